@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/model/needs.h"
+#include "common/model/reduced_model.h"
+
+namespace exmat {
+
+/// Writes the groups that the model holds to a temporary file beside `path`, then renames it over `path`. The same model
+/// gives the same bytes. Throws WorkError (message names the file); `path` is then as it was.
+void write_bundle(const ReducedModel& model, const std::filesystem::path& path);
+
+/// What a bundle says of itself: read from its attributes and table of contents alone.
+struct BundleSummary {
+  std::string asset_name, generator, input_sha256;
+  std::int64_t format_version = 0;
+  std::vector<std::string> groups;  ///< present, in bundle order
+  bool constrained = false;         ///< root attribute of that name (int64, 0 or 1)
+  std::int64_t vertices = 0, tets = 0, modes = 0, cubature_elements = 0, eigenfunctions = 0, examples = 0;
+};
+BundleSummary summarise_bundle(const std::filesystem::path& path);
+
+/// What was read from a bundle: dataset path and bytes, in order.
+struct ReadRecord {
+  std::string dataset;
+  std::size_t bytes = 0;
+};
+
+/// Which parts of a bundle to read.
+struct BundleRequest {
+  std::vector<LedgerEntry> groups;  ///< plan_groups(...); an included group that the file lacks is an InputError that names it
+  bool step_only = false;           ///< only datasets whose schema `use` is "step": what stepping needs
+  bool positions = false;           ///< with step_only: also those with `use` "positions": what writing positions needs
+};
+
+/// Reads and validates: magic, version, types, sizes, ranges, finiteness, checksums, cross-references. Throws InputError
+/// that names the file and the dataset. `record`, if given, receives every dataset that was read.
+ReducedModel read_bundle(const std::filesystem::path& path, const BundleRequest& request,
+                         std::vector<ReadRecord>* record = nullptr);
+
+/// Reads all of it.
+ReducedModel read_bundle(const std::filesystem::path& path);
+
+/// [3k x r] rows of /modal/basis for k vertices; ids out of range are an InputError.
+RowMatrix read_basis_rows(const std::filesystem::path& path, std::span<const std::int64_t> vertices,
+                          std::vector<ReadRecord>* record = nullptr);
+
+}  // namespace exmat

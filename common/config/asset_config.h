@@ -1,0 +1,78 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace exmat {
+
+/// Vertices inside an axis-aligned box, bounds included [m].
+struct BoxSelection {
+  std::array<double, 3> min{}, max{};
+};
+/// Vertices inside a ball, its surface included [m].
+struct SphereSelection {
+  std::array<double, 3> center{};
+  double radius = 0;
+};
+/// Vertex ids in a text file, 1-based as in .bou files: separated by commas, blanks or lines; '#' starts a comment.
+struct FileSelection {
+  std::filesystem::path file;
+};
+/// 0-based vertex ids.
+struct IdSelection {
+  std::vector<std::int64_t> ids;
+};
+using VertexSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection>;
+
+struct MaterialConfig {
+  std::string model = "stvk";
+  std::optional<double> youngs_modulus, poisson_ratio, density;  ///< absent: the mesh file's own
+};
+
+/// Faults of a mesh that are mended by dropping instead of refused.
+struct DropConfig {
+  bool degenerate_tets = false;
+  bool unreferenced_vertices = false;
+  bool smaller_components = false;
+};
+
+struct ExampleConfig {
+  std::string name;
+  std::filesystem::path mesh;
+  bool rest = false;
+  DropConfig drop;
+};
+
+/// ASSET.json after validation, paths resolved against its folder. interfaces.md, "ASSET.json".
+struct AssetConfig {
+  std::filesystem::path file;
+  std::string name;
+  std::filesystem::path object_mesh;
+  MaterialConfig material;
+  std::optional<VertexSelection> fixed;  ///< absent: a free body
+  DropConfig object_drop;
+  std::vector<ExampleConfig> examples;
+
+  int eigenfunctions = 20;               ///< m
+  std::string weighting = "eigenvalue";  ///< or "none"
+  std::string frame = "auto";            ///< "auto", "shared" or "free"
+
+  int basis_size = 30;        ///< r
+  int linear_modes = 15;
+  bool example_fields = true;
+
+  std::optional<int> cubature_elements;      ///< s; both absent: 2 r
+  std::optional<double> cubature_tolerance;  ///< held-out relative force error
+  std::string cubature_method = "greedy_swap";
+  int training_poses = 200;
+
+  std::optional<std::vector<std::string>> needs;  ///< optional groups to write ("examples", "rigid"); absent: all that apply
+  std::uint64_t seed = 1;
+};
+
+}  // namespace exmat

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <filesystem>
+
+#include "common/config/asset_config.h"
+#include "common/config/scene_config.h"
+#include "common/model/needs.h"
+
+namespace exmat {
+
+/// Reads ASSET.json or SCENE.json, validates it against schemas/, fills in the defaults. Throws InputError with the file,
+/// the JSON pointer, what was expected and found; an unknown member suggests the nearest name.
+AssetConfig load_asset(const std::filesystem::path& file);
+SceneConfig load_scene(const std::filesystem::path& file);
+
+/// What a scene needs of its bundle.
+Needs needs_of(const SceneConfig& scene);
+
+}  // namespace exmat

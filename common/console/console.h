@@ -1,0 +1,27 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+#include <string>
+
+namespace exmat {
+
+/// Options that both programs and all their commands take.
+struct CommonOptions {
+  int threads = 0;  ///< 0: as many as OpenMP gives
+  std::string log_level = "info";
+  std::string progress = "auto";
+};
+
+/// Adds --threads, --log-level and --progress to a command.
+void add_common_options(CLI::App& command, CommonOptions& options);
+
+/// Connects exmat::log and progress reports to stderr and sets the number of OpenMP threads. Call it once the options
+/// are parsed.
+void apply(const CommonOptions& options);
+
+/// Parses, runs `action` and turns what it throws into one message on stderr and an exit status: 0 done (also --help
+/// and --version), 1 a failure while working, 2 bad usage or bad input.
+int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action);
+
+}  // namespace exmat

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/mesh/tet_mesh.h"
+
+namespace exmat {
+
+/// n_t signed volumes [m^3].
+Eigen::VectorXd tet_volumes(const TetMesh& mesh);
+
+/// [4 x 3] gradients of the four linear shape functions of a tet with the given [4 x 3] vertex positions [1/m].
+Eigen::Matrix<double, 4, 3> shape_gradients(const Eigen::Matrix<double, 4, 3>& positions);
+
+/// [4 x 3] vertex positions of one tet.
+Eigen::Matrix<double, 4, 3> tet_positions(const TetMesh& mesh, Eigen::Index tet);
+
+/// Volume-weighted centroid [m].
+Eigen::Vector3d centroid(const TetMesh& mesh);
+
+/// Length of the diagonal of the axis-aligned bounding box [m].
+double bounding_box_diagonal(const VertexArray& vertices);
+
+/// n_f x 3 outward-oriented boundary triangles, in the order of their tets.
+TriangleArray surface_triangles(const TetArray& tets);
+
+}  // namespace exmat

@@ -1,0 +1,114 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "common/mesh/tet_mesh.h"
+
+namespace exmat {
+
+// The contract between the two stages: what precompute builds, the bundle holds and the run time steps.
+// Symbols: n vertices, n_t tets, n_f surface triangles, m eigenfunctions, K examples, r modes, s cubature elements.
+
+/// Group /object: the rest mesh as given, in the world frame.
+struct ObjectData {
+  TetMesh mesh;
+  TriangleArray surface;   ///< n_f x 3, outward
+  FlagVector fixed;        ///< n, 1 where the vertex is clamped
+  TetMaterials materials;  ///< n_t each
+  std::string material;    ///< "stvk"
+};
+
+/// Group /shape_space: Laplace-Beltrami eigenpairs of the object at centroid 0 and volume 1, the constant one dropped.
+struct ShapeSpaceData {
+  Eigen::VectorXd eigenvalues;                         ///< m, ascending, > 0
+  RowMatrix eigenfunctions;                            ///< n x m, phi^T (M_s/V) phi = I
+  RowMatrix rest_descriptor;                           ///< m x 3
+  double volume = 0;                                   ///< of the object [m^3]
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< of the object [m]
+  std::string weighting;                               ///< "eigenvalue" or "none"
+  std::int64_t splits_cluster = 0;                     ///< 1 where the m-th and the next eigenvalue are (nearly) equal
+};
+
+/// One group /examples/NAME: an example in the object's frame and basis. method.md, section 1.
+struct ExampleData {
+  std::string name;
+  std::int64_t index = 0;  ///< 0 is the rest pose
+  bool is_rest = false;
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< from the example's frame to the object's
+  double scale = 1;               ///< object's length unit over the example's: (V_object / V_example)^(1/3)
+  std::string method;             ///< how it was mapped to the object
+  double alignment_residual = 0;  ///< relative
+  double confidence = 0;          ///< J of alignment.md; 0 is certain, above 1.2 refused
+  double shape_space_error = 0;   ///< share of its displacement that the m functions lose, relative M-norm
+  double basis_error = 0;         ///< share of its transferred displacement that U loses, relative M-norm
+  RowMatrix descriptor;           ///< m x 3
+  Eigen::VectorXd reduced;        ///< r, T^+ (e_k - e_0)
+};
+
+/// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex. method.md, section 5.
+struct ExampleSet {
+  std::vector<ExampleData> examples;  ///< K, in index order, the rest pose first
+  RowMatrix gram;                     ///< K x K, G = E^T E
+  Eigen::VectorXd h0;                 ///< K, E^T c_rest
+  RowMatrix hq;                       ///< K x r, E^T T
+};
+
+/// Group /modal.
+struct ModalData {
+  RowMatrix basis;              ///< 3n x r (dataset n 3 r), mass-orthonormal, zero on fixed vertices
+  Eigen::VectorXd frequencies;  ///< of the linear modes, ascending [Hz]
+  RowMatrix gravity_load;       ///< 3 x r, row a = U^T M 1_a: generalised force per unit acceleration along axis a
+};
+
+/// Group /cubature.
+struct CubatureData {
+  IndexVector elements;                ///< s, distinct tets of the object, ascending
+  Eigen::VectorXd weights;             ///< s, >= 0
+  Eigen::VectorXd volumes;             ///< s [m^3]
+  RowMatrix gradient;                  ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
+  Eigen::VectorXd youngs_modulus;      ///< s [Pa]
+  Eigen::VectorXd poisson_ratio;       ///< s
+  RowMatrix heldout_poses;             ///< N x r reduced poses that the held-out errors are measured on
+  std::string method;                  ///< "greedy_swap", "greedy" or "nn_htp"
+  double training_error = 0;           ///< relative, force, as heldout_error
+  double heldout_error = 0;            ///< relative, force in the norm of the inverse rest stiffness
+  double heldout_energy_error = 0;     ///< relative
+  double heldout_stiffness_error = 0;  ///< relative, Frobenius norm
+};
+
+/// Group /projection. method.md, section 4.
+struct ProjectionData {
+  RowMatrix shape_from_reduced;  ///< 3m x r, T, row 3i + axis
+  RowMatrix reduced_from_shape;  ///< r x 3m, T^+
+  RowMatrix target_basis;        ///< r x d, orthonormal basis of the range of T^+, d <= min(r, 3m)
+};
+
+/// Group /rigid: moments of a free body about its centre of mass, X centred there. method.md, section 6.
+struct RigidData {
+  double mass = 0;                 ///< [kg]
+  Eigen::Vector3d centre_of_mass;  ///< at rest, world [m]
+  RowMatrix3 inertia;              ///< J_0 at rest [kg m^2]
+  RowMatrix3 second_moments;       ///< P0_ab = sum m X_a X_b [kg m^2]
+  RowMatrix linear_moments;        ///< 9 x r (dataset 3 3 r): p1_ab, row 3a + b
+  RowMatrix basis_moments;         ///< 9r x r (dataset 3 3 r r): S_ab = U_a^T M_s' U_b, block 3a + b
+};
+
+/// Everything a scene may need of one asset. Absent groups were left out (method.md, section 7).
+struct ReducedModel {
+  std::string asset_name;
+  std::string generator;
+  std::string input_sha256;
+  std::optional<ObjectData> object;
+  std::optional<ModalData> modal;
+  std::optional<CubatureData> cubature;
+  std::optional<ShapeSpaceData> shape_space;
+  std::optional<ExampleSet> examples;
+  std::optional<ProjectionData> projection;
+  std::optional<RigidData> rigid;
+};
+
+}  // namespace exmat

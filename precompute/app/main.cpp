@@ -1,0 +1,104 @@
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <fmt/format.h>
+#include <optional>
+
+#include "common/bundle/bundle.h"
+#include "common/config/config.h"
+#include "common/console/console.h"
+#include "common/core/log.h"
+#include "common/core/timer.h"
+#include "precompute/pipeline/build_model.h"
+#include "precompute/solvers/semidefinite_solver.h"
+
+namespace {
+
+using namespace exmat;
+
+struct Options {
+  CommonOptions common;
+  std::string asset;
+  std::string bundle;
+  std::string scene;
+};
+
+void print_stages(const precompute::BuildReport& report) {
+  double total = 0;
+  fmt::print("\n{:<28}{:>10}\n", "stage", "seconds");
+  for (const auto& stage : report.stages) {
+    fmt::print("{:<28}{:>10.3f}\n", stage.stage, stage.seconds);
+    total += stage.seconds;
+  }
+  fmt::print("{:<28}{:>10.3f}\n", "total", total);
+}
+
+void print_ledger(const std::vector<LedgerEntry>& ledger) {
+  fmt::print("\n{:<14}{:>12}  {:<5}{}\n", "group", "bytes", "in", "why");
+  for (const auto& entry : ledger)
+    fmt::print("{:<14}{:>12}  {:<5}{}\n", entry.group, entry.bytes, entry.included ? "yes" : "no", entry.reason);
+}
+
+void print_examples(const ReducedModel& model) {
+  if (!model.examples) return;
+  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", "example", "method", "confidence", "lost by m [%]", "by basis [%]");
+  for (const auto& example : model.examples->examples)
+    fmt::print("{:<20}{:>14.13}{:>12.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.confidence,
+               100 * example.shape_space_error, 100 * example.basis_error);
+}
+
+void bundle(const Options& options) {
+  const AssetConfig asset = load_asset(options.asset);
+  std::optional<Needs> scene_needs;
+  if (!options.scene.empty()) scene_needs = needs_of(load_scene(options.scene));
+  precompute::BuildReport report;
+  const ReducedModel model = precompute::build_model(asset, precompute::resolve_needs(asset, scene_needs), report);
+  const Timer timer;
+  write_bundle(model, options.bundle);
+  report.stages.push_back({"writing the bundle", timer.seconds()});
+  fill_bytes(model, report.ledger);
+
+  fmt::print("{}: {} vertices, {} tets, {} body, r = {}, s = {}", options.bundle, model.object->mesh.vertex_count(),
+             model.object->mesh.tet_count(), model.object->fixed.any() ? "constrained" : "free",
+             model.modal->basis.cols(), model.cubature->elements.size());
+  if (model.shape_space) fmt::print(", m = {}", model.shape_space->eigenvalues.size());
+  fmt::print(", {} bytes\n", std::filesystem::file_size(options.bundle));
+  fmt::print(
+      "frequencies {:.4g} to {:.4g} Hz; held-out cubature error: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %\n",
+      model.modal->frequencies.minCoeff(), model.modal->frequencies.maxCoeff(), 100 * model.cubature->heldout_error,
+      100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error);
+  print_examples(model);
+  print_ledger(report.ledger);
+  print_stages(report);
+}
+
+void check(const Options& options) {
+  precompute::BuildReport report;
+  precompute::check_inputs(load_asset(options.asset), report);
+  fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
+  app.set_version_flag("--version",
+                       [] { return "exmat-precompute " EXMAT_VERSION ", " + precompute::solver_versions(); });
+  app.require_subcommand(1);
+  Options options;
+
+  auto* bundle_command = app.add_subcommand("bundle", "compute the offline stage and write a bundle");
+  bundle_command->add_option("ASSET", options.asset, "asset file (JSON)")->required();
+  bundle_command->add_option("-o,--output", options.bundle, "bundle to write (HDF5)")->required();
+  bundle_command->add_option("--scene", options.scene, "write only what this scene needs");
+  add_common_options(*bundle_command, options.common);
+
+  auto* check_command = app.add_subcommand("check", "read and check the inputs, compute nothing");
+  check_command->add_option("ASSET", options.asset, "asset file (JSON)")->required();
+  add_common_options(*check_command, options.common);
+
+  return run_program(app, argc, argv, [&] {
+    apply(options.common);
+    if (bundle_command->parsed()) bundle(options);
+    if (check_command->parsed()) check(options);
+  });
+}

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "common/model/reduced_model.h"
+#include "precompute/cubature/training_poses.h"
+
+namespace exmat::precompute {
+
+struct CubatureOptions {
+  std::optional<int> elements;         ///< s
+  std::optional<double> tolerance;     ///< held-out force error; both absent: 2 r elements
+  std::string method = "greedy_swap";  ///< "greedy_swap", "greedy" or "nn_htp"
+  int training_poses = 200;
+  std::uint64_t seed = 1;
+};
+
+/// Relative errors of a weighted element subset against all elements, root mean square over poses: forces in the norm
+/// of the inverse rest stiffness, |L^-1 (f - f_all)| / |L^-1 f_all| with L L^T = U^T K U; energies; stiffness
+/// (Frobenius, the first ten poses).
+struct CubatureErrors {
+  double force = 0, energy = 0, stiffness = 0;
+};
+CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
+                               const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
+                               const RowMatrix& poses);
+
+/// Chooses elements and weights on training poses and measures them on held-out ones. Throws WorkError where a
+/// tolerance cannot be met.
+CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
+                            const CubatureOptions& options);
+
+}  // namespace exmat::precompute

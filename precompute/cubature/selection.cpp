@@ -1,0 +1,335 @@
+#include "precompute/cubature/selection.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numeric>
+#include <random>
+#include <set>
+
+namespace exmat::precompute {
+namespace {
+
+constexpr int kSwapRounds = 100;
+constexpr std::size_t kSwapTries = 3;        // members tried for removal each round
+constexpr std::size_t kSwapCandidates = 64;  // columns whose exact gain is computed
+constexpr double kSwapGain = 1e-6;           // of the squared residual, below which a swap is noise
+constexpr std::size_t kRandomCandidates = 100;
+constexpr int kThresholdingRounds = 50;
+constexpr double kCorrelationFloor = 1e-12;  // of |b|: no column helps any more
+
+using Members = std::vector<Eigen::Index>;
+
+// The normal equations of the problem, columns of G = A^T A computed when they are first asked for.
+class NormalEquations {
+ public:
+  explicit NormalEquations(const SelectionProblem& problem) : problem_(problem) {
+    const Eigen::Index n = problem.columns.cols();
+    linear_.resize(n);
+    norms_.resize(n);
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index e = 0; e < n; ++e) {
+      linear_[e] = problem.columns.col(e).dot(problem.target);
+      norms_[e] = problem.columns.col(e).norm();
+    }
+    target_squared_ = problem.target.squaredNorm();
+  }
+
+  const Eigen::VectorXd& linear() const { return linear_; }
+  const Eigen::VectorXd& norms() const { return norms_; }
+  double target_squared() const { return target_squared_; }
+  bool usable(Eigen::Index e) const { return norms_[e] > 0; }
+
+  const Eigen::VectorXd& column(Eigen::Index e) {
+    auto [entry, inserted] = columns_.try_emplace(e);
+    if (inserted) {
+      entry->second.resize(linear_.size());
+#pragma omp parallel for schedule(static)
+      for (Eigen::Index i = 0; i < linear_.size(); ++i)
+        entry->second[i] = problem_.columns.col(i).dot(problem_.columns.col(e));
+    }
+    return entry->second;
+  }
+
+  Eigen::MatrixXd gram(const Members& members) {
+    const auto size = static_cast<Eigen::Index>(members.size());
+    Eigen::MatrixXd block(size, size);
+    for (Eigen::Index j = 0; j < size; ++j) block.col(j) = column(members[static_cast<std::size_t>(j)])(members);
+    return block;
+  }
+
+  // h - G w, the negative gradient.
+  Eigen::VectorXd correlation(const Members& members, const Eigen::VectorXd& weights) {
+    Eigen::VectorXd result = linear_;
+    for (std::size_t k = 0; k < members.size(); ++k)
+      result -= weights[static_cast<Eigen::Index>(k)] * column(members[k]);
+    return result;
+  }
+
+  double squared_residual(const Members& members, const Eigen::VectorXd& weights) {
+    const double linear_part = weights.dot(linear_(members));
+    return std::max(0.0, target_squared_ - 2 * linear_part + weights.dot(gram(members) * weights));
+  }
+
+ private:
+  const SelectionProblem& problem_;
+  Eigen::VectorXd linear_, norms_;
+  double target_squared_ = 0;
+  std::map<Eigen::Index, Eigen::VectorXd> columns_;
+};
+
+// A support with its non-negative least squares weights.
+struct Support {
+  Members members;
+  Eigen::VectorXd weights;
+
+  bool contains(Eigen::Index e) const { return std::find(members.begin(), members.end(), e) != members.end(); }
+  void add(Eigen::Index e) {
+    members.push_back(e);
+    weights.conservativeResize(weights.size() + 1);
+    weights[weights.size() - 1] = 0;
+  }
+  void remove(std::size_t position) {
+    const auto p = static_cast<Eigen::Index>(position);
+    members.erase(members.begin() + p);
+    const Eigen::VectorXd tail = weights.tail(weights.size() - p - 1);
+    weights.conservativeResize(weights.size() - 1);
+    weights.tail(tail.size()) = tail;
+  }
+};
+
+// Non-negative least squares on the support, from its feasible weights: Lawson and Hanson's inner loop. Zeros leave the
+// support.
+void fit_weights(NormalEquations& equations, Support& support) {
+  while (!support.members.empty()) {
+    const Eigen::VectorXd rhs = equations.linear()(support.members);
+    const Eigen::VectorXd free = equations.gram(support.members).ldlt().solve(rhs);
+    double step = 1;
+    Eigen::Index blocking = -1;
+    for (Eigen::Index k = 0; k < free.size(); ++k) {
+      if (free[k] > 0) continue;
+      const double limit = support.weights[k] > 0 ? support.weights[k] / (support.weights[k] - free[k]) : 0.0;
+      if (blocking < 0 || limit < step) {
+        step = limit;
+        blocking = k;
+      }
+    }
+    if (blocking < 0) {
+      support.weights = free;
+      return;
+    }
+    support.weights += step * (free - support.weights);
+    support.remove(static_cast<std::size_t>(blocking));
+  }
+}
+
+Selection finish(NormalEquations& equations, const Support& support) {
+  std::vector<std::size_t> order(support.members.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return support.members[a] < support.members[b]; });
+  Selection selection;
+  selection.weights.resize(static_cast<Eigen::Index>(order.size()));
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    selection.members.push_back(support.members[order[k]]);
+    selection.weights[static_cast<Eigen::Index>(k)] = support.weights[static_cast<Eigen::Index>(order[k])];
+  }
+  selection.relative_residual =
+      std::sqrt(equations.squared_residual(support.members, support.weights) / equations.target_squared());
+  return selection;
+}
+
+// The usable column outside the support of largest correlation per norm among the offered ones, or -1.
+template <typename Candidates>
+Eigen::Index best_candidate(const NormalEquations& equations, const Eigen::VectorXd& correlation,
+                            const Support& support, const Candidates& candidates) {
+  Eigen::Index best = -1;
+  double best_score = kCorrelationFloor * std::sqrt(equations.target_squared());
+  for (const Eigen::Index e : candidates) {
+    if (!equations.usable(e)) continue;
+    const double score = correlation[e] / equations.norms()[e];
+    if (score > best_score && !support.contains(e)) {
+      best_score = score;
+      best = e;
+    }
+  }
+  return best;
+}
+
+// Grows the support to `count` members; `offer` gives the candidates of a round.
+template <typename Offer>
+void grow(NormalEquations& equations, Support& support, std::size_t count, const StopRule* stop, const Offer& offer) {
+  for (std::size_t round = 0; support.members.size() < count && round < 20 * count; ++round) {
+    const auto correlation = equations.correlation(support.members, support.weights);
+    const Eigen::Index next = best_candidate(equations, correlation, support, offer());
+    if (next < 0) break;
+    support.add(next);
+    fit_weights(equations, support);
+    if (stop != nullptr && support.members.size() % stop->interval == 0 && stop->satisfied(finish(equations, support)))
+      break;
+  }
+}
+
+// Positions of the members whose removal raises the squared residual least: w_i^2 / (G^-1)_ii.
+std::vector<std::size_t> cheapest_members(NormalEquations& equations, const Support& support) {
+  const auto size = static_cast<Eigen::Index>(support.members.size());
+  const Eigen::MatrixXd inverse = equations.gram(support.members).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+  const Eigen::VectorXd cost = support.weights.cwiseAbs2().cwiseQuotient(inverse.diagonal().cwiseMax(1e-300));
+  std::vector<std::size_t> order(support.members.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return cost[static_cast<Eigen::Index>(a)] < cost[static_cast<Eigen::Index>(b)];
+  });
+  order.resize(std::min(order.size(), kSwapTries));
+  return order;
+}
+
+// The column outside the support whose addition lowers the squared residual most, g^2 / Schur complement, among those
+// of largest g^2 / G_ee.
+Eigen::Index best_gain(NormalEquations& equations, const Support& support, const Eigen::VectorXd& correlation) {
+  Members candidates;
+  for (Eigen::Index e = 0; e < correlation.size(); ++e)
+    if (equations.usable(e) && correlation[e] > 0 && !support.contains(e)) candidates.push_back(e);
+  const auto score = [&](Eigen::Index e) { return correlation[e] / equations.norms()[e]; };
+  const std::size_t kept = std::min(candidates.size(), kSwapCandidates);
+  std::partial_sort(
+      candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(kept), candidates.end(),
+      [&](Eigen::Index a, Eigen::Index b) { return score(a) > score(b) || (score(a) == score(b) && a < b); });
+  candidates.resize(kept);
+  const auto factor = equations.gram(support.members).ldlt();
+  Eigen::Index best = -1;
+  double best_gain = 0;
+  Eigen::VectorXd coupling(static_cast<Eigen::Index>(support.members.size()));
+  for (const Eigen::Index e : candidates) {
+    for (std::size_t k = 0; k < support.members.size(); ++k)
+      coupling[static_cast<Eigen::Index>(k)] = equations.column(support.members[k])[e];
+    const double own = equations.norms()[e] * equations.norms()[e];
+    const double schur = std::max(own - coupling.dot(factor.solve(coupling)), 1e-12 * own);
+    const double gain = correlation[e] * correlation[e] / schur;
+    if (gain > best_gain) {
+      best_gain = gain;
+      best = e;
+    }
+  }
+  return best;
+}
+
+// One accepted swap, or false.
+bool swap_once(NormalEquations& equations, Support& support, double& squared) {
+  for (const std::size_t position : cheapest_members(equations, support)) {
+    Support trial = support;
+    trial.remove(position);
+    fit_weights(equations, trial);
+    const Eigen::Index added = best_gain(equations, trial, equations.correlation(trial.members, trial.weights));
+    if (added < 0) continue;
+    trial.add(added);
+    fit_weights(equations, trial);
+    const double trial_squared = equations.squared_residual(trial.members, trial.weights);
+    if (trial_squared >= (1 - kSwapGain) * squared) continue;
+    support = trial;
+    squared = trial_squared;
+    return true;
+  }
+  return false;
+}
+
+Support initial_support(NormalEquations& equations, const Members& start) {
+  Support support;
+  for (const Eigen::Index e : start) {
+    support.add(e);
+    fit_weights(equations, support);
+  }
+  return support;
+}
+
+}  // namespace
+
+Selection select_greedy_swap(const SelectionProblem& problem, std::size_t count, const std::vector<Eigen::Index>& start,
+                             const StopRule* stop) {
+  NormalEquations equations(problem);
+  Support support = initial_support(equations, start);
+  Members all(static_cast<std::size_t>(problem.columns.cols()));
+  std::iota(all.begin(), all.end(), 0);
+  const auto offer_all = [&all]() -> const Members& { return all; };
+  const auto improve = [&] {
+    const std::size_t reached = support.members.size();
+    double squared = equations.squared_residual(support.members, support.weights);
+    for (int round = 0; round < kSwapRounds && swap_once(equations, support, squared); ++round) {
+      // A swap may drop members whose weights became zero: their places are filled again.
+      grow(equations, support, reached, nullptr, offer_all);
+      squared = equations.squared_residual(support.members, support.weights);
+    }
+  };
+  // Swaps fit the training poses better, and may break the stop rule's measure: then the support grows on.
+  for (;;) {
+    const std::size_t before = support.members.size();
+    grow(equations, support, count, stop, offer_all);
+    improve();
+    const bool open = stop != nullptr && support.members.size() < count && support.members.size() > before;
+    if (!open || stop->satisfied(finish(equations, support))) break;
+  }
+  return finish(equations, support);
+}
+
+Selection select_greedy_random(const SelectionProblem& problem, std::size_t count,
+                               const std::vector<Eigen::Index>& start, const StopRule* stop, std::uint64_t seed) {
+  NormalEquations equations(problem);
+  Support support = initial_support(equations, start);
+  std::mt19937_64 generator(seed);
+  std::uniform_int_distribution<Eigen::Index> any(0, problem.columns.cols() - 1);
+  grow(equations, support, count, stop, [&]() {
+    Members candidates(kRandomCandidates);
+    std::generate(candidates.begin(), candidates.end(), [&]() { return any(generator); });
+    return candidates;
+  });
+  return finish(equations, support);
+}
+
+Selection select_hard_thresholding(const SelectionProblem& problem, std::size_t count) {
+  NormalEquations equations(problem);
+  // Columns are taken as normalised: one step length suits all of them.
+  const Eigen::VectorXd scale = equations.norms().unaryExpr([](double norm) { return norm > 0 ? 1 / norm : 0.0; });
+  Support support, best;
+  double best_squared = std::numeric_limits<double>::infinity();
+  std::set<Members> seen;
+  for (int round = 0; round < kThresholdingRounds; ++round) {
+    const Eigen::VectorXd gradient = scale.cwiseProduct(equations.correlation(support.members, support.weights));
+    // Normalised step: |g_S|^2 / |A g_S|^2 over the support, or over the `count` largest entries before there is one.
+    Eigen::VectorXd point = Eigen::VectorXd::Zero(gradient.size());
+    for (std::size_t k = 0; k < support.members.size(); ++k)
+      point[support.members[k]] = support.weights[static_cast<Eigen::Index>(k)] / scale[support.members[k]];
+    Members order(static_cast<std::size_t>(gradient.size()));
+    std::iota(order.begin(), order.end(), 0);
+    const auto largest_first = [&order, count](const Eigen::VectorXd& values) {
+      std::stable_sort(order.begin(), order.end(),
+                       [&values](Eigen::Index a, Eigen::Index b) { return values[a] > values[b]; });
+      return Members(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(std::min(count, order.size())));
+    };
+    const Members directions = support.members.empty() ? largest_first(gradient) : support.members;
+    const Eigen::VectorXd along = gradient(directions);
+    const Eigen::VectorXd image = problem.columns(Eigen::all, directions) * along.cwiseProduct(scale(directions));
+    const double curvature = image.squaredNorm();
+    if (curvature > 0) point += along.squaredNorm() / curvature * gradient;
+    Support next;
+    for (const Eigen::Index e : largest_first(point))
+      if (point[e] > 0) {
+        next.add(e);
+        next.weights[next.weights.size() - 1] = point[e] * scale[e];
+      }
+    fit_weights(equations, next);
+    support = next;
+    const double squared = equations.squared_residual(support.members, support.weights);
+    if (squared < best_squared) {
+      best_squared = squared;
+      best = support;
+    }
+    Members key = support.members;
+    std::sort(key.begin(), key.end());
+    if (!seen.insert(key).second) break;
+  }
+  return finish(equations, best);
+}
+
+}  // namespace exmat::precompute

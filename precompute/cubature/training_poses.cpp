@@ -1,0 +1,107 @@
+#include "precompute/cubature/training_poses.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+namespace exmat::precompute {
+namespace {
+
+constexpr double kLargestDisplacement = 0.4;  // of L
+constexpr double kSmallestShare = 0.05;       // of that
+constexpr double kNoiseEnergy = 0.01;
+constexpr Eigen::Index kExampleStride = 4;  // every fourth pose is an example's
+
+class PoseGenerator {
+ public:
+  PoseGenerator(const PoseSource& source, std::uint64_t seed)
+      : source_(source), generator_(seed), stiffness_factor_(source.rest_stiffness) {}
+
+  Eigen::VectorXd on_manifold() {
+    const Eigen::Index k = source_.eigenvalues.size();
+    Eigen::VectorXd z(k);
+    for (Eigen::Index i = 0; i < k; ++i) z[i] = normal_(generator_) * source_.eigenvalues[0] / source_.eigenvalues[i];
+    const Eigen::VectorXd linear = source_.reduced_modes * z;
+    Eigen::VectorXd quadratic = Eigen::VectorXd::Zero(linear.size());
+    for (Eigen::Index j = 0; j < k; ++j)
+      for (Eigen::Index i = 0; i <= j; ++i)
+        quadratic += (i == j ? 0.5 : 1.0) * z[i] * z[j] * source_.reduced_derivatives.col(pair_index(i, j));
+    const double share = kSmallestShare + (1 - kSmallestShare) * uniform_(generator_);
+    const double scale = scale_to(linear, quadratic, share * kLargestDisplacement * source_.body_size);
+    return with_noise(scale * linear + scale * scale * quadratic);
+  }
+
+  Eigen::VectorXd on_segment() {
+    const Eigen::Index count = source_.examples.cols();
+    std::uniform_int_distribution<Eigen::Index> any(0, count);  // `count` stands for the rest pose
+    const Eigen::Index from = any(generator_);
+    const Eigen::Index to =
+        (from + 1 + std::uniform_int_distribution<Eigen::Index>(0, count - 1)(generator_)) % (count + 1);
+    const double t = uniform_(generator_);
+    return with_noise((1 - t) * example(from) + t * example(to));
+  }
+
+ private:
+  Eigen::VectorXd example(Eigen::Index index) const {
+    if (index == source_.examples.cols()) return Eigen::VectorXd::Zero(source_.examples.rows());
+    return source_.examples.col(index);
+  }
+
+  // s such that the largest displacement of s a + s^2 b is `target`, by bisection of a bracket.
+  double scale_to(const Eigen::VectorXd& linear, const Eigen::VectorXd& quadratic, double target) const {
+    const auto field = [this](const Eigen::VectorXd& q) -> VertexArray {
+      return (source_.basis * q).reshaped<Eigen::RowMajor>(source_.basis.rows() / 3, 3);
+    };
+    const VertexArray a = field(linear), b = field(quadratic);
+    const auto largest = [&](double s) { return (s * a + s * s * b).rowwise().norm().maxCoeff(); };
+    double low = 0, high = target / a.rowwise().norm().maxCoeff();
+    while (largest(high) < target) high *= 2;
+    for (int round = 0; round < 40; ++round) {
+      const double middle = 0.5 * (low + high);
+      (largest(middle) < target ? low : high) = middle;
+    }
+    return high;
+  }
+
+  Eigen::VectorXd with_noise(const Eigen::VectorXd& pose) {
+    Eigen::VectorXd noise(pose.size());
+    for (double& entry : noise) entry = normal_(generator_);
+    stiffness_factor_.matrixU().solveInPlace(noise);  // now noise^T K noise = |raw noise|^2
+    const double energy = pose.dot(source_.rest_stiffness * pose), raw = noise.dot(source_.rest_stiffness * noise);
+    return pose + std::sqrt(kNoiseEnergy * energy / raw) * noise;
+  }
+
+  const PoseSource& source_;
+  std::mt19937_64 generator_;
+  std::normal_distribution<double> normal_;
+  std::uniform_real_distribution<double> uniform_;
+  Eigen::LLT<Eigen::MatrixXd> stiffness_factor_;
+};
+
+}  // namespace
+
+PoseSource pose_source(const ElasticSystem& system, const LinearModes& modes, const Eigen::MatrixXd& derivatives,
+                       const Eigen::MatrixXd& free_basis, double body_size, const Eigen::MatrixXd& examples) {
+  const Eigen::Index k = std::min<Eigen::Index>(kTrainingModes, modes.eigenvalues.size());
+  const Eigen::MatrixXd mass_basis = system.mass * free_basis;
+  return {modes.eigenvalues.head(k),
+          mass_basis.transpose() * modes.modes.leftCols(k),
+          mass_basis.transpose() * derivatives.leftCols(k * (k + 1) / 2),
+          system.extend(free_basis),
+          free_basis.transpose() * (system.stiffness * free_basis),
+          body_size,
+          examples};
+}
+
+RowMatrix draw_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed) {
+  PoseGenerator generator(source, seed);
+  RowMatrix poses(count, source.rest_stiffness.rows());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const bool of_example = source.examples.cols() > 0 && i % kExampleStride == kExampleStride - 1;
+    poses.row(i) = of_example ? generator.on_segment() : generator.on_manifold();
+  }
+  return poses;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+
+#include "precompute/fem/elastic_system.h"
+#include "precompute/modes/linear_modes.h"
+
+namespace exmat::precompute {
+
+/// What reduced poses are drawn from.
+struct PoseSource {
+  Eigen::VectorXd eigenvalues;          ///< k, of the modes in use
+  Eigen::MatrixXd reduced_modes;        ///< r x k, U^T M Psi
+  Eigen::MatrixXd reduced_derivatives;  ///< r x k(k+1)/2, U^T M phi_ij, columns as pair_index
+  RowMatrix basis;                      ///< 3n x r
+  Eigen::MatrixXd rest_stiffness;       ///< r x r, U^T K U
+  double body_size = 0;                 ///< L [m]
+  Eigen::MatrixXd examples;             ///< r x (K-1) reduced poses of the examples but the rest one, or no columns
+};
+
+/// The number of linear modes that poses are drawn from.
+constexpr Eigen::Index kTrainingModes = 12;
+
+PoseSource pose_source(const ElasticSystem& system, const LinearModes& modes, const Eigen::MatrixXd& derivatives,
+                       const Eigen::MatrixXd& free_basis, double body_size, const Eigen::MatrixXd& examples);
+
+/// [count x r] poses: on the manifold of modes and modal derivatives, largest displacement uniform in (0.05, 1) 0.4 L;
+/// a quarter of them, where there are examples, on segments between two examples (the rest pose is one); all with noise
+/// of one percent of their linear energy. design: reduction.md, "Training poses".
+RowMatrix draw_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed);
+
+}  // namespace exmat::precompute

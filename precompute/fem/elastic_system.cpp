@@ -1,0 +1,95 @@
+#include "precompute/fem/elastic_system.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+
+#include "common/core/error.h"
+
+namespace exmat::precompute {
+namespace {
+
+// A clamp that resists a rigid motion this little, relative to the others, does not resist it.
+constexpr double kClampRank = 1e-8;
+
+// [3n x 6] translations and rotations about `centre`.
+Eigen::MatrixXd raw_rigid_motions(const TetMesh& mesh, const Eigen::Vector3d& centre) {
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3 * mesh.vertex_count(), 6);
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
+    const Eigen::Vector3d x = mesh.vertices.row(v).transpose() - centre;
+    for (int axis = 0; axis < 3; ++axis) {
+      motions(3 * v + axis, axis) = 1;
+      motions.block<3, 1>(3 * v, 3 + axis) = Eigen::Vector3d::Unit(axis).cross(x);
+    }
+  }
+  return motions;
+}
+
+void require_clamped(const TetMesh& mesh, const FlagVector& fixed) {
+  const Eigen::MatrixXd motions = raw_rigid_motions(mesh, mesh.vertices.colwise().mean().transpose());
+  Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
+  const Eigen::VectorXd scales = motions.colwise().norm().cwiseInverse();
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
+    const Eigen::Matrix<double, 3, 6> rows = motions.middleRows<3>(3 * v) * scales.asDiagonal();
+    if (fixed[v] != 0) gram += rows.transpose() * rows;
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix<double, 6, 6>> svd(gram);
+  if (svd.singularValues()[5] > kClampRank * svd.singularValues()[0]) return;
+  throw WorkError("object.fixed: expected at least three fixed vertices that are not on one line, found " +
+                  std::to_string(fixed.cast<int>().sum()) +
+                  " that leave the body free to move rigidly; fix more of them");
+}
+
+}  // namespace
+
+Eigen::MatrixXd ElasticSystem::restrict(const Eigen::MatrixXd& fields) const { return fields(free_dofs, Eigen::all); }
+
+Eigen::MatrixXd ElasticSystem::extend(const Eigen::MatrixXd& free_rows) const {
+  Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(full_mass.rows(), free_rows.cols());
+  fields(free_dofs, Eigen::all) = free_rows;
+  return fields;
+}
+
+MassProperties mass_properties(const TetMesh& mesh, const SparseMatrix& mass) {
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(mass.rows());
+  const Eigen::VectorXd row_sums = mass * ones;
+  MassProperties properties;
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
+    properties.mass += row_sums[3 * v];
+    properties.centre += row_sums[3 * v] * mesh.vertices.row(v).transpose();
+  }
+  properties.centre /= properties.mass;
+  return properties;
+}
+
+Eigen::MatrixXd rigid_motions(const TetMesh& mesh, const SparseMatrix& mass) {
+  Eigen::MatrixXd motions = raw_rigid_motions(mesh, mass_properties(mesh, mass).centre);
+  for (int pass = 0; pass < 2; ++pass) {
+    const Eigen::MatrixXd gram = motions.transpose() * (mass * motions);
+    gram.llt().matrixU().solveInPlace<Eigen::OnTheRight>(motions);
+  }
+  return motions;
+}
+
+ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed) {
+  ElasticSystem system;
+  system.full_mass = expand_to_vectors(scalar_mass(mesh, materials.density));
+  system.full_stiffness = elastic_stiffness(mesh, materials);
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v)
+    for (int axis = 0; fixed[v] == 0 && axis < 3; ++axis)
+      system.free_dofs.push_back(static_cast<std::int32_t>(3 * v + axis));
+  const auto size = static_cast<Eigen::Index>(system.free_dofs.size());
+  if (size == system.full_mass.rows()) {
+    system.mass = system.full_mass;
+    system.stiffness = system.full_stiffness;
+    system.null_space = rigid_motions(mesh, system.full_mass);
+    return system;
+  }
+  require_clamped(mesh, fixed);
+  system.mass = submatrix(system.full_mass, system.free_dofs);
+  system.stiffness = submatrix(system.full_stiffness, system.free_dofs);
+  system.null_space.resize(size, 0);
+  return system;
+}
+
+}  // namespace exmat::precompute

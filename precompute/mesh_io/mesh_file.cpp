@@ -1,0 +1,18 @@
+#include "precompute/mesh_io/mesh_file.h"
+
+#include "common/core/error.h"
+#include "precompute/mesh_io/msh_reader.h"
+#include "precompute/mesh_io/text_input.h"
+#include "precompute/mesh_io/veg_reader.h"
+
+namespace exmat::precompute {
+
+MeshFile read_mesh(const std::filesystem::path& file) {
+  const std::string extension = file.extension().string();
+  if (extension == ".veg") return read_veg(file);
+  if (extension == ".msh") return read_msh(file);
+  throw InputError({file.string(), "", "a mesh file with the extension .veg or .msh",
+                    extension.empty() ? "no extension" : quote(extension), ""});
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,83 @@
+#include "precompute/mesh_io/text_input.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+
+#include "common/core/error.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr std::string_view kBlanks = " \t\r\n\v\f";
+constexpr std::string_view kSeparators = " \t\r\n\v\f,";
+
+// from_chars knows no plus sign.
+std::string_view without_plus(std::string_view field) {
+  const bool signed_number = field.size() > 1 && field[0] == '+' && field[1] != '-' && field[1] != '+';
+  return signed_number ? field.substr(1) : field;
+}
+
+template <typename Number>
+std::optional<Number> parse_whole(std::string_view field) {
+  field = without_plus(field);
+  Number value{};
+  const char* end = field.data() + field.size();
+  const auto [stop, error] = std::from_chars(field.data(), end, value);
+  if (error != std::errc{} || stop != end) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+std::string read_whole_file(const std::filesystem::path& file, const std::string& expected) {
+  const auto refuse = [&](const std::string& found) { throw InputError({file.string(), "", expected, found, ""}); };
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status)) refuse("no such file");
+  if (std::filesystem::is_directory(status)) refuse("a folder");
+  if (!std::filesystem::is_regular_file(status)) refuse("something that is not a regular file");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) refuse(std::string("a file that cannot be opened (") + std::strerror(errno) + ")");
+  std::string bytes(std::filesystem::file_size(file), '\0');
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!stream) refuse("a file that cannot be read to its end");
+  if (bytes.empty()) refuse("an empty file");
+  return bytes;
+}
+
+std::string_view Fields::next() {
+  const std::size_t begin = std::min(rest_.find_first_not_of(kSeparators), rest_.size());
+  rest_.remove_prefix(begin);
+  const std::size_t length = std::min(rest_.find_first_of(kSeparators), rest_.size());
+  const std::string_view field = rest_.substr(0, length);
+  rest_.remove_prefix(length);
+  return field;
+}
+
+std::optional<double> parse_real(std::string_view field) {
+  const auto value = parse_whole<double>(field);
+  return value && std::isfinite(*value) ? value : std::nullopt;
+}
+
+std::optional<std::int64_t> parse_integer(std::string_view field) { return parse_whole<std::int64_t>(field); }
+
+std::string_view trimmed(std::string_view text) {
+  const std::size_t begin = text.find_first_not_of(kBlanks);
+  if (begin == std::string_view::npos) return {};
+  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+}
+
+std::string quote(std::string_view text) {
+  constexpr std::size_t kLongest = 40;
+  if (text.empty()) return "the end of the line";
+  std::string shown(text.substr(0, kLongest));
+  std::replace_if(
+      shown.begin(), shown.end(), [](unsigned char c) { return c < 0x20 || c > 0x7e; }, '?');
+  return "'" + shown + (text.size() > kLongest ? "...'" : "'");
+}
+
+}  // namespace exmat::precompute

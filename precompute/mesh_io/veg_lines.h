@@ -1,0 +1,55 @@
+#pragma once
+
+#include <deque>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace exmat::precompute {
+
+/// A line of a .veg file without its comment and the blanks around it. Views stay valid as long as the VegLines.
+struct VegLine {
+  std::string_view text;
+  const std::filesystem::path* file = nullptr;
+  std::size_t number = 0;  ///< 1-based
+};
+
+/// Throws the InputError of one line.
+[[noreturn]] void fail_at(const VegLine& line, const std::string& expected, const std::string& found,
+                          const std::string& advice = "");
+
+/// The lines of a .veg file that are not empty, with the lines of included files in place of each *INCLUDE. Included
+/// paths are relative to the file that names them.
+class VegLines {
+ public:
+  explicit VegLines(const std::filesystem::path& file);
+
+  /// The line to read next; empty at the end of the file.
+  const std::optional<VegLine>& current() const { return current_; }
+  void advance();
+
+  /// As fail_at(current line), or at the end of the named file.
+  [[noreturn]] void fail(const std::string& expected, const std::string& advice = "") const;
+
+  /// Every file opened so far, the named one first.
+  std::vector<std::filesystem::path> files() const;
+
+ private:
+  struct File {
+    std::filesystem::path path;
+    std::string text;
+    std::size_t offset = 0;
+    std::size_t line = 0;
+  };
+  std::optional<VegLine> next_plain_line();
+  void open(const std::filesystem::path& file);
+  void open_include(const VegLine& line);
+
+  std::deque<File> files_;
+  std::vector<File*> open_;  // the innermost last
+  std::optional<VegLine> current_;
+};
+
+}  // namespace exmat::precompute

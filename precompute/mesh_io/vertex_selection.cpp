@@ -1,0 +1,106 @@
+#include "precompute/mesh_io/vertex_selection.h"
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <fmt/format.h>
+
+#include "common/core/error.h"
+#include "precompute/mesh_io/text_input.h"
+
+namespace exmat::precompute {
+namespace {
+
+std::string to_text(const Eigen::RowVector3d& point) {
+  return fmt::format("({:.6g}, {:.6g}, {:.6g})", point[0], point[1], point[2]);
+}
+
+std::string bounding_box(const VertexArray& vertices) {
+  if (vertices.rows() == 0) return "the mesh has no vertices";
+  return fmt::format("the mesh lies in {} to {}", to_text(vertices.colwise().minCoeff()),
+                     to_text(vertices.colwise().maxCoeff()));
+}
+
+template <typename Predicate>
+std::vector<std::int32_t> vertices_where(const VertexArray& vertices, Predicate is_inside) {
+  std::vector<std::int32_t> ids;
+  for (Eigen::Index v = 0; v < vertices.rows(); ++v)
+    if (is_inside(Eigen::RowVector3d(vertices.row(v)))) ids.push_back(static_cast<std::int32_t>(v));
+  return ids;
+}
+
+class Selector {
+ public:
+  Selector(const VertexArray& vertices, const std::string& asset_file) : vertices_(vertices), asset_file_(asset_file) {}
+
+  std::vector<std::int32_t> operator()(const BoxSelection& box) const {
+    const Eigen::RowVector3d min(box.min.data()), max(box.max.data());
+    auto ids = vertices_where(vertices_, [&](const Eigen::RowVector3d& x) {
+      return (x.array() >= min.array()).all() && (x.array() <= max.array()).all();
+    });
+    return require_some(std::move(ids), asset_file_, fmt::format("the box {} to {}", to_text(min), to_text(max)));
+  }
+
+  std::vector<std::int32_t> operator()(const SphereSelection& sphere) const {
+    const Eigen::RowVector3d center(sphere.center.data());
+    auto ids =
+        vertices_where(vertices_, [&](const Eigen::RowVector3d& x) { return (x - center).norm() <= sphere.radius; });
+    const auto place = fmt::format("the sphere about {} of radius {:.6g}", to_text(center), sphere.radius);
+    return require_some(std::move(ids), asset_file_, place);
+  }
+
+  std::vector<std::int32_t> operator()(const IdSelection& selection) const {
+    std::vector<std::int32_t> ids;
+    for (const std::int64_t id : selection.ids) {
+      if (id < 0 || id >= vertices_.rows())
+        throw InputError(
+            {asset_file_, "ids", fmt::format("0-based vertex ids below {}", vertices_.rows()), std::to_string(id), ""});
+      ids.push_back(static_cast<std::int32_t>(id));
+    }
+    return require_some(std::move(ids), asset_file_, "ids");
+  }
+
+  std::vector<std::int32_t> operator()(const FileSelection& selection) const {
+    const std::string text = read_whole_file(selection.file, "vertex ids");
+    std::vector<std::int32_t> ids;
+    std::size_t line_number = 0;
+    for (std::size_t begin = 0, end = 0; begin < text.size(); begin = end + 1) {
+      end = std::min(text.find('\n', begin), text.size());
+      ++line_number;
+      const auto line = std::string_view(text).substr(begin, end - begin);
+      Fields fields(line.substr(0, line.find('#')));
+      for (auto field = fields.next(); !field.empty(); field = fields.next())
+        ids.push_back(read_id(field, selection.file.string(), line_number));
+    }
+    return require_some(std::move(ids), selection.file.string(), "");
+  }
+
+ private:
+  std::int32_t read_id(std::string_view field, const std::string& file, std::size_t line_number) const {
+    const auto id = parse_integer(field);
+    if (!id || *id < 1 || *id > vertices_.rows())
+      throw InputError({file, fmt::format("line {}", line_number),
+                        fmt::format("a 1-based vertex id, 1 to {}", vertices_.rows()), quote(field), ""});
+    return static_cast<std::int32_t>(*id - 1);
+  }
+
+  std::vector<std::int32_t> require_some(std::vector<std::int32_t> ids, const std::string& file,
+                                         const std::string& place) const {
+    if (ids.empty())
+      throw InputError({file, place, "at least one vertex of the mesh", "none", bounding_box(vertices_)});
+    std::sort(ids.begin(), ids.end());
+    ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+    return ids;
+  }
+
+  const VertexArray& vertices_;
+  const std::string& asset_file_;
+};
+
+}  // namespace
+
+std::vector<std::int32_t> select_vertices(const VertexArray& vertices, const VertexSelection& selection,
+                                          const std::string& asset_file) {
+  return std::visit(Selector(vertices, asset_file), selection);
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/config/asset_config.h"
+#include "common/core/arrays.h"
+
+namespace exmat::precompute {
+
+/// Sorted unique 0-based ids of the selected vertices. Throws InputError where an id is no vertex, a file cannot be
+/// read, or nothing is selected (the message then gives the mesh's bounding box). `asset_file` is for the message.
+std::vector<std::int32_t> select_vertices(const VertexArray& vertices, const VertexSelection& selection,
+                                          const std::string& asset_file);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,26 @@
+#pragma once
+
+#include "precompute/modes/linear_modes.h"
+
+namespace exmat::precompute {
+
+struct BasisInput {
+  const ElasticSystem& system;
+  const LinearModes& modes;
+  const Eigen::MatrixXd& derivatives;  ///< f x k(k+1)/2, see modal_derivatives
+  double body_size;                    ///< L, diagonal of the bounding box [m]
+  Eigen::MatrixXd example_fields;      ///< f x (K-1) displacements that the basis must hold, or no columns
+};
+
+/// [f x r] mass-orthonormal basis, orthogonal to the rigid motions of a free body: the example fields (their principal
+/// components where they would take more than half of r), then the principal components of scaled modes and modal
+/// derivatives in their complement. Scaling: design in docs/method.md, after Barbic and James 2005, section 4.1. Throws
+/// WorkError where the snapshots span fewer than r dimensions.
+Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
+
+/// [f x K-1] fields made fit for a clamped body: each plus the elastic displacement that brings its fixed vertices back
+/// to rest.
+Eigen::MatrixXd clamp_fields(const ElasticSystem& system, const SemidefiniteSolver& solver,
+                             const Eigen::MatrixXd& fields);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,325 @@
+#include "precompute/pipeline/build_model.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numbers>
+#include <utility>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/core/timer.h"
+#include "common/mesh/geometry.h"
+#include "precompute/cubature/cubature.h"
+#include "precompute/fem/elastic_system.h"
+#include "precompute/fem/rigid_moments.h"
+#include "precompute/modes/basis.h"
+#include "precompute/modes/linear_modes.h"
+#include "precompute/shape_space/projection.h"
+#include "precompute/shape_space/transfer.h"
+#include "precompute/solvers/eigenpairs.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr const char* kGenerator = "exmat-precompute " EXMAT_VERSION;
+// Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
+constexpr Eigen::Index kExtraEigenfunctions = 4;
+constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
+// A share of an example's displacement lost to truncation that is worth a warning.
+constexpr double kTruncationWarning = 0.25;
+
+// The object's shape space and its examples in it, before there is a basis.
+struct ShapeStage {
+  LaplaceBasis object;
+  Eigen::VectorXd weights;  ///< Lambda
+  ShapeSpaceData data;
+  ExampleSet examples;
+  Eigen::MatrixXd displacements;  ///< 3n x (K-1)
+};
+
+class Pipeline {
+ public:
+  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report)
+      : asset_(asset), needs_(needs), report_(report) {}
+
+  ReducedModel run();
+
+ private:
+  template <typename Work>
+  auto timed(const std::string& stage, Work work) {
+    log::debug(stage + " ...");
+    const Timer timer;
+    auto result = work();
+    report_.stages.push_back({stage, timer.seconds()});
+    log::info(fmt::format("{}: {:.3f} s", stage, timer.seconds()));
+    return result;
+  }
+  void warn(const std::string& message) {
+    report_.warnings.push_back(message);
+    log::warning(message);
+  }
+
+  ObjectData object_data() const;
+  ShapeStage shape_stage(const ExampleInput& input);
+  void set_shape_data(ShapeStage& stage, const Eigen::VectorXd& eigenvalues);
+  RestMap map_rest(const LaplaceBasis& object, const ExampleInput& input, const LaplaceBasis& rest_basis);
+  bool free_example(const RestMap& map);
+  ExampleData posed_example(const ShapeStage& stage, const PoseInput& pose, const TransferredPose& transferred,
+                            const RestMap& map, double scale) const;
+  void add_examples(ShapeStage& stage, const ExampleInput& input);
+  void finish_examples(ReducedModel& model, ShapeStage& stage, const ElasticSystem& system);
+  void require_upright(const ReducedModel& model) const;
+  ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
+
+  const AssetConfig& asset_;
+  const Needs& needs_;
+  BuildReport& report_;
+  ObjectInput object_;
+};
+
+ObjectData Pipeline::object_data() const {
+  return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials, asset_.material.model};
+}
+
+void Pipeline::set_shape_data(ShapeStage& stage, const Eigen::VectorXd& eigenvalues) {
+  const Eigen::Index m = asset_.eigenfunctions;
+  stage.weights = descriptor_weights(stage.object, asset_.weighting);
+  const Eigen::MatrixXd rest = coefficients(stage.object, stage.object.vertices);
+  stage.data = {stage.object.eigenvalues,
+                stage.object.eigenfunctions,
+                stage.weights.asDiagonal() * rest,
+                stage.object.volume,
+                stage.object.centroid,
+                asset_.weighting,
+                splits_cluster(eigenvalues, m) ? 1 : 0};
+  if (stage.data.splits_cluster != 0)
+    warn(fmt::format(
+        "shape_space.eigenfunctions: {} splits a cluster of nearly equal eigenvalues ({:.4g} and {:.4g}); {} would not",
+        m, eigenvalues[m - 1], eigenvalues[m], next_uncut(eigenvalues, m)));
+}
+
+RestMap Pipeline::map_rest(const LaplaceBasis& object, const ExampleInput& input, const LaplaceBasis& rest_basis) {
+  if (input.object_is_rest) return identity_map(object.eigenvalues.size());
+  const RestMap map = rest_map(object, input.rest, rest_basis);
+  log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)", input.rest_name,
+                        100 * map.residual, map.confidence));
+  const std::string advice = "expected a rest example that lies where the object does and has about its shape";
+  if (map.confidence > kConfidenceRefusal)
+    throw WorkError(fmt::format("example {}: alignment refused, confidence {:.2f} (limit {}): {}", input.rest_name,
+                                map.confidence, kConfidenceRefusal, advice));
+  if (map.confidence > kConfidenceWarning)
+    warn(fmt::format("example {}: doubtful alignment, confidence {:.2f}: {}", input.rest_name, map.confidence, advice));
+  return map;
+}
+
+bool Pipeline::free_example(const RestMap& map) {
+  if (asset_.frame != "auto") return asset_.frame == "free";
+  log::info(map.same_frame ? "examples share the object's frame: the rest example coincides with it"
+                           : "examples are rotated to the object's frame: the rest example does not coincide with it");
+  return !map.same_frame;
+}
+
+ExampleData Pipeline::posed_example(const ShapeStage& stage, const PoseInput& pose, const TransferredPose& transferred,
+                                    const RestMap& map, double scale) const {
+  ExampleData example;
+  example.name = pose.name;
+  example.index = static_cast<std::int64_t>(stage.examples.examples.size());
+  example.rotation = transferred.rotation;
+  example.scale = scale;
+  example.method = "same_connectivity";
+  example.alignment_residual = map.residual;
+  example.confidence = map.confidence;
+  example.shape_space_error = transferred.shape_space_error;
+  example.descriptor = stage.weights.asDiagonal() * transferred.coefficients;
+  return example;
+}
+
+void Pipeline::add_examples(ShapeStage& stage, const ExampleInput& input) {
+  const Eigen::Index m = asset_.eigenfunctions;
+  const LaplaceBasis rest_basis =
+      input.object_is_rest
+          ? stage.object
+          : laplace_basis(input.rest, example_function_count(m, input.rest.vertex_count()), input.rest_name);
+  const RestMap map = map_rest(stage.object, input, rest_basis);
+
+  ExampleData rest;
+  rest.name = input.rest_name;
+  rest.is_rest = true;
+  rest.method = input.object_is_rest ? "object" : "rest_map";
+  rest.scale = std::cbrt(stage.object.volume / rest_basis.volume);
+  rest.alignment_residual = map.residual;
+  rest.confidence = map.confidence;
+  rest.descriptor = stage.data.rest_descriptor;
+  stage.examples.examples.push_back(rest);
+
+  PoseFrame frame;
+  frame.free_example = free_example(map);
+  if (object_.fixed.any())
+    frame.fit_weights = Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal();
+  else
+    frame.fit_weights = scalar_mass(object_.mesh, object_.materials.density);
+  const Eigen::MatrixXd rest_coefficients = coefficients(stage.object, stage.object.vertices);
+  stage.displacements.resize(3 * object_.mesh.vertex_count(), static_cast<Eigen::Index>(input.poses.size()));
+  for (std::size_t k = 0; k < input.poses.size(); ++k) {
+    const TetMesh posed{input.poses[k].vertices, input.rest.tets};
+    const auto transferred =
+        transfer_pose(stage.object, rest_coefficients, map, rest_basis, normalised_positions(posed), frame);
+    const double scale = std::cbrt(stage.object.volume / tet_volumes(posed).sum());
+    stage.examples.examples.push_back(posed_example(stage, input.poses[k], transferred, map, scale));
+    stage.displacements.col(static_cast<Eigen::Index>(k)) = reconstruct_displacement(
+        stage.object, stage.weights, stage.examples.examples.back().descriptor - stage.data.rest_descriptor);
+  }
+}
+
+ShapeStage Pipeline::shape_stage(const ExampleInput& input) {
+  const Eigen::Index m = asset_.eigenfunctions;
+  ShapeStage stage;
+  stage.object =
+      laplace_basis(object_.mesh, std::min(m + kExtraEigenfunctions, object_.mesh.vertex_count() - 2), asset_.name);
+  const Eigen::VectorXd eigenvalues = stage.object.eigenvalues;
+  if (m >= eigenvalues.size())
+    throw InputError(
+        {asset_.file.string(), "/shape_space/eigenfunctions",
+         fmt::format("at most {} for a mesh of {} vertices", eigenvalues.size() - 1, object_.mesh.vertex_count()),
+         std::to_string(m), "ask for fewer or refine the mesh"});
+  stage.object.eigenvalues.conservativeResize(m);
+  stage.object.eigenfunctions.conservativeResize(Eigen::NoChange, m);
+  set_shape_data(stage, eigenvalues);
+  add_examples(stage, input);
+  return stage;
+}
+
+void Pipeline::require_upright(const ReducedModel& model) const {
+  for (const auto& example : model.examples->examples) {
+    const Eigen::VectorXd H = model.cubature->gradient * example.reduced;
+    for (Eigen::Index j = 0; j < model.cubature->elements.size(); ++j) {
+      const RowMatrix3 F = Eigen::Map<const RowMatrix3>(H.data() + 9 * j) + RowMatrix3::Identity();
+      if (F.determinant() > 0) continue;
+      throw InputError({asset_.file.string(), "/examples, " + example.name,
+                        "a pose that inverts no cubature element of the object",
+                        fmt::format("determinant {:.3g} of the deformation gradient in tet {}", F.determinant(),
+                                    model.cubature->elements[j]),
+                        "use a milder pose, more shape_space.eigenfunctions, or another seed"});
+    }
+  }
+}
+
+void Pipeline::finish_examples(ReducedModel& model, ShapeStage& stage, const ElasticSystem& system) {
+  model.projection = direct_projection(stage.object, stage.weights, system.full_mass, model.modal->basis);
+  fill_weights_problem(stage.data.rest_descriptor, *model.projection, stage.examples);
+  for (Eigen::Index k = 0; k < stage.displacements.cols(); ++k) {
+    auto& example = stage.examples.examples[static_cast<std::size_t>(k + 1)];
+    const Eigen::VectorXd field = stage.displacements.col(k);
+    const Eigen::VectorXd rest = field - model.modal->basis * example.reduced;
+    const double norm = field.dot(system.full_mass * field);
+    example.basis_error = norm > 0 ? std::sqrt(std::max(0.0, rest.dot(system.full_mass * rest) / norm)) : 0;
+    log::info(fmt::format(
+        "example {}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
+        example.name, asset_.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
+    if (example.shape_space_error > kTruncationWarning)
+      warn(
+          fmt::format("example {}: {} eigenfunctions lose {:.0f} % of its displacement; more "
+                      "shape_space.eigenfunctions (20 is usual) "
+                      "keep more",
+                      example.name, asset_.eigenfunctions, 100 * example.shape_space_error));
+  }
+  model.shape_space = std::move(stage.data);
+  model.examples = std::move(stage.examples);
+}
+
+ModalData Pipeline::modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const {
+  ModalData modal;
+  modal.frequencies = modes.eigenvalues.cwiseSqrt() / (2 * std::numbers::pi);
+  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(basis.rows(), 3);
+  for (int axis = 0; axis < 3; ++axis) directions(Eigen::seqN(axis, basis.rows() / 3, 3), axis).setOnes();
+  modal.gravity_load = (system.full_mass * directions).transpose() * basis;
+  modal.basis = std::move(basis);
+  return modal;
+}
+
+ReducedModel Pipeline::run() {
+  object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
+  report_.ledger = plan_groups(needs_, object_.fixed.any(), !asset_.examples.empty());
+  const bool with_examples = includes(report_.ledger, "examples");
+  std::optional<ExampleInput> example_input;
+  if (with_examples)
+    example_input = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });
+
+  ReducedModel model;
+  model.asset_name = asset_.name;
+  model.generator = kGenerator;
+  model.input_sha256 = hash_inputs(
+      report_.inputs, fmt::format("{}\nexamples {}\nrigid {}\n", kGenerator, needs_.examples, needs_.rigid));
+  model.object = object_data();
+
+  std::optional<ShapeStage> shape;
+  if (with_examples) shape = timed("shape space and examples", [&] { return shape_stage(*example_input); });
+
+  const auto system =
+      timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
+  const auto solver = timed("factorisation", [&] {
+    return SemidefiniteSolver(system.stiffness, system.mass * system.null_space, asset_.name + ": elastic stiffness");
+  });
+  log::info(system.constrained() ? fmt::format("constrained body: {} fixed vertices", object_.fixed.cast<int>().sum())
+                                 : "free body: six rigid modes found and excluded");
+  const auto modes = timed("linear modes", [&] { return linear_modes(system, solver, asset_.linear_modes); });
+  const auto derivatives = timed("modal derivatives", [&] {
+    return modal_derivatives(object_.mesh, object_.materials, system, solver, modes.modes);
+  });
+
+  const double size = bounding_box_diagonal(object_.mesh.vertices);
+  const auto basis = timed("basis", [&] {
+    Eigen::MatrixXd fields;
+    if (shape && asset_.example_fields) fields = clamp_fields(system, solver, shape->displacements);
+    return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
+  });
+  model.modal = modal_data(system, modes, system.extend(basis));
+  if (shape) finish_examples(model, *shape, system);
+
+  model.cubature = timed("cubature", [&] {
+    Eigen::MatrixXd poses(basis.cols(), 0);
+    if (model.examples) {
+      poses.resize(basis.cols(), static_cast<Eigen::Index>(model.examples->examples.size()) - 1);
+      for (Eigen::Index k = 0; k < poses.cols(); ++k)
+        poses.col(k) = model.examples->examples[static_cast<std::size_t>(k + 1)].reduced;
+    }
+    const auto source = pose_source(system, modes, derivatives, basis, size, poses);
+    return build_cubature(object_.mesh, object_.materials, source,
+                          {asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
+                           asset_.training_poses, asset_.seed});
+  });
+  log::info(fmt::format("cubature: {} elements, held-out errors: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %",
+                        model.cubature->elements.size(), 100 * model.cubature->heldout_error,
+                        100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error));
+  if (model.examples) require_upright(model);
+  if (includes(report_.ledger, "rigid"))
+    model.rigid = timed("rigid moments",
+                        [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
+  return model;
+}
+
+}  // namespace
+
+Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs) {
+  if (scene_needs) return *scene_needs;
+  if (!asset.needs) return {};
+  const auto named = [&](const char* group) {
+    return std::find(asset.needs->begin(), asset.needs->end(), group) != asset.needs->end();
+  };
+  return {named("examples"), named("rigid")};
+}
+
+ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report) {
+  report.inputs.push_back(asset.file);
+  return Pipeline(asset, needs, report).run();
+}
+
+void check_inputs(const AssetConfig& asset, BuildReport& report) {
+  report.inputs.push_back(asset.file);
+  const auto object = read_object(asset, report.inputs);
+  if (!asset.examples.empty()) read_examples(asset, object, report.inputs);
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,30 @@
+#pragma once
+
+#include <string>
+
+#include "common/mesh/tet_mesh.h"
+#include "precompute/fem/assembly.h"
+
+namespace exmat::precompute {
+
+/// Laplace-Beltrami eigenfunctions of a mesh brought to centroid 0 and volume 1, the constant one dropped. method.md,
+/// section 1.
+struct LaplaceBasis {
+  Eigen::VectorXd eigenvalues;                         ///< k, ascending, dimensionless
+  Eigen::MatrixXd eigenfunctions;                      ///< n x k, phi^T mass phi = I
+  SparseMatrix mass;                                   ///< n x n, M_s / V
+  VertexArray vertices;                                ///< n x 3, normalised positions
+  double volume = 0;                                   ///< V [m^3]
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [m]
+};
+
+/// The first `count` eigenpairs; `name` is for messages.
+LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::string& name);
+
+/// [n x 3] positions of a mesh of positive volume, moved to centroid 0 and scaled to volume 1.
+VertexArray normalised_positions(const TetMesh& mesh);
+
+/// [k x 3] coefficients Phi^T mass X of a field on the vertices of the basis's mesh.
+Eigen::MatrixXd coefficients(const LaplaceBasis& basis, const VertexArray& field);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,64 @@
+#include "precompute/shape_space/projection.h"
+
+#include <Eigen/SVD>
+#include <cmath>
+
+namespace exmat::precompute {
+namespace {
+
+// Directions of T^+ that are this much weaker than the strongest are outside its range.
+constexpr double kRangeTolerance = 1e-8;
+
+// [m x 3] row-major as a vector of 3m, entry 3i + axis.
+Eigen::VectorXd flatten(const RowMatrix& descriptor) { return descriptor.reshaped<Eigen::RowMajor>(); }
+
+}  // namespace
+
+Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, const std::string& weighting) {
+  if (weighting == "eigenvalue") return object.eigenvalues;
+  return Eigen::VectorXd::Ones(object.eigenvalues.size());
+}
+
+ProjectionData direct_projection(const LaplaceBasis& object, const Eigen::VectorXd& weights, const SparseMatrix& mass,
+                                 const RowMatrix& basis) {
+  const Eigen::Index n = object.vertices.rows(), m = weights.size(), r = basis.cols();
+  const double unit = std::cbrt(object.volume);
+  const Eigen::MatrixXd forward = object.mass * (object.eigenfunctions * weights.asDiagonal()) / unit;
+  const Eigen::MatrixXd backward = object.eigenfunctions * weights.cwiseInverse().asDiagonal() * unit;
+  const RowMatrix mass_basis = mass * basis;
+  ProjectionData projection;
+  projection.shape_from_reduced.resize(3 * m, r);
+  projection.reduced_from_shape.resize(r, 3 * m);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto rows = Eigen::seqN(axis, n, 3);
+    const auto shape_rows = Eigen::seqN(axis, m, 3);
+    const RowMatrix basis_rows = basis(rows, Eigen::all), mass_basis_rows = mass_basis(rows, Eigen::all);
+    projection.shape_from_reduced(shape_rows, Eigen::all) = forward.transpose() * basis_rows;
+    projection.reduced_from_shape(Eigen::all, shape_rows) = mass_basis_rows.transpose() * backward;
+  }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(projection.reduced_from_shape, Eigen::ComputeThinU);
+  const auto& sigma = svd.singularValues();
+  const Eigen::Index rank = (sigma.array() > kRangeTolerance * sigma[0]).count();
+  projection.target_basis = svd.matrixU().leftCols(rank);
+  return projection;
+}
+
+Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen::VectorXd& weights,
+                                         const Eigen::MatrixXd& descriptor_change) {
+  const RowMatrix field =
+      object.eigenfunctions * (weights.cwiseInverse().asDiagonal() * descriptor_change) * std::cbrt(object.volume);
+  return flatten(field);
+}
+
+void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, ExampleSet& set) {
+  const auto count = static_cast<Eigen::Index>(set.examples.size());
+  Eigen::MatrixXd E(rest_descriptor.size(), count);
+  for (Eigen::Index k = 0; k < count; ++k) E.col(k) = flatten(set.examples[static_cast<std::size_t>(k)].descriptor);
+  for (auto& example : set.examples)
+    example.reduced = projection.reduced_from_shape * (flatten(example.descriptor) - flatten(rest_descriptor));
+  set.gram = E.transpose() * E;
+  set.h0 = E.transpose() * flatten(rest_descriptor);
+  set.hq = E.transpose() * projection.shape_from_reduced;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,85 @@
+#include "precompute/shape_space/transfer.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/shape_space/nearest_point.h"
+
+namespace exmat::precompute {
+namespace {
+
+// A second singular value below this, relative to the first, leaves the angle about an axis open.
+constexpr double kRankOne = 1e-8;
+// Displacements below this, relative to the body's size, are rounding.
+constexpr double kNoDisplacement = 1e-12;
+
+// Fit of the posed to the rest object in the product of the weights, both about their weighted means.
+Eigen::Matrix3d fit_rotation(const VertexArray& posed, const VertexArray& rest, const SparseMatrix& weights) {
+  const Eigen::RowVectorXd sums = Eigen::RowVectorXd::Ones(weights.rows()) * weights;
+  const Eigen::RowVector3d posed_mean = sums * posed / sums.sum(), rest_mean = sums * rest / sums.sum();
+  const VertexArray centred = posed.rowwise() - posed_mean;
+  return procrustes_rotation((rest.rowwise() - rest_mean).transpose() * (weights * centred));
+}
+
+// Share of a displacement [n_e x 3] of the rest example, its mean left out, that the map does not carry over.
+double lost_share(const RestMap& map, const LaplaceBasis& rest_basis, const VertexArray& displacement) {
+  const VertexArray deforming = displacement.rowwise() - (rest_basis.mass * displacement).colwise().sum();
+  const double full = (deforming.transpose() * (rest_basis.mass * deforming)).trace();
+  if (full <= kNoDisplacement * kNoDisplacement) return 0;
+  const double carried = (map.functional_map * coefficients(rest_basis, deforming)).squaredNorm();
+  return std::sqrt(std::max(0.0, 1 - carried / full));
+}
+
+}  // namespace
+
+Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moments, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const auto& sigma = svd.singularValues();
+  if (sigma[1] <= kRankOne * sigma[0])
+    return Eigen::Quaterniond::FromTwoVectors(svd.matrixV().col(0), svd.matrixU().col(0)).toRotationMatrix();
+  Eigen::Vector3d signs = Eigen::Vector3d::Ones();
+  signs[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+Eigen::Index example_function_count(Eigen::Index m, Eigen::Index vertices) {
+  return std::min(m + m / 2 + 5, vertices - 2);
+}
+
+RestMap identity_map(Eigen::Index m) { return {Eigen::MatrixXd::Identity(m, m), 0, 0, true}; }
+
+RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const LaplaceBasis& rest_basis) {
+  const TetMesh normalised{rest_basis.vertices, rest_mesh.tets};
+  const auto nearest = nearest_points(normalised, object.vertices);
+  const Eigen::MatrixXd pulled_back = nearest.interpolate(normalised, rest_basis.eigenfunctions);
+  const Eigen::MatrixXd map = object.eigenfunctions.transpose() * (object.mass * pulled_back);
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(map, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  RestMap result;
+  result.functional_map = svd.matrixU() * svd.matrixV().transpose();
+  result.confidence = (svd.singularValues().array() - 1).matrix().norm() / std::sqrt(static_cast<double>(map.rows()));
+  const double radius = object.vertices.rowwise().norm().norm();
+  result.residual = nearest.distances.norm() / radius;
+  result.same_frame = result.residual <= kSameFrame;
+  return result;
+}
+
+TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients, const RestMap& map,
+                              const LaplaceBasis& rest_basis, const VertexArray& posed, const PoseFrame& frame) {
+  const Eigen::MatrixXd example_rest = coefficients(rest_basis, rest_basis.vertices);
+  const Eigen::MatrixXd example_posed = coefficients(rest_basis, posed);
+  Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
+  if (frame.free_example) to_rest = procrustes_rotation(example_rest.transpose() * example_posed);
+  const Eigen::MatrixXd change = map.functional_map * (example_posed * to_rest.transpose() - example_rest);
+
+  const VertexArray posed_object = object.vertices + object.eigenfunctions * change;
+  const Eigen::Matrix3d fit = fit_rotation(posed_object, object.vertices, frame.fit_weights);
+  TransferredPose pose;
+  pose.coefficients = (rest_coefficients + change) * fit.transpose();
+  pose.rotation = fit * to_rest;
+  pose.shape_space_error = lost_share(map, rest_basis, posed * pose.rotation.transpose() - rest_basis.vertices);
+  return pose;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+#include "precompute/shape_space/laplace_basis.h"
+
+namespace exmat::precompute {
+
+/// Where an example file's body stands to the object: alignment.md, "Default".
+struct RestMap {
+  Eigen::MatrixXd functional_map;  ///< C_0, m x K_e, orthonormal rows
+  double residual = 0;  ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
+  double confidence =
+      0;  ///< |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 where they are the object's own
+  bool same_frame = true;  ///< the rest example coincides with the object within kSameFrame
+};
+
+/// Residual up to which the rest example is taken to share the object's frame.
+constexpr double kSameFrame = 0.05;
+
+/// Number of example functions for m of the object: 1.5 m + 5, bounded by the mesh.
+Eigen::Index example_function_count(Eigen::Index m, Eigen::Index vertices);
+
+/// C_0 = polar(Phi_o^T M_o Phi_e[p]) with p the nearest point of the rest example for each object vertex, both
+/// normalised. `object` holds the object's first m functions.
+RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const LaplaceBasis& rest_basis);
+
+/// The identity map of an object that is its own rest example.
+RestMap identity_map(Eigen::Index m);
+
+/// A pose of the rest example's mesh, in the object's shape space.
+struct TransferredPose {
+  Eigen::MatrixXd coefficients;                  ///< m x 3, of the posed object
+  RowMatrix3 rotation = RowMatrix3::Identity();  ///< from the example's frame to the object's
+  double shape_space_error = 0;                  ///< share of the displacement that the map's m functions lose
+};
+
+/// What a pose is brought into once it is transferred. method.md, section 1, "Frame".
+struct PoseFrame {
+  bool free_example = false;  ///< rotate the example to the rest example first (alignment.frame: free)
+  /// n x n weights of the fit of the posed to the rest object: the mass of a free body; ones at the fixed vertices of a
+  /// clamped one.
+  SparseMatrix fit_weights;
+};
+
+/// `rest_coefficients` [m x 3] of the object; `posed` [n_e x 3] normalised positions on the vertices of the rest
+/// example.
+TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients, const RestMap& map,
+                              const LaplaceBasis& rest_basis, const VertexArray& posed, const PoseFrame& frame);
+
+/// Proper rotation R that minimises sum_i w_i |R a_i - b_i|^2 for [3 x 3] moments sum_i w_i b_i a_i^T. Where the
+/// moments leave the angle about an axis open (rank one), the smallest rotation is taken. Kabsch 1976; Umeyama 1991.
+Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/core/error.h"
+#include "precompute/mesh_io/mesh_file.h"
+
+namespace exmat::precompute::test {
+
+/// A folder of its own for each test, removed with the object.
+class TemporaryFolder {
+ public:
+  TemporaryFolder();
+  ~TemporaryFolder();
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+
+  std::filesystem::path write(const std::string& name, std::string_view contents) const;
+  std::filesystem::path path(const std::string& name) const { return path_ / name; }
+
+ private:
+  std::filesystem::path path_;
+};
+
+/// A grid of `cells`^3 cubes with coordinates of 17 digits, and the tet sets "all" and, of the first third, "soft
+/// part".
+MeshFile sample_mesh(int cells);
+
+/// Appends binary values, if `swap` in the byte order that is not this machine's.
+class ByteWriter {
+ public:
+  explicit ByteWriter(bool swap = false) : swap_(swap) {}
+  ByteWriter& text(std::string_view text);
+  ByteWriter& integer(std::int32_t value);
+  ByteWriter& size(std::uint64_t value);
+  ByteWriter& real(double value);
+  const std::string& bytes() const { return bytes_; }
+
+ private:
+  void append(const void* value, std::size_t size);
+
+  bool swap_;
+  std::string bytes_;
+};
+
+/// The mesh and its sets in each format, with a point, a line and a triangle besides the tets where the format has
+/// them.
+std::string to_veg(const MeshFile& mesh_file);
+std::string to_msh_22_text(const MeshFile& mesh_file);
+std::string to_msh_22_binary(const MeshFile& mesh_file, bool swap = false);
+std::string to_msh_41_text(const MeshFile& mesh_file);
+std::string to_msh_41_binary(const MeshFile& mesh_file, bool swap = false);
+
+struct Flavour {
+  std::string name, extension;
+  std::string (*write)(const MeshFile&);
+};
+/// Every format and encoding.
+const std::vector<Flavour>& flavours();
+
+/// `text` with its only occurrence of `from` replaced.
+std::string edited(std::string text, std::string_view from, std::string_view to);
+
+/// The complaint of the InputError that `read` throws.
+Complaint complaint_of(const std::function<void()>& read);
+
+/// Same vertices and tets, to the last bit.
+bool same_mesh(const TetMesh& a, const TetMesh& b);
+
+}  // namespace exmat::precompute::test

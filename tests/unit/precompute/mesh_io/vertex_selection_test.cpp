@@ -1,0 +1,98 @@
+#include "precompute/mesh_io/vertex_selection.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/box_mesh.h"
+#include "tests/unit/precompute/mesh_io/mesh_samples.h"
+
+namespace exmat::precompute {
+namespace {
+
+using test::complaint_of;
+using test::TemporaryFolder;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+/// Corners of the unit cube: vertex i is (i & 1, i >> 1 & 1, i >> 2 & 1).
+const VertexArray& cube() {
+  static const VertexArray kVertices = exmat::test::cube_grid(1).vertices;
+  return kVertices;
+}
+
+std::vector<std::int32_t> select(const VertexSelection& selection) {
+  return select_vertices(cube(), selection, "asset.json");
+}
+
+Complaint complaint_of_selecting(const VertexSelection& selection) {
+  return complaint_of([&] { select(selection); });
+}
+
+TEST(SelectVertices, InABoxIncludesItsBounds) {
+  EXPECT_THAT(select(BoxSelection{{0, 0, 0}, {1, 1, 0}}), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(select(BoxSelection{{1, 1, 1}, {1, 1, 1}}), ElementsAre(7));
+  EXPECT_THAT(select(BoxSelection{{-1, -1, 0.5}, {2, 2, 2}}), ElementsAre(4, 5, 6, 7));
+}
+
+TEST(SelectVertices, InASphereIncludesItsSurface) {
+  EXPECT_THAT(select(SphereSelection{{0, 0, 0}, 1}), ElementsAre(0, 1, 2, 4));
+  EXPECT_THAT(select(SphereSelection{{0, 0, 0}, 0}), ElementsAre(0));
+}
+
+TEST(SelectVertices, ByIdsSortsThemAndCollapsesRepeats) {
+  EXPECT_THAT(select(IdSelection{{7, 0, 3, 0, 7}}), ElementsAre(0, 3, 7));
+}
+
+TEST(SelectVertices, ByAFileTakesCommasBlanksLinesAndComments) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("left.bou", "# fixed\n8, 1,2\n\n 3\t4 # 5\n,4,\r\n8");
+  EXPECT_THAT(select(FileSelection{file}), ElementsAre(0, 1, 2, 3, 7));
+}
+
+TEST(SelectVertices, RefusesIdsThatAreNoVertices) {
+  for (const std::int64_t id : {std::int64_t{-1}, std::int64_t{8}, std::int64_t{1} << 40}) {
+    const Complaint complaint = complaint_of_selecting(IdSelection{{0, id}});
+    EXPECT_EQ(complaint.file, "asset.json");
+    EXPECT_EQ(complaint.place, "ids");
+    EXPECT_EQ(complaint.expected, "0-based vertex ids below 8");
+    EXPECT_EQ(complaint.found, std::to_string(id));
+  }
+}
+
+TEST(SelectVertices, RefusesLinesOfAFileThatAreNoVertices) {
+  const TemporaryFolder folder;
+  for (const std::string field : {"0", "9", "-1", "1.5", "two", "99999999999999999999"}) {
+    const auto file = folder.write("ids.txt", "1\n2, " + field + "\n");
+    const Complaint complaint = complaint_of_selecting(FileSelection{file});
+    EXPECT_EQ(complaint.file, file.string());
+    EXPECT_EQ(complaint.place, "line 2");
+    EXPECT_EQ(complaint.expected, "a 1-based vertex id, 1 to 8");
+    EXPECT_EQ(complaint.found, "'" + field + "'");
+  }
+}
+
+TEST(SelectVertices, RefusesAMissingFile) {
+  const Complaint complaint = complaint_of_selecting(FileSelection{"nowhere/ids.txt"});
+  EXPECT_EQ(complaint.file, "nowhere/ids.txt");
+  EXPECT_EQ(complaint.expected, "vertex ids");
+  EXPECT_EQ(complaint.found, "no such file");
+}
+
+TEST(SelectVertices, RefusesAnEmptySelectionAndGivesTheBoundingBox) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("ids.txt", "# none yet\n");
+  const std::vector<VertexSelection> selections{BoxSelection{{2, 2, 2}, {3, 3, 3}}, BoxSelection{{1, 1, 1}, {0, 0, 0}},
+                                                SphereSelection{{0.5, 0.5, 0.5}, 0.5}, FileSelection{file},
+                                                IdSelection{}};
+  for (const auto& selection : selections) {
+    const Complaint complaint = complaint_of_selecting(selection);
+    EXPECT_EQ(complaint.expected, "at least one vertex of the mesh");
+    EXPECT_EQ(complaint.advice, "the mesh lies in (0, 0, 0) to (1, 1, 1)");
+  }
+  EXPECT_EQ(complaint_of_selecting(selections[0]).place, "the box (2, 2, 2) to (3, 3, 3)");
+  EXPECT_EQ(complaint_of_selecting(selections[2]).place, "the sphere about (0.5, 0.5, 0.5) of radius 0.5");
+  EXPECT_EQ(complaint_of_selecting(selections[3]).file, file.string());
+}
+
+}  // namespace
+}  // namespace exmat::precompute

@@ -1,0 +1,138 @@
+#include "precompute/modes/basis.h"
+
+#include <gtest/gtest.h>
+#include <optional>
+#include <random>
+
+#include "common/core/error.h"
+#include "common/elastic/st_venant_kirchhoff.h"
+#include "common/mesh/geometry.h"
+#include "tests/support/box_mesh.h"
+
+namespace exmat::precompute {
+namespace {
+
+// 3n internal force of St.Venant-Kirchhoff at a displacement, element by element.
+Eigen::VectorXd internal_force(const TetMesh& mesh, const TetMaterials& materials, const Eigen::VectorXd& u) {
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(u.size());
+  const Eigen::VectorXd volumes = tet_volumes(mesh);
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+    const auto gradients = shape_gradients(tet_positions(mesh, t));
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    for (int c = 0; c < 4; ++c) H += u.segment<3>(3 * mesh.tets(t, c)) * gradients.row(c);
+    const auto P = StVenantKirchhoff::first_piola_kirchhoff(
+        H, lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]));
+    for (int c = 0; c < 4; ++c) force.segment<3>(3 * mesh.tets(t, c)) += volumes[t] * P * gradients.row(c).transpose();
+  }
+  return force;
+}
+
+class Basis : public testing::TestWithParam<bool> {
+ protected:
+  Basis() {
+    materials_ = {Eigen::VectorXd::LinSpaced(mesh_.tet_count(), 800, 1200),
+                  Eigen::VectorXd::Constant(mesh_.tet_count(), 1e5),
+                  Eigen::VectorXd::Constant(mesh_.tet_count(), 0.35)};
+    FlagVector fixed = FlagVector::Zero(mesh_.vertex_count());
+    for (Eigen::Index v = 0; clamped() && v < fixed.size(); ++v) fixed[v] = mesh_.vertices(v, 0) < 1e-9 ? 1 : 0;
+    system_ = build_elastic_system(mesh_, materials_, fixed);
+    solver_.emplace(system_.stiffness, system_.mass * system_.null_space, "test");
+    modes_ = linear_modes(system_, *solver_, 6);
+    derivatives_ = modal_derivatives(mesh_, materials_, system_, *solver_, modes_.modes);
+  }
+  static bool clamped() { return GetParam(); }
+  Eigen::MatrixXd basis(int size, const Eigen::MatrixXd& fields = {}) const {
+    return modal_basis({system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), fields}, size);
+  }
+
+  TetMesh mesh_ = test::box_mesh({6, 2, 2}, {1.0, 0.3, 0.25});
+  TetMaterials materials_;
+  ElasticSystem system_;
+  std::optional<SemidefiniteSolver> solver_;
+  LinearModes modes_;
+  Eigen::MatrixXd derivatives_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Bodies, Basis, testing::Bool(),
+                         [](const auto& body) { return body.param ? "clamped" : "free"; });
+
+// The force is a cubic polynomial: the mixed central difference is its second derivative but for rounding.
+TEST_P(Basis, ModalDerivativesSolveTheDifferentiatedEquilibrium) {
+  const double amplitude = 0.1 * bounding_box_diagonal(mesh_.vertices);
+  const Eigen::MatrixXd fields = system_.extend(modes_.modes);
+  const auto f = [this](const Eigen::VectorXd& u) { return internal_force(mesh_, materials_, u); };
+  for (Eigen::Index j = 0; j < 6; ++j)
+    for (Eigen::Index i = 0; i <= j; ++i) {
+      const double si = amplitude / fields.col(i).cwiseAbs().maxCoeff(),
+                   sj = amplitude / fields.col(j).cwiseAbs().maxCoeff();
+      const Eigen::VectorXd a = si * fields.col(i), b = sj * fields.col(j);
+      const Eigen::VectorXd second = (f(a + b) - f(a - b) - f(b - a) + f(-a - b)) / (4 * si * sj);
+      Eigen::VectorXd load = -system_.restrict(second);
+      if (system_.null_space.cols() > 0)
+        load -= system_.mass * (system_.null_space * (system_.null_space.transpose() * load));
+      const Eigen::VectorXd residual = system_.stiffness * derivatives_.col(pair_index(i, j)) - load;
+      EXPECT_LE(residual.norm(), 1e-9 * load.norm()) << i << " " << j;
+    }
+}
+
+TEST_P(Basis, IsMassOrthonormalAndFreeOfRigidMotion) {
+  const auto U = basis(20);
+  EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(20, 20)).cwiseAbs().maxCoeff(), 1e-12);
+  if (!clamped()) {
+    EXPECT_LE((system_.null_space.transpose() * (system_.mass * U)).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
+TEST_P(Basis, DoesNotDependOnUnits) {
+  const auto U = basis(15);
+  mesh_.vertices *= 1000;  // millimetres
+  materials_.density *= 1e-9;
+  materials_.youngs_modulus *= 1e-3;
+  FlagVector fixed = FlagVector::Zero(mesh_.vertex_count());
+  for (Eigen::Index v = 0; clamped() && v < fixed.size(); ++v) fixed[v] = mesh_.vertices(v, 0) < 1e-9 ? 1 : 0;
+  const auto other = build_elastic_system(mesh_, materials_, fixed);
+  const SemidefiniteSolver solver(other.stiffness, other.mass * other.null_space, "test");
+  const auto modes = linear_modes(other, solver, 6);
+  const auto derivatives = modal_derivatives(mesh_, materials_, other, solver, modes.modes);
+  const Eigen::MatrixXd V = modal_basis({other, modes, derivatives, bounding_box_diagonal(mesh_.vertices), {}}, 15);
+  // The spans agree: the projection of one basis onto the other has singular values of one.
+  const Eigen::MatrixXd overlap = U.transpose() * (system_.mass * V);
+  const Eigen::VectorXd scaled =
+      overlap.colwise().norm() / V.colwise().norm().maxCoeff() * U.colwise().norm().maxCoeff();
+  const Eigen::MatrixXd unit = V * std::sqrt(1 / (V.col(0).dot(system_.mass * V.col(0))));
+  EXPECT_LE((unit - U * (U.transpose() * (system_.mass * unit))).norm(), 1e-6 * unit.norm());
+}
+
+TEST_P(Basis, HoldsTheExampleFields) {
+  std::mt19937 generator(7);
+  std::normal_distribution<double> normal;
+  Eigen::MatrixXd fields = Eigen::MatrixXd::NullaryExpr(system_.full_mass.rows(), 2, [&] { return normal(generator); });
+  const Eigen::MatrixXd clamped_fields = clamp_fields(system_, *solver_, fields);
+  const auto U = basis(20, clamped_fields);
+  Eigen::MatrixXd deforming = clamped_fields;
+  if (system_.null_space.cols() > 0)
+    deforming -= system_.null_space * (system_.null_space.transpose() * (system_.mass * deforming));
+  EXPECT_LE((deforming - U * (U.transpose() * (system_.mass * deforming))).norm(), 1e-10 * deforming.norm());
+  EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(20, 20)).cwiseAbs().maxCoeff(), 1e-12);
+}
+
+TEST_P(Basis, ClampedFieldsAreInEquilibriumWithTheirClamp) {
+  if (!clamped()) GTEST_SKIP();
+  const Eigen::MatrixXd fields = Eigen::MatrixXd::Random(system_.full_mass.rows(), 1);
+  const Eigen::MatrixXd correction = system_.extend(clamp_fields(system_, *solver_, fields)) - fields;
+  // The correction cancels the field on the clamp and loads no free vertex.
+  const Eigen::MatrixXd load = system_.restrict(system_.full_stiffness * correction);
+  EXPECT_LE(load.norm(), 1e-10 * (system_.full_stiffness * fields).norm());
+}
+
+TEST_P(Basis, MoreModesThanSnapshotsAreRefused) {
+  try {
+    basis(28);
+    FAIL();
+  } catch (const WorkError& error) {
+    EXPECT_NE(std::string(error.what()).find("expected at most 27"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace exmat::precompute
