@@ -101,7 +101,7 @@ void Pipeline::set_shape_data(ShapeStage& stage, const Eigen::VectorXd& eigenval
 }
 
 RestMap Pipeline::map_rest(const LaplaceBasis& object, const ExampleInput& input, const LaplaceBasis& rest_basis) {
-  if (input.object_is_rest) return identity_map(object.eigenvalues.size());
+  if (input.object_is_rest) return identity_map(object.eigenvalues.size(), object.vertices.rows());
   const RestMap map = rest_map(object, input.rest, rest_basis);
   log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)", input.rest_name,
                         100 * map.residual, map.confidence));

@@ -82,12 +82,14 @@ struct Minimizer {
 
 }  // namespace
 
-Eigen::MatrixXd BarycentricPoints::interpolate(const TetMesh& mesh, const Eigen::MatrixXd& vertex_values) const {
-  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(tets.size(), vertex_values.cols());
+SparseMatrix BarycentricPoints::interpolation(const TetMesh& mesh) const {
+  std::vector<Eigen::Triplet<double>> entries;
   for (Eigen::Index k = 0; k < tets.size(); ++k)
     for (int corner = 0; corner < 4; ++corner)
-      values.row(k) += weights(k, corner) * vertex_values.row(mesh.tets(tets[k], corner));
-  return values;
+      entries.emplace_back(static_cast<int>(k), mesh.tets(tets[k], corner), weights(k, corner));
+  SparseMatrix matrix(tets.size(), mesh.vertex_count());
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
 }
 
 BarycentricPoints nearest_points(const TetMesh& mesh, const VertexArray& points) {

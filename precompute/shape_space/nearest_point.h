@@ -1,6 +1,7 @@
 #pragma once
 
 #include "common/mesh/tet_mesh.h"
+#include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
 
@@ -10,8 +11,8 @@ struct BarycentricPoints {
   Eigen::Matrix<double, Eigen::Dynamic, 4> weights;  ///< k x 4, >= 0, rows sum to 1
   Eigen::VectorXd distances;                         ///< k, from the queried points
 
-  /// [k x c] values of a piecewise linear field given [n x c] on the vertices.
-  Eigen::MatrixXd interpolate(const TetMesh& mesh, const Eigen::MatrixXd& vertex_values) const;
+  /// [k x n] matrix that interpolates piecewise linear fields given on the vertices of the mesh.
+  SparseMatrix interpolation(const TetMesh& mesh) const;
 };
 
 /// The nearest point of the body for each of [k x 3] points; those inside it are their own.

@@ -23,13 +23,19 @@ Eigen::Matrix3d fit_rotation(const VertexArray& posed, const VertexArray& rest, 
   return procrustes_rotation((rest.rowwise() - rest_mean).transpose() * (weights * centred));
 }
 
-// Share of a displacement [n_e x 3] of the rest example, its mean left out, that the map does not carry over.
-double lost_share(const RestMap& map, const LaplaceBasis& rest_basis, const VertexArray& displacement) {
-  const VertexArray deforming = displacement.rowwise() - (rest_basis.mass * displacement).colwise().sum();
-  const double full = (deforming.transpose() * (rest_basis.mass * deforming)).trace();
-  if (full <= kNoDisplacement * kNoDisplacement) return 0;
-  const double carried = (map.functional_map * coefficients(rest_basis, deforming)).squaredNorm();
-  return std::sqrt(std::max(0.0, 1 - carried / full));
+// |d - d_m| / |d| in the object's mass, d the displacement [n_e x 3] of the rest example pulled back to the object, its
+// mean left out, and d_m what the object's functions have of it.
+double lost_share(const LaplaceBasis& object, const RestMap& map, const LaplaceBasis& rest_basis,
+                  const VertexArray& displacement) {
+  const auto norm = [&object](const VertexArray& field) {
+    return std::sqrt((field.transpose() * (object.mass * field)).trace());
+  };
+  VertexArray pulled_back = map.pull_back * displacement;
+  pulled_back.rowwise() -= (object.mass * pulled_back).colwise().sum();
+  const double full = norm(pulled_back);
+  if (full <= kNoDisplacement) return 0;
+  const Eigen::MatrixXd carried = map.functional_map * coefficients(rest_basis, displacement);
+  return norm(pulled_back - object.eigenfunctions * carried) / full;
 }
 
 }  // namespace
@@ -48,15 +54,20 @@ Eigen::Index example_function_count(Eigen::Index m, Eigen::Index vertices) {
   return std::min(m + m / 2 + 5, vertices - 2);
 }
 
-RestMap identity_map(Eigen::Index m) { return {Eigen::MatrixXd::Identity(m, m), 0, 0, true}; }
+RestMap identity_map(Eigen::Index m, Eigen::Index vertices) {
+  SparseMatrix identity(vertices, vertices);
+  identity.setIdentity();
+  return {Eigen::MatrixXd::Identity(m, m), identity, 0, 0, true};
+}
 
 RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const LaplaceBasis& rest_basis) {
   const TetMesh normalised{rest_basis.vertices, rest_mesh.tets};
   const auto nearest = nearest_points(normalised, object.vertices);
-  const Eigen::MatrixXd pulled_back = nearest.interpolate(normalised, rest_basis.eigenfunctions);
-  const Eigen::MatrixXd map = object.eigenfunctions.transpose() * (object.mass * pulled_back);
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(map, Eigen::ComputeThinU | Eigen::ComputeThinV);
   RestMap result;
+  result.pull_back = nearest.interpolation(normalised);
+  const Eigen::MatrixXd map =
+      object.eigenfunctions.transpose() * (object.mass * (result.pull_back * rest_basis.eigenfunctions));
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(map, Eigen::ComputeThinU | Eigen::ComputeThinV);
   result.functional_map = svd.matrixU() * svd.matrixV().transpose();
   result.confidence = (svd.singularValues().array() - 1).matrix().norm() / std::sqrt(static_cast<double>(map.rows()));
   const double radius = object.vertices.rowwise().norm().norm();
@@ -78,7 +89,7 @@ TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd&
   TransferredPose pose;
   pose.coefficients = (rest_coefficients + change) * fit.transpose();
   pose.rotation = fit * to_rest;
-  pose.shape_space_error = lost_share(map, rest_basis, posed * pose.rotation.transpose() - rest_basis.vertices);
+  pose.shape_space_error = lost_share(object, map, rest_basis, posed * pose.rotation.transpose() - rest_basis.vertices);
   return pose;
 }
 

@@ -11,6 +11,7 @@ namespace exmat::precompute {
 /// Where an example file's body stands to the object: alignment.md, "Default".
 struct RestMap {
   Eigen::MatrixXd functional_map;  ///< C_0, m x K_e, orthonormal rows
+  SparseMatrix pull_back;          ///< n x n_e, values at the nearest point of the rest example for each object vertex
   double residual = 0;  ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
   double confidence =
       0;  ///< |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 where they are the object's own
@@ -27,14 +28,15 @@ Eigen::Index example_function_count(Eigen::Index m, Eigen::Index vertices);
 /// normalised. `object` holds the object's first m functions.
 RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const LaplaceBasis& rest_basis);
 
-/// The identity map of an object that is its own rest example.
-RestMap identity_map(Eigen::Index m);
+/// The identity map of an object of m functions that is its own rest example.
+RestMap identity_map(Eigen::Index m, Eigen::Index vertices);
 
 /// A pose of the rest example's mesh, in the object's shape space.
 struct TransferredPose {
   Eigen::MatrixXd coefficients;                  ///< m x 3, of the posed object
   RowMatrix3 rotation = RowMatrix3::Identity();  ///< from the example's frame to the object's
-  double shape_space_error = 0;                  ///< share of the displacement that the map's m functions lose
+  double shape_space_error =
+      0;  ///< |d - d_m|_M / |d|_M on the object: d the example's displacement, d_m what came over
 };
 
 /// What a pose is brought into once it is transferred. method.md, section 1, "Frame".

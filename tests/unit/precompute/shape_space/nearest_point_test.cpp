@@ -20,7 +20,7 @@ TEST(NearestPoints, OfABoxAreTheClampedPoints) {
   const auto mesh = test::box_mesh({5, 4, 3}, {1.0, 0.8, 0.6});
   const VertexArray points = random_points(400, -0.7, 1.5);
   const auto nearest = nearest_points(mesh, points);
-  const Eigen::MatrixXd found = nearest.interpolate(mesh, mesh.vertices);
+  const Eigen::MatrixXd found = nearest.interpolation(mesh) * mesh.vertices;
   for (Eigen::Index k = 0; k < points.rows(); ++k) {
     const Eigen::RowVector3d exact = points.row(k).cwiseMax(0.0).cwiseMin(Eigen::RowVector3d(1.0, 0.8, 0.6));
     EXPECT_LE((found.row(k) - exact).norm(), 1e-13);
