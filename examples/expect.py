@@ -1,0 +1,35 @@
+#!/usr/bin/python3
+"""Compare a trajectory with the values that its example expects.
+
+Usage: expect.py EXPECTED.json TRAJECTORY.h5    (Debian: python3-h5py)
+
+EXPECTED.json: {"DATASET[last]" or "DATASET[max]": {"value": number or list, "margin": relative to the largest magnitude}, ...}.
+Exit status 0 when every value is within its margin.
+"""
+import json
+import re
+import sys
+
+import h5py
+import numpy as np
+
+
+def main():
+    failures = 0
+    with open(sys.argv[1]) as f:
+        expected = json.load(f)
+    with h5py.File(sys.argv[2]) as trajectory:
+        for name, entry in expected.items():
+            dataset, what = re.fullmatch(r"(.*)\[(last|max)\]", name).groups()
+            values = trajectory[dataset][:]
+            found = values[-1] if what == "last" else np.abs(values).max(0)
+            wanted = np.asarray(entry["value"])
+            error = np.abs(found - wanted).max() / np.abs(wanted).max()
+            ok = error <= entry["margin"]
+            failures += not ok
+            print(f"{'ok  ' if ok else 'FAIL'} {name}: {np.array2string(np.asarray(found), precision=6)}, off by {error:.1e} (margin {entry['margin']:g})")
+    return 1 if failures else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
