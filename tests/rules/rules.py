@@ -1,0 +1,126 @@
+#!/usr/bin/python3
+"""The rules of the house: what may include what, what links to what, how sources look.
+
+Usage: rules.py ROOT    prints each violation as "rule: file:line: what"; exit status 1 if there are any.
+"""
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "tests", "examples", "docs", "README.md", "LICENSE",
+             "CHANGELOG.md", "CMakePresets.json", "install-dependencies"}
+LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime/sim")
+LEAN_INCLUDES = LEAN + ("exmat",)
+POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of core/atomic_file alone
+STREAMS = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "cstdio"}
+PRIVATE_HEADERS = {"precompute/solvers/petsc_handles.h": "precompute/solvers", "precompute/solvers/solver_access.h": "precompute/solvers"}
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+OWN = re.compile(r"^(common|precompute|runtime|tests)/")
+
+
+def sources(root, folders=("common", "precompute", "runtime")):
+    for folder in folders:
+        for path in sorted((root / folder).rglob("*")):
+            if path.suffix in (".h", ".cpp"):
+                yield path.relative_to(root).as_posix(), path
+
+
+def includes(path):
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        match = INCLUDE.match(line)
+        if match:
+            yield number, match.group(2)
+
+
+def without_comments_and_strings(text):
+    pattern = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.S)
+    return pattern.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), text)
+
+
+def direction(root):
+    """runtime never includes precompute; common includes neither."""
+    forbidden = {"common": ("precompute/", "runtime/"), "runtime": ("precompute/",), "precompute": ("runtime/",)}
+    for name, path in sources(root):
+        for number, header in includes(path):
+            if header.startswith(forbidden[name.split("/")[0]]):
+                yield f"{name}:{number}: includes {header}"
+
+
+def lean(root):
+    """The shared kernels and the hot path use the standard library and Eigen only."""
+    for name, path in sources(root):
+        if not name.startswith(LEAN):
+            continue
+        for number, header in includes(path):
+            own = OWN.match(header) and header.startswith(LEAN_INCLUDES)
+            standard = re.fullmatch(r"[a-z_0-9]+", header)
+            posix = header in POSIX and name == "common/core/atomic_file.cpp"
+            if not (own or standard or posix or header.startswith(("Eigen/", "unsupported/Eigen/", "exmat/"))):
+                yield f"{name}:{number}: includes {header}"
+
+
+def hot_path(root):
+    """No streams and no exceptions in runtime/sim."""
+    for name, path in sources(root, ("runtime/sim",)):
+        for number, header in includes(path):
+            if header in STREAMS:
+                yield f"{name}:{number}: includes {header}"
+        for number, line in enumerate(without_comments_and_strings(path.read_text()).splitlines(), 1):
+            if re.search(r"\b(throw|try|catch)\b", line):
+                yield f"{name}:{number}: {line.strip()}"
+
+
+def petsc(root):
+    """PETSc and SLEPc are seen in precompute/solvers alone."""
+    for name, path in sources(root):
+        inside = name.startswith("precompute/solvers/")
+        for number, header in includes(path):
+            foreign = re.match(r"(petsc|slepc|mpi)", header)
+            public = inside and path.suffix == ".h" and name not in PRIVATE_HEADERS
+            if (foreign and (not inside or public)) or (header in PRIVATE_HEADERS and (not inside or public)):
+                yield f"{name}:{number}: includes {header}"
+
+
+def hdf5(root):
+    """HDF5 is seen in common/bundle and runtime/io alone."""
+    for name, path in sources(root):
+        for number, header in includes(path):
+            if re.match(r"(hdf5|H5)", header) and not name.startswith(("common/bundle/", "runtime/io/")):
+                yield f"{name}:{number}: includes {header}"
+
+
+def top_level(root):
+    """Nothing but what the architecture names stands at the top."""
+    listed = subprocess.run(["git", "-C", str(root), "ls-files"], capture_output=True, text=True)
+    names = {line.split("/")[0] for line in listed.stdout.splitlines()} or {path.name for path in root.iterdir()}
+    for name in sorted(names):
+        if name not in TOP_LEVEL and not name.startswith("."):
+            yield f"{name}: not in the list"
+
+
+def formatting(root):
+    """clang-format has nothing to change."""
+    files = [str(path) for _, path in sources(root, ("common", "precompute", "runtime", "tests"))]
+    result = subprocess.run(["clang-format", "--dry-run", f"--style=file:{Path(__file__).parents[2] / '.clang-format'}", *files],
+                            capture_output=True, text=True)
+    for line in result.stderr.splitlines():
+        if "warning:" in line or "error:" in line:
+            yield line
+
+
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, top_level, formatting)}
+
+
+def violations(root):
+    return [f"{name}: {found}" for name, rule in RULES.items() for found in rule(root)]
+
+
+def main():
+    found = violations(Path(sys.argv[1]).resolve())
+    print("\n".join(found) if found else f"{len(RULES)} rules hold")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
