@@ -30,7 +30,7 @@ def draw(axes, positions, rest, surface, largest, title):
     axes.add_collection3d(Poly3DCollection(triangles, facecolors=shade(triangles, colours), edgecolors=(0, 0, 0, 0.15), linewidths=0.3))
     axes.set_title(title, fontsize=9)
     axes.set_axis_off()
-    axes.view_init(elev=18, azim=-65)
+    axes.view_init(elev=22, azim=-50)
 
 
 def main():
@@ -43,12 +43,12 @@ def main():
         time, vertices = f["/time"][frames], f["/vertices"][frames]
     largest = max(np.linalg.norm(v - rest, axis=1).max() for v in vertices) or 1
     low, high = vertices.min((0, 1)), vertices.max((0, 1))
-    figure = plt.figure(figsize=(3.2 * len(frames), 2.8))
+    figure = plt.figure(figsize=(3.4 * len(frames), 2.6))
     for k, (t, positions) in enumerate(zip(time, vertices)):
         axes = figure.add_subplot(1, len(frames), k + 1, projection="3d")
         draw(axes, positions, rest, surface, largest, f"t = {t:.2f} s")
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        axes.set_box_aspect(high - low, zoom=1.5)
+        axes.set_box_aspect(high - low, zoom=1.02)
     figure.tight_layout(pad=0.2)
     figure.savefig(picture, dpi=110)
     print(f"{picture}: {len(frames)} frames, largest displacement {largest:.3g} m")
