@@ -11,9 +11,12 @@
 
 namespace exmat {
 
-/// Writes the groups that the model holds to a temporary file beside `path`, then renames it over `path`. The same model
-/// gives the same bytes. Throws WorkError (message names the file); `path` is then as it was.
+/// Writes the groups that the model holds to a temporary file beside `path`, then renames it over `path`. The same
+/// model gives the same bytes. Throws WorkError (message names the file); `path` is then as it was.
 void write_bundle(const ReducedModel& model, const std::filesystem::path& path);
+
+/// Sets the bytes of each included group's datasets as write_bundle would write them.
+void fill_bytes(const ReducedModel& model, std::vector<LedgerEntry>& ledger);
 
 /// What a bundle says of itself: read from its attributes and table of contents alone.
 struct BundleSummary {
@@ -33,13 +36,14 @@ struct ReadRecord {
 
 /// Which parts of a bundle to read.
 struct BundleRequest {
-  std::vector<LedgerEntry> groups;  ///< plan_groups(...); an included group that the file lacks is an InputError that names it
-  bool step_only = false;           ///< only datasets whose schema `use` is "step": what stepping needs
-  bool positions = false;           ///< with step_only: also those with `use` "positions": what writing positions needs
+  /// From plan_groups(). An included group that the file lacks is an InputError that names it.
+  std::vector<LedgerEntry> groups;
+  bool step_only = false;  ///< only datasets whose schema `use` is "step": what stepping needs
+  bool positions = false;  ///< with step_only: also those with `use` "positions": what writing positions needs
 };
 
-/// Reads and validates: magic, version, types, sizes, ranges, finiteness, checksums, cross-references. Throws InputError
-/// that names the file and the dataset. `record`, if given, receives every dataset that was read.
+/// Reads and validates: magic, version, types, sizes, ranges, finiteness, checksums, cross-references. Throws
+/// InputError that names the file and the dataset. `record`, if given, receives every dataset that was read.
 ReducedModel read_bundle(const std::filesystem::path& path, const BundleRequest& request,
                          std::vector<ReadRecord>* record = nullptr);
 
@@ -49,5 +53,10 @@ ReducedModel read_bundle(const std::filesystem::path& path);
 /// [3k x r] rows of /modal/basis for k vertices; ids out of range are an InputError.
 RowMatrix read_basis_rows(const std::filesystem::path& path, std::span<const std::int64_t> vertices,
                           std::vector<ReadRecord>* record = nullptr);
+
+/// All that is wrong with a bundle, one message each; empty if it is sound. Beyond what read_bundle checks: the
+/// attributes of every dataset, the list of features, and entries that the format does not have (which read_bundle
+/// ignores).
+std::vector<std::string> validate_bundle(const std::filesystem::path& path);
 
 }  // namespace exmat

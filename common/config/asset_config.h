@@ -62,7 +62,7 @@ struct AssetConfig {
   std::string weighting = "eigenvalue";  ///< or "none"
   std::string frame = "auto";            ///< "auto", "shared" or "free"
 
-  int basis_size = 30;        ///< r
+  int basis_size = 30;  ///< r
   int linear_modes = 15;
   bool example_fields = true;
 
@@ -71,7 +71,10 @@ struct AssetConfig {
   std::string cubature_method = "greedy_swap";
   int training_poses = 200;
 
-  std::optional<std::vector<std::string>> needs;  ///< optional groups to write ("examples", "rigid"); absent: all that apply
+  double target_tolerance = 1e-4;  ///< relative error of the table of targets
+
+  std::optional<std::vector<std::string>>
+      needs;  ///< optional groups to write ("examples", "rigid"); absent: all that apply
   std::uint64_t seed = 1;
 };
 

@@ -8,8 +8,8 @@
 
 namespace exmat {
 
-/// Reads ASSET.json or SCENE.json, validates it against schemas/, fills in the defaults. Throws InputError with the file,
-/// the JSON pointer, what was expected and found; an unknown member suggests the nearest name.
+/// Reads ASSET.json or SCENE.json, validates it against schemas/, fills in the defaults. Throws InputError with the
+/// file, the JSON pointer, what was expected and found; an unknown member suggests the nearest name.
 AssetConfig load_asset(const std::filesystem::path& file);
 SceneConfig load_scene(const std::filesystem::path& file);
 

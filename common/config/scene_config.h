@@ -12,9 +12,9 @@ namespace exmat {
 
 /// A constant world-space force on each of the named vertices while start <= t < end.
 struct VertexForceConfig {
-  std::vector<std::int64_t> vertices;  ///< 0-based ids
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();  ///< on each vertex [N]
-  double start = 0;                                 ///< [s]
+  std::vector<std::int64_t> vertices;                    ///< 0-based ids
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();       ///< on each vertex [N]
+  double start = 0;                                      ///< [s]
   double end = std::numeric_limits<double>::infinity();  ///< [s]
 };
 

@@ -30,9 +30,9 @@ std::string random_suffix() {
   constexpr char kDigits[] = "0123456789abcdef";
   constexpr int kLength = 16;
   std::random_device device;
-  std::string suffix;
+  std::string suffix = ".";
   for (int i = 0; i < kLength; ++i) suffix += kDigits[device() % 16];
-  return suffix;
+  return suffix + ".tmp";
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& target) {
@@ -75,7 +75,7 @@ AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)
   check_target(target_);
   for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
     temporary_ = target_;
-    temporary_ += "." + random_suffix() + ".tmp";
+    temporary_ += random_suffix();
     const Descriptor descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL);
     if (descriptor.get() >= 0) {
       pending_ = true;

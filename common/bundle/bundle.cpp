@@ -1,0 +1,79 @@
+#include "common/bundle/bundle.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+
+#include "common/bundle/bundle_reader.h"
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+constexpr std::string_view kPlaceholder = "{example}";
+
+std::int64_t value_of(const SymbolSizes& sizes, std::string_view symbol) {
+  const auto* binding = sizes.find(symbol);
+  return binding == nullptr ? 0 : binding->value;
+}
+
+// Binds all sizes from the table of contents.
+void open_listed(BundleReader& reader, const std::vector<LedgerEntry>& groups) {
+  for (const DatasetSchema& schema : bundle_schema().datasets)
+    if (includes(groups, schema.group) && schema.path.find(kPlaceholder) == std::string::npos)
+      reader.open_checked(schema, schema.path);
+}
+
+}  // namespace
+
+BundleSummary summarise_bundle(const std::filesystem::path& path) {
+  BundleReader reader(path);
+  const auto groups = reader.listed_groups();
+  open_listed(reader, groups);
+  BundleSummary summary;
+  summary.asset_name = reader.text_attribute("asset_name");
+  summary.generator = reader.text_attribute("generator");
+  summary.input_sha256 = reader.text_attribute("input_sha256");
+  summary.format_version = reader.format_version();
+  summary.constrained = reader.constrained();
+  for (const LedgerEntry& entry : groups)
+    if (entry.included) summary.groups.push_back(entry.group);
+  const SymbolSizes& sizes = reader.sizes();
+  summary.vertices = value_of(sizes, "n");
+  summary.tets = value_of(sizes, "n_t");
+  summary.modes = value_of(sizes, "r");
+  summary.cubature_elements = value_of(sizes, "s");
+  summary.eigenfunctions = value_of(sizes, "m");
+  summary.examples = value_of(sizes, "K");
+  return summary;
+}
+
+ReducedModel read_bundle(const std::filesystem::path& path, const BundleRequest& request,
+                         std::vector<ReadRecord>* record) {
+  return BundleReader(path, record).read(request);
+}
+
+ReducedModel read_bundle(const std::filesystem::path& path) {
+  BundleReader reader(path);
+  return reader.read({.groups = reader.listed_groups()});
+}
+
+RowMatrix read_basis_rows(const std::filesystem::path& path, std::span<const std::int64_t> vertices,
+                          std::vector<ReadRecord>* record) {
+  BundleReader reader(path, record);
+  const DatasetSchema& schema = bundle_schema().dataset("/modal/basis");
+  const Hdf5Dataset basis = reader.open_checked(schema, schema.path);
+  const std::int64_t count = basis.sizes()[0], modes = basis.sizes()[2];
+  RowMatrix rows(3 * std::ssize(vertices), modes);
+  for (std::size_t i = 0; i < vertices.size(); ++i) {
+    const std::int64_t vertex = vertices[i];
+    if (vertex < 0 || vertex >= count)
+      throw InputError({path.string(), schema.path, fmt::format("vertex ids from 0 to {}", count - 1),
+                        fmt::format("{}", vertex), ""});
+    basis.read_rows(vertex, 1, rows.row(3 * static_cast<Eigen::Index>(i)).data(), schema.type);
+  }
+  if (!rows.allFinite()) throw InputError({path.string(), schema.path, "finite numbers", "others", ""});
+  reader.note(schema.path, static_cast<std::size_t>(rows.size()) * sizeof(double));
+  return rows;
+}
+
+}  // namespace exmat

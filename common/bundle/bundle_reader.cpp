@@ -1,0 +1,215 @@
+#include "common/bundle/bundle_reader.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <span>
+
+#include "common/bundle/value_checks.h"
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attributes, std::string_view name) {
+  const auto found = std::ranges::find(attributes, name, &AttributeSchema::name);
+  if (found == attributes.end()) throw std::logic_error(fmt::format("attribute {} is not in the schema", name));
+  return *found;
+}
+
+std::string size_text(std::span<const std::int64_t> sizes) {
+  return sizes.empty() ? "a scalar" : fmt::format("{}", fmt::join(sizes, " x "));
+}
+
+}  // namespace
+
+BundleReader::BundleReader(const std::filesystem::path& path, std::vector<ReadRecord>* record,
+                           std::vector<std::string>* problems)
+    : file_(Hdf5File::open(path)), record_(record), problems_(problems) {
+  read_header();
+}
+
+void BundleReader::read_header() {
+  header_value("format");
+  format_version_ = std::get<std::int64_t>(header_value("format_version"));
+  if (format_version_ > bundle_schema().format_version)
+    refuse("/@format_version", fmt::format("at most {}", bundle_schema().format_version),
+           fmt::format("{}", format_version_), "a newer version of exmat wrote this bundle");
+  features_ = std::get<std::vector<std::string>>(header_value("features"));
+  constrained_ = std::get<std::int64_t>(header_value("constrained")) != 0;
+}
+
+AttributeValue BundleReader::header_value(std::string_view name) const {
+  const AttributeSchema& schema = find_attribute(bundle_schema().attributes, name);
+  AttributeValue value = file_.read_attribute("/", schema.name);
+  if (const auto fault = check_value(schema, value, sizes_)) refuse("/@" + schema.name, fault->expected, fault->found);
+  return value;
+}
+
+std::string BundleReader::text_attribute(const std::string& name) const {
+  return std::get<std::string>(header_value(name));
+}
+
+std::vector<LedgerEntry> BundleReader::listed_groups() const {
+  std::vector<LedgerEntry> ledger = plan_groups(Needs{}, constrained_, true);
+  for (LedgerEntry& entry : ledger) {
+    entry.included = std::ranges::find(features_, entry.group) != features_.end();
+    entry.reason = "the root attribute features lists it";
+  }
+  return ledger;
+}
+
+std::vector<std::string> BundleReader::example_names() const {
+  std::vector<std::string> names;
+  for (std::string& name : file_.list("/examples"))
+    if (std::ranges::find(kExampleDatasets, name) == std::end(kExampleDatasets) && file_.has_group("/examples/" + name))
+      names.push_back(std::move(name));
+  return names;
+}
+
+ReducedModel BundleReader::read(const BundleRequest& request) {
+  request_ = request;
+  ReducedModel model;
+  for (const LedgerEntry& entry : request.groups) {
+    if (!entry.included) continue;
+    attempt([&] {
+      require_group(entry);
+      add_group(model, entry.group);
+    });
+  }
+  if (model.examples) {
+    for (const std::string& name : example_names()) model.examples->examples.emplace_back().name = name;
+    sizes_.set("K", std::ssize(model.examples->examples), "the groups of /examples");
+  }
+  visit_fields(model, *this);
+  check_model(model);
+  if (model.examples) std::ranges::stable_sort(model.examples->examples, {}, &ExampleData::index);
+  return model;
+}
+
+void BundleReader::require_group(const LedgerEntry& entry) const {
+  const std::string path = "/" + entry.group;
+  if (file_.has_group(path)) return;
+  refuse(path, fmt::format("the group ({})", entry.reason), "none",
+         fmt::format("precompute the bundle again, with --scene SCENE.json or with \"{}\" among the needs of the asset",
+                     entry.group));
+}
+
+Hdf5Dataset BundleReader::open_checked(const DatasetSchema& schema, const std::string& path) {
+  Hdf5Dataset dataset = file_.open_dataset(path);
+  if (dataset.type() != schema.type) refuse(path, std::string(name_of(schema.type)), dataset.type_name());
+  if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), path))
+    refuse(path, *expected, size_text(dataset.sizes()));
+  const bool may_be_empty = std::ranges::find(schema.constraints, Constraint::Kind::kMayBeEmpty, &Constraint::kind) !=
+                            schema.constraints.end();
+  if (dataset.element_count() == 0 && !may_be_empty) refuse(path, "some elements", size_text(dataset.sizes()));
+  dataset.check_storage();
+  return dataset;
+}
+
+void BundleReader::note(const std::string& dataset, std::size_t bytes) {
+  if (record_ != nullptr) record_->push_back({dataset, bytes});
+}
+
+void BundleReader::attempt(const std::function<void()>& check) {
+  try {
+    check();
+  } catch (const InputError& error) {
+    if (problems_ == nullptr) throw;
+    problems_->push_back(error.what());
+  }
+}
+
+void BundleReader::group(std::string_view schema_path, std::string_view example) {
+  schema_path_ = schema_path;
+  path_ = fill_example(schema_path, example);
+}
+
+AttributeValue BundleReader::read_value(std::string_view name) {
+  const auto& attributes =
+      schema_path_ == "/" ? bundle_schema().attributes : bundle_schema().group(schema_path_).attributes;
+  const AttributeSchema& schema = find_attribute(attributes, name);
+  AttributeValue value = file_.read_attribute(path_, schema.name);
+  const std::string place = path_ + "@" + schema.name;
+  if (const auto fault = check_value(schema, value, sizes_)) refuse(place, fault->expected, fault->found);
+  sound_.insert(place);
+  return value;
+}
+
+const DatasetSchema& BundleReader::schema_of(std::string_view name) const {
+  return bundle_schema().dataset(fmt::format("{}/{}", schema_path_, name));
+}
+
+bool BundleReader::is_wanted(const DatasetSchema& schema) const {
+  if (schema.since > format_version_) return false;
+  if (!request_.step_only || schema.use == Use::kStep) return true;
+  return request_.positions && schema.use == Use::kPositions;
+}
+
+std::pair<std::int64_t, std::int64_t> BundleReader::matrix_sizes(const Hdf5Dataset& dataset) {
+  const auto& sizes = dataset.sizes();
+  if (sizes.size() == 1) return {sizes.front(), 1};
+  std::int64_t rows = 1;
+  for (std::size_t axis = 0; axis + 1 < sizes.size(); ++axis) rows *= sizes[axis];
+  return {rows, sizes.back()};
+}
+
+void BundleReader::read_checked(const Hdf5Dataset& dataset, const DatasetSchema& schema, void* memory) {
+  const std::size_t bytes = dataset.element_count() * size_of(schema.type);
+  dataset.read(memory, schema.type);
+  note(dataset.path(), bytes);
+  const std::int64_t crc = crc32_of({static_cast<const std::byte*>(memory), bytes});
+  const AttributeValue stored = file_.read_attribute(dataset.path(), "crc32");
+  const auto* stored_crc = std::get_if<std::int64_t>(&stored);
+  const bool intact = stored_crc != nullptr && *stored_crc == crc;
+  constexpr const char* kChanged = "the data are damaged or were changed after the bundle was written";
+  // The value comes first: it says more.
+  if (const auto fault = check_values(schema, dataset.sizes(), memory, sizes_))
+    refuse(dataset.path(), fault->expected, fault->found, intact ? "" : kChanged);
+  if (!intact)
+    refuse(dataset.path(), stored_crc == nullptr ? "a checksum" : fmt::format("checksum {:08x}", *stored_crc),
+           fmt::format("{:08x}", crc), kChanged);
+  sound_.insert(dataset.path());
+}
+
+void BundleReader::check_model(const ReducedModel& model) {
+  if (model.examples) attempt([&] { check_example_indices(*model.examples); });
+  attempt([&] { check_fixed_vertices(model); });
+}
+
+void BundleReader::check_example_indices(const ExampleSet& set) const {
+  const auto count = set.examples.size();
+  if (count == 0) refuse("/examples", "at least the rest pose", "no example");
+  std::vector<const ExampleData*> by_index(count, nullptr);
+  for (const ExampleData& example : set.examples) {
+    const std::string path = "/examples/" + example.name;
+    if (!is_sound(path + "@index") || !is_sound(path + "@is_rest")) return;
+    const ExampleData*& slot = by_index[static_cast<std::size_t>(example.index)];
+    if (slot != nullptr)
+      refuse(path + "@index", "another index for each example",
+             fmt::format("{}, that of {} too", example.index, slot->name));
+    slot = &example;
+    if (example.is_rest != (example.index == 0))
+      refuse(path + "@is_rest", "1 for index 0 and 0 for all others",
+             fmt::format("{} for index {}", example.is_rest ? 1 : 0, example.index));
+  }
+}
+
+void BundleReader::check_fixed_vertices(const ReducedModel& model) const {
+  if (!is_sound("/object/fixed")) return;
+  const FlagVector& fixed = model.object->fixed;
+  const bool any_fixed = (fixed.array() != 0).any();
+  if (any_fixed != constrained_)
+    refuse("/@constrained", any_fixed ? "1 (/object/fixed has fixed vertices)" : "0 (/object/fixed has none)",
+           constrained_ ? "1" : "0");
+  if (!is_sound("/modal/basis")) return;
+  for (Eigen::Index v = 0; v < fixed.size(); ++v)
+    if (fixed[v] != 0 && !model.modal->basis.middleRows(3 * v, 3).isZero(0))
+      refuse("/modal/basis", fmt::format("zeros on vertex {}, fixed by /object/fixed", v), "other numbers");
+}
+
+void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,
+                          const std::string& advice) const {
+  throw InputError({file_.name(), place, expected, found, advice});
+}
+
+}  // namespace exmat

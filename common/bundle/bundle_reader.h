@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <functional>
+#include <set>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/bundle/bundle.h"
+#include "common/bundle/fields.h"
+#include "common/bundle/hdf5_file.h"
+#include "common/bundle/schema.h"
+#include "common/model/reduced_model.h"
+
+namespace exmat {
+
+/// Reads a bundle's header when constructed, then what is asked of it. Every fault is an InputError that names the file
+/// and the dataset, or, with `problems`, one more message there. Also the visitor of the field list (fields.h).
+class BundleReader {
+ public:
+  BundleReader(const std::filesystem::path& path, std::vector<ReadRecord>* record = nullptr,
+               std::vector<std::string>* problems = nullptr);
+
+  const Hdf5File& file() const { return file_; }
+  std::int64_t format_version() const { return format_version_; }
+  const std::vector<std::string>& features() const { return features_; }
+  bool constrained() const { return constrained_; }
+  const SymbolSizes& sizes() const { return sizes_; }
+
+  /// Ledger of the groups that the header lists, in bundle order.
+  std::vector<LedgerEntry> listed_groups() const;
+  /// Names of the groups in /examples.
+  std::vector<std::string> example_names() const;
+
+  ReducedModel read(const BundleRequest& request);
+  /// Of the root.
+  std::string text_attribute(const std::string& name) const;
+  /// Opens a dataset and checks its type and sizes, which binds its symbols; reads no data.
+  Hdf5Dataset open_checked(const DatasetSchema& schema, const std::string& path);
+  void note(const std::string& dataset, std::size_t bytes);
+  /// Runs `check`; with `problems`, an InputError of it is noted there.
+  void attempt(const std::function<void()>& check);
+
+  void group(std::string_view schema_path, std::string_view example);
+
+  template <typename T>
+  void attribute(std::string_view name, T& member) {
+    attempt([&] { from_attribute(read_value(name), member); });
+  }
+
+  template <typename T>
+  void dataset(std::string_view name, T& member) {
+    const DatasetSchema& schema = schema_of(name);
+    if (!is_wanted(schema)) return;
+    attempt([&] {
+      const std::string path = path_ + "/" + std::string(name);
+      const Hdf5Dataset dataset = open_checked(schema, path);
+      const auto [rows, cols] = matrix_sizes(dataset);
+      read_checked(dataset, schema, resized(member, rows, cols));
+    });
+  }
+
+ private:
+  void read_header();
+  AttributeValue header_value(std::string_view name) const;
+  AttributeValue read_value(std::string_view name);
+  void require_group(const LedgerEntry& entry) const;
+  const DatasetSchema& schema_of(std::string_view name) const;
+  bool is_wanted(const DatasetSchema& schema) const;
+  static std::pair<std::int64_t, std::int64_t> matrix_sizes(const Hdf5Dataset& dataset);
+  void read_checked(const Hdf5Dataset& dataset, const DatasetSchema& schema, void* memory);
+  void check_model(const ReducedModel& model);
+  void check_example_indices(const ExampleSet& set) const;
+  void check_fixed_vertices(const ReducedModel& model) const;
+  bool is_sound(const std::string& place) const { return sound_.contains(place); }
+  [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,
+                           const std::string& advice = "") const;
+
+  Hdf5File file_;
+  std::vector<ReadRecord>* record_;
+  std::vector<std::string>* problems_;
+  std::int64_t format_version_ = 0;
+  std::vector<std::string> features_;
+  bool constrained_ = false;
+
+  BundleRequest request_;
+  SymbolSizes sizes_;
+  std::set<std::string> sound_;  // datasets and attributes that were read and passed
+  std::string schema_path_;
+  std::string path_;
+};
+
+}  // namespace exmat

@@ -1,0 +1,196 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <stdexcept>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "common/bundle/hdf5_file.h"
+#include "common/bundle/schema.h"
+#include "common/model/reduced_model.h"
+
+namespace exmat {
+
+// The one list that binds every dataset and attribute of schemas/bundle.json to a member of ReducedModel. The writer,
+// the reader and the drift test all visit it. A visitor has
+//   void group(std::string_view schema_path, std::string_view example);  the fields that follow are in it
+//   void attribute(std::string_view name, T& member);
+//   void dataset(std::string_view name, T& member);
+
+template <typename Object, typename Visitor>
+void visit_object(Object& object, Visitor& visit) {
+  visit.group("/object", "");
+  visit.attribute("material", object.material);
+  visit.dataset("vertices", object.mesh.vertices);
+  visit.dataset("tets", object.mesh.tets);
+  visit.dataset("surface", object.surface);
+  visit.dataset("fixed", object.fixed);
+  visit.dataset("density", object.materials.density);
+  visit.dataset("youngs_modulus", object.materials.youngs_modulus);
+  visit.dataset("poisson_ratio", object.materials.poisson_ratio);
+}
+
+template <typename ShapeSpace, typename Visitor>
+void visit_shape_space(ShapeSpace& shape_space, Visitor& visit) {
+  visit.group("/shape_space", "");
+  visit.attribute("volume", shape_space.volume);
+  visit.attribute("centroid", shape_space.centroid);
+  visit.attribute("weighting", shape_space.weighting);
+  visit.attribute("splits_cluster", shape_space.splits_cluster);
+  visit.dataset("eigenvalues", shape_space.eigenvalues);
+  visit.dataset("eigenfunctions", shape_space.eigenfunctions);
+  visit.dataset("rest_descriptor", shape_space.rest_descriptor);
+}
+
+template <typename Example, typename Visitor>
+void visit_example(Example& example, Visitor& visit) {
+  visit.group("/examples/{example}", example.name);
+  visit.attribute("index", example.index);
+  visit.attribute("is_rest", example.is_rest);
+  visit.attribute("rotation", example.rotation);
+  visit.attribute("scale", example.scale);
+  visit.attribute("method", example.method);
+  visit.attribute("alignment_residual", example.alignment_residual);
+  visit.attribute("confidence", example.confidence);
+  visit.attribute("shape_space_error", example.shape_space_error);
+  visit.attribute("basis_error", example.basis_error);
+  visit.dataset("descriptor", example.descriptor);
+  visit.dataset("reduced", example.reduced);
+}
+
+template <typename Examples, typename Visitor>
+void visit_examples(Examples& examples, Visitor& visit) {
+  visit.group("/examples", "");
+  visit.dataset("gram", examples.gram);
+  visit.dataset("h0", examples.h0);
+  visit.dataset("hq", examples.hq);
+  for (auto& example : examples.examples) visit_example(example, visit);
+}
+
+template <typename Modal, typename Visitor>
+void visit_modal(Modal& modal, Visitor& visit) {
+  visit.group("/modal", "");
+  visit.dataset("basis", modal.basis);
+  visit.dataset("frequencies", modal.frequencies);
+  visit.dataset("gravity_load", modal.gravity_load);
+}
+
+template <typename Cubature, typename Visitor>
+void visit_cubature(Cubature& cubature, Visitor& visit) {
+  visit.group("/cubature", "");
+  visit.attribute("method", cubature.method);
+  visit.attribute("training_error", cubature.training_error);
+  visit.attribute("heldout_error", cubature.heldout_error);
+  visit.attribute("heldout_energy_error", cubature.heldout_energy_error);
+  visit.attribute("heldout_stiffness_error", cubature.heldout_stiffness_error);
+  visit.dataset("elements", cubature.elements);
+  visit.dataset("weights", cubature.weights);
+  visit.dataset("volumes", cubature.volumes);
+  visit.dataset("gradient", cubature.gradient);
+  visit.dataset("youngs_modulus", cubature.youngs_modulus);
+  visit.dataset("poisson_ratio", cubature.poisson_ratio);
+  visit.dataset("heldout_poses", cubature.heldout_poses);
+}
+
+template <typename Projection, typename Visitor>
+void visit_projection(Projection& projection, Visitor& visit) {
+  visit.group("/projection", "");
+  visit.dataset("shape_from_reduced", projection.shape_from_reduced);
+  visit.dataset("reduced_from_shape", projection.reduced_from_shape);
+  visit.dataset("target_basis", projection.target_basis);
+}
+
+template <typename Rigid, typename Visitor>
+void visit_rigid(Rigid& rigid, Visitor& visit) {
+  visit.group("/rigid", "");
+  visit.dataset("mass", rigid.mass);
+  visit.dataset("centre_of_mass", rigid.centre_of_mass);
+  visit.dataset("inertia", rigid.inertia);
+  visit.dataset("second_moments", rigid.second_moments);
+  visit.dataset("linear_moments", rigid.linear_moments);
+  visit.dataset("basis_moments", rigid.basis_moments);
+}
+
+/// Visits the groups that the model holds, in bundle order. Model is ReducedModel or const ReducedModel.
+template <typename Model, typename Visitor>
+void visit_fields(Model& model, Visitor& visit) {
+  visit.group("/", "");
+  visit.attribute("asset_name", model.asset_name);
+  visit.attribute("generator", model.generator);
+  visit.attribute("input_sha256", model.input_sha256);
+  if (model.object) visit_object(*model.object, visit);
+  if (model.shape_space) visit_shape_space(*model.shape_space, visit);
+  if (model.examples) visit_examples(*model.examples, visit);
+  if (model.modal) visit_modal(*model.modal, visit);
+  if (model.cubature) visit_cubature(*model.cubature, visit);
+  if (model.projection) visit_projection(*model.projection, visit);
+  if (model.rigid) visit_rigid(*model.rigid, visit);
+}
+
+/// Root attributes that are no members of the model; write_bundle and read_bundle know them by name.
+inline constexpr std::string_view kHeaderAttributes[] = {"format", "format_version", "features", "constrained"};
+
+/// Names of /examples that are not examples.
+inline constexpr std::string_view kExampleDatasets[] = {"gram", "h0", "hq"};
+
+/// Adds the empty group of that name ("object", ...) to a model. std::logic_error if there is none.
+void add_group(ReducedModel& model, std::string_view group);
+
+/// How the list above and a schema differ, one message each; empty where each schema entry is bound to a member of its
+/// type.
+std::vector<std::string> binding_faults(const FileSchema& schema);
+
+/// A member as its dataset's memory: rows x cols, row-major.
+struct ArrayView {
+  ElementType type = ElementType::kFloat64;
+  std::int64_t rows = 1;
+  std::int64_t cols = 1;
+  const void* data = nullptr;
+};
+
+inline ArrayView view_of(const double& value) { return {ElementType::kFloat64, 1, 1, &value}; }
+
+template <typename Derived>
+ArrayView view_of(const Eigen::PlainObjectBase<Derived>& array) {
+  static_assert(Derived::IsRowMajor || Derived::IsVectorAtCompileTime, "datasets are row-major");
+  return {kElementType<typename Derived::Scalar>, array.rows(), array.cols(), array.data()};
+}
+
+inline void* resized(double& value, std::int64_t, std::int64_t) { return &value; }
+
+/// Makes the member rows x cols and returns its memory; sizes fixed in the type must agree (std::logic_error).
+template <typename Derived>
+void* resized(Eigen::PlainObjectBase<Derived>& array, std::int64_t rows, std::int64_t cols) {
+  const bool fits = (Derived::RowsAtCompileTime == Eigen::Dynamic || Derived::RowsAtCompileTime == rows) &&
+                    (Derived::ColsAtCompileTime == Eigen::Dynamic || Derived::ColsAtCompileTime == cols);
+  if (!fits) throw std::logic_error("the schema's dims do not fit the member");
+  array.resize(rows, cols);
+  return array.data();
+}
+
+/// A member as an attribute: flags as 0 or 1, matrices row-major.
+template <typename T>
+AttributeValue to_attribute(const T& member) {
+  if constexpr (std::is_same_v<T, bool>)
+    return std::int64_t{member ? 1 : 0};
+  else if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>) {
+    const RowMatrix values = member;
+    return std::vector<double>(values.data(), values.data() + values.size());
+  } else
+    return member;
+}
+
+/// The inverse; the value must have the type and size that to_attribute gives.
+template <typename T>
+void from_attribute(const AttributeValue& value, T& member) {
+  if constexpr (std::is_same_v<T, bool>)
+    member = std::get<std::int64_t>(value) != 0;
+  else if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>)
+    member = Eigen::Map<const RowMatrix>(std::get<std::vector<double>>(value).data(), member.rows(), member.cols());
+  else
+    member = std::get<T>(value);
+}
+
+}  // namespace exmat

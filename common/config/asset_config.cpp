@@ -1,0 +1,135 @@
+#include "common/config/asset_config.h"
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <set>
+
+#include "common/config/config.h"
+#include "common/config/json_file.h"
+#include "common/config/json_values.h"
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+// Names in /examples of the bundle that are no examples, and what HDF5 takes for the group itself.
+constexpr std::array<std::string_view, 5> kReservedNames = {"gram", "h0", "hq", ".", ".."};
+
+class AssetReader {
+ public:
+  explicit AssetReader(const std::filesystem::path& file) : file_(file) {}
+
+  AssetConfig read(const Json& json) {
+    AssetConfig asset;
+    asset.file = file_;
+    asset.name = json["name"];
+    read_object(json["object"], asset);
+    read_shape_space(json, asset);
+    read_examples(member_or(json, "examples", Json::array()), asset);
+    read_basis(member_or(json, "basis", Json::object()), asset);
+    read_cubature(member_or(json, "cubature", Json::object()), asset);
+    asset.target_tolerance = member_or(json, "targets", Json::object()).value("tolerance", asset.target_tolerance);
+    asset.needs = optional_member<std::vector<std::string>>(json, "needs");
+    asset.seed = json.value("seed", asset.seed);
+    return asset;
+  }
+
+ private:
+  void read_object(const Json& json, AssetConfig& asset) const {
+    asset.object_mesh = resolve_path(file_, json["mesh"]);
+    const Json material = member_or(json, "material", Json::object());
+    asset.material.model = material.value("model", asset.material.model);
+    asset.material.youngs_modulus = optional_member<double>(material, "youngs_modulus");
+    asset.material.poisson_ratio = optional_member<double>(material, "poisson_ratio");
+    asset.material.density = optional_member<double>(material, "density");
+    if (json.contains("fixed")) asset.fixed = read_selection(json["fixed"], "/object/fixed");
+    asset.object_drop = read_drop(json);
+  }
+
+  VertexSelection read_selection(const Json& json, const std::string& place) const {
+    if (json.contains("box")) return read_box(json["box"], place + "/box");
+    if (json.contains("sphere"))
+      return SphereSelection{json["sphere"]["center"].get<std::array<double, 3>>(), json["sphere"]["radius"]};
+    if (json.contains("file")) return FileSelection{resolve_path(file_, json["file"])};
+    return IdSelection{read_ids(json["ids"], file_, place + "/ids")};
+  }
+
+  BoxSelection read_box(const Json& json, const std::string& place) const {
+    const BoxSelection box{json["min"].get<std::array<double, 3>>(), json["max"].get<std::array<double, 3>>()};
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      if (box.min[axis] > box.max[axis])
+        refuse(fmt::format("{}/max/{}", place, axis), fmt::format("a number >= {} (min)", box.min[axis]),
+               fmt::format("{}", box.max[axis]));
+    return box;
+  }
+
+  static DropConfig read_drop(const Json& json) {
+    const auto names = member_or(json, "drop", Json::array()).get<std::set<std::string>>();
+    return {names.contains("degenerate_tets"), names.contains("unreferenced_vertices"),
+            names.contains("smaller_components")};
+  }
+
+  static void read_shape_space(const Json& json, AssetConfig& asset) {
+    const Json shape_space = member_or(json, "shape_space", Json::object());
+    asset.eigenfunctions = shape_space.value("eigenfunctions", asset.eigenfunctions);
+    asset.weighting = shape_space.value("weighting", asset.weighting);
+    asset.frame = member_or(json, "alignment", Json::object()).value("frame", asset.frame);
+  }
+
+  void read_examples(const Json& json, AssetConfig& asset) const {
+    for (std::size_t i = 0; i < json.size(); ++i) {
+      const std::string place = fmt::format("/examples/{}", i);
+      const Json& example = json[i];
+      ExampleConfig config{example["name"], resolve_path(file_, example["mesh"]), example.value("rest", false),
+                           read_drop(example)};
+      check_example(config, asset.examples, place);
+      asset.examples.push_back(std::move(config));
+    }
+  }
+
+  void check_example(const ExampleConfig& example, const std::vector<ExampleConfig>& earlier,
+                     const std::string& place) const {
+    const bool is_reserved = std::ranges::find(kReservedNames, example.name) != kReservedNames.end();
+    if (is_reserved || example.name.find('/') != std::string::npos)
+      refuse(place + "/name", "a name without '/' that is none of \".\", \"..\", \"gram\", \"h0\" and \"hq\"",
+             "\"" + example.name + "\"");
+    for (std::size_t i = 0; i < earlier.size(); ++i) {
+      if (earlier[i].name == example.name)
+        refuse(place + "/name", "another name for each example",
+               fmt::format("\"{}\", that of /examples/{} too", example.name, i));
+      if (earlier[i].rest && example.rest)
+        refuse(place + "/rest", "at most one rest example", fmt::format("another one: /examples/{}", i));
+    }
+  }
+
+  static void read_basis(const Json& json, AssetConfig& asset) {
+    asset.basis_size = json.value("size", asset.basis_size);
+    asset.linear_modes = json.value("linear_modes", asset.linear_modes);
+    asset.example_fields = json.value("example_fields", asset.example_fields);
+  }
+
+  void read_cubature(const Json& json, AssetConfig& asset) const {
+    asset.cubature_elements = optional_member<int>(json, "elements");
+    asset.cubature_tolerance = optional_member<double>(json, "tolerance");
+    if (asset.cubature_elements && asset.cubature_tolerance) refuse("/cubature", "elements or tolerance", "both");
+    asset.cubature_method = json.value("method", asset.cubature_method);
+    asset.training_poses = json.value("training_poses", asset.training_poses);
+  }
+
+  [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found) const {
+    throw InputError({file_.string(), place, expected, found, ""});
+  }
+
+  std::filesystem::path file_;
+};
+
+}  // namespace
+
+AssetConfig load_asset(const std::filesystem::path& file) {
+  const Json json = read_json(file);
+  check_against_schema(json, "asset", file);
+  return AssetReader(file).read(json);
+}
+
+}  // namespace exmat

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+namespace exmat {
+
+/// Reads and parses a JSON file (RFC 8259). Throws InputError: no such file, a syntax error with line and column, a
+/// repeated member, more than 64 nested levels, numbers beyond double, control characters in strings.
+nlohmann::json read_json(const std::filesystem::path& file);
+
+/// Text of a file. Throws InputError where it cannot be read; `what` says in the message what it should be ("a text
+/// file").
+std::string read_text(const std::filesystem::path& file, const std::string& what);
+
+/// Throws InputError unless the document follows schemas/NAME.json: at the first fault, with its JSON pointer, what was
+/// expected and found. An unknown member suggests the nearest name; what the schema lists as x-later is refused as not
+/// supported yet.
+void check_against_schema(const nlohmann::json& document, const std::string& schema_name,
+                          const std::filesystem::path& file);
+
+}  // namespace exmat

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace exmat {
+
+using Json = nlohmann::json;
+
+// Members of documents that check_against_schema has passed.
+
+inline Json member_or(const Json& object, const char* name, Json fallback) {
+  return object.contains(name) ? object[name] : std::move(fallback);
+}
+
+template <typename T>
+std::optional<T> optional_member(const Json& object, const char* name) {
+  return object.contains(name) ? std::optional<T>(object[name].template get<T>()) : std::nullopt;
+}
+
+/// A path of a JSON file, relative to that file.
+std::filesystem::path resolve_path(const std::filesystem::path& json_file, const std::string& path);
+
+/// 0-based vertex ids; throws InputError where one is repeated.
+std::vector<std::int64_t> read_ids(const Json& ids, const std::filesystem::path& json_file, const std::string& place);
+
+}  // namespace exmat

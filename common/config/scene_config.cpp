@@ -1,0 +1,72 @@
+#include "common/config/scene_config.h"
+
+#include <array>
+#include <fmt/format.h>
+
+#include "common/config/config.h"
+#include "common/config/json_file.h"
+#include "common/config/json_values.h"
+#include "common/config/vertex_ids.h"
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+Eigen::Vector3d read_vector(const Json& json) { return Eigen::Vector3d(json.get<std::array<double, 3>>().data()); }
+
+ExampleForceConfig read_example_force(const Json& json) {
+  ExampleForceConfig config;
+  config.stiffness = json["stiffness"];
+  config.damping = json.value("damping", config.damping);
+  config.bias = json.value("bias", config.bias);
+  config.target = json.value("target", config.target);
+  config.force = json.value("force", config.force);
+  config.energy_reference = json.value("energy_reference", config.energy_reference);
+  return config;
+}
+
+VertexForceConfig read_vertex_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  VertexForceConfig config;
+  const Json& vertices = json["vertices"];
+  config.vertices = vertices.contains("file") ? read_vertex_ids(resolve_path(file, vertices["file"]))
+                                              : read_ids(vertices["ids"], file, place + "/vertices/ids");
+  config.force = read_vector(json["force"]);
+  config.start = json.value("start", config.start);
+  config.end = json.value("end", config.end);
+  if (config.end <= config.start)
+    throw InputError({file.string(), place + "/end", fmt::format("a number > {} (start)", config.start),
+                      fmt::format("{}", config.end), ""});
+  return config;
+}
+
+}  // namespace
+
+SceneConfig load_scene(const std::filesystem::path& file) {
+  const Json json = read_json(file);
+  check_against_schema(json, "scene", file);
+  SceneConfig scene;
+  scene.file = file;
+  scene.bundle = resolve_path(file, json["bundle"]);
+  scene.time_step = json.value("time_step", scene.time_step);
+  scene.steps = json.value("steps", scene.steps);
+  if (json.contains("gravity")) scene.gravity = read_vector(json["gravity"]);
+  scene.integrator = json.value("integrator", scene.integrator);
+  const Json damping = member_or(json, "damping", Json::object());
+  scene.mass_damping = damping.value("mass", scene.mass_damping);
+  scene.stiffness_damping = damping.value("stiffness", scene.stiffness_damping);
+  const Json newton = member_or(json, "newton", Json::object());
+  scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
+  scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
+  if (json.contains("examples")) scene.examples = read_example_force(json["examples"]);
+  const Json forces = member_or(json, "forces", Json::array());
+  for (std::size_t i = 0; i < forces.size(); ++i)
+    scene.forces.push_back(read_vertex_force(forces[i], file, fmt::format("/forces/{}", i)));
+  const Json output = member_or(json, "output", Json::object());
+  if (output.contains("trajectory")) scene.trajectory = resolve_path(file, output["trajectory"]);
+  scene.every = output.value("every", scene.every);
+  return scene;
+}
+
+Needs needs_of(const SceneConfig& scene) { return {.examples = scene.examples.has_value(), .rigid = true}; }
+
+}  // namespace exmat

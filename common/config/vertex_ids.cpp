@@ -1,0 +1,54 @@
+#include "common/config/vertex_ids.h"
+
+#include <algorithm>
+#include <charconv>
+#include <fmt/format.h>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <unordered_set>
+
+#include "common/config/json_file.h"
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+constexpr std::string_view kSeparators = ", \t\r";
+
+std::int64_t parse_id(std::string_view word, const std::string& file, const std::string& place) {
+  std::int64_t id = 0;
+  const auto result = std::from_chars(word.data(), word.data() + word.size(), id);
+  const bool is_integer = result.ec == std::errc() && result.ptr == word.data() + word.size();
+  if (!is_integer || id < 1 || id > std::numeric_limits<std::int32_t>::max())
+    throw InputError({file, place, "vertex ids >= 1", fmt::format("\"{}\"", word), ""});
+  return id - 1;
+}
+
+}  // namespace
+
+std::vector<std::int64_t> read_vertex_ids(const std::filesystem::path& file) {
+  const std::string text = read_text(file, "a text file of vertex ids");
+  std::vector<std::int64_t> ids;
+  std::unordered_set<std::int64_t> seen;
+  std::size_t line_number = 0;
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.find('\n', begin), text.size());
+    std::string_view line(text.data() + begin, end - begin);
+    line = line.substr(0, line.find('#'));
+    const std::string place = fmt::format("line {}", ++line_number);
+    for (std::size_t at = line.find_first_not_of(kSeparators); at < line.size();
+         at = line.find_first_not_of(kSeparators, at)) {
+      const std::size_t stop = std::min(line.find_first_of(kSeparators, at), line.size());
+      ids.push_back(parse_id(line.substr(at, stop - at), file.string(), place));
+      if (!seen.insert(ids.back()).second)
+        throw InputError({file.string(), place, "each vertex once", fmt::format("{} again", ids.back() + 1), ""});
+      at = stop;
+    }
+    begin = end + 1;
+  }
+  if (ids.empty()) throw InputError({file.string(), "", "vertex ids >= 1", "none", ""});
+  return ids;
+}
+
+}  // namespace exmat

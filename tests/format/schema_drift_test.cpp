@@ -1,0 +1,150 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "common/bundle/bundle.h"
+#include "common/bundle/fields.h"
+#include "common/bundle/schema.h"
+#include "common/config/embedded_schema.h"
+#include "tests/unit/common/bundle/small_model.h"
+
+namespace exmat {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+using Json = nlohmann::json;
+
+TEST(BundleSchema, IsBoundToTheModelEntryByEntry) { EXPECT_THAT(binding_faults(bundle_schema()), IsEmpty()); }
+
+TEST(BundleSchema, IsCaughtWithAnEntryThatIsNotBound) {
+  FileSchema schema = bundle_schema();
+  schema.datasets.push_back(schema.dataset("/modal/basis"));
+  schema.datasets.back().path = "/modal/planted";
+  EXPECT_THAT(binding_faults(schema), ElementsAre("/modal/planted of the schema is bound to no member"));
+}
+
+TEST(BundleSchema, IsCaughtWithoutAnEntryThatIsBound) {
+  FileSchema schema = bundle_schema();
+  std::erase_if(schema.datasets, [](const DatasetSchema& dataset) { return dataset.path == "/modal/basis"; });
+  schema.groups.front().attributes.clear();
+  EXPECT_THAT(binding_faults(schema), ElementsAre("/modal/basis is bound to a member but not in the schema",
+                                                  "/object@material is bound to a member but not in the schema"));
+}
+
+TEST(BundleSchema, IsCaughtWithAnotherType) {
+  FileSchema schema = bundle_schema();
+  schema.datasets.front().type = ElementType::kFloat32;
+  EXPECT_THAT(binding_faults(schema), ElementsAre("/object/vertices of the schema has another type than its member"));
+}
+
+TEST(BundleSchema, ListsTheGroupsOfTheLedgerInOrder) {
+  std::vector<std::string> ledger, schema;
+  for (const LedgerEntry& entry : plan_groups({}, false, true)) ledger.push_back(entry.group);
+  for (const GroupSchema& group : bundle_schema().groups)
+    if (schema.empty() || schema.back() != group.group) schema.push_back(group.group);
+  EXPECT_EQ(schema, ledger);
+}
+
+std::set<std::string> datasets_of(const Hdf5File& file, const std::string& group) {
+  std::set<std::string> paths;
+  for (const std::string& name : file.list(group)) {
+    const std::string path = (group == "/" ? "" : group) + "/" + name;
+    if (file.has_group(path))
+      paths.merge(datasets_of(file, path));
+    else
+      paths.insert(path);
+  }
+  return paths;
+}
+
+TEST(WrittenBundle, HoldsExactlyTheSchemasDatasets) {
+  const test::TemporaryFolder folder;
+  ReducedModel model = test::small_model(false);
+  write_bundle(model, folder / "a.h5");
+  std::set<std::string> expected;
+  for (const DatasetSchema& dataset : bundle_schema().datasets)
+    for (const ExampleData& example : model.examples->examples)
+      expected.insert(fill_example(dataset.path, example.name));
+  const auto file = Hdf5File::open(folder / "a.h5");
+  EXPECT_EQ(datasets_of(file, "/"), expected);
+  for (const GroupSchema& group : bundle_schema().groups)
+    for (const AttributeSchema& attribute : group.attributes)
+      EXPECT_TRUE(file.has_attribute(fill_example(group.path, "bend"), attribute.name)) << group.path << attribute.name;
+  for (const AttributeSchema& attribute : bundle_schema().attributes)
+    EXPECT_TRUE(file.has_attribute("/", attribute.name));
+}
+
+class FileSchemaOf : public ::testing::TestWithParam<const char*> {
+ protected:
+  FileSchema schema_ = parse_file_schema(embedded_schema(GetParam()));
+};
+INSTANTIATE_TEST_SUITE_P(Each, FileSchemaOf, ::testing::Values("bundle", "trajectory"));
+
+TEST_P(FileSchemaOf, NamesOnlyItsSymbolsAndGroups) {
+  std::set<std::string> symbols, groups = {""};
+  for (const auto& [name, meaning] : schema_.symbols) symbols.insert(name);
+  for (const GroupSchema& group : schema_.groups) groups.insert(group.path);
+  for (const DatasetSchema& dataset : schema_.datasets) {
+    for (const Extent& extent : dataset.dims)
+      EXPECT_TRUE(extent.symbol.empty() || symbols.contains(extent.symbol)) << dataset.path << extent.symbol;
+    for (const Constraint& constraint : dataset.constraints)
+      EXPECT_TRUE(constraint.kind != Constraint::Kind::kIndex || symbols.contains(constraint.argument)) << dataset.path;
+    EXPECT_TRUE(groups.contains(dataset.path.substr(0, dataset.path.rfind('/')))) << dataset.path;
+  }
+}
+
+TEST_P(FileSchemaOf, DescribesEveryEntry) {
+  EXPECT_FALSE(schema_.description.empty());
+  for (const GroupSchema& group : schema_.groups) {
+    EXPECT_FALSE(group.description.empty()) << group.path;
+    for (const AttributeSchema& attribute : group.attributes)
+      EXPECT_FALSE(attribute.description.empty()) << attribute.name;
+  }
+  for (const DatasetSchema& dataset : schema_.datasets) {
+    EXPECT_FALSE(dataset.description.empty()) << dataset.path;
+    EXPECT_GE(dataset.since, 1) << dataset.path;
+    EXPECT_LE(dataset.since, schema_.format_version) << dataset.path;
+    const bool is_index = dataset.type == ElementType::kInt32 || dataset.type == ElementType::kUint8;
+    EXPECT_EQ(dataset.units.empty(), is_index) << dataset.path;
+  }
+}
+
+TEST(FileSchemaText, IsRefusedWithAnUnknownTypeUseOrConstraint) {
+  const std::string text(embedded_schema("bundle"));
+  for (const auto& [from, to] : {std::pair{"\"float64\"", "\"float65\""}, std::pair{"\"step\"", "\"steps\""},
+                                 std::pair{"\"poisson\"", "\"fish\""}}) {
+    std::string spoilt = text;
+    spoilt.replace(spoilt.find(from), std::string(from).size(), to);
+    EXPECT_THROW(parse_file_schema(spoilt), std::logic_error) << to;
+  }
+}
+
+// JSON Schemas: every object closed, every member described, every optional member with a default.
+void check_closed(const Json& schema, const std::string& place) {
+  if (schema.value("type", "") != "object") {
+    if (schema.contains("items")) check_closed(schema["items"], place + "/items");
+    return;
+  }
+  EXPECT_EQ(schema.value("additionalProperties", true), false) << place;
+  const Json required = schema.value("required", Json::array());
+  for (const auto& [name, member] : schema.at("properties").items()) {
+    const bool is_required = std::find(required.begin(), required.end(), name) != required.end();
+    EXPECT_TRUE(member.contains("description")) << place << "/" << name;
+    EXPECT_EQ(member.contains("default"), !is_required) << place << "/" << name;
+    check_closed(member, place + "/" + name);
+  }
+}
+
+class ConfigSchema : public ::testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(Each, ConfigSchema, ::testing::Values("asset", "scene"));
+
+TEST_P(ConfigSchema, IsClosedAndDescribed) {
+  const Json schema = Json::parse(embedded_schema(GetParam()));
+  check_closed(schema, "");
+  for (const auto& [name, definition] : schema.at("definitions").items()) check_closed(definition, name);
+}
+
+}  // namespace
+}  // namespace exmat

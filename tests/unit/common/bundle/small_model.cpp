@@ -1,0 +1,154 @@
+#include "tests/unit/common/bundle/small_model.h"
+
+#include <fstream>
+#include <iterator>
+#include <stdexcept>
+#include <stdlib.h>
+
+namespace exmat::test {
+namespace {
+
+constexpr Eigen::Index kVertices = 5, kTets = 2, kEigenfunctions = 2, kExamples = 3, kModes = 2, kElements = 2;
+
+// Distinct numbers, none of them zero.
+RowMatrix numbers(Eigen::Index rows, Eigen::Index cols, double first) {
+  RowMatrix matrix(rows, cols);
+  for (Eigen::Index i = 0; i < matrix.size(); ++i) matrix.data()[i] = first + 0.125 * static_cast<double>(i);
+  return matrix;
+}
+
+ObjectData small_object(bool constrained) {
+  ObjectData object;
+  object.mesh.vertices.resize(kVertices, 3);
+  object.mesh.vertices << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 1, 1;
+  object.mesh.tets.resize(kTets, 4);
+  object.mesh.tets << 0, 1, 2, 3, 1, 4, 2, 3;
+  object.surface.resize(6, 3);
+  object.surface << 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 4, 3, 1, 2, 4, 2, 3, 4;
+  object.fixed = FlagVector::Zero(kVertices);
+  if (constrained) object.fixed[0] = 1;
+  object.materials.density = numbers(kTets, 1, 1000);
+  object.materials.youngs_modulus = numbers(kTets, 1, 1e5);
+  object.materials.poisson_ratio = numbers(kTets, 1, 0.3);
+  object.material = "stvk";
+  return object;
+}
+
+ShapeSpaceData small_shape_space() {
+  return {.eigenvalues = numbers(kEigenfunctions, 1, 10),
+          .eigenfunctions = numbers(kVertices, kEigenfunctions, -1.5),
+          .rest_descriptor = numbers(kEigenfunctions, 3, 0.25),
+          .volume = 0.5,
+          .centroid = {0.5, 0.25, 0.125},
+          .weighting = "eigenvalue",
+          .splits_cluster = 1};
+}
+
+ExampleData small_example(const std::string& name, std::int64_t index) {
+  ExampleData example;
+  example.name = name;
+  example.index = index;
+  example.is_rest = index == 0;
+  example.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  example.scale = 1.5;
+  example.method = "spectral";
+  example.alignment_residual = 0.01;
+  example.confidence = 0.25;
+  example.shape_space_error = 0.125;
+  example.basis_error = 0.0625;
+  example.descriptor = numbers(kEigenfunctions, 3, static_cast<double>(index));
+  example.reduced = numbers(kModes, 1, static_cast<double>(index));
+  return example;
+}
+
+// The names' order is not the indices'.
+ExampleSet small_examples() {
+  ExampleSet set;
+  set.examples = {small_example("z rest", 0), small_example("bend", 1), small_example("twist \xc3\xa9", 2)};
+  const RowMatrix factor = numbers(kExamples, kExamples, 0.5);
+  set.gram = factor * factor.transpose();
+  set.h0 = numbers(kExamples, 1, 2);
+  set.hq = numbers(kExamples, kModes, -3);
+  return set;
+}
+
+ModalData small_modal(bool constrained) {
+  ModalData modal{numbers(3 * kVertices, kModes, 0.1), numbers(3, 1, 20), numbers(3, kModes, -1)};
+  if (constrained) modal.basis.topRows(3).setZero();
+  return modal;
+}
+
+CubatureData small_cubature() {
+  CubatureData cubature;
+  cubature.elements.resize(kElements);
+  cubature.elements << 0, 1;
+  cubature.weights = numbers(kElements, 1, 1);
+  cubature.volumes = numbers(kElements, 1, 0.25);
+  cubature.gradient = numbers(9 * kElements, kModes, -2);
+  cubature.youngs_modulus = numbers(kElements, 1, 1e5);
+  cubature.poisson_ratio = numbers(kElements, 1, 0.3);
+  cubature.heldout_poses = numbers(4, kModes, -0.75);
+  cubature.method = "greedy";
+  cubature.training_error = 0.01;
+  cubature.heldout_error = 0.02;
+  cubature.heldout_energy_error = 0.03;
+  cubature.heldout_stiffness_error = 0.04;
+  return cubature;
+}
+
+RigidData small_rigid() {
+  const RowMatrix3 factor = numbers(3, 3, 0.5);
+  return {.mass = 125,
+          .centre_of_mass = {0.25, 0.5, 0.75},
+          .inertia = factor * factor.transpose(),
+          .second_moments = 2 * factor * factor.transpose(),
+          .linear_moments = numbers(9, kModes, 4),
+          .basis_moments = numbers(9 * kModes, kModes, 5)};
+}
+
+}  // namespace
+
+ReducedModel small_model(bool constrained, bool with_examples) {
+  ReducedModel model;
+  model.asset_name = "small";
+  model.generator = "exmat test";
+  model.input_sha256 = std::string(64, 'a');
+  model.object = small_object(constrained);
+  model.modal = small_modal(constrained);
+  model.cubature = small_cubature();
+  if (with_examples) {
+    model.shape_space = small_shape_space();
+    model.examples = small_examples();
+    model.projection = ProjectionData{numbers(3 * kEigenfunctions, kModes, 6), numbers(kModes, 3 * kEigenfunctions, 7),
+                                      numbers(kModes, 1, 8)};
+  }
+  if (!constrained) model.rigid = small_rigid();
+  return model;
+}
+
+TemporaryFolder::TemporaryFolder() {
+  std::string name = (std::filesystem::temp_directory_path() / "exmat_test_XXXXXX").string();
+  if (mkdtemp(name.data()) == nullptr) throw std::runtime_error("no temporary folder");
+  path_ = name;
+}
+
+TemporaryFolder::~TemporaryFolder() {
+  std::error_code ignored;
+  std::filesystem::remove_all(path_, ignored);
+}
+
+std::size_t TemporaryFolder::size() const {
+  return static_cast<std::size_t>(
+      std::distance(std::filesystem::directory_iterator(path_), std::filesystem::directory_iterator()));
+}
+
+std::string read_file(const std::filesystem::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+void write_file(const std::filesystem::path& file, const std::string& content) {
+  std::ofstream(file, std::ios::binary) << content;
+}
+
+}  // namespace exmat::test
