@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+
+namespace exmat::runtime {
+
+struct RunOptions {
+  std::filesystem::path scene;
+  std::optional<std::filesystem::path> trajectory;  ///< instead of the scene's
+  std::optional<std::int64_t> steps;                ///< instead of the scene's
+  bool profile = false;
+};
+
+// The commands of exmat-runtime: results on stdout, logs and progress on stderr; failures are InputError or WorkError.
+void run_command(const RunOptions& options);
+void info_command(const std::filesystem::path& bundle);
+void validate_command(const std::filesystem::path& bundle);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,58 @@
+#include <fmt/format.h>
+
+#include "common/bundle/bundle.h"
+#include "common/core/error.h"
+#include "runtime/app/commands.h"
+
+namespace exmat::runtime {
+namespace {
+
+void print_groups(const ReducedModel& model, const BundleSummary& summary) {
+  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples > 0);
+  fill_bytes(model, ledger);
+  fmt::print("\n{:<14} {:>14}\n", "group", "bytes");
+  for (const LedgerEntry& entry : ledger)
+    if (entry.bytes > 0) fmt::print("{:<14} {:>14}\n", entry.group, entry.bytes);
+}
+
+void print_examples(const ExampleSet& set) {
+  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12}\n", "example", "mapped by", "residual", "confidence",
+             "shape error", "basis error");
+  for (const ExampleData& example : set.examples)
+    fmt::print("{:<20} {:<20} {:>10.3g} {:>12.3g} {:>14.3g} {:>12.3g}\n", example.name, example.method,
+               example.alignment_residual, example.confidence, example.shape_space_error, example.basis_error);
+}
+
+}  // namespace
+
+void info_command(const std::filesystem::path& bundle) {
+  const BundleSummary summary = summarise_bundle(bundle);
+  const ReducedModel model = read_bundle(bundle);
+  fmt::print("asset          {}\ngenerator      {}\nformat version {}\ninput sha256   {}\nbody           {}\n",
+             summary.asset_name, summary.generator, summary.format_version, summary.input_sha256,
+             summary.constrained ? "constrained" : "free");
+  fmt::print("mesh           {} vertices, {} tets\n", summary.vertices, summary.tets);
+  fmt::print("modes          {}\n", summary.modes);
+  fmt::print("cubature       {} elements\n", summary.cubature_elements);
+  if (model.object) fmt::print("material       {}\n", model.object->material);
+  if (model.modal && model.modal->frequencies.size() > 0)
+    fmt::print("frequencies    {:.4g} to {:.4g} Hz ({} linear modes)\n", model.modal->frequencies.minCoeff(),
+               model.modal->frequencies.maxCoeff(), model.modal->frequencies.size());
+  if (model.cubature)
+    fmt::print("held-out error force {:.3g}, energy {:.3g}, stiffness {:.3g}\n", model.cubature->heldout_error,
+               model.cubature->heldout_energy_error, model.cubature->heldout_stiffness_error);
+  if (summary.eigenfunctions > 0) fmt::print("eigenfunctions {}\n", summary.eigenfunctions);
+  print_groups(model, summary);
+  if (model.examples) print_examples(*model.examples);
+}
+
+void validate_command(const std::filesystem::path& bundle) {
+  const std::vector<std::string> problems = validate_bundle(bundle);
+  for (const std::string& problem : problems) fmt::print("{}\n", problem);
+  if (!problems.empty())
+    throw InputError({bundle.string(), "", "a sound bundle", fmt::format("{} problem(s)", problems.size()),
+                      "compute it again with exmat-precompute"});
+  fmt::print("{}: sound\n", bundle.string());
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,38 @@
+#include <CLI/CLI.hpp>
+
+#include "common/bundle/hdf5_file.h"
+#include "common/console/console.h"
+#include "runtime/app/commands.h"
+
+int main(int argc, char** argv) {
+  using namespace exmat;
+  CLI::App app{"Steps example-based elastic bodies in real time.", "exmat-runtime"};
+  app.set_version_flag("--version", generator_name());
+  app.require_subcommand(1);
+  CommonOptions common;
+
+  runtime::RunOptions options;
+  CLI::App& run = *app.add_subcommand("run", "Step a scene on its bundle");
+  run.add_option("scene", options.scene, "SCENE.json")->required();
+  run.add_option("-o,--output", options.trajectory,
+                 "Trajectory (HDF5; an .xdmf comes beside it), instead of the scene's");
+  run.add_option("--steps", options.steps, "Number of steps, instead of the scene's")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000'000}));
+  run.add_flag("--profile", options.profile, "Print the time of each stage");
+
+  std::filesystem::path bundle;
+  CLI::App& info = *app.add_subcommand("info", "Say what a bundle holds");
+  CLI::App& validate = *app.add_subcommand("validate", "Say whether every dataset of a bundle is sound");
+  for (CLI::App* command : {&info, &validate}) command->add_option("bundle", bundle, "BUNDLE.h5")->required();
+  for (CLI::App* command : {&run, &info, &validate}) {
+    add_common_options(*command, common);
+    command->set_version_flag("--version", generator_name());
+  }
+
+  return run_program(app, argc, argv, [&] {
+    apply(common);
+    if (run.parsed()) runtime::run_command(options);
+    if (info.parsed()) runtime::info_command(bundle);
+    if (validate.parsed()) runtime::validate_command(bundle);
+  });
+}

@@ -1,0 +1,77 @@
+#include <fmt/format.h>
+
+#include "common/config/config.h"
+#include "common/core/log.h"
+#include "runtime/app/commands.h"
+#include "runtime/io/scene_loader.h"
+#include "runtime/io/scene_run.h"
+
+namespace exmat::runtime {
+namespace {
+
+void log_loaded(const LoadedScene& loaded, const SceneConfig& config) {
+  log::info(fmt::format("bundle {}: asset \"{}\", {} vertices, {} tets, r = {}, s = {}", config.bundle.string(),
+                        loaded.summary.asset_name, loaded.summary.vertices, loaded.summary.tets, loaded.summary.modes,
+                        loaded.summary.cubature_elements));
+  for (const ReadRecord& record : loaded.records)
+    log::info(fmt::format("read {}: {} bytes", record.dataset, record.bytes));
+  for (const LedgerEntry& entry : loaded.ledger)
+    log::info(fmt::format("group {}: {}, {} bytes, {}", entry.group, entry.included ? "in" : "out", entry.bytes,
+                          entry.reason));
+  for (const std::string& line : describe_plan(loaded, config)) log::info("plan: " + line);
+}
+
+void print(const char* name, const std::string& value) { fmt::print("{:<22} {}\n", name, value); }
+
+std::string microseconds(double seconds) { return fmt::format("{:.2f} us", 1e6 * seconds); }
+
+void print_summary(const RunSummary& summary, const LoadedScene& loaded, const SceneConfig& config) {
+  const double mean = summary.step_seconds.mean();
+  print("steps", std::to_string(summary.steps));
+  print("simulated time", fmt::format("{:g} s", summary.simulated_seconds));
+  print("mean step time", microseconds(mean));
+  print("median step time", microseconds(summary.step_seconds.quantile(0.5)));
+  print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)));
+  print("real-time factor", fmt::format("{:.1f}", mean > 0 ? config.time_step / mean : 0));
+  print("Newton iterations", fmt::format("{:.2f} a step", summary.newton_iterations.mean()));
+  if (runs_examples(*loaded.model, loaded.scene))
+    print("target iterations", fmt::format("{:.2f} a step", summary.target_iterations.mean()));
+  print("projections", std::to_string(summary.projections));
+  print("unconverged steps", std::to_string(summary.unconverged_steps));
+  print("kinetic energy", fmt::format("{:.6g} J", summary.energies.kinetic));
+  print("elastic energy", fmt::format("{:.6g} J", summary.energies.elastic));
+  print("potential energy", fmt::format("{:.6g} J", summary.energies.potential));
+  if (summary.largest_displacement)
+    print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
+  if (config.trajectory) print("trajectory", config.trajectory->string());
+}
+
+void print_profile(const RunSummary& summary) {
+  if (!summary.stage_seconds) return;
+  fmt::print("\n{:<22} {:>12} {:>12} {:>12}\n", "stage", "mean us", "median us", "95 % us");
+  for (std::size_t stage = 0; stage < kStageNames.size(); ++stage) {
+    const Samples& seconds = (*summary.stage_seconds)[stage];
+    fmt::print("{:<22} {:>12.2f} {:>12.2f} {:>12.2f}\n", kStageNames[stage], 1e6 * seconds.mean(),
+               1e6 * seconds.quantile(0.5), 1e6 * seconds.quantile(0.95));
+  }
+}
+
+}  // namespace
+
+void run_command(const RunOptions& options) {
+  SceneConfig config = load_scene(options.scene);
+  if (options.trajectory) config.trajectory = options.trajectory;
+  if (options.steps) config.steps = *options.steps;
+  const LoadedScene loaded = load_run(config);
+  log_loaded(loaded, config);
+  const RunSummary summary = run(loaded, config, options.profile);
+  if (summary.unconverged_steps > 0)
+    log::warning(
+        fmt::format("{} of {} steps did not reach the tolerance {:g} (target included); a smaller time_step or more "
+                    "newton.max_iterations may help",
+                    summary.unconverged_steps, summary.steps, config.newton.tolerance));
+  print_summary(summary, loaded, config);
+  print_profile(summary);
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,190 @@
+#include "runtime/io/trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <optional>
+#include <span>
+
+#include "common/mesh/geometry.h"
+#include "runtime/io/momentum.h"
+
+namespace exmat::runtime {
+namespace {
+
+SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
+  SymbolSizes sizes;
+  sizes.set("F", info.frames, "the scene");
+  sizes.set("n", model.object->mesh.vertex_count(), "the bundle");
+  sizes.set("n_t", model.object->mesh.tet_count(), "the bundle");
+  sizes.set("r", model.modal->basis.cols(), "the bundle");
+  sizes.set("K", info.examples, "the bundle");
+  return sizes;
+}
+
+Hdf5File create_file(const AtomicFile& output, const ReducedModel& model, const TrajectoryInfo& info) {
+  Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
+  write_header(file, trajectory_schema(), generator_name());
+  file.write_attribute("/", "asset_name", model.asset_name);
+  file.write_attribute("/", "input_sha256", model.input_sha256);
+  file.write_attribute("/", "integrator", info.integrator);
+  file.write_attribute("/", "time_step", info.time_step);
+  for (const GroupSchema& group : trajectory_schema().groups)
+    if (info.examples > 0 || group.group != "examples") write_group(file, group, group.path);
+  return file;
+}
+
+std::span<const double> row_of(const Eigen::VectorXd& vector) {
+  return {vector.data(), static_cast<std::size_t>(vector.size())};
+}
+
+std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.data(), 3}; }
+
+/// One grid of the temporal collection: a hyperslab of /vertices on the shared /tets.
+std::string xdmf_frame(const std::string& h5, const ReducedModel& model, const TrajectoryInfo& info, std::size_t frame,
+                       double time) {
+  const auto n = model.object->mesh.vertex_count(), tets = model.object->mesh.tet_count();
+  return fmt::format(
+      "      <Grid Name=\"frame {0}\">\n"
+      "        <Time Value=\"{1}\"/>\n"
+      "        <Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">\n"
+      "          <DataItem Dimensions=\"{2} 4\" NumberType=\"Int\" Precision=\"4\" "
+      "Format=\"HDF\">{3}:/tets</DataItem>\n"
+      "        </Topology>\n"
+      "        <Geometry GeometryType=\"XYZ\">\n"
+      "          <DataItem ItemType=\"HyperSlab\" Dimensions=\"1 {4} 3\">\n"
+      "            <DataItem Dimensions=\"3 3\" NumberType=\"Int\" Format=\"XML\">{0} 0 0 1 1 1 1 {4} 3</DataItem>\n"
+      "            <DataItem Dimensions=\"{5} {4} 3\" NumberType=\"Float\" Precision=\"4\" Format=\"HDF\">{3}:/vertices"
+      "</DataItem>\n"
+      "          </DataItem>\n"
+      "        </Geometry>\n"
+      "      </Grid>\n",
+      frame, time, tets, h5, n, info.frames);
+}
+
+std::string escape_xml(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string xdmf_text(const std::filesystem::path& trajectory, const ReducedModel& model, const TrajectoryInfo& info,
+                      const std::vector<double>& times) {
+  const std::string h5 = escape_xml(trajectory.filename().string());
+  std::string text = fmt::format(
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
+      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
+      escape_xml(model.asset_name));
+  for (std::size_t frame = 0; frame < times.size(); ++frame) text += xdmf_frame(h5, model, info, frame, times[frame]);
+  return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
+}
+
+}  // namespace
+
+/// Open datasets, in the order of the format.
+struct TrajectoryWriter::Datasets {
+  Datasets(Hdf5File& file, const SymbolSizes& sizes, bool examples) : file_(file), sizes_(sizes) {
+    if (examples) weights.emplace(rows("/examples/weights"));
+  }
+
+  void finish() {
+    for (RowWriter* dataset : {&time, &positions, &reduced, &reduced_velocity, &body_position, &body_orientation,
+                               &linear_momentum, &angular_momentum, &kinetic, &elastic, &potential, &step_time})
+      dataset->finish();
+    if (weights) weights->finish();
+  }
+
+ private:
+  RowWriter rows(const char* path) const { return {file_, trajectory_schema().dataset(path), sizes_}; }
+
+  Hdf5File& file_;
+  const SymbolSizes& sizes_;
+
+ public:
+  RowWriter time = rows("/time");
+  RowWriter positions = rows("/vertices");
+  RowWriter reduced = rows("/reduced");
+  RowWriter reduced_velocity = rows("/reduced_velocity");
+  RowWriter body_position = rows("/body/position");
+  RowWriter body_orientation = rows("/body/orientation");
+  RowWriter linear_momentum = rows("/linear_momentum");
+  RowWriter angular_momentum = rows("/angular_momentum");
+  RowWriter kinetic = rows("/energy/kinetic");
+  RowWriter elastic = rows("/energy/elastic");
+  RowWriter potential = rows("/energy/potential");
+  RowWriter step_time = rows("/step_time");
+  std::optional<RowWriter> weights;
+};
+
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model,
+                                   const TrajectoryInfo& info)
+    : model_(model),
+      info_(info),
+      output_(path),
+      file_(create_file(output_, model, info)),
+      rest_masses_(tet_volumes(model.object->mesh).cwiseProduct(model.object->materials.density)),
+      displacements_(model.object->mesh.vertex_count(), 3),
+      velocities_(model.object->mesh.vertex_count(), 3) {
+  const SymbolSizes sizes = sizes_of(model, info);
+  const TetArray& tets = model.object->mesh.tets;
+  const DatasetSchema& schema = trajectory_schema().dataset("/tets");
+  write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), tets.data());
+  datasets_ = std::make_unique<Datasets>(file_, sizes, info.examples > 0);
+}
+
+TrajectoryWriter::~TrajectoryWriter() = default;
+
+void TrajectoryWriter::append(const State& state, const Energies& energies, double step_seconds) {
+  constexpr std::array kOrigin{0.0, 0.0, 0.0};
+  constexpr std::array kIdentity{1.0, 0.0, 0.0, 0.0};
+  times_.push_back(state.time);
+  datasets_->time.append(state.time);
+  append_positions(state);
+  datasets_->reduced.append(row_of(state.q));
+  datasets_->reduced_velocity.append(row_of(state.v));
+  datasets_->body_position.append(std::span<const double>(kOrigin));
+  datasets_->body_orientation.append(std::span<const double>(kIdentity));
+  datasets_->kinetic.append(energies.kinetic);
+  datasets_->elastic.append(energies.elastic);
+  datasets_->potential.append(energies.potential);
+  datasets_->step_time.append(step_seconds);
+  if (datasets_->weights) datasets_->weights->append(row_of(state.weights));
+}
+
+void TrajectoryWriter::append_positions(const State& state) {
+  const RowMatrix& basis = model_.modal->basis;
+  displacements_.reshaped<Eigen::RowMajor>().noalias() = basis * state.q;
+  velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
+  const VertexArray positions = model_.object->mesh.vertices + displacements_;
+  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
+  datasets_->positions.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
+  largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
+  const Momenta now = momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
+  datasets_->linear_momentum.append(row_of(now.linear));
+  datasets_->angular_momentum.append(row_of(now.angular));
+}
+
+void TrajectoryWriter::finish() {
+  datasets_->finish();
+  datasets_.reset();
+  file_.close();
+  output_.commit();
+  write_file_atomically(std::filesystem::path(output_.target()).replace_extension(".xdmf"),
+                        xdmf_text(output_.target(), model_, info_, times_));
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "runtime/sim/model.h"
+#include "runtime/sim/newton.h"
+
+namespace exmat::runtime {
+
+enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
+
+/// A constant generalised force that acts in every step whose midpoint lies in [start, end).
+struct ScriptedForce {
+  Eigen::VectorXd force;                                 ///< [r]
+  double start = 0;                                      ///< [s]
+  double end = std::numeric_limits<double>::infinity();  ///< [s]
+};
+
+/// The linear example force. method.md, section 5.
+struct ExampleSettings {
+  double stiffness = 0;  ///< kappa >= 0 [1/s^2]
+  double damping = 0;    ///< c_kappa >= 0 [1/s]
+  double bias = 1;       ///< in [0, 1]
+};
+
+/// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.
+struct StepScene {
+  double time_step = 0.001;  ///< > 0 [s]
+  Integrator integrator = Integrator::kBdf2;
+  double mass_damping = 0;       ///< alpha >= 0 [1/s]
+  double stiffness_damping = 0;  ///< beta >= 0 [s]
+  NewtonSettings newton;
+  Eigen::VectorXd gravity_force;  ///< [r], gravity_load^T g
+  std::vector<ScriptedForce> forces;
+  std::optional<ExampleSettings> examples;  ///< absent: no weights, no target, no example force
+};
+
+/// Whether steps compute weights and target: there are examples and a force that depends on them.
+inline bool runs_examples(const Model& model, const StepScene& scene) noexcept {
+  return model.examples && scene.examples && (scene.examples->stiffness > 0 || scene.examples->damping > 0);
+}
+
+/// [r] generalised force of gravity [m/s^2].
+Eigen::VectorXd gravity_force(const Model& model, const Eigen::Vector3d& gravity);
+
+/// [r] generalised force of the same world-space force [N] on each of k vertices, `basis_rows` [3k x r].
+Eigen::VectorXd vertex_force(const RowMatrix& basis_rows, const Eigen::Vector3d& force);
+
+}  // namespace exmat::runtime

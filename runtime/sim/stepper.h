@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+
+#include "runtime/sim/model.h"
+#include "runtime/sim/scene.h"
+#include "runtime/sim/state.h"
+#include "runtime/sim/workspace.h"
+
+namespace exmat::runtime {
+
+/// Bits of StepReport::status.
+enum StepStatus : std::uint32_t {
+  kStepNonFinite = 1,       ///< NaN or infinity met: the state is as it was before the step
+  kStepIterationLimit = 2,  ///< the residual is above the tolerance
+  kStepStagnated = 4,       ///< likewise, and no step along the Newton direction lowers the potential
+  kTargetNotConverged = 8,  ///< the target is its last iterate
+};
+
+/// What one step did.
+struct StepReport {
+  std::uint32_t status = 0;
+  int newton_iterations = 0;
+  int line_search_evaluations = 0;
+  int projections = 0;  ///< Hessians that needed positive semi-definite element tangents
+  int target_iterations = 0;
+  double residual = 0;  ///< of the equation of motion [kg^1/2 m/s^2]
+};
+
+/// Advances a constrained body by one time step: qddot + (alpha I + beta K) qdot + f_int(q) = f_ext + f_example.
+/// method.md, section 6. No allocation, no exception. docs/step_in_detail.md.
+StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
+
+/// Example weights of a state that no step has led to, for its output.
+void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
+
+struct Energies {
+  double kinetic = 0;    ///< 1/2 |v|^2 [J]
+  double elastic = 0;    ///< E(q) [J]
+  double potential = 0;  ///< of gravity, 0 at rest [J]
+};
+Energies energies(const StepScene& scene, const State& state) noexcept;
+
+}  // namespace exmat::runtime
