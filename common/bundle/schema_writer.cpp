@@ -3,12 +3,12 @@
 #include <zlib.h>
 
 #include "common/bundle/hdf5_file.h"
+#include "common/core/version.h"
 
 namespace exmat {
 namespace {
 
 // That of the project in CMakeLists.txt; tests/format compares them.
-constexpr std::string_view kVersion = "0.1.0";
 
 void write_labels(Hdf5File& file, const DatasetSchema& schema, const std::string& path) {
   file.write_attribute(path, "description", schema.description);
@@ -18,7 +18,7 @@ void write_labels(Hdf5File& file, const DatasetSchema& schema, const std::string
 
 }  // namespace
 
-std::string generator_name() { return fmt::format("exmat {}", kVersion); }
+std::string generator_name() { return fmt::format("exmat {}", version()); }
 
 std::uint32_t crc32_of(std::span<const std::byte> bytes, std::uint32_t crc) {
   return static_cast<std::uint32_t>(::crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <charconv>
 #include <fmt/format.h>
-#include <limits>
 #include <string>
 #include <string_view>
 #include <unordered_set>
@@ -16,18 +15,20 @@ namespace {
 
 constexpr std::string_view kSeparators = ", \t\r";
 
-std::int64_t parse_id(std::string_view word, const std::string& file, const std::string& place) {
+std::int64_t parse_id(std::string_view word, std::int64_t largest, const std::string& file, const std::string& place) {
   std::int64_t id = 0;
   const auto result = std::from_chars(word.data(), word.data() + word.size(), id);
   const bool is_integer = result.ec == std::errc() && result.ptr == word.data() + word.size();
-  if (!is_integer || id < 1 || id > std::numeric_limits<std::int32_t>::max())
-    throw InputError({file, place, "vertex ids >= 1", fmt::format("\"{}\"", word), ""});
+  if (!is_integer || id < 1 || id > largest) {
+    const std::string range = largest == kLargestVertexId ? ">= 1" : fmt::format("from 1 to {}", largest);
+    throw InputError({file, place, "vertex ids " + range, fmt::format("\"{}\"", word), ""});
+  }
   return id - 1;
 }
 
 }  // namespace
 
-std::vector<std::int64_t> read_vertex_ids(const std::filesystem::path& file) {
+std::vector<std::int64_t> read_vertex_ids(const std::filesystem::path& file, std::int64_t largest) {
   const std::string text = read_text(file, "a text file of vertex ids");
   std::vector<std::int64_t> ids;
   std::unordered_set<std::int64_t> seen;
@@ -40,7 +41,7 @@ std::vector<std::int64_t> read_vertex_ids(const std::filesystem::path& file) {
     for (std::size_t at = line.find_first_not_of(kSeparators); at < line.size();
          at = line.find_first_not_of(kSeparators, at)) {
       const std::size_t stop = std::min(line.find_first_of(kSeparators, at), line.size());
-      ids.push_back(parse_id(line.substr(at, stop - at), file.string(), place));
+      ids.push_back(parse_id(line.substr(at, stop - at), largest, file.string(), place));
       if (!seen.insert(ids.back()).second)
         throw InputError({file.string(), place, "each vertex once", fmt::format("{} again", ids.back() + 1), ""});
       at = stop;

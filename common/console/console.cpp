@@ -99,7 +99,9 @@ int run_program(CLI::App& app, int argc, char** argv, const std::function<void()
     action();
     return static_cast<int>(ExitStatus::kDone);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? static_cast<int>(ExitStatus::kDone) : static_cast<int>(ExitStatus::kBadInput);
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::fputs((app.get_name() + ": " + error.what() + "; see " + app.get_name() + " --help\n").c_str(), stderr);
+    return static_cast<int>(ExitStatus::kBadInput);
   } catch (const InputError& error) {
     std::fputs((app.get_name() + ": " + error.what() + "\n").c_str(), stderr);
     return static_cast<int>(ExitStatus::kBadInput);

@@ -6,8 +6,9 @@
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/console/console.h"
-#include "common/core/log.h"
+#include "common/core/atomic_file.h"
 #include "common/core/timer.h"
+#include "common/core/version.h"
 #include "precompute/pipeline/build_model.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
@@ -50,6 +51,7 @@ void bundle(const Options& options) {
   const AssetConfig asset = load_asset(options.asset);
   std::optional<Needs> scene_needs;
   if (!options.scene.empty()) scene_needs = needs_of(load_scene(options.scene));
+  { const AtomicFile writable(options.bundle); }  // better refused now than after the work
   precompute::BuildReport report;
   const ReducedModel model = precompute::build_model(asset, precompute::resolve_needs(asset, scene_needs), report);
   const Timer timer;
@@ -82,7 +84,7 @@ void check(const Options& options) {
 int main(int argc, char** argv) {
   CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
   app.set_version_flag("--version",
-                       [] { return "exmat-precompute " EXMAT_VERSION ", " + precompute::solver_versions(); });
+                       [] { return fmt::format("exmat-precompute {}, {}", version(), precompute::solver_versions()); });
   app.require_subcommand(1);
   Options options;
 

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <fmt/format.h>
 #include <numeric>
 #include <random>
 
@@ -231,10 +232,11 @@ Choice choose(const ElementSamples& samples, const PoseSource& source, const Cub
 
 void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
   if (options.elements && *options.elements > tets)
-    throw WorkError("cubature.elements: expected at most the number of tets, " + std::to_string(tets) + ", found " +
-                    std::to_string(*options.elements));
+    throw InputError({"", "/cubature/elements", "at most the number of tets, " + std::to_string(tets),
+                      std::to_string(*options.elements), ""});
   if (options.tolerance && options.method == "nn_htp")
-    throw WorkError("cubature.tolerance: expected cubature.elements with method nn_htp, which needs a fixed number");
+    throw InputError({"", "/cubature/tolerance", "cubature.elements with method nn_htp, which needs a fixed number",
+                      "a tolerance", ""});
 }
 
 }  // namespace
@@ -278,9 +280,10 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
   data.heldout_energy_error = errors.energy;
   data.heldout_stiffness_error = errors.stiffness;
   if (options.tolerance && data.heldout_error > *options.tolerance)
-    throw WorkError("cubature.tolerance: expected a held-out error of at most " + std::to_string(*options.tolerance) +
-                    ", found " + std::to_string(data.heldout_error) + " with " + std::to_string(s) +
-                    " elements; raise it, or lower basis.size");
+    throw WorkError(
+        fmt::format("cubature.tolerance: expected a held-out error of at most {:.3g}, found {:.3g} with {} elements; "
+                    "raise it, or lower basis.size",
+                    *options.tolerance, data.heldout_error, s));
   return data;
 }
 

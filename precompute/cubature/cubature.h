@@ -26,8 +26,8 @@ CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& material
                                const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
                                const RowMatrix& poses);
 
-/// Chooses elements and weights on training poses and measures them on held-out ones. Throws WorkError where a
-/// tolerance cannot be met.
+/// Chooses elements and weights on training poses and measures them on held-out ones. Throws InputError (without
+/// a file) where the options do not fit the mesh, WorkError where a tolerance cannot be met.
 CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                             const CubatureOptions& options);
 

@@ -43,14 +43,12 @@ class NormalEquations {
   bool usable(Eigen::Index e) const { return norms_[e] > 0; }
 
   const Eigen::VectorXd& column(Eigen::Index e) {
-    auto [entry, inserted] = columns_.try_emplace(e);
-    if (inserted) {
-      entry->second.resize(linear_.size());
+    Eigen::VectorXd& values = columns_[e];
+    if (values.size() > 0) return values;
+    values.resize(linear_.size());
 #pragma omp parallel for schedule(static)
-      for (Eigen::Index i = 0; i < linear_.size(); ++i)
-        entry->second[i] = problem_.columns.col(i).dot(problem_.columns.col(e));
-    }
-    return entry->second;
+    for (Eigen::Index i = 0; i < linear_.size(); ++i) values[i] = problem_.columns.col(i).dot(problem_.columns.col(e));
+    return values;
   }
 
   Eigen::MatrixXd gram(const Members& members) {

@@ -35,9 +35,9 @@ void require_clamped(const TetMesh& mesh, const FlagVector& fixed) {
   }
   const Eigen::JacobiSVD<Eigen::Matrix<double, 6, 6>> svd(gram);
   if (svd.singularValues()[5] > kClampRank * svd.singularValues()[0]) return;
-  throw WorkError("object.fixed: expected at least three fixed vertices that are not on one line, found " +
-                  std::to_string(fixed.cast<int>().sum()) +
-                  " that leave the body free to move rigidly; fix more of them");
+  throw InputError({"", "/object/fixed", "at least three fixed vertices that are not on one line",
+                    std::to_string(fixed.cast<int>().sum()) + " that leave the body free to move rigidly",
+                    "fix more of them"});
 }
 
 }  // namespace
@@ -85,6 +85,8 @@ ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& mate
     system.null_space = rigid_motions(mesh, system.full_mass);
     return system;
   }
+  if (size == 0)
+    throw InputError({"", "/object/fixed", "a vertex that is free to move", "all of them fixed", "fix fewer"});
   require_clamped(mesh, fixed);
   system.mass = submatrix(system.full_mass, system.free_dofs);
   system.stiffness = submatrix(system.full_stiffness, system.free_dofs);

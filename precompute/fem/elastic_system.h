@@ -25,8 +25,8 @@ struct ElasticSystem {
   Eigen::MatrixXd extend(const Eigen::MatrixXd& free_rows) const;
 };
 
-/// `fixed` [n] flags the clamped vertices; all zero: a free body. Throws WorkError where the clamped vertices leave the
-/// body a rigid motion: they must be at least three and not lie on one line.
+/// `fixed` [n] flags the clamped vertices; all zero: a free body. Throws InputError (without a file) where the clamped
+/// vertices are all there are, or leave the body a rigid motion: they must be at least three and not lie on one line.
 ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed);
 
 /// [3n x 6] translations along and rotations about the axes through the centre of mass, M-orthonormal.

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <fmt/format.h>
 
+#include "common/config/vertex_ids.h"
 #include "common/core/error.h"
-#include "precompute/mesh_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {
@@ -60,29 +60,13 @@ class Selector {
   }
 
   std::vector<std::int32_t> operator()(const FileSelection& selection) const {
-    const std::string text = read_whole_file(selection.file, "vertex ids");
     std::vector<std::int32_t> ids;
-    std::size_t line_number = 0;
-    for (std::size_t begin = 0, end = 0; begin < text.size(); begin = end + 1) {
-      end = std::min(text.find('\n', begin), text.size());
-      ++line_number;
-      const auto line = std::string_view(text).substr(begin, end - begin);
-      Fields fields(line.substr(0, line.find('#')));
-      for (auto field = fields.next(); !field.empty(); field = fields.next())
-        ids.push_back(read_id(field, selection.file.string(), line_number));
-    }
+    for (const std::int64_t id : read_vertex_ids(selection.file, vertices_.rows()))
+      ids.push_back(static_cast<std::int32_t>(id));
     return require_some(std::move(ids), selection.file.string(), "");
   }
 
  private:
-  std::int32_t read_id(std::string_view field, const std::string& file, std::size_t line_number) const {
-    const auto id = parse_integer(field);
-    if (!id || *id < 1 || *id > vertices_.rows())
-      throw InputError({file, fmt::format("line {}", line_number),
-                        fmt::format("a 1-based vertex id, 1 to {}", vertices_.rows()), quote(field), ""});
-    return static_cast<std::int32_t>(*id - 1);
-  }
-
   std::vector<std::int32_t> require_some(std::vector<std::int32_t> ids, const std::string& file,
                                          const std::string& place) const {
     if (ids.empty())

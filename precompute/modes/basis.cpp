@@ -73,9 +73,10 @@ Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
   remove_components(mass, basis, snapshots);
   const Eigen::MatrixXd components = principal_components(mass, snapshots, size - basis.cols());
   if (basis.cols() + components.cols() < size)
-    throw WorkError("basis.size: expected at most " + std::to_string(basis.cols() + components.cols()) +
-                    ", the number of independent snapshots, found " + std::to_string(size) +
-                    "; ask for fewer, or for more basis.linear_modes");
+    throw InputError(
+        {"", "/basis/size",
+         "at most " + std::to_string(basis.cols() + components.cols()) + ", the number of independent snapshots",
+         std::to_string(size), "ask for fewer, or for more basis.linear_modes"});
   Eigen::MatrixXd result(mass.rows(), size);
   result << basis, components;
   for (int pass = 0; pass < 2; ++pass) {

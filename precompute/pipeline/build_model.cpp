@@ -10,6 +10,7 @@
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/core/timer.h"
+#include "common/core/version.h"
 #include "common/mesh/geometry.h"
 #include "precompute/cubature/cubature.h"
 #include "precompute/fem/elastic_system.h"
@@ -23,7 +24,6 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr const char* kGenerator = "exmat-precompute " EXMAT_VERSION;
 // Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
 constexpr Eigen::Index kExtraEigenfunctions = 4;
 constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
@@ -70,6 +70,7 @@ class Pipeline {
                             const RestMap& map, double scale) const;
   void add_examples(ShapeStage& stage, const ExampleInput& input);
   void finish_examples(ReducedModel& model, ShapeStage& stage, const ElasticSystem& system);
+  void require_modes(const ElasticSystem& system) const;
   void require_upright(const ReducedModel& model) const;
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
 
@@ -175,20 +176,29 @@ void Pipeline::add_examples(ShapeStage& stage, const ExampleInput& input) {
 
 ShapeStage Pipeline::shape_stage(const ExampleInput& input) {
   const Eigen::Index m = asset_.eigenfunctions;
+  const Eigen::Index available = object_.mesh.vertex_count() - 2;
+  if (m >= available)
+    throw InputError({asset_.file.string(), "/shape_space/eigenfunctions",
+                      fmt::format("at most {} for a mesh of {} vertices", available - 1, object_.mesh.vertex_count()),
+                      std::to_string(m), "ask for fewer or refine the mesh"});
   ShapeStage stage;
-  stage.object =
-      laplace_basis(object_.mesh, std::min(m + kExtraEigenfunctions, object_.mesh.vertex_count() - 2), asset_.name);
+  stage.object = laplace_basis(object_.mesh, std::min(m + kExtraEigenfunctions, available), asset_.name);
   const Eigen::VectorXd eigenvalues = stage.object.eigenvalues;
-  if (m >= eigenvalues.size())
-    throw InputError(
-        {asset_.file.string(), "/shape_space/eigenfunctions",
-         fmt::format("at most {} for a mesh of {} vertices", eigenvalues.size() - 1, object_.mesh.vertex_count()),
-         std::to_string(m), "ask for fewer or refine the mesh"});
   stage.object.eigenvalues.conservativeResize(m);
   stage.object.eigenfunctions.conservativeResize(Eigen::NoChange, m);
   set_shape_data(stage, eigenvalues);
   add_examples(stage, input);
   return stage;
+}
+
+// One more than is asked for must be there, to see that none was missed.
+void Pipeline::require_modes(const ElasticSystem& system) const {
+  const Eigen::Index available = system.mass.rows() - system.null_space.cols();
+  if (asset_.linear_modes < available) return;
+  throw InputError({asset_.file.string(), "/basis/linear_modes",
+                    fmt::format("at most {} for a mesh of {} vertices, {} of them fixed", available - 1,
+                                object_.mesh.vertex_count(), object_.fixed.cast<int>().sum()),
+                    std::to_string(asset_.linear_modes), "ask for fewer or refine the mesh"});
 }
 
 void Pipeline::require_upright(const ReducedModel& model) const {
@@ -249,9 +259,9 @@ ReducedModel Pipeline::run() {
 
   ReducedModel model;
   model.asset_name = asset_.name;
-  model.generator = kGenerator;
+  model.generator = fmt::format("exmat-precompute {}", version());
   model.input_sha256 = hash_inputs(
-      report_.inputs, fmt::format("{}\nexamples {}\nrigid {}\n", kGenerator, needs_.examples, needs_.rigid));
+      report_.inputs, fmt::format("{}\nexamples {}\nrigid {}\n", model.generator, needs_.examples, needs_.rigid));
   model.object = object_data();
 
   std::optional<ShapeStage> shape;
@@ -259,6 +269,7 @@ ReducedModel Pipeline::run() {
 
   const auto system =
       timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
+  require_modes(system);
   const auto solver = timed("factorisation", [&] {
     return SemidefiniteSolver(system.stiffness, system.mass * system.null_space, asset_.name + ": elastic stiffness");
   });
@@ -313,7 +324,14 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
 
 ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report) {
   report.inputs.push_back(asset.file);
-  return Pipeline(asset, needs, report).run();
+  try {
+    return Pipeline(asset, needs, report).run();
+  } catch (const InputError& error) {
+    // What the numerical stages refuse is a member of the asset; they do not know its file.
+    Complaint complaint = error.complaint();
+    if (complaint.file.empty()) complaint.file = asset.file.string();
+    throw InputError(std::move(complaint));
+  }
 }
 
 void check_inputs(const AssetConfig& asset, BuildReport& report) {

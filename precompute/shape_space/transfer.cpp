@@ -69,9 +69,10 @@ RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const Lap
       object.eigenfunctions.transpose() * (object.mass * (result.pull_back * rest_basis.eigenfunctions));
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(map, Eigen::ComputeThinU | Eigen::ComputeThinV);
   result.functional_map = svd.matrixU() * svd.matrixV().transpose();
-  result.confidence = (svd.singularValues().array() - 1).matrix().norm() / std::sqrt(static_cast<double>(map.rows()));
-  const double radius = object.vertices.rowwise().norm().norm();
-  result.residual = nearest.distances.norm() / radius;
+  result.residual = nearest.distances.norm() / object.vertices.rowwise().norm().norm();
+  result.confidence =
+      result.residual + (svd.singularValues().array() - 1).matrix().norm() / std::sqrt(static_cast<double>(map.rows()));
+
   result.same_frame = result.residual <= kSameFrame;
   return result;
 }

@@ -12,9 +12,8 @@ namespace exmat::precompute {
 struct RestMap {
   Eigen::MatrixXd functional_map;  ///< C_0, m x K_e, orthonormal rows
   SparseMatrix pull_back;          ///< n x n_e, values at the nearest point of the rest example for each object vertex
-  double residual = 0;  ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
-  double confidence =
-      0;  ///< |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 where they are the object's own
+  double residual = 0;    ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
+  double confidence = 0;  ///< residual + |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 is certain
   bool same_frame = true;  ///< the rest example coincides with the object within kSameFrame
 };
 

@@ -40,6 +40,9 @@ void count_bytes(const std::vector<ReadRecord>& records, std::vector<LedgerEntry
     const std::string folder = fmt::format("/{}/", entry.group);
     for (const ReadRecord& record : records)
       if (record.dataset.starts_with(folder)) entry.bytes += record.bytes;
+    if (!entry.included || entry.bytes > 0) continue;
+    entry.included = false;
+    entry.reason = "not needed to step";
   }
 }
 

@@ -4,6 +4,7 @@
 Usage: test_rules.py BUILD_FOLDER
 """
 import os
+import re
 import subprocess
 import sys
 import tempfile
@@ -94,8 +95,9 @@ class Naming(unittest.TestCase):
         jobs = str(os.cpu_count())
         result = subprocess.run(["run-clang-tidy", "-quiet", "-j", jobs, "-p", str(BUILD), "-checks=-*,readability-identifier-naming",
                                  pattern], capture_output=True, text=True)
-        self.assertEqual([line for line in result.stdout.splitlines() if ": error:" in line or ": warning:" in line], [])
-        self.assertEqual(result.returncode, 0, result.stdout[-2000:])
+        plain = re.sub(r"\x1b\[[0-9;]*m", "", result.stdout)
+        self.assertEqual([line for line in plain.splitlines() if re.search(r"\b(error|warning):", line)], [])
+        self.assertEqual(result.returncode, 0, plain[-2000:] + result.stderr[-2000:])
 
     def test_catches_a_planted_violation(self):
         with tempfile.TemporaryDirectory() as folder:

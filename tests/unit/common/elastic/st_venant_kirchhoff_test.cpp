@@ -111,7 +111,9 @@ TEST(StVenantKirchhoff, PatchTestHasNoForceInside) {
     for (int corner = 0; corner < 4; ++corner) forces.row(mesh.tets(t, corner)) += local.row(corner);
   }
   for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v)
-    if (interior[v]) EXPECT_LE(forces.row(v).norm(), 1e-13 * P.norm());
+    if (interior[v]) {
+      EXPECT_LE(forces.row(v).norm(), 1e-13 * P.norm());
+    }
   EXPECT_GT(forces.norm(), 0.1 * P.norm());
 }
 

@@ -106,7 +106,7 @@ TEST(ElasticSystem, ClampOnALineIsRefused) {
   try {
     build_elastic_system(mesh, uniform(mesh, 1, 1, 0.3), fixed);
     FAIL() << "a hinge passed as a clamp";
-  } catch (const WorkError& error) {
+  } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("3 that leave the body free to move rigidly"), std::string::npos)
         << error.what();
   }

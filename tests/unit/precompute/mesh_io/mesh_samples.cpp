@@ -57,28 +57,6 @@ std::string joined_tags(const auto& vertices) {
 
 }  // namespace
 
-TemporaryFolder::TemporaryFolder() {
-  const auto* test = testing::UnitTest::GetInstance()->current_test_info();
-  std::string name = fmt::format("exmat_{}_{}_{}", test->test_suite_name(), test->name(), getpid());
-  std::replace(name.begin(), name.end(), '/', '_');
-  path_ = std::filesystem::temp_directory_path() / name;
-  std::filesystem::create_directories(path_);
-}
-
-TemporaryFolder::~TemporaryFolder() {
-  std::error_code ignored;
-  std::filesystem::remove_all(path_, ignored);
-}
-
-std::filesystem::path TemporaryFolder::write(const std::string& name, std::string_view contents) const {
-  const auto file = path_ / name;
-  std::filesystem::create_directories(file.parent_path());
-  std::ofstream stream(file, std::ios::binary);
-  stream.write(contents.data(), static_cast<std::streamsize>(contents.size()));
-  EXPECT_TRUE(stream.good());
-  return file;
-}
-
 MeshFile sample_mesh(int cells) {
   MeshFile result;
   result.mesh = exmat::test::cube_grid(cells, 0.1);

@@ -8,23 +8,11 @@
 
 #include "common/core/error.h"
 #include "precompute/mesh_io/mesh_file.h"
+#include "tests/support/temporary_folder.h"
 
 namespace exmat::precompute::test {
 
-/// A folder of its own for each test, removed with the object.
-class TemporaryFolder {
- public:
-  TemporaryFolder();
-  ~TemporaryFolder();
-  TemporaryFolder(const TemporaryFolder&) = delete;
-  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
-
-  std::filesystem::path write(const std::string& name, std::string_view contents) const;
-  std::filesystem::path path(const std::string& name) const { return path_ / name; }
-
- private:
-  std::filesystem::path path_;
-};
+using exmat::test::TemporaryFolder;
 
 /// A grid of `cells`^3 cubes with coordinates of 17 digits, and the tet sets "all" and, of the first third, "soft
 /// part".

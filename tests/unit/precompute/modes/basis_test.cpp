@@ -129,7 +129,7 @@ TEST_P(Basis, MoreModesThanSnapshotsAreRefused) {
   try {
     basis(28);
     FAIL();
-  } catch (const WorkError& error) {
+  } catch (const InputError& error) {
     EXPECT_NE(std::string(error.what()).find("expected at most 27"), std::string::npos) << error.what();
   }
 }

@@ -58,6 +58,18 @@ TEST(RestMap, OfTheSameBodyOnAnotherMeshIsCertain) {
   EXPECT_LE((gram - Eigen::MatrixXd::Identity(kM, kM)).norm(), 1e-12);
 }
 
+// A rest example that does not lie where the object does, or is another body, is told by its confidence.
+TEST(RestMap, OfABodyThatLiesElsewhereIsDoubtful) {
+  const auto& s = setting();
+  TetMesh turned = s.example_mesh;
+  turned.vertices.col(0).swap(turned.vertices.col(1));
+  turned.tets.col(0).swap(turned.tets.col(1));
+  const auto basis = laplace_basis(turned, s.example.eigenvalues.size(), "turned");
+  const auto map = rest_map(s.object, turned, basis);
+  EXPECT_GT(map.confidence, 1.0);
+  EXPECT_FALSE(map.same_frame);
+}
+
 // The true pose of the object is known: the same analytic twist of its own vertices. The error is compared with that of
 // the best approximation in the object's functions.
 TEST(TransferPose, IsCloseToTheIdealProjection) {

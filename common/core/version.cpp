@@ -1,0 +1,7 @@
+#include "common/core/version.h"
+
+namespace exmat {
+
+std::string_view version() { return EXMAT_VERSION; }
+
+}  // namespace exmat
