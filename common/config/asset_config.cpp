@@ -29,7 +29,8 @@ class AssetReader {
     read_examples(member_or(json, "examples", Json::array()), asset);
     read_basis(member_or(json, "basis", Json::object()), asset);
     read_cubature(member_or(json, "cubature", Json::object()), asset);
-    asset.target_tolerance = member_or(json, "targets", Json::object()).value("tolerance", asset.target_tolerance);
+    const Json targets = member_or(json, "targets", Json::object());
+    if (targets.contains("tolerance")) asset.target_tolerance = targets["tolerance"].get<double>();
     asset.needs = optional_member<std::vector<std::string>>(json, "needs");
     asset.seed = json.value("seed", asset.seed);
     return asset;

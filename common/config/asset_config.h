@@ -71,7 +71,7 @@ struct AssetConfig {
   std::string cubature_method = "greedy_swap";
   int training_poses = 200;
 
-  double target_tolerance = 1e-4;  ///< relative error of the table of targets
+  std::optional<double> target_tolerance;  ///< relative error of the table of targets
 
   std::optional<std::vector<std::string>>
       needs;  ///< optional groups to write ("examples", "rigid"); absent: all that apply

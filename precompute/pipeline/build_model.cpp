@@ -253,6 +253,7 @@ ReducedModel Pipeline::run() {
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
   report_.ledger = plan_groups(needs_, object_.fixed.any(), !asset_.examples.empty());
   const bool with_examples = includes(report_.ledger, "examples");
+  if (asset_.target_tolerance) log::info("targets.tolerance: not used, this version makes no table of targets");
   std::optional<ExampleInput> example_input;
   if (with_examples)
     example_input = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });

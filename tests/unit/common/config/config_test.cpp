@@ -32,7 +32,7 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.eigenfunctions, 20);
   EXPECT_EQ(asset.basis_size, 30);
   EXPECT_EQ(asset.cubature_method, "greedy_swap");
-  EXPECT_EQ(asset.target_tolerance, 1e-4);
+  EXPECT_EQ(asset.target_tolerance, std::nullopt);
   EXPECT_EQ(asset.seed, 1u);
 }
 
