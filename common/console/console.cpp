@@ -72,14 +72,17 @@ ProgressSink make_progress_sink(const std::string& mode) {
 
 }  // namespace
 
-void add_common_options(CLI::App& command, CommonOptions& options) {
-  command.add_option("--threads", options.threads, "OpenMP threads; 0: all cores. Results do not depend on it")
+void add_common_options(CLI::App& app, CommonOptions& options) {
+  app.fallthrough();
+  app.footer("Every command also takes --version, --threads, --log-level and --progress: see " + app.get_name() +
+             " --help.");
+  app.add_option("--threads", options.threads, "OpenMP threads; 0: all cores. Results do not depend on it")
       ->check(CLI::Range(0, 4096))
       ->capture_default_str();
-  command.add_option("--log-level", options.log_level, "debug, info, warning or error")
+  app.add_option("--log-level", options.log_level, "debug, info, warning or error")
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}))
       ->capture_default_str();
-  command.add_option("--progress", options.progress, "auto, plain, json (one object a line on stderr) or none")
+  app.add_option("--progress", options.progress, "auto, plain, json (one object a line on stderr) or none")
       ->check(CLI::IsMember({"auto", "plain", "json", "none"}))
       ->capture_default_str();
 }

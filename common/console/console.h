@@ -13,8 +13,8 @@ struct CommonOptions {
   std::string progress = "auto";
 };
 
-/// Adds --threads, --log-level and --progress to a command.
-void add_common_options(CLI::App& command, CommonOptions& options);
+/// Adds --threads, --log-level and --progress to a program, to be given before or after the name of a command.
+void add_common_options(CLI::App& app, CommonOptions& options);
 
 /// Connects exmat::log and progress reports to stderr and sets the number of OpenMP threads. Call it once the options
 /// are parsed.

@@ -87,16 +87,15 @@ int main(int argc, char** argv) {
                        [] { return fmt::format("exmat-precompute {}, {}", version(), precompute::solver_versions()); });
   app.require_subcommand(1);
   Options options;
+  add_common_options(app, options.common);
 
   auto* bundle_command = app.add_subcommand("bundle", "compute the offline stage and write a bundle");
   bundle_command->add_option("ASSET", options.asset, "asset file (JSON)")->required();
   bundle_command->add_option("-o,--output", options.bundle, "bundle to write (HDF5)")->required();
   bundle_command->add_option("--scene", options.scene, "write only what this scene needs");
-  add_common_options(*bundle_command, options.common);
 
   auto* check_command = app.add_subcommand("check", "read and check the inputs, compute nothing");
   check_command->add_option("ASSET", options.asset, "asset file (JSON)")->required();
-  add_common_options(*check_command, options.common);
 
   return run_program(app, argc, argv, [&] {
     apply(options.common);

@@ -10,6 +10,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", generator_name());
   app.require_subcommand(1);
   CommonOptions common;
+  add_common_options(app, common);
 
   runtime::RunOptions options;
   CLI::App& run = *app.add_subcommand("run", "Step a scene on its bundle");
@@ -24,10 +25,6 @@ int main(int argc, char** argv) {
   CLI::App& info = *app.add_subcommand("info", "Say what a bundle holds");
   CLI::App& validate = *app.add_subcommand("validate", "Say whether every dataset of a bundle is sound");
   for (CLI::App* command : {&info, &validate}) command->add_option("bundle", bundle, "BUNDLE.h5")->required();
-  for (CLI::App* command : {&run, &info, &validate}) {
-    add_common_options(*command, common);
-    command->set_version_flag("--version", generator_name());
-  }
 
   return run_program(app, argc, argv, [&] {
     apply(common);
