@@ -20,7 +20,8 @@ PetscErrorCode remember_error(MPI_Comm, int, const char*, const char*, PetscErro
 // Once per program; PETSc and MPI cannot be started a second time, so they end with it.
 void start_solvers() {
   static const bool started = [] {
-    // A single process needs neither binding nor a network.
+    // A single process needs no daemon, no binding and no network. mpirun sets its own.
+    setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
     setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
     setenv("OMPI_MCA_btl", "self,vader", 0);
     check_petsc(SlepcInitializeNoArguments(), "initialisation");
