@@ -22,6 +22,7 @@ void start_solvers() {
   static const bool started = [] {
     // A single process needs no daemon, no binding and no network. mpirun sets its own.
     setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
+    setenv("HWLOC_HIDE_ERRORS", "2", 0);  // stderr is for the log, also in containers without /sys
     setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
     setenv("OMPI_MCA_btl", "self,vader", 0);
     check_petsc(SlepcInitializeNoArguments(), "initialisation");
