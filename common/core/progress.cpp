@@ -21,8 +21,8 @@ Progress::Progress(std::string stage, std::int64_t total)
 
 Progress::~Progress() { report(true); }
 
-void Progress::advance(std::int64_t count) {
-  done_ += count;
+void Progress::reach(std::int64_t done) {
+  done_ = done;
   const auto now = Clock::now();
   if (now - last_report_ < kReportInterval) return;
   last_report_ = now;

@@ -22,7 +22,7 @@ using ProgressSink = std::function<void(const ProgressReport&)>;
 void set_progress_sink(ProgressSink sink);
 
 /// Progress of one stage: construct where it begins, advance as work is done, destroy where it ends. Call from one
-/// thread.
+/// thread at a time.
 class Progress {
  public:
   Progress(std::string stage, std::int64_t total);
@@ -30,7 +30,9 @@ class Progress {
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
 
-  void advance(std::int64_t count = 1);
+  void advance(std::int64_t count = 1) { reach(done_ + count); }
+  /// Sets what is done of the total.
+  void reach(std::int64_t done);
 
  private:
   using Clock = std::chrono::steady_clock;

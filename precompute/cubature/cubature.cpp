@@ -36,6 +36,7 @@ Totals sum_responses(const ElementSamples& samples, const RowMatrix& poses) {
   std::vector<ElementSamples::Response> partial(static_cast<std::size_t>(blocks));
   Totals totals{{Eigen::MatrixXd::Zero(samples.modes(), poses.rows()), Eigen::VectorXd::Zero(poses.rows())},
                 Eigen::VectorXd(samples.count())};
+  Progress progress("element responses", blocks);
 #pragma omp parallel for schedule(dynamic)
   for (Eigen::Index block = 0; block < blocks; ++block) {
     auto& sum = partial[static_cast<std::size_t>(block)];
@@ -46,6 +47,8 @@ Totals sum_responses(const ElementSamples& samples, const RowMatrix& poses) {
       sum.energies += own.energies;
       totals.element_energies[t] = own.energies.mean();
     }
+#pragma omp critical(element_responses_progress)
+    progress.advance();
   }
   for (const auto& sum : partial) {
     totals.response.forces += sum.forces;
@@ -211,7 +214,7 @@ Choice choose(const ElementSamples& samples, const PoseSource& source, const Cub
   const auto target = open_ended ? std::min<std::size_t>(10 * r, static_cast<std::size_t>(samples.count()))
                                  : static_cast<std::size_t>(options.elements.value_or(static_cast<int>(2 * r)));
   Choice choice;
-  Progress progress("cubature", passes);
+  Progress progress("cubature passes", passes);
   for (int pass = 0; pass < passes; ++pass) {
     const auto candidates = choose_candidates(totals.element_energies, choice.elements, limit,
                                               options.seed + 1000 + static_cast<unsigned>(pass));

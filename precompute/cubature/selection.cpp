@@ -9,6 +9,8 @@
 #include <random>
 #include <set>
 
+#include "common/core/progress.h"
+
 namespace exmat::precompute {
 namespace {
 
@@ -159,7 +161,9 @@ Eigen::Index best_candidate(const NormalEquations& equations, const Eigen::Vecto
 // Grows the support to `count` members; `offer` gives the candidates of a round.
 template <typename Offer>
 void grow(NormalEquations& equations, Support& support, std::size_t count, const StopRule* stop, const Offer& offer) {
+  Progress progress("cubature elements", static_cast<std::int64_t>(count));
   for (std::size_t round = 0; support.members.size() < count && round < 20 * count; ++round) {
+    progress.reach(static_cast<std::int64_t>(support.members.size()));
     const auto correlation = equations.correlation(support.members, support.weights);
     const Eigen::Index next = best_candidate(equations, correlation, support, offer());
     if (next < 0) break;

@@ -58,10 +58,14 @@ Eigen::MatrixXd modal_derivatives(const TetMesh& mesh, const TetMaterials& mater
   for (Eigen::Index j = 0; j < modes.cols(); ++j)
     for (Eigen::Index i = 0; i <= j; ++i) pairs.emplace_back(i, j);
   Eigen::MatrixXd loads(fields.rows(), static_cast<Eigen::Index>(pairs.size()));
+  Progress progress("modal derivatives", static_cast<std::int64_t>(pairs.size()));
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t p = 0; p < pairs.size(); ++p)
+  for (std::size_t p = 0; p < pairs.size(); ++p) {
     loads.col(static_cast<Eigen::Index>(p)) = -second_derivative<StVenantKirchhoff>(
         mesh, materials, gradients, volumes, fields.col(pairs[p].first), fields.col(pairs[p].second));
+#pragma omp critical(modal_derivatives_progress)
+    progress.advance();
+  }
   return solver.solve(system.restrict(loads));
 }
 

@@ -49,7 +49,7 @@ class Pipeline {
  private:
   template <typename Work>
   auto timed(const std::string& stage, Work work) {
-    log::debug(stage + " ...");
+    log::info(stage);
     const Timer timer;
     auto result = work();
     report_.stages.push_back({stage, timer.seconds()});

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/core/error.h"
+#include "common/core/progress.h"
 #include "precompute/solvers/petsc_handles.h"
 
 namespace exmat::precompute {
@@ -28,6 +29,12 @@ PetscErrorCode apply_inverse(PC preconditioner, Vec x, Vec y) {
   Eigen::Map<Eigen::VectorXd>(output, solver->size()) = solver->solve(Columns(input, solver->size()));
   check_petsc(VecRestoreArrayRead(x, &input), "vector");
   check_petsc(VecRestoreArrayWrite(y, &output), "vector");
+  return 0;
+}
+
+PetscErrorCode report_progress(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt,
+                               void* progress) {
+  static_cast<Progress*>(progress)->reach(converged);
   return 0;
 }
 
@@ -85,6 +92,8 @@ Eigen::MatrixXd krylov_schur(Mat stiffness, Mat mass, const SemidefiniteSolver& 
   const auto start = to_vec(solver.solve(start_vector(solver.size(), 1 + static_cast<unsigned>(found.cols()))));
   Vec raw_start = start.get();
   check_petsc(EPSSetInitialSpace(eps.get(), 1, &raw_start), "start vector");
+  Progress progress("eigenpairs", count);
+  check_petsc(EPSMonitorSet(eps.get(), report_progress, &progress, nullptr), "monitor");
   check_petsc(EPSSolve(eps.get()), "eigensolution");
 
   PetscInt converged = 0;
