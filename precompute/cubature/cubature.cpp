@@ -147,10 +147,10 @@ ElementSamples::Response weighted_response(const ElementSamples& samples, const 
 class ErrorMeter {
  public:
   ErrorMeter(const ElementSamples& samples, const PoseSource& source, const RowMatrix& poses)
-      : samples_(samples),
-        poses_(poses),
-        factor_(source.rest_stiffness),
-        totals_(sum_responses(samples, poses).response) {}
+      : samples_(samples), poses_(poses), factor_(source.rest_stiffness), totals_(sum_responses(samples, poses)) {}
+
+  const RowMatrix& poses() const { return poses_; }
+  const Totals& totals() const { return totals_; }
 
   double force_error(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
     return force_error(weighted_response(samples_, elements, weights, poses_));
@@ -158,14 +158,15 @@ class ErrorMeter {
 
   CubatureErrors all_errors(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
     const auto reduced = weighted_response(samples_, elements, weights, poses_);
-    const Eigen::VectorXd energy = (reduced.energies - totals_.energies).cwiseQuotient(totals_.energies);
+    const Eigen::VectorXd energy =
+        (reduced.energies - totals_.response.energies).cwiseQuotient(totals_.response.energies);
     return {force_error(reduced), root_mean_square(energy), stiffness_error(elements, weights)};
   }
 
  private:
   double force_error(const ElementSamples::Response& reduced) const {
-    const Eigen::MatrixXd difference = factor_.matrixL().solve(reduced.forces - totals_.forces);
-    const Eigen::MatrixXd reference = factor_.matrixL().solve(totals_.forces);
+    const Eigen::MatrixXd difference = factor_.matrixL().solve(reduced.forces - totals_.response.forces);
+    const Eigen::MatrixXd reference = factor_.matrixL().solve(totals_.response.forces);
     return root_mean_square(
         (difference.colwise().norm().array() / reference.colwise().norm().array()).matrix().transpose());
   }
@@ -188,7 +189,7 @@ class ErrorMeter {
   const ElementSamples& samples_;
   const RowMatrix& poses_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
-  ElementSamples::Response totals_;
+  Totals totals_;
 };
 
 Selection select(const SelectionProblem& problem, const CubatureOptions& options, std::size_t count,
@@ -204,8 +205,9 @@ struct Choice {
 };
 
 Choice choose(const ElementSamples& samples, const PoseSource& source, const CubatureOptions& options,
-              const RowMatrix& poses, const ErrorMeter& heldout) {
-  const auto totals = sum_responses(samples, poses);
+              const ErrorMeter& training, const ErrorMeter& heldout) {
+  const RowMatrix& poses = training.poses();
+  const Totals& totals = training.totals();
   const TrainingRows rows(source, totals.response);
   const Eigen::Index limit = std::max<Eigen::Index>(1, kTrainingEntries / ((samples.modes() + 1) * poses.rows()));
   const int passes = samples.count() > limit ? kPasses : 1;
@@ -255,7 +257,8 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
                             const CubatureOptions& options) {
   require_sound_options(options, mesh.tet_count());
   const ElementSamples samples(mesh, materials, source.basis);
-  const RowMatrix training = draw_poses(source, options.training_poses, options.seed);
+  const RowMatrix training_poses = draw_poses(source, options.training_poses, options.seed);
+  const ErrorMeter training(samples, source, training_poses);
   CubatureData data;
   data.heldout_poses = draw_poses(source, kHeldoutPoses, options.seed + 1'000'003);
   const ErrorMeter heldout(samples, source, data.heldout_poses);
@@ -277,7 +280,7 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
     data.youngs_modulus[j] = materials.youngs_modulus[tet];
     data.poisson_ratio[j] = materials.poisson_ratio[tet];
   }
-  data.training_error = ErrorMeter(samples, source, training).force_error(choice.elements, choice.weights);
+  data.training_error = training.force_error(choice.elements, choice.weights);
   const auto errors = heldout.all_errors(choice.elements, choice.weights);
   data.heldout_error = errors.force;
   data.heldout_energy_error = errors.energy;
