@@ -33,7 +33,8 @@ constexpr double kTruncationWarning = 0.25;
 // The object's shape space and its examples in it, before there is a basis.
 struct ShapeStage {
   LaplaceBasis object;
-  Eigen::VectorXd weights;  ///< Lambda
+  Eigen::MatrixXd rest_coefficients;  ///< m x 3, of the object
+  Eigen::VectorXd weights;            ///< Lambda
   ShapeSpaceData data;
   ExampleSet examples;
   Eigen::MatrixXd displacements;  ///< 3n x (K-1)
@@ -87,10 +88,10 @@ ObjectData Pipeline::object_data() const {
 void Pipeline::set_shape_data(ShapeStage& stage, const Eigen::VectorXd& eigenvalues) {
   const Eigen::Index m = asset_.eigenfunctions;
   stage.weights = descriptor_weights(stage.object, asset_.weighting);
-  const Eigen::MatrixXd rest = coefficients(stage.object, stage.object.vertices);
+  stage.rest_coefficients = coefficients(stage.object, stage.object.vertices);
   stage.data = {stage.object.eigenvalues,
                 stage.object.eigenfunctions,
-                stage.weights.asDiagonal() * rest,
+                stage.weights.asDiagonal() * stage.rest_coefficients,
                 stage.object.volume,
                 stage.object.centroid,
                 asset_.weighting,
@@ -161,12 +162,11 @@ void Pipeline::add_examples(ShapeStage& stage, const ExampleInput& input) {
     frame.fit_weights = Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal();
   else
     frame.fit_weights = scalar_mass(object_.mesh, object_.materials.density);
-  const Eigen::MatrixXd rest_coefficients = coefficients(stage.object, stage.object.vertices);
   stage.displacements.resize(3 * object_.mesh.vertex_count(), static_cast<Eigen::Index>(input.poses.size()));
   for (std::size_t k = 0; k < input.poses.size(); ++k) {
     const TetMesh posed{input.poses[k].vertices, input.rest.tets};
     const auto transferred =
-        transfer_pose(stage.object, rest_coefficients, map, rest_basis, normalised_positions(posed), frame);
+        transfer_pose(stage.object, stage.rest_coefficients, map, rest_basis, normalised_positions(posed), frame);
     const double scale = std::cbrt(stage.object.volume / tet_volumes(posed).sum());
     stage.examples.examples.push_back(posed_example(stage, input.poses[k], transferred, map, scale));
     stage.displacements.col(static_cast<Eigen::Index>(k)) = reconstruct_displacement(
