@@ -44,7 +44,18 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   summary.cubature_elements = value_of(sizes, "s");
   summary.eigenfunctions = value_of(sizes, "m");
   summary.examples = value_of(sizes, "K");
+  summary.has_polynomial = includes(groups, "polynomial");
+  summary.has_targets = includes(groups, "targets");
+  summary.internal_force = CubatureData{}.internal_force;
+  if (includes(groups, "cubature")) reader.read_text("/cubature", "internal_force", summary.internal_force);
+  if (summary.has_targets) reader.read_text("/targets", "energy_reference", summary.energy_reference);
   return summary;
+}
+
+Needs fit_needs(Needs needs, const BundleSummary& summary) {
+  if (needs.internal_force == "auto") needs.internal_force = summary.internal_force;
+  needs.targets = needs.targets && summary.has_targets && summary.energy_reference == needs.energy_reference;
+  return needs;
 }
 
 ReducedModel read_bundle(const std::filesystem::path& path, const BundleRequest& request,

@@ -25,8 +25,16 @@ struct BundleSummary {
   std::vector<std::string> groups;  ///< present, in bundle order
   bool constrained = false;         ///< root attribute of that name (int64, 0 or 1)
   std::int64_t vertices = 0, tets = 0, modes = 0, cubature_elements = 0, eigenfunctions = 0, examples = 0;
+  std::string internal_force;    ///< "cubature" or "polynomial": what `auto` takes
+  std::string energy_reference;  ///< of /targets; empty where there are none
+  bool has_polynomial = false;   ///< /polynomial is there
+  bool has_targets = false;      ///< /targets is there
 };
 BundleSummary summarise_bundle(const std::filesystem::path& path);
+
+/// What of these needs the bundle serves: internal_force `auto` becomes its choice, and targets are not needed where it
+/// has none of that energy_reference.
+Needs fit_needs(Needs needs, const BundleSummary& summary);
 
 /// What was read from a bundle: dataset path and bytes, in order.
 struct ReadRecord {

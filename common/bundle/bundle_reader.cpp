@@ -16,6 +16,13 @@ const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attrib
   return *found;
 }
 
+// What of an asset brings a group.
+std::string asset_member(std::string_view group) {
+  if (group == "polynomial") return "\"polynomial\" as internal_force";
+  const bool is_need = group == "targets" || group == "rigid" || group == "contact";
+  return fmt::format("\"{}\" among the needs", is_need ? group : "examples");
+}
+
 std::string size_text(std::span<const std::int64_t> sizes) {
   return sizes.empty() ? "a scalar" : fmt::format("{}", fmt::join(sizes, " x "));
 }
@@ -49,8 +56,13 @@ std::string BundleReader::text_attribute(const std::string& name) const {
   return std::get<std::string>(header_value(name));
 }
 
+void BundleReader::read_text(const std::string& group_path, const std::string& name, std::string& text) {
+  group(group_path, "");
+  attribute(name, text);
+}
+
 std::vector<LedgerEntry> BundleReader::listed_groups() const {
-  std::vector<LedgerEntry> ledger = plan_groups(Needs{}, constrained_, true);
+  std::vector<LedgerEntry> ledger = plan_groups(Needs{}, constrained_, 0);
   for (LedgerEntry& entry : ledger) {
     entry.included = std::ranges::find(features_, entry.group) != features_.end();
     entry.reason = "the root attribute features lists it";
@@ -88,10 +100,10 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
 
 void BundleReader::require_group(const LedgerEntry& entry) const {
   const std::string path = "/" + entry.group;
-  if (file_.has_group(path)) return;
+  if (bundle_schema().group(path).since <= format_version_ && file_.has_group(path)) return;
   refuse(path, fmt::format("the group ({})", entry.reason), "none",
-         fmt::format("precompute the bundle again, with --scene SCENE.json or with \"{}\" among the needs of the asset",
-                     entry.group));
+         fmt::format("precompute the bundle again, with --scene SCENE.json or with {} of the asset",
+                     asset_member(entry.group)));
 }
 
 Hdf5Dataset BundleReader::open_checked(const DatasetSchema& schema, const std::string& path) {
@@ -124,10 +136,13 @@ void BundleReader::group(std::string_view schema_path, std::string_view example)
   path_ = fill_example(schema_path, example);
 }
 
-AttributeValue BundleReader::read_value(std::string_view name) {
+const AttributeSchema& BundleReader::attribute_schema(std::string_view name) const {
   const auto& attributes =
       schema_path_ == "/" ? bundle_schema().attributes : bundle_schema().group(schema_path_).attributes;
-  const AttributeSchema& schema = find_attribute(attributes, name);
+  return find_attribute(attributes, name);
+}
+
+AttributeValue BundleReader::read_value(const AttributeSchema& schema) {
   AttributeValue value = file_.read_attribute(path_, schema.name);
   const std::string place = path_ + "@" + schema.name;
   if (const auto fault = check_value(schema, value, sizes_)) refuse(place, fault->expected, fault->found);
@@ -174,6 +189,8 @@ void BundleReader::read_checked(const Hdf5Dataset& dataset, const DatasetSchema&
 void BundleReader::check_model(const ReducedModel& model) {
   if (model.examples) attempt([&] { check_example_indices(*model.examples); });
   attempt([&] { check_fixed_vertices(model); });
+  if (model.targets) attempt([&] { check_exponents(*model.targets); });
+  if (model.targets) attempt([&] { check_target_knots(*model.targets); });
 }
 
 void BundleReader::check_example_indices(const ExampleSet& set) const {
@@ -205,6 +222,20 @@ void BundleReader::check_fixed_vertices(const ReducedModel& model) const {
   for (Eigen::Index v = 0; v < fixed.size(); ++v)
     if (fixed[v] != 0 && !model.modal->basis.middleRows(3 * v, 3).isZero(0))
       refuse("/modal/basis", fmt::format("zeros on vertex {}, fixed by /object/fixed", v), "other numbers");
+}
+
+void BundleReader::check_exponents(const TargetTableData& targets) const {
+  const std::string path = "/targets/exponents";
+  if (!is_sound(path) || !is_sound("/targets@degree")) return;
+  if (const auto fault = check_exponent_rows(targets.degree, targets.exponents))
+    refuse(path, fault->expected, fault->found);
+}
+
+void BundleReader::check_target_knots(const TargetTableData& targets) const {
+  const std::string path = "/targets/knots";
+  if (!is_sound(path) || !is_sound("/targets/exponents")) return;
+  if (const auto fault = check_knots(targets.knots, targets.exponents.cols()))
+    refuse(path, fault->expected, fault->found);
 }
 
 void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,

@@ -17,7 +17,8 @@
 namespace exmat {
 
 /// Reads a bundle's header when constructed, then what is asked of it. Every fault is an InputError that names the file
-/// and the dataset, or, with `problems`, one more message there. Also the visitor of the field list (fields.h).
+/// and the dataset, or, with `problems`, one more message there. Also the visitor of the field list (fields.h). What is
+/// newer than the file keeps its default.
 class BundleReader {
  public:
   BundleReader(const std::filesystem::path& path, std::vector<ReadRecord>* record = nullptr,
@@ -37,6 +38,8 @@ class BundleReader {
   ReducedModel read(const BundleRequest& request);
   /// Of the root.
   std::string text_attribute(const std::string& name) const;
+  /// Of another group; `text` stays as it is where the file is older than the attribute.
+  void read_text(const std::string& group_path, const std::string& name, std::string& text);
   /// Opens a dataset and checks its type and sizes, which binds its symbols; reads no data.
   Hdf5Dataset open_checked(const DatasetSchema& schema, const std::string& path);
   void note(const std::string& dataset, std::size_t bytes);
@@ -47,7 +50,9 @@ class BundleReader {
 
   template <typename T>
   void attribute(std::string_view name, T& member) {
-    attempt([&] { from_attribute(read_value(name), member); });
+    const AttributeSchema& schema = attribute_schema(name);
+    if (schema.since > format_version_) return;
+    attempt([&] { from_attribute(read_value(schema), member); });
   }
 
   template <typename T>
@@ -65,7 +70,8 @@ class BundleReader {
  private:
   void read_header();
   AttributeValue header_value(std::string_view name) const;
-  AttributeValue read_value(std::string_view name);
+  const AttributeSchema& attribute_schema(std::string_view name) const;
+  AttributeValue read_value(const AttributeSchema& schema);
   void require_group(const LedgerEntry& entry) const;
   const DatasetSchema& schema_of(std::string_view name) const;
   bool is_wanted(const DatasetSchema& schema) const;
@@ -74,6 +80,8 @@ class BundleReader {
   void check_model(const ReducedModel& model);
   void check_example_indices(const ExampleSet& set) const;
   void check_fixed_vertices(const ReducedModel& model) const;
+  void check_exponents(const TargetTableData& targets) const;
+  void check_target_knots(const TargetTableData& targets) const;
   bool is_sound(const std::string& place) const { return sound_.contains(place); }
   [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,
                            const std::string& advice = "") const;

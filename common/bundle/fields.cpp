@@ -63,10 +63,16 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.modal.emplace();
   else if (group == "cubature")
     model.cubature.emplace();
+  else if (group == "polynomial")
+    model.polynomial.emplace();
   else if (group == "projection")
     model.projection.emplace();
+  else if (group == "targets")
+    model.targets.emplace();
   else if (group == "rigid")
     model.rigid.emplace();
+  else if (group == "contact")
+    model.contact.emplace();
   else
     throw std::logic_error("no member of the model is bound to the group " + std::string(group));
 }

@@ -80,6 +80,8 @@ void visit_modal(Modal& modal, Visitor& visit) {
 template <typename Cubature, typename Visitor>
 void visit_cubature(Cubature& cubature, Visitor& visit) {
   visit.group("/cubature", "");
+  visit.attribute("internal_force", cubature.internal_force);
+  visit.attribute("internal_force_reason", cubature.internal_force_reason);
   visit.attribute("method", cubature.method);
   visit.attribute("training_error", cubature.training_error);
   visit.attribute("heldout_error", cubature.heldout_error);
@@ -94,12 +96,31 @@ void visit_cubature(Cubature& cubature, Visitor& visit) {
   visit.dataset("heldout_poses", cubature.heldout_poses);
 }
 
+template <typename Polynomial, typename Visitor>
+void visit_polynomial(Polynomial& polynomial, Visitor& visit) {
+  visit.group("/polynomial", "");
+  visit.dataset("stiffness", polynomial.stiffness);
+  visit.dataset("cubic", polynomial.cubic);
+  visit.dataset("quartic", polynomial.quartic);
+}
+
 template <typename Projection, typename Visitor>
 void visit_projection(Projection& projection, Visitor& visit) {
   visit.group("/projection", "");
   visit.dataset("shape_from_reduced", projection.shape_from_reduced);
   visit.dataset("reduced_from_shape", projection.reduced_from_shape);
   visit.dataset("target_basis", projection.target_basis);
+}
+
+template <typename Targets, typename Visitor>
+void visit_targets(Targets& targets, Visitor& visit) {
+  visit.group("/targets", "");
+  visit.attribute("degree", targets.degree);
+  visit.attribute("error", targets.error);
+  visit.attribute("energy_reference", targets.energy_reference);
+  visit.dataset("exponents", targets.exponents);
+  visit.dataset("control_points", targets.control_points);
+  visit.dataset("knots", targets.knots);
 }
 
 template <typename Rigid, typename Visitor>
@@ -111,6 +132,15 @@ void visit_rigid(Rigid& rigid, Visitor& visit) {
   visit.dataset("second_moments", rigid.second_moments);
   visit.dataset("linear_moments", rigid.linear_moments);
   visit.dataset("basis_moments", rigid.basis_moments);
+}
+
+template <typename Contact, typename Visitor>
+void visit_contact(Contact& contact, Visitor& visit) {
+  visit.group("/contact", "");
+  visit.dataset("vertices", contact.vertices);
+  visit.dataset("positions", contact.positions);
+  visit.dataset("areas", contact.areas);
+  visit.dataset("basis", contact.basis);
 }
 
 /// Visits the groups that the model holds, in bundle order. Model is ReducedModel or const ReducedModel.
@@ -125,8 +155,11 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.examples) visit_examples(*model.examples, visit);
   if (model.modal) visit_modal(*model.modal, visit);
   if (model.cubature) visit_cubature(*model.cubature, visit);
+  if (model.polynomial) visit_polynomial(*model.polynomial, visit);
   if (model.projection) visit_projection(*model.projection, visit);
+  if (model.targets) visit_targets(*model.targets, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);
+  if (model.contact) visit_contact(*model.contact, visit);
 }
 
 /// Root attributes that are no members of the model; write_bundle and read_bundle know them by name.

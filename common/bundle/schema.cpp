@@ -5,6 +5,7 @@
 #include <charconv>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
@@ -32,6 +33,22 @@ constexpr std::array kTypes = {
 const TypeInfo& info_of(ElementType type) {
   return *std::find_if(kTypes.begin(), kTypes.end(), [type](const TypeInfo& info) { return info.type == type; });
 }
+
+// The pairs (i, j), i >= j, of v: v (v + 1) / 2, or more than any array has.
+std::int64_t pair_count(std::int64_t v) {
+  constexpr std::int64_t kLimit = 2'000'000'000;
+  return v < kLimit ? v * (v + 1) / 2 : std::numeric_limits<std::int64_t>::max();
+}
+
+std::int64_t one_more(std::int64_t v) { return v + 1; }
+
+// Symbols that follow from another, which is bound before them.
+struct DerivedSymbol {
+  std::string_view name, from;
+  std::int64_t (*value)(std::int64_t);
+};
+constexpr std::array kDerivedSymbols = {DerivedSymbol{"R", "r", pair_count}, DerivedSymbol{"Q", "R", pair_count},
+                                        DerivedSymbol{"P+1", "P", one_more}};
 
 constexpr std::array<std::pair<Use, std::string_view>, 3> kUses = {
     {{Use::kStep, "step"}, {Use::kPositions, "positions"}, {Use::kInspect, "inspect"}}};
@@ -198,6 +215,12 @@ std::string fill_example(std::string_view schema_path, std::string_view example)
 
 void SymbolSizes::set(const std::string& symbol, std::int64_t value, std::string bound_by) {
   bindings_[symbol] = {value, std::move(bound_by)};
+  bind_derived();
+}
+
+void SymbolSizes::bind_derived() {
+  for (const auto& [name, from, value] : kDerivedSymbols)
+    if (const Binding* known = find(from)) bindings_[std::string(name)] = {value(known->value), known->bound_by};
 }
 
 const SymbolSizes::Binding* SymbolSizes::find(std::string_view symbol) const {
@@ -231,6 +254,7 @@ std::optional<std::string> SymbolSizes::bind(std::span<const Extent> dims, std::
     if (!symbol.empty() && known == nullptr) added[symbol] = {sizes[axis] / factor, bound_by};
   }
   bindings_.merge(added);
+  bind_derived();
   return std::nullopt;
 }
 

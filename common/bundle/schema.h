@@ -121,7 +121,8 @@ const FileSchema& trajectory_schema();
 /// "/examples/{example}/reduced" with the name filled in.
 std::string fill_example(std::string_view schema_path, std::string_view example);
 
-/// Values of symbols such as n and r, each with what gave it its value, for messages.
+/// Values of symbols such as n and r, each with what gave it its value, for messages. With r come R = r (r + 1) / 2 and
+/// Q = R (R + 1) / 2.
 class SymbolSizes {
  public:
   struct Binding {
@@ -143,6 +144,7 @@ class SymbolSizes {
 
  private:
   std::string describe(std::span<const Extent> dims) const;
+  void bind_derived();
 
   std::map<std::string, Binding, std::less<>> bindings_;
 };

@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <stdexcept>
 #include <type_traits>
+#include <utility>
 
 namespace exmat {
 namespace {
@@ -165,6 +167,22 @@ std::optional<ValueFault> check_shape(const AttributeSchema& schema, const Attri
                     describe(shape.type, shape.is_scalar, fmt::format("{}", shape.count))};
 }
 
+using IntegerRow = Eigen::Matrix<std::int64_t, 1, Eigen::Dynamic>;
+
+// Makes it the next smaller one of the same sum; false where there is none.
+bool descend(IntegerRow& row) {
+  const Eigen::Index last = row.size() - 1;
+  Eigen::Index i = last - 1;
+  while (i >= 0 && row[i] == 0) --i;
+  if (i < 0) return false;
+  --row[i];
+  const std::int64_t rest = std::exchange(row[last], 0);
+  row[i + 1] = rest + 1;
+  return true;
+}
+
+std::string text_of(const IntegerRow& row) { return fmt::format("{}", fmt::join(row.begin(), row.end(), " ")); }
+
 template <typename T>
 std::span<const T> as_span(const void* data, std::size_t count) {
   return {static_cast<const T*>(data), count};
@@ -209,6 +227,30 @@ std::optional<ValueFault> check_value(const AttributeSchema& schema, const Attri
         }
       },
       value);
+}
+
+std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMatrix& rows) {
+  IntegerRow expected = IntegerRow::Zero(rows.cols());
+  expected[0] = degree;
+  bool more = true;
+  for (Eigen::Index i = 0; i < rows.rows(); ++i) {
+    const IntegerRow row = rows.row(i).cast<std::int64_t>();
+    if (!more) return ValueFault{fmt::format("{} rows for degree {}", i, degree), fmt::format("{}", rows.rows())};
+    if (row != expected)
+      return ValueFault{fmt::format("{} in row {}, for degree {}", text_of(expected), i, degree), text_of(row)};
+    more = descend(expected);
+  }
+  if (more) return ValueFault{fmt::format("a row {} after the last, for degree {}", text_of(expected), degree), "none"};
+  return std::nullopt;
+}
+
+std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index examples) {
+  const Eigen::Index last = knots.size() - 1;
+  if (last < 1 || (last > 1 && examples != 2))
+    return ValueFault{fmt::format("2 knots for {} examples", examples), fmt::format("{}", knots.size())};
+  if (knots[0] != 0) return ValueFault{"0 at [0]", fmt::format("{}", knots[0])};
+  if (knots[last] != 1) return ValueFault{fmt::format("1 at [{}]", last), fmt::format("{}", knots[last])};
+  return std::nullopt;
 }
 
 }  // namespace exmat

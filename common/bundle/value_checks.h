@@ -6,6 +6,7 @@
 
 #include "common/bundle/hdf5_file.h"
 #include "common/bundle/schema.h"
+#include "common/core/arrays.h"
 
 namespace exmat {
 
@@ -24,5 +25,11 @@ std::optional<ValueFault> check_values(const DatasetSchema& schema, std::span<co
 /// The same for an attribute, its type and size included.
 std::optional<ValueFault> check_value(const AttributeSchema& schema, const AttributeValue& value,
                                       const SymbolSizes& sizes_known);
+
+/// Whether the rows are all vectors of integers >= 0 that add up to `degree`, lexicographic, descending.
+std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMatrix& rows);
+
+/// Whether they begin at 0 and end at 1, with others between for two examples only.
+std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index examples);
 
 }  // namespace exmat

@@ -30,7 +30,11 @@ class AssetReader {
     read_basis(member_or(json, "basis", Json::object()), asset);
     read_cubature(member_or(json, "cubature", Json::object()), asset);
     const Json targets = member_or(json, "targets", Json::object());
-    if (targets.contains("tolerance")) asset.target_tolerance = targets["tolerance"].get<double>();
+    asset.target_tolerance = targets.value("tolerance", asset.target_tolerance);
+    asset.internal_force = json.value("internal_force", asset.internal_force);
+    const Json contact = member_or(json, "contact", Json::object());
+    if (contact.contains("vertices")) asset.contact_vertices = read_selection(contact["vertices"], "/contact/vertices");
+    asset.contact_count = optional_member<int>(contact, "count");
     asset.needs = optional_member<std::vector<std::string>>(json, "needs");
     asset.seed = json.value("seed", asset.seed);
     return asset;

@@ -71,10 +71,15 @@ struct AssetConfig {
   std::string cubature_method = "greedy_swap";
   int training_poses = 200;
 
-  std::optional<double> target_tolerance;  ///< relative error of the table of targets
+  double target_tolerance = 1e-4;  ///< relative error of the table of targets
+
+  std::string internal_force = "auto";  ///< "auto", "cubature" or "polynomial"
+
+  std::optional<VertexSelection> contact_vertices;  ///< absent: all of the surface
+  std::optional<int> contact_count;                 ///< sampled from these; absent: all of them
 
   std::optional<std::vector<std::string>>
-      needs;  ///< optional groups to write ("examples", "rigid"); absent: all that apply
+      needs;  ///< optional parts to write ("examples", "targets", "rigid", "contact"); absent: all that apply
   std::uint64_t seed = 1;
 };
 

@@ -1,18 +1,17 @@
 #include "common/config/scene_config.h"
 
-#include <array>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/config/json_values.h"
+#include "common/config/motion_reader.h"
+#include "common/config/obstacle_reader.h"
 #include "common/config/vertex_ids.h"
 #include "common/core/error.h"
 
 namespace exmat {
 namespace {
-
-Eigen::Vector3d read_vector(const Json& json) { return Eigen::Vector3d(json.get<std::array<double, 3>>().data()); }
 
 ExampleForceConfig read_example_force(const Json& json) {
   ExampleForceConfig config;
@@ -20,6 +19,7 @@ ExampleForceConfig read_example_force(const Json& json) {
   config.damping = json.value("damping", config.damping);
   config.bias = json.value("bias", config.bias);
   config.target = json.value("target", config.target);
+  config.target_iterations = json.value("target_iterations", config.target_iterations);
   config.force = json.value("force", config.force);
   config.energy_reference = json.value("energy_reference", config.energy_reference);
   return config;
@@ -39,6 +39,29 @@ VertexForceConfig read_vertex_force(const Json& json, const std::filesystem::pat
   return config;
 }
 
+std::optional<Eigen::Vector3d> optional_vector(const Json& json, const char* name) {
+  return json.contains(name) ? std::optional(read_vector(json[name])) : std::nullopt;
+}
+
+Eigen::VectorXd read_numbers(const Json& json) {
+  const auto numbers = json.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+}
+
+BodyConfig read_body(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  if (json.contains("reduced") && json.contains("pose"))
+    throw InputError({file.string(), place, "reduced or pose", "both", ""});
+  BodyConfig body;
+  body.position = optional_vector(json, "position");
+  if (json.contains("orientation")) body.orientation = read_orientation(json, file, place);
+  body.linear_velocity = optional_vector(json, "linear_velocity");
+  body.angular_velocity = optional_vector(json, "angular_velocity");
+  if (json.contains("reduced")) body.reduced = read_numbers(json["reduced"]);
+  if (json.contains("pose")) body.pose = PoseConfig{json["pose"]["example"], json["pose"].value("weight", 1.0)};
+  body.motion = read_motion(member_or(json, "motion", Json::array()), file, place + "/motion");
+  return body;
+}
+
 }  // namespace
 
 SceneConfig load_scene(const std::filesystem::path& file) {
@@ -51,6 +74,7 @@ SceneConfig load_scene(const std::filesystem::path& file) {
   scene.steps = json.value("steps", scene.steps);
   if (json.contains("gravity")) scene.gravity = read_vector(json["gravity"]);
   scene.integrator = json.value("integrator", scene.integrator);
+  scene.internal_force = json.value("internal_force", scene.internal_force);
   const Json damping = member_or(json, "damping", Json::object());
   scene.mass_damping = damping.value("mass", scene.mass_damping);
   scene.stiffness_damping = damping.value("stiffness", scene.stiffness_damping);
@@ -61,12 +85,24 @@ SceneConfig load_scene(const std::filesystem::path& file) {
   const Json forces = member_or(json, "forces", Json::array());
   for (std::size_t i = 0; i < forces.size(); ++i)
     scene.forces.push_back(read_vertex_force(forces[i], file, fmt::format("/forces/{}", i)));
+  scene.body = read_body(member_or(json, "body", Json::object()), file, "/body");
+  const Json obstacles = member_or(json, "obstacles", Json::array());
+  for (std::size_t i = 0; i < obstacles.size(); ++i)
+    scene.obstacles.push_back(read_obstacle(obstacles[i], file, fmt::format("/obstacles/{}", i)));
+  scene.instances = json.value("instances", scene.instances);
   const Json output = member_or(json, "output", Json::object());
   if (output.contains("trajectory")) scene.trajectory = resolve_path(file, output["trajectory"]);
   scene.every = output.value("every", scene.every);
   return scene;
 }
 
-Needs needs_of(const SceneConfig& scene) { return {.examples = scene.examples.has_value(), .rigid = true}; }
+Needs needs_of(const SceneConfig& scene) {
+  Needs needs{.examples = scene.examples || scene.body.pose,
+              .targets = scene.examples && scene.examples->target != "solve",
+              .contact = !scene.obstacles.empty(),
+              .internal_force = scene.internal_force};
+  if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
+  return needs;
+}
 
 }  // namespace exmat

@@ -1,11 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <optional>
 #include <string>
+#include <variant>
 #include <vector>
 
 namespace exmat {
@@ -19,10 +21,11 @@ struct VertexForceConfig {
 };
 
 struct ExampleForceConfig {
-  double stiffness = 0;  ///< kappa >= 0 [1/s^2]
-  double damping = 0;    ///< c_kappa >= 0 [1/s]
-  double bias = 1;       ///< in [0, 1]
-  std::string target = "solve";
+  double stiffness = 0;         ///< kappa >= 0 [1/s^2]
+  double damping = 0;           ///< c_kappa >= 0 [1/s]
+  double bias = 1;              ///< in [0, 1]
+  std::string target = "auto";  ///< "table", "solve" or "auto": the bundle's table if it has one
+  int target_iterations = 4;    ///< most Newton iterations of "solve" in one step; the next step carries on
   std::string force = "linear";
   std::string energy_reference = "example";  ///< or "rest"
 };
@@ -30,6 +33,56 @@ struct ExampleForceConfig {
 struct NewtonConfig {
   int max_iterations = 20;
   double tolerance = 1e-6;  ///< relative to |f_ext| + |f_int| + |inertia|
+};
+
+/// A pose of a rigid motion at a time.
+struct KeyframeConfig {
+  double time = 0;                                                  ///< [s]
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< [m]
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
+};
+
+// Shapes in the frame of their obstacle, which is the world without a motion [m].
+
+struct PlaneConfig {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();  ///< normal: unit, outward
+};
+struct SphereConfig {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double radius = 0;
+};
+struct BoxConfig {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero(), half_extents = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
+};
+struct CapsuleConfig {
+  Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::Zero();
+  double radius = 0;
+};
+
+/// What the body may touch; all per area of its surface.
+struct ObstacleConfig {
+  std::variant<PlaneConfig, SphereConfig, BoxConfig, CapsuleConfig> shape;
+  double stiffness = 1e6;              ///< pressure per depth [N/m^3]
+  double damping = 0;                  ///< pressure per approach velocity [N s/m^3]
+  double friction = 0;                 ///< Coulomb's coefficient
+  std::vector<KeyframeConfig> motion;  ///< of the shape's frame; empty: the world
+};
+
+/// An example's pose, scaled.
+struct PoseConfig {
+  std::string example;
+  double weight = 1;
+};
+
+/// Where a body starts, and what carries it. Position to velocities are a free body's, motion a constrained one's.
+struct BodyConfig {
+  std::optional<Eigen::Vector3d> position;        ///< displacement of the centre of mass from rest [m]
+  std::optional<Eigen::Quaterniond> orientation;  ///< about the centre of mass, unit
+  std::optional<Eigen::Vector3d> linear_velocity, angular_velocity;  ///< world [m/s], [rad/s]
+  std::optional<Eigen::VectorXd> reduced;                            ///< q; this or pose, or neither
+  std::optional<PoseConfig> pose;
+  std::vector<KeyframeConfig> motion;  ///< of the fixed vertices: x = position + orientation X, X the rest mesh
 };
 
 /// SCENE.json after validation, paths resolved against its folder. interfaces.md, "SCENE.json".
@@ -40,11 +93,15 @@ struct SceneConfig {
   std::int64_t steps = 1000;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]
   std::string integrator = "bdf2";                    ///< "bdf2", "backward_euler" or "newmark"
+  std::string internal_force = "auto";                ///< "cubature", "polynomial" or "auto": the bundle's choice
   double mass_damping = 0;                            ///< alpha [1/s]
   double stiffness_damping = 0;                       ///< beta [s]
   NewtonConfig newton;
   std::optional<ExampleForceConfig> examples;
   std::vector<VertexForceConfig> forces;
+  BodyConfig body;
+  std::vector<ObstacleConfig> obstacles;  ///< none: no contact
+  int instances = 1;                      ///< bodies that are stepped; the trajectory shows the first
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;
 };

@@ -3,22 +3,43 @@
 #include <algorithm>
 
 namespace exmat {
+namespace {
 
-std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, bool has_examples) {
-  const bool examples = needs.examples && has_examples;
-  const std::string example_reason = !has_examples     ? "the asset has no examples"
-                                     : !needs.examples ? "no example force is asked for"
-                                                       : "an example force is asked for";
+LedgerEntry plan_targets(const Needs& needs, const LedgerEntry& examples, std::int64_t example_count) {
+  if (!examples.included) return {"targets", false, 0, examples.reason};
+  if (!needs.targets) return {"targets", false, 0, "no table of targets is asked for"};
+  if (example_count < 2) return {"targets", false, 0, "the rest pose is the only example"};
+  if (example_count > kMostTableExamples)
+    return {"targets", false, 0, "a table serves at most " + std::to_string(kMostTableExamples) + " examples"};
+  return {"targets", true, 0, "an example force is asked for"};
+}
+
+LedgerEntry plan_polynomial(const Needs& needs) {
+  if (needs.internal_force == "cubature") return {"polynomial", false, 0, "the internal force is by cubature"};
+  if (needs.internal_force == "polynomial") return {"polynomial", true, 0, "the internal force is a polynomial"};
+  return {"polynomial", true, 0, "the internal force may be a polynomial"};
+}
+
+}  // namespace
+
+std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count) {
+  const std::string example_reason = example_count == 0 ? "the asset has no examples"
+                                     : !needs.examples  ? "no example force is asked for"
+                                                        : "an example force is asked for";
+  const LedgerEntry examples = {"examples", needs.examples && example_count > 0, 0, example_reason};
   const std::string rigid_reason = constrained    ? "the body is constrained"
                                    : !needs.rigid ? "no rigid motion is asked for"
                                                   : "the body is free";
   return {{"object", true, 0, "always"},
-          {"shape_space", examples, 0, example_reason},
-          {"examples", examples, 0, example_reason},
+          {"shape_space", examples.included, 0, example_reason},
+          examples,
           {"modal", true, 0, "always"},
           {"cubature", true, 0, "always"},
-          {"projection", examples, 0, example_reason},
-          {"rigid", needs.rigid && !constrained, 0, rigid_reason}};
+          plan_polynomial(needs),
+          {"projection", examples.included, 0, example_reason},
+          plan_targets(needs, examples, example_count),
+          {"rigid", needs.rigid && !constrained, 0, rigid_reason},
+          {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"}};
 }
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group) {

@@ -1,15 +1,23 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
 
 namespace exmat {
 
+/// Most examples, the rest pose among them, that a table of targets is made for; it takes two.
+inline constexpr std::int64_t kMostTableExamples = 4;
+
 /// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
 struct Needs {
-  bool examples = true;  ///< /shape_space, /examples, /projection
-  bool rigid = true;     ///< /rigid; free bodies only
+  bool examples = true;                      ///< /shape_space, /examples, /projection
+  bool rigid = true;                         ///< /rigid; free bodies only
+  bool targets = true;                       ///< /targets, of at most kMostTableExamples examples
+  bool contact = true;                       ///< /contact
+  std::string internal_force = "auto";       ///< "auto", "cubature" or "polynomial" (/polynomial)
+  std::string energy_reference = "example";  ///< or "rest": undeformed shape in the energy of the targets
 };
 
 /// One line of the ledger: a bundle group, whether it is in, and why.
@@ -20,9 +28,9 @@ struct LedgerEntry {
   std::string reason;
 };
 
-/// One entry per group of the bundle, in bundle order, bytes 0. Both stages decide by this list alone. method.md,
-/// section 7.
-std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, bool has_examples);
+/// One entry per group of the bundle, in bundle order, bytes 0, of an asset with so many examples, the rest pose among
+/// them. Both stages decide by this list alone. method.md, section 7.
+std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count);
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group);
 

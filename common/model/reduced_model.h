@@ -66,18 +66,42 @@ struct ModalData {
 
 /// Group /cubature.
 struct CubatureData {
-  IndexVector elements;                ///< s, distinct tets of the object, ascending
-  Eigen::VectorXd weights;             ///< s, >= 0
-  Eigen::VectorXd volumes;             ///< s [m^3]
-  RowMatrix gradient;                  ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
-  Eigen::VectorXd youngs_modulus;      ///< s [Pa]
-  Eigen::VectorXd poisson_ratio;       ///< s
-  RowMatrix heldout_poses;             ///< N x r reduced poses that the held-out errors are measured on
-  std::string method;                  ///< "greedy_swap", "greedy" or "nn_htp"
-  double training_error = 0;           ///< relative, force, as heldout_error
-  double heldout_error = 0;            ///< relative, force in the norm of the inverse rest stiffness
-  double heldout_energy_error = 0;     ///< relative
-  double heldout_stiffness_error = 0;  ///< relative, Frobenius norm
+  IndexVector elements;                     ///< s, distinct tets of the object, ascending
+  Eigen::VectorXd weights;                  ///< s, >= 0
+  Eigen::VectorXd volumes;                  ///< s [m^3]
+  RowMatrix gradient;                       ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
+  Eigen::VectorXd youngs_modulus;           ///< s [Pa]
+  Eigen::VectorXd poisson_ratio;            ///< s
+  RowMatrix heldout_poses;                  ///< N x r reduced poses that the held-out errors are measured on
+  std::string internal_force = "cubature";  ///< what `auto` takes: "cubature" or "polynomial"
+  std::string internal_force_reason;        ///< why
+  std::string method;                       ///< "greedy_swap", "greedy" or "nn_htp"
+  double training_error = 0;                ///< relative, force, as heldout_error
+  double heldout_error = 0;                 ///< relative, force in the norm of the inverse rest stiffness
+  double heldout_energy_error = 0;          ///< relative
+  double heldout_stiffness_error = 0;       ///< relative, Frobenius norm
+};
+
+/// Group /polynomial: derivatives at rest of the reduced energy of St.Venant-Kirchhoff over all tets, which is an exact
+/// quartic polynomial: E(q) = 1/2 K_ij q_i q_j + 1/6 C_ijk q_i q_j q_k + 1/24 D_ijkl q_i q_j q_k q_l, C and D fully
+/// symmetric. Barbic and James 2005. A pair (i, j), i >= j, is row i (i + 1) / 2 + j of r (r + 1) / 2 = R.
+struct PolynomialData {
+  RowMatrix stiffness;      ///< r x r, K
+  RowMatrix cubic;          ///< R x r, C_(ij)k
+  Eigen::VectorXd quartic;  ///< R (R + 1) / 2, D_(ij)(kl), lower triangle by rows
+};
+
+/// Group /targets: p*(w) on the simplex as one polynomial of degree D in Bernstein form,
+/// p*(w) = sum_a D!/(a_1! ... a_K!) w_1^a_1 ... w_K^a_K P_a, c = (D + K - 1)! / (D! (K - 1)!) control points; or, for
+/// K = 2, as P such polynomials, each of the weights (1 - s, s) of the ends of its piece t_i <= t <= t_i+1, where t is
+/// the weight of the second example and s = (t - t_i) / (t_i+1 - t_i).
+struct TargetTableData {
+  std::int64_t degree = 0;
+  IndexMatrix exponents;     ///< c x K, a, each row adds up to D; lexicographic, descending
+  RowMatrix control_points;  ///< P c x r (dataset P c r), P_a in reduced coordinates, pieces in order
+  Eigen::VectorXd knots = Eigen::Vector2d(0, 1);  ///< P + 1, t_i: 0, ..., 1, each above the one before it
+  double error = 0;              ///< largest found, in the energy norm at rest, relative to the largest example
+  std::string energy_reference;  ///< "example" or "rest"
 };
 
 /// Group /projection. method.md, section 4.
@@ -97,18 +121,29 @@ struct RigidData {
   RowMatrix basis_moments;         ///< 9r x r (dataset 3 3 r r): S_ab = U_a^T M_s' U_b, block 3a + b
 };
 
+/// Group /contact: the surface vertices that may touch obstacles, none of them fixed. method.md, section 6.
+struct ContactData {
+  IndexVector vertices;   ///< k, distinct vertices of the object, ascending
+  VertexArray positions;  ///< k x 3, at rest, world [m]
+  Eigen::VectorXd areas;  ///< k, share of the surface, > 0 [m^2]
+  RowMatrix basis;        ///< 3k x r (dataset k 3 r), their rows of the modal basis
+};
+
 /// Everything a scene may need of one asset. Absent groups were left out (method.md, section 7).
 struct ReducedModel {
   std::string asset_name;
   std::string generator;
   std::string input_sha256;
   std::optional<ObjectData> object;
-  std::optional<ModalData> modal;
-  std::optional<CubatureData> cubature;
   std::optional<ShapeSpaceData> shape_space;
   std::optional<ExampleSet> examples;
+  std::optional<ModalData> modal;
+  std::optional<CubatureData> cubature;
+  std::optional<PolynomialData> polynomial;
   std::optional<ProjectionData> projection;
+  std::optional<TargetTableData> targets;
   std::optional<RigidData> rigid;
+  std::optional<ContactData> contact;
 };
 
 }  // namespace exmat

@@ -12,14 +12,18 @@
 #include "common/core/timer.h"
 #include "common/core/version.h"
 #include "common/mesh/geometry.h"
+#include "precompute/contact/contact_vertices.h"
 #include "precompute/cubature/cubature.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/basis.h"
 #include "precompute/modes/linear_modes.h"
+#include "precompute/pipeline/internal_force.h"
+#include "precompute/polynomial/reduced_polynomial.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/transfer.h"
 #include "precompute/solvers/eigenpairs.h"
+#include "precompute/targets/target_table.h"
 
 namespace exmat::precompute {
 namespace {
@@ -29,6 +33,12 @@ constexpr Eigen::Index kExtraEigenfunctions = 4;
 constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
 // A share of an example's displacement lost to truncation that is worth a warning.
 constexpr double kTruncationWarning = 0.25;
+
+// The rest pose among them, which is the object where no example is marked rest.
+std::int64_t example_count(const AssetConfig& asset) {
+  if (asset.examples.empty()) return 0;
+  return std::ssize(asset.examples) + (std::ranges::any_of(asset.examples, &ExampleConfig::rest) ? 0 : 1);
+}
 
 // The object's shape space and its examples in it, before there is a basis.
 struct ShapeStage {
@@ -74,6 +84,10 @@ class Pipeline {
   void require_modes(const ElasticSystem& system) const;
   void require_upright(const ReducedModel& model) const;
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
+  void leave_out(const std::string& group, const std::string& reason);
+  void add_internal_force(ReducedModel& model);
+  void add_targets(ReducedModel& model);
+  void add_contact(ReducedModel& model);
 
   const AssetConfig& asset_;
   const Needs& needs_;
@@ -249,11 +263,54 @@ ModalData Pipeline::modal_data(const ElasticSystem& system, const LinearModes& m
   return modal;
 }
 
+void Pipeline::leave_out(const std::string& group, const std::string& reason) {
+  auto& entry = *std::ranges::find(report_.ledger, group, &LedgerEntry::group);
+  entry.included = false;
+  entry.reason = reason;
+}
+
+void Pipeline::add_internal_force(ReducedModel& model) {
+  if (!includes(report_.ledger, "polynomial")) return choose_internal_force("cubature", std::nullopt, model);
+  const std::string& asked = needs_.internal_force;
+  if (asked == "polynomial" || reason_against_polynomial(model, asset_.cubature_tolerance).empty())
+    model.polynomial =
+        timed("polynomial", [&] { return reduced_polynomial(object_.mesh, object_.materials, model.modal->basis); });
+  timed("internal force", [&] {
+    choose_internal_force(asked, asset_.cubature_tolerance, model);
+    return 0;
+  });
+  log::info(
+      fmt::format("internal force: {}, {}", model.cubature->internal_force, model.cubature->internal_force_reason));
+  if (!model.polynomial) leave_out("polynomial", model.cubature->internal_force_reason);
+}
+
+void Pipeline::add_targets(ReducedModel& model) {
+  if (!includes(report_.ledger, "targets")) return;
+  TargetTableReport table;
+  model.targets = timed("targets", [&] {
+    return build_target_table(
+        model, {.tolerance = asset_.target_tolerance, .energy_reference = needs_.energy_reference}, table);
+  });
+  log::info(table.message);
+  if (!model.targets) leave_out("targets", table.message);
+}
+
+void Pipeline::add_contact(ReducedModel& model) {
+  if (!includes(report_.ledger, "contact")) return;
+  model.contact = timed("contact", [&] {
+    return contact_data(*model.object, model.modal->basis, object_.contact, asset_.contact_count);
+  });
+  if (model.contact->areas.size() == 0)
+    throw InputError(
+        {asset_.file.string(), "/contact/vertices", "vertices of the surface, some of them not fixed", "none", ""});
+  log::info(fmt::format("contact: {} vertices", model.contact->areas.size()));
+}
+
 ReducedModel Pipeline::run() {
+  if (needs_.internal_force == "polynomial") require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
-  report_.ledger = plan_groups(needs_, object_.fixed.any(), !asset_.examples.empty());
+  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_));
   const bool with_examples = includes(report_.ledger, "examples");
-  if (asset_.target_tolerance) log::info("targets.tolerance: not used, this version makes no table of targets");
   std::optional<ExampleInput> example_input;
   if (with_examples)
     example_input = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });
@@ -262,7 +319,10 @@ ReducedModel Pipeline::run() {
   model.asset_name = asset_.name;
   model.generator = fmt::format("exmat-precompute {}", version());
   model.input_sha256 = hash_inputs(
-      report_.inputs, fmt::format("{}\nexamples {}\nrigid {}\n", model.generator, needs_.examples, needs_.rigid));
+      report_.inputs,
+      fmt::format("{}\nexamples {}\nrigid {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n",
+                  model.generator, needs_.examples, needs_.rigid, needs_.targets, needs_.contact, needs_.internal_force,
+                  needs_.energy_reference));
   model.object = object_data();
 
   std::optional<ShapeStage> shape;
@@ -306,21 +366,29 @@ ReducedModel Pipeline::run() {
                         model.cubature->elements.size(), 100 * model.cubature->heldout_error,
                         100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error));
   if (model.examples) require_upright(model);
+  add_internal_force(model);
+  add_targets(model);
   if (includes(report_.ledger, "rigid"))
     model.rigid = timed("rigid moments",
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
+  add_contact(model);
   return model;
 }
 
 }  // namespace
 
 Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs) {
-  if (scene_needs) return *scene_needs;
-  if (!asset.needs) return {};
-  const auto named = [&](const char* group) {
-    return std::find(asset.needs->begin(), asset.needs->end(), group) != asset.needs->end();
+  Needs needs = scene_needs.value_or(Needs{});
+  if (needs.internal_force == "auto") needs.internal_force = asset.internal_force;
+  if (scene_needs || !asset.needs) return needs;
+  const auto named = [&](const char* part) {
+    return std::find(asset.needs->begin(), asset.needs->end(), part) != asset.needs->end();
   };
-  return {named("examples"), named("rigid")};
+  needs.examples = named("examples");
+  needs.targets = named("targets");
+  needs.rigid = named("rigid");
+  needs.contact = named("contact");
+  return needs;
 }
 
 ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report) {

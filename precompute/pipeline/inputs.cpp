@@ -69,12 +69,13 @@ Eigen::VectorXd resolve(const std::optional<double>& value, const char* name, co
   return ((*checked.file.materials).*member)(kept);
 }
 
-FlagVector flag_fixed(const AssetConfig& asset, const CheckedMesh& checked) {
-  FlagVector flags = FlagVector::Zero(checked.file.mesh.vertex_count());
-  if (!asset.fixed) return flags;
+// 1 for the selected vertices, whose ids are the file's; `absent` for all where none are selected.
+FlagVector flag(const std::optional<VertexSelection>& selection, std::uint8_t absent, const AssetConfig& asset,
+                const CheckedMesh& checked, InputFiles& files) {
+  if (!selection) return FlagVector::Constant(checked.file.mesh.vertex_count(), absent);
   FlagVector in_file = FlagVector::Zero(checked.file_vertices.rows());
-  for (const auto vertex : select_vertices(checked.file_vertices, *asset.fixed, asset.file.string()))
-    in_file[vertex] = 1;
+  for (const auto vertex : select_vertices(checked.file_vertices, *selection, asset.file.string())) in_file[vertex] = 1;
+  if (const auto* file = std::get_if<FileSelection>(&*selection)) files.push_back(file->file);
   return in_file(checked.report.kept_vertices);
 }
 
@@ -109,12 +110,11 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
       resolve(asset.material.youngs_modulus, "youngs_modulus", checked, &TetMaterials::youngs_modulus, asset);
   object.materials.poisson_ratio =
       resolve(asset.material.poisson_ratio, "poisson_ratio", checked, &TetMaterials::poisson_ratio, asset);
-  object.fixed = flag_fixed(asset, checked);
+  object.fixed = flag(asset.fixed, 0, asset, checked, files);
+  object.contact = flag(asset.contact_vertices, 1, asset, checked, files);
   object.file_tets = checked.file_tets;
   object.kept_vertices = checked.report.kept_vertices;
   object.kept_tets = checked.report.kept_tets;
-  if (asset.fixed)
-    if (const auto* selection = std::get_if<FileSelection>(&*asset.fixed)) files.push_back(selection->file);
   return object;
 }
 

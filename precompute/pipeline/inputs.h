@@ -12,7 +12,8 @@ namespace exmat::precompute {
 struct ObjectInput {
   TetMesh mesh;
   TetMaterials materials;
-  FlagVector fixed;  ///< n
+  FlagVector fixed;    ///< n
+  FlagVector contact;  ///< n, 1 where the asset lets the surface touch
   std::vector<std::int32_t>
       file_tets;  ///< corner indices as in the file, 4 n_t of it: what "same connectivity" compares
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file

@@ -13,8 +13,15 @@ struct RunOptions {
   bool profile = false;
 };
 
+struct BenchCommandOptions {
+  std::filesystem::path scene;
+  std::optional<std::int64_t> steps;  ///< of one round, instead of the scene's
+  bool json = false;
+};
+
 // The commands of exmat-runtime: results on stdout, logs and progress on stderr; failures are InputError or WorkError.
 void run_command(const RunOptions& options);
+void bench_command(const BenchCommandOptions& options);
 void info_command(const std::filesystem::path& bundle);
 void validate_command(const std::filesystem::path& bundle);
 

@@ -8,7 +8,7 @@ namespace exmat::runtime {
 namespace {
 
 void print_groups(const ReducedModel& model, const BundleSummary& summary) {
-  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples > 0);
+  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples);
   fill_bytes(model, ledger);
   fmt::print("\n{:<14} {:>14}\n", "group", "bytes");
   for (const LedgerEntry& entry : ledger)

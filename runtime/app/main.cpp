@@ -17,9 +17,18 @@ int main(int argc, char** argv) {
   run.add_option("scene", options.scene, "SCENE.json")->required();
   run.add_option("-o,--output", options.trajectory,
                  "Trajectory (HDF5; an .xdmf comes beside it), instead of the scene's");
-  run.add_option("--steps", options.steps, "Number of steps, instead of the scene's")
-      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000'000'000}));
+  const CLI::Range step_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
+  run.add_option("--steps", options.steps, "Number of steps, instead of the scene's")->check(step_range);
   run.add_flag("--profile", options.profile, "Print the time of each stage");
+
+  runtime::BenchCommandOptions bench_options;
+  CLI::App& bench = *app.add_subcommand("bench", "Step a scene without output and say how fast each stage is");
+  bench.add_option("scene", bench_options.scene, "SCENE.json")->required();
+  bench
+      .add_option("--steps", bench_options.steps,
+                  "Steps of one round; default: the scene's, or what two seconds allow if that is less")
+      ->check(step_range);
+  bench.add_flag("--json", bench_options.json, "Print JSON instead of a table");
 
   std::filesystem::path bundle;
   CLI::App& info = *app.add_subcommand("info", "Say what a bundle holds");
@@ -29,6 +38,7 @@ int main(int argc, char** argv) {
   return run_program(app, argc, argv, [&] {
     apply(common);
     if (run.parsed()) runtime::run_command(options);
+    if (bench.parsed()) runtime::bench_command(bench_options);
     if (info.parsed()) runtime::info_command(bundle);
     if (validate.parsed()) runtime::validate_command(bundle);
   });

@@ -3,23 +3,11 @@
 #include "common/config/config.h"
 #include "common/core/log.h"
 #include "runtime/app/commands.h"
-#include "runtime/io/scene_loader.h"
+#include "runtime/app/loading_log.h"
 #include "runtime/io/scene_run.h"
 
 namespace exmat::runtime {
 namespace {
-
-void log_loaded(const LoadedScene& loaded, const SceneConfig& config) {
-  log::info(fmt::format("bundle {}: asset \"{}\", {} vertices, {} tets, r = {}, s = {}", config.bundle.string(),
-                        loaded.summary.asset_name, loaded.summary.vertices, loaded.summary.tets, loaded.summary.modes,
-                        loaded.summary.cubature_elements));
-  for (const ReadRecord& record : loaded.records)
-    log::info(fmt::format("read {}: {} bytes", record.dataset, record.bytes));
-  for (const LedgerEntry& entry : loaded.ledger)
-    log::info(fmt::format("group {}: {}, {} bytes, {}", entry.group, entry.included ? "in" : "out", entry.bytes,
-                          entry.reason));
-  for (const std::string& line : describe_plan(loaded, config)) log::info("plan: " + line);
-}
 
 void print(const char* name, const std::string& value) { fmt::print("{:<22} {}\n", name, value); }
 
@@ -28,11 +16,17 @@ std::string microseconds(double seconds) { return fmt::format("{:.2f} us", 1e6 *
 void print_summary(const RunSummary& summary, const LoadedScene& loaded, const SceneConfig& config) {
   const double mean = summary.step_seconds.mean();
   print("steps", std::to_string(summary.steps));
+  if (summary.bodies > 1) {
+    print("bodies", fmt::format("{} (energies and trajectory are those of the first)", summary.bodies));
+    print("threads", std::to_string(summary.threads));
+  }
   print("simulated time", fmt::format("{:g} s", summary.simulated_seconds));
+  print("steps per second",
+        fmt::format("{:.0f}{}", mean > 0 ? 1 / mean : 0, summary.bodies > 1 ? " over all bodies" : ""));
   print("mean step time", microseconds(mean));
   print("median step time", microseconds(summary.step_seconds.quantile(0.5)));
   print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)));
-  print("real-time factor", fmt::format("{:.1f}", mean > 0 ? config.time_step / mean : 0));
+  print("real-time factor", fmt::format("{:.1f}", mean > 0 ? config.time_step / (mean * summary.bodies) : 0));
   print("Newton iterations", fmt::format("{:.2f} a step", summary.newton_iterations.mean()));
   if (runs_examples(*loaded.model, loaded.scene))
     print("target iterations", fmt::format("{:.2f} a step", summary.target_iterations.mean()));
@@ -43,6 +37,7 @@ void print_summary(const RunSummary& summary, const LoadedScene& loaded, const S
   print("potential energy", fmt::format("{:.6g} J", summary.energies.potential));
   if (summary.largest_displacement)
     print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
+  print("state hash", fmt::format("{:016x}", summary.state_hash));
   if (config.trajectory) print("trajectory", config.trajectory->string());
 }
 
@@ -69,7 +64,7 @@ void run_command(const RunOptions& options) {
     log::warning(
         fmt::format("{} of {} steps did not reach the tolerance {:g} (target included); a smaller time_step or more "
                     "newton.max_iterations may help",
-                    summary.unconverged_steps, summary.steps, config.newton.tolerance));
+                    summary.unconverged_steps, summary.steps * summary.bodies, config.newton.tolerance));
   print_summary(summary, loaded, config);
   print_profile(summary);
 }

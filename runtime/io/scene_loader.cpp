@@ -6,6 +6,7 @@
 
 #include "common/config/config.h"
 #include "common/core/error.h"
+#include "runtime/io/obstacle_loader.h"
 
 namespace exmat::runtime {
 namespace {
@@ -16,14 +17,28 @@ Integrator integrator_from_name(std::string_view name) {
   return Integrator::kBdf2;
 }
 
-void check_body(const SceneConfig& config, const BundleSummary& summary) {
+void check_examples(const SceneConfig& config, const BundleSummary& summary) {
   const std::string bundle = config.bundle.string();
-  if (!summary.constrained)
-    throw InputError({bundle, "/", "a body with fixed vertices", "a free body",
-                      "name \"fixed\" vertices in the asset; free bodies come in a later version"});
   if (config.examples && summary.examples == 0)
     throw InputError({bundle, "/examples", "this group, since the scene asks for an example force", "none",
                       "precompute the asset with its examples, or drop \"examples\" from " + config.file.string()});
+}
+
+void check_methods(const SceneConfig& config, const BundleSummary& summary) {
+  const std::string bundle = config.bundle.string();
+  if (config.internal_force == "polynomial" && !summary.has_polynomial)
+    throw InputError({bundle, "/polynomial", "this group, since the scene asks for it by internal_force", "none",
+                      "precompute the asset with internal_force \"polynomial\", or let the scene say \"auto\""});
+  if (!config.examples || config.examples->target != "table") return;
+  if (!summary.has_targets)
+    throw InputError(
+        {bundle, "/targets", "this group, since the scene asks for a table of targets", "none",
+         "precompute the asset with this scene (--scene), or let the scene's examples.target say \"auto\""});
+  if (summary.energy_reference != config.examples->energy_reference)
+    throw InputError(
+        {bundle, "/targets", "targets of energy_reference \"" + config.examples->energy_reference + '"',
+         '"' + summary.energy_reference + '"',
+         "precompute the asset with this scene (--scene), or let the scene's examples.target say \"auto\""});
 }
 
 void check_force_vertices(const SceneConfig& config, const BundleSummary& summary) {
@@ -46,6 +61,15 @@ void count_bytes(const std::vector<ReadRecord>& records, std::vector<LedgerEntry
   }
 }
 
+/// What this version reads and checks, yet does not step.
+void refuse_unsupported(const SceneConfig& config) {
+  const auto refuse = [&](const char* member, const char* advice) {
+    throw InputError(
+        {config.file.string(), member, "no such member: this version does not support it yet", "one", advice});
+  };
+  if (!config.body.motion.empty()) refuse("/body/motion", "remove it: fixed vertices stay where they are");
+}
+
 RowMatrix basis_rows(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
   const RowMatrix& basis = loaded.data.modal->basis;
   if (basis.rows() == 0) return read_basis_rows(config.bundle, force.vertices, &loaded.records);
@@ -55,6 +79,24 @@ RowMatrix basis_rows(const SceneConfig& config, const VertexForceConfig& force, 
   return rows;
 }
 
+ScriptedForce scripted_force(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
+  const RowMatrix rows = basis_rows(config, force, loaded);
+  ScriptedForce scripted;
+  scripted.start = force.start;
+  scripted.end = force.end;
+  scripted.force = vertex_force(rows, force.force);
+  if (!loaded.model->rigid) return scripted;
+  const auto count = static_cast<double>(force.vertices.size());
+  scripted.total = count * force.force;
+  scripted.mean_basis.setZero(3, rows.cols());
+  scripted.lever = -loaded.model->rigid->centre_of_mass();
+  for (std::size_t i = 0; i < force.vertices.size(); ++i) {
+    scripted.lever += loaded.data.object->mesh.vertices.row(force.vertices[i]).transpose() / count;
+    scripted.mean_basis += rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) / count;
+  }
+  return scripted;
+}
+
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   StepScene scene;
   scene.time_step = config.time_step;
@@ -62,17 +104,35 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.mass_damping = config.mass_damping;
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
+  scene.obstacles = make_obstacles(config);
+  scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
-  for (const VertexForceConfig& force : config.forces)
-    scene.forces.push_back({vertex_force(basis_rows(config, force, loaded), force.force), force.start, force.end});
+  for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force(config, force, loaded));
   if (config.examples)
-    scene.examples = ExampleSettings{config.examples->stiffness, config.examples->damping, config.examples->bias};
+    scene.examples = ExampleSettings{config.examples->stiffness, config.examples->damping, config.examples->bias,
+                                     config.examples->target_iterations};
   return scene;
+}
+
+State start_state(const SceneConfig& config, const LoadedScene& loaded) {
+  const Eigen::Index modes = loaded.model->modes();
+  State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
+  prepare_contacts(*loaded.model, config.obstacles.size(), state);
+  if (!state.body) return state;
+  FreeMotion motion;
+  motion.position = config.body.position.value_or(motion.position);
+  motion.orientation = config.body.orientation.value_or(motion.orientation);
+  motion.linear_velocity = config.body.linear_velocity.value_or(motion.linear_velocity);
+  motion.angular_velocity = config.body.angular_velocity.value_or(motion.angular_velocity);
+  set_motion(*loaded.model, motion, state);
+  return state;
 }
 
 std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedModel& data) {
   ModelOptions options;
   options.examples = config.examples.has_value();
+  options.target_table = data.targets.has_value();
+  options.polynomial = data.polynomial.has_value();
   if (config.examples && config.examples->energy_reference == "rest") options.energy_reference = EnergyReference::kRest;
   ModelResult result = build_model(data, options);
   if (result.model) return std::move(result.model);
@@ -85,20 +145,40 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
 LoadedScene load_run(const SceneConfig& config) {
   LoadedScene loaded;
   loaded.summary = summarise_bundle(config.bundle);
-  check_body(config, loaded.summary);
+  refuse_unsupported(config);
+  check_body(config, loaded.summary.constrained);
+  check_examples(config, loaded.summary);
+  check_methods(config, loaded.summary);
   check_force_vertices(config, loaded.summary);
-  loaded.ledger = plan_groups(needs_of(config), loaded.summary.constrained, loaded.summary.examples > 0);
-  const BundleRequest request{loaded.ledger, /*step_only=*/true, /*positions=*/config.trajectory.has_value()};
+  loaded.ledger =
+      plan_groups(fit_needs(needs_of(config), loaded.summary), loaded.summary.constrained, loaded.summary.examples);
+  // A force on a free body needs to know where it acts.
+  const bool positions = config.trajectory || (!loaded.summary.constrained && !config.forces.empty());
+  const BundleRequest request{loaded.ledger, /*step_only=*/true, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   loaded.model = prepare(config, loaded.data);
   loaded.scene = step_scene(config, loaded);
+  loaded.start = start_state(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
   // The model holds its own, prepared for stepping.
   loaded.data.cubature.reset();
   loaded.data.examples.reset();
   loaded.data.projection.reset();
+  loaded.data.polynomial.reset();
+  loaded.data.targets.reset();
+  loaded.data.contact.reset();
   return loaded;
 }
+
+namespace {
+
+std::string describe_target(const ExampleModel& examples, const StepScene& scene) {
+  if (examples.table) return fmt::format("target: table, one polynomial of degree {}", examples.table->degree());
+  return fmt::format("target: Newton in d = {} coordinates, s = {} elements, at most {} iterations a step",
+                     examples.target->dimension(), examples.target->elements(), scene.examples->target_iterations);
+}
+
+}  // namespace
 
 std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneConfig& config) {
   const Model& model = *loaded.model;
@@ -112,8 +192,7 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   if (runs_examples(model, scene)) {
     const Eigen::Index count = model.example_count();
     plan.push_back(fmt::format("weights: K = {} examples, bias {:g}", count, scene.examples->bias));
-    plan.push_back(fmt::format("target: Newton in d = {} coordinates, {} examples of s = {} elements",
-                               model.examples->target.dimension(), count, model.elasticity.elements()));
+    plan.push_back(describe_target(*model.examples, scene));
     plan.push_back(fmt::format("example_force: linear, {} filter of {} x {}",
                                model.examples->filter.is_symmetric() ? "symmetric" : "unsymmetric", model.modes(),
                                model.modes()));
@@ -121,7 +200,10 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
     left_out("weights, target, example_force",
              scene.examples ? "stiffness and damping are 0" : "the scene names no examples");
   }
-  plan.push_back(fmt::format("internal_force: cubature, s = {} elements", model.elasticity.elements()));
+  plan.push_back(model.internal_force.polynomial() ? std::string("internal_force: exact polynomial")
+                                                   : fmt::format("internal_force: cubature, s = {} elements",
+                                                                 model.internal_force.cubature().elements()));
+  plan.push_back(fmt::format("instruction set: {}", kernels().name));
   plan.push_back(fmt::format("solve: Newton, Cholesky of {} x {}, at most {} iterations", model.modes(), model.modes(),
                              scene.newton.max_iterations));
   if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {
@@ -135,8 +217,15 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   } else {
     plan.push_back(fmt::format("scripted forces: {}", scene.forces.size()));
   }
-  left_out("rigid motion", "the body is constrained");
-  left_out("contact", "the scene names no obstacles");
+  if (model.rigid)
+    plan.push_back("rigid motion: momenta, rotation by the spin that keeps the angular momentum");
+  else
+    left_out("rigid motion", "the body is constrained");
+  if (touches(model, scene))
+    plan.push_back(fmt::format("contact: {} vertices against {} obstacles, backward Euler near them",
+                               model.contact->vertices(), scene.obstacles.size()));
+  else
+    left_out("contact", "the scene names no obstacles");
   if (config.trajectory) {
     plan.push_back(fmt::format("output: n = {} positions every {} steps", loaded.summary.vertices, config.every));
   } else {

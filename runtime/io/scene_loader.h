@@ -7,6 +7,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/scene_config.h"
 #include "runtime/sim/scene.h"
+#include "runtime/sim/state.h"
 
 namespace exmat::runtime {
 
@@ -14,6 +15,7 @@ namespace exmat::runtime {
 struct LoadedScene {
   std::unique_ptr<const Model> model;
   StepScene scene;
+  State start;  ///< where every body begins
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;  ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;  ///< datasets that were read, in order
@@ -21,7 +23,7 @@ struct LoadedScene {
 };
 
 /// Reads of the bundle what the scene needs, no more: positions only if it writes a trajectory. Throws InputError: a
-/// free body, a group that the scene needs and the bundle lacks, a vertex out of range, an example that inverts an
+/// group that the scene needs and the bundle lacks, a vertex out of range, an example that inverts an
 /// element.
 LoadedScene load_run(const SceneConfig& config);
 

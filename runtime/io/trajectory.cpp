@@ -149,15 +149,17 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const Redu
 TrajectoryWriter::~TrajectoryWriter() = default;
 
 void TrajectoryWriter::append(const State& state, const Energies& energies, double step_seconds) {
-  constexpr std::array kOrigin{0.0, 0.0, 0.0};
-  constexpr std::array kIdentity{1.0, 0.0, 0.0, 0.0};
+  const FreeState rest;
+  const FreeState& body = state.body ? *state.body : rest;
+  const Eigen::Quaterniond& turn = body.orientation;
+  const std::array orientation{turn.w(), turn.x(), turn.y(), turn.z()};
   times_.push_back(state.time);
   datasets_->time.append(state.time);
   append_positions(state);
   datasets_->reduced.append(row_of(state.q));
   datasets_->reduced_velocity.append(row_of(state.v));
-  datasets_->body_position.append(std::span<const double>(kOrigin));
-  datasets_->body_orientation.append(std::span<const double>(kIdentity));
+  datasets_->body_position.append(row_of(body.position));
+  datasets_->body_orientation.append(std::span<const double>(orientation));
   datasets_->kinetic.append(energies.kinetic);
   datasets_->elastic.append(energies.elastic);
   datasets_->potential.append(energies.potential);
@@ -169,13 +171,23 @@ void TrajectoryWriter::append_positions(const State& state) {
   const RowMatrix& basis = model_.modal->basis;
   displacements_.reshaped<Eigen::RowMajor>().noalias() = basis * state.q;
   velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
-  const VertexArray positions = model_.object->mesh.vertices + displacements_;
+  VertexArray positions = model_.object->mesh.vertices + displacements_;
+  if (state.body) place(*state.body, positions);
   const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
   datasets_->positions.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
-  const Momenta now = momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
+  const Momenta now = state.body ? Momenta{state.body->linear_momentum, state.body->angular_momentum}
+                                 : momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
   datasets_->linear_momentum.append(row_of(now.linear));
   datasets_->angular_momentum.append(row_of(now.angular));
+}
+
+/// From the body's frame at rest to the world.
+void TrajectoryWriter::place(const FreeState& body, VertexArray& positions) const {
+  const Eigen::RowVector3d centre = model_.rigid->centre_of_mass.transpose();
+  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix();
+  positions = (positions.rowwise() - centre) * rotation.transpose();
+  positions.rowwise() += centre + body.position.transpose();
 }
 
 void TrajectoryWriter::finish() {

@@ -21,7 +21,7 @@ struct TrajectoryInfo {
   std::int64_t examples = 0;  ///< K; 0: no /examples/weights
 };
 
-/// Writes the trajectory of a constrained body and an .xdmf beside it. interfaces.md, "Trajectory". Both appear under
+/// Writes the trajectory of a body and an .xdmf beside it. interfaces.md, "Trajectory". Both appear under
 /// their names in finish() and not before; without it nothing is left. Two equal runs give the same bytes except
 /// /step_time.
 class TrajectoryWriter {
@@ -42,6 +42,7 @@ class TrajectoryWriter {
  private:
   struct Datasets;
   void append_positions(const State& state);
+  void place(const FreeState& body, VertexArray& positions) const;
 
   const ReducedModel& model_;
   TrajectoryInfo info_;

@@ -1,121 +1,175 @@
 #include "runtime/sim/incremental_potential.h"
 
 #include <cmath>
+#include <limits>
 
 namespace exmat::runtime {
 namespace {
 
-PotentialValue& operator+=(PotentialValue& sum, const PotentialValue& term) {
-  sum.value += term.value;
-  sum.magnitude += term.magnitude;
-  return sum;
-}
-
-PotentialValue term(double value) { return {value, std::abs(value)}; }
+constexpr double kSmallSpin = 0.05;  // of c_v: then iterations without the gyroscopic part converge as fast
 
 }  // namespace
 
-IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& scene, Workspace& workspace) noexcept
-    : model_(model), scene_(scene), workspace_(workspace), examples_(runs_examples(model, scene)) {}
+IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& scene, const State& state,
+                                           Workspace& workspace) noexcept
+    : model_(model),
+      scene_(scene),
+      state_(state),
+      workspace_(workspace),
+      examples_(runs_examples(model, scene)),
+      skew_(examples_ && !model.examples->filter.is_symmetric()),
+      rotates_(state.body.has_value()) {}
 
-double IncrementalPotential::without_damping(const Eigen::VectorXd& q, double elastic_energy) const noexcept {
+double IncrementalPotential::internal_flops(bool stiffness) const noexcept {
+  return model_.internal_force.force_flops() + (stiffness ? model_.internal_force.stiffness_flops() : 0);
+}
+
+double IncrementalPotential::inertia_and_load(const Eigen::VectorXd& q) const noexcept {
   const StepForm& form = workspace_.form;
-  return 0.5 * form.acceleration_factor * (q - form.acceleration_centre).squaredNorm() + elastic_energy -
+  return 0.5 * form.acceleration_factor * (q - form.acceleration_centre).squaredNorm() -
          workspace_.external_force.dot(q);
 }
 
-PotentialEvaluation IncrementalPotential::gradient_and_hessian(const Eigen::VectorXd& q, Eigen::VectorXd& gradient,
-                                                               Eigen::MatrixXd& hessian) noexcept {
-  {
-    const StageTimer timer(workspace_.profile, Stage::kInternalForce);
-    elastic_energy_ =
-        model_.elasticity.force_and_stiffness(q, workspace_.elasticity, workspace_.internal_force, hessian);
+double IncrementalPotential::start(const Eigen::VectorXd& first_iterate) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(true));
+  elastic_energy_ = model_.internal_force.force_and_stiffness(first_iterate, workspace_.elasticity,
+                                                              workspace_.internal_force, workspace_.newton.hessian);
+  return elastic_energy_ + inertia_and_load(first_iterate);
+}
+
+double IncrementalPotential::potential_at_start() const noexcept {
+  return state_.elastic_energy + inertia_and_load(state_.q);
+}
+
+/// A and its gradient g at q_n: value 1/2 x^T A x + g^T x, x = q - q_n. Differences from q_n keep the digits that
+/// products with c_a would lose.
+void IncrementalPotential::prepare() noexcept {
+  const StepForm& form = workspace_.form;
+  Eigen::MatrixXd& A = workspace_.quadratic;
+  Eigen::VectorXd& g = workspace_.linear;
+  const Eigen::Index modes = model_.modes();
+  const double diagonal = form.acceleration_factor + form.velocity_factor * scene_.mass_damping;
+  const auto symmetric = workspace_.newton.hessian.selfadjointView<Eigen::Lower>();
+
+  g = form.acceleration_factor * (state_.q - form.acceleration_centre) - workspace_.external_force;
+  workspace_.offset = form.velocity_factor * (state_.q - form.velocity_centre);
+  if (scene_.mass_damping > 0) g += scene_.mass_damping * workspace_.offset;
+  auto used = A.topRows(modes);
+  if (scene_.stiffness_damping > 0) {
+    g.noalias() += scene_.stiffness_damping * (symmetric * workspace_.offset);
+    used = scene_.stiffness_damping * form.velocity_factor * workspace_.newton.hessian;
+    used.triangularView<Eigen::StrictlyUpper>() = used.transpose();
+  } else {
+    used.setZero();
   }
-  freeze_damping(hessian);
-  complete_hessian(hessian);
-  return assemble(q, gradient);
+  if (examples_) {
+    const ExampleForce& example = workspace_.example_force;
+    const ShapeFilter& filter = model_.examples->filter;
+    used += example.stiffness * filter.symmetric_part();
+    workspace_.offset = example.stiffness * (state_.q - example.centre);
+    g.noalias() += filter.matrix() * workspace_.offset;
+    g -= example.pull;
+  }
+  A.diagonal().array() += diagonal;
+  workspace_.frozen_force.setZero();
 }
 
-PotentialEvaluation IncrementalPotential::gradient(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept {
+PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient,
+                                                   Eigen::MatrixXd& hessian) noexcept {
+  PotentialEvaluation evaluation = assemble(q, gradient);
+  accept(evaluation);
+  add_quadratic(hessian);
+  return evaluation;
+}
+
+PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(false));
   at_first_iterate_ = false;
-  const StageTimer timer(workspace_.profile, Stage::kInternalForce);
-  elastic_energy_ = model_.elasticity.force(q, workspace_.elasticity, workspace_.internal_force);
+  elastic_energy_ = model_.internal_force.force(q, workspace_.elasticity, workspace_.internal_force);
   return assemble(q, gradient);
-}
-
-void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
-  const StageTimer timer(workspace_.profile, Stage::kInternalForce);
-  model_.elasticity.stiffness(q, tangent, workspace_.elasticity, hessian);
-  // Damping by a stiffness that had to be projected would feed energy in.
-  if (at_first_iterate_) freeze_damping(hessian);
-  complete_hessian(hessian);
 }
 
 PotentialValue IncrementalPotential::value(const Eigen::VectorXd& q) noexcept {
-  return sum_of_terms(q, model_.elasticity.energy(q, workspace_.elasticity), nullptr);
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(false));
+  set_offset(q);
+  return quadratic(model_.internal_force.energy(q, workspace_.elasticity));
 }
 
+void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(true));
+  model_.internal_force.stiffness(q, tangent, workspace_.elasticity, hessian);
+  // Damping by a stiffness that had to be projected would feed energy in.
+  if (at_first_iterate_ && scene_.stiffness_damping > 0) prepare();
+  add_quadratic(hessian);
+}
+
+void IncrementalPotential::accept(PotentialEvaluation& evaluation) noexcept {
+  if (!skew_ && !rotates_) return;
+  workspace_.frozen_force.swap(workspace_.next_frozen_force);
+  evaluation.potential.value +=
+      workspace_.frozen_force.dot(workspace_.offset) - workspace_.next_frozen_force.dot(workspace_.offset);
+}
+
+/// q - q_n and its product with A.
+void IncrementalPotential::set_offset(const Eigen::VectorXd& q) noexcept {
+  workspace_.offset = q - state_.q;
+  const Eigen::MatrixXd& A = workspace_.quadratic;
+  kernels().matrix_vector(A.data(), A.rows(), A.cols(), A.outerStride(), workspace_.offset.data(),
+                          workspace_.product.data());
+}
+
+/// Of internal_force and elastic_energy_ at q; leaves q - q_n in the workspace.
 PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept {
-  gradient = workspace_.internal_force - workspace_.external_force;
-  const PotentialValue potential = sum_of_terms(q, elastic_energy_, &gradient);
-  workspace_.offset = q - workspace_.form.acceleration_centre;
-  const double inertia = workspace_.form.acceleration_factor * workspace_.offset.norm();
-  return {potential, workspace_.external_force.norm() + workspace_.internal_force.norm() + inertia};
+  const StepForm& form = workspace_.form;
+  set_offset(q);
+  gradient = workspace_.internal_force + workspace_.linear + workspace_.product.head(q.size());
+  const double inertia = form.acceleration_factor * (q - form.acceleration_centre).norm();
+  PotentialEvaluation evaluation{quadratic(elastic_energy_),
+                                 workspace_.external_force.norm() + workspace_.internal_force.norm() + inertia};
+  if (skew_ || rotates_) {
+    if (!update_frozen_force(q)) evaluation.potential.value = std::numeric_limits<double>::infinity();
+    gradient += workspace_.next_frozen_force;
+  }
+  return evaluation;
 }
 
-PotentialValue IncrementalPotential::sum_of_terms(const Eigen::VectorXd& q, double elastic_energy,
-                                                  Eigen::VectorXd* gradient) noexcept {
+/// Of q, into next_frozen_force. False where the rotation has no solution.
+bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
+  workspace_.next_frozen_force.setZero();
+  if (skew_)
+    workspace_.next_frozen_force.noalias() +=
+        workspace_.example_force.stiffness * (model_.examples->filter.skew_part() * workspace_.offset);
+  if (!rotates_) return true;
+  FreeMotionWorkspace& free = *workspace_.free;
   const StepForm& form = workspace_.form;
-  workspace_.offset = q - form.acceleration_centre;
-  if (gradient != nullptr) *gradient += form.acceleration_factor * workspace_.offset;
-  PotentialValue sum = term(0.5 * form.acceleration_factor * workspace_.offset.squaredNorm());
-  sum += term(elastic_energy);
-  sum += term(-workspace_.external_force.dot(q));
-  if (scene_.mass_damping > 0 || scene_.stiffness_damping > 0) sum += add_damping(q, gradient);
-  if (examples_) sum += add_examples(q, gradient);
+  free.velocity = form.velocity_factor * (q - form.velocity_centre);
+  const bool found = update_spin(*model_.rigid, q, free);
+  rotation_force(*model_.rigid, form.velocity_factor, free);
+  workspace_.next_frozen_force -= free.force;
+  return found;
+}
+
+/// -2 c_v W, where it is not small beside c_a.
+const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
+  if (!rotates_) return nullptr;
+  FreeMotionWorkspace& free = *workspace_.free;
+  if (free.solution.spin.norm() <= kSmallSpin * workspace_.form.velocity_factor) return nullptr;
+  set_gyroscopic(*model_.rigid, workspace_.form.velocity_factor, free);
+  return &free.gyroscopic;
+}
+
+/// Of offset and its product with A.
+PotentialValue IncrementalPotential::quadratic(double elastic_energy) noexcept {
+  const double square = 0.5 * workspace_.offset.dot(workspace_.product.head(workspace_.offset.size()));
+  const double linear = workspace_.linear.dot(workspace_.offset);
+  PotentialValue sum{elastic_energy + square + linear, std::abs(elastic_energy) + std::abs(square) + std::abs(linear)};
+  if (skew_ || rotates_) sum.value += workspace_.frozen_force.dot(workspace_.offset);
   return sum;
 }
 
-PotentialValue IncrementalPotential::add_damping(const Eigen::VectorXd& q, Eigen::VectorXd* gradient) noexcept {
-  const StepForm& form = workspace_.form;
-  Eigen::VectorXd& offset = workspace_.offset;
-  Eigen::VectorXd& product = workspace_.product;
-  offset = q - form.velocity_centre;
-  product = scene_.mass_damping * offset;
-  if (scene_.stiffness_damping > 0) product.noalias() += workspace_.damping.selfadjointView<Eigen::Lower>() * offset;
-  product *= form.velocity_factor;
-  if (gradient != nullptr) *gradient += product;
-  return term(0.5 * offset.dot(product));
-}
-
-PotentialValue IncrementalPotential::add_examples(const Eigen::VectorXd& q, Eigen::VectorXd* gradient) noexcept {
-  const ExampleForce& example = workspace_.example_force;
-  const ShapeFilter& filter = model_.examples->filter;
-  Eigen::VectorXd& offset = workspace_.offset;
-  Eigen::VectorXd& product = workspace_.product;
-  offset = q - example.centre;
-  product.noalias() = example.stiffness * (filter.matrix() * offset);
-  PotentialValue sum = term(0.5 * offset.dot(product));
-  sum += term(-example.pull.dot(q));
-  if (gradient != nullptr) *gradient += product - example.pull;
-  if (filter.is_symmetric()) return sum;
-  if (gradient != nullptr) workspace_.skew_force.noalias() = example.stiffness * (filter.skew_part() * offset);
-  sum += term(workspace_.skew_force.dot(q));
-  return sum;
-}
-
-void IncrementalPotential::freeze_damping(const Eigen::MatrixXd& stiffness) noexcept {
-  if (scene_.stiffness_damping > 0)
-    workspace_.damping.triangularView<Eigen::Lower>() = scene_.stiffness_damping * stiffness;
-}
-
-void IncrementalPotential::complete_hessian(Eigen::MatrixXd& hessian) const noexcept {
-  const StepForm& form = workspace_.form;
-  hessian.diagonal().array() += form.acceleration_factor + form.velocity_factor * scene_.mass_damping;
-  if (scene_.stiffness_damping > 0) hessian.triangularView<Eigen::Lower>() += form.velocity_factor * workspace_.damping;
-  if (examples_)
-    hessian.triangularView<Eigen::Lower>() +=
-        workspace_.example_force.stiffness * model_.examples->filter.symmetric_part();
+void IncrementalPotential::add_quadratic(Eigen::MatrixXd& hessian) const noexcept {
+  hessian.triangularView<Eigen::Lower>() += workspace_.quadratic.topRows(hessian.rows());
+  if (rotates_) add_rotation_stiffness(*model_.rigid, workspace_.form.velocity_factor, *workspace_.free, hessian);
 }
 
 }  // namespace exmat::runtime

@@ -6,7 +6,7 @@ void backward_euler_form(const State& state, double time_step, StepForm& form) n
   form.velocity_factor = 1 / time_step;
   form.acceleration_factor = 1 / (time_step * time_step);
   form.velocity_centre = state.q;
-  form.acceleration_centre = state.q + time_step * state.v;
+  form.acceleration_centre = state.q + time_step * state.momentum();
 }
 
 void bdf2_form(const State& state, double time_step, StepForm& form) noexcept {
@@ -14,14 +14,15 @@ void bdf2_form(const State& state, double time_step, StepForm& form) noexcept {
   form.velocity_factor = 1 / h;
   form.acceleration_factor = 1 / (h * h);
   form.velocity_centre = (4 * state.q - state.q_previous) / 3;
-  form.acceleration_centre = form.velocity_centre + h / 3 * (4 * state.v - state.v_previous);
+  form.acceleration_centre = form.velocity_centre + h / 3 * (4 * state.momentum() - state.momentum_previous());
 }
 
 void newmark_form(const State& state, const Eigen::VectorXd& acceleration, double time_step, StepForm& form) noexcept {
   form.velocity_factor = 2 / time_step;
   form.acceleration_factor = 4 / (time_step * time_step);
   form.velocity_centre = state.q + time_step / 2 * state.v;
-  form.acceleration_centre = state.q + time_step * state.v + time_step * time_step / 4 * acceleration;
+  form.acceleration_centre =
+      form.velocity_centre + time_step / 2 * state.momentum() + time_step * time_step / 4 * acceleration;
 }
 
 }  // namespace exmat::runtime

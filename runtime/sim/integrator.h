@@ -8,7 +8,8 @@
 namespace exmat::runtime {
 
 /// An implicit integrator within one step: v = c_v (q - q_v), a = c_a (q - q_a) at the end of the step. reduction.md,
-/// "Integration".
+/// "Integration". For a free body a is the rate of change of its momentum pi as far as pi is qdot: the centres then
+/// come from pi where those of a constrained body come from v.
 struct StepForm {
   double velocity_factor = 0;                            ///< c_v [1/s]
   double acceleration_factor = 0;                        ///< c_a [1/s^2]
@@ -22,7 +23,7 @@ void backward_euler_form(const State& state, double time_step, StepForm& form) n
 void bdf2_form(const State& state, double time_step, StepForm& form) noexcept;
 
 /// Newmark, beta 1/4, gamma 1/2 (Newmark 1959), from the acceleration a_n `acceleration` [r] at the beginning of the
-/// step.
+/// step: that of q, or of a free body's pi.
 void newmark_form(const State& state, const Eigen::VectorXd& acceleration, double time_step, StepForm& form) noexcept;
 
 }  // namespace exmat::runtime

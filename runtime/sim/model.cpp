@@ -22,18 +22,28 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   }
   auto model = std::make_unique<Model>();
   const CubatureData& cubature = *reduced.cubature;
-  model->elasticity = ReducedElasticity(*material, cubature.gradient, cubature.weights.cwiseProduct(cubature.volumes),
-                                        cubature_lame(cubature));
+  if (options.polynomial && !reduced.polynomial) return {nullptr, missing_group("/polynomial")};
+  std::optional<ReducedPolynomial> polynomial;
+  if (options.polynomial) polynomial.emplace(*reduced.polynomial);
+  model->internal_force = InternalForce(ReducedElasticity(*material, cubature), std::move(polynomial));
   model->gravity_load = reduced.modal->gravity_load;
+  if (reduced.rigid) model->rigid.emplace(*reduced.rigid);
+  if (reduced.contact)
+    model->contact.emplace(*reduced.contact,
+                           reduced.rigid ? reduced.rigid->centre_of_mass : Eigen::Vector3d::Zero().eval());
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};
     const ExampleSet& set = *reduced.examples;
     ExampleModel& examples = model->examples.emplace();
     examples.weights = ExampleWeights(set.gram, set.h0, set.hq);
     examples.filter = ShapeFilter(*reduced.projection);
-    if (auto complaint = examples.target.build(*material, cubature, set.examples, reduced.projection->target_basis,
-                                               options.energy_reference))
+    if (options.target_table) {
+      if (!reduced.targets) return {nullptr, missing_group("/targets")};
+      examples.table.emplace(*reduced.targets);
+    } else if (auto complaint = examples.target.emplace().build(
+                   *material, cubature, set.examples, reduced.projection->target_basis, options.energy_reference)) {
       return {nullptr, std::move(*complaint)};
+    }
   }
   return {std::move(model), {}};
 }

@@ -7,32 +7,40 @@
 #include "common/core/arrays.h"
 #include "common/core/error.h"
 #include "common/model/reduced_model.h"
+#include "runtime/sim/contact.h"
 #include "runtime/sim/example_force.h"
 #include "runtime/sim/example_weights.h"
-#include "runtime/sim/reduced_elasticity.h"
+#include "runtime/sim/internal_force.h"
+#include "runtime/sim/rigid_frame.h"
 #include "runtime/sim/target.h"
+#include "runtime/sim/target_table.h"
 
 namespace exmat::runtime {
 
 /// What example forces need. K examples.
 struct ExampleModel {
   ExampleWeights weights;
-  TargetSolver target;
+  std::optional<TargetTable> table;    ///< serves the targets if there is one
+  std::optional<TargetSolver> target;  ///< otherwise
   ShapeFilter filter;
 };
 
 /// A reduced body prepared for stepping: immutable, shared by any number of States.
 struct Model {
-  ReducedElasticity elasticity;
+  InternalForce internal_force;
   RowMatrix gravity_load;                ///< 3 x r
+  std::optional<ContactSet> contact;     ///< of a scene with obstacles
+  std::optional<RigidFrame> rigid;       ///< of a free body
   std::optional<ExampleModel> examples;  ///< absent: this model was prepared without
 
-  Eigen::Index modes() const { return elasticity.modes(); }
+  Eigen::Index modes() const { return internal_force.modes(); }
   Eigen::Index example_count() const { return examples ? examples->weights.examples() : 0; }
 };
 
 struct ModelOptions {
-  bool examples = true;  ///< prepare example forces, if the bundle has examples
+  bool examples = true;       ///< prepare example forces, if the bundle has examples
+  bool target_table = false;  ///< take targets from /targets; false: solve for them
+  bool polynomial = false;    ///< internal force by /polynomial; false: by cubature
   EnergyReference energy_reference = EnergyReference::kExample;
 };
 

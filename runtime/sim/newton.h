@@ -1,12 +1,15 @@
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
+#include "runtime/kernels/aligned_array.h"
+#include "runtime/sim/element_potential.h"
 #include "runtime/sim/profile.h"
-#include "runtime/sim/reduced_elasticity.h"
 
 namespace exmat::runtime {
 
@@ -25,9 +28,10 @@ enum class NewtonStatus {
 struct NewtonReport {
   NewtonStatus status = NewtonStatus::kConverged;
   int iterations = 0;
-  int line_search_evaluations = 0;
-  int projections = 0;  ///< times that the exact Hessian was not positive definite
-  double residual = 0;  ///< |gradient| at the end
+  int factorisations = 0;           ///< of the Hessian; fewer than iterations where an older one served
+  int line_search_evaluations = 0;  ///< beyond the one that each iteration needs
+  int projections = 0;              ///< times that the exact Hessian was not positive definite
+  double residual = 0;              ///< |gradient| at the end
 };
 
 /// A potential and the size of the terms that add up to it, by which rounding is judged.
@@ -46,16 +50,18 @@ struct PotentialEvaluation {
 struct NewtonWorkspace {
   explicit NewtonWorkspace(Eigen::Index size = 0)
       : gradient(size),
-        direction(size),
         trial(size),
+        trial_gradient(size),
         hessian(Eigen::MatrixXd::Zero(size, size)),
-        cholesky(Eigen::MatrixXd::Identity(size, size)) {
-  }  // by size alone it could not be copied: its status is undefined
+        factor(size * padded(size)),
+        direction(size) {}
 
-  Eigen::VectorXd gradient, direction, trial;
+  Eigen::VectorXd gradient, trial, trial_gradient;
   Eigen::MatrixXd hessian;  ///< lower triangle
-  Eigen::LLT<Eigen::MatrixXd> cholesky;
+  AlignedArray factor;      ///< its Cholesky factor, see Kernels::cholesky
+  AlignedArray direction;
   Profile* profile = nullptr;
+  std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> lu;  ///< only for problems with a gyroscopic() part
 };
 
 namespace detail {
@@ -65,95 +71,166 @@ inline constexpr int kHalvings = 30;
 inline constexpr int kShifts = 12;
 inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
 inline constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+inline constexpr double kChordRate = 0.25;  // of the residual from one iteration to the next
+inline constexpr double kChordSteps = 4;    // that cost less than a new Hessian
 
-inline bool factorize(NewtonWorkspace& workspace) {
-  const StageTimer timer(workspace.profile, Stage::kSolve);
-  workspace.cholesky.compute(workspace.hessian);
-  return workspace.cholesky.info() == Eigen::Success;
+inline bool factorize(NewtonWorkspace& workspace, NewtonReport& report) {
+  const Eigen::Index size = workspace.hessian.rows();
+  const StageTimer timer(workspace.profile, Stage::kSolve, static_cast<double>(size * size * size) / 3);
+  ++report.factorisations;
+  return kernels().cholesky(workspace.hessian.data(), size, workspace.hessian.outerStride(), workspace.factor.data());
 }
 
 /// A Hessian that even projected tangents leave indefinite is shifted until it is not.
-inline bool factorize_shifted(NewtonWorkspace& workspace) {
-  if (factorize(workspace)) return true;
+inline bool factorize_shifted(NewtonWorkspace& workspace, NewtonReport& report) {
+  if (factorize(workspace, report)) return true;
   double shift = kFirstShift * workspace.hessian.diagonal().cwiseAbs().maxCoeff();
   for (int attempt = 0; attempt < kShifts; ++attempt, shift *= 10) {
     workspace.hessian.diagonal().array() += shift;
-    if (factorize(workspace)) return true;
+    if (factorize(workspace, report)) return true;
   }
   return false;
 }
 
-/// Armijo backtracking along workspace.direction; leaves the accepted point in workspace.trial.
+template <class Problem>
+const Eigen::MatrixXd* gyroscopic_part(const Problem& problem) {
+  if constexpr (requires { problem.gyroscopic(); })
+    return problem.gyroscopic();
+  else
+    return nullptr;
+}
+
+/// H + G, G antisymmetric: whatever G is, the direction of a positive definite H is one of descent.
+inline void factorize_gyroscopic(const Eigen::MatrixXd& gyroscopic, NewtonWorkspace& workspace) {
+  const Eigen::Index size = workspace.hessian.rows();
+  const StageTimer timer(workspace.profile, Stage::kSolve, 2 * static_cast<double>(size * size * size) / 3);
+  workspace.hessian.triangularView<Eigen::StrictlyUpper>() = workspace.hessian.transpose();
+  workspace.hessian += gyroscopic;
+  workspace.lu->compute(workspace.hessian);
+}
+
+/// workspace.direction = -H^-1 gradient; returns its slope.
+inline double solve_direction(NewtonWorkspace& workspace, bool gyroscopic) {
+  const Eigen::Index size = workspace.gradient.size();
+  const StageTimer timer(workspace.profile, Stage::kSolve, 2.0 * static_cast<double>(size * size));
+  Eigen::Map<Eigen::VectorXd> direction(workspace.direction.data(), size);
+  if (gyroscopic) {
+    direction.noalias() = workspace.lu->solve(-workspace.gradient);
+  } else {
+    direction = -workspace.gradient;
+    kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+  }
+  return workspace.gradient.dot(direction);
+}
+
+/// Armijo backtracking along workspace.direction from `x`; leaves the accepted point in workspace.trial, its gradient
+/// in workspace.trial_gradient and the rest in `there`.
 template <class Problem>
 bool line_search(Problem& problem, const Eigen::VectorXd& x, const PotentialValue& start, double slope,
-                 NewtonWorkspace& workspace, NewtonReport& report) {
-  const StageTimer timer(workspace.profile, Stage::kLineSearch);
-  double length = 1;
-  for (int halving = 0; halving <= kHalvings; ++halving, length *= 0.5) {
-    workspace.trial.noalias() = x + length * workspace.direction;
-    const PotentialValue value = problem.value(workspace.trial);
+                 NewtonWorkspace& workspace, NewtonReport& report, PotentialEvaluation& there) {
+  const Eigen::Map<const Eigen::VectorXd> direction(workspace.direction.data(), x.size());
+  const auto low_enough = [&](double length, const PotentialValue& value) {
+    return value.value <= start.value + kArmijo * length * slope + kRounding * start.magnitude;
+  };
+  workspace.trial = x + direction;
+  there = problem.evaluate(workspace.trial, workspace.trial_gradient);
+  if (low_enough(1, there.potential)) return true;
+  // Forces without a potential may need what raises it.
+  if constexpr (requires { problem.gyroscopic(); })
+    if (workspace.trial_gradient.norm() <= 0.5 * workspace.gradient.norm()) return true;
+  double length = 0.5;
+  for (int halving = 0; halving < kHalvings; ++halving, length *= 0.5) {
+    workspace.trial = x + length * direction;
     ++report.line_search_evaluations;
-    if (value.value <= start.value + kArmijo * length * slope + kRounding * start.magnitude) return true;
+    if (!low_enough(length, problem.value(workspace.trial))) continue;
+    there = problem.evaluate(workspace.trial, workspace.trial_gradient);
+    return true;
   }
   return false;
+}
+
+/// Whether the factor at hand brings the residual to its limit for less than a new Hessian costs.
+inline bool factor_serves(double before, double now, double limit) {
+  const double rate = now / before;
+  return rate <= kChordRate && std::log(now / limit) <= -kChordSteps * std::log(rate);
 }
 
 }  // namespace detail
 
 /// Minimises a potential from `x` by Newton's method: exact Hessian and Cholesky, positive semi-definite element
-/// tangents only where Cholesky fails, Armijo line search. reduction.md, "Integration". Problem offers, for x of the
-/// workspace's size,
-///   PotentialEvaluation gradient_and_hessian(x, gradient, hessian)   at the first iterate
-///   PotentialEvaluation gradient(x, gradient)                        at every later one
-///   void hessian(x, Tangent, hessian)                                lower triangle
+/// tangents only where Cholesky fails, Armijo line search. An earlier factor serves for as long as it brings the
+/// residual down fast. reduction.md, "Integration". Problem offers, for x of the workspace's size,
+///   PotentialEvaluation evaluate(x, gradient, hessian)   at the first iterate, lower triangle
+///   PotentialEvaluation evaluate(x, gradient)
 ///   PotentialValue value(x)
-/// The gradient is evaluated anew after a hessian() of projected tangents, which may change what the problem keeps
-/// frozen.
+///   void hessian(x, Tangent, hessian)                    lower triangle
+///   void accept(evaluation)                              x of the last evaluate(x, gradient) is the next iterate
+///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
+///                                                        of forces without a potential, or null
+/// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
+/// On return the last evaluate() was at x.
 template <class Problem>
 NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
                              NewtonWorkspace& workspace) noexcept {
   NewtonReport report;
-  auto& [gradient, direction, trial, hessian, cholesky, profile] = workspace;
-  PotentialEvaluation here = problem.gradient_and_hessian(x, gradient, hessian);
+  auto& [gradient, trial, trial_gradient, hessian, factor, direction, profile, lu] = workspace;
+  PotentialEvaluation here = problem.evaluate(x, gradient, hessian);
+  enum class Hessian { kEvaluated, kFactorised, kStale } state = Hessian::kEvaluated;
   const auto finish = [&](NewtonStatus status) {
     report.status = status;
     return report;
   };
+  bool gyroscopic = false;
   double unchecked_from =
       std::numeric_limits<double>::infinity();  // residual before a step that no line search checked
+  report.residual = gradient.norm();
   for (;;) {
-    report.residual = gradient.norm();
+    const double limit = settings.tolerance * here.force_scale;
     if (!std::isfinite(report.residual) || !std::isfinite(here.potential.value))
       return finish(NewtonStatus::kNonFinite);
-    if (report.residual <= settings.tolerance * here.force_scale) return finish(NewtonStatus::kConverged);
+    if (report.residual <= limit) return finish(NewtonStatus::kConverged);
     if (report.residual > 0.5 * unchecked_from) return finish(NewtonStatus::kStagnated);
     if (report.iterations == settings.max_iterations) return finish(NewtonStatus::kIterationLimit);
 
-    if (report.iterations > 0) problem.hessian(x, Tangent::kExact, hessian);
-    if (!detail::factorize(workspace)) {
+    const bool fresh = state != Hessian::kFactorised;
+    if (state == Hessian::kStale) problem.hessian(x, Tangent::kExact, hessian);
+    if (fresh && !detail::factorize(workspace, report)) {
       ++report.projections;
       problem.hessian(x, Tangent::kPositiveSemidefinite, hessian);
-      here = problem.gradient(x, gradient);
-      if (!detail::factorize_shifted(workspace)) return finish(NewtonStatus::kNonFinite);
+      here = problem.evaluate(x, gradient);
+      problem.accept(here);
+      report.residual = gradient.norm();
+      if (!detail::factorize_shifted(workspace, report)) return finish(NewtonStatus::kNonFinite);
     }
-    {
-      const StageTimer timer(profile, Stage::kSolve);
-      direction = -gradient;
-      cholesky.solveInPlace(direction);
+    if (fresh) {
+      const Eigen::MatrixXd* part = detail::gyroscopic_part(problem);
+      gyroscopic = part != nullptr;
+      if (gyroscopic) detail::factorize_gyroscopic(*part, workspace);
     }
-    const double slope = gradient.dot(direction);
+    const double slope = detail::solve_direction(workspace, gyroscopic);
     if (!std::isfinite(slope)) return finish(NewtonStatus::kNonFinite);
     const bool below_rounding = -slope <= detail::kRounding * here.potential.magnitude;
     unchecked_from = below_rounding ? report.residual : std::numeric_limits<double>::infinity();
+    PotentialEvaluation there;
     if (below_rounding) {
       // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
-      trial = x + direction;
-    } else if (!detail::line_search(problem, x, here.potential, slope, workspace, report)) {
-      return finish(NewtonStatus::kStagnated);
+      trial = x + Eigen::Map<const Eigen::VectorXd>(direction.data(), x.size());
+      there = problem.evaluate(trial, trial_gradient);
+    } else if (!detail::line_search(problem, x, here.potential, slope, workspace, report, there)) {
+      here = problem.evaluate(x, gradient);
+      if (fresh) return finish(NewtonStatus::kStagnated);
+      state = Hessian::kStale;
+      continue;
     }
+    problem.accept(there);
     x.swap(trial);
+    gradient.swap(trial_gradient);
+    here = there;
     ++report.iterations;
-    here = problem.gradient(x, gradient);
+    const double before = report.residual;
+    report.residual = gradient.norm();
+    const double next_limit = settings.tolerance * here.force_scale;
+    state = detail::factor_serves(before, report.residual, next_limit) ? Hessian::kFactorised : Hessian::kStale;
   }
 }
 

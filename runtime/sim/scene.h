@@ -8,23 +8,28 @@
 #include "common/core/arrays.h"
 #include "runtime/sim/model.h"
 #include "runtime/sim/newton.h"
+#include "runtime/sim/obstacle.h"
 
 namespace exmat::runtime {
 
 enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 
-/// A constant generalised force that acts in every step whose midpoint lies in [start, end).
+/// A constant world-space force on each of some vertices that acts in every step whose midpoint lies in [start, end).
 struct ScriptedForce {
-  Eigen::VectorXd force;                                 ///< [r]
+  Eigen::VectorXd force;                                 ///< [r] generalised, of a body that does not rotate
   double start = 0;                                      ///< [s]
   double end = std::numeric_limits<double>::infinity();  ///< [s]
+  Eigen::Vector3d total = Eigen::Vector3d::Zero();       ///< sum over the vertices [N]
+  Eigen::Vector3d lever = Eigen::Vector3d::Zero();       ///< mean of the vertices' X about the centre of mass [m]
+  Eigen::Matrix3Xd mean_basis{};                         ///< [3 x r] mean of their U; these three for a free body
 };
 
 /// The linear example force. method.md, section 5.
 struct ExampleSettings {
-  double stiffness = 0;  ///< kappa >= 0 [1/s^2]
-  double damping = 0;    ///< c_kappa >= 0 [1/s]
-  double bias = 1;       ///< in [0, 1]
+  double stiffness = 0;                                  ///< kappa >= 0 [1/s^2]
+  double damping = 0;                                    ///< c_kappa >= 0 [1/s]
+  double bias = 1;                                       ///< in [0, 1]
+  int target_iterations = TargetSolver::kMaxIterations;  ///< most in one step; the next one carries on
 };
 
 /// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.
@@ -34,14 +39,21 @@ struct StepScene {
   double mass_damping = 0;       ///< alpha >= 0 [1/s]
   double stiffness_damping = 0;  ///< beta >= 0 [s]
   NewtonSettings newton;
-  Eigen::VectorXd gravity_force;  ///< [r], gravity_load^T g
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; moves a free body
+  Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
   std::vector<ScriptedForce> forces;
+  std::vector<Obstacle> obstacles;
   std::optional<ExampleSettings> examples;  ///< absent: no weights, no target, no example force
 };
 
 /// Whether steps compute weights and target: there are examples and a force that depends on them.
 inline bool runs_examples(const Model& model, const StepScene& scene) noexcept {
   return model.examples && scene.examples && (scene.examples->stiffness > 0 || scene.examples->damping > 0);
+}
+
+/// Whether steps look for contacts.
+inline bool touches(const Model& model, const StepScene& scene) noexcept {
+  return model.contact && !scene.obstacles.empty();
 }
 
 /// [r] generalised force of gravity [m/s^2].

@@ -12,13 +12,35 @@ State make_state(const Model& model, const Eigen::VectorXd& q, const Eigen::Vect
   state.q = state.q_previous = q;
   state.v = state.v_previous = v;
   state.a = Eigen::VectorXd::Zero(model.modes());
-  auto scratch = model.elasticity.make_workspace();
-  state.elastic_energy = model.elasticity.energy(q, scratch);
+  state.applied_force = Eigen::VectorXd::Zero(model.modes());
+  auto scratch = model.internal_force.make_workspace();
+  state.elastic_energy = model.internal_force.energy(q, scratch);
+  if (model.rigid) {
+    state.body.emplace();
+    set_motion(model, {}, state);
+  }
   if (model.examples) {
     state.weights = Eigen::VectorXd::Unit(model.example_count(), 0);
-    state.target = Eigen::VectorXd::Zero(model.examples->target.dimension());
+    if (model.examples->target) state.target = Eigen::VectorXd::Zero(model.examples->target->dimension());
   }
   return state;
+}
+
+void prepare_contacts(const Model& model, std::size_t obstacles, State& state) {
+  if (model.contact) state.contacts = model.contact->make_state(obstacles);
+}
+
+void set_motion(const Model& model, const FreeMotion& motion, State& state) {
+  FreeState& body = *state.body;
+  auto moments = model.rigid->make_moments();
+  model.rigid->moments(state.q, moments);
+  body.mass = model.rigid->mass();
+  body.position = motion.position;
+  body.orientation = motion.orientation.normalized();
+  body.spin = body.orientation.conjugate() * motion.angular_velocity;
+  body.linear_momentum = model.rigid->mass() * motion.linear_velocity;
+  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation * state.v);
+  body.momentum = body.momentum_previous = state.v + moments.deformation.transpose() * body.spin;
 }
 
 }  // namespace exmat::runtime

@@ -1,23 +1,157 @@
 #include "runtime/sim/stepper.h"
 
+#include <Eigen/LU>
 #include <cmath>
 
+#include "runtime/sim/contact_problem.h"
 #include "runtime/sim/incremental_potential.h"
 
 namespace exmat::runtime {
 namespace {
 
+constexpr double kMarginSteps = 2;      // way of a vertex that candidates are looked for in
+constexpr int kFrictionRounds = 3;      // solutions of one step for the normal forces of friction
+constexpr double kSameFriction = 0.05;  // relative change of friction that needs no further one
+constexpr double kResolvedTurn = 0.3;   // [rad] of a free body in one step
+
 bool acts(const ScriptedForce& force, double time) { return force.start <= time && time < force.end; }
 
-void gather_external_force(const StepScene& scene, double midpoint, Eigen::VectorXd& external_force) {
-  external_force = scene.gravity_force;
+void gather_external_force(const StepScene& scene, const State& state, double midpoint,
+                           Eigen::VectorXd& external_force) {
+  external_force = scene.gravity_force + state.applied_force;
+  if (state.body) return;
   for (const ScriptedForce& force : scene.forces)
     if (acts(force, midpoint)) external_force += force.force;
 }
 
+/// Momenta and centre of mass of a free body at the end of the step, and its forces on q, into the workspace. Scripted
+/// forces act where the body would be at the middle of the step by its spin. The centre of mass is exact for them, away
+/// from obstacles.
+void move_free_body(const Model& model, const StepScene& scene, Integrator integrator, bool near, const State& state,
+                    double midpoint, Workspace& workspace) {
+  FreeState& body = *workspace.body;
+  body = *state.body;
+  const double dt = scene.time_step;
+  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
+  Eigen::Vector3d force = model.rigid->mass() * scene.gravity, torque = Eigen::Vector3d::Zero();
+  for (const ScriptedForce& scripted : scene.forces) {
+    if (!acts(scripted, midpoint)) continue;
+    const Eigen::Vector3d local = rotation.transpose() * scripted.total;
+    const Eigen::Vector3d arm = scripted.lever + scripted.mean_basis * state.q;
+    force += scripted.total;
+    torque += rotation * arm.cross(local);
+    workspace.external_force.noalias() += scripted.mean_basis.transpose() * local;
+  }
+  // Forces that contacts balance have to act on the position as those do.
+  const double share = near ? 1 : 0.5;
+  body.position += dt / model.rigid->mass() * (body.linear_momentum + share * dt * force);
+  body.linear_momentum += dt * force;
+  body.angular_momentum += dt * torque;
+  begin_rotation(body, dt, integrator == Integrator::kBackwardEuler, *workspace.free);
+}
+
+BodyPose pose_of(const Model& model, const State& state) {
+  BodyPose pose{.q = state.q};
+  if (!state.body) return pose;
+  pose.position = model.rigid->centre_of_mass() + state.body->position;
+  pose.rotation = state.body->orientation.toRotationMatrix();
+  return pose;
+}
+
+/// Whether any vertex may touch an obstacle in this step; then the candidates are in the workspace.
+bool is_near_obstacles(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) {
+  if (!touches(model, scene)) return false;
+  const StageTimer timer(workspace.profile, Stage::kContact);
+  const BodyPose pose = pose_of(model, state);
+  BodyVelocity velocity{.v = state.v};
+  if (state.body) {
+    velocity.linear = state.body->linear_momentum / state.body->mass;
+    velocity.angular = pose.rotation * state.body->spin;
+  }
+  const ContactSet& set = *model.contact;
+  const double dt = scene.time_step;
+  const double margin = kMarginSteps * set.travel_bound(pose, velocity, dt) + dt * dt * scene.gravity.norm();
+  ContactWorkspace& contact = workspace.near->contact;
+  set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
+  if (contact.candidate_count == 0) return false;
+  set.freeze(pose, velocity, dt, state.contacts, contact);
+  return true;
+}
+
+/// Pose and momenta of the solution x of a ContactProblem, into the workspace.
+void take_contact_solution(const StepScene& scene, const State& state, Workspace& workspace) {
+  ContactProblemWorkspace& near = *workspace.near;
+  workspace.q = state.q + near.x.tail(state.q.size());
+  if (!state.body) return;
+  FreeState& body = *workspace.body;
+  FreeMotionWorkspace& free = *workspace.free;
+  body.position += near.x.head<3>();
+  body.linear_momentum += scene.time_step * near.contact.force;
+  body.angular_momentum += scene.time_step * near.contact.torque;
+  const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
+  const Eigen::Vector3d momentum = rotation.transpose() * body.angular_momentum;
+  free.solution.spin = free.moments.inertia.inverse() * (momentum - free.moments.deformation * free.velocity);
+}
+
+void add(const NewtonReport& more, NewtonReport& total) {
+  total.status = more.status;
+  total.residual = more.residual;
+  total.iterations += more.iterations;
+  total.factorisations += more.factorisations;
+  total.line_search_evaluations += more.line_search_evaluations;
+  total.projections += more.projections;
+}
+
+/// Newton's method of a step near obstacles, from workspace.q; friction follows the normal forces of the solution.
+NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,
+                                 IncrementalPotential& potential, Workspace& workspace, StepReport& report) {
+  ContactProblemWorkspace& near = *workspace.near;
+  near.x.setZero();
+  near.x.tail(state.q.size()) = workspace.q - state.q;
+  if (state.body) {
+    workspace.free->spin_is_given = true;
+    near.x.segment<3>(3) = workspace.free->solution.rotation;
+    model.rigid->moments(workspace.q, workspace.free->moments);
+  }
+  near.newton.profile = workspace.profile;
+  ContactProblem problem(model, scene, state, potential, workspace);
+  NewtonReport total;
+  for (int round = 0; round < kFrictionRounds; ++round) {
+    if (round > 0) {
+      workspace.q = state.q + near.x.tail(state.q.size());
+      potential.start(workspace.q);
+    }
+    add(newton_minimize(problem, scene.newton, near.x, near.newton), total);
+    if (total.status == NewtonStatus::kNonFinite) return total;
+    if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
+  }
+  take_contact_solution(scene, state, workspace);
+  report.contacts = near.contact.touching;
+  report.contact_force = near.contact.force;
+  return total;
+}
+
+/// Of the pose and velocity that Newton's method found.
+void finish_rotation(Workspace& workspace) {
+  FreeState& body = *workspace.body;
+  const FreeMotionWorkspace& free = *workspace.free;
+  const Eigen::Vector3d& t = free.solution.rotation;
+  const double half = 0.5 * t.norm();
+  const double share = half > 1e-8 ? 0.5 * std::sin(half) / half : 0.5;
+  body.orientation = body.orientation * Eigen::Quaterniond(std::cos(half), share * t[0], share * t[1], share * t[2]);
+  body.orientation.normalize();
+  body.spin = free.solution.spin;
+}
+
+/// What resolves a step: backward Euler where the body turns too far in it for anything of second order.
+Integrator integrator_of_step(const StepScene& scene, const State& state, bool near) {
+  const bool resolved = !near && (!state.body || state.body->spin.norm() * scene.time_step <= kResolvedTurn);
+  return resolved ? scene.integrator : Integrator::kBackwardEuler;
+}
+
 /// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with.
 bool begins_anew(const StepScene& scene, const State& state, double midpoint) {
-  if (state.step == 0) return true;
+  if (state.begins_anew) return true;
   for (const ScriptedForce& force : scene.forces)
     if (acts(force, midpoint) != acts(force, midpoint - scene.time_step)) return true;
   return false;
@@ -30,31 +164,42 @@ void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::V
   apply_example_bias(scene.examples->bias, workspace.weights);
 }
 
+/// p* by Newton's method from the last target, into the workspace.
+void solve_target(const TargetSolver& solver, const StepScene& scene, const State& state, Workspace& workspace,
+                  StepReport& report) {
+  Eigen::VectorXd& y = workspace.solved_target;
+  y = state.target;
+  if (!state.has_target) solver.start(workspace.weights, y);
+  workspace.target_converged = state.has_target && state.target_converged && workspace.weights == state.weights;
+  if (!workspace.target_converged) {
+    const NewtonReport solved =
+        solver.solve(workspace.weights, workspace.target_solver, y, scene.examples->target_iterations);
+    report.target_iterations += solved.iterations;
+    workspace.target_converged = solved.status != NewtonStatus::kIterationLimit;
+    if (!workspace.target_converged) report.status |= kTargetNotConverged;
+    if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
+  }
+  workspace.target.noalias() = solver.basis() * y;
+}
+
 /// Weights and target at the pose q, into the workspace. method.md, section 5.
 void update_target(const Model& model, const StepScene& scene, const State& state, const Eigen::VectorXd& q,
                    Workspace& workspace, StepReport& report) {
   const ExampleModel& examples = *model.examples;
   evaluate_weights(model, scene, q, workspace);
   const StageTimer timer(workspace.profile, Stage::kTarget);
-  workspace.target = state.target;
-  if (!state.has_target) {
-    examples.target.start(workspace.weights, workspace.target);
-  } else if (workspace.weights == state.weights) {
-    return;
-  }
-  const NewtonReport solved = examples.target.solve(workspace.weights, workspace.target_solver, workspace.target);
-  report.target_iterations += solved.iterations;
-  if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
-  if (solved.status == NewtonStatus::kIterationLimit) report.status |= kTargetNotConverged;
+  if (examples.table)
+    examples.table->evaluate(workspace.weights, workspace.target_table, workspace.target);
+  else
+    solve_target(*examples.target, scene, state, workspace, report);
 }
 
 /// f_example = -kappa (P_s q - p*) - c_kappa P_s qdot added to `force`.
 void add_example_force(const Model& model, const StepScene& scene, const State& state, Workspace& workspace,
                        Eigen::VectorXd& force) {
-  const ExampleModel& examples = *model.examples;
   workspace.offset = scene.examples->stiffness * state.q + scene.examples->damping * state.v;
-  force.noalias() -= examples.filter.matrix() * workspace.offset;
-  force.noalias() += scene.examples->stiffness * (examples.target.basis() * workspace.target);
+  force.noalias() -= model.examples->filter.matrix() * workspace.offset;
+  force += scene.examples->stiffness * workspace.target;
 }
 
 /// a_n of Newmark's method from the equation of motion at the beginning of the step.
@@ -63,57 +208,84 @@ void start_acceleration(const Model& model, const StepScene& scene, const State&
   Eigen::VectorXd& a = workspace.acceleration;
   if (scene.stiffness_damping > 0) {
     Eigen::MatrixXd& stiffness = workspace.newton.hessian;
-    model.elasticity.force_and_stiffness(state.q, workspace.elasticity, workspace.internal_force, stiffness);
-    workspace.product.noalias() = stiffness.selfadjointView<Eigen::Lower>() * state.v;
-    a = workspace.external_force - workspace.internal_force - scene.stiffness_damping * workspace.product;
+    model.internal_force.force_and_stiffness(state.q, workspace.elasticity, workspace.internal_force, stiffness);
+    workspace.offset.noalias() = stiffness.selfadjointView<Eigen::Lower>() * state.v;
+    a = workspace.external_force - workspace.internal_force - scene.stiffness_damping * workspace.offset;
   } else {
-    model.elasticity.force(state.q, workspace.elasticity, workspace.internal_force);
+    model.internal_force.force(state.q, workspace.elasticity, workspace.internal_force);
     a = workspace.external_force - workspace.internal_force;
   }
   a -= scene.mass_damping * state.v;
+  if (state.body) {
+    FreeMotionWorkspace& free = *workspace.free;
+    free.velocity = state.v;
+    free.solution.spin = state.body->spin;
+    model.rigid->moments(state.q, free.moments);
+    rotation_force(*model.rigid, 0, free);
+    a += free.force;
+  }
   if (!runs_examples(model, scene)) return;
   update_target(model, scene, state, state.q, workspace, report);
   add_example_force(model, scene, state, workspace, a);
 }
 
-void prepare_integrator(const Model& model, const StepScene& scene, const State& state, bool anew, Workspace& workspace,
-                        StepReport& report) {
-  if (scene.integrator == Integrator::kNewmark) {
+void prepare_integrator(const Model& model, const StepScene& scene, Integrator integrator, const State& state,
+                        bool anew, Workspace& workspace, StepReport& report) {
+  if (integrator == Integrator::kNewmark) {
     if (anew) {
       start_acceleration(model, scene, state, workspace, report);
     } else {
       workspace.acceleration = state.a;
     }
     newmark_form(state, workspace.acceleration, scene.time_step, workspace.form);
-  } else if (scene.integrator == Integrator::kBdf2 && !anew) {
+  } else if (integrator == Integrator::kBdf2 && !anew) {
     bdf2_form(state, scene.time_step, workspace.form);
   } else {
     backward_euler_form(state, scene.time_step, workspace.form);
   }
 }
 
-/// The predictor q_n + dt v_n or q_n itself, whichever has the lower potential, into workspace.q.
-void choose_first_iterate(const Model& model, const StepScene& scene, const State& state,
-                          const IncrementalPotential& potential, Workspace& workspace, StepReport& report) {
-  const StageTimer timer(workspace.profile, Stage::kLineSearch);
-  workspace.q = state.q;
-  workspace.predictor = state.q + scene.time_step * state.v;
-  if (workspace.predictor == state.q) return;
-  const double predicted_energy = model.elasticity.energy(workspace.predictor, workspace.elasticity);
+/// The predictor q_n + dt v_n or q_n itself, whichever has the lower potential, into workspace.q, and its elasticity.
+void choose_first_iterate(const StepScene& scene, const State& state, IncrementalPotential& potential,
+                          Workspace& workspace, StepReport& report) {
+  workspace.q = state.q + scene.time_step * state.v;
+  const double predicted = potential.start(workspace.q);
+  if (predicted <= potential.potential_at_start() || workspace.q == state.q) return;
   ++report.line_search_evaluations;
-  if (potential.without_damping(workspace.predictor, predicted_energy) <
-      potential.without_damping(state.q, state.elastic_energy))
-    workspace.q = workspace.predictor;
+  workspace.q = state.q;
+  potential.start(workspace.q);
 }
 
 /// The terms of the example force that stay the same during the step.
-void prepare_example_force(const Model& model, const StepScene& scene, Workspace& workspace) {
+void prepare_example_force(const StepScene& scene, Workspace& workspace) {
   const ExampleSettings& settings = *scene.examples;
   ExampleForce& force = workspace.example_force;
   const double damping = settings.damping * workspace.form.velocity_factor;
   force.stiffness = settings.stiffness + damping;
   force.centre = damping / force.stiffness * workspace.form.velocity_centre;
-  force.pull.noalias() = settings.stiffness * (model.examples->target.basis() * workspace.target);
+  force.pull = settings.stiffness * workspace.target;
+}
+
+/// pi = v - W q, and its rate for Newmark.
+void commit_body(Workspace& workspace, State& state) {
+  const FreeMotionWorkspace& free = *workspace.free;
+  const Eigen::Vector3d& spin = free.solution.spin;
+  workspace.body->momentum_previous = state.body->momentum;
+  workspace.body->momentum.noalias() = state.v + free.moments.deformation.transpose().lazyProduct(spin);
+  state.a += workspace.form.velocity_factor * (workspace.body->momentum - state.v);
+  finish_rotation(workspace);
+  *state.body = *workspace.body;
+}
+
+/// Arithmetic on subnormal numbers takes a hundred times as long, and a body that comes to rest is full of them.
+bool flush_subnormals(Eigen::VectorXd& numbers) {
+  bool found = false;
+  for (double& number : numbers)
+    if (std::fpclassify(number) == FP_SUBNORMAL) {
+      number = 0;
+      found = true;
+    }
+  return found;
 }
 
 void commit(const Model& model, const StepScene& scene, double elastic_energy, Workspace& workspace, State& state) {
@@ -121,20 +293,32 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.q_previous = state.q;
   state.v_previous = state.v;
   state.q = workspace.q;
-  state.v = workspace.product;
+  state.v = workspace.offset;
   state.a = form.acceleration_factor * (state.q - form.acceleration_centre);
+  if (state.body) commit_body(workspace, state);
   state.elastic_energy = elastic_energy;
   ++state.step;
   state.time = static_cast<double>(state.step) * scene.time_step;
   if (!runs_examples(model, scene)) return;
   state.weights = workspace.weights;
-  state.target = workspace.target;
+  if (model.examples->table) return;
+  state.target = workspace.solved_target;
   state.has_target = true;
+  state.target_converged = workspace.target_converged;
+}
+
+void commit_contacts(const Model& model, bool near, Workspace& workspace, State& state) {
+  state.begins_anew = near;
+  if (near)
+    model.contact->commit(pose_of(model, state), workspace.near->contact, state.contacts);
+  else
+    state.contacts.count = 0;
 }
 
 void add_newton_report(const NewtonReport& newton, StepReport& report) {
   report.newton_iterations = newton.iterations;
   report.line_search_evaluations += newton.line_search_evaluations;
+  report.factorisations = newton.factorisations;
   report.projections = newton.projections;
   report.residual = newton.residual;
   if (newton.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
@@ -147,23 +331,33 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) {
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   StepReport report;
   const double midpoint = state.time + 0.5 * scene.time_step;
-  gather_external_force(scene, midpoint, workspace.external_force);
-  prepare_integrator(model, scene, state, begins_anew(scene, state, midpoint), workspace, report);
+  gather_external_force(scene, state, midpoint, workspace.external_force);
+  const bool near = is_near_obstacles(model, scene, state, workspace);
+  const Integrator integrator = integrator_of_step(scene, state, near);
+  if (state.body) move_free_body(model, scene, integrator, near, state, midpoint, workspace);
+  prepare_integrator(model, scene, integrator, state, begins_anew(scene, state, midpoint), workspace, report);
 
-  IncrementalPotential potential(model, scene, workspace);
-  choose_first_iterate(model, scene, state, potential, workspace, report);
+  workspace.newton.profile = workspace.profile;
+  IncrementalPotential potential(model, scene, state, workspace);
+  choose_first_iterate(scene, state, potential, workspace, report);
   if (!workspace.q.allFinite()) report.status |= kStepNonFinite;
   if (runs_examples(model, scene) && !(report.status & kStepNonFinite)) {
     update_target(model, scene, state, workspace.q, workspace, report);
-    prepare_example_force(model, scene, workspace);
+    prepare_example_force(scene, workspace);
   }
   if (report.status & kStepNonFinite) return report;
 
-  workspace.newton.profile = workspace.profile;
-  add_newton_report(newton_minimize(potential, scene.newton, workspace.q, workspace.newton), report);
-  workspace.product = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
-  if (!workspace.q.allFinite() || !workspace.product.allFinite()) report.status |= kStepNonFinite;
-  if (!(report.status & kStepNonFinite)) commit(model, scene, potential.elastic_energy(), workspace, state);
+  potential.prepare();
+  add_newton_report(near ? solve_with_contacts(model, scene, state, potential, workspace, report)
+                         : newton_minimize(potential, scene.newton, workspace.q, workspace.newton),
+                    report);
+  workspace.offset = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
+  if (!workspace.q.allFinite() || !workspace.offset.allFinite()) report.status |= kStepNonFinite;
+  if (report.status & kStepNonFinite) return report;
+  const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.offset);
+  if (small_q || small_v) report.status |= kStepSubnormal;
+  commit(model, scene, potential.elastic_energy(), workspace, state);
+  commit_contacts(model, near, workspace, state);
   return report;
 }
 
@@ -174,7 +368,15 @@ void refresh_weights(const Model& model, const StepScene& scene, State& state, W
 }
 
 Energies energies(const StepScene& scene, const State& state) noexcept {
-  return {0.5 * state.v.squaredNorm(), state.elastic_energy, -scene.gravity_force.dot(state.q)};
+  Energies energies{0.5 * state.v.squaredNorm(), state.elastic_energy, -scene.gravity_force.dot(state.q)};
+  if (!state.body) return energies;
+  const FreeState& body = *state.body;
+  // w . l = w . (J w + h) and (pi - v) . v = w . h.
+  const Eigen::Vector3d l = body.orientation.conjugate() * body.angular_momentum;
+  energies.kinetic += 0.5 * body.linear_momentum.squaredNorm() / body.mass;
+  energies.kinetic += 0.5 * (body.spin.dot(l) + (body.momentum - state.v).dot(state.v));
+  energies.potential -= body.mass * scene.gravity.dot(body.position);
+  return energies;
 }
 
 }  // namespace exmat::runtime

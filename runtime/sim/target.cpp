@@ -10,8 +10,7 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr int kMaxIterations = 50;
-constexpr double kTolerance = 1e-9;        // of the largest example, in the energy norm
+constexpr double kTolerance = 1e-10;       // of the largest example, in the energy norm
 constexpr double kRegularisation = 1e-12;  // of the stiffest direction
 
 /// target_basis L^-T with the rest stiffness L L^T in it: coordinates of unit stiffness at rest.
@@ -27,12 +26,30 @@ RowMatrix unit_stiffness_basis(Material material, const CubatureData& cubature, 
   return cholesky.matrixL().solve(target_basis.transpose()).transpose();
 }
 
-/// d/dy of (F(p) F_k^-1) of one element [9 x d] from dF/dy: each row of F is multiplied by F_k^-1.
-RowMatrix relative_gradient(const Eigen::Ref<const RowMatrix>& gradient, const Eigen::Matrix3d& example_gradient) {
-  const Eigen::Matrix3d inverse_transpose = example_gradient.inverse().transpose();
-  RowMatrix relative(9, gradient.cols());
-  for (int a = 0; a < 3; ++a) relative.middleRows<3>(3 * a) = inverse_transpose * gradient.middleRows<3>(3 * a);
-  return relative;
+constexpr int kRows[6] = {0, 1, 2, 1, 0, 0};  // of a symmetric 3 x 3 in the order of ElementLaw
+constexpr int kColumns[6] = {0, 1, 2, 2, 2, 1};
+
+/// The numbers of ElementLaw for volume Psi(F F_k^-1), kLanes apart. C_abcd = lambda b_ab b_cd
+/// + mu (b_ac b_bd + b_ad b_bc), b = F_k^-1 F_k^-T, S0 = C : E_k, constant = E_k : C : E_k / 2.
+void set_quadratic(const Eigen::Matrix3d& F, double volume, const LameParameters& lame, double* numbers) {
+  const Eigen::Matrix3d inverse = F.inverse();
+  const Eigen::Matrix3d b = inverse * inverse.transpose();
+  const Eigen::Matrix3d strain = 0.5 * (F.transpose() * F - Eigen::Matrix3d::Identity());
+  int entry = 0;
+  double constant = 0;
+  for (int i = 0; i < 6; ++i) {
+    double stress = 0;
+    for (int j = 0; j < 6; ++j) {
+      const int a = kRows[i], c = kColumns[i], d = kRows[j], e = kColumns[j];
+      const double value =
+          volume * (lame.lambda * b(a, c) * b(d, e) + lame.mu * (b(a, d) * b(c, e) + b(a, e) * b(c, d)));
+      if (j >= i) numbers[entry++ * kLanes] = value;
+      stress += value * strain(d, e) * (j < 3 ? 1 : 2);
+    }
+    numbers[(21 + i) * kLanes] = stress;
+    constant += 0.5 * stress * strain(kRows[i], kColumns[i]) * (i < 3 ? 1 : 2);
+  }
+  numbers[27 * kLanes] = constant;
 }
 
 Complaint inverted_element(const ExampleData& example, Eigen::Index element, double determinant) {
@@ -43,27 +60,53 @@ Complaint inverted_element(const ExampleData& example, Eigen::Index element, dou
 
 }  // namespace
 
+std::optional<Complaint> TargetSolver::add_quadratic(const CubatureData& cubature, const ExampleData& example) {
+  const std::vector<LameParameters> lame = cubature_lame(cubature);
+  const Eigen::VectorXd displacement_gradients = cubature.gradient * example.reduced;
+  AlignedArray& numbers = quadratics_.emplace_back(quadratic_size());
+  for (Eigen::Index j = 0; j < cubature.weights.size(); ++j) {
+    const Eigen::Map<const RowMatrix3> H(displacement_gradients.data() + 9 * j);
+    const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + H;
+    const double determinant = F.determinant();
+    if (!(determinant > 0)) return inverted_element(example, j, determinant);
+    set_quadratic(F, cubature.weights[j] * cubature.volumes[j] * determinant, lame[static_cast<std::size_t>(j)],
+                  numbers.data() + j / kLanes * kQuadraticNumbers * kLanes + j % kLanes);
+  }
+  return std::nullopt;
+}
+
+void TargetSolver::add_shift(const Eigen::VectorXd& displacement_gradients) {
+  const Eigen::Index k = examples(), count = shifts_.size() / (potential_.panels() * 9 * kLanes);
+  for (Eigen::Index i = 0; i < displacement_gradients.size(); ++i) {
+    const Eigen::Index element = i / 9;
+    shifts_[((element / kLanes * count + k) * 9 + i % 9) * kLanes + element % kLanes] = displacement_gradients[i];
+  }
+}
+
 std::optional<Complaint> TargetSolver::build(Material material, const CubatureData& cubature,
                                              const std::vector<ExampleData>& examples, const RowMatrix& target_basis,
                                              EnergyReference reference) {
   if (target_basis.cols() == 0)
     return Complaint{"", "/projection/target_basis", "at least one column", "none", "precompute the bundle again"};
+  reference_ = reference;
   basis_ = unit_stiffness_basis(material, cubature, target_basis);
-  const Eigen::Index elements = cubature.weights.size();
-  const RowMatrix reduced_gradient = cubature.gradient * basis_;
-  for (const ExampleData& example : examples) {
-    RowMatrix gradient = reduced_gradient;
-    Eigen::VectorXd weighted_volumes = cubature.weights.cwiseProduct(cubature.volumes);
-    const Eigen::VectorXd displacement_gradients = cubature.gradient * example.reduced;
-    for (Eigen::Index j = 0; reference == EnergyReference::kExample && j < elements; ++j) {
-      const Eigen::Map<const RowMatrix3> H(displacement_gradients.data() + 9 * j);
-      const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + H;
-      const double determinant = F.determinant();
-      if (!(determinant > 0)) return inverted_element(example, j, determinant);
-      gradient.middleRows<9>(9 * j) = relative_gradient(reduced_gradient.middleRows<9>(9 * j), F);
-      weighted_volumes[j] *= determinant;
+  potential_ = ElementPotential(cubature.gradient * basis_);
+  if (reference == EnergyReference::kRest) {
+    const std::vector<LameParameters> lame = cubature_lame(cubature);
+    const Eigen::Index elements = cubature.weights.size();
+    mu_ = lambda_ = AlignedArray(elements);
+    for (Eigen::Index j = 0; j < elements; ++j) {
+      const double volume = cubature.weights[j] * cubature.volumes[j];
+      mu_[j] = volume * lame[static_cast<std::size_t>(j)].mu;
+      lambda_[j] = volume * lame[static_cast<std::size_t>(j)].lambda;
     }
-    energies_.emplace_back(material, std::move(gradient), std::move(weighted_volumes), cubature_lame(cubature));
+    shifts_ = AlignedArray(potential_.panels() * static_cast<Eigen::Index>(examples.size()) * 9 * kLanes);
+  }
+  for (const ExampleData& example : examples) {
+    if (reference == EnergyReference::kRest)
+      add_shift(cubature.gradient * example.reduced);
+    else if (auto complaint = add_quadratic(cubature, example))
+      return complaint;
     centres_.emplace_back(basis_.householderQr().solve(example.reduced));
     force_tolerance_ = std::max(force_tolerance_, kTolerance * centres_.back().norm());
   }
@@ -71,44 +114,59 @@ std::optional<Complaint> TargetSolver::build(Material material, const CubatureDa
 }
 
 TargetSolver::Workspace TargetSolver::make_workspace() const {
-  return {NewtonWorkspace(dimension()), energies_.front().make_workspace(), Eigen::VectorXd::Zero(dimension()),
-          Eigen::VectorXd::Zero(dimension()), Eigen::MatrixXd::Zero(dimension(), dimension())};
+  return {NewtonWorkspace(dimension()), potential_.make_workspace(),
+          AlignedArray(reference_ == EnergyReference::kExample ? quadratic_size() : 0), AlignedArray(examples())};
+}
+
+/// sum_k w_k E_k as a law of the workspace.
+ElementLaw TargetSolver::law(const Eigen::VectorXd& weights, Workspace& workspace) const noexcept {
+  ElementLaw law;
+  if (reference_ == EnergyReference::kRest) {
+    std::copy(weights.data(), weights.data() + weights.size(), workspace.shift_weights.data());
+    law.mu = mu_.data();
+    law.lambda = lambda_.data();
+    law.shift_count = examples();
+    law.shifts = shifts_.data();
+    law.shift_weights = workspace.shift_weights.data();
+    return law;
+  }
+  Eigen::Map<Eigen::VectorXd> blended(workspace.quadratic.data(), workspace.quadratic.size());
+  blended.setZero();
+  for (std::size_t k = 0; k < quadratics_.size(); ++k)
+    if (weights[k] != 0)
+      blended += weights[k] * Eigen::Map<const Eigen::VectorXd>(quadratics_[k].data(), quadratics_[k].size());
+  law.kind = ElementLaw::Kind::kQuadraticInGreenStrain;
+  law.quadratic = workspace.quadratic.data();
+  return law;
 }
 
 class TargetSolver::Problem {
  public:
-  Problem(const TargetSolver& solver, const Eigen::VectorXd& weights, Workspace& workspace)
-      : solver_(solver), weights_(weights), workspace_(workspace) {}
+  Problem(const ElementPotential& potential, const ElementLaw& law, double scale, Workspace& workspace)
+      : potential_(potential), law_(law), scale_(scale), workspace_(workspace) {}
 
-  PotentialValue value(const Eigen::VectorXd& y) const {
-    const double energy = solver_.energy(weights_, y, workspace_);
-    return {energy, energy};
+  PotentialValue value(const Eigen::VectorXd& y) const { return scaled(potential_.energy(law_, y)); }
+
+  PotentialEvaluation evaluate(const Eigen::VectorXd& y, Eigen::VectorXd& gradient) const {
+    return {scaled(potential_.force(law_, y, workspace_.elements, gradient)), 1};
   }
 
-  PotentialEvaluation gradient(const Eigen::VectorXd& y, Eigen::VectorXd& gradient) const {
-    const double energy = solver_.force(weights_, y, workspace_, gradient);
-    return {{energy, energy}, 1};
+  PotentialEvaluation evaluate(const Eigen::VectorXd& y, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) const {
+    return {scaled(potential_.force_and_stiffness(law_, y, workspace_.elements, gradient, hessian)), 1};
   }
 
   void hessian(const Eigen::VectorXd& y, Tangent tangent, Eigen::MatrixXd& hessian) const {
-    hessian.setZero();
-    for (std::size_t k = 0; k < solver_.energies_.size(); ++k) {
-      if (weights_[k] == 0) continue;
-      workspace_.shifted = y - solver_.centres_[k];
-      solver_.energies_[k].stiffness(workspace_.shifted, tangent, workspace_.elasticity, workspace_.stiffness);
-      hessian += weights_[k] * workspace_.stiffness;
-    }
+    potential_.stiffness(law_, y, tangent, workspace_.elements, hessian);
   }
 
-  PotentialEvaluation gradient_and_hessian(const Eigen::VectorXd& y, Eigen::VectorXd& gradient_at_y,
-                                           Eigen::MatrixXd& hessian_at_y) const {
-    hessian(y, Tangent::kExact, hessian_at_y);
-    return gradient(y, gradient_at_y);
-  }
+  void accept(const PotentialEvaluation&) const {}
 
  private:
-  const TargetSolver& solver_;
-  const Eigen::VectorXd& weights_;
+  PotentialValue scaled(double energy) const { return {energy, energy + scale_}; }
+
+  const ElementPotential& potential_;
+  const ElementLaw law_;
+  double scale_;  // of the terms that the energy is a difference of
   Workspace& workspace_;
 };
 
@@ -117,34 +175,28 @@ void TargetSolver::start(const Eigen::VectorXd& weights, Eigen::VectorXd& y) con
   for (std::size_t k = 0; k < centres_.size(); ++k) y += weights[k] * centres_[k];
 }
 
-NewtonReport TargetSolver::solve(const Eigen::VectorXd& weights, Workspace& workspace,
-                                 Eigen::VectorXd& y) const noexcept {
-  Problem problem(*this, weights, workspace);
-  return newton_minimize(problem, {kMaxIterations, force_tolerance_}, y, workspace.newton);
+NewtonReport TargetSolver::solve(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::VectorXd& y,
+                                 int max_iterations) const noexcept {
+  const ElementLaw blended = law(weights, workspace);
+  double scale = 0;
+  for (Eigen::Index k = 0; k < examples(); ++k) scale += weights[k] * centres_[k].squaredNorm();
+  Problem problem(potential_, blended, scale, workspace);
+  return newton_minimize(problem, {max_iterations, force_tolerance_}, y, workspace.newton);
 }
 
 double TargetSolver::energy(const Eigen::VectorXd& weights, const Eigen::VectorXd& y,
                             Workspace& workspace) const noexcept {
-  double sum = 0;
-  for (std::size_t k = 0; k < energies_.size(); ++k) {
-    if (weights[k] == 0) continue;
-    workspace.shifted = y - centres_[k];
-    sum += weights[k] * energies_[k].energy(workspace.shifted, workspace.elasticity);
-  }
-  return sum;
+  return potential_.energy(law(weights, workspace), y);
 }
 
 double TargetSolver::force(const Eigen::VectorXd& weights, const Eigen::VectorXd& y, Workspace& workspace,
                            Eigen::VectorXd& force) const noexcept {
-  double sum = 0;
-  force.setZero();
-  for (std::size_t k = 0; k < energies_.size(); ++k) {
-    if (weights[k] == 0) continue;
-    workspace.shifted = y - centres_[k];
-    sum += weights[k] * energies_[k].force(workspace.shifted, workspace.elasticity, workspace.force);
-    force += weights[k] * workspace.force;
-  }
-  return sum;
+  return potential_.force(law(weights, workspace), y, workspace.elements, force);
+}
+
+void TargetSolver::hessian(const Eigen::VectorXd& weights, const Eigen::VectorXd& y, Workspace& workspace,
+                           Eigen::MatrixXd& hessian) const noexcept {
+  potential_.stiffness(law(weights, workspace), y, Tangent::kExact, workspace.elements, hessian);
 }
 
 }  // namespace exmat::runtime

@@ -7,6 +7,7 @@
 #include "common/core/arrays.h"
 #include "common/core/error.h"
 #include "common/model/reduced_model.h"
+#include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/newton.h"
 #include "runtime/sim/reduced_elasticity.h"
 
@@ -19,16 +20,20 @@ enum class EnergyReference {
 };
 
 /// Target p*(w) = argmin_p sum_k w_k E_k(p) over p = Z y, Z [r x d] a basis of the range of T^+ in which the stiffness
-/// at rest is the identity, so that |y| is an energy norm. method.md, section 5. F_j(p) F_jk^-1 - I = B_j (p - p_k)
-/// F_jk^-1 is linear in y - y_k, so that every E_k is a ReducedElasticity of y - y_k. Immutable; no call of solve()
+/// at rest is the identity, so that |y| is an energy norm. method.md, section 5. Immutable; no call of solve()
 /// allocates or throws.
+///
+/// With F_jk as the undeformed shape, the Green strain of E_k is F_jk^-T (E - E_jk) F_jk^-1, linear in that of F_j(p):
+/// sum_k w_k E_k of St.Venant-Kirchhoff is one quadratic form of E for each element, whatever the number of examples.
 class TargetSolver {
  public:
+  static constexpr int kMaxIterations = 50;
+
   struct Workspace {
     NewtonWorkspace newton;
-    ReducedElasticity::Workspace elasticity;
-    Eigen::VectorXd shifted, force;  ///< d
-    Eigen::MatrixXd stiffness;       ///< d x d
+    ElementPotential::Workspace elements;
+    AlignedArray quadratic;      ///< of the blended examples
+    AlignedArray shift_weights;  ///< K
   };
 
   TargetSolver() = default;
@@ -42,27 +47,41 @@ class TargetSolver {
   Workspace make_workspace() const;
 
   Eigen::Index dimension() const { return basis_.cols(); }                      ///< d
+  Eigen::Index elements() const { return potential_.elements(); }               ///< s
   const RowMatrix& basis() const { return basis_; }                             ///< Z [r x d]
   const Eigen::VectorXd& example(Eigen::Index k) const { return centres_[k]; }  ///< y_k [d]
 
   /// `y` [d] = sum_k w_k y_k, a start where there is no earlier target.
   void start(const Eigen::VectorXd& weights, Eigen::VectorXd& y) const noexcept;
 
-  /// Improves `y` [d] to the minimum by Newton's method; weights [K] >= 0, examples of weight 0 cost nothing.
-  NewtonReport solve(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::VectorXd& y) const noexcept;
+  /// Improves `y` [d] towards the minimum by at most `max_iterations` of Newton's method; weights [K] >= 0.
+  NewtonReport solve(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::VectorXd& y,
+                     int max_iterations = kMaxIterations) const noexcept;
 
   /// sum_k w_k E_k [J], and its derivative by y.
   double energy(const Eigen::VectorXd& weights, const Eigen::VectorXd& y, Workspace& workspace) const noexcept;
   double force(const Eigen::VectorXd& weights, const Eigen::VectorXd& y, Workspace& workspace,
                Eigen::VectorXd& force) const noexcept;
+  /// Lower triangle of the second derivative [d x d]; the upper one is left as it was.
+  void hessian(const Eigen::VectorXd& weights, const Eigen::VectorXd& y, Workspace& workspace,
+               Eigen::MatrixXd& hessian) const noexcept;
 
  private:
   class Problem;
 
+  Eigen::Index examples() const { return static_cast<Eigen::Index>(centres_.size()); }
+  Eigen::Index quadratic_size() const { return potential_.panels() * kQuadraticNumbers * kLanes; }
+  ElementLaw law(const Eigen::VectorXd& weights, Workspace& workspace) const noexcept;
+  std::optional<Complaint> add_quadratic(const CubatureData& cubature, const ExampleData& example);
+  void add_shift(const Eigen::VectorXd& displacement_gradients);
+
+  EnergyReference reference_ = EnergyReference::kExample;
   RowMatrix basis_;
-  std::vector<ReducedElasticity> energies_;  ///< K, of y - y_k
-  std::vector<Eigen::VectorXd> centres_;     ///< K, y_k [d]
-  double force_tolerance_ = 0;               ///< [J^1/2]
+  ElementPotential potential_;
+  std::vector<Eigen::VectorXd> centres_;  ///< K, y_k [d]
+  std::vector<AlignedArray> quadratics_;  ///< K, see ElementLaw; kExample only
+  AlignedArray mu_, lambda_, shifts_;     ///< kRest only
+  double force_tolerance_ = 0;            ///< [J^1/2]
 };
 
 }  // namespace exmat::runtime

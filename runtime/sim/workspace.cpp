@@ -2,18 +2,38 @@
 
 namespace exmat::runtime {
 
+ContactProblemWorkspace::ContactProblemWorkspace(const Model& model, const StepScene& scene)
+    : contact(*model.contact, scene.obstacles.size()),
+      newton(model.modes() + (model.rigid ? 6 : 0)),
+      x(Eigen::VectorXd::Zero(model.modes() + (model.rigid ? 6 : 0))),
+      q(Eigen::VectorXd::Zero(model.modes())),
+      gradient_q(q),
+      stiffness(Eigen::MatrixXd::Zero(x.size(), x.size())) {}
+
 Workspace::Workspace(const Model& model, const StepScene& scene)
-    : newton(model.modes()), elasticity(model.elasticity.make_workspace()) {
+    : newton(model.modes()), elasticity(model.internal_force.make_workspace()) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.modes());
   form.velocity_centre = form.acceleration_centre = zero;
-  q = predictor = external_force = internal_force = acceleration = offset = product = zero;
-  if (scene.stiffness_damping > 0) damping.setZero(model.modes(), model.modes());
+  q = predictor = external_force = internal_force = acceleration = offset = linear = zero;
+  frozen_force = next_frozen_force = zero;
+  if (model.rigid) {
+    free.emplace(model);
+    body.emplace();
+    body->momentum = body->momentum_previous = zero;
+    newton.lu.emplace(model.modes());
+  }
+  if (touches(model, scene)) near.emplace(model, scene);
+  product.setZero(padded(model.modes()));
+  quadratic.setZero(padded(model.modes()), model.modes());
   if (!runs_examples(model, scene)) return;
   weights_solver = model.examples->weights.make_workspace();
-  target_solver = model.examples->target.make_workspace();
+  if (model.examples->table) target_table = model.examples->table->make_workspace();
+  if (model.examples->target) {
+    target_solver = model.examples->target->make_workspace();
+    solved_target.setZero(model.examples->target->dimension());
+  }
   weights.setZero(model.example_count());
-  target.setZero(model.examples->target.dimension());
-  example_force.centre = example_force.pull = skew_force = zero;
+  target = example_force.centre = example_force.pull = zero;
 }
 
 }  // namespace exmat::runtime

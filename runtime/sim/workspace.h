@@ -1,7 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
+#include "runtime/sim/contact.h"
+#include "runtime/sim/free_motion.h"
 #include "runtime/sim/integrator.h"
 #include "runtime/sim/model.h"
 #include "runtime/sim/newton.h"
@@ -10,6 +13,18 @@
 
 namespace exmat::runtime {
 
+/// Scratch of steps near obstacles, sized once.
+struct ContactProblemWorkspace {
+  ContactProblemWorkspace() = default;
+  ContactProblemWorkspace(const Model& model, const StepScene& scene);
+
+  ContactWorkspace contact;
+  NewtonWorkspace newton;         ///< of the unknowns below
+  Eigen::VectorXd x;              ///< 6 + r, or r of a constrained body
+  Eigen::VectorXd q, gradient_q;  ///< r
+  Eigen::MatrixXd stiffness;      ///< of the contacts, as the unknowns
+};
+
 /// Scratch of one step, sized once for a model and a scene; holds nothing from step to step. One per thread.
 struct Workspace {
   Workspace(const Model& model, const StepScene& scene);
@@ -17,20 +32,30 @@ struct Workspace {
   Profile* profile = nullptr;  ///< times every stage, if set
 
   NewtonWorkspace newton;
-  ReducedElasticity::Workspace elasticity;
+  InternalForce::Workspace elasticity;
   StepForm form;
-  Eigen::VectorXd q, predictor;     ///< r
-  Eigen::VectorXd external_force;   ///< r
-  Eigen::VectorXd internal_force;   ///< r
-  Eigen::VectorXd acceleration;     ///< r, at the beginning of the step
-  Eigen::VectorXd offset, product;  ///< r
-  Eigen::MatrixXd damping;          ///< r x r, beta K; only with stiffness damping
-  Eigen::VectorXd skew_force;       ///< r; only with examples
+  Eigen::VectorXd q, predictor;    ///< r
+  Eigen::VectorXd external_force;  ///< r
+  Eigen::VectorXd internal_force;  ///< r
+  Eigen::VectorXd acceleration;    ///< r, at the beginning of the step
+  Eigen::VectorXd offset;          ///< r
+  Eigen::MatrixXd quadratic;       ///< padded(r) x r, see IncrementalPotential
+  Eigen::VectorXd linear;          ///< r
+  Eigen::VectorXd product;         ///< padded(r)
+
+  Eigen::VectorXd frozen_force, next_frozen_force;  ///< r, see IncrementalPotential
+
+  std::optional<ContactProblemWorkspace> near;  ///< with obstacles
+  std::optional<FreeMotionWorkspace> free;      ///< of a free body
+  std::optional<FreeState> body;                ///< and where it will be
 
   ExampleWeights::Workspace weights_solver;  // the rest only with examples
+  TargetTable::Workspace target_table;
   TargetSolver::Workspace target_solver;
-  Eigen::VectorXd weights;  ///< K
-  Eigen::VectorXd target;   ///< d
+  Eigen::VectorXd weights;        ///< K
+  Eigen::VectorXd solved_target;  ///< d
+  bool target_converged = false;  ///< of solved_target
+  Eigen::VectorXd target;         ///< r, p*
   ExampleForce example_force;
 };
 

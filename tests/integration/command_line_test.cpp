@@ -190,8 +190,8 @@ TEST_F(CommandLine, FaultsOfASceneAreNamed) {
   expect_scene_refused(R"({ "examples": { "stiffness": 10 } })", {bundle, "/examples"});
   expect_scene_refused(R"({ "forces": [ { "vertices": { "ids": [54] }, "force": [0, 0, 1] } ] })",
                        {scene, "/forces/0/vertices", "0 to 53", "found 54"});
-  make_bundle(Json::parse(R"({ "object": { "fixed": null } })"));
-  expect_scene_refused("{}", {bundle, "fixed vertices", "a free body"});
+  expect_scene_refused(R"({ "body": { "position": [0, 0, 1] } })",
+                       {"scene.json", "/body/position", "the bundle's body has fixed vertices"});
 }
 
 TEST_F(CommandLine, CheckReadsTheInputsAndWritesNothing) {

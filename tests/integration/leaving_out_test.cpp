@@ -18,10 +18,23 @@ using ::testing::HasSubstr;
 using ::testing::StartsWith;
 using Groups = std::vector<std::string>;
 
-const Groups kPlain{"object", "modal", "cubature"};
-const Groups kPlainAndRigid{"object", "modal", "cubature", "rigid"};
-const Groups kWithExamples{"object", "shape_space", "examples", "modal", "cubature", "projection"};
-const Groups kAll{"object", "shape_space", "examples", "modal", "cubature", "projection", "rigid"};
+// The small bar's polynomial is several times faster than its cubature.
+const Groups kPlain{"object", "modal", "cubature", "polynomial"};
+const Groups kPlainAndRigid{"object", "modal", "cubature", "polynomial", "rigid"};
+const Groups kWithExamples{"object",   "shape_space", "examples",   "modal",
+                           "cubature", "polynomial",  "projection", "targets"};
+const Groups kAll{"object",     "shape_space", "examples", "modal", "cubature",
+                  "polynomial", "projection",  "targets",  "rigid", "contact"};
+
+Groups without_group(Groups groups, const char* group) {
+  std::erase(groups, group);
+  return groups;
+}
+
+Groups and_contact(Groups groups) {
+  groups.push_back("contact");
+  return groups;
+}
 
 /// First components of the paths that h5dump lists; nothing without h5dump.
 std::optional<std::set<std::string>> groups_by_h5dump(const std::filesystem::path& bundle) {
@@ -49,7 +62,10 @@ class LeavingOut : public testing::Test {
     EXPECT_EQ(model.examples.has_value(), std::ranges::count(groups, "examples") > 0);
     EXPECT_EQ(model.shape_space.has_value(), model.examples.has_value());
     EXPECT_EQ(model.projection.has_value(), model.examples.has_value());
+    EXPECT_EQ(model.polynomial.has_value(), std::ranges::count(groups, "polynomial") > 0);
+    EXPECT_EQ(model.targets.has_value(), std::ranges::count(groups, "targets") > 0);
     EXPECT_EQ(model.rigid.has_value(), std::ranges::count(groups, "rigid") > 0);
+    EXPECT_EQ(model.contact.has_value(), std::ranges::count(groups, "contact") > 0);
 
     fill_bytes(built.model, built.report.ledger);
     Groups included;
@@ -93,17 +109,19 @@ class LeavingOut : public testing::Test {
 };
 
 TEST_F(LeavingOut, AConstrainedBodyHoldsWhatItsSceneNeeds) {
-  expect_groups(Json::object(), std::nullopt, kWithExamples);
+  expect_groups(Json::object(), std::nullopt, and_contact(kWithExamples));
   expect_groups(Json::object(), needs_of_scene(R"({ "examples": { "stiffness": 10 } })"), kWithExamples);
   expect_groups(Json::object(), needs_of_scene("{}"), kPlain);
-  expect_groups(Json::parse(R"({ "examples": [] })"), std::nullopt, kPlain);
+  expect_groups(Json::object(), needs_of_scene(R"({ "obstacles": [ { "sphere": { "radius": 1 } } ] })"),
+                and_contact(kPlain));
+  expect_groups(Json::parse(R"({ "examples": [] })"), std::nullopt, and_contact(kPlain));
 }
 
 TEST_F(LeavingOut, AFreeBodyHoldsItsRigidMotionToo) {
   expect_groups(free_, std::nullopt, kAll);
   expect_groups(free_, needs_of_scene("{}"), kPlainAndRigid);
   free_["examples"] = Json::array();
-  expect_groups(free_, std::nullopt, kPlainAndRigid);
+  expect_groups(free_, std::nullopt, and_contact(kPlainAndRigid));
 }
 
 TEST_F(LeavingOut, TheAssetNamesItsNeeds) {
@@ -111,10 +129,31 @@ TEST_F(LeavingOut, TheAssetNamesItsNeeds) {
   expect_groups(free_, std::nullopt, kPlain);
   free_["needs"] = {"rigid"};
   expect_groups(free_, std::nullopt, kPlainAndRigid);
+  free_["needs"] = {"rigid", "contact"};
+  expect_groups(free_, std::nullopt, and_contact(kPlainAndRigid));
   free_["needs"] = Json::array({"examples"});
+  expect_groups(free_, std::nullopt, without_group(kWithExamples, "targets"));
+  free_["needs"] = {"examples", "targets"};
   expect_groups(free_, std::nullopt, kWithExamples);
   // A scene decides before the asset does.
   expect_groups(free_, needs_of_scene("{}"), kPlainAndRigid);
+}
+
+TEST_F(LeavingOut, APolynomialIsWrittenWhereItIsAskedFor) {
+  const Json cubature = Json::parse(R"({ "internal_force": "cubature", "examples": [] })");
+  expect_groups(cubature, std::nullopt, and_contact(without_group(kPlain, "polynomial")));
+  EXPECT_EQ(summarise_bundle(bundle_).internal_force, "cubature");
+  // The scene decides before the asset does.
+  expect_groups(cubature, needs_of_scene(R"({ "internal_force": "polynomial" })"), kPlain);
+  EXPECT_EQ(summarise_bundle(bundle_).internal_force, "polynomial");
+  expect_groups(cubature, needs_of_scene("{}"), without_group(kPlain, "polynomial"));
+  expect_groups(Json::parse(R"({ "examples": [] })"), needs_of_scene(R"({ "internal_force": "cubature" })"),
+                without_group(kPlain, "polynomial"));
+}
+
+TEST_F(LeavingOut, ATableOfTargetsIsLeftOutWhereTheSceneSolves) {
+  expect_groups(Json::object(), needs_of_scene(R"({ "examples": { "stiffness": 10, "target": "solve" } })"),
+                without_group(kWithExamples, "targets"));
 }
 
 TEST_F(LeavingOut, TheRunTimeReadsWhatItsSceneNeeds) {
@@ -137,12 +176,12 @@ TEST_F(LeavingOut, TheRunTimeReadsWhatItsSceneNeeds) {
 }
 
 TEST_F(LeavingOut, AMissingGroupIsNamed) {
-  write_bundle(build(write_small_bar(folder_), Needs{.examples = false, .rigid = true}).model, bundle_);
+  write_bundle(build(write_small_bar(folder_), Needs{.examples = false}).model, bundle_);
   EXPECT_THAT(refusal([this] { datasets_read(R"({ "examples": { "stiffness": 10 } })"); }),
               AllOf(HasSubstr("bundle.h5"), HasSubstr("/examples")));
 
-  write_bundle(build(write_small_bar(folder_, free_), Needs{.examples = true, .rigid = false}).model, bundle_);
-  const BundleRequest request{plan_groups({}, /*constrained=*/false, /*has_examples=*/true)};
+  write_bundle(build(write_small_bar(folder_, free_), Needs{.rigid = false}).model, bundle_);
+  const BundleRequest request{plan_groups({}, /*constrained=*/false, /*example_count=*/2)};
   EXPECT_THAT(refusal([&] { read_bundle(bundle_, request); }), AllOf(HasSubstr("bundle.h5"), HasSubstr("/rigid")));
 }
 

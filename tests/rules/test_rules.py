@@ -20,7 +20,7 @@ BUILD = Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build/release"
 PLANTED = [
     ("direction", "runtime/io/x.cpp", '#include "precompute/fem/assembly.h"\n'),
     ("direction", "common/mesh/x.h", '#include "runtime/sim/model.h"\n'),
-    ("direction", "precompute/study/x.cpp", '#include "runtime/sim/model.h"\n'),
+    ("direction", "precompute/study/x.cpp", '#include "runtime/io/trajectory.h"\n'),
     ("lean", "common/elastic/x.h", "#include <nlohmann/json.hpp>\n"),
     ("lean", "common/model/x.h", '#include "common/bundle/bundle.h"\n'),
     ("lean", "runtime/sim/x.cpp", "#include <hdf5.h>\n"),
@@ -31,6 +31,9 @@ PLANTED = [
     ("petsc", "precompute/solvers/x.h", "#include <slepceps.h>\n"),
     ("petsc", "precompute/modes/x.cpp", '#include "precompute/solvers/petsc_handles.h"\n'),
     ("hdf5", "precompute/pipeline/x.cpp", "#include <hdf5.h>\n"),
+    ("public_headers", "runtime/include/exmat/x.hpp", "#include <Eigen/Core>\n"),
+    ("public_headers", "runtime/include/exmat/x.hpp", '#include "common/core/error.h"\n'),
+    ("public_headers", "runtime/include/exmat/x.h", "#include <vector>\n"),
     ("top_level", "scratch/x.txt", "\n"),
     ("formatting", "common/core/x.cpp", "int  f( ) {return 1 ;}\n"),
 ]
@@ -39,6 +42,8 @@ HARMLESS = [
     ("runtime/sim/x.cpp", "// throw nothing, try nothing\n#include <Eigen/Core>\n#include <cmath>\n"),
     ("runtime/io/x.cpp", "#include <hdf5.h>\n"),
     ("precompute/solvers/x.cpp", "#include <petscmat.h>\n"),
+    ("runtime/include/exmat/x.h", "#include <stdint.h>\n"),
+    ("runtime/include/exmat/x.hpp", '#include <vector>\n\n#include "exmat/exmat.h"\n'),
 ]
 
 
@@ -77,8 +82,30 @@ class Linking(unittest.TestCase):
         found = [name for name in ("mpi", "petsc", "slepc", "mumps") if name in libraries.lower()]
         return found + ([] if "libhdf5_serial" in libraries else ["no serial HDF5"])
 
+    @staticmethod
+    def foreign_symbols(library):
+        """Names that a library defines for others beside its C interface."""
+        lines = subprocess.run(["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True).stdout
+        return [line for line in lines.splitlines() if not line.split()[-1].startswith("exmat_")]
+
     def test_of_the_run_time(self):
         self.assertEqual(self.faults(BUILD / "bin/exmat-runtime"), [])
+
+    def test_of_the_library(self):
+        library = BUILD / "lib/libexmat_runtime.so"
+        self.assertEqual(self.faults(library), [])
+        self.assertEqual(self.foreign_symbols(library), [])
+        symbols = subprocess.run(["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True).stdout
+        header = (ROOT / "runtime/include/exmat/exmat.h").read_text()
+        for name in re.findall(r"\b(exmat_[a-z_]+)\(", rules.without_comments_and_strings(header)):
+            self.assertRegex(symbols, rf" T {name}\b")
+
+    def test_catches_a_library_that_shows_its_insides(self):
+        with tempfile.TemporaryDirectory() as folder:
+            source, library = Path(folder) / "x.cpp", Path(folder) / "x.so"
+            source.write_text('extern "C" void exmat_x() {}\nvoid inside() {}\n')
+            subprocess.run(["c++", "-shared", "-fPIC", "-o", str(library), str(source)], check=True)
+            self.assertEqual(len(self.foreign_symbols(library)), 1)
 
     @unittest.skipUnless((BUILD / "bin/exmat-precompute").exists(), "built without the offline stage")
     def test_catches_a_program_that_links_the_offline_stage(self):
@@ -117,9 +144,10 @@ class RuntimeAlone(unittest.TestCase):
             blind = dict(os.environ, PKG_CONFIG_PATH="/nowhere")
             options = ["-DEXMAT_BUILD_PRECOMPUTE=OFF", "-DEXMAT_BUILD_TESTS=OFF", "-DCMAKE_BUILD_TYPE=None", "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON"]
             subprocess.run(["cmake", "-S", str(ROOT), "-B", folder, "-GNinja", *options], check=True, env=blind, capture_output=True)
-            result = subprocess.run(["cmake", "--build", folder, "--target", "exmat-runtime"], env=blind, capture_output=True, text=True)
+            result = subprocess.run(["cmake", "--build", folder, "--target", "exmat-runtime", "exmat_runtime"], env=blind, capture_output=True, text=True)
             self.assertEqual(result.returncode, 0, result.stdout[-3000:])
-            self.assertEqual(Linking.faults(Path(folder) / "bin/exmat-runtime"), [])
+            for built in ("bin/exmat-runtime", "lib/libexmat_runtime.so"):
+                self.assertEqual(Linking.faults(Path(folder) / built), [])
 
 
 if __name__ == "__main__":

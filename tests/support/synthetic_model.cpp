@@ -130,11 +130,14 @@ ModalData modal_basis(const ObjectData& object, const FullMatrices& full, const 
     if (object.fixed[dof / 3] == 0) free.push_back(dof);
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(full.stiffness(free, free),
                                                                          full.mass(free, free));
+  const int rigid = object.fixed.any() ? 0 : 6;
   Eigen::MatrixXd basis = Eigen::MatrixXd::Zero(full.mass.rows(), linear_modes);
-  for (int mode = 0; mode < linear_modes; ++mode) basis(free, mode) = solver.eigenvectors().col(mode);
+  for (int mode = 0; mode < linear_modes; ++mode) basis(free, mode) = solver.eigenvectors().col(rigid + mode);
+  const Eigen::MatrixXd rigid_modes = solver.eigenvectors().leftCols(rigid);  // all coordinates are free then
   for (std::size_t k = 1; k < std::min<std::size_t>(fields.size(), 4); ++k) {
     Eigen::VectorXd column = fields[k];
     for (int pass = 0; pass < 3; ++pass) {
+      if (rigid > 0) column -= rigid_modes * (rigid_modes.transpose() * (full.mass * column));
       column -= basis * (basis.transpose() * (full.mass * column));
       column /= std::sqrt(column.dot(full.mass * column));
     }
@@ -143,7 +146,7 @@ ModalData modal_basis(const ObjectData& object, const FullMatrices& full, const 
   }
   ModalData modal;
   modal.basis = basis;
-  modal.frequencies = solver.eigenvalues().head(linear_modes).cwiseSqrt() / (2 * std::numbers::pi);
+  modal.frequencies = solver.eigenvalues().segment(rigid, linear_modes).cwiseSqrt() / (2 * std::numbers::pi);
   modal.gravity_load.resize(3, basis.cols());
   for (int axis = 0; axis < 3; ++axis) {
     Eigen::VectorXd unit = Eigen::VectorXd::Zero(full.mass.rows());
@@ -151,6 +154,29 @@ ModalData modal_basis(const ObjectData& object, const FullMatrices& full, const 
     modal.gravity_load.row(axis) = basis.transpose() * (full.mass * unit);
   }
   return modal;
+}
+
+/// By vertices, from their definition.
+RigidData rigid_data(const ObjectData& object, const FullMatrices& full, const ModalData& modal) {
+  const Eigen::Index n = object.mesh.vertex_count(), r = modal.basis.cols();
+  const Eigen::MatrixXd scalar = full.mass(Eigen::seqN(0, n, 3), Eigen::seqN(0, n, 3));
+  const Eigen::VectorXd masses = scalar * Eigen::VectorXd::Ones(n);
+  RigidData rigid;
+  rigid.mass = masses.sum();
+  rigid.centre_of_mass = object.mesh.vertices.transpose() * masses / rigid.mass;
+  const VertexArray X = object.mesh.vertices.rowwise() - rigid.centre_of_mass.transpose();
+  rigid.second_moments = X.transpose() * scalar * X;
+  rigid.inertia = rigid.second_moments.trace() * Eigen::Matrix3d::Identity() - rigid.second_moments;
+  rigid.linear_moments.resize(9, r);
+  rigid.basis_moments.resize(9 * r, r);
+  const auto rows = [&](int axis) { return Eigen::MatrixXd(modal.basis(Eigen::seqN(axis, n, 3), Eigen::all)); };
+  for (int a = 0; a < 3; ++a)
+    for (int b = 0; b < 3; ++b) {
+      rigid.linear_moments.row(3 * a + b) =
+          X.col(a).transpose() * scalar * rows(b) + X.col(b).transpose() * scalar * rows(a);
+      rigid.basis_moments.middleRows((3 * a + b) * r, r) = rows(a).transpose() * scalar * rows(b);
+    }
+  return rigid;
 }
 
 CubatureData all_elements(const ObjectData& object, const ModalData& modal) {
@@ -244,7 +270,7 @@ ObjectData bar_object(const BarOptions& options) {
   ObjectData object;
   object.mesh = bar_mesh(options);
   object.surface = surface_triangles(object.mesh.tets);
-  object.fixed = (object.mesh.vertices.col(0).array() < 1e-9).cast<std::uint8_t>();
+  object.fixed = (object.mesh.vertices.col(0).array() < (options.free ? -1 : 1e-9)).cast<std::uint8_t>();
   const Eigen::Index tets = object.mesh.tet_count();
   object.materials.density.resize(tets);
   for (Eigen::Index t = 0; t < tets; ++t) {
@@ -271,6 +297,7 @@ Bar make_bar(const BarOptions& options) {
     bar.example_fields.push_back(example_field(k, model.object->mesh, options));
   model.modal = modal_basis(*model.object, full, bar.example_fields, options.linear_modes);
   model.cubature = all_elements(*model.object, *model.modal);
+  if (options.free) model.rigid = rigid_data(*model.object, full, *model.modal);
   if (options.examples > 0) {
     model.shape_space = shape_space(*model.object, full, options.eigenfunctions);
     model.projection = projection(*model.shape_space, full, *model.modal);

@@ -9,7 +9,7 @@
 
 namespace exmat::test {
 
-/// A bar along x clamped at x = 0, cut into cubes of six tets.
+/// A bar along x clamped at x = 0, or free, cut into cubes of six tets.
 struct BarOptions {
   std::array<int, 3> cells{6, 2, 2};
   std::array<double, 3> lengths{1.0, 0.25, 0.25};  ///< [m]
@@ -17,6 +17,7 @@ struct BarOptions {
   double poisson_ratio = 0.35;
   double density = 1000;        ///< [kg/m^3]
   double density_gradient = 0;  ///< density * (1 + density_gradient * x / length)
+  bool free = false;            ///< not clamped: the six rigid modes are left out and /rigid is filled
   int linear_modes = 8;
   int eigenfunctions = 6;  ///< m
   int examples = 0;        ///< K, the rest pose counted: rest, bend, twist, stretch, then mixtures of them

@@ -151,10 +151,11 @@ TEST_F(SceneRunTest, BadInputIsNamed) {
   write_bundle(test::make_bar().model, folder_ / "bar.h5");
   EXPECT_THAT(load(", \"examples\": {\"stiffness\": 1}"), HasSubstr("/examples"));
 
+  // Its rigid motion needs /rigid.
   Bar free = test::make_bar();
   free.model.object->fixed.setZero();
   write_bundle(free.model, folder_ / "bar.h5");
-  EXPECT_THAT(load(""), HasSubstr("a body with fixed vertices"));
+  EXPECT_THAT(load(""), HasSubstr("bar.h5: /rigid: expected the group (the body is free), found none"));
 }
 
 TEST_F(SceneRunTest, TrajectoryHoldsTheRun) {
@@ -264,6 +265,35 @@ TEST_F(SceneRunTest, XdmfNamesTheFramesOfTheTrajectory) {
   EXPECT_THAT(xdmf, HasSubstr("Dimensions=\"3 63 3\""));
 }
 
+TEST_F(SceneRunTest, TheTrajectoryOfManyBodiesIsThatOfTheFirst) {
+  const std::string members =
+      ", \"examples\": {\"stiffness\": 100}, \"output\": {\"trajectory\": \"t.h5\", \"every\": 5}";
+  std::map<int, RunSummary> summaries;
+  std::map<int, std::vector<double>> reduced;
+  for (const int instances : {1, 7}) {
+    const SceneConfig config = scene(members + ", \"instances\": " + std::to_string(instances));
+    summaries[instances] = run(load_run(config), config, true);
+    reduced[instances] = doubles(Hdf5File::open(folder_ / "t.h5"), "/reduced");
+  }
+  const RunSummary& one = summaries[1];
+  const RunSummary& many = summaries[7];
+  EXPECT_EQ(reduced[7], reduced[1]);
+  EXPECT_EQ(many.bodies, 7);
+  EXPECT_EQ(many.steps, one.steps) << "of each body";
+  EXPECT_EQ(many.energies.elastic, one.energies.elastic);
+  EXPECT_EQ(many.newton_iterations.mean(), one.newton_iterations.mean());
+  EXPECT_NE(many.state_hash, one.state_hash);
+  EXPECT_GT((*many.stage_seconds)[static_cast<std::size_t>(Stage::kOutput)].mean(), 0);
+}
+
+TEST_F(SceneRunTest, TheHashIsThatOfTheStates) {
+  SceneConfig config = scene("");
+  const std::uint64_t hash = run(load_run(config), config, false).state_hash;
+  EXPECT_EQ(run(load_run(config), config, true).state_hash, hash);
+  ++config.steps;
+  EXPECT_NE(run(load_run(config), config, false).state_hash, hash);
+}
+
 TEST_F(SceneRunTest, ANonFiniteStepEndsTheRunAndLeavesNoTrajectory) {
   const SceneConfig config = scene(
       ", \"forces\": [{\"vertices\": {\"ids\": [62]}, \"force\": [0, 1e300, 0], \"start\": 0.1}], "
@@ -273,7 +303,8 @@ TEST_F(SceneRunTest, ANonFiniteStepEndsTheRunAndLeavesNoTrajectory) {
     run(loaded, config, false);
     FAIL() << "ran to its end";
   } catch (const WorkError& error) {
-    EXPECT_THAT(error.what(), ::testing::AllOf(HasSubstr("step 11 (t = 0.11 s)"), HasSubstr("smaller time_step")));
+    EXPECT_THAT(error.what(),
+                ::testing::AllOf(HasSubstr("step 11 (t = 0.11 s), body 1 of 1:"), HasSubstr("smaller time_step")));
   }
   EXPECT_EQ(files(), (std::set<std::string>{"bar.h5", "scene.json"}));
 }

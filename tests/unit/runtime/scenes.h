@@ -5,13 +5,23 @@
 
 #include "runtime/sim/stepper.h"
 #include "tests/support/synthetic_model.h"
+#include "tests/support/synthetic_polynomial.h"
+#include "tests/support/synthetic_targets.h"
 
 namespace exmat::runtime {
 
-inline std::unique_ptr<const Model> prepared(const test::Bar& bar) {
-  ModelResult result = build_model(bar.model, {});
+inline std::unique_ptr<const Model> prepared(const test::Bar& bar, const ModelOptions& options = {}) {
+  ModelResult result = build_model(bar.model, options);
   EXPECT_TRUE(result.model) << to_string(result.complaint);
   return std::move(result.model);
+}
+
+/// A bar with the polynomial of its energy and, if it has examples, a table of targets.
+inline test::Bar full_bar(const test::BarOptions& options) {
+  test::Bar bar = test::make_bar(options);
+  bar.model.polynomial = test::make_polynomial(*bar.model.cubature);
+  if (bar.model.examples) bar.model.targets = test::linear_targets(bar.model.examples->examples, 3);
+  return bar;
 }
 
 /// No load, no damping, no examples.

@@ -1,5 +1,6 @@
 #include "runtime/sim/stepper.h"
 
+#include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 #include <limits>
 #include <string>
@@ -84,7 +85,7 @@ TEST(StepperTest, SolvesTheEquationOfMotionAlsoWhereTheFilterIsNotSymmetric) {
       Workspace workspace(*model, scene);
       for (int i = 0; i < 50; ++i) {
         ASSERT_EQ(step(*model, scene, state, workspace).status, 0U);
-        const Eigen::VectorXd target = model->examples->target.basis() * state.target;
+        const Eigen::VectorXd target = model->examples->target->basis() * state.target;
         const Eigen::VectorXd elastic = bar.basis().transpose() * test::full_internal_force(bar, bar.basis() * state.q);
         const ProjectionData& project = *bar.model.projection;
         const auto filtered = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
@@ -163,7 +164,7 @@ TEST(StepperTest, EnergiesAreThoseOfTheFullSpace) {
   const Energies now = energies(scene, state);
   const Eigen::VectorXd velocity = bar.basis() * state.v, displacement = bar.basis() * state.q;
   EXPECT_NEAR(now.kinetic, 0.5 * velocity.dot(bar.mass * velocity), 1e-12 * now.kinetic);
-  EXPECT_EQ(now.elastic, model->elasticity.energy(state.q, workspace.elasticity));
+  EXPECT_EQ(now.elastic, model->internal_force.energy(state.q, workspace.elasticity));
   Eigen::VectorXd height = Eigen::VectorXd::Zero(displacement.size());
   for (Eigen::Index i = 1; i < height.size(); i += 3) height[i] = displacement[i];
   EXPECT_NEAR(now.potential, 9.81 * (bar.mass * height).sum(), 1e-12 * std::abs(now.potential));
@@ -211,10 +212,43 @@ TEST(StepperTest, NonFiniteInputSetsTheBitAndKeepsTheState) {
     }
 }
 
-struct ExtremeCase {
-  double youngs_modulus, poisson_ratio, time_step;
-  int load;
-};
+TEST(Stepper, SubnormalNumbersBecomeZeroAndAreReported) {
+  const Bar bar = test::make_bar();
+  const auto model = prepared(bar);
+  const StepScene scene = free_scene(*model, Integrator::kBdf2, 1e-3);
+  State state = make_state(*model);
+  state.q.setConstant(1e-310);
+  state.v.setConstant(-1e-309);
+  Workspace workspace(*model, scene);
+  EXPECT_EQ(step(*model, scene, state, workspace).status, kStepSubnormal);
+  EXPECT_EQ(state.q, Eigen::VectorXd::Zero(model->modes()));
+  EXPECT_EQ(step(*model, scene, state, workspace).status, 0U);
+}
+
+// Few iterations a step lag behind, report it, and arrive where many do.
+TEST(Stepper, ABoundedTargetCarriesOnInTheNextStep) {
+  const Bar bar = test::make_bar({.examples = 4});
+  const auto model = prepared(bar);
+  StepScene scene = free_scene(*model, Integrator::kBdf2, 1e-3);
+  scene.examples = ExampleSettings{1e-12, 0, 0.1, 1};  // the body stays where it is, and with it the weights
+  const TargetSolver& solver = *model->examples->target;
+  State state = make_state(*model);
+  Workspace workspace(*model, scene);
+  int steps = 0;
+  while (!state.target_converged && steps < 50) {
+    const StepReport report = step(*model, scene, state, workspace);
+    EXPECT_LE(report.target_iterations, 1);
+    EXPECT_EQ((report.status & kTargetNotConverged) != 0, !state.target_converged) << steps;
+    ++steps;
+  }
+  EXPECT_GT(steps, 1);
+  ASSERT_TRUE(state.target_converged);
+  auto scratch = solver.make_workspace();
+  Eigen::VectorXd expected(solver.dimension());
+  solver.start(state.weights, expected);
+  solver.solve(state.weights, scratch, expected);
+  EXPECT_LE((state.target - expected).norm(), 1e-8 * expected.norm());
+}
 
 class ExtremeRuns : public ::testing::TestWithParam<std::tuple<double, double, double, int>> {};
 
@@ -247,39 +281,57 @@ TEST_P(ExtremeRuns, StayFiniteAndBounded) {
   }
 }
 
+enum class Target { kNone, kTable, kSolve };
+
+/// Allocations of steps from rest; the force ends after two of them.
+std::size_t allocations_of_steps(const Model& model, const StepScene& scene, bool profiled) {
+  State state = make_state(model);
+  Workspace workspace(model, scene);
+  Profile profile;
+  if (profiled) workspace.profile = &profile;
+  const test::AllocationCounter counter;
+  for (int i = 0; i < 4; ++i) step(model, scene, state, workspace);
+  energies(scene, state);
+  return counter.count();
+}
+
+void expect_no_allocation(const Model& model, Target target) {
+  for (const Integrator integrator : kIntegrators)
+    for (const bool damped : {false, true})
+      for (const bool scripted : {false, true})
+        for (const bool profiled : {false, true}) {
+          StepScene scene = free_scene(model, integrator, 0.01);
+          scene.gravity_force = gravity_force(model, {0, -20, -5});
+          if (damped) scene.mass_damping = scene.stiffness_damping = 0.01;
+          if (target != Target::kNone) scene.examples = ExampleSettings{300, 4, 0.5};
+          if (scripted) scene.forces.push_back({scene.gravity_force, 0, 0.025});
+          EXPECT_EQ(allocations_of_steps(model, scene, profiled), 0U)
+              << static_cast<int>(integrator) << damped << scripted << profiled;
+        }
+}
+
 TEST(AllocationTest, NoStepAllocates) {
   if (!test::AllocationCounter::works()) GTEST_SKIP() << "a sanitizer owns malloc";
-  // Large enough for blocked products and factorisations.
   for (const double density_gradient : {0.0, 3.0}) {
-    const Bar bar = test::make_bar({.cells = {8, 3, 3},
-                                    .density_gradient = density_gradient,
-                                    .linear_modes = 47,
-                                    .eigenfunctions = 14,
-                                    .examples = 4});
-    const auto model = prepared(bar);
-    for (const Integrator integrator : kIntegrators)
-      for (const bool damped : {false, true})
-        for (const bool examples : {false, true})
-          for (const bool profiled : {false, true}) {
-            StepScene scene = free_scene(*model, integrator, 0.01);
-            scene.gravity_force = gravity_force(*model, {0, -20, -5});
-            if (damped) scene.mass_damping = scene.stiffness_damping = 0.01;
-            if (examples) scene.examples = ExampleSettings{300, 4, 0.5};
-            scene.forces.push_back({scene.gravity_force, 0, 0.025});
-            State state = make_state(*model);
-            Workspace workspace(*model, scene);
-            Profile profile;
-            if (profiled) workspace.profile = &profile;
-            std::size_t allocations = 0;
-            {
-              const test::AllocationCounter counter;
-              for (int i = 0; i < 4; ++i) step(*model, scene, state, workspace);
-              energies(scene, state);
-              allocations = counter.count();
-            }
-            EXPECT_EQ(allocations, 0U) << static_cast<int>(integrator) << damped << examples;
-          }
+    const Bar bar = full_bar({.cells = {5, 2, 2},
+                              .density_gradient = density_gradient,
+                              .linear_modes = 18,
+                              .eigenfunctions = 8,
+                              .examples = 4});
+    for (const Target target : {Target::kNone, Target::kTable, Target::kSolve})
+      for (const bool polynomial : {false, true}) {
+        SCOPED_TRACE(::testing::Message() << "target " << static_cast<int>(target) << " polynomial " << polynomial);
+        expect_no_allocation(*prepared(bar, {.target_table = target == Target::kTable, .polynomial = polynomial}),
+                             target);
+      }
   }
+}
+
+TEST(AllocationTest, NorDoesAStepOfManyModes) {
+  if (!test::AllocationCounter::works()) GTEST_SKIP() << "a sanitizer owns malloc";
+  // Large enough for blocked products and factorisations.
+  const BarOptions options{.cells = {8, 3, 3}, .linear_modes = 47, .eigenfunctions = 14, .examples = 4};
+  expect_no_allocation(*prepared(test::make_bar(options)), Target::kSolve);
 }
 
 TEST(AllocationTest, NorDoesAProjectedStiffness) {

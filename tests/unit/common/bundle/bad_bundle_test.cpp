@@ -10,6 +10,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/hdf5_file.h"
+#include "common/bundle/value_checks.h"
 #include "common/core/error.h"
 #include "tests/unit/common/bundle/small_model.h"
 
@@ -131,8 +132,8 @@ const BadBundle kBadBundles[] = {
     {"OtherFormat", [](Spoiler& s) { s.set_text("/", "format", "other"); },
      "/@format: expected \"exmat-bundle\", found \"other\""},
     {"NoFormat", [](Spoiler& s) { s.remove_attribute("/", "format"); }, "/@format: expected an attribute, found none"},
-    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 2); },
-     "/@format_version: expected at most 1, found 2; a newer version of exmat"},
+    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 3); },
+     "/@format_version: expected at most 2, found 3; a newer version of exmat"},
     {"NoVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 0); },
      "/@format_version: expected a number > 0, found 0"},
     {"TextVersion", [](Spoiler& s) { s.set_text("/", "format_version", "1"); },
@@ -203,6 +204,35 @@ const BadBundle kBadBundles[] = {
      "/projection/shape_from_reduced: expected 3m x r (m = 2 from /shape_space/eigenvalues, r = 2 from "},
     {"WrongExampleCount", [](Spoiler& s) { s.remove("/examples/bend"); },
      "/examples/gram: expected K x K (K = 2 from the groups of /examples), found 3 x 3"},
+    {"TooFewPairs",
+     [](Spoiler& s) {
+       s.replace("/polynomial/cubic", H5T_NATIVE_DOUBLE, {2, 2});
+     },
+     "/polynomial/cubic: expected R x r (R = 3 from /examples/hq, r = 2 from /examples/hq), found 2 x 2"},
+    {"TooManyPairsOfPairs", [](Spoiler& s) { s.replace("/polynomial/quartic", H5T_NATIVE_DOUBLE, {9}); },
+     "/polynomial/quartic: expected Q (Q = 6 from /examples/hq), found 9"},
+    {"ContactOfOtherVertices", [](Spoiler& s) { s.replace("/contact/areas", H5T_NATIVE_DOUBLE, {3}); },
+     "/contact/areas: expected k (k = 2 from /contact/vertices), found 3"},
+    {"ContactWithoutArea", [](Spoiler& s) { s.set("/contact/areas", 1, 0.0); },
+     "/contact/areas: expected a number > 0, found 0 at [1]"},
+    {"ExponentsOfOtherExamples",
+     [](Spoiler& s) {
+       s.replace("/targets/exponents", H5T_NATIVE_INT32, {6, 2});
+     },
+     "/targets/exponents: expected c x K (K = 3 from the groups of /examples), found 6 x 2"},
+    {"TooFewControlPoints",
+     [](Spoiler& s) {
+       s.replace("/targets/control_points", H5T_NATIVE_DOUBLE, {1, 5, 2});
+     },
+     "/targets/control_points: expected P x c x r (c = 6 from /targets/exponents, r = 2 from /examples/hq), found 1 x "
+     "5 x 2"},
+    {"TooManyKnots", [](Spoiler& s) { s.replace("/targets/knots", H5T_NATIVE_DOUBLE, {3}); },
+     "/targets/knots: expected P+1 (P+1 = 2 from /targets/control_points), found 3"},
+    {"FirstKnot", [](Spoiler& s) { s.set("/targets/knots", 0, 0.25); },
+     "/targets/knots: expected 0 at [0], found 0.25"},
+    {"LastKnot", [](Spoiler& s) { s.set("/targets/knots", 1, 0.75); }, "/targets/knots: expected 1 at [1], found 0.75"},
+    {"KnotsOutOfOrder", [](Spoiler& s) { s.set("/targets/knots", 0, 1.0); },
+     "/targets/knots: expected each element above the one before it, found 1 at [1] after 1"},
     {"EmptyDataset", [](Spoiler& s) { s.replace("/modal/frequencies", H5T_NATIVE_DOUBLE, {0}); },
      "/modal/frequencies: expected some elements, found 0"},
     {"LargerThanTheFile", [](Spoiler& s) { s.replace("/modal/frequencies", H5T_NATIVE_DOUBLE, {hsize_t{1} << 60}); },
@@ -241,6 +271,20 @@ const BadBundle kBadBundles[] = {
      "/shape_space/eigenvalues: expected no element below the one before it, found 10.125 at [1] after 99"},
     {"GramNotSymmetric", [](Spoiler& s) { s.set("/examples/gram", 1, 0.0); },
      "/examples/gram: expected a symmetric matrix, found "},
+    {"StiffnessNotSymmetric", [](Spoiler& s) { s.set("/polynomial/stiffness", 1, 0.0); },
+     "/polynomial/stiffness: expected a symmetric matrix, found "},
+    {"UnknownInternalForce", [](Spoiler& s) { s.set_text("/cubature", "internal_force", "auto"); },
+     "/cubature@internal_force: expected \"cubature\" or \"polynomial\", found \"auto\""},
+    {"UnknownEnergyReference", [](Spoiler& s) { s.set_text("/targets", "energy_reference", "none"); },
+     "/targets@energy_reference: expected \"example\" or \"rest\", found \"none\""},
+    {"DegreeZero", [](Spoiler& s) { s.set_integer("/targets", "degree", 0); },
+     "/targets@degree: expected a number > 0, found 0"},
+    {"NegativeExponent", [](Spoiler& s) { s.set("/targets/exponents", 4, std::int32_t{-1}); },
+     "/targets/exponents: expected a number >= 0, found -1 at [1][1]"},
+    {"ExponentsOfAnotherDegree", [](Spoiler& s) { s.set_integer("/targets", "degree", 3); },
+     "/targets/exponents: expected 3 0 0 in row 0, for degree 3, found 2 0 0"},
+    {"ExponentsOutOfOrder", [](Spoiler& s) { s.set("/targets/exponents", 14, std::int32_t{2}); },
+     "/targets/exponents: expected 0 1 1 in row 4, for degree 2, found 0 1 2"},
     {"IndexTwice", [](Spoiler& s) { s.set_integer("/examples/bend", "index", 2); },
      "/examples/twist \xc3\xa9@index: expected another index for each example, found 2, that of bend too"},
     {"IndexBeyondCount", [](Spoiler& s) { s.set_integer("/examples/bend", "index", 3); },
@@ -252,6 +296,15 @@ const BadBundle kBadBundles[] = {
 };
 INSTANTIATE_TEST_SUITE_P(Each, BadBundleIs, ::testing::ValuesIn(kBadBundles),
                          [](const auto& test) { return std::string(test.param.name); });
+
+TEST(TargetKnots, AreBetweenTheEndsForTwoExamplesOnly) {
+  EXPECT_FALSE(check_knots(Eigen::Vector2d(0, 1), 4));
+  EXPECT_FALSE(check_knots(Eigen::Vector4d(0, 0.1, 0.2, 1), 2));
+  const auto fault = check_knots(Eigen::Vector4d(0, 0.1, 0.2, 1), 3);
+  ASSERT_TRUE(fault);
+  EXPECT_EQ(fault->expected, "2 knots for 3 examples");
+  EXPECT_EQ(fault->found, "4");
+}
 
 TEST(BadBundle, WithABasisThatMovesFixedVertices) {
   const TemporaryFolder folder;
@@ -275,6 +328,47 @@ TEST(BadBundle, OfAnotherKindOfFile) {
     } catch (const InputError& error) {
       EXPECT_THAT(error.what(), HasSubstr("a.h5: expected an HDF5 file, found another kind of file"));
     }
+  }
+}
+
+// small_model() as version 1 wrote it.
+void write_version_1(const std::filesystem::path& path) {
+  ReducedModel model = small_model();
+  model.polynomial.reset();
+  model.targets.reset();
+  model.contact.reset();
+  write_bundle(model, path);
+  Spoiler spoiler(path);
+  spoiler.set_integer("/", "format_version", 1);
+  spoiler.remove_attribute("/cubature", "internal_force");
+  spoiler.remove_attribute("/cubature", "internal_force_reason");
+}
+
+TEST(BundleOfVersion1, IsRead) {
+  const TemporaryFolder folder;
+  write_version_1(folder / "a.h5");
+  const ReducedModel model = read_bundle(folder / "a.h5");
+  EXPECT_EQ(model.cubature->internal_force, "cubature");
+  EXPECT_EQ(model.cubature->internal_force_reason, "");
+  EXPECT_EQ(model.cubature->method, "greedy");
+  EXPECT_THAT(validate_bundle(folder / "a.h5"), ::testing::IsEmpty());
+  const BundleSummary summary = summarise_bundle(folder / "a.h5");
+  EXPECT_EQ(summary.format_version, 1);
+  EXPECT_EQ(summary.internal_force, "cubature");
+  EXPECT_FALSE(summary.has_polynomial || summary.has_targets);
+}
+
+TEST(BundleOfVersion1, HasNoNewerGroups) {
+  const TemporaryFolder folder;
+  write_version_1(folder / "a.h5");
+  Spoiler(folder / "a.h5").add_group("/polynomial");
+  try {
+    read_bundle(folder / "a.h5", {.groups = plan_groups({.internal_force = "polynomial"}, true, 3)});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(),
+                HasSubstr("/polynomial: expected the group (the internal force is a polynomial), found none"));
+    EXPECT_THAT(error.what(), HasSubstr("--scene SCENE.json or with \"polynomial\" as internal_force of the asset"));
   }
 }
 

@@ -52,7 +52,7 @@ std::vector<std::string> datasets_of(const std::vector<ReadRecord>& record) {
 }
 
 BundleRequest request_for(const Needs& needs, bool constrained, bool step_only, bool positions) {
-  return {plan_groups(needs, constrained, true), step_only, positions};
+  return {plan_groups(needs, constrained, 3), step_only, positions};
 }
 
 class BundleOfEachKind : public ::testing::TestWithParam<std::pair<bool, bool>> {};
@@ -93,12 +93,14 @@ TEST(Bundle, ForSteppingReadsOnlyWhatStepsNeed) {
   const TemporaryFolder folder;
   write_bundle(small_model(true), folder / "a.h5");
   std::vector<ReadRecord> record;
-  const auto model = read_bundle(folder / "a.h5", request_for({.examples = false}, true, true, false), &record);
+  const Needs needs{.examples = false, .contact = false, .internal_force = "cubature"};
+  const auto model = read_bundle(folder / "a.h5", request_for(needs, true, true, false), &record);
   EXPECT_THAT(datasets_of(record),
               ElementsAre("/modal/gravity_load", "/cubature/weights", "/cubature/volumes", "/cubature/gradient",
                           "/cubature/youngs_modulus", "/cubature/poisson_ratio"));
   EXPECT_EQ(record[0].bytes, 3u * 2u * 8u);
-  EXPECT_FALSE(model.examples || model.shape_space || model.projection || model.rigid);
+  EXPECT_FALSE(model.examples || model.shape_space || model.polynomial || model.projection || model.targets ||
+               model.rigid || model.contact);
   EXPECT_EQ(model.object->mesh.vertices.rows(), 0);
   EXPECT_EQ(model.modal->basis.rows(), 0);
   EXPECT_EQ(model.object->material, "stvk");
@@ -108,7 +110,9 @@ TEST(Bundle, ForPositionsReadsMeshAndBasisToo) {
   const TemporaryFolder folder;
   write_bundle(small_model(true), folder / "a.h5");
   std::vector<ReadRecord> record;
-  read_bundle(folder / "a.h5", request_for({.examples = false}, true, true, true), &record);
+  read_bundle(folder / "a.h5",
+              request_for({.examples = false, .contact = false, .internal_force = "cubature"}, true, true, true),
+              &record);
   EXPECT_THAT(datasets_of(record),
               ElementsAre("/object/vertices", "/object/tets", "/object/density", "/modal/basis", "/modal/gravity_load",
                           "/cubature/weights", "/cubature/volumes", "/cubature/gradient", "/cubature/youngs_modulus",
@@ -125,8 +129,10 @@ TEST(Bundle, ForExampleForcesReadsTheirProblem) {
   EXPECT_EQ(model.examples->examples[2].index, 2);
   EXPECT_EQ(model.examples->gram, small_model().examples->gram);
   EXPECT_EQ(model.examples->examples[0].descriptor.size(), 0);
-  EXPECT_THAT(datasets_of(record), ::testing::Contains("/examples/bend/reduced"));
-  EXPECT_EQ(record.back().dataset, "/rigid/basis_moments");
+  EXPECT_THAT(datasets_of(record),
+              ::testing::IsSupersetOf({"/examples/bend/reduced", "/polynomial/quartic", "/targets/exponents",
+                                       "/targets/control_points", "/targets/knots"}));
+  EXPECT_EQ(record.back().dataset, "/contact/basis");
 }
 
 TEST(Bundle, NamesAGroupThatIsMissing) {
@@ -150,16 +156,33 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.asset_name, "small");
   EXPECT_EQ(summary.generator, "exmat test");
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
-  EXPECT_EQ(summary.format_version, 1);
+  EXPECT_EQ(summary.format_version, 2);
   EXPECT_FALSE(summary.constrained);
-  EXPECT_THAT(summary.groups,
-              ElementsAre("object", "shape_space", "examples", "modal", "cubature", "projection", "rigid"));
+  EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
+                                          "projection", "targets", "rigid", "contact"));
   EXPECT_EQ(summary.vertices, 5);
   EXPECT_EQ(summary.tets, 2);
   EXPECT_EQ(summary.modes, 2);
   EXPECT_EQ(summary.cubature_elements, 2);
   EXPECT_EQ(summary.eigenfunctions, 2);
   EXPECT_EQ(summary.examples, 3);
+  EXPECT_TRUE(summary.has_polynomial && summary.has_targets);
+  EXPECT_EQ(summary.internal_force, "polynomial");
+  EXPECT_EQ(summary.energy_reference, "rest");
+}
+
+TEST(FitNeeds, TakesTheBundlesInternalForceAndItsTargetsOfTheSameEnergy) {
+  BundleSummary summary;
+  summary.internal_force = "polynomial";
+  summary.energy_reference = "rest";
+  summary.has_targets = true;
+  EXPECT_EQ(fit_needs({}, summary).internal_force, "polynomial");
+  EXPECT_EQ(fit_needs({.internal_force = "cubature"}, summary).internal_force, "cubature");
+  EXPECT_FALSE(fit_needs({.energy_reference = "example"}, summary).targets);
+  EXPECT_TRUE(fit_needs({.energy_reference = "rest"}, summary).targets);
+  EXPECT_FALSE(fit_needs({.targets = false, .energy_reference = "rest"}, summary).targets);
+  summary.has_targets = false;
+  EXPECT_FALSE(fit_needs({.energy_reference = "rest"}, summary).targets);
 }
 
 TEST(Bundle, GivesSomeRowsOfTheBasis) {
@@ -202,7 +225,7 @@ TEST(Bundle, ReadsAnEmptyListOfPoses) {
 TEST(LedgerBytes, AreThoseOfTheDatasets) {
   const TemporaryFolder folder;
   const ReducedModel model = small_model(true);
-  auto ledger = plan_groups({}, true, true);
+  auto ledger = plan_groups({}, true, 3);
   fill_bytes(model, ledger);
   write_bundle(model, folder / "a.h5");
   std::vector<ReadRecord> record;

@@ -88,12 +88,30 @@ CubatureData small_cubature() {
   cubature.youngs_modulus = numbers(kElements, 1, 1e5);
   cubature.poisson_ratio = numbers(kElements, 1, 0.3);
   cubature.heldout_poses = numbers(4, kModes, -0.75);
+  cubature.internal_force = "polynomial";
+  cubature.internal_force_reason = "faster";
   cubature.method = "greedy";
   cubature.training_error = 0.01;
   cubature.heldout_error = 0.02;
   cubature.heldout_energy_error = 0.03;
   cubature.heldout_stiffness_error = 0.04;
   return cubature;
+}
+
+PolynomialData small_polynomial() {
+  const RowMatrix factor = numbers(kModes, kModes, 2);
+  return {factor * factor.transpose(), numbers(3, kModes, -4), numbers(6, 1, 9)};
+}
+
+TargetTableData small_targets() {
+  TargetTableData targets;
+  targets.degree = 2;
+  targets.error = 1e-5;
+  targets.energy_reference = "rest";
+  targets.exponents.resize(6, kExamples);
+  targets.exponents << 2, 0, 0, 1, 1, 0, 1, 0, 1, 0, 2, 0, 0, 1, 1, 0, 0, 2;
+  targets.control_points = numbers(6, kModes, 3);
+  return targets;
 }
 
 RigidData small_rigid() {
@@ -106,6 +124,18 @@ RigidData small_rigid() {
           .basis_moments = numbers(9 * kModes, kModes, 5)};
 }
 
+// Vertices 1 and 3.
+ContactData small_contact(const ReducedModel& model) {
+  ContactData contact;
+  contact.vertices.resize(2);
+  contact.vertices << 1, 3;
+  contact.positions = model.object->mesh.vertices(contact.vertices, Eigen::all);
+  contact.areas = numbers(2, 1, 0.5);
+  contact.basis.resize(6, kModes);
+  contact.basis << model.modal->basis.middleRows(3, 3), model.modal->basis.middleRows(9, 3);
+  return contact;
+}
+
 }  // namespace
 
 ReducedModel small_model(bool constrained, bool with_examples) {
@@ -116,13 +146,16 @@ ReducedModel small_model(bool constrained, bool with_examples) {
   model.object = small_object(constrained);
   model.modal = small_modal(constrained);
   model.cubature = small_cubature();
+  model.polynomial = small_polynomial();
   if (with_examples) {
     model.shape_space = small_shape_space();
     model.examples = small_examples();
     model.projection = ProjectionData{numbers(3 * kEigenfunctions, kModes, 6), numbers(kModes, 3 * kEigenfunctions, 7),
                                       numbers(kModes, 1, 8)};
+    model.targets = small_targets();
   }
   if (!constrained) model.rigid = small_rigid();
+  model.contact = small_contact(model);
   return model;
 }
 

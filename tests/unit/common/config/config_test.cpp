@@ -27,12 +27,13 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.object_mesh, folder / "bar.veg");
   EXPECT_EQ(asset.material.model, "stvk");
   EXPECT_FALSE(asset.material.density || asset.fixed || asset.cubature_elements || asset.cubature_tolerance ||
-               asset.needs);
+               asset.needs || asset.contact_vertices || asset.contact_count);
   EXPECT_TRUE(asset.examples.empty());
   EXPECT_EQ(asset.eigenfunctions, 20);
   EXPECT_EQ(asset.basis_size, 30);
   EXPECT_EQ(asset.cubature_method, "greedy_swap");
-  EXPECT_EQ(asset.target_tolerance, std::nullopt);
+  EXPECT_EQ(asset.target_tolerance, 1e-4);
+  EXPECT_EQ(asset.internal_force, "auto");
   EXPECT_EQ(asset.seed, 1u);
 }
 
@@ -50,7 +51,9 @@ TEST(LoadAsset, ReadsEveryMember) {
     "basis": {"size": 20, "linear_modes": 12, "example_fields": false},
     "cubature": {"elements": 23, "method": "nn_htp", "training_poses": 50},
     "targets": {"tolerance": 1e-3},
-    "needs": ["rigid"],
+    "internal_force": "polynomial",
+    "contact": {"vertices": {"ids": [3, 4, 5]}, "count": 2},
+    "needs": ["rigid", "targets", "contact"],
     "seed": 9007199254740991})");
   EXPECT_EQ(asset.object_mesh, "/data/car.veg");
   EXPECT_TRUE(asset.object_drop.degenerate_tets && asset.object_drop.smaller_components);
@@ -77,7 +80,10 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_EQ(asset.cubature_method, "nn_htp");
   EXPECT_EQ(asset.training_poses, 50);
   EXPECT_EQ(asset.target_tolerance, 1e-3);
-  EXPECT_THAT(*asset.needs, ElementsAre("rigid"));
+  EXPECT_EQ(asset.internal_force, "polynomial");
+  EXPECT_THAT(std::get<IdSelection>(*asset.contact_vertices).ids, ElementsAre(3, 4, 5));
+  EXPECT_EQ(asset.contact_count, 2);
+  EXPECT_THAT(*asset.needs, ElementsAre("rigid", "targets", "contact"));
   EXPECT_EQ(asset.seed, 9007199254740991u);
 }
 
@@ -103,6 +109,8 @@ TEST(LoadScene, FillsInDefaults) {
   EXPECT_EQ(scene.gravity, Eigen::Vector3d::Zero());
   EXPECT_FALSE(scene.examples || scene.trajectory);
   EXPECT_EQ(scene.newton.max_iterations, 20);
+  EXPECT_EQ(scene.internal_force, "auto");
+  EXPECT_EQ(scene.instances, 1);
   EXPECT_EQ(scene.every, 10);
 }
 
@@ -111,10 +119,10 @@ TEST(LoadScene, ReadsEveryMember) {
   write_file(folder / "ids.txt", "3, 1\n");
   const SceneConfig scene = load(folder, load_scene, R"({
     "bundle": "car.h5", "time_step": 0.01, "steps": 20, "gravity": [0, -0.98, 0], "integrator": "newmark",
-    "internal_force": "cubature", "instances": 1,
+    "internal_force": "polynomial", "instances": 1000,
     "damping": {"mass": 0.02, "stiffness": 0.003}, "newton": {"max_iterations": 5, "tolerance": 1e-8},
-    "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "target": "solve", "force": "linear",
-                 "energy_reference": "rest"},
+    "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "target": "table", "target_iterations": 7,
+                 "force": "linear", "energy_reference": "rest"},
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
                {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]}],
     "output": {"trajectory": "run.h5", "every": 2}})");
@@ -129,7 +137,11 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.examples->stiffness, 400);
   EXPECT_EQ(scene.examples->damping, 2);
   EXPECT_EQ(scene.examples->bias, 0.6);
+  EXPECT_EQ(scene.examples->target, "table");
+  EXPECT_EQ(scene.examples->target_iterations, 7);
   EXPECT_EQ(scene.examples->energy_reference, "rest");
+  EXPECT_EQ(scene.internal_force, "polynomial");
+  EXPECT_EQ(scene.instances, 1000);
   ASSERT_EQ(scene.forces.size(), 2u);
   EXPECT_THAT(scene.forces[0].vertices, ElementsAre(10, 11));
   EXPECT_EQ(scene.forces[0].force, Eigen::Vector3d(0, 0, 50));
@@ -139,6 +151,61 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.forces[1].end, std::numeric_limits<double>::infinity());
   EXPECT_EQ(*scene.trajectory, folder / "run.h5");
   EXPECT_EQ(scene.every, 2);
+}
+
+TEST(LoadScene, ReadsObstacles) {
+  const TemporaryFolder folder;
+  const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5", "obstacles": [
+    {"plane": {"point": [0, -1.7, 0], "normal": [0, 2, 0]}, "stiffness": 2e6, "damping": 30, "friction": 0.5},
+    {"sphere": {"radius": 0.5}},
+    {"box": {"center": [1, 2, 3], "half_extents": [0.1, 0.2, 0.3], "orientation": [0, 0, 1, 0]}},
+    {"capsule": {"start": [0, 0, 0], "end": [1, 0, 0], "radius": 0.25},
+     "motion": [{"time": 0}, {"time": 1.5, "position": [1, 0, 0], "orientation": [0.6, 0.8, 0, 0]}]}]})");
+  ASSERT_EQ(scene.obstacles.size(), 4u);
+  const auto& plane = std::get<PlaneConfig>(scene.obstacles[0].shape);
+  EXPECT_EQ(plane.point, Eigen::Vector3d(0, -1.7, 0));
+  EXPECT_EQ(plane.normal, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(scene.obstacles[0].stiffness, 2e6);
+  EXPECT_EQ(scene.obstacles[0].damping, 30);
+  EXPECT_EQ(scene.obstacles[0].friction, 0.5);
+  const auto& sphere = std::get<SphereConfig>(scene.obstacles[1].shape);
+  EXPECT_EQ(sphere.center, Eigen::Vector3d::Zero());
+  EXPECT_EQ(sphere.radius, 0.5);
+  EXPECT_EQ(scene.obstacles[1].stiffness, 1e6);
+  EXPECT_EQ(scene.obstacles[1].friction, 0);
+  EXPECT_TRUE(scene.obstacles[1].motion.empty());
+  const auto& box = std::get<BoxConfig>(scene.obstacles[2].shape);
+  EXPECT_EQ(box.half_extents, Eigen::Vector3d(0.1, 0.2, 0.3));
+  EXPECT_EQ(box.orientation.y(), 1);
+  EXPECT_EQ(std::get<CapsuleConfig>(scene.obstacles[3].shape).end, Eigen::Vector3d::UnitX());
+  ASSERT_EQ(scene.obstacles[3].motion.size(), 2u);
+  EXPECT_EQ(scene.obstacles[3].motion[0].orientation.w(), 1);
+  EXPECT_EQ(scene.obstacles[3].motion[1].time, 1.5);
+  EXPECT_EQ(scene.obstacles[3].motion[1].position, Eigen::Vector3d::UnitX());
+  EXPECT_DOUBLE_EQ(scene.obstacles[3].motion[1].orientation.x(), 0.8);
+}
+
+TEST(LoadScene, ReadsTheBody) {
+  const TemporaryFolder folder;
+  const auto body = [&](const std::string& members) {
+    return load(folder, load_scene, R"({"bundle": "b.h5", "body": )" + members + "}").body;
+  };
+  const BodyConfig none = body("{}");
+  EXPECT_FALSE(none.position || none.orientation || none.linear_velocity || none.angular_velocity || none.reduced ||
+               none.pose);
+  const BodyConfig rigid = body(R"({"position": [1, 2, 3], "orientation": [0.6, 0, 0, 0.8],
+                                    "linear_velocity": [-2, 0, 0], "angular_velocity": [0, 0, 7],
+                                    "reduced": [1, 2.5]})");
+  EXPECT_EQ(*rigid.position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_DOUBLE_EQ(rigid.orientation->z(), 0.8);
+  EXPECT_EQ(*rigid.linear_velocity, Eigen::Vector3d(-2, 0, 0));
+  EXPECT_EQ(*rigid.angular_velocity, Eigen::Vector3d(0, 0, 7));
+  EXPECT_EQ(*rigid.reduced, Eigen::Vector2d(1, 2.5));
+  const BodyConfig posed = body(R"({"pose": {"example": "bend", "weight": 0.5}, "motion": [{"time": 2}]})");
+  EXPECT_EQ(posed.pose->example, "bend");
+  EXPECT_EQ(posed.pose->weight, 0.5);
+  EXPECT_EQ(posed.motion.size(), 1u);
+  EXPECT_EQ(body(R"({"pose": {"example": "bend"}})").pose->weight, 1);
 }
 
 TEST(LoadScene, ResolvesPathsOfAFileInTheCurrentFolder) {
@@ -154,8 +221,39 @@ TEST(NeedsOfAScene, AreExamplesWhereItHasAnExampleForce) {
   SceneConfig scene;
   EXPECT_FALSE(needs_of(scene).examples);
   EXPECT_TRUE(needs_of(scene).rigid);
+  EXPECT_FALSE(needs_of(scene).targets);
+  EXPECT_EQ(needs_of(scene).internal_force, "auto");
+  EXPECT_EQ(needs_of(scene).energy_reference, "example");
+  scene.internal_force = "cubature";
   scene.examples.emplace();
+  scene.examples->energy_reference = "rest";
   EXPECT_TRUE(needs_of(scene).examples);
+  EXPECT_TRUE(needs_of(scene).targets);
+  EXPECT_EQ(needs_of(scene).internal_force, "cubature");
+  EXPECT_EQ(needs_of(scene).energy_reference, "rest");
+}
+
+TEST(NeedsOfAScene, AreContactWhereItHasObstacles) {
+  SceneConfig scene;
+  EXPECT_FALSE(needs_of(scene).contact);
+  scene.obstacles.emplace_back();
+  EXPECT_TRUE(needs_of(scene).contact);
+}
+
+TEST(NeedsOfAScene, AreExamplesWhereItStartsFromOne) {
+  SceneConfig scene;
+  scene.body.pose = PoseConfig{"bend", 1};
+  EXPECT_TRUE(needs_of(scene).examples);
+  EXPECT_FALSE(needs_of(scene).targets);
+}
+
+TEST(NeedsOfAScene, AreNoTargetsWhereItSolvesForThem) {
+  SceneConfig scene;
+  scene.examples.emplace();
+  for (const char* target : {"auto", "table", "solve"}) {
+    scene.examples->target = target;
+    EXPECT_EQ(needs_of(scene).targets, scene.examples->target != "solve");
+  }
 }
 
 TEST(VertexIds, AreReadFromBouFiles) {

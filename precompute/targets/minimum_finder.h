@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "runtime/sim/target.h"
+
+namespace exmat::precompute {
+
+/// p*(w) in the coordinates y of TargetSolver: of the minima that several starts lead to, the lowest.
+class MinimumFinder {
+ public:
+  using Starts = std::function<std::vector<Eigen::VectorXd>(const Eigen::VectorXd& weights, Eigen::Index row)>;
+
+  /// Answers nearer to each other than `same_distance` in y are one minimum.
+  MinimumFinder(const runtime::TargetSolver& target, double same_distance)
+      : target_(target), same_distance_(same_distance) {}
+
+  /// [n x d] for weights [n x K], each found by itself; NaN where no start led to a minimum. `stage` names the work.
+  RowMatrix find(const RowMatrix& weights, const Starts& starts, const std::string& stage);
+
+  int solves() const { return solves_; }
+  int ambiguous() const { return ambiguous_; }  ///< weights with more than one minimum
+
+ private:
+  struct Minimum {
+    Eigen::VectorXd y;
+    bool only = true;  ///< all starts led to it
+  };
+  Minimum lowest(const Eigen::VectorXd& weights, const std::vector<Eigen::VectorXd>& starts,
+                 runtime::TargetSolver::Workspace& workspace) const;
+
+  const runtime::TargetSolver& target_;
+  double same_distance_;
+  int solves_ = 0;
+  int ambiguous_ = 0;
+};
+
+/// sum_k w_k y_k.
+Eigen::VectorXd blend(const runtime::TargetSolver& target, const Eigen::VectorXd& weights);
+
+/// The blend, then y_k of every example with a share in the weights.
+std::vector<Eigen::VectorXd> blend_and_examples(const runtime::TargetSolver& target, const Eigen::VectorXd& weights);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,226 @@
+#include "precompute/targets/target_table.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+#include "common/core/timer.h"
+#include "common/model/needs.h"
+#include "precompute/targets/minimum_finder.h"
+#include "precompute/targets/simplex_points.h"
+#include "precompute/targets/table_error.h"
+#include "precompute/targets/target_pieces.h"
+#include "runtime/sim/bernstein_basis.h"
+#include "runtime/sim/target.h"
+#include "runtime/sim/target_table.h"
+
+namespace exmat::precompute {
+namespace {
+
+using runtime::BernsteinBasis;
+using runtime::EnergyReference;
+using runtime::TargetSolver;
+using runtime::TargetTable;
+
+constexpr int kFirstDegree = 4, kDegreeStep = 2;
+constexpr int kDegreesPerGrid = 2;       // degrees that are fitted to the same nodes
+constexpr double kOversampling = 1.25;   // degree of the nodes over that of the polynomial
+constexpr int kChecksPerDimension = 64;  // weights on every edge; twice as many on every face
+constexpr Eigen::Index kEveryStart = 4;  // every fourth of them is solved from every example
+constexpr double kMargin = 0.7;          // of the tolerance: more may turn up between the checks
+constexpr double kSame = 0.1;            // of the tolerance: answers nearer to each other are one minimum
+
+int most_degree(const TargetTableOptions& options, Eigen::Index examples) {
+  if (options.most_degree > 0) return std::min(options.most_degree, BernsteinBasis::kMostDegree);
+  return examples == 2 ? 40 : examples == 3 ? 24 : 14;
+}
+
+class TableBuilder {
+ public:
+  TableBuilder(const TargetSolver& target, const std::vector<ExampleData>& examples, const TargetTableOptions& options,
+               TargetTableReport& report);
+
+  std::optional<TargetTableData> run();
+
+ private:
+  TargetSamples solve_checks();
+  TargetSamples solve_nodes(int degree);
+  TargetTableData fit(int degree, const TargetSamples& nodes) const;
+  std::optional<TargetTableData> one_polynomial(const TargetSamples& checks);
+  std::optional<TargetTableData> pieces(const TargetSamples& checks);
+  void record(const TargetFit& fit);
+  std::string lost_message() const;
+  std::string success_message(const TargetTableData& data) const;
+  std::string refusal_message() const;
+
+  const TargetSolver& target_;
+  const std::vector<ExampleData>& example_data_;
+  const TargetTableOptions& options_;
+  TargetTableReport& report_;
+  Eigen::Index examples_;  ///< K
+  TableError error_;
+  MinimumFinder finder_;
+  std::optional<TargetTable> former_;  ///< of the degree before
+  bool lost_ = false;                  ///< p*(w) was not found at some weights
+  bool lost_between_ = false;          ///< only in or between pieces
+};
+
+TableBuilder::TableBuilder(const TargetSolver& target, const std::vector<ExampleData>& examples,
+                           const TargetTableOptions& options, TargetTableReport& report)
+    : target_(target),
+      example_data_(examples),
+      options_(options),
+      report_(report),
+      examples_(static_cast<Eigen::Index>(examples.size())),
+      error_(target, examples_),
+      finder_(target, kSame * options.tolerance * error_.scale()) {}
+
+// Not from the table, which must not confirm itself.
+TargetSamples TableBuilder::solve_checks() {
+  const RowMatrix weights = spread_points(examples_, kChecksPerDimension);
+  const auto starts = [&](const Eigen::VectorXd& w, Eigen::Index row) -> std::vector<Eigen::VectorXd> {
+    if (row % kEveryStart == 0) return blend_and_examples(target_, w);
+    return {blend(target_, w)};
+  };
+  return {weights, finder_.find(weights, starts, "targets to check the table by")};
+}
+
+TargetSamples TableBuilder::solve_nodes(int degree) {
+  const RowMatrix weights = interpolation_nodes(BernsteinBasis(degree, static_cast<int>(examples_)).exponents());
+  const auto starts = [&](const Eigen::VectorXd& w, Eigen::Index) {
+    std::vector<Eigen::VectorXd> from{blend(target_, w)};
+    if (former_) from.emplace_back(error_.decode(*former_, w.transpose()).row(0).transpose());
+    return from;
+  };
+  return {weights, finder_.find(weights, starts, "targets of the table")};
+}
+
+// Least squares over the nodes; the control points at the corners are the examples themselves.
+TargetTableData TableBuilder::fit(int degree, const TargetSamples& nodes) const {
+  const BernsteinBasis basis(degree, static_cast<int>(examples_));
+  TargetTableData data;
+  data.degree = degree;
+  data.energy_reference = options_.energy_reference;
+  data.exponents = basis.exponents();
+  data.control_points.resize(basis.size(), example_data_.front().reduced.size());
+  const Eigen::MatrixXd values = collocation(basis, nodes.weights);
+  Eigen::MatrixXd rest = nodes.minima;
+  std::vector<Eigen::Index> free;
+  for (Eigen::Index n = 0; n < basis.size(); ++n) {
+    Eigen::Index k = 0;
+    if (data.exponents.row(n).maxCoeff(&k) < degree) {
+      free.push_back(n);
+      continue;
+    }
+    data.control_points.row(n) = example_data_[static_cast<std::size_t>(k)].reduced.transpose();
+    rest -= values.col(n) * target_.example(k).transpose();
+  }
+  const Eigen::HouseholderQR<Eigen::MatrixXd> solver(values(Eigen::all, free));
+  data.control_points(free, Eigen::all) = solver.solve(rest) * target_.basis().transpose();
+  return data;
+}
+
+constexpr const char* kAdvice = "use \"target\": \"solve\" in the scene, a larger targets.tolerance or milder examples";
+
+std::string TableBuilder::lost_message() const {
+  return fmt::format("no table of targets: p*(w) was not found at some weights w; {}", kAdvice);
+}
+
+std::string TableBuilder::success_message(const TargetTableData& data) const {
+  const std::string kind = report_.pieces == 1 ? fmt::format("degree {}", data.degree)
+                                               : fmt::format("{} pieces of degree {}", report_.pieces, data.degree);
+  return fmt::format("table of targets: {}, {} control points, error {:.2g} (tolerance {:.2g})", kind,
+                     data.control_points.rows(), data.error, options_.tolerance);
+}
+
+std::string TableBuilder::refusal_message() const {
+  std::string tries;
+  for (const TargetFit& fit : report_.fits) {
+    if (fit.pieces > 1)
+      tries += fmt::format(", {:.2g} in {} pieces of degree {}", fit.error, fit.pieces, fit.degree);
+    else
+      tries = fmt::format("error {:.2g} at degree {}, the highest", fit.error, fit.degree);
+  }
+  if (lost_between_) tries += ", where p*(w) was not found or has no derivative at some weights";
+  const std::string several =
+      finder_.ambiguous() == 0 ? "" : fmt::format(", more than one minimum at {} weights", finder_.ambiguous());
+  return fmt::format("no table of targets: {} (tolerance {:.2g}){}; {}", tries, options_.tolerance, several, kAdvice);
+}
+
+void TableBuilder::record(const TargetFit& fit) {
+  report_.degree = fit.degree;
+  report_.pieces = fit.pieces;
+  report_.error = fit.error;
+  report_.fits.push_back(fit);
+}
+
+std::optional<TargetTableData> TableBuilder::one_polynomial(const TargetSamples& checks) {
+  const int most = most_degree(options_, examples_);
+  TargetSamples nodes;
+  int served = 0;  // largest degree that the nodes are for
+  for (int degree = std::min(kFirstDegree, most); degree <= most; degree += kDegreeStep) {
+    if (degree > served) {
+      served = std::min(most, degree + kDegreeStep * (kDegreesPerGrid - 1));
+      nodes = solve_nodes(static_cast<int>(std::ceil(kOversampling * served)));
+    }
+    lost_ = !nodes.minima.allFinite();
+    if (lost_) return std::nullopt;
+    TargetTableData data = fit(degree, nodes);
+    former_.emplace(data);
+    data.error = std::max(error_.errors(*former_, checks).maxCoeff(), error_.errors(*former_, nodes).maxCoeff());
+    record({degree, data.error});
+    if (data.error <= kMargin * options_.tolerance) return data;
+  }
+  return std::nullopt;
+}
+
+std::optional<TargetTableData> TableBuilder::pieces(const TargetSamples& checks) {
+  PieceReport report;
+  auto data = build_target_pieces(target_, example_data_, checks, {kMargin * options_.tolerance, options_.most_pieces},
+                                  finder_, report);
+  lost_between_ = report.lost;
+  if (report.pieces > 0) record({kPieceDegree, report.error, report.pieces});
+  if (data) data->energy_reference = options_.energy_reference;
+  return data;
+}
+
+std::optional<TargetTableData> TableBuilder::run() {
+  const TargetSamples checks = solve_checks();
+  lost_ = !checks.minima.allFinite();
+  std::optional<TargetTableData> data;
+  if (!lost_) data = one_polynomial(checks);
+  if (!lost_ && !data && examples_ == 2) data = pieces(checks);
+  report_.solves = finder_.solves();
+  report_.message = data ? success_message(*data) : lost_ ? lost_message() : refusal_message();
+  return data;
+}
+
+}  // namespace
+
+std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
+                                                  TargetTableReport& report) {
+  const Timer timer;
+  report = {};
+  const std::vector<ExampleData>& examples = model.examples->examples;
+  const auto count = static_cast<std::int64_t>(examples.size());
+  if (count < 2 || count > kMostTableExamples) {
+    report.message =
+        count < 2 ? "no table of targets: one example alone needs none"
+                  : fmt::format("no table of targets: {} examples, at most {}; use \"target\": \"solve\" in the scene",
+                                count, kMostTableExamples);
+    return std::nullopt;
+  }
+  const auto reference = options.energy_reference == "rest" ? EnergyReference::kRest : EnergyReference::kExample;
+  TargetSolver target;
+  if (const auto complaint = target.build(*runtime::material_from_name(model.object->material), *model.cubature,
+                                          examples, model.projection->target_basis, reference)) {
+    report.message = "no table of targets: " + to_string(*complaint);
+    return std::nullopt;
+  }
+  auto data = TableBuilder(target, examples, options, report).run();
+  report.seconds = timer.seconds();
+  return data;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+
+namespace exmat::precompute {
+
+struct TargetTableOptions {
+  double tolerance = 1e-4;                   ///< of the error as TargetTableData has it [Limit: > 0]
+  std::string energy_reference = "example";  ///< or "rest"
+  int most_degree = 0;                       ///< of one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
+  std::int64_t most_pieces = 256;            ///< for K = 2
+};
+
+/// One table that was tried, and its largest error at the weights of the check.
+struct TargetFit {
+  int degree = 0;
+  double error = 0;
+  std::int64_t pieces = 1;
+};
+
+struct TargetTableReport {
+  std::string message;          ///< what was made, or why nothing was and what to do
+  int degree = 0;               ///< of the last fit
+  std::int64_t pieces = 1;      ///< of the last fit
+  double error = 0;             ///< of the last fit
+  std::vector<TargetFit> fits;  ///< in order
+  int solves = 0;               ///< of p*(w)
+  double seconds = 0;
+};
+
+/// The table of targets of a model with cubature, projection and 2 <= K <= kMostTableExamples examples. p*(w) is solved
+/// at the nodes of Isaac 2020 and fitted by least squares, by polynomials of growing degree until the error as the run
+/// time decodes it, also at further weights inside and on every edge and face of the simplex, is below the tolerance.
+/// Where no degree allowed gets there, K = 2 takes pieces (target_pieces.h); otherwise there is nothing, as where p*(w)
+/// jumps from one minimum to another. The same in every run and for every number of threads. method.md, section 5.
+std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
+                                                  TargetTableReport& report);
+
+}  // namespace exmat::precompute

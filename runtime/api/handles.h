@@ -1,0 +1,40 @@
+#pragma once
+
+#include <atomic>
+#include <limits>
+#include <memory>
+
+#include "exmat/exmat.h"
+#include "runtime/api/point_set.h"
+#include "runtime/sim/stepper.h"
+
+// What the handles of the C API point to. NOLINTBEGIN(readability-identifier-naming): their names are the API's.
+
+struct exmat_model {
+  std::shared_ptr<const exmat::runtime::Source> source;
+
+  const exmat::runtime::Model& model() const { return *source->loaded.model; }
+};
+
+struct exmat_points {
+  std::shared_ptr<const exmat::runtime::Source> source;
+  exmat::runtime::PointSet set;
+};
+
+struct exmat_body {
+  explicit exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source);
+
+  const exmat::runtime::Model& model() const { return *source->loaded.model; }
+  Eigen::Index modes() const { return state.q.size(); }
+
+  std::shared_ptr<const exmat::runtime::Source> source;
+  exmat::runtime::StepScene scene;  ///< the model's
+  exmat::runtime::State start, state;
+  exmat::runtime::Workspace workspace;
+  exmat::runtime::VertexPositions::Workspace drawing;
+  Eigen::VectorXd force;  ///< r
+  exmat_report report{};
+  std::atomic_flag in_use = ATOMIC_FLAG_INIT;
+};
+
+// NOLINTEND(readability-identifier-naming)

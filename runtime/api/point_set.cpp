@@ -1,0 +1,97 @@
+#include "runtime/api/point_set.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <vector>
+
+#include "common/bundle/bundle.h"
+#include "common/mesh/geometry.h"
+#include "runtime/api/failures.h"
+#include "runtime/api/tet_tree.h"
+
+namespace exmat::runtime {
+namespace {
+
+using Ids = std::vector<std::int64_t>;
+
+/// Rows of single vertices are read one by one up to this share of all.
+constexpr std::size_t kWholeBasisAbove = 8;
+
+ReducedModel read_rest(const Source& source, bool basis) {
+  const std::string reason = "points are asked for";
+  const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
+  ReducedModel data = read_bundle(source.bundle, {groups, /*step_only=*/true, /*positions=*/true});
+  const BundleSummary& summary = source.loaded.summary;
+  if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
+    throw InputError({source.bundle.string(), "/", "the bundle that the model was created from", "another one",
+                      "create the model again"});
+  return data;
+}
+
+RowMatrix rows_of(const Source& source, const Ids& ids) {
+  if (ids.size() * kWholeBasisAbove < static_cast<std::size_t>(source.loaded.summary.vertices))
+    return read_basis_rows(source.bundle, ids);
+  const RowMatrix basis = read_rest(source, /*basis=*/true).modal->basis;
+  RowMatrix rows(3 * std::ssize(ids), basis.cols());
+  for (std::size_t i = 0; i < ids.size(); ++i)
+    rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * ids[i]);
+  return rows;
+}
+
+}  // namespace
+
+PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids) {
+  const ReducedModel data = read_rest(source, /*basis=*/false);
+  const VertexArray& vertices = data.object->mesh.vertices;
+  VertexArray rest(std::ssize(ids), 3);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (ids[i] < 0 || ids[i] >= vertices.rows())
+      throw InvalidArgument(
+          fmt::format("ids[{}] = {}: expected vertices of the object, 0 to {}", i, ids[i], vertices.rows() - 1));
+    rest.row(static_cast<Eigen::Index>(i)) = vertices.row(ids[i]);
+  }
+  PointSet points;
+  points.basis_rows = rows_of(source, Ids(ids.begin(), ids.end()));
+  points.positions = VertexPositions(rest, points.basis_rows);
+  points.distances = Eigen::VectorXd::Zero(rest.rows());
+  return points;
+}
+
+PointSet read_all_vertices(const Source& source) {
+  const ReducedModel data = read_rest(source, /*basis=*/true);
+  PointSet points;
+  points.positions = VertexPositions(data.object->mesh.vertices, data.modal->basis);
+  points.basis_rows.resize(0, data.modal->basis.cols());
+  points.distances = Eigen::VectorXd::Zero(data.object->mesh.vertex_count());
+  return points;
+}
+
+PointSet read_points_at(const Source& source, const VertexArray& rest) {
+  const ReducedModel data = read_rest(source, /*basis=*/false);
+  const TetMesh& mesh = data.object->mesh;
+  const TetTree tree(mesh);
+  PointSet points;
+  points.distances.resize(rest.rows());
+  Eigen::Matrix<std::int64_t, Eigen::Dynamic, 4> corners(rest.rows(), 4);
+  Eigen::Matrix<double, Eigen::Dynamic, 4> shares(rest.rows(), 4);
+  for (Eigen::Index i = 0; i < rest.rows(); ++i) {
+    const TetTree::Hit hit = tree.nearest(rest.row(i));
+    points.distances[i] = hit.distance;
+    corners.row(i) = mesh.tets.row(hit.tet).cast<std::int64_t>();
+    shares.row(i) = barycentric(tet_positions(mesh, hit.tet), rest.row(i));
+  }
+  Ids ids(corners.data(), corners.data() + corners.size());
+  std::ranges::sort(ids);
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  const RowMatrix rows = rows_of(source, ids);
+  points.basis_rows.setZero(3 * rest.rows(), rows.cols());
+  for (Eigen::Index i = 0; i < rest.rows(); ++i)
+    for (int corner = 0; corner < 4; ++corner) {
+      const auto row = std::ranges::lower_bound(ids, corners(i, corner)) - ids.begin();
+      points.basis_rows.middleRows<3>(3 * i) += shares(i, corner) * rows.middleRows<3>(3 * row);
+    }
+  points.positions = VertexPositions(rest, points.basis_rows);
+  return points;
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+
+#include "runtime/io/scene_loader.h"
+#include "runtime/sim/vertex_positions.h"
+
+namespace exmat::runtime {
+
+/// A loaded scene and the bundle that more can be read of.
+struct Source {
+  std::filesystem::path bundle;
+  LoadedScene loaded;
+};
+
+/// k material points of a body.
+struct PointSet {
+  VertexPositions positions;
+  RowMatrix basis_rows;       ///< 3k x r; 0 x r: for drawing alone
+  Eigen::VectorXd distances;  ///< k, to the object at rest [m]
+};
+
+// They read of the bundle what the points need. Throw InputError, also where the bundle is no longer the one that was
+// loaded, and InvalidArgument: a vertex that is not there.
+PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids);
+PointSet read_all_vertices(const Source& source);
+PointSet read_points_at(const Source& source, const VertexArray& points);
+
+}  // namespace exmat::runtime

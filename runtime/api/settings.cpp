@@ -1,0 +1,131 @@
+#include "runtime/api/settings.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <fmt/format.h>
+#include <string>
+
+#include "common/config/json_file.h"
+#include "runtime/api/failures.h"
+
+namespace exmat::runtime {
+namespace {
+
+using Json = nlohmann::json;
+
+static_assert(kSettingsSizes.now >= kSettingsSizes.first && kReportSizes.now >= kReportSizes.first);
+
+constexpr std::array kIntegrators{"bdf2", "backward_euler", "newmark"};
+constexpr std::array kInternalForces{"auto", "cubature", "polynomial"};
+constexpr std::array kTargets{"auto", "table", "solve"};
+constexpr std::array kEnergyReferences{"example", "rest"};
+
+template <std::size_t N>
+const char* name_of(std::int32_t value, const std::array<const char*, N>& names, const char* member) {
+  if (value < 0 || static_cast<std::size_t>(value) >= N)
+    throw InvalidArgument(fmt::format("settings.{} = {}: expected 0 to {}", member, value, N - 1));
+  return names[static_cast<std::size_t>(value)];
+}
+
+/// Callers that were compiled with an older version leave out members, those with a newer one may set none that are
+/// not known here.
+exmat_settings completed(const exmat_settings* given) {
+  exmat_settings settings = default_settings();
+  if (given == nullptr) return settings;
+  const std::size_t size = given->size;
+  if (size < kSettingsSizes.first || size > kMostStructBytes)
+    throw InvalidArgument(
+        fmt::format("settings.size = {}: expected {}, sizeof(exmat_settings); call "
+                    "exmat_settings_default() first",
+                    size, sizeof settings));
+  const auto* const bytes = reinterpret_cast<const unsigned char*>(given);
+  if (size > sizeof settings && std::any_of(bytes + sizeof settings, bytes + size, [](auto byte) { return byte != 0; }))
+    throw InvalidArgument("settings: a member that this version of the library does not know is set");
+  std::memcpy(&settings, given, std::min(size, sizeof settings));
+  return settings;
+}
+
+void check_finite(const exmat_settings& settings) {
+  const std::array<std::pair<const char*, double>, 10> members{{{"time_step", settings.time_step},
+                                                                {"gravity[0]", settings.gravity[0]},
+                                                                {"gravity[1]", settings.gravity[1]},
+                                                                {"gravity[2]", settings.gravity[2]},
+                                                                {"mass_damping", settings.mass_damping},
+                                                                {"stiffness_damping", settings.stiffness_damping},
+                                                                {"newton_tolerance", settings.newton_tolerance},
+                                                                {"example_stiffness", settings.example_stiffness},
+                                                                {"example_damping", settings.example_damping},
+                                                                {"example_bias", settings.example_bias}}};
+  for (const auto& [name, value] : members)
+    if (!std::isfinite(value))
+      throw InvalidArgument(fmt::format("settings.{} = {}: expected a finite number", name, value));
+}
+
+/// The ranges are those of scene files.
+void check_ranges(const exmat_settings& settings) {
+  const Json scene{
+      {"bundle", "a bundle"},
+      {"time_step", settings.time_step},
+      {"damping", {{"mass", settings.mass_damping}, {"stiffness", settings.stiffness_damping}}},
+      {"newton", {{"max_iterations", settings.newton_iterations}, {"tolerance", settings.newton_tolerance}}},
+      {"examples",
+       {{"stiffness", settings.example_stiffness},
+        {"damping", settings.example_damping},
+        {"bias", settings.example_bias},
+        {"target_iterations", settings.target_iterations}}}};
+  try {
+    check_against_schema(scene, "scene", "settings");
+  } catch (const InputError& error) {
+    throw InvalidArgument(error.what());
+  }
+  if (settings.use_examples != 0 && settings.use_examples != 1)
+    throw InvalidArgument(fmt::format("settings.use_examples = {}: expected 0 or 1", settings.use_examples));
+}
+
+}  // namespace
+
+exmat_settings default_settings() {
+  const SceneConfig scene;
+  const ExampleForceConfig examples;
+  exmat_settings settings{};
+  settings.size = sizeof settings;
+  settings.time_step = scene.time_step;
+  settings.mass_damping = scene.mass_damping;
+  settings.stiffness_damping = scene.stiffness_damping;
+  settings.newton_tolerance = scene.newton.tolerance;
+  settings.newton_iterations = scene.newton.max_iterations;
+  settings.example_stiffness = examples.stiffness;
+  settings.example_damping = examples.damping;
+  settings.example_bias = examples.bias;
+  settings.target_iterations = examples.target_iterations;
+  return settings;
+}
+
+SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* given) {
+  const exmat_settings settings = completed(given);
+  check_finite(settings);
+  check_ranges(settings);
+  SceneConfig scene;
+  scene.file = "settings";
+  scene.bundle = bundle;
+  scene.time_step = settings.time_step;
+  scene.gravity = Eigen::Vector3d(settings.gravity);
+  scene.integrator = name_of(settings.integrator, kIntegrators, "integrator");
+  scene.internal_force = name_of(settings.internal_force, kInternalForces, "internal_force");
+  scene.mass_damping = settings.mass_damping;
+  scene.stiffness_damping = settings.stiffness_damping;
+  scene.newton = {settings.newton_iterations, settings.newton_tolerance};
+  ExampleForceConfig examples;
+  examples.stiffness = settings.example_stiffness;
+  examples.damping = settings.example_damping;
+  examples.bias = settings.example_bias;
+  examples.target = name_of(settings.example_target, kTargets, "example_target");
+  examples.target_iterations = settings.target_iterations;
+  examples.energy_reference = name_of(settings.energy_reference, kEnergyReferences, "energy_reference");
+  if (settings.use_examples == 1) scene.examples = examples;
+  return scene;
+}
+
+}  // namespace exmat::runtime

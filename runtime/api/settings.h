@@ -1,0 +1,25 @@
+#pragma once
+
+#include <filesystem>
+
+#include "common/config/scene_config.h"
+#include "exmat/exmat.h"
+
+namespace exmat::runtime {
+
+/// Of a struct of the API that begins with its size: in the first version, and in this one.
+struct StructSizes {
+  std::size_t first = 0, now = 0;
+};
+inline constexpr StructSizes kSettingsSizes{120, sizeof(exmat_settings)};
+inline constexpr StructSizes kReportSizes{80, sizeof(exmat_report)};
+inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
+
+/// The defaults of a scene file.
+exmat_settings default_settings();
+
+/// The scene that steps `bundle` with these settings; null: the defaults. Throws InvalidArgument: a size that no
+/// version of exmat_settings has, a member out of the range that schemas/scene.json gives it.
+SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* settings);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,76 @@
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "common/config/config.h"
+#include "runtime/app/commands.h"
+#include "runtime/app/loading_log.h"
+#include "runtime/io/bench.h"
+
+namespace exmat::runtime {
+namespace {
+
+void print(const char* name, const std::string& value) { fmt::print("{:<22} {}\n", name, value); }
+
+void print_times(std::string_view name, const Samples& seconds, double flops, double whole) {
+  const double mean = seconds.mean();
+  fmt::print("{:<16} {:>10.2f} {:>10.2f} {:>10.2f} {:>8.1f} {:>12.0f} {:>10.2f}\n", name, 1e6 * seconds.quantile(0.5),
+             1e6 * seconds.quantile(0.95), 1e6 * mean, 100 * mean / whole, flops, mean > 0 ? 1e-9 * flops / mean : 0);
+}
+
+void print_stages(const BenchResult& result) {
+  double whole = 0;
+  for (const BenchStage& stage : result.stages) whole += stage.seconds.mean();
+  fmt::print("{:<16} {:>10} {:>10} {:>10} {:>8} {:>12} {:>10}\n", "a step", "median us", "95 % us", "mean us",
+             "share %", "flops", "GFLOP/s");
+  for (std::size_t stage = 0; stage < kBenchStageNames.size(); ++stage)
+    print_times(kBenchStageNames[stage], result.stages[stage].seconds, result.stages[stage].flops, whole);
+  print_times("whole step", result.step_seconds, result.flops(), result.step_seconds.mean());
+}
+
+void print_scene(const BenchResult& result) {
+  print("model", fmt::format("r = {}, s = {}, K = {} ({} tets, which no step sees)", result.modes, result.elements,
+                             result.examples, result.tets));
+  print("internal force", result.internal_force);
+  print("target", result.target);
+  print("integrator", fmt::format("{}, time step {:g} s", result.integrator, result.time_step));
+  print("steps", fmt::format("{} from rest, {} times", result.steps, result.rounds));
+  print("bodies, threads", fmt::format("{}, {}", result.instances, result.threads));
+  print("instruction set", result.instruction_set);
+}
+
+void print_rates(const BenchResult& result) {
+  print("Newton iterations",
+        fmt::format("{:.2f} a step, {:.2f} factorisations", result.newton_iterations, result.factorisations));
+  if (result.target == "solve") print("target iterations", fmt::format("{:.2f} a step", result.target_iterations));
+  print("steps per second",
+        fmt::format("{:.0f}{}", result.steps_per_second(), result.instances > 1 ? " over all bodies" : ""));
+  print("real-time factor", fmt::format("{:.1f}", result.real_time_factor()));
+  print("bytes touched", fmt::format("{:.0f} a step", result.bytes));
+  print("achieved", fmt::format("{:.2f} GFLOP/s", 1e-9 * result.flops_per_second()));
+  print("DGEMM", fmt::format("{:.2f} GFLOP/s in one thread, best of this run; median {:.2f}",
+                             1e-9 * result.dgemm_flops_per_second, 1e-9 * result.dgemm_median_per_second));
+  print("limit", fmt::format("{:.2f} us a step: its flops at the DGEMM rate", 1e6 * result.limit_seconds()));
+  print("limit ratio", fmt::format("{:.2f}: the median step takes so many times the limit", result.limit_ratio()));
+  print("state hash", fmt::format("{:016x}", result.state_hash));
+}
+
+}  // namespace
+
+void bench_command(const BenchCommandOptions& options) {
+  SceneConfig config = load_scene(options.scene);
+  config.trajectory.reset();
+  const LoadedScene loaded = load_run(config);
+  log_loaded(loaded, config);
+  const BenchResult result = bench(loaded, config, {.steps = options.steps});
+  if (options.json) {
+    fmt::print("{}\n", to_json(result).dump(2));
+    return;
+  }
+  print_scene(result);
+  fmt::print("\n");
+  print_stages(result);
+  fmt::print("\n");
+  print_rates(result);
+}
+
+}  // namespace exmat::runtime

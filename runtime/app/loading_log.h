@@ -1,0 +1,10 @@
+#pragma once
+
+#include "runtime/io/scene_loader.h"
+
+namespace exmat::runtime {
+
+/// What was read, what was left out and the plan of the step, as messages.
+void log_loaded(const LoadedScene& loaded, const SceneConfig& config);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,219 @@
+/*
+ * exmat in other programs: load a bundle once, step any number of bodies of it, push and read any of their points.
+ * C99, and the one binary interface of libexmat_runtime: exmat.hpp wraps it for C++. docs/embedding.md has a program.
+ *
+ * Units: SI, world frame. Shapes: row-major, x y z of one point after another. r modes, K examples, n vertices.
+ *
+ * Errors: a function that can fail returns a status; the message of the last failure of this thread is
+ * exmat_last_error(). Then nothing has changed, and what would have been created is NULL. NULL for an argument that is
+ * not said to allow it, and a length that does not fit, are EXMAT_INVALID_ARGUMENT. Lengths count numbers, not points
+ * or bytes.
+ *
+ * Memory: only ..._create... functions allocate (and the first exmat_bodies_step() with more threads than before, which
+ * starts them). What they create is the caller's, to be given to the matching ..._destroy, in any order: a body or a
+ * set of points keeps what it needs of its model. ..._destroy(NULL) does nothing.
+ *
+ * Threads: models and points never change: any number of threads may use them. A body is for one thread at a time.
+ * ..._create... functions may be called from any thread and take turns.
+ */
+#ifndef EXMAT_EXMAT_H
+#define EXMAT_EXMAT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+/* NOLINTBEGIN(readability-identifier-naming): names of a C library */
+
+#if defined(__GNUC__)
+#define EXMAT_API __attribute__((visibility("default")))
+#else
+#define EXMAT_API
+#endif
+
+#ifdef __cplusplus
+#define EXMAT_NOEXCEPT noexcept
+extern "C" {
+#else
+#define EXMAT_NOEXCEPT
+#endif
+
+typedef enum exmat_status {
+  EXMAT_OK = 0,
+  EXMAT_FAILURE = 1,          /* out of memory, a file that cannot be read to its end, ... */
+  EXMAT_BAD_INPUT = 2,        /* a bundle or scene; the message has file, place, expected, found and advice */
+  EXMAT_INVALID_ARGUMENT = 3, /* of a function */
+  EXMAT_NON_FINITE = 4        /* a step met NaN or infinity: the body is as it was before that step */
+} exmat_status;
+
+/* Message of this thread's last failure, "" before the first; valid until the next one. */
+EXMAT_API const char* exmat_last_error(void) EXMAT_NOEXCEPT;
+
+/* Of the library: "0.1.0". */
+EXMAT_API const char* exmat_version(void) EXMAT_NOEXCEPT;
+
+/* ---- models ---------------------------------------------------------------------------------------------------- */
+
+/* A bundle prepared for stepping, and what acts on its bodies. */
+typedef struct exmat_model exmat_model;
+
+enum { EXMAT_BDF2 = 0, EXMAT_BACKWARD_EULER = 1, EXMAT_NEWMARK = 2 };             /* integrator */
+enum { EXMAT_INTERNAL_FORCE_AUTO = 0, EXMAT_CUBATURE = 1, EXMAT_POLYNOMIAL = 2 }; /* internal_force */
+enum { EXMAT_TARGET_AUTO = 0, EXMAT_TARGET_TABLE = 1, EXMAT_TARGET_SOLVE = 2 };   /* example_target */
+enum { EXMAT_ENERGY_REFERENCE_EXAMPLE = 0, EXMAT_ENERGY_REFERENCE_REST = 1 };     /* energy_reference */
+
+/* The members of a scene file that belong to a model; schemas/scene.json says what each is. */
+typedef struct exmat_settings {
+  size_t size;               /* sizeof(exmat_settings) where the caller was compiled */
+  double time_step;          /* > 0 [s]; 0.001 */
+  double gravity[3];         /* [m/s^2]; 0 */
+  double mass_damping;       /* alpha >= 0 [1/s]; 0 */
+  double stiffness_damping;  /* beta >= 0 [s]; 0 */
+  double newton_tolerance;   /* in (0, 1), relative; 1e-6 */
+  double example_stiffness;  /* kappa >= 0 [1/s^2]; 0. All of examples: with use_examples */
+  double example_damping;    /* c_kappa >= 0 [1/s]; 0 */
+  double example_bias;       /* in [0, 1], factor on the weight of the rest pose; 1 */
+  int32_t newton_iterations; /* most in one step, 1 to 10000; 20 */
+  int32_t integrator;        /* EXMAT_BDF2 */
+  int32_t internal_force;    /* EXMAT_INTERNAL_FORCE_AUTO: as the bundle says */
+  int32_t use_examples;      /* 1: example force; 0 */
+  int32_t example_target;    /* EXMAT_TARGET_AUTO: by the table where the bundle has one */
+  int32_t target_iterations; /* most in one step, 1 to 1000; 4 */
+  int32_t energy_reference;  /* EXMAT_ENERGY_REFERENCE_EXAMPLE */
+  int32_t reserved;          /* 0 */
+} exmat_settings;
+
+/* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
+EXMAT_API exmat_status exmat_settings_default(exmat_settings* settings, size_t size) EXMAT_NOEXCEPT;
+
+/* Of a bundle; `settings` NULL: the defaults. Reads what these settings need, no more. */
+EXMAT_API exmat_status exmat_model_create(const char* bundle_path, const exmat_settings* settings,
+                                          exmat_model** model) EXMAT_NOEXCEPT;
+
+/* Of a scene file, its scripted forces included. Its steps, instances and output are not the model's business. */
+EXMAT_API exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) EXMAT_NOEXCEPT;
+
+EXMAT_API void exmat_model_destroy(exmat_model* model) EXMAT_NOEXCEPT;
+
+/* Negative where `model` is NULL. */
+EXMAT_API int64_t exmat_model_modes(const exmat_model* model) EXMAT_NOEXCEPT;    /* r */
+EXMAT_API int64_t exmat_model_vertices(const exmat_model* model) EXMAT_NOEXCEPT; /* n */
+EXMAT_API int64_t exmat_model_examples(const exmat_model* model) EXMAT_NOEXCEPT; /* K; 0 without an example force */
+EXMAT_API double exmat_model_time_step(const exmat_model* model) EXMAT_NOEXCEPT; /* [s] */
+
+/* ---- points ---------------------------------------------------------------------------------------------------- */
+
+/* k material points of a model's body, in the order given. */
+typedef struct exmat_points exmat_points;
+
+/* Vertices of the object, 0-based `ids` [count], count >= 1; repeated ones are allowed. */
+EXMAT_API exmat_status exmat_points_create_vertices(const exmat_model* model, const int64_t* ids, int64_t count,
+                                                    exmat_points** points) EXMAT_NOEXCEPT;
+
+/* All vertices, in single precision: to be read, not to be pushed. */
+EXMAT_API exmat_status exmat_points_create_all_vertices(const exmat_model* model, exmat_points** points) EXMAT_NOEXCEPT;
+
+/* Points of the rest shape `xyz` [coordinates = 3k] [m], k >= 1: each moves with the tet that holds it, or with the
+   nearest one, continued linearly, where none does. */
+EXMAT_API exmat_status exmat_points_create_at(const exmat_model* model, const double* xyz, int64_t coordinates,
+                                              exmat_points** points) EXMAT_NOEXCEPT;
+
+EXMAT_API void exmat_points_destroy(exmat_points* points) EXMAT_NOEXCEPT;
+
+/* k; negative where `points` is NULL. */
+EXMAT_API int64_t exmat_points_count(const exmat_points* points) EXMAT_NOEXCEPT;
+
+/* `distances` [count = k]: from each point to the object at rest, 0 inside [m]. */
+EXMAT_API exmat_status exmat_points_distances(const exmat_points* points, double* distances,
+                                              int64_t count) EXMAT_NOEXCEPT;
+
+/* ---- bodies ---------------------------------------------------------------------------------------------------- */
+
+/* One body: its state, the forces on it and the scratch of its steps. */
+typedef struct exmat_body exmat_body;
+
+/* At rest at time 0. */
+EXMAT_API exmat_status exmat_body_create(const exmat_model* model, exmat_body** body) EXMAT_NOEXCEPT;
+EXMAT_API void exmat_body_destroy(exmat_body* body) EXMAT_NOEXCEPT;
+
+/* Back to rest at time 0, without applied forces. */
+EXMAT_API exmat_status exmat_body_reset(exmat_body* body) EXMAT_NOEXCEPT;
+
+/* As reset, at the reduced displacement `q` with the velocity `v`, [modes = r] each. */
+EXMAT_API exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const double* v,
+                                              int64_t modes) EXMAT_NOEXCEPT;
+
+/* Bits of exmat_report.status. */
+enum {
+  EXMAT_STEP_NON_FINITE = 1,
+  EXMAT_STEP_ITERATION_LIMIT = 2,      /* the residual is above the tolerance */
+  EXMAT_STEP_STAGNATED = 4,            /* likewise, and no descent is left: rounding */
+  EXMAT_STEP_TARGET_NOT_CONVERGED = 8, /* the next step carries on */
+  EXMAT_STEP_SUBNORMAL = 16            /* no fault: numbers below 2.2e-308 were set to zero */
+};
+
+/* What the steps of one call did: sums, unless said otherwise. */
+typedef struct exmat_report {
+  size_t size;     /* sizeof(exmat_report), set by the caller */
+  int64_t steps;   /* taken; fewer than asked for only with EXMAT_NON_FINITE */
+  uint32_t status; /* bits of all steps */
+  uint32_t reserved;
+  int64_t newton_iterations;
+  int64_t factorisations;
+  int64_t line_search_evaluations;
+  int64_t projections;
+  int64_t target_iterations;
+  double residual; /* of the equation of motion at the end of the last step [kg^1/2 m/s^2] */
+  double seconds;  /* wall clock */
+} exmat_report;
+
+/* Takes `steps` >= 0 steps, fewer with EXMAT_NON_FINITE. `report` may be NULL. */
+EXMAT_API exmat_status exmat_body_step(exmat_body* body, int64_t steps, exmat_report* report) EXMAT_NOEXCEPT;
+
+/* The same for `count` different bodies, of any models, by up to `threads` threads (0: as many as there are
+   processors). Each body is stepped by one of them: the results do not depend on their number. EXMAT_NON_FINITE names
+   the first such body; the others have taken all their steps. */
+EXMAT_API exmat_status exmat_bodies_step(exmat_body* const* bodies, int64_t count, int64_t steps,
+                                         int32_t threads) EXMAT_NOEXCEPT;
+
+/* Of the last call that stepped this body. */
+EXMAT_API exmat_status exmat_body_report(const exmat_body* body, exmat_report* report) EXMAT_NOEXCEPT;
+
+/* Adds `forces` [coordinates = 3k] [N] on the points, constant in the world, to those that act in every step from now
+   on. Points of another model and forces that are not finite are refused. */
+EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* points, const double* forces,
+                                               int64_t coordinates) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
+
+/* To be called after forces have changed abruptly: the next step then takes nothing from the ones before but position
+   and velocity, as where a scene's scripted force begins or ends, so that the impulse is exact. Forces that follow
+   something smooth do without. */
+EXMAT_API exmat_status exmat_body_restart_integrator(exmat_body* body) EXMAT_NOEXCEPT;
+
+/* World positions `xyz` [coordinates = 3k] [m] in single precision; of all vertices as fast as memory is read. */
+EXMAT_API exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* points, float* xyz,
+                                                 int64_t coordinates) EXMAT_NOEXCEPT;
+
+/* Reduced displacement `q` and velocity `v`, [modes = r] each; either may be NULL. */
+EXMAT_API exmat_status exmat_body_read_reduced(const exmat_body* body, double* q, double* v,
+                                               int64_t modes) EXMAT_NOEXCEPT;
+
+/* Example weights [count = K] of the last step, after the bias. */
+EXMAT_API exmat_status exmat_body_weights(const exmat_body* body, double* weights, int64_t count) EXMAT_NOEXCEPT;
+
+typedef struct exmat_energies {
+  double kinetic;   /* [J] */
+  double elastic;   /* [J] */
+  double potential; /* of gravity, 0 at rest [J] */
+} exmat_energies;
+EXMAT_API exmat_status exmat_body_energies(const exmat_body* body, exmat_energies* energies) EXMAT_NOEXCEPT;
+
+/* [s]; negative where `body` is NULL. */
+EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
+
+#ifdef __cplusplus
+}
+#endif
+
+/* NOLINTEND(readability-identifier-naming) */
+
+#endif

@@ -1,0 +1,211 @@
+// exmat.h for C++20: handles that own, exceptions instead of codes, spans instead of pointers and lengths. A thin
+// header over the C interface; what the functions do is said there.
+#ifndef EXMAT_EXMAT_HPP
+#define EXMAT_EXMAT_HPP
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "exmat/exmat.h"
+
+namespace exmat {
+
+/// What a function of exmat.h returned, with its message.
+class Error : public std::runtime_error {
+ public:
+  Error(exmat_status status, const char* message) : std::runtime_error(message), status_(status) {}
+  exmat_status status() const noexcept { return status_; }
+
+ private:
+  exmat_status status_;
+};
+
+namespace detail {
+
+inline void check(exmat_status status) {
+  if (status != EXMAT_OK) throw Error(status, exmat_last_error());
+}
+
+template <auto Destroy>
+struct Destroyer {
+  template <typename Handle>
+  void operator()(Handle* handle) const noexcept {
+    Destroy(handle);
+  }
+};
+
+template <typename Handle, auto Destroy>
+using Owner = std::unique_ptr<Handle, Destroyer<Destroy>>;
+
+template <typename T>
+std::int64_t length(std::span<T> numbers) noexcept {
+  return static_cast<std::int64_t>(numbers.size());
+}
+
+}  // namespace detail
+
+inline exmat_settings default_settings() {
+  exmat_settings settings;
+  detail::check(exmat_settings_default(&settings, sizeof settings));
+  return settings;
+}
+
+/// A bundle prepared for stepping. All of these are moved, not copied; one that was moved from is empty.
+class Model {
+ public:
+  explicit Model(const std::string& bundle) : Model(bundle, default_settings()) {}
+  Model(const std::string& bundle, const exmat_settings& settings) {
+    exmat_model* model = nullptr;
+    detail::check(exmat_model_create(bundle.c_str(), &settings, &model));
+    handle_.reset(model);
+  }
+  static Model from_scene(const std::string& scene) {
+    exmat_model* model = nullptr;
+    detail::check(exmat_model_create_from_scene(scene.c_str(), &model));
+    return Model(model);
+  }
+
+  std::size_t modes() const noexcept { return static_cast<std::size_t>(exmat_model_modes(get())); }
+  std::size_t vertices() const noexcept { return static_cast<std::size_t>(exmat_model_vertices(get())); }
+  std::size_t examples() const noexcept { return static_cast<std::size_t>(exmat_model_examples(get())); }
+  double time_step() const noexcept { return exmat_model_time_step(get()); }
+
+  const exmat_model* get() const noexcept { return handle_.get(); }
+
+ private:
+  explicit Model(exmat_model* model) : handle_(model) {}
+  detail::Owner<exmat_model, exmat_model_destroy> handle_;
+};
+
+/// k material points of a model's body.
+class Points {
+ public:
+  static Points vertices(const Model& model, std::span<const std::int64_t> ids) {
+    exmat_points* points = nullptr;
+    detail::check(exmat_points_create_vertices(model.get(), ids.data(), detail::length(ids), &points));
+    return Points(points);
+  }
+  /// To be read, not to be pushed.
+  static Points all_vertices(const Model& model) {
+    exmat_points* points = nullptr;
+    detail::check(exmat_points_create_all_vertices(model.get(), &points));
+    return Points(points);
+  }
+  /// `xyz` [3k], in the rest shape.
+  static Points at(const Model& model, std::span<const double> xyz) {
+    exmat_points* points = nullptr;
+    detail::check(exmat_points_create_at(model.get(), xyz.data(), detail::length(xyz), &points));
+    return Points(points);
+  }
+
+  std::size_t size() const noexcept { return static_cast<std::size_t>(exmat_points_count(get())); }
+  /// [k], from the object at rest.
+  std::vector<double> distances() const {
+    std::vector<double> distances(size());
+    detail::check(exmat_points_distances(get(), distances.data(), static_cast<std::int64_t>(distances.size())));
+    return distances;
+  }
+
+  const exmat_points* get() const noexcept { return handle_.get(); }
+
+ private:
+  explicit Points(exmat_points* points) : handle_(points) {}
+  detail::Owner<exmat_points, exmat_points_destroy> handle_;
+};
+
+class Body {
+ public:
+  explicit Body(const Model& model) {
+    exmat_body* body = nullptr;
+    detail::check(exmat_body_create(model.get(), &body));
+    handle_.reset(body);
+  }
+
+  void reset() { detail::check(exmat_body_reset(get())); }
+  void set_reduced(std::span<const double> q, std::span<const double> v) {
+    if (q.size() != v.size()) throw Error(EXMAT_INVALID_ARGUMENT, "set_reduced: q and v differ in length");
+    detail::check(exmat_body_set_reduced(get(), q.data(), v.data(), detail::length(q)));
+  }
+
+  exmat_report step(std::int64_t steps = 1) {
+    exmat_report report;
+    report.size = sizeof report;
+    detail::check(exmat_body_step(get(), steps, &report));
+    return report;
+  }
+  /// Of the last steps, also where they threw.
+  exmat_report report() const {
+    exmat_report report;
+    report.size = sizeof report;
+    detail::check(exmat_body_report(get(), &report));
+    return report;
+  }
+
+  /// `forces` [3k].
+  void apply_forces(const Points& points, std::span<const double> forces) {
+    detail::check(exmat_body_apply_forces(get(), points.get(), forces.data(), detail::length(forces)));
+  }
+  void clear_forces() { detail::check(exmat_body_clear_forces(get())); }
+  void restart_integrator() { detail::check(exmat_body_restart_integrator(get())); }
+
+  /// `xyz` [3k].
+  void read_positions(const Points& points, std::span<float> xyz) {
+    detail::check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
+  }
+  /// `q` [r].
+  void read_displacement(std::span<double> q) const {
+    detail::check(exmat_body_read_reduced(get(), q.data(), nullptr, detail::length(q)));
+  }
+  /// `v` [r].
+  void read_velocity(std::span<double> v) const {
+    detail::check(exmat_body_read_reduced(get(), nullptr, v.data(), detail::length(v)));
+  }
+  /// `weights` [K].
+  void read_weights(std::span<double> weights) const {
+    detail::check(exmat_body_weights(get(), weights.data(), detail::length(weights)));
+  }
+  exmat_energies energies() const {
+    exmat_energies energies;
+    detail::check(exmat_body_energies(get(), &energies));
+    return energies;
+  }
+  double time() const noexcept { return exmat_body_time(get()); }
+
+  exmat_body* get() const noexcept { return handle_.get(); }
+
+ private:
+  detail::Owner<exmat_body, exmat_body_destroy> handle_;
+};
+
+/// Bodies that are stepped together.
+class Bodies {
+ public:
+  void add(Body body) {
+    handles_.reserve(bodies_.size() + 1);
+    bodies_.push_back(std::move(body));
+    handles_.push_back(bodies_.back().get());
+  }
+
+  std::size_t size() const noexcept { return bodies_.size(); }
+  Body& operator[](std::size_t i) noexcept { return bodies_[i]; }
+  const Body& operator[](std::size_t i) const noexcept { return bodies_[i]; }
+
+  /// By up to `threads` threads, 0: as many as there are processors.
+  void step(std::int64_t steps = 1, int threads = 0) {
+    detail::check(exmat_bodies_step(handles_.data(), static_cast<std::int64_t>(handles_.size()), steps, threads));
+  }
+
+ private:
+  std::vector<Body> bodies_;
+  std::vector<exmat_body*> handles_;
+};
+
+}  // namespace exmat
+
+#endif

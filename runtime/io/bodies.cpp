@@ -1,0 +1,111 @@
+#include "runtime/io/bodies.h"
+
+#include <algorithm>
+#include <bit>
+#include <omp.h>
+#include <utility>
+
+#include "common/core/timer.h"
+
+namespace exmat::runtime {
+namespace {
+
+/// FNV-1a of numbers, byte by byte.
+class Hash {
+ public:
+  void add(const auto& values) {
+    for (const double value : values)
+      for (int shift = 0; shift < 64; shift += 8) {
+        hash_ ^= std::bit_cast<std::uint64_t>(value) >> shift & 0xff;
+        hash_ *= 0x100000001b3;
+      }
+  }
+  std::uint64_t value() const { return hash_; }
+
+ private:
+  std::uint64_t hash_ = 0xcbf29ce484222325;
+};
+
+}  // namespace
+
+Bodies::Bodies(const Model& model, const StepScene& scene, State start, int count)
+    : model_(model),
+      scene_(scene),
+      start_(std::move(start)),
+      reports_(static_cast<std::size_t>(count)),
+      threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene}, {}}) {
+  refresh_weights(model, scene, start_, threads_.front().workspace);
+  states_.assign(reports_.size(), start_);
+}
+
+void Bodies::restart() {
+  for (State& state : states_) state = start_;
+}
+
+/// The bodies of one thread: a contiguous share, which depends on the number of threads and on nothing else.
+void Bodies::step_share(int thread) noexcept {
+  auto& [workspace, measured] = threads_[static_cast<std::size_t>(thread)];
+  const std::size_t first = states_.size() * static_cast<std::size_t>(thread) / threads_.size();
+  const std::size_t last = states_.size() * static_cast<std::size_t>(thread + 1) / threads_.size();
+  for (std::size_t body = first; body < last; ++body) {
+    if (workspace.profile == nullptr) {
+      reports_[body] = runtime::step(model_, scene_, states_[body], workspace);
+      continue;
+    }
+    const Timer timer;
+    reports_[body] = runtime::step(model_, scene_, states_[body], workspace);
+    measured.seconds += timer.seconds();
+    measured.work += step_work(model_, scene_, reports_[body]);
+  }
+}
+
+std::span<const StepReport> Bodies::step() noexcept {
+  const int threads = this->threads();
+  if (threads == 1) {
+    step_share(0);
+    return reports_;
+  }
+#pragma omp parallel for schedule(static, 1) num_threads(threads)
+  for (int thread = 0; thread < threads; ++thread) step_share(thread);
+  return reports_;
+}
+
+std::optional<int> Bodies::first_non_finite() const {
+  for (int body = 0; body < count(); ++body)
+    if ((reports_[static_cast<std::size_t>(body)].status & kStepNonFinite) != 0) return body;
+  return std::nullopt;
+}
+
+std::uint64_t Bodies::hash() const {
+  Hash hash;
+  for (const State& state : states_) {
+    hash.add(state.q);
+    hash.add(state.v);
+    if (!state.body) continue;
+    hash.add(state.body->position);
+    hash.add(state.body->orientation.coeffs());
+    hash.add(state.body->linear_momentum);
+    hash.add(state.body->angular_momentum);
+  }
+  return hash.value();
+}
+
+void Bodies::set_profiled(bool profiled) {
+  for (Thread& thread : threads_) thread.workspace.profile = profiled ? &thread.measured.profile : nullptr;
+}
+
+Bodies::Measured Bodies::take_measured() {
+  Measured sum;
+  for (Thread& thread : threads_) {
+    for (std::size_t stage = 0; stage < kStageNames.size(); ++stage) {
+      sum.profile.seconds[stage] += thread.measured.profile.seconds[stage];
+      sum.profile.flops[stage] += thread.measured.profile.flops[stage];
+    }
+    sum.seconds += thread.measured.seconds;
+    sum.work += thread.measured.work;
+    thread.measured = {};
+  }
+  return sum;
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "runtime/sim/model.h"
+#include "runtime/sim/scene.h"
+#include "runtime/sim/spin.h"
+#include "runtime/sim/state.h"
+
+namespace exmat::runtime {
+
+/// Rotation of a free body within one step, and what it does to q: with the spin w(q, v) that keeps the angular
+/// momentum and W = sum_c w_c A_c, pi = v - W q and
+///   dpi/dt = W v + d/dq (1/2 w^T J w) - f_int + f_ext + f_example.
+/// method.md, section 6. r modes. No call allocates or throws.
+struct FreeMotionWorkspace {
+  FreeMotionWorkspace() = default;
+  explicit FreeMotionWorkspace(const Model& model);
+
+  SpinProblem problem;         ///< of this step
+  bool spin_is_given = false;  ///< near obstacles the spin is an unknown of its own
+  SpinSolution solution;
+  RigidFrame::Moments moments;
+  AlignedArray scratch;
+  Eigen::VectorXd force, product, velocity;             ///< r, product padded(r)
+  Eigen::Matrix3Xd slope;                               ///< 3 x r, D + V
+  Eigen::Matrix3Xd inverse_slope, inverse_deformation;  ///< 3 x r, J^-1 (D + V) and J^-1 H
+  Eigen::MatrixXd gyroscopic;                           ///< r x r
+};
+
+/// The problem of the spin in this step, after external forces have changed the momenta of `body`. `dissipative`:
+/// implicit Euler instead of implicit midpoint.
+void begin_rotation(const FreeState& body, double time_step, bool dissipative, FreeMotionWorkspace& workspace) noexcept;
+
+/// Moments at q and the spin at the end of the step for q and its velocity in workspace.velocity. False where there is
+/// no such spin.
+bool update_spin(const RigidFrame& frame, const Eigen::VectorXd& q, FreeMotionWorkspace& workspace) noexcept;
+
+/// workspace.force = d/dt (W q) + W v + d/dq (1/2 w^T J w), d/dt as the integrator has it: `rate` W q.
+void rotation_force(const RigidFrame& frame, double rate, FreeMotionWorkspace& workspace) noexcept;
+
+/// The rotation's part of the derivative of the gradient, v = c_v (q - q_v), after rotation_force(): with D = d(J
+/// w)/dq, V = dh/dq and H = dh/dv, w of constant angular momentum gives (D + V - c_v H)^T J^-1 (D + V + c_v H). Adds
+/// its symmetric part to the lower triangle, and what the centrifugal force softens where that is small beside inertia.
+void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace,
+                            Eigen::MatrixXd& hessian) noexcept;
+
+/// Its antisymmetric part and -2 c_v W into workspace.gyroscopic. After add_rotation_stiffness().
+void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept;
+
+}  // namespace exmat::runtime

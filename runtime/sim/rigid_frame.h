@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/model/reduced_model.h"
+#include "runtime/kernels/aligned_array.h"
+
+namespace exmat::runtime {
+
+/// Rotation of a free body x = c + R (X + U q) by its moments: no sum over vertices. method.md, section 6. r modes;
+/// body frame. Second moments P_ab(q) = P0_ab + p1_ab . q + q^T S_ab q, inertia J = tr(P) I - P, angular momentum of
+/// the deformation h_c = q^T A_c v, A_c = S_ab - S_ba with (c, a, b) cyclic. Immutable; no call allocates or throws.
+class RigidFrame {
+ public:
+  /// What depends on q alone.
+  struct Moments {
+    AlignedArray products;         ///< S_ab q of the six symmetric S_ab, then A_c q, padded(r) each
+    Eigen::Matrix3d inertia;       ///< J
+    Eigen::Matrix3Xd deformation;  ///< H [3 x r] = dh/dv, row c = -(A_c q)^T
+    Eigen::MatrixXd gradients;     ///< r x 6, dP_ab/dq in the order xx, yy, zz, yz, xz, xy
+  };
+
+  RigidFrame() = default;
+  explicit RigidFrame(const RigidData& data);
+
+  Moments make_moments() const;
+
+  Eigen::Index modes() const { return linear_.rows(); }
+  double mass() const { return mass_; }
+  const Eigen::Vector3d& centre_of_mass() const { return centre_of_mass_; }  ///< at rest, world [m]
+
+  void moments(const Eigen::VectorXd& q, Moments& moments) const noexcept;
+
+  /// `force` [r] = d/dq (1/2 w^T J w) for the spin w: centrifugal.
+  void centrifugal_force(const Moments& moments, const Eigen::Vector3d& spin, Eigen::VectorXd& force) const noexcept;
+
+  /// `product` [padded(r)] = sum_c w_c A_c v.
+  void gyroscopic_product(const Eigen::Vector3d& spin, const Eigen::VectorXd& v, AlignedArray& scratch,
+                          Eigen::VectorXd& product) const noexcept;
+
+  /// sum_c w_c A_c [r x r], antisymmetric, added `factor` times.
+  void add_gyroscopic(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept;
+
+  /// d2/dq2 (1/2 w^T J w) [r x r], positive semi-definite, added `factor` times to the lower triangle.
+  void add_centrifugal(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept;
+
+  /// d(J w)/dq [3 x r] at fixed w.
+  void inertia_slope(const Moments& moments, const Eigen::Vector3d& spin, Eigen::Matrix3Xd& slope) const noexcept;
+
+ private:
+  static constexpr int kSymmetric = 6;
+  static constexpr int kProducts = 9;
+
+  double mass_ = 0;
+  Eigen::Vector3d centre_of_mass_ = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second_moments_ = Eigen::Matrix3d::Zero();
+  Eigen::MatrixXd linear_;  ///< r x 6, p1_ab
+  AlignedArray stacked_;    ///< kProducts padded(r) x r by columns: S_ab and A_c
+};
+
+}  // namespace exmat::runtime

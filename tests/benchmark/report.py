@@ -1,0 +1,181 @@
+#!/usr/bin/python3
+"""Runs exmat-benchmark with every instruction set and writes the results into docs/performance.md.
+
+Usage: report.py --results DIR --page PAGE.md [--compiler NAME] [--run EXMAT-BENCHMARK]
+Without --run, the JSON files of an earlier run in DIR are reported again. The target `benchmark` of the build calls it.
+"""
+import argparse
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+SETS = ("avx512", "avx2", "portable")  # the fastest first; the first one that the machine has runs everything
+REPETITIONS = 5
+BEGIN, END = "<!-- results: begin -->", "<!-- results: end -->"
+KERNELS = {
+    "force_and_stiffness": "force and stiffness", "force": "force", "energy": "energy",
+    "polynomial": "polynomial (force and stiffness)", "cholesky": "Cholesky", "solve": "solve",
+    "target_table": "target, table", "target_solve": "target, solve", "weights": "weights",
+    "positions_1000": "positions of 1,000 vertices", "positions_100000": "positions of 100,000 vertices"}
+TARGETS = {"no_examples": "no examples", "table": "examples, table", "solve": "examples, solve"}
+
+
+def run(program, results):
+    results.mkdir(parents=True, exist_ok=True)
+    first = True
+    for name in SETS:
+        output = results / f"{name}.json"
+        output.unlink(missing_ok=True)
+        command = [str(program), f"--benchmark_out={output}", "--benchmark_out_format=json", "--benchmark_min_time=0.1",
+                   f"--benchmark_repetitions={REPETITIONS}", "--benchmark_enable_random_interleaving=true",
+                   "--benchmark_filter=" + (".*" if first else "^kernel/")]
+        subprocess.run(command, check=True, env=os.environ | {"EXMAT_SIMD": name})
+        if json.loads(output.read_text())["context"]["instruction_set"] == name:
+            first = False
+        else:  # this machine does not have it
+            output.unlink()
+
+
+class Results:
+    """Of one instruction set: for each benchmark the best repetition, and the best DGEMM rate of them all."""
+
+    def __init__(self, path):
+        document = json.loads(path.read_text())
+        self.name = document["context"]["instruction_set"]
+        runs = [run for run in document["benchmarks"] if run["run_type"] == "iteration"]
+        self.dgemm = max(run["dgemm_gflops"] for run in runs)
+        self.best = {}
+        for run in runs:
+            real = run["run_name"].endswith("/real_time")
+            nanoseconds = run["real_time" if real else "cpu_time"]
+            name = run["run_name"].removesuffix("/real_time")
+            if name not in self.best or nanoseconds < self.best[name]["nanoseconds"]:
+                self.best[name] = run | {"nanoseconds": nanoseconds}
+
+    def microseconds(self, name):
+        return self.best[name]["nanoseconds"] / 1e3
+
+    def ratio(self, name):
+        return self.best[name]["nanoseconds"] * self.dgemm / self.best[name]["flops"]
+
+    def cell(self, name):
+        return f"{number(self.microseconds(name))} ({number(self.ratio(name))})" if name in self.best else ""
+
+
+def number(value):
+    if value >= 1000:
+        return f"{value:,.0f}"
+    return f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def table(header, rows):
+    lines = ["| " + " | ".join(header) + " |", "| " + " | ".join(["---"] * len(header)) + " |"]
+    return "\n".join(lines + ["| " + " | ".join(str(cell) for cell in row) + " |" for row in rows])
+
+
+def by_size(name):
+    """Orders kernel/NAME/rR/sS by R and S."""
+    return [int(size) for size in re.findall(r"/[rs](\d+)", name)]
+
+
+def machine(results, compiler):
+    info = Path("/proc/cpuinfo").read_text()
+    model = re.search(r"model name\s*: (.*)", info)
+    caches = {}
+    for index in sorted(Path("/sys/devices/system/cpu/cpu0/cache").glob("index*")):
+        level, kind, size = ((index / part).read_text().strip() for part in ("level", "type", "size"))
+        if kind != "Instruction":
+            caches[level] = size
+    rates = ", ".join(f"{result.dgemm:.1f} ({result.name})" for result in results)
+    return table(("machine", ""), [
+        ("processor", model.group(1) if model else "unknown"),
+        ("cores", os.cpu_count()),
+        ("caches", ", ".join(f"L{level} {size}" for level, size in caches.items())),
+        ("compiler", compiler),
+        ("DGEMM in one thread [GFLOP/s]", rates)])
+
+
+def kernels(results):
+    rows = []
+    for kernel, title in KERNELS.items():
+        names = sorted((name for name in results[0].best if name.startswith(f"kernel/{kernel}/")), key=by_size)
+        for name in names:
+            sizes = by_size(name) + [""]
+            rows.append((title, sizes[0], sizes[1], *(result.cell(name) for result in results)))
+    return table(("kernel", "r", "s", *(result.name for result in results)), rows)
+
+
+def steps(result):
+    found = {tuple(name.split("/")[1:]) for name in result.best if name.startswith("step/")}
+    cubature = sorted((force for _, force, _ in found if force[1:].isdigit()), key=lambda force: int(force[1:]))
+    columns = [*dict.fromkeys(cubature), "polynomial"]
+    rows = []
+    for modes in sorted({modes for modes, _, _ in found}):
+        for target, title in TARGETS.items():
+            rows.append((modes[1:], title, *(result.cell(f"step/{modes}/{force}/{target}") for force in columns)))
+    titles = [f"s = {force[1:]}" if force[1:].isdigit() else force for force in columns]
+    return table(("r", "", *titles), rows)
+
+
+def sizes(result):
+    names = {int(name.split("/")[1].removesuffix("_tets")): name for name in result.best if name.startswith("size/")}
+    first = result.microseconds(names[min(names)])
+    rows = []
+    for tets, name in sorted(names.items()):
+        time, read = result.microseconds(name), result.best[name]["bytes_read"]
+        rows.append((f"{tets:,}", number(time), f"{time / first:.2f}", f"{read:,.0f}"))
+    return table(("tets", "a step [us]", "over the smallest", "bytes read at load"), rows)
+
+
+def instances(result):
+    found = sorted((int(count), threads) for _, threads, count in
+                   (name.split("/") for name in result.best if name.startswith("instances/")))
+    one = result.microseconds("instances/threads1/1")
+    rows = {}
+    for count, threads in found:
+        per_body = result.microseconds(f"instances/{threads}/{count}") / count
+        rows.setdefault(count, {})[threads] = f"{number(per_body)} ({one / per_body:.2f})"
+    return table(("bodies", "1 thread", "2 threads"),
+                 [(f"{count:,}", row.get("threads1", ""), row.get("threads2", "")) for count, row in rows.items()])
+
+
+def report(results, compiler):
+    fastest = results[0]
+    return "\n\n".join((
+        machine(results, compiler),
+        f"Each number is the best of {REPETITIONS} repetitions, which were taken in random order so that a disturbance "
+        "does not hit all of one benchmark's.\nTimes of one thread are of its processor time, those of several bodies "
+        "of the wall clock.",
+        f"### Whole steps ({fastest.name})\n\nMicroseconds of a step; in parentheses how many times as long as its "
+        "flops at the DGEMM rate.",
+        steps(fastest),
+        f"### Size of the mesh ({fastest.name})\n\nThe same reduced model (r = 20, s = 60, four examples, table) in "
+        "bundles of meshes that differ in size alone,\nloaded as `exmat-runtime run` does without a trajectory.",
+        sizes(fastest),
+        f"### Many bodies ({fastest.name})\n\nMicroseconds of wall clock for a step of one body, r = 20, s = 60, four "
+        "examples, table; in parentheses the\nspeed-up over one body alone.",
+        instances(fastest),
+        "### Kernels\n\nMicroseconds; in parentheses how many times as long as its flops at the DGEMM rate of the same "
+        "instruction set.",
+        kernels(results)))
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--run", type=Path)
+    parser.add_argument("--results", type=Path, required=True)
+    parser.add_argument("--page", type=Path, required=True)
+    parser.add_argument("--compiler", default="unknown")
+    options = parser.parse_args()
+    if options.run:
+        run(options.run, options.results)
+    results = [Results(path) for name in SETS if (path := options.results / f"{name}.json").exists()]
+    text = options.page.read_text()
+    before, after = text[:text.index(BEGIN) + len(BEGIN)], text[text.index(END):]
+    options.page.write_text(f"{before}\n{report(results, options.compiler)}\n{after}")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,196 @@
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+
+#include "runtime/sim/stepper.h"
+#include "tests/support/allocation_counter.h"
+#include "tests/support/synthetic_model.h"
+
+namespace exmat::runtime {
+namespace {
+
+/// All surface vertices, a third of the area of their triangles each.
+ContactData contact_data(const ReducedModel& model) {
+  const ObjectData& object = *model.object;
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(object.mesh.vertex_count());
+  for (Eigen::Index t = 0; t < object.surface.rows(); ++t) {
+    const auto corner = [&](int i) { return Eigen::Vector3d(object.mesh.vertices.row(object.surface(t, i))); };
+    const double area = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+    for (int i = 0; i < 3; ++i) areas[object.surface(t, i)] += area / 3;
+  }
+  ContactData data;
+  std::vector<std::int32_t> ids;
+  for (Eigen::Index i = 0; i < areas.size(); ++i)
+    if (areas[i] > 0) ids.push_back(static_cast<std::int32_t>(i));
+  const auto count = static_cast<Eigen::Index>(ids.size());
+  data.vertices = Eigen::Map<const IndexVector>(ids.data(), count);
+  data.positions.resize(count, 3);
+  data.areas.resize(count);
+  data.basis.resize(3 * count, model.modal->basis.cols());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    data.positions.row(i) = object.mesh.vertices.row(data.vertices[i]);
+    data.areas[i] = areas[data.vertices[i]];
+    data.basis.middleRows<3>(3 * i) = model.modal->basis.middleRows<3>(3 * data.vertices[i]);
+  }
+  return data;
+}
+
+constexpr double kGravity = 9.81;
+
+/// A free block and a floor through the origin.
+struct Dropped {
+  explicit Dropped(double time_step, double stiffness, double friction = 0, double damping = 0, bool free = true)
+      : bar(test::make_bar({.cells = {4, 2, 2}, .lengths = {0.4, 0.2, 0.2}, .youngs_modulus = 1e6, .free = free})) {
+    bar.model.contact = contact_data(bar.model);
+    model = build_model(bar.model, {}).model;
+    scene.time_step = time_step;
+    scene.gravity = Eigen::Vector3d(0, 0, -kGravity);
+    scene.gravity_force = gravity_force(*model, scene.gravity);
+    if (free) scene.gravity_force.setZero();
+    scene.obstacles.push_back(
+        {Plane{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ()}, RigidMotion(), stiffness, damping, friction});
+    state = make_state(*model);
+    prepare_contacts(*model, 1, state);
+  }
+
+  double mass() const { return bar.model.rigid->mass; }
+  double energy() const {
+    const Energies now = energies(scene, state);
+    return now.kinetic + now.elastic + now.potential;
+  }
+
+  test::Bar bar;
+  std::unique_ptr<const Model> model;
+  StepScene scene;
+  State state;
+};
+
+TEST(ContactStep, ADroppedBodyComesToRestAndTheFloorCarriesIt) {
+  Dropped dropped(2e-3, 1e7, 0.5, 2e4);
+  dropped.scene.mass_damping = 2;
+  dropped.scene.stiffness_damping = 2e-3;
+  dropped.state.body->position = Eigen::Vector3d(0, 0, 0.05);
+  Workspace workspace(*dropped.model, dropped.scene);
+  const double energy = dropped.mass() * kGravity * 0.05;
+  StepReport report;
+  Eigen::Vector3d there = Eigen::Vector3d::Zero();
+  for (int i = 0; i < 3000; ++i) {
+    report = step(*dropped.model, dropped.scene, dropped.state, workspace);
+    ASSERT_FALSE(report.status & kStepNonFinite) << i;
+    if (i == 1500) there = dropped.state.body->position;
+  }
+  EXPECT_LE(energies(dropped.scene, dropped.state).kinetic, 1e-8 * energy);
+  EXPECT_NEAR(report.contact_force[2], dropped.mass() * kGravity, 1e-3 * dropped.mass() * kGravity);
+  EXPECT_LE((dropped.state.body->position - there).norm(), 1e-6);
+  EXPECT_GT(report.contacts, 3);
+}
+
+TEST(ContactStep, SlidesOrStaysOnASlope) {
+  constexpr double kSlope = 20 * std::numbers::pi / 180;
+  for (const double friction : {0.2, 0.8}) {
+    Dropped body(2e-3, 1e7, friction, 2e4);
+    // The floor stays level; gravity leans.
+    body.scene.gravity = kGravity * Eigen::Vector3d(std::sin(kSlope), 0, -std::cos(kSlope));
+    body.scene.mass_damping = 2;
+    body.scene.stiffness_damping = 2e-3;
+    Workspace workspace(*body.model, body.scene);
+    for (int i = 0; i < 500; ++i) step(*body.model, body.scene, body.state, workspace);
+    const Eigen::Vector3d position = body.state.body->position;
+    const double velocity = body.state.body->linear_momentum[0] / body.mass();
+    constexpr int kSteps = 2500;
+    for (int i = 0; i < kSteps; ++i) step(*body.model, body.scene, body.state, workspace);
+    const double time = kSteps * body.scene.time_step;
+    if (friction > std::tan(kSlope)) {
+      EXPECT_LE((body.state.body->position - position).norm(), 1e-6);
+    } else {
+      const double acceleration = (body.state.body->linear_momentum[0] / body.mass() - velocity) / time;
+      const double expected = kGravity * (std::sin(kSlope) - friction * std::cos(kSlope));
+      EXPECT_NEAR(acceleration, expected, 0.02 * expected);
+    }
+  }
+}
+
+TEST(ContactStep, ImpactTakesNoEnergyAndMomentumIsTheIntegralOfTheForces) {
+  for (const double time_step : {1e-4, 1e-3, 5e-3, 1e-2})
+    for (const double stiffness : {1e4, 1e6, 1e8}) {
+      Dropped dropped(time_step, stiffness, 0.3);
+      FreeMotion motion;
+      motion.position = Eigen::Vector3d(0, 0, 0.2);
+      motion.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d(1, 2, 0.5).normalized()));
+      motion.linear_velocity = Eigen::Vector3d(1, 0, -3);
+      motion.angular_velocity = Eigen::Vector3d(0, 4, 1);
+      set_motion(*dropped.model, motion, dropped.state);
+      Workspace workspace(*dropped.model, dropped.scene);
+      const double energy = dropped.energy();
+      const Eigen::Vector3d momentum = dropped.state.body->linear_momentum;
+      Eigen::Vector3d impulse = Eigen::Vector3d::Zero();
+      double highest = energy;
+      int touching = 0;
+      const int steps = static_cast<int>(1 / time_step);
+      for (int i = 0; i < steps; ++i) {
+        const StepReport report = step(*dropped.model, dropped.scene, dropped.state, workspace);
+        ASSERT_FALSE(report.status & kStepNonFinite) << time_step << " " << stiffness << " " << i;
+        impulse += time_step * (report.contact_force + dropped.mass() * dropped.scene.gravity);
+        touching += report.contacts;
+        highest = std::max(highest, dropped.energy());
+      }
+      EXPECT_GT(touching, 0);
+      EXPECT_LE((dropped.state.body->linear_momentum - momentum - impulse).norm(),
+                1e-10 * dropped.mass() * motion.linear_velocity.norm());
+      EXPECT_LE(highest, energy + 1e-6 * dropped.mass() * 5) << time_step << " " << stiffness;
+      EXPECT_LE((dropped.bar.basis() * dropped.state.q).lpNorm<Eigen::Infinity>(), dropped.bar.length);
+    }
+}
+
+TEST(ContactStep, AwayFromObstaclesNothingIsLookedAt) {
+  Dropped dropped(1e-3, 1e6);
+  dropped.state.body->position = Eigen::Vector3d(0, 0, 50);
+  Workspace workspace(*dropped.model, dropped.scene);
+  StepScene without = dropped.scene;
+  without.obstacles.clear();
+  State alone = dropped.state;
+  Workspace other(*dropped.model, without);
+  for (int i = 0; i < 100; ++i) {
+    step(*dropped.model, dropped.scene, dropped.state, workspace);
+    step(*dropped.model, without, alone, other);
+    ASSERT_EQ(workspace.near->contact.tested_vertices, 0);
+  }
+  EXPECT_EQ(dropped.state.q, alone.q);
+  EXPECT_EQ(dropped.state.body->position, alone.body->position);
+}
+
+TEST(ContactStep, AllocatesNothing) {
+  for (const bool free : {true, false}) {
+    Dropped body(2e-3, 1e7, 0.5, 2e4, free);
+    Workspace workspace(*body.model, body.scene);
+    const test::AllocationCounter counter;
+    int touching = 0;
+    for (int i = 0; i < 5; ++i) touching += step(*body.model, body.scene, body.state, workspace).contacts;
+    EXPECT_EQ(counter.count(), 0U);
+    EXPECT_GT(touching, 0);
+  }
+}
+
+// A clamped bar that is bent down by gravity onto a floor.
+TEST(ContactStep, AClampedBodyRestsOnAnObstacle) {
+  Dropped bar(2e-3, 1e7, 0, 2e4, /*free=*/false);
+  bar.scene.gravity_force = gravity_force(*bar.model, Eigen::Vector3d(0, 0, -200));
+  bar.scene.mass_damping = 20;
+  bar.scene.obstacles[0].shape = Plane{Eigen::Vector3d(0, 0, -0.005), Eigen::Vector3d::UnitZ()};
+  Workspace workspace(*bar.model, bar.scene);
+  StepReport report;
+  for (int i = 0; i < 2000; ++i) report = step(*bar.model, bar.scene, bar.state, workspace);
+  EXPECT_GT(report.contacts, 0);
+  EXPECT_LE(bar.state.v.norm(), 1e-6);
+  const Eigen::VectorXd u = bar.bar.basis() * bar.state.q;
+  const VertexArray& rest = bar.bar.model.object->mesh.vertices;
+  for (Eigen::Index i = 0; i < rest.rows(); ++i) EXPECT_GE(rest(i, 2) + u[3 * i + 2], -0.01) << i;
+  // In equilibrium forces and contacts cancel.
+  Eigen::VectorXd internal(bar.model->modes());
+  bar.model->internal_force.force(bar.state.q, workspace.elasticity, internal);
+  const Eigen::VectorXd residual = internal - bar.scene.gravity_force - workspace.near->contact.generalised;
+  EXPECT_LE(residual.norm(), 1e-5 * bar.scene.gravity_force.norm());
+}
+
+}  // namespace
+}  // namespace exmat::runtime
