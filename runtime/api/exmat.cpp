@@ -49,10 +49,15 @@ bool all_finite(const double* numbers, std::int64_t count) {
 exmat_model* load_model(SceneConfig config) {
   config.trajectory.reset();  // positions are read when they are asked for
   auto source = std::make_shared<Source>(Source{config.bundle, load_run(config)});
-  if (!source->loaded.summary.constrained)
-    throw InputError({config.bundle.string(), "/", "a body with fixed vertices", "a free body",
-                      "step it with exmat-runtime; the library does not place free bodies yet"});
   return new exmat_model{std::move(source)};
+}
+
+/// Where a point of a free body at rest in the world is now.
+template <typename Scalar>
+Eigen::Vector3<Scalar> placed(const exmat_body& body, const Eigen::Vector3<Scalar>& point) {
+  const FreeState& free = *body.state.body;
+  const Eigen::Vector3<Scalar> centre = body.model().rigid->centre_of_mass().cast<Scalar>();
+  return centre + free.position.cast<Scalar>() + free.orientation.cast<Scalar>() * (point - centre);
 }
 
 exmat_points* new_points(const exmat_model& model, PointSet set) {
@@ -122,7 +127,8 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source)
       start(source->loaded.start),
       workspace(model(), scene),
       drawing(VertexPositions::make_workspace(model().modes())),
-      force(Eigen::VectorXd::Zero(model().modes())) {
+      force(Eigen::VectorXd::Zero(model().modes())),
+      moments(model().rigid ? model().rigid->make_moments() : RigidFrame::Moments{}) {
   refresh_weights(model(), scene, start, workspace);
   state = start;
 }
@@ -263,6 +269,7 @@ exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const dou
   state.q = state.q_previous = Eigen::Map<const Eigen::VectorXd>(q, modes);
   state.v = state.v_previous = Eigen::Map<const Eigen::VectorXd>(v, modes);
   state.elastic_energy = body->model().internal_force.energy(state.q, body->workspace.elasticity);
+  if (state.body) set_motion(body->model(), motion_of(*state.body), body->moments, state);
   refresh_weights(body->model(), body->scene, state, body->workspace);
   return EXMAT_OK;
 }
@@ -336,18 +343,37 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
   EXMAT_REQUIRE_LENGTH(coordinates, rows.rows());
   Eigen::VectorXd& sum = body->force;
   sum.setZero();
-  for (Eigen::Index i = 0; i < rows.rows(); i += 3)
-    sum += rows.middleRows<3>(i).transpose().lazyProduct(Eigen::Map<const Eigen::Vector3d>(forces + i));
+  Eigen::Vector3d total = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
+    Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
+    if (body->state.body) {
+      const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
+      const Eigen::Vector3d now = placed<double>(*body, points->set.rest.row(i / 3).transpose() + displacement);
+      const Eigen::Vector3d centre = body->model().rigid->centre_of_mass() + body->state.body->position;
+      total += force;
+      torque += (now - centre).cross(force);
+      force = body->state.body->orientation.conjugate() * force;
+    }
+    sum += rows.middleRows<3>(i).transpose().lazyProduct(force);
+  }
   // A force that is not finite makes every sum so, unless it is where nothing moves.
   if (!all_finite(forces, coordinates) || !sum.allFinite())
     return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
   body->state.applied_force += sum;
+  if (body->state.body) {
+    body->state.body->applied_force += total;
+    body->state.body->applied_torque += torque;
+  }
   return EXMAT_OK;
 }
 
 exmat_status exmat_body_clear_forces(exmat_body* body) noexcept {
   EXMAT_REQUIRE(body);
   body->state.applied_force.setZero();
+  if (body->state.body) {
+    body->state.body->applied_force.setZero();
+    body->state.body->applied_torque.setZero();
+  }
   return EXMAT_OK;
 }
 
@@ -366,6 +392,47 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, 3 * points->set.positions.points());
   points->set.positions.evaluate(body->state.q, body->drawing, xyz);
+  if (!body->state.body) return EXMAT_OK;
+  for (std::int64_t i = 0; i < coordinates; i += 3) {
+    Eigen::Map<Eigen::Vector3f> point(xyz + i);
+    point = placed<float>(*body, point);
+  }
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(motion);
+  *motion = {{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
+  if (!body->state.body) return EXMAT_OK;
+  const FreeMotion now = motion_of(*body->state.body);
+  for (int i = 0; i < 3; ++i) {
+    motion->position[i] = now.position[i];
+    motion->orientation[i + 1] = now.orientation.vec()[i];
+    motion->linear_velocity[i] = now.linear_velocity[i];
+    motion->angular_velocity[i] = now.angular_velocity[i];
+  }
+  motion->orientation[0] = now.orientation.w();
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(motion);
+  if (!body->state.body) return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
+  FreeMotion wanted;
+  wanted.position = Eigen::Vector3d(motion->position);
+  wanted.linear_velocity = Eigen::Vector3d(motion->linear_velocity);
+  wanted.angular_velocity = Eigen::Vector3d(motion->angular_velocity);
+  const double* turn = motion->orientation;
+  wanted.orientation = Eigen::Quaterniond(turn[0], turn[1], turn[2], turn[3]);
+  const double length = wanted.orientation.norm();
+  const bool finite = wanted.position.allFinite() && wanted.linear_velocity.allFinite() &&
+                      wanted.angular_velocity.allFinite() && std::isfinite(length);
+  if (!finite || !(length > 0))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
+  set_motion(body->model(), wanted, body->moments, body->state);
+  body->state.begins_anew = true;
   return EXMAT_OK;
 }
 

@@ -53,6 +53,7 @@ PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids) 
   PointSet points;
   points.basis_rows = rows_of(source, Ids(ids.begin(), ids.end()));
   points.positions = VertexPositions(rest, points.basis_rows);
+  points.rest = rest;
   points.distances = Eigen::VectorXd::Zero(rest.rows());
   return points;
 }
@@ -91,6 +92,7 @@ PointSet read_points_at(const Source& source, const VertexArray& rest) {
       points.basis_rows.middleRows<3>(3 * i) += shares(i, corner) * rows.middleRows<3>(3 * row);
     }
   points.positions = VertexPositions(rest, points.basis_rows);
+  points.rest = rest;
   return points;
 }
 

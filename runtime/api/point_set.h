@@ -19,6 +19,7 @@ struct Source {
 struct PointSet {
   VertexPositions positions;
   RowMatrix basis_rows;       ///< 3k x r; 0 x r: for drawing alone
+  VertexArray rest;           ///< k x 3, at rest, world [m]; 0 x 3: for drawing alone
   Eigen::VectorXd distances;  ///< k, to the object at rest [m]
 };
 

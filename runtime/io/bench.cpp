@@ -102,7 +102,9 @@ class Bench {
 
   void step_profiled(BenchResult& result) {
     profiled_.step();
-    const auto& [seconds, profile, work] = profiled_.take_measured();
+    const Bodies::Measured measured = profiled_.take_measured();
+    const Profile& profile = measured.profile;
+    const StepWork& work = measured.work;
     const double staged = std::accumulate(profile.seconds.begin(), profile.seconds.end(), 0.0);
     const auto of = [&profile](Stage stage) { return profile.seconds[static_cast<std::size_t>(stage)]; };
     const auto flops = [&profile](Stage stage) { return profile.flops[static_cast<std::size_t>(stage)]; };
@@ -110,7 +112,8 @@ class Bench {
     add(1, of(Stage::kTarget), flops(Stage::kTarget) + work.target_flops, result);
     add(2, of(Stage::kInternalForce), flops(Stage::kInternalForce), result);
     add(3, of(Stage::kSolve), flops(Stage::kSolve), result);
-    add(4, std::max(0.0, seconds - staged), work.other_flops, result);
+    add(4, of(Stage::kContact), flops(Stage::kContact), result);
+    add(5, std::max(0.0, measured.seconds - staged), work.other_flops, result);
     sums_.bytes += work.bytes;
   }
 

@@ -14,8 +14,8 @@
 namespace exmat::runtime {
 
 /// The stages of a step without output, and what is left of it.
-inline constexpr std::array<std::string_view, 5> kBenchStageNames{"weights", "target", "internal_force", "solve",
-                                                                  "other"};
+inline constexpr std::array<std::string_view, 6> kBenchStageNames{"weights", "target",  "internal_force",
+                                                                  "solve",   "contact", "other"};
 
 struct BenchOptions {
   std::optional<std::int64_t> steps =

@@ -30,9 +30,17 @@ void prepare_contacts(const Model& model, std::size_t obstacles, State& state) {
   if (model.contact) state.contacts = model.contact->make_state(obstacles);
 }
 
+FreeMotion motion_of(const FreeState& body) {
+  return {body.position, body.orientation, body.linear_momentum / body.mass, body.orientation * body.spin};
+}
+
 void set_motion(const Model& model, const FreeMotion& motion, State& state) {
-  FreeState& body = *state.body;
   auto moments = model.rigid->make_moments();
+  set_motion(model, motion, moments, state);
+}
+
+void set_motion(const Model& model, const FreeMotion& motion, RigidFrame::Moments& moments, State& state) {
+  FreeState& body = *state.body;
   model.rigid->moments(state.q, moments);
   body.mass = model.rigid->mass();
   body.position = motion.position;
@@ -40,7 +48,8 @@ void set_motion(const Model& model, const FreeMotion& motion, State& state) {
   body.spin = body.orientation.conjugate() * motion.angular_velocity;
   body.linear_momentum = model.rigid->mass() * motion.linear_velocity;
   body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation * state.v);
-  body.momentum = body.momentum_previous = state.v + moments.deformation.transpose() * body.spin;
+  body.momentum = state.v + moments.deformation.transpose().lazyProduct(body.spin);
+  body.momentum_previous = body.momentum;
 }
 
 }  // namespace exmat::runtime

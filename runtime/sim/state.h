@@ -18,6 +18,8 @@ struct FreeState {
   Eigen::Vector3d linear_momentum = Eigen::Vector3d::Zero();        ///< p [kg m/s]
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();       ///< L about c [kg m^2/s]
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();                   ///< omega, body frame [rad/s]
+  Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< of the caller, beside State::applied_force [N]
+  Eigen::Vector3d applied_torque = Eigen::Vector3d::Zero();         ///< about c [N m]
   Eigen::VectorXd momentum, momentum_previous;                      ///< [r] pi = qdot - sum_c omega_c A_c q
 };
 
@@ -51,7 +53,10 @@ struct FreeMotion {
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< [rad/s]
 };
 
-/// Sets how a free body moves; its q and v stay.
+FreeMotion motion_of(const FreeState& body);
+
+/// Sets how a free body moves; its q and v stay. `moments` is scratch: with it nothing is allocated.
+void set_motion(const Model& model, const FreeMotion& motion, RigidFrame::Moments& moments, State& state);
 void set_motion(const Model& model, const FreeMotion& motion, State& state);
 
 /// Sizes what a state remembers of its contacts with so many obstacles.

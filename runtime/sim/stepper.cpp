@@ -33,7 +33,7 @@ void move_free_body(const Model& model, const StepScene& scene, Integrator integ
   body = *state.body;
   const double dt = scene.time_step;
   const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
-  Eigen::Vector3d force = model.rigid->mass() * scene.gravity, torque = Eigen::Vector3d::Zero();
+  Eigen::Vector3d force = model.rigid->mass() * scene.gravity + body.applied_force, torque = body.applied_torque;
   for (const ScriptedForce& scripted : scene.forces) {
     if (!acts(scripted, midpoint)) continue;
     const Eigen::Vector3d local = rotation.transpose() * scripted.total;

@@ -114,6 +114,41 @@ TEST_F(ApiTest, StepsAreThoseOfTheLibraryBitForBit) {
   }
 }
 
+TEST_F(ApiTest, FreeBodiesArePlacedPushedAndRead) {
+  const test::Bar bar = test::make_bar({.free = true, .examples = 3});
+  write_bundle(bar.model, files_.bundle());
+  const Model free = model();
+  Body body(free);
+  exmat_motion motion{{1, 2, 3}, {0.8, 0, 0.6, 0}, {0.5, 0, 0}, {0, 0, 2}};
+  body.set_motion(motion);
+  const std::vector<std::int64_t> ids{0, 7};
+  const Points points = Points::vertices(free, ids);
+  std::vector<float> xyz(6);
+  body.read_positions(points, xyz);
+  const Eigen::Quaterniond turn(0.8, 0, 0.6, 0);
+  const Eigen::Vector3d centre = bar.model.rigid->centre_of_mass;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const Eigen::Vector3d rest = bar.model.object->mesh.vertices.row(ids[i]);
+    const Eigen::Vector3d expected = centre + Eigen::Vector3d(1, 2, 3) + turn * (rest - centre);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(xyz[3 * i + static_cast<std::size_t>(axis)], expected[axis], 1e-6);
+  }
+  // Two opposite forces: a couple, which changes the angular momentum alone.
+  const std::vector<double> couple{0, 0, 4, 0, 0, -4};
+  body.apply_forces(points, couple);
+  body.step(1);
+  const exmat_motion turned = body.motion();
+  EXPECT_EQ(turned.linear_velocity[0], 0.5);
+  EXPECT_NE(turned.angular_velocity[0], motion.angular_velocity[0]);
+  body.clear_forces();
+  const std::vector<double> push{0, 8, 0, 0, 8, 0};
+  body.apply_forces(points, push);
+  body.step(10);
+  const double gained = body.motion().linear_velocity[1] - turned.linear_velocity[1];
+  EXPECT_NEAR(gained, 10 * free.time_step() * (16 / bar.model.rigid->mass - 9.81), 1e-12);
+  motion.orientation[0] = motion.orientation[2] = 0;
+  EXPECT_THROW(body.set_motion(motion), Error);
+}
+
 TEST_F(ApiTest, SettingsGiveTheScene) {
   Reference reference(files_.scene(test::kDampedExamples));
   const std::uint32_t status = reference.step(25);

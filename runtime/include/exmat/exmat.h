@@ -184,6 +184,24 @@ EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_poi
                                                int64_t coordinates) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
 
+/* A free body's forces act at where the points are when this is called: their sum and their torque about the centre of
+   mass stay in the world, what they do to the shape turns with the body. Call it again as the body moves. */
+
+/* How a free body moves, world frame: displacement of the centre of mass from rest [m], unit quaternion (w first),
+   velocity of the centre of mass [m/s] and angular velocity [rad/s]. */
+typedef struct exmat_motion {
+  double position[3];
+  double orientation[4];
+  double linear_velocity[3];
+  double angular_velocity[3];
+} exmat_motion;
+
+/* That of a body with fixed vertices is rest. */
+EXMAT_API exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion) EXMAT_NOEXCEPT;
+
+/* Free bodies only; the shape and how fast it changes stay. The quaternion is normalised. */
+EXMAT_API exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion) EXMAT_NOEXCEPT;
+
 /* To be called after forces have changed abruptly: the next step then takes nothing from the ones before but position
    and velocity, as where a scene's scripted force begins or ends, so that the impulse is exact. Forces that follow
    something smooth do without. */

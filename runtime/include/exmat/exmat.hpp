@@ -154,6 +154,13 @@ class Body {
   void clear_forces() { detail::check(exmat_body_clear_forces(get())); }
   void restart_integrator() { detail::check(exmat_body_restart_integrator(get())); }
 
+  exmat_motion motion() const {
+    exmat_motion motion{};
+    detail::check(exmat_body_read_motion(get(), &motion));
+    return motion;
+  }
+  void set_motion(const exmat_motion& motion) { detail::check(exmat_body_set_motion(get(), &motion)); }
+
   /// `xyz` [3k].
   void read_positions(const Points& points, std::span<float> xyz) {
     detail::check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
