@@ -75,7 +75,7 @@ TEST_F(BenchTest, NumbersAreConsistent) {
   double sum = 0, mean = 0;
   for (const auto& [name, stage] : json["stages"].items()) {
     EXPECT_LE(stage["median_us"], stage["p95_us"]) << name;
-    EXPECT_GT(stage["flops"].get<double>(), 0) << name;
+    EXPECT_EQ(stage["flops"].get<double>() > 0, name != "contact") << name;  // the scene has no obstacles
     sum += stage["flops"].get<double>();
     mean += stage["mean_us"].get<double>();
   }
