@@ -1,6 +1,7 @@
 #include "runtime/sim/free_motion.h"
 
 #include <Eigen/LU>
+#include <cmath>
 
 namespace exmat::runtime {
 namespace {
@@ -82,6 +83,24 @@ void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionW
       G(i, j) += coupling;
       G(j, i) -= coupling;
     }
+}
+
+void commit_free_motion(double rate, const FreeState& moved, const FreeMotionWorkspace& workspace,
+                        State& state) noexcept {
+  FreeState& body = *state.body;
+  const Eigen::Vector3d& spin = workspace.solution.spin;
+  const Eigen::Vector3d& t = workspace.solution.rotation;
+  body.momentum.swap(body.momentum_previous);
+  body.momentum.noalias() = state.v + workspace.moments.deformation.transpose().lazyProduct(spin);
+  state.a += rate * (body.momentum - state.v);
+  const double half = 0.5 * t.norm();
+  const double share = half > 1e-8 ? 0.5 * std::sin(half) / half : 0.5;
+  body.orientation = body.orientation * Eigen::Quaterniond(std::cos(half), share * t[0], share * t[1], share * t[2]);
+  body.orientation.normalize();
+  body.spin = spin;
+  body.position = moved.position;
+  body.linear_momentum = moved.linear_momentum;
+  body.angular_momentum = moved.angular_momentum;
 }
 
 }  // namespace exmat::runtime

@@ -48,4 +48,9 @@ void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, Fre
 /// Its antisymmetric part and -2 c_v W into workspace.gyroscopic. After add_rotation_stiffness().
 void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept;
 
+/// Takes position and momenta of `moved`, turns the body by the solution and sets pi = v - W q and, for Newmark, its
+/// rate; q and v of the state are those of the end of the step, state.a = rate (v - ...) so far.
+void commit_free_motion(double rate, const FreeState& moved, const FreeMotionWorkspace& workspace,
+                        State& state) noexcept;
+
 }  // namespace exmat::runtime

@@ -1,18 +1,14 @@
 #include "runtime/sim/stepper.h"
 
-#include <Eigen/LU>
 #include <cmath>
 
-#include "runtime/sim/contact_problem.h"
+#include "runtime/sim/contact_step.h"
 #include "runtime/sim/incremental_potential.h"
 
 namespace exmat::runtime {
 namespace {
 
-constexpr double kMarginSteps = 2;      // way of a vertex that candidates are looked for in
-constexpr int kFrictionRounds = 3;      // solutions of one step for the normal forces of friction
-constexpr double kSameFriction = 0.05;  // relative change of friction that needs no further one
-constexpr double kResolvedTurn = 0.3;   // [rad] of a free body in one step
+constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
 
 bool acts(const ScriptedForce& force, double time) { return force.start <= time && time < force.end; }
 
@@ -48,99 +44,6 @@ void move_free_body(const Model& model, const StepScene& scene, Integrator integ
   body.linear_momentum += dt * force;
   body.angular_momentum += dt * torque;
   begin_rotation(body, dt, integrator == Integrator::kBackwardEuler, *workspace.free);
-}
-
-BodyPose pose_of(const Model& model, const State& state) {
-  BodyPose pose{.q = state.q};
-  if (!state.body) return pose;
-  pose.position = model.rigid->centre_of_mass() + state.body->position;
-  pose.rotation = state.body->orientation.toRotationMatrix();
-  return pose;
-}
-
-/// Whether any vertex may touch an obstacle in this step; then the candidates are in the workspace.
-bool is_near_obstacles(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) {
-  if (!touches(model, scene)) return false;
-  const StageTimer timer(workspace.profile, Stage::kContact);
-  const BodyPose pose = pose_of(model, state);
-  BodyVelocity velocity{.v = state.v};
-  if (state.body) {
-    velocity.linear = state.body->linear_momentum / state.body->mass;
-    velocity.angular = pose.rotation * state.body->spin;
-  }
-  const ContactSet& set = *model.contact;
-  const double dt = scene.time_step;
-  const double margin = kMarginSteps * set.travel_bound(pose, velocity, dt) + dt * dt * scene.gravity.norm();
-  ContactWorkspace& contact = workspace.near->contact;
-  set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
-  if (contact.candidate_count == 0) return false;
-  set.freeze(pose, velocity, dt, state.contacts, contact);
-  return true;
-}
-
-/// Pose and momenta of the solution x of a ContactProblem, into the workspace.
-void take_contact_solution(const StepScene& scene, const State& state, Workspace& workspace) {
-  ContactProblemWorkspace& near = *workspace.near;
-  workspace.q = state.q + near.x.tail(state.q.size());
-  if (!state.body) return;
-  FreeState& body = *workspace.body;
-  FreeMotionWorkspace& free = *workspace.free;
-  body.position += near.x.head<3>();
-  body.linear_momentum += scene.time_step * near.contact.force;
-  body.angular_momentum += scene.time_step * near.contact.torque;
-  const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
-  const Eigen::Vector3d momentum = rotation.transpose() * body.angular_momentum;
-  free.solution.spin = free.moments.inertia.inverse() * (momentum - free.moments.deformation * free.velocity);
-}
-
-void add(const NewtonReport& more, NewtonReport& total) {
-  total.status = more.status;
-  total.residual = more.residual;
-  total.iterations += more.iterations;
-  total.factorisations += more.factorisations;
-  total.line_search_evaluations += more.line_search_evaluations;
-  total.projections += more.projections;
-}
-
-/// Newton's method of a step near obstacles, from workspace.q; friction follows the normal forces of the solution.
-NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,
-                                 IncrementalPotential& potential, Workspace& workspace, StepReport& report) {
-  ContactProblemWorkspace& near = *workspace.near;
-  near.x.setZero();
-  near.x.tail(state.q.size()) = workspace.q - state.q;
-  if (state.body) {
-    workspace.free->spin_is_given = true;
-    near.x.segment<3>(3) = workspace.free->solution.rotation;
-    model.rigid->moments(workspace.q, workspace.free->moments);
-  }
-  near.newton.profile = workspace.profile;
-  ContactProblem problem(model, scene, state, potential, workspace);
-  NewtonReport total;
-  for (int round = 0; round < kFrictionRounds; ++round) {
-    if (round > 0) {
-      workspace.q = state.q + near.x.tail(state.q.size());
-      potential.start(workspace.q);
-    }
-    add(newton_minimize(problem, scene.newton, near.x, near.newton), total);
-    if (total.status == NewtonStatus::kNonFinite) return total;
-    if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
-  }
-  take_contact_solution(scene, state, workspace);
-  report.contacts = near.contact.touching;
-  report.contact_force = near.contact.force;
-  return total;
-}
-
-/// Of the pose and velocity that Newton's method found.
-void finish_rotation(Workspace& workspace) {
-  FreeState& body = *workspace.body;
-  const FreeMotionWorkspace& free = *workspace.free;
-  const Eigen::Vector3d& t = free.solution.rotation;
-  const double half = 0.5 * t.norm();
-  const double share = half > 1e-8 ? 0.5 * std::sin(half) / half : 0.5;
-  body.orientation = body.orientation * Eigen::Quaterniond(std::cos(half), share * t[0], share * t[1], share * t[2]);
-  body.orientation.normalize();
-  body.spin = free.solution.spin;
 }
 
 /// What resolves a step: backward Euler where the body turns too far in it for anything of second order.
@@ -266,17 +169,6 @@ void prepare_example_force(const StepScene& scene, Workspace& workspace) {
   force.pull = settings.stiffness * workspace.target;
 }
 
-/// pi = v - W q, and its rate for Newmark.
-void commit_body(Workspace& workspace, State& state) {
-  const FreeMotionWorkspace& free = *workspace.free;
-  const Eigen::Vector3d& spin = free.solution.spin;
-  workspace.body->momentum_previous = state.body->momentum;
-  workspace.body->momentum.noalias() = state.v + free.moments.deformation.transpose().lazyProduct(spin);
-  state.a += workspace.form.velocity_factor * (workspace.body->momentum - state.v);
-  finish_rotation(workspace);
-  *state.body = *workspace.body;
-}
-
 /// Arithmetic on subnormal numbers takes a hundred times as long, and a body that comes to rest is full of them.
 bool flush_subnormals(Eigen::VectorXd& numbers) {
   bool found = false;
@@ -295,7 +187,7 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.q = workspace.q;
   state.v = workspace.offset;
   state.a = form.acceleration_factor * (state.q - form.acceleration_centre);
-  if (state.body) commit_body(workspace, state);
+  if (state.body) commit_free_motion(workspace.form.velocity_factor, workspace.body.value(), *workspace.free, state);
   state.elastic_energy = elastic_energy;
   ++state.step;
   state.time = static_cast<double>(state.step) * scene.time_step;
@@ -305,14 +197,6 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.target = workspace.solved_target;
   state.has_target = true;
   state.target_converged = workspace.target_converged;
-}
-
-void commit_contacts(const Model& model, bool near, Workspace& workspace, State& state) {
-  state.begins_anew = near;
-  if (near)
-    model.contact->commit(pose_of(model, state), workspace.near->contact, state.contacts);
-  else
-    state.contacts.count = 0;
 }
 
 void add_newton_report(const NewtonReport& newton, StepReport& report) {
@@ -348,15 +232,20 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   if (report.status & kStepNonFinite) return report;
 
   potential.prepare();
-  add_newton_report(near ? solve_with_contacts(model, scene, state, potential, workspace, report)
+  add_newton_report(near ? solve_with_contacts(model, scene, state, potential, workspace)
                          : newton_minimize(potential, scene.newton, workspace.q, workspace.newton),
                     report);
   workspace.offset = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
   if (!workspace.q.allFinite() || !workspace.offset.allFinite()) report.status |= kStepNonFinite;
   if (report.status & kStepNonFinite) return report;
+  if (near) {
+    report.contacts = workspace.near->contact.touching;
+    report.contact_force = workspace.near->contact.force;
+  }
   const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.offset);
   if (small_q || small_v) report.status |= kStepSubnormal;
   commit(model, scene, potential.elastic_energy(), workspace, state);
+  state.begins_anew = near;
   commit_contacts(model, near, workspace, state);
   return report;
 }

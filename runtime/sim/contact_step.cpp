@@ -1,0 +1,98 @@
+#include "runtime/sim/contact_step.h"
+
+#include <Eigen/LU>
+
+namespace exmat::runtime {
+namespace {
+
+constexpr double kMarginSteps = 2;      // way of a vertex that candidates are looked for in
+constexpr int kFrictionRounds = 3;      // solutions of one step for the normal forces of friction
+constexpr double kSameFriction = 0.05;  // relative change of friction that needs no further one
+
+BodyPose pose_of(const Model& model, const State& state) {
+  BodyPose pose{.q = state.q};
+  if (!state.body) return pose;
+  pose.position = model.rigid->centre_of_mass() + state.body->position;
+  pose.rotation = state.body->orientation.toRotationMatrix();
+  return pose;
+}
+
+/// Pose and momenta of the solution x of a ContactProblem, into the workspace.
+void take_contact_solution(const StepScene& scene, const State& state, Workspace& workspace) {
+  ContactProblemWorkspace& near = *workspace.near;
+  workspace.q = state.q + near.x.tail(state.q.size());
+  if (!state.body) return;
+  FreeState& body = *workspace.body;
+  FreeMotionWorkspace& free = *workspace.free;
+  body.position += near.x.head<3>();
+  body.linear_momentum += scene.time_step * near.contact.force;
+  body.angular_momentum += scene.time_step * near.contact.torque;
+  const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
+  const Eigen::Vector3d momentum = rotation.transpose() * body.angular_momentum;
+  free.solution.spin = free.moments.inertia.inverse() * (momentum - free.moments.deformation * free.velocity);
+}
+
+void add(const NewtonReport& more, NewtonReport& total) {
+  total.status = more.status;
+  total.residual = more.residual;
+  total.iterations += more.iterations;
+  total.factorisations += more.factorisations;
+  total.line_search_evaluations += more.line_search_evaluations;
+  total.projections += more.projections;
+}
+
+}  // namespace
+
+bool is_near_obstacles(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept {
+  if (!touches(model, scene)) return false;
+  const StageTimer timer(workspace.profile, Stage::kContact);
+  const BodyPose pose = pose_of(model, state);
+  BodyVelocity velocity{.v = state.v};
+  if (state.body) {
+    velocity.linear = state.body->linear_momentum / state.body->mass;
+    velocity.angular = pose.rotation * state.body->spin;
+  }
+  const ContactSet& set = *model.contact;
+  const double dt = scene.time_step;
+  const double margin = kMarginSteps * set.travel_bound(pose, velocity, dt) + dt * dt * scene.gravity.norm();
+  ContactWorkspace& contact = workspace.near->contact;
+  set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
+  if (contact.candidate_count == 0) return false;
+  set.freeze(pose, velocity, dt, state.contacts, contact);
+  return true;
+}
+
+NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,
+                                 IncrementalPotential& potential, Workspace& workspace) noexcept {
+  ContactProblemWorkspace& near = *workspace.near;
+  near.x.setZero();
+  near.x.tail(state.q.size()) = workspace.q - state.q;
+  if (state.body) {
+    workspace.free->spin_is_given = true;
+    near.x.segment<3>(3) = workspace.free->solution.rotation;
+    model.rigid->moments(workspace.q, workspace.free->moments);
+  }
+  near.newton.profile = workspace.profile;
+  ContactProblem problem(model, scene, state, potential, workspace);
+  NewtonReport total;
+  for (int round = 0; round < kFrictionRounds; ++round) {
+    if (round > 0) {
+      workspace.q = state.q + near.x.tail(state.q.size());
+      potential.start(workspace.q);
+    }
+    add(newton_minimize(problem, scene.newton, near.x, near.newton), total);
+    if (total.status == NewtonStatus::kNonFinite) return total;
+    if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
+  }
+  take_contact_solution(scene, state, workspace);
+  return total;
+}
+
+void commit_contacts(const Model& model, bool near, const Workspace& workspace, State& state) noexcept {
+  if (near)
+    model.contact->commit(pose_of(model, state), workspace.near->contact, state.contacts);
+  else
+    state.contacts.count = 0;
+}
+
+}  // namespace exmat::runtime
