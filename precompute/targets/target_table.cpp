@@ -19,7 +19,6 @@ namespace exmat::precompute {
 namespace {
 
 using runtime::BernsteinBasis;
-using runtime::EnergyReference;
 using runtime::TargetSolver;
 using runtime::TargetTable;
 
@@ -211,7 +210,7 @@ std::optional<TargetTableData> build_target_table(const ReducedModel& model, con
                                 count, kMostTableExamples);
     return std::nullopt;
   }
-  const auto reference = options.energy_reference == "rest" ? EnergyReference::kRest : EnergyReference::kExample;
+  const auto reference = runtime::energy_reference_from_name(options.energy_reference);
   TargetSolver target;
   if (const auto complaint = target.build(*runtime::material_from_name(model.object->material), *model.cubature,
                                           examples, model.projection->target_basis, reference)) {

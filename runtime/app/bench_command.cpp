@@ -4,12 +4,11 @@
 #include "common/config/config.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
+#include "runtime/app/print.h"
 #include "runtime/io/bench.h"
 
 namespace exmat::runtime {
 namespace {
-
-void print(const char* name, const std::string& value) { fmt::print("{:<22} {}\n", name, value); }
 
 void print_times(std::string_view name, const Samples& seconds, double flops, double whole) {
   const double mean = seconds.mean();

@@ -4,12 +4,11 @@
 #include "common/core/log.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
+#include "runtime/app/print.h"
 #include "runtime/io/scene_run.h"
 
 namespace exmat::runtime {
 namespace {
-
-void print(const char* name, const std::string& value) { fmt::print("{:<22} {}\n", name, value); }
 
 std::string microseconds(double seconds) { return fmt::format("{:.2f} us", 1e6 * seconds); }
 

@@ -106,14 +106,11 @@ class Bench {
     const Profile& profile = measured.profile;
     const StepWork& work = measured.work;
     const double staged = std::accumulate(profile.seconds.begin(), profile.seconds.end(), 0.0);
-    const auto of = [&profile](Stage stage) { return profile.seconds[static_cast<std::size_t>(stage)]; };
-    const auto flops = [&profile](Stage stage) { return profile.flops[static_cast<std::size_t>(stage)]; };
-    add(0, of(Stage::kWeights), flops(Stage::kWeights) + work.weights_flops, result);
-    add(1, of(Stage::kTarget), flops(Stage::kTarget) + work.target_flops, result);
-    add(2, of(Stage::kInternalForce), flops(Stage::kInternalForce), result);
-    add(3, of(Stage::kSolve), flops(Stage::kSolve), result);
-    add(4, of(Stage::kContact), flops(Stage::kContact), result);
-    add(5, std::max(0.0, measured.seconds - staged), work.other_flops, result);
+    for (std::size_t stage = 0; stage < kBenchStageNames.size(); ++stage)
+      if (stage != kOtherStage) add(stage, profile.seconds[stage], profile.flops[stage], result);
+    add(kOtherStage, std::max(0.0, measured.seconds - staged), work.other_flops, result);
+    sums_.flops[static_cast<std::size_t>(Stage::kWeights)] += work.weights_flops;
+    sums_.flops[static_cast<std::size_t>(Stage::kTarget)] += work.target_flops;
     sums_.bytes += work.bytes;
   }
 

@@ -10,12 +10,17 @@
 #include "runtime/io/samples.h"
 #include "runtime/io/scene_loader.h"
 #include "runtime/io/scene_run.h"
+#include "runtime/sim/profile.h"
 
 namespace exmat::runtime {
 
-/// The stages of a step without output, and what is left of it.
-inline constexpr std::array<std::string_view, 6> kBenchStageNames{"weights", "target",  "internal_force",
-                                                                  "solve",   "contact", "other"};
+/// The stages of a step, and what is left of it in the place of output.
+inline constexpr std::size_t kOtherStage = static_cast<std::size_t>(Stage::kOutput);
+inline constexpr auto kBenchStageNames = [] {
+  auto names = kStageNames;
+  names[kOtherStage] = "other";
+  return names;
+}();
 
 struct BenchOptions {
   std::optional<std::int64_t> steps =

@@ -26,17 +26,10 @@ void DgemmRate::measure(int count) {
   for (int i = 0; i < count; ++i) {
     const Timer timer;
     kernels_.gemm(kSize, a_.data(), b_.data(), c_.data());
-    rates_.push_back(kFlops / timer.seconds());
-    best_ = std::max(best_, rates_.back());
+    const double rate = kFlops / timer.seconds();
+    rates_.add(rate);
+    best_ = std::max(best_, rate);
   }
-}
-
-double DgemmRate::median() const {
-  if (rates_.empty()) return 0;
-  std::vector<double> sorted = rates_;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
 }
 
 }  // namespace exmat::runtime

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <vector>
-
+#include "runtime/io/samples.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/kernels/kernels.h"
 
@@ -16,13 +15,13 @@ class DgemmRate {
   /// Times `count` products, after one that is not timed.
   void measure(int count = 4);
 
-  double best() const { return best_; }  ///< [flop/s], of all products so far
-  double median() const;                 ///< [flop/s], likewise
+  double best() const { return best_; }                   ///< [flop/s], of all products so far
+  double median() const { return rates_.quantile(0.5); }  ///< [flop/s], likewise
 
  private:
   const Kernels& kernels_;
   AlignedArray a_, b_, c_;
-  std::vector<double> rates_;
+  Samples rates_;
   double best_ = 0;
 };
 

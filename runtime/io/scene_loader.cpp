@@ -133,11 +133,17 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   options.examples = config.examples.has_value();
   options.target_table = data.targets.has_value();
   options.polynomial = data.polynomial.has_value();
-  if (config.examples && config.examples->energy_reference == "rest") options.energy_reference = EnergyReference::kRest;
+  if (config.examples) options.energy_reference = energy_reference_from_name(config.examples->energy_reference);
   ModelResult result = build_model(data, options);
   if (result.model) return std::move(result.model);
   result.complaint.file = config.bundle.string();
   throw InputError(std::move(result.complaint));
+}
+
+std::string describe_target(const ExampleModel& examples, const StepScene& scene) {
+  if (examples.table) return fmt::format("target: table, one polynomial of degree {}", examples.table->degree());
+  return fmt::format("target: Newton in d = {} coordinates, s = {} elements, at most {} iterations a step",
+                     examples.target->dimension(), examples.target->elements(), scene.examples->target_iterations);
 }
 
 }  // namespace
@@ -169,16 +175,6 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.data.contact.reset();
   return loaded;
 }
-
-namespace {
-
-std::string describe_target(const ExampleModel& examples, const StepScene& scene) {
-  if (examples.table) return fmt::format("target: table, one polynomial of degree {}", examples.table->degree());
-  return fmt::format("target: Newton in d = {} coordinates, s = {} elements, at most {} iterations a step",
-                     examples.target->dimension(), examples.target->elements(), scene.examples->target_iterations);
-}
-
-}  // namespace
 
 std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneConfig& config) {
   const Model& model = *loaded.model;

@@ -67,9 +67,9 @@ StepWork& StepWork::operator+=(const StepWork& more) {
 /// One stiffness and one factorisation, whatever the number of iterations; force and solve in each of them.
 double target_flops(const TargetSolver& solver, int iterations) {
   const auto d = static_cast<double>(solver.dimension());
-  const auto products = static_cast<double>(solver.elements()) * d;
-  const double force = 36 * products, stiffness = 162 * products + 9 * products * (d + 1);
-  return (1 + iterations) * force + stiffness + d * d * d / 3 + iterations * 2 * d * d;
+  const ElementPotential& elements = solver.potential();
+  return (1 + iterations) * elements.force_flops() + elements.stiffness_flops() + d * d * d / 3 +
+         iterations * 2 * d * d;
 }
 
 StepWork step_work(const Model& model, const StepScene& scene, const StepReport& report) {

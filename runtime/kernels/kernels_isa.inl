@@ -59,6 +59,13 @@ inline void green_strain(const Vec* H, Vec* E) {
   E[5] = 0.5 * (H[1] + H[3] + H[0] * H[1] + H[3] * H[4] + H[6] * H[7]);
 }
 
+/// Place of (i, j) in the upper triangle by rows of a symmetric size x size.
+template <Index size>
+constexpr Index triangle_entry(Index i, Index j) {
+  const Index row = i < j ? i : j, column = i < j ? j : i;
+  return row * size - row * (row - 1) / 2 + column - row;
+}
+
 constexpr Index kVoigt[3][3] = {{0, 5, 4}, {5, 1, 3}, {4, 3, 2}};
 
 /// P += (I + H) S.
@@ -113,15 +120,10 @@ struct Quadratic {
 
   Vec number(Index i) const { return load(numbers + i * kLanes); }
 
-  static constexpr Index entry(Index i, Index j) {
-    const Index row = i < j ? i : j, column = i < j ? j : i;
-    return row * 6 - row * (row - 1) / 2 + column - row;
-  }
-
   void linear_stress(const Vec* E, Vec* S) const {
     for (Index i = 0; i < 6; ++i) {
       S[i] = zero();
-      for (Index j = 0; j < 6; ++j) S[i] += number(entry(i, j)) * (j < 3 ? E[j] : 2.0 * E[j]);
+      for (Index j = 0; j < 6; ++j) S[i] += number(triangle_entry<6>(i, j)) * (j < 3 ? E[j] : 2.0 * E[j]);
     }
   }
 
@@ -149,8 +151,9 @@ struct Quadratic {
       for (Index d = b; d < 3; ++d) {
         Vec FC[9];  // F_ai C_ibjd, at 3a + j
         for (Index j = 0; j < 3; ++j) {
-          const Vec C0 = number(entry(kVoigt[0][b], kVoigt[j][d])), C1 = number(entry(kVoigt[1][b], kVoigt[j][d])),
-                    C2 = number(entry(kVoigt[2][b], kVoigt[j][d]));
+          const Vec C0 = number(triangle_entry<6>(kVoigt[0][b], kVoigt[j][d])),
+                    C1 = number(triangle_entry<6>(kVoigt[1][b], kVoigt[j][d])),
+                    C2 = number(triangle_entry<6>(kVoigt[2][b], kVoigt[j][d]));
           for (Index a = 0; a < 3; ++a) FC[3 * a + j] = F[3 * a] * C0 + F[3 * a + 1] * C1 + F[3 * a + 2] * C2;
         }
         for (Index a = 0; a < 3; ++a)
@@ -159,8 +162,7 @@ struct Quadratic {
             if (b == d && row > column) continue;
             Vec value = FC[3 * a] * F[3 * c] + FC[3 * a + 1] * F[3 * c + 1] + FC[3 * a + 2] * F[3 * c + 2];
             if (a == c) value += S[kVoigt[b][d]];
-            const Index low = row < column ? row : column, high = row < column ? column : row;
-            store(tangent + (low * 9 - low * (low - 1) / 2 + high - low) * kLanes, value);
+            store(tangent + triangle_entry<9>(row, column) * kLanes, value);
           }
       }
   }
@@ -214,11 +216,6 @@ inline Vec evaluate_all(const ElementLaw& law, Index at, const Vec* H, Vec* P, d
 
 // --- stiffness -------------------------------------------------------------------------------------------------------
 
-constexpr Index tangent_entry(Index i, Index j) {
-  const Index row = i < j ? i : j, column = i < j ? j : i;
-  return row * 9 - row * (row - 1) / 2 + column - row;
-}
-
 /// `vectors` registers of the columns of D B of one element.
 template <Index vectors>
 inline void tangent_product_columns(const double* tangent, const double* B, Index stride, double* product) {
@@ -229,12 +226,12 @@ inline void tangent_product_columns(const double* tangent, const double* B, Inde
   for (Index i = 0; i < 9; ++i) {
     Vec even[vectors], odd[vectors];
     for (Index v = 0; v < vectors; ++v) {
-      even[v] = b[0][v] * tangent[tangent_entry(i, 0) * kLanes];
-      odd[v] = b[1][v] * tangent[tangent_entry(i, 1) * kLanes];
+      even[v] = b[0][v] * tangent[triangle_entry<9>(i, 0) * kLanes];
+      odd[v] = b[1][v] * tangent[triangle_entry<9>(i, 1) * kLanes];
     }
 #pragma GCC unroll 7
     for (Index k = 2; k < 9; ++k) {
-      const double d = tangent[tangent_entry(i, k) * kLanes];
+      const double d = tangent[triangle_entry<9>(i, k) * kLanes];
       for (Index v = 0; v < vectors; ++v) (k % 2 == 0 ? even : odd)[v] += b[k][v] * d;
     }
     for (Index v = 0; v < vectors; ++v) store(product + i * stride + v * kWidth, even[v] + odd[v]);

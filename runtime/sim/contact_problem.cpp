@@ -42,7 +42,7 @@ PotentialEvaluation ContactProblem::evaluate(const Eigen::VectorXd& x, Eigen::Ve
   model_.contact->evaluate(pose, near_.contact);
   PotentialEvaluation evaluation = finish(x, inner, gradient);
   frozen_turn_ = next_frozen_turn_;
-  assemble_hessian(x, hessian);
+  assemble_hessian(pose, x, hessian);
   return evaluation;
 }
 
@@ -99,13 +99,12 @@ double ContactProblem::add_rigid_terms(const Eigen::VectorXd& x, Eigen::VectorXd
 void ContactProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
   const BodyPose pose = place(x);
   potential_.hessian(near_.q, tangent, workspace_.newton.hessian);
-  model_.contact->evaluate(pose, near_.contact);
-  assemble_hessian(x, hessian);
+  assemble_hessian(pose, x, hessian);
 }
 
-void ContactProblem::assemble_hessian(const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept {
+void ContactProblem::assemble_hessian(const BodyPose& pose, const Eigen::VectorXd& x,
+                                      Eigen::MatrixXd& hessian) noexcept {
   const Eigen::Index modes = near_.q.size();
-  const BodyPose pose = place(x);
   hessian.setZero();
   hessian.bottomRightCorner(modes, modes).triangularView<Eigen::Lower>() = workspace_.newton.hessian;
   near_.stiffness.setZero();

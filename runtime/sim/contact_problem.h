@@ -32,7 +32,7 @@ class ContactProblem {
 
  private:
   double add_rigid_terms(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) noexcept;
-  void assemble_hessian(const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;
+  void assemble_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;
   PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& inner,
                              Eigen::VectorXd& gradient) noexcept;
 

@@ -77,10 +77,4 @@ void ElementPotential::stiffness(const ElementLaw& law, const Eigen::VectorXd& x
                                   stiffness.outerStride());
 }
 
-AlignedArray padded_values(const Eigen::VectorXd& values) {
-  AlignedArray array(values.size());
-  std::copy(values.data(), values.data() + values.size(), array.data());
-  return array;
-}
-
 }  // namespace exmat::runtime

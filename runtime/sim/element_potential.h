@@ -66,7 +66,4 @@ class ElementPotential {
   AlignedArray by_mode_, by_element_;
 };
 
-/// values [s] in the padded array of a law, the padding zero.
-AlignedArray padded_values(const Eigen::VectorXd& values);
-
 }  // namespace exmat::runtime

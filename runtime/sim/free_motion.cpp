@@ -1,12 +1,23 @@
 #include "runtime/sim/free_motion.h"
 
 #include <Eigen/LU>
-#include <cmath>
 
 namespace exmat::runtime {
 namespace {
 
 constexpr double kSmallSoftening = 0.25;  // of the inertia
+
+/// D + V, see free_motion.h, and what J^-1 makes of it and of H.
+void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace) {
+  frame.inertia_slope(workspace.moments, workspace.solution.spin, workspace.slope);
+  const Eigen::Index stride = padded(frame.modes());
+  for (int c = 0; c < 3; ++c)
+    workspace.slope.row(c) +=
+        Eigen::Map<const Eigen::VectorXd>(workspace.scratch.data() + c * stride, frame.modes()).transpose();
+  const Eigen::Matrix3d inverse = workspace.moments.inertia.inverse();
+  workspace.inverse_slope.noalias() = inverse.lazyProduct(workspace.slope);
+  workspace.inverse_deformation.noalias() = inverse.lazyProduct(workspace.moments.deformation);
+}
 
 }  // namespace
 
@@ -47,27 +58,18 @@ void rotation_force(const RigidFrame& frame, double rate, FreeMotionWorkspace& w
   workspace.force += workspace.product - rate * workspace.moments.deformation.transpose().lazyProduct(spin);
 }
 
-void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace) noexcept {
-  frame.inertia_slope(workspace.moments, workspace.solution.spin, workspace.slope);
-  const Eigen::Index stride = padded(frame.modes());
-  for (int c = 0; c < 3; ++c)
-    workspace.slope.row(c) +=
-        Eigen::Map<const Eigen::VectorXd>(workspace.scratch.data() + c * stride, frame.modes()).transpose();
-  const Eigen::Matrix3d inverse = workspace.moments.inertia.inverse();
-  workspace.inverse_slope.noalias() = inverse.lazyProduct(workspace.slope);
-  workspace.inverse_deformation.noalias() = inverse.lazyProduct(workspace.moments.deformation);
-}
-
 void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace,
                             Eigen::MatrixXd& hessian) noexcept {
   const Eigen::Vector3d& spin = workspace.solution.spin;
   const double inertia = velocity_factor * velocity_factor;
-  set_rotation_slope(frame, workspace);
-  for (Eigen::Index j = 0; j < hessian.cols() && !workspace.spin_is_given; ++j) {
-    const Eigen::Vector3d stiffening = workspace.inverse_slope.col(j);
-    const Eigen::Vector3d lost = inertia * workspace.inverse_deformation.col(j);
-    for (Eigen::Index i = j; i < hessian.rows(); ++i)
-      hessian(i, j) += workspace.slope.col(i).dot(stiffening) - workspace.moments.deformation.col(i).dot(lost);
+  if (!workspace.spin_is_given) {
+    set_rotation_slope(frame, workspace);
+    for (Eigen::Index j = 0; j < hessian.cols(); ++j) {
+      const Eigen::Vector3d stiffening = workspace.inverse_slope.col(j);
+      const Eigen::Vector3d lost = inertia * workspace.inverse_deformation.col(j);
+      for (Eigen::Index i = j; i < hessian.rows(); ++i)
+        hessian(i, j) += workspace.slope.col(i).dot(stiffening) - workspace.moments.deformation.col(i).dot(lost);
+    }
   }
   if (spin.squaredNorm() <= kSmallSoftening * inertia) frame.add_centrifugal(spin, -1, hessian);
 }
@@ -89,13 +91,10 @@ void commit_free_motion(double rate, const FreeState& moved, const FreeMotionWor
                         State& state) noexcept {
   FreeState& body = *state.body;
   const Eigen::Vector3d& spin = workspace.solution.spin;
-  const Eigen::Vector3d& t = workspace.solution.rotation;
   body.momentum.swap(body.momentum_previous);
   body.momentum.noalias() = state.v + workspace.moments.deformation.transpose().lazyProduct(spin);
   state.a += rate * (body.momentum - state.v);
-  const double half = 0.5 * t.norm();
-  const double share = half > 1e-8 ? 0.5 * std::sin(half) / half : 0.5;
-  body.orientation = body.orientation * Eigen::Quaterniond(std::cos(half), share * t[0], share * t[1], share * t[2]);
+  body.orientation = body.orientation * quaternion_of(workspace.solution.rotation);
   body.orientation.normalize();
   body.spin = spin;
   body.position = moved.position;

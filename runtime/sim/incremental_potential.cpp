@@ -149,7 +149,7 @@ bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcep
   return found;
 }
 
-/// -2 c_v W, where it is not small beside c_a.
+/// The antisymmetric part of the rotation, where it is not small beside c_a.
 const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
   if (!rotates_) return nullptr;
   FreeMotionWorkspace& free = *workspace_.free;

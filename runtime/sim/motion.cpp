@@ -5,22 +5,17 @@
 #include <cmath>
 #include <cstddef>
 
+#include "runtime/sim/spin.h"
+
 namespace exmat::runtime {
 namespace {
 
-/// The rotation vector of a unit quaternion, at most half a turn [rad].
+/// The rotation vector of a unit quaternion, at most half a turn [rad]; quaternion_of() is its inverse.
 Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& rotation) {
   const double sign = rotation.w() < 0 ? -1 : 1;
   const double sine = rotation.vec().norm();
   if (sine == 0) return Eigen::Vector3d::Zero();
   return rotation.vec() * (sign * 2 * std::atan2(sine, sign * rotation.w()) / sine);
-}
-
-/// Its inverse.
-Eigen::Quaterniond turn(const Eigen::Vector3d& vector) {
-  const double angle = vector.norm();
-  if (angle == 0) return Eigen::Quaterniond::Identity();
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle, vector / angle));
 }
 
 /// Velocities at the keys: 0 at both ends, else the mean of the rates on both sides, each weighted by the other's
@@ -70,8 +65,8 @@ RigidMotion::RigidMotion(const std::vector<Keyframe>& keys) {
     segment.rotation = resting(keys[i]).rotation;
     segment.turns[0] = spins[i] * (durations[i] / 3);
     segment.turns[2] = spins[i + 1] * (durations[i] / 3);
-    segment.turns[1] =
-        rotation_vector(turn(segment.turns[0]).conjugate() * turns[i] * turn(segment.turns[2]).conjugate());
+    segment.turns[1] = rotation_vector(quaternion_of(segment.turns[0]).conjugate() * turns[i] *
+                                       quaternion_of(segment.turns[2]).conjugate());
   }
 }
 
@@ -106,7 +101,7 @@ void RigidMotion::sample_rotation(const Segment& segment, double s, MotionSample
   Eigen::Vector3d spin = Eigen::Vector3d::Zero(), spin_rate = Eigen::Vector3d::Zero();  // frame components
   for (std::size_t i = 0; i < 3; ++i) {
     const Eigen::Vector3d& axis = segment.turns[i];
-    const Eigen::Matrix3d factor = turn(share[i] * axis).toRotationMatrix();
+    const Eigen::Matrix3d factor = quaternion_of(share[i] * axis).toRotationMatrix();
     const Eigen::Vector3d own = rate[i] * axis, carried = factor.transpose() * spin;
     spin_rate = factor.transpose() * spin_rate - own.cross(carried) + change[i] * axis;
     spin = carried + own;

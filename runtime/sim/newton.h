@@ -163,7 +163,7 @@ inline bool factor_serves(double before, double now, double limit) {
 ///   PotentialEvaluation evaluate(x, gradient, hessian)   at the first iterate, lower triangle
 ///   PotentialEvaluation evaluate(x, gradient)
 ///   PotentialValue value(x)
-///   void hessian(x, Tangent, hessian)                    lower triangle
+///   void hessian(x, Tangent, hessian)                    lower triangle; x of the last evaluate()
 ///   void accept(evaluation)                              x of the last evaluate(x, gradient) is the next iterate
 ///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
 ///                                                        of forces without a potential, or null

@@ -14,15 +14,18 @@ std::vector<LameParameters> cubature_lame(const CubatureData& cubature) {
   return lame;
 }
 
-ReducedElasticity::ReducedElasticity(Material, const RowMatrix& gradient, const Eigen::VectorXd& weighted_volumes,
-                                     const std::vector<LameParameters>& lame)
-    : potential_(gradient), mu_(weighted_volumes.size()), lambda_(weighted_volumes.size()) {
+WeightedLame::WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame)
+    : mu(weighted_volumes.size()), lambda(weighted_volumes.size()) {
   for (Eigen::Index j = 0; j < weighted_volumes.size(); ++j) {
     const LameParameters& own = lame[static_cast<std::size_t>(j)];
-    mu_[j] = weighted_volumes[j] * own.mu;
-    lambda_[j] = weighted_volumes[j] * own.lambda;
+    mu[j] = weighted_volumes[j] * own.mu;
+    lambda[j] = weighted_volumes[j] * own.lambda;
   }
 }
+
+ReducedElasticity::ReducedElasticity(Material, const RowMatrix& gradient, const Eigen::VectorXd& weighted_volumes,
+                                     const std::vector<LameParameters>& lame)
+    : potential_(gradient), lame_(weighted_volumes, lame) {}
 
 ReducedElasticity::ReducedElasticity(Material material, const CubatureData& cubature)
     : ReducedElasticity(material, cubature.gradient, cubature.weights.cwiseProduct(cubature.volumes),
@@ -30,8 +33,8 @@ ReducedElasticity::ReducedElasticity(Material material, const CubatureData& cuba
 
 ElementLaw ReducedElasticity::law() const noexcept {
   ElementLaw law;
-  law.mu = mu_.data();
-  law.lambda = lambda_.data();
+  law.mu = lame_.mu.data();
+  law.lambda = lame_.lambda.data();
   return law;
 }
 

@@ -20,6 +20,14 @@ std::optional<Material> material_from_name(std::string_view name);
 /// [s] Lame parameters of the cubature elements.
 std::vector<LameParameters> cubature_lame(const CubatureData& cubature);
 
+/// c_j mu_j and c_j lambda_j [N m], s each, c_j = w_j V_j.
+struct WeightedLame {
+  AlignedArray mu, lambda;
+
+  WeightedLame() = default;
+  WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame);
+};
+
 /// Elasticity of a reduced body by cubature: E(q) = sum_j c_j Psi(I + B_j q), c_j = w_j V_j. method.md, section 6.
 /// s elements, r coordinates. Immutable; all scratch is the caller's, no call allocates or throws.
 class ReducedElasticity {
@@ -64,7 +72,7 @@ class ReducedElasticity {
   ElementLaw law() const noexcept;
 
   ElementPotential potential_;
-  AlignedArray mu_, lambda_;  ///< s, c_j mu_j and c_j lambda_j [N m]
+  WeightedLame lame_;
 };
 
 }  // namespace exmat::runtime

@@ -39,6 +39,12 @@ Eigen::Matrix3d rotation_of(const Eigen::Vector3d& t) noexcept {
   return Eigen::Matrix3d::Identity() + c.sine * cross + c.cosine * cross * cross;
 }
 
+Eigen::Quaterniond quaternion_of(const Eigen::Vector3d& t) noexcept {
+  const double half = 0.5 * t.norm();
+  const double share = half > 1e-8 ? 0.5 * std::sin(half) / half : 0.5;
+  return {std::cos(half), share * t[0], share * t[1], share * t[2]};
+}
+
 Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& t) noexcept {
   const Coefficients c = coefficients(t.norm());
   const Eigen::Matrix3d cross = cross_matrix(t);

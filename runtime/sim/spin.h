@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 
 namespace exmat::runtime {
 
@@ -9,6 +10,9 @@ Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& w) noexcept;
 
 /// exp([t]x), Rodrigues; exact to rounding for small t too.
 Eigen::Matrix3d rotation_of(const Eigen::Vector3d& t) noexcept;
+
+/// The same rotation as a quaternion.
+Eigen::Quaterniond quaternion_of(const Eigen::Vector3d& t) noexcept;
 
 /// Right Jacobian of exp: exp([t + dt]x) = exp([t]x) exp([J dt]x) to first order.
 Eigen::Matrix3d right_jacobian(const Eigen::Vector3d& t) noexcept;

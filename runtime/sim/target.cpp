@@ -60,6 +60,10 @@ Complaint inverted_element(const ExampleData& example, Eigen::Index element, dou
 
 }  // namespace
 
+EnergyReference energy_reference_from_name(std::string_view name) {
+  return name == "rest" ? EnergyReference::kRest : EnergyReference::kExample;
+}
+
 std::optional<Complaint> TargetSolver::add_quadratic(const CubatureData& cubature, const ExampleData& example) {
   const std::vector<LameParameters> lame = cubature_lame(cubature);
   const Eigen::VectorXd displacement_gradients = cubature.gradient * example.reduced;
@@ -92,14 +96,7 @@ std::optional<Complaint> TargetSolver::build(Material material, const CubatureDa
   basis_ = unit_stiffness_basis(material, cubature, target_basis);
   potential_ = ElementPotential(cubature.gradient * basis_);
   if (reference == EnergyReference::kRest) {
-    const std::vector<LameParameters> lame = cubature_lame(cubature);
-    const Eigen::Index elements = cubature.weights.size();
-    mu_ = lambda_ = AlignedArray(elements);
-    for (Eigen::Index j = 0; j < elements; ++j) {
-      const double volume = cubature.weights[j] * cubature.volumes[j];
-      mu_[j] = volume * lame[static_cast<std::size_t>(j)].mu;
-      lambda_[j] = volume * lame[static_cast<std::size_t>(j)].lambda;
-    }
+    lame_ = WeightedLame(cubature.weights.cwiseProduct(cubature.volumes), cubature_lame(cubature));
     shifts_ = AlignedArray(potential_.panels() * static_cast<Eigen::Index>(examples.size()) * 9 * kLanes);
   }
   for (const ExampleData& example : examples) {
@@ -123,8 +120,8 @@ ElementLaw TargetSolver::law(const Eigen::VectorXd& weights, Workspace& workspac
   ElementLaw law;
   if (reference_ == EnergyReference::kRest) {
     std::copy(weights.data(), weights.data() + weights.size(), workspace.shift_weights.data());
-    law.mu = mu_.data();
-    law.lambda = lambda_.data();
+    law.mu = lame_.mu.data();
+    law.lambda = lame_.lambda.data();
     law.shift_count = examples();
     law.shifts = shifts_.data();
     law.shift_weights = workspace.shift_weights.data();

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "common/core/arrays.h"
@@ -18,6 +19,9 @@ enum class EnergyReference {
   kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)
   kRest,     ///< E_k(p) = sum_j w_j V_j Psi(I + B_j (p - p_k))
 };
+
+/// "rest", or else the example.
+EnergyReference energy_reference_from_name(std::string_view name);
 
 /// Target p*(w) = argmin_p sum_k w_k E_k(p) over p = Z y, Z [r x d] a basis of the range of T^+ in which the stiffness
 /// at rest is the identity, so that |y| is an energy norm. method.md, section 5. Immutable; no call of solve()
@@ -46,8 +50,9 @@ class TargetSolver {
 
   Workspace make_workspace() const;
 
-  Eigen::Index dimension() const { return basis_.cols(); }                      ///< d
-  Eigen::Index elements() const { return potential_.elements(); }               ///< s
+  Eigen::Index dimension() const { return basis_.cols(); }         ///< d
+  Eigen::Index elements() const { return potential_.elements(); }  ///< s
+  const ElementPotential& potential() const { return potential_; }
   const RowMatrix& basis() const { return basis_; }                             ///< Z [r x d]
   const Eigen::VectorXd& example(Eigen::Index k) const { return centres_[k]; }  ///< y_k [d]
 
@@ -80,7 +85,8 @@ class TargetSolver {
   ElementPotential potential_;
   std::vector<Eigen::VectorXd> centres_;  ///< K, y_k [d]
   std::vector<AlignedArray> quadratics_;  ///< K, see ElementLaw; kExample only
-  AlignedArray mu_, lambda_, shifts_;     ///< kRest only
+  WeightedLame lame_;                     ///< kRest only
+  AlignedArray shifts_;                   ///< kRest only
   double force_tolerance_ = 0;            ///< [J^1/2]
 };
 
