@@ -86,7 +86,8 @@ double ContactProblem::add_rigid_terms(const Eigen::VectorXd& x, Eigen::VectorXd
   if (gradient == nullptr) return value;
   const FreeMotionWorkspace& free = *workspace_.free;
   const Eigen::Matrix3d turn = rotation_of(t);
-  const Eigen::Vector3d momentum = free.moments.inertia * free.solution.spin + free.moments.deformation * free.velocity;
+  const Eigen::Vector3d momentum =
+      free.moments.inertia * free.solution.spin + free.moments.deformation.transpose() * free.velocity;
   const Eigen::Matrix3d to_turn = right_jacobian(t).transpose();
   const Eigen::Vector3d inertia = to_turn * ((momentum - turn.transpose() * free.problem.momentum) / dt);
   next_frozen_turn_ = inertia - quadratic;
@@ -130,7 +131,7 @@ void ContactProblem::assemble_hessian(const BodyPose& pose, const Eigen::VectorX
   hessian.triangularView<Eigen::Lower>() += K;
   hessian.diagonal().head<3>().array() += model_.rigid->mass() / (dt * dt);
   hessian.block<3, 3>(3, 3).triangularView<Eigen::Lower>() += free.moments.inertia / (dt * dt);
-  hessian.block(6, 3, modes, 3) += free.moments.deformation.transpose() / (dt * dt);
+  hessian.block(6, 3, modes, 3) += free.moments.deformation / (dt * dt);
 }
 
 void ContactProblem::accept(PotentialEvaluation& evaluation) noexcept {

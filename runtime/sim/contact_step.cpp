@@ -29,7 +29,8 @@ void take_contact_solution(const StepScene& scene, const State& state, Workspace
   body.angular_momentum += scene.time_step * near.contact.torque;
   const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
   const Eigen::Vector3d momentum = rotation.transpose() * body.angular_momentum;
-  free.solution.spin = free.moments.inertia.inverse() * (momentum - free.moments.deformation * free.velocity);
+  free.solution.spin =
+      free.moments.inertia.inverse() * (momentum - free.moments.deformation.transpose() * free.velocity);
 }
 
 void add(const NewtonReport& more, NewtonReport& total) {

@@ -1,22 +1,23 @@
 #include "runtime/sim/free_motion.h"
 
 #include <Eigen/LU>
+#include <tuple>
 
 namespace exmat::runtime {
 namespace {
 
-constexpr double kSmallSoftening = 0.25;  // of the inertia
+// Shares of inertia: more softening may leave the Hessian indefinite, less of it changes no iteration.
+constexpr double kMostSoftening = 0.25, kLeastSoftening = 1e-5;
 
 /// D + V, see free_motion.h, and what J^-1 makes of it and of H.
 void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace) {
   frame.inertia_slope(workspace.moments, workspace.solution.spin, workspace.slope);
   const Eigen::Index stride = padded(frame.modes());
   for (int c = 0; c < 3; ++c)
-    workspace.slope.row(c) +=
-        Eigen::Map<const Eigen::VectorXd>(workspace.scratch.data() + c * stride, frame.modes()).transpose();
-  const Eigen::Matrix3d inverse = workspace.moments.inertia.inverse();
-  workspace.inverse_slope.noalias() = inverse.lazyProduct(workspace.slope);
-  workspace.inverse_deformation.noalias() = inverse.lazyProduct(workspace.moments.deformation);
+    workspace.slope.col(c) += Eigen::Map<const Eigen::VectorXd>(workspace.scratch.data() + c * stride, frame.modes());
+  const Eigen::Matrix3d inverse = workspace.moments.inertia.inverse();  // symmetric
+  workspace.inverse_slope.noalias() = workspace.slope.lazyProduct(inverse);
+  workspace.inverse_deformation.noalias() = workspace.moments.deformation.lazyProduct(inverse);
 }
 
 }  // namespace
@@ -27,9 +28,9 @@ FreeMotionWorkspace::FreeMotionWorkspace(const Model& model)
       force(Eigen::VectorXd::Zero(model.modes())),
       product(Eigen::VectorXd::Zero(model.modes())),
       velocity(Eigen::VectorXd::Zero(model.modes())),
-      slope(Eigen::Matrix3Xd::Zero(3, model.modes())),
-      inverse_slope(Eigen::Matrix3Xd::Zero(3, model.modes())),
-      inverse_deformation(Eigen::Matrix3Xd::Zero(3, model.modes())),
+      slope(Eigen::MatrixX3d::Zero(model.modes(), 3)),
+      inverse_slope(Eigen::MatrixX3d::Zero(model.modes(), 3)),
+      inverse_deformation(Eigen::MatrixX3d::Zero(model.modes(), 3)),
       gyroscopic(Eigen::MatrixXd::Zero(model.modes(), model.modes())) {}
 
 void begin_rotation(const FreeState& body, double time_step, bool dissipative,
@@ -45,7 +46,7 @@ void begin_rotation(const FreeState& body, double time_step, bool dissipative,
 bool update_spin(const RigidFrame& frame, const Eigen::VectorXd& q, FreeMotionWorkspace& workspace) noexcept {
   frame.moments(q, workspace.moments);
   if (workspace.spin_is_given) return true;
-  const Eigen::Vector3d deformation = workspace.moments.deformation * workspace.velocity;
+  const Eigen::Vector3d deformation = workspace.moments.deformation.transpose() * workspace.velocity;
   workspace.solution = solve_spin(workspace.problem, workspace.moments.inertia, deformation, workspace.solution.spin);
   return workspace.solution.converged;
 }
@@ -55,7 +56,7 @@ void rotation_force(const RigidFrame& frame, double rate, FreeMotionWorkspace& w
   frame.centrifugal_force(workspace.moments, spin, workspace.force);
   frame.gyroscopic_product(spin, workspace.velocity, workspace.scratch, workspace.product);
   // W q = -H^T w.
-  workspace.force += workspace.product - rate * workspace.moments.deformation.transpose().lazyProduct(spin);
+  workspace.force += workspace.product - rate * workspace.moments.deformation.lazyProduct(spin);
 }
 
 void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace,
@@ -64,14 +65,17 @@ void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, Fre
   const double inertia = velocity_factor * velocity_factor;
   if (!workspace.spin_is_given) {
     set_rotation_slope(frame, workspace);
+    const auto& [slope, deformation] = std::tie(workspace.slope, workspace.moments.deformation);
     for (Eigen::Index j = 0; j < hessian.cols(); ++j) {
-      const Eigen::Vector3d stiffening = workspace.inverse_slope.col(j);
-      const Eigen::Vector3d lost = inertia * workspace.inverse_deformation.col(j);
-      for (Eigen::Index i = j; i < hessian.rows(); ++i)
-        hessian(i, j) += workspace.slope.col(i).dot(stiffening) - workspace.moments.deformation.col(i).dot(lost);
+      const Eigen::Index below = hessian.rows() - j;
+      const Eigen::Vector3d stiffening = workspace.inverse_slope.row(j);
+      const Eigen::Vector3d lost = inertia * workspace.inverse_deformation.row(j);
+      hessian.col(j).tail(below) +=
+          slope.bottomRows(below).lazyProduct(stiffening) - deformation.bottomRows(below).lazyProduct(lost);
     }
   }
-  if (spin.squaredNorm() <= kSmallSoftening * inertia) frame.add_centrifugal(spin, -1, hessian);
+  const double softening = spin.squaredNorm() / inertia;
+  if (softening >= kLeastSoftening && softening <= kMostSoftening) frame.add_centrifugal(spin, -1, hessian);
 }
 
 void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept {
@@ -80,11 +84,20 @@ void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionW
   frame.add_gyroscopic(workspace.solution.spin, -2 * velocity_factor, G);
   for (Eigen::Index j = 0; j < G.cols(); ++j)
     for (Eigen::Index i = j + 1; i < G.rows(); ++i) {
-      const double coupling = velocity_factor * (workspace.slope.col(i).dot(workspace.inverse_deformation.col(j)) -
-                                                 workspace.slope.col(j).dot(workspace.inverse_deformation.col(i)));
+      const double coupling = velocity_factor * (workspace.slope.row(i).dot(workspace.inverse_deformation.row(j)) -
+                                                 workspace.slope.row(j).dot(workspace.inverse_deformation.row(i)));
       G(i, j) += coupling;
       G(j, i) -= coupling;
     }
+}
+
+void gyroscopic_product(const RigidFrame& frame, double velocity_factor, const Eigen::VectorXd& x,
+                        FreeMotionWorkspace& workspace) noexcept {
+  frame.gyroscopic_product(workspace.solution.spin, x, workspace.scratch, workspace.product);
+  const Eigen::Vector3d by_slope = velocity_factor * (workspace.inverse_slope.transpose() * x);
+  const Eigen::Vector3d by_deformation = velocity_factor * (workspace.inverse_deformation.transpose() * x);
+  workspace.product = workspace.slope.lazyProduct(by_deformation) -
+                      workspace.moments.deformation.lazyProduct(by_slope) - 2 * velocity_factor * workspace.product;
 }
 
 void commit_free_motion(double rate, const FreeState& moved, const FreeMotionWorkspace& workspace,
@@ -92,7 +105,7 @@ void commit_free_motion(double rate, const FreeState& moved, const FreeMotionWor
   FreeState& body = *state.body;
   const Eigen::Vector3d& spin = workspace.solution.spin;
   body.momentum.swap(body.momentum_previous);
-  body.momentum.noalias() = state.v + workspace.moments.deformation.transpose().lazyProduct(spin);
+  body.momentum.noalias() = state.v + workspace.moments.deformation.lazyProduct(spin);
   state.a += rate * (body.momentum - state.v);
   body.orientation = body.orientation * quaternion_of(workspace.solution.rotation);
   body.orientation.normalize();

@@ -23,8 +23,8 @@ struct FreeMotionWorkspace {
   RigidFrame::Moments moments;
   AlignedArray scratch;
   Eigen::VectorXd force, product, velocity;             ///< r, product padded(r)
-  Eigen::Matrix3Xd slope;                               ///< 3 x r, D + V
-  Eigen::Matrix3Xd inverse_slope, inverse_deformation;  ///< 3 x r, J^-1 (D + V) and J^-1 H
+  Eigen::MatrixX3d slope;                               ///< r x 3, (D + V)^T
+  Eigen::MatrixX3d inverse_slope, inverse_deformation;  ///< r x 3, transposes of J^-1 (D + V) and J^-1 H
   Eigen::MatrixXd gyroscopic;                           ///< r x r
 };
 
@@ -47,6 +47,10 @@ void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, Fre
 
 /// Its antisymmetric part and -2 c_v W into workspace.gyroscopic. After add_rotation_stiffness().
 void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept;
+
+/// The product of that matrix with `x` [r] into workspace.product, without the matrix.
+void gyroscopic_product(const RigidFrame& frame, double velocity_factor, const Eigen::VectorXd& x,
+                        FreeMotionWorkspace& workspace) noexcept;
 
 /// Takes position and momenta of `moved`, turns the body by the solution and sets pi = v - W q and, for Newmark, its
 /// rate; q and v of the state are those of the end of the step, state.a = rate (v - ...) so far.

@@ -6,7 +6,8 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kSmallSpin = 0.05;  // of c_v: then iterations without the gyroscopic part converge as fast
+constexpr double kSmallSpin = 0.05;        // of c_v: beyond it a factorisation costs less than the terms of a series
+constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
 
 }  // namespace
 
@@ -156,6 +157,21 @@ const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
   if (free.solution.spin.norm() <= kSmallSpin * workspace_.form.velocity_factor) return nullptr;
   set_gyroscopic(*model_.rigid, workspace_.form.velocity_factor, free);
   return &free.gyroscopic;
+}
+
+/// The antisymmetric part is about 2 |w| / c_v of inertia.
+int IncrementalPotential::gyroscopic_terms() const noexcept {
+  if (!rotates_) return 0;
+  const double ratio = 2 * workspace_.free->solution.spin.norm() / workspace_.form.velocity_factor;
+  double error = ratio;
+  int terms = 0;
+  for (; error > kGyroscopicError; error *= ratio) ++terms;
+  return terms;
+}
+
+const Eigen::VectorXd& IncrementalPotential::gyroscopic_product(const Eigen::VectorXd& x) const noexcept {
+  runtime::gyroscopic_product(*model_.rigid, workspace_.form.velocity_factor, x, *workspace_.free);
+  return workspace_.free->product;
 }
 
 /// Of offset and its product with A.

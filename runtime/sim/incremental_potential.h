@@ -34,6 +34,8 @@ class IncrementalPotential {
   void hessian(const Eigen::VectorXd& q, Tangent tangent, Eigen::MatrixXd& hessian) noexcept;
   void accept(PotentialEvaluation& evaluation) noexcept;
   const Eigen::MatrixXd* gyroscopic() const noexcept;
+  int gyroscopic_terms() const noexcept;
+  const Eigen::VectorXd& gyroscopic_product(const Eigen::VectorXd& x) const noexcept;
 
   /// E at the last evaluate().
   double elastic_energy() const noexcept { return elastic_energy_; }

@@ -109,16 +109,25 @@ inline void factorize_gyroscopic(const Eigen::MatrixXd& gyroscopic, NewtonWorksp
   workspace.lu->compute(workspace.hessian);
 }
 
-/// workspace.direction = -H^-1 gradient; returns its slope.
-inline double solve_direction(NewtonWorkspace& workspace, bool gyroscopic) {
+/// workspace.direction = -(H + G)^-1 gradient, by the LU factors or, where G is weak, as -H^-1 (gradient + G (-H^-1
+/// (gradient + ...))), as many terms as the problem asks for; returns its slope.
+template <class Problem>
+double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyroscopic) {
   const Eigen::Index size = workspace.gradient.size();
   const StageTimer timer(workspace.profile, Stage::kSolve, 2.0 * static_cast<double>(size * size));
   Eigen::Map<Eigen::VectorXd> direction(workspace.direction.data(), size);
   if (gyroscopic) {
     direction.noalias() = workspace.lu->solve(-workspace.gradient);
-  } else {
-    direction = -workspace.gradient;
-    kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+    return workspace.gradient.dot(direction);
+  }
+  direction = -workspace.gradient;
+  kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+  if constexpr (requires { problem.gyroscopic_terms(); }) {
+    for (int term = problem.gyroscopic_terms(); term > 0; --term) {
+      workspace.trial = direction;
+      direction = -workspace.gradient - problem.gyroscopic_product(workspace.trial);
+      kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+    }
   }
   return workspace.gradient.dot(direction);
 }
@@ -166,7 +175,8 @@ inline bool factor_serves(double before, double now, double limit) {
 ///   void hessian(x, Tangent, hessian)                    lower triangle; x of the last evaluate()
 ///   void accept(evaluation)                              x of the last evaluate(x, gradient) is the next iterate
 ///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
-///                                                        of forces without a potential, or null
+///                                                        of forces without a potential, or null where it is weak
+///   int gyroscopic_terms(); VectorXd gyroscopic_product(x)   optional: how often a weak one is applied, its product
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
 /// On return the last evaluate() was at x.
 template <class Problem>
@@ -207,7 +217,7 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
       gyroscopic = part != nullptr;
       if (gyroscopic) detail::factorize_gyroscopic(*part, workspace);
     }
-    const double slope = detail::solve_direction(workspace, gyroscopic);
+    const double slope = detail::solve_direction(problem, workspace, gyroscopic);
     if (!std::isfinite(slope)) return finish(NewtonStatus::kNonFinite);
     const bool below_rounding = -slope <= detail::kRounding * here.potential.magnitude;
     unchecked_from = below_rounding ? report.residual : std::numeric_limits<double>::infinity();

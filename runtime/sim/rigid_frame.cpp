@@ -39,7 +39,7 @@ RigidFrame::RigidFrame(const RigidData& data)
 }
 
 RigidFrame::Moments RigidFrame::make_moments() const {
-  return {AlignedArray(kProducts * padded(modes())), Eigen::Matrix3d::Zero(), Eigen::Matrix3Xd::Zero(3, modes()),
+  return {AlignedArray(kProducts * padded(modes())), Eigen::Matrix3d::Zero(), Eigen::MatrixX3d::Zero(modes(), 3),
           Eigen::MatrixXd::Zero(modes(), kSymmetric)};
 }
 
@@ -57,7 +57,7 @@ void RigidFrame::moments(const Eigen::VectorXd& q, Moments& moments) const noexc
     moments.gradients.col(pair) = linear_.col(pair) + 2 * product(pair);
   }
   moments.inertia = P.trace() * Eigen::Matrix3d::Identity() - P;
-  for (int c = 0; c < 3; ++c) moments.deformation.row(c) = -product(kSymmetric + c).transpose();
+  for (int c = 0; c < 3; ++c) moments.deformation.col(c) = -product(kSymmetric + c);
 }
 
 void RigidFrame::centrifugal_force(const Moments& moments, const Eigen::Vector3d& spin,
@@ -81,22 +81,26 @@ void RigidFrame::add_gyroscopic(const Eigen::Vector3d& spin, double factor, Eige
 
 void RigidFrame::add_centrifugal(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept {
   const Eigen::Index stride = padded(modes());
-  const Eigen::Map<const Eigen::MatrixXd> stacked(stacked_.data(), kProducts * stride, modes());
-  const auto slopes = energy_slopes(spin);
-  for (int pair = 0; pair < kSymmetric; ++pair)
-    matrix.triangularView<Eigen::Lower>() += 2 * factor * slopes[pair] * stacked.middleRows(pair * stride, modes());
+  const Eigen::Matrix<double, 6, 1> slopes = 2 * factor * energy_slopes(spin);
+  for (Eigen::Index j = 0; j < modes(); ++j) {
+    const Eigen::Index below = modes() - j;
+    const auto S = [&](int pair) {
+      return Eigen::Map<const Eigen::VectorXd>(stacked_.data() + (j * kProducts + pair) * stride + j, below);
+    };
+    matrix.col(j).tail(below) +=
+        slopes[0] * S(0) + slopes[1] * S(1) + slopes[2] * S(2) + slopes[3] * S(3) + slopes[4] * S(4) + slopes[5] * S(5);
+  }
 }
 
 void RigidFrame::inertia_slope(const Moments& moments, const Eigen::Vector3d& spin,
-                               Eigen::Matrix3Xd& slope) const noexcept {
+                               Eigen::MatrixX3d& slope) const noexcept {
   // J w = tr(P) w - P w.
   for (int axis = 0; axis < 3; ++axis)
-    slope.row(axis) =
-        spin[axis] * (moments.gradients.col(0) + moments.gradients.col(1) + moments.gradients.col(2)).transpose();
+    slope.col(axis) = spin[axis] * (moments.gradients.col(0) + moments.gradients.col(1) + moments.gradients.col(2));
   for (int pair = 0; pair < kSymmetric; ++pair) {
     const int a = kFirst[pair], b = kSecond[pair];
-    slope.row(a) -= spin[b] * moments.gradients.col(pair).transpose();
-    if (a != b) slope.row(b) -= spin[a] * moments.gradients.col(pair).transpose();
+    slope.col(a) -= spin[b] * moments.gradients.col(pair);
+    if (a != b) slope.col(b) -= spin[a] * moments.gradients.col(pair);
   }
 }
 

@@ -16,7 +16,7 @@ class RigidFrame {
   struct Moments {
     AlignedArray products;         ///< S_ab q of the six symmetric S_ab, then A_c q, padded(r) each
     Eigen::Matrix3d inertia;       ///< J
-    Eigen::Matrix3Xd deformation;  ///< H [3 x r] = dh/dv, row c = -(A_c q)^T
+    Eigen::MatrixX3d deformation;  ///< H^T [r x 3], H = dh/dv, column c = -A_c q
     Eigen::MatrixXd gradients;     ///< r x 6, dP_ab/dq in the order xx, yy, zz, yz, xz, xy
   };
 
@@ -44,8 +44,8 @@ class RigidFrame {
   /// d2/dq2 (1/2 w^T J w) [r x r], positive semi-definite, added `factor` times to the lower triangle.
   void add_centrifugal(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept;
 
-  /// d(J w)/dq [3 x r] at fixed w.
-  void inertia_slope(const Moments& moments, const Eigen::Vector3d& spin, Eigen::Matrix3Xd& slope) const noexcept;
+  /// (d(J w)/dq)^T [r x 3] at fixed w.
+  void inertia_slope(const Moments& moments, const Eigen::Vector3d& spin, Eigen::MatrixX3d& slope) const noexcept;
 
  private:
   static constexpr int kSymmetric = 6;

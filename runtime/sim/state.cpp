@@ -47,8 +47,8 @@ void set_motion(const Model& model, const FreeMotion& motion, RigidFrame::Moment
   body.orientation = motion.orientation.normalized();
   body.spin = body.orientation.conjugate() * motion.angular_velocity;
   body.linear_momentum = model.rigid->mass() * motion.linear_velocity;
-  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation * state.v);
-  body.momentum = state.v + moments.deformation.transpose().lazyProduct(body.spin);
+  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation.transpose() * state.v);
+  body.momentum = state.v + moments.deformation.lazyProduct(body.spin);
   body.momentum_previous = body.momentum;
 }
 

@@ -14,7 +14,7 @@ void register_instances() {
       add(name, [=](::benchmark::State& state) {
         omp_set_num_threads(threads);
         const auto model = prepare(bar_model(20, 60), Target::kTable, false);
-        time_steps(state, *model, swing(*model, Target::kTable), count);
+        time_steps(state, *model, swing(*model, Target::kTable), make_state(*model), count);
       })->UseRealTime();
     }
 }

@@ -26,6 +26,7 @@ int main(int argc, char** argv) {
   ::benchmark::AddCustomContext("instruction_set", runtime::kernels().name);
   benchmarks::register_kernels();
   benchmarks::register_steps();
+  benchmarks::register_free_bodies();
   benchmarks::register_sizes();
   benchmarks::register_instances();
   ::benchmark::RunSpecifiedBenchmarks();

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "tests/support/synthetic_polynomial.h"
@@ -28,8 +29,9 @@ CubatureData evenly_spread(const CubatureData& all, int elements) {
   return some;
 }
 
-ReducedModel whole_bar(int modes) {
-  test::BarOptions options{.cells = {8, 3, 3}, .linear_modes = modes - 3, .eigenfunctions = 14, .examples = kExamples};
+ReducedModel whole_bar(int modes, bool free) {
+  test::BarOptions options{
+      .cells = {8, 3, 3}, .free = free, .linear_modes = modes - 3, .eigenfunctions = 14, .examples = kExamples};
   ReducedModel model = test::make_bar(options).model;
   model.polynomial = test::make_polynomial(*model.cubature);
   model.targets = test::linear_targets(model.examples->examples, kTableDegree);
@@ -38,12 +40,13 @@ ReducedModel whole_bar(int modes) {
 
 }  // namespace
 
-const ReducedModel& bar_model(int modes, int elements) {
-  static std::map<int, ReducedModel> wholes;
-  static std::map<std::pair<int, int>, ReducedModel> models;
-  if (!wholes.contains(modes)) wholes[modes] = whole_bar(modes);
-  const auto [found, made] = models.try_emplace({modes, elements}, wholes[modes]);
-  if (made) found->second.cubature = evenly_spread(*wholes[modes].cubature, elements);
+const ReducedModel& bar_model(int modes, int elements, bool free) {
+  static std::map<std::pair<int, bool>, ReducedModel> wholes;
+  static std::map<std::tuple<int, int, bool>, ReducedModel> models;
+  if (!wholes.contains({modes, free})) wholes[{modes, free}] = whole_bar(modes, free);
+  const ReducedModel& whole = wholes[{modes, free}];
+  const auto [found, made] = models.try_emplace({modes, elements, free}, whole);
+  if (made) found->second.cubature = evenly_spread(*whole.cubature, elements);
   return found->second;
 }
 

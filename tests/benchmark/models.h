@@ -13,9 +13,9 @@ inline constexpr std::array kElements{23, 30, 60, 120};
 inline constexpr int kExamples = 4;
 inline constexpr int kTableDegree = 8;  ///< 165 control points
 
-/// A clamped bar of 432 tets with four examples, r modes, a table of targets and the exact polynomial; s of its
+/// A clamped or free bar of 432 tets with four examples, r modes, a table of targets and the exact polynomial; s of its
 /// elements, evenly spread, with equal weights as cubature. Kept for the life of the process.
-const ReducedModel& bar_model(int modes, int elements);
+const ReducedModel& bar_model(int modes, int elements, bool free = false);
 
 enum class Target { kNone, kTable, kSolve };
 inline constexpr std::array kTargets{Target::kNone, Target::kTable, Target::kSolve};

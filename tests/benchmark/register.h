@@ -9,6 +9,7 @@ namespace exmat::benchmarks {
 /// One family of benchmarks each, named FAMILY/...; called by main before they run.
 void register_kernels();
 void register_steps();
+void register_free_bodies();
 void register_sizes();
 void register_instances();
 

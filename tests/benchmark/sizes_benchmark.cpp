@@ -51,7 +51,7 @@ void register_sizes() {
       std::size_t bytes = 0;
       for (const ReadRecord& record : scene.records) bytes += record.bytes;
       state.counters["bytes_read"] = static_cast<double>(bytes);
-      time_steps(state, *scene.model, scene.scene);
+      time_steps(state, *scene.model, scene.scene, scene.start);
     });
 }
 

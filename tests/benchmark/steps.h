@@ -1,12 +1,14 @@
 #pragma once
 
 #include "runtime/sim/scene.h"
+#include "runtime/sim/state.h"
 #include "tests/benchmark/register.h"
 
 namespace exmat::benchmarks {
 
-/// Times steps of `count` bodies from rest, again and again over the same 500 steps. Counters: those of
+/// Times steps of `count` bodies from `start`, again and again over the same 500 steps. Counters: those of
 /// compare_with_dgemm, of one body's step where there are several; newton_iterations; bodies.
-void time_steps(::benchmark::State& state, const runtime::Model& model, const runtime::StepScene& scene, int count = 1);
+void time_steps(::benchmark::State& state, const runtime::Model& model, const runtime::StepScene& scene,
+                const runtime::State& start, int count = 1);
 
 }  // namespace exmat::benchmarks

@@ -14,8 +14,8 @@ struct MeanWork {
 };
 
 /// Of one step of one body, over the cycle.
-MeanWork mean_work(const runtime::Model& model, const runtime::StepScene& scene) {
-  runtime::Bodies body(model, scene, make_state(model), 1);
+MeanWork mean_work(const runtime::Model& model, const runtime::StepScene& scene, const runtime::State& start) {
+  runtime::Bodies body(model, scene, start, 1);
   body.set_profiled(true);
   MeanWork mean;
   for (int i = 0; i < kCycle; ++i) mean.newton_iterations += body.step().front().newton_iterations / double{kCycle};
@@ -33,15 +33,16 @@ void add_step(int modes, int elements, bool polynomial, Target target) {
   const std::string force = polynomial ? "polynomial" : "s" + std::to_string(elements);
   add(step_name(modes, force, target), [=](::benchmark::State& state) {
     const auto model = prepare(bar_model(modes, elements), target, polynomial);
-    time_steps(state, *model, swing(*model, target));
+    time_steps(state, *model, swing(*model, target), make_state(*model));
   });
 }
 
 }  // namespace
 
-void time_steps(::benchmark::State& state, const runtime::Model& model, const runtime::StepScene& scene, int count) {
-  const MeanWork mean = mean_work(model, scene);
-  runtime::Bodies bodies(model, scene, make_state(model), count);
+void time_steps(::benchmark::State& state, const runtime::Model& model, const runtime::StepScene& scene,
+                const runtime::State& start, int count) {
+  const MeanWork mean = mean_work(model, scene, start);
+  runtime::Bodies bodies(model, scene, start, count);
   int steps = 0;
   for (auto _ : state) {
     if (steps++ == kCycle) {

@@ -334,4 +334,29 @@ Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displ
   return force;
 }
 
+ContactData surface_contact(const ReducedModel& model) {
+  const ObjectData& object = *model.object;
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(object.mesh.vertex_count());
+  for (Eigen::Index t = 0; t < object.surface.rows(); ++t) {
+    const auto corner = [&](int i) { return Eigen::Vector3d(object.mesh.vertices.row(object.surface(t, i))); };
+    const double area = 0.5 * (corner(1) - corner(0)).cross(corner(2) - corner(0)).norm();
+    for (int i = 0; i < 3; ++i) areas[object.surface(t, i)] += area / 3;
+  }
+  ContactData data;
+  std::vector<std::int32_t> ids;
+  for (Eigen::Index i = 0; i < areas.size(); ++i)
+    if (areas[i] > 0) ids.push_back(static_cast<std::int32_t>(i));
+  const auto count = static_cast<Eigen::Index>(ids.size());
+  data.vertices = Eigen::Map<const IndexVector>(ids.data(), count);
+  data.positions.resize(count, 3);
+  data.areas.resize(count);
+  data.basis.resize(3 * count, model.modal->basis.cols());
+  for (Eigen::Index i = 0; i < count; ++i) {
+    data.positions.row(i) = object.mesh.vertices.row(data.vertices[i]);
+    data.areas[i] = areas[data.vertices[i]];
+    data.basis.middleRows<3>(3 * i) = model.modal->basis.middleRows<3>(3 * data.vertices[i]);
+  }
+  return data;
+}
+
 }  // namespace exmat::test

@@ -39,4 +39,7 @@ Bar make_bar(const BarOptions& options = {});
 /// 3n internal force of St.Venant-Kirchhoff at the displacement u [3n], by nodes: f_i = V P grad N_i.
 Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displacement);
 
+/// Contact at all surface vertices, a third of the area of their triangles each.
+ContactData surface_contact(const ReducedModel& model);
+
 }  // namespace exmat::test
