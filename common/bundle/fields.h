@@ -132,6 +132,7 @@ void visit_rigid(Rigid& rigid, Visitor& visit) {
   visit.dataset("second_moments", rigid.second_moments);
   visit.dataset("linear_moments", rigid.linear_moments);
   visit.dataset("basis_moments", rigid.basis_moments);
+  visit.dataset("spin_load", rigid.spin_load);
 }
 
 template <typename Contact, typename Visitor>

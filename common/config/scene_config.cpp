@@ -98,6 +98,7 @@ SceneConfig load_scene(const std::filesystem::path& file) {
 
 Needs needs_of(const SceneConfig& scene) {
   Needs needs{.examples = scene.examples || scene.body.pose,
+              .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != "solve",
               .contact = !scene.obstacles.empty(),
               .internal_force = scene.internal_force};

@@ -27,9 +27,9 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
                                      : !needs.examples  ? "no example force is asked for"
                                                         : "an example force is asked for";
   const LedgerEntry examples = {"examples", needs.examples && example_count > 0, 0, example_reason};
-  const std::string rigid_reason = constrained    ? "the body is constrained"
-                                   : !needs.rigid ? "no rigid motion is asked for"
-                                                  : "the body is free";
+  const bool rigid = constrained ? needs.carried : needs.rigid;
+  const std::string rigid_reason = constrained ? (rigid ? "a motion carries the body" : "the body is constrained")
+                                               : (rigid ? "the body is free" : "no rigid motion is asked for");
   return {{"object", true, 0, "always"},
           {"shape_space", examples.included, 0, example_reason},
           examples,
@@ -38,7 +38,7 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
           plan_polynomial(needs),
           {"projection", examples.included, 0, example_reason},
           plan_targets(needs, examples, example_count),
-          {"rigid", needs.rigid && !constrained, 0, rigid_reason},
+          {"rigid", rigid, 0, rigid_reason},
           {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"}};
 }
 

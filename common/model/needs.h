@@ -13,7 +13,8 @@ inline constexpr std::int64_t kMostTableExamples = 4;
 /// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
 struct Needs {
   bool examples = true;                      ///< /shape_space, /examples, /projection
-  bool rigid = true;                         ///< /rigid; free bodies only
+  bool rigid = true;                         ///< /rigid, of a free body
+  bool carried = false;                      ///< /rigid, of a body with fixed vertices that a motion carries
   bool targets = true;                       ///< /targets, of at most kMostTableExamples examples
   bool contact = true;                       ///< /contact
   std::string internal_force = "auto";       ///< "auto", "cubature" or "polynomial" (/polynomial)

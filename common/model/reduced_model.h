@@ -111,7 +111,8 @@ struct ProjectionData {
   RowMatrix target_basis;        ///< r x d, orthonormal basis of the range of T^+, d <= min(r, 3m)
 };
 
-/// Group /rigid: moments of a free body about its centre of mass, X centred there. method.md, section 6.
+/// Group /rigid: moments about the centre of mass, X centred there, of a free body or of one whose fixed part is
+/// carried. method.md, section 6.
 struct RigidData {
   double mass = 0;                 ///< [kg]
   Eigen::Vector3d centre_of_mass;  ///< at rest, world [m]
@@ -119,6 +120,7 @@ struct RigidData {
   RowMatrix3 second_moments;       ///< P0_ab = sum m X_a X_b [kg m^2]
   RowMatrix linear_moments;        ///< 9 x r (dataset 3 3 r): p1_ab, row 3a + b
   RowMatrix basis_moments;         ///< 9r x r (dataset 3 3 r r): S_ab = U_a^T M_s' U_b, block 3a + b
+  RowMatrix spin_load;             ///< 3 x r, sum m X x U: 0 but for rounding where the body is free
 };
 
 /// Group /contact: the surface vertices that may touch obstacles, none of them fixed. method.md, section 6.

@@ -21,6 +21,12 @@ RigidData rigid_moments(const TetMesh& mesh, const Eigen::VectorXd& density, con
     axis_basis[axis] = basis(Eigen::seqN(axis, n, 3), Eigen::all);
     mass_axis_basis[axis] = mass * axis_basis[axis];
   }
+  rigid.spin_load.resize(3, r);
+  for (int c = 0; c < 3; ++c) {
+    const int a = (c + 1) % 3, b = (c + 2) % 3;
+    rigid.spin_load.row(c) =
+        mass_centred.col(a).transpose() * axis_basis[b] - mass_centred.col(b).transpose() * axis_basis[a];
+  }
   rigid.linear_moments.resize(9, r);
   rigid.basis_moments.resize(9 * r, r);
   for (int a = 0; a < 3; ++a)

@@ -320,9 +320,9 @@ ReducedModel Pipeline::run() {
   model.generator = fmt::format("exmat-precompute {}", version());
   model.input_sha256 = hash_inputs(
       report_.inputs,
-      fmt::format("{}\nexamples {}\nrigid {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n",
-                  model.generator, needs_.examples, needs_.rigid, needs_.targets, needs_.contact, needs_.internal_force,
-                  needs_.energy_reference));
+      fmt::format("{}\nexamples {}\nrigid {} {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n",
+                  model.generator, needs_.examples, needs_.rigid, needs_.carried, needs_.targets, needs_.contact,
+                  needs_.internal_force, needs_.energy_reference));
   model.object = object_data();
 
   std::optional<ShapeStage> shape;
@@ -386,7 +386,7 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   };
   needs.examples = named("examples");
   needs.targets = named("targets");
-  needs.rigid = named("rigid");
+  needs.rigid = needs.carried = named("rigid");
   needs.contact = named("contact");
   return needs;
 }

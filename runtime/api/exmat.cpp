@@ -270,6 +270,7 @@ exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const dou
   state.v = state.v_previous = Eigen::Map<const Eigen::VectorXd>(v, modes);
   state.elastic_energy = body->model().internal_force.energy(state.q, body->workspace.elasticity);
   if (state.body) set_motion(body->model(), motion_of(*state.body), body->moments, state);
+  if (state.carried) place_on_carrier(body->model(), body->scene, state);
   refresh_weights(body->model(), body->scene, state, body->workspace);
   return EXMAT_OK;
 }
@@ -354,6 +355,7 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
       torque += (now - centre).cross(force);
       force = body->state.body->orientation.conjugate() * force;
     }
+    if (body->state.carried) force = body->state.carried->frame.rotation.transpose() * force;
     sum += rows.middleRows<3>(i).transpose().lazyProduct(force);
   }
   // A force that is not finite makes every sum so, unless it is where nothing moves.
@@ -392,10 +394,13 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, 3 * points->set.positions.points());
   points->set.positions.evaluate(body->state.q, body->drawing, xyz);
-  if (!body->state.body) return EXMAT_OK;
+  if (!body->state.body && !body->state.carried) return EXMAT_OK;
   for (std::int64_t i = 0; i < coordinates; i += 3) {
     Eigen::Map<Eigen::Vector3f> point(xyz + i);
-    point = placed<float>(*body, point);
+    if (body->state.body)
+      point = placed<float>(*body, point);
+    else
+      point = body->state.carried->frame.to_world(point.cast<double>()).cast<float>();
   }
   return EXMAT_OK;
 }
@@ -404,8 +409,8 @@ exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(motion);
   *motion = {{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  if (!body->state.body) return EXMAT_OK;
-  const FreeMotion now = motion_of(*body->state.body);
+  if (!body->state.body && !body->state.carried) return EXMAT_OK;
+  const FreeMotion now = body->state.body ? motion_of(*body->state.body) : motion_of(body->state.carried->frame);
   for (int i = 0; i < 3; ++i) {
     motion->position[i] = now.position[i];
     motion->orientation[i + 1] = now.orientation.vec()[i];

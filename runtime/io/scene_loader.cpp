@@ -7,6 +7,7 @@
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "runtime/io/obstacle_loader.h"
+#include "runtime/sim/stepper.h"
 
 namespace exmat::runtime {
 namespace {
@@ -61,15 +62,6 @@ void count_bytes(const std::vector<ReadRecord>& records, std::vector<LedgerEntry
   }
 }
 
-/// What this version reads and checks, yet does not step.
-void refuse_unsupported(const SceneConfig& config) {
-  const auto refuse = [&](const char* member, const char* advice) {
-    throw InputError(
-        {config.file.string(), member, "no such member: this version does not support it yet", "one", advice});
-  };
-  if (!config.body.motion.empty()) refuse("/body/motion", "remove it: fixed vertices stay where they are");
-}
-
 RowMatrix basis_rows(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
   const RowMatrix& basis = loaded.data.modal->basis;
   if (basis.rows() == 0) return read_basis_rows(config.bundle, force.vertices, &loaded.records);
@@ -85,11 +77,12 @@ ScriptedForce scripted_force(const SceneConfig& config, const VertexForceConfig&
   scripted.start = force.start;
   scripted.end = force.end;
   scripted.force = vertex_force(rows, force.force);
-  if (!loaded.model->rigid) return scripted;
+  const Model& model = *loaded.model;
+  if (!model.rigid && !model.carried) return scripted;
   const auto count = static_cast<double>(force.vertices.size());
   scripted.total = count * force.force;
   scripted.mean_basis.setZero(3, rows.cols());
-  scripted.lever = -loaded.model->rigid->centre_of_mass();
+  scripted.lever = -(model.rigid ? *model.rigid : model.carried->moments).centre_of_mass();
   for (std::size_t i = 0; i < force.vertices.size(); ++i) {
     scripted.lever += loaded.data.object->mesh.vertices.row(force.vertices[i]).transpose() / count;
     scripted.mean_basis += rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) / count;
@@ -105,6 +98,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
   scene.obstacles = make_obstacles(config);
+  if (loaded.model->carried) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
   for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force(config, force, loaded));
@@ -118,6 +112,7 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   const Eigen::Index modes = loaded.model->modes();
   State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
   prepare_contacts(*loaded.model, config.obstacles.size(), state);
+  if (loaded.model->carried) place_on_carrier(*loaded.model, loaded.scene, state);
   if (!state.body) return state;
   FreeMotion motion;
   motion.position = config.body.position.value_or(motion.position);
@@ -133,6 +128,7 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   options.examples = config.examples.has_value();
   options.target_table = data.targets.has_value();
   options.polynomial = data.polynomial.has_value();
+  options.carried = !config.body.motion.empty();
   if (config.examples) options.energy_reference = energy_reference_from_name(config.examples->energy_reference);
   ModelResult result = build_model(data, options);
   if (result.model) return std::move(result.model);
@@ -151,15 +147,15 @@ std::string describe_target(const ExampleModel& examples, const StepScene& scene
 LoadedScene load_run(const SceneConfig& config) {
   LoadedScene loaded;
   loaded.summary = summarise_bundle(config.bundle);
-  refuse_unsupported(config);
   check_body(config, loaded.summary.constrained);
   check_examples(config, loaded.summary);
   check_methods(config, loaded.summary);
   check_force_vertices(config, loaded.summary);
   loaded.ledger =
       plan_groups(fit_needs(needs_of(config), loaded.summary), loaded.summary.constrained, loaded.summary.examples);
-  // A force on a free body needs to know where it acts.
-  const bool positions = config.trajectory || (!loaded.summary.constrained && !config.forces.empty());
+  // A force on a body that moves needs to know where it acts.
+  const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
+  const bool positions = config.trajectory || (moves && !config.forces.empty());
   const BundleRequest request{loaded.ledger, /*step_only=*/true, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   loaded.model = prepare(config, loaded.data);
@@ -215,6 +211,8 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   }
   if (model.rigid)
     plan.push_back("rigid motion: momenta, rotation by the spin that keeps the angular momentum");
+  else if (model.carried)
+    plan.push_back("rigid motion: prescribed, with the inertial forces that it causes");
   else
     left_out("rigid motion", "the body is constrained");
   if (touches(model, scene))

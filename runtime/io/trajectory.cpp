@@ -149,8 +149,13 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const Redu
 TrajectoryWriter::~TrajectoryWriter() = default;
 
 void TrajectoryWriter::append(const State& state, const Energies& energies, double step_seconds) {
-  const FreeState rest;
-  const FreeState& body = state.body ? *state.body : rest;
+  FreeState where;
+  if (state.carried) {
+    const FreeMotion frame = motion_of(state.carried->frame);
+    where.position = frame.position;
+    where.orientation = frame.orientation;
+  }
+  const FreeState& body = state.body ? *state.body : where;
   const Eigen::Quaterniond& turn = body.orientation;
   const std::array orientation{turn.w(), turn.x(), turn.y(), turn.z()};
   times_.push_back(state.time);
@@ -173,6 +178,7 @@ void TrajectoryWriter::append_positions(const State& state) {
   velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
   VertexArray positions = model_.object->mesh.vertices + displacements_;
   if (state.body) place(*state.body, positions);
+  if (state.carried) carry(state.carried->frame, positions);
   const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
   datasets_->positions.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
@@ -188,6 +194,15 @@ void TrajectoryWriter::place(const FreeState& body, VertexArray& positions) cons
   const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix();
   positions = (positions.rowwise() - centre) * rotation.transpose();
   positions.rowwise() += centre + body.position.transpose();
+}
+
+/// Positions and velocities from the moving frame to the world.
+void TrajectoryWriter::carry(const MotionSample& frame, VertexArray& positions) {
+  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+    const Eigen::Vector3d point = frame.to_world(positions.row(i).transpose());
+    velocities_.row(i) = frame.velocity_at(point) + frame.rotation * velocities_.row(i).transpose();
+    positions.row(i) = point;
+  }
 }
 
 void TrajectoryWriter::finish() {

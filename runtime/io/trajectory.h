@@ -43,6 +43,7 @@ class TrajectoryWriter {
   struct Datasets;
   void append_positions(const State& state);
   void place(const FreeState& body, VertexArray& positions) const;
+  void carry(const MotionSample& frame, VertexArray& positions);
 
   const ReducedModel& model_;
   TrajectoryInfo info_;

@@ -26,6 +26,10 @@ ContactProblem::ContactProblem(const Model& model, const StepScene& scene, const
 BodyPose ContactProblem::place(const Eigen::VectorXd& x) noexcept {
   near_.q = state_.q + x.tail(near_.q.size());
   BodyPose pose{.q = near_.q};
+  if (model_.carried) {
+    pose.position = workspace_.carried->frame.position;
+    pose.rotation = workspace_.carried->frame.rotation;
+  }
   if (rigid_ == 0) return pose;
   const Eigen::Vector3d turn = x.segment<3>(3);
   workspace_.free->solution.rotation = turn;

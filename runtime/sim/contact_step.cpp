@@ -1,6 +1,7 @@
 #include "runtime/sim/contact_step.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 
 namespace exmat::runtime {
 namespace {
@@ -11,6 +12,10 @@ constexpr double kSameFriction = 0.05;  // relative change of friction that need
 
 BodyPose pose_of(const Model& model, const State& state) {
   BodyPose pose{.q = state.q};
+  if (state.carried) {
+    pose.position = state.carried->frame.position;
+    pose.rotation = state.carried->frame.rotation;
+  }
   if (!state.body) return pose;
   pose.position = model.rigid->centre_of_mass() + state.body->position;
   pose.rotation = state.body->orientation.toRotationMatrix();
@@ -53,9 +58,18 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
     velocity.linear = state.body->linear_momentum / state.body->mass;
     velocity.angular = pose.rotation * state.body->spin;
   }
+  if (state.carried) {
+    velocity.linear = state.carried->frame.linear_velocity;
+    velocity.angular = state.carried->frame.angular_velocity;
+  }
   const ContactSet& set = *model.contact;
   const double dt = scene.time_step;
-  const double margin = kMarginSteps * set.travel_bound(pose, velocity, dt) + dt * dt * scene.gravity.norm();
+  double travel = set.travel_bound(pose, velocity, dt);
+  if (state.carried) {
+    const MotionSample& end = workspace.carried->frame;
+    travel = std::max(travel, set.travel_bound(pose, {end.linear_velocity, end.angular_velocity, state.v}, dt));
+  }
+  const double margin = kMarginSteps * travel + dt * dt * scene.gravity.norm();
   ContactWorkspace& contact = workspace.near->contact;
   set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
   if (contact.candidate_count == 0) return false;

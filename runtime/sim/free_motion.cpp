@@ -6,9 +6,6 @@
 namespace exmat::runtime {
 namespace {
 
-// Shares of inertia: more softening may leave the Hessian indefinite, less of it changes no iteration.
-constexpr double kMostSoftening = 0.25, kLeastSoftening = 1e-5;
-
 /// D + V, see free_motion.h, and what J^-1 makes of it and of H.
 void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace) {
   frame.inertia_slope(workspace.moments, workspace.solution.spin, workspace.slope);
@@ -74,8 +71,7 @@ void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, Fre
           slope.bottomRows(below).lazyProduct(stiffening) - deformation.bottomRows(below).lazyProduct(lost);
     }
   }
-  const double softening = spin.squaredNorm() / inertia;
-  if (softening >= kLeastSoftening && softening <= kMostSoftening) frame.add_centrifugal(spin, -1, hessian);
+  frame.add_softening(spin, velocity_factor, hessian);
 }
 
 void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept {

@@ -6,7 +6,7 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kSmallSpin = 0.05;        // of c_v: beyond it a factorisation costs less than the terms of a series
+constexpr double kSmallRatio = 0.1;  // of inertia: beyond it a factorisation costs less than the terms of a series
 constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
 
 }  // namespace
@@ -19,7 +19,8 @@ IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& 
       workspace_(workspace),
       examples_(runs_examples(model, scene)),
       skew_(examples_ && !model.examples->filter.is_symmetric()),
-      rotates_(state.body.has_value()) {}
+      rotates_(state.body.has_value()),
+      carried_(model.carried.has_value()) {}
 
 double IncrementalPotential::internal_flops(bool stiffness) const noexcept {
   return model_.internal_force.force_flops() + (stiffness ? model_.internal_force.stiffness_flops() : 0);
@@ -105,7 +106,7 @@ void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Ei
 }
 
 void IncrementalPotential::accept(PotentialEvaluation& evaluation) noexcept {
-  if (!skew_ && !rotates_) return;
+  if (!has_frozen_force()) return;
   workspace_.frozen_force.swap(workspace_.next_frozen_force);
   evaluation.potential.value +=
       workspace_.frozen_force.dot(workspace_.offset) - workspace_.next_frozen_force.dot(workspace_.offset);
@@ -127,7 +128,7 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
   const double inertia = form.acceleration_factor * (q - form.acceleration_centre).norm();
   PotentialEvaluation evaluation{quadratic(elastic_energy_),
                                  workspace_.external_force.norm() + workspace_.internal_force.norm() + inertia};
-  if (skew_ || rotates_) {
+  if (has_frozen_force()) {
     if (!update_frozen_force(q)) evaluation.potential.value = std::numeric_limits<double>::infinity();
     gradient += workspace_.next_frozen_force;
   }
@@ -140,6 +141,11 @@ bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcep
   if (skew_)
     workspace_.next_frozen_force.noalias() +=
         workspace_.example_force.stiffness * (model_.examples->filter.skew_part() * workspace_.offset);
+  if (carried_) {
+    workspace_.carried->velocity = workspace_.form.velocity_factor * (q - workspace_.form.velocity_centre);
+    carried_force(*model_.carried, q, *workspace_.carried);
+    workspace_.next_frozen_force -= workspace_.carried->force;
+  }
   if (!rotates_) return true;
   FreeMotionWorkspace& free = *workspace_.free;
   const StepForm& form = workspace_.form;
@@ -152,17 +158,26 @@ bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcep
 
 /// The antisymmetric part of the rotation, where it is not small beside c_a.
 const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
-  if (!rotates_) return nullptr;
-  FreeMotionWorkspace& free = *workspace_.free;
-  if (free.solution.spin.norm() <= kSmallSpin * workspace_.form.velocity_factor) return nullptr;
-  set_gyroscopic(*model_.rigid, workspace_.form.velocity_factor, free);
-  return &free.gyroscopic;
+  if (gyroscopic_ratio() <= kSmallRatio) return nullptr;
+  const double factor = workspace_.form.velocity_factor;
+  if (carried_) {
+    set_gyroscopic(*model_.carried, factor, *workspace_.carried);
+    return &workspace_.carried->gyroscopic;
+  }
+  set_gyroscopic(*model_.rigid, factor, *workspace_.free);
+  return &workspace_.free->gyroscopic;
 }
 
-/// The antisymmetric part is about 2 |w| / c_v of inertia.
+/// About what the antisymmetric part is of inertia.
+double IncrementalPotential::gyroscopic_ratio() const noexcept {
+  const double factor = workspace_.form.velocity_factor;
+  if (rotates_) return 2 * workspace_.free->solution.spin.norm() / factor;
+  if (!carried_) return 0;
+  return (2 * workspace_.carried->spin.norm() + workspace_.carried->spin_rate.norm() / factor) / factor;
+}
+
 int IncrementalPotential::gyroscopic_terms() const noexcept {
-  if (!rotates_) return 0;
-  const double ratio = 2 * workspace_.free->solution.spin.norm() / workspace_.form.velocity_factor;
+  const double ratio = gyroscopic_ratio();
   double error = ratio;
   int terms = 0;
   for (; error > kGyroscopicError; error *= ratio) ++terms;
@@ -170,7 +185,12 @@ int IncrementalPotential::gyroscopic_terms() const noexcept {
 }
 
 const Eigen::VectorXd& IncrementalPotential::gyroscopic_product(const Eigen::VectorXd& x) const noexcept {
-  runtime::gyroscopic_product(*model_.rigid, workspace_.form.velocity_factor, x, *workspace_.free);
+  const double factor = workspace_.form.velocity_factor;
+  if (carried_) {
+    runtime::gyroscopic_product(*model_.carried, factor, x, *workspace_.carried);
+    return workspace_.carried->product;
+  }
+  runtime::gyroscopic_product(*model_.rigid, factor, x, *workspace_.free);
   return workspace_.free->product;
 }
 
@@ -179,13 +199,15 @@ PotentialValue IncrementalPotential::quadratic(double elastic_energy) noexcept {
   const double square = 0.5 * workspace_.offset.dot(workspace_.product.head(workspace_.offset.size()));
   const double linear = workspace_.linear.dot(workspace_.offset);
   PotentialValue sum{elastic_energy + square + linear, std::abs(elastic_energy) + std::abs(square) + std::abs(linear)};
-  if (skew_ || rotates_) sum.value += workspace_.frozen_force.dot(workspace_.offset);
+  if (has_frozen_force()) sum.value += workspace_.frozen_force.dot(workspace_.offset);
   return sum;
 }
 
 void IncrementalPotential::add_quadratic(Eigen::MatrixXd& hessian) const noexcept {
   hessian.triangularView<Eigen::Lower>() += workspace_.quadratic.topRows(hessian.rows());
-  if (rotates_) add_rotation_stiffness(*model_.rigid, workspace_.form.velocity_factor, *workspace_.free, hessian);
+  const double factor = workspace_.form.velocity_factor;
+  if (rotates_) add_rotation_stiffness(*model_.rigid, factor, *workspace_.free, hessian);
+  if (carried_) model_.carried->moments.add_softening(workspace_.carried->spin, factor, hessian);
 }
 
 }  // namespace exmat::runtime

@@ -12,7 +12,7 @@ namespace exmat::runtime {
 ///   q,
 /// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
 /// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
-/// the skew part of P_s and, on a free body, those of its rotation (free_motion.h): in values they are those of the
+/// the skew part of P_s and those of a rotation (free_motion.h, carried_motion.h): in values they are those of the
 /// iterate last accepted, so that the gradient is exact. reduction.md, "Integration"; ExampleForce. Reads form and
 /// external_force of the workspace.
 class IncrementalPotential {
@@ -47,6 +47,8 @@ class IncrementalPotential {
   bool update_frozen_force(const Eigen::VectorXd& q) noexcept;
   PotentialValue quadratic(double elastic_energy) noexcept;
   void add_quadratic(Eigen::MatrixXd& hessian) const noexcept;
+  double gyroscopic_ratio() const noexcept;
+  bool has_frozen_force() const noexcept { return skew_ || rotates_ || carried_; }
   double internal_flops(bool stiffness) const noexcept;
 
   const Model& model_;
@@ -56,6 +58,7 @@ class IncrementalPotential {
   bool examples_;
   bool skew_;
   bool rotates_;
+  bool carried_;
   bool at_first_iterate_ = true;
   double elastic_energy_ = 0;
 };

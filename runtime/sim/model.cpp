@@ -6,7 +6,7 @@ namespace exmat::runtime {
 namespace {
 
 Complaint missing_group(const char* group) {
-  return {"", group, "this group", "none", "precompute the bundle again with this scene (--scene)"};
+  return {"", group, "this part", "none", "precompute the bundle again with this scene (--scene)"};
 }
 
 }  // namespace
@@ -27,10 +27,15 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   if (options.polynomial) polynomial.emplace(*reduced.polynomial);
   model->internal_force = InternalForce(ReducedElasticity(*material, cubature), std::move(polynomial));
   model->gravity_load = reduced.modal->gravity_load;
-  if (reduced.rigid) model->rigid.emplace(*reduced.rigid);
+  if (options.carried && !(reduced.rigid && reduced.rigid->spin_load.size() > 0))
+    return {nullptr, missing_group("/rigid/spin_load")};
+  if (options.carried)
+    model->carried = CarriedFrame{RigidFrame(*reduced.rigid), reduced.rigid->spin_load};
+  else if (reduced.rigid)
+    model->rigid.emplace(*reduced.rigid);
   if (reduced.contact)
     model->contact.emplace(*reduced.contact,
-                           reduced.rigid ? reduced.rigid->centre_of_mass : Eigen::Vector3d::Zero().eval());
+                           model->rigid ? reduced.rigid->centre_of_mass : Eigen::Vector3d::Zero().eval());
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};
     const ExampleSet& set = *reduced.examples;

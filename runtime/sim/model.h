@@ -7,6 +7,7 @@
 #include "common/core/arrays.h"
 #include "common/core/error.h"
 #include "common/model/reduced_model.h"
+#include "runtime/sim/carried_motion.h"
 #include "runtime/sim/contact.h"
 #include "runtime/sim/example_force.h"
 #include "runtime/sim/example_weights.h"
@@ -31,6 +32,7 @@ struct Model {
   RowMatrix gravity_load;                ///< 3 x r
   std::optional<ContactSet> contact;     ///< of a scene with obstacles
   std::optional<RigidFrame> rigid;       ///< of a free body
+  std::optional<CarriedFrame> carried;   ///< of a body whose fixed part a motion carries
   std::optional<ExampleModel> examples;  ///< absent: this model was prepared without
 
   Eigen::Index modes() const { return internal_force.modes(); }
@@ -40,6 +42,7 @@ struct Model {
 struct ModelOptions {
   bool examples = true;       ///< prepare example forces, if the bundle has examples
   bool target_table = false;  ///< take targets from /targets; false: solve for them
+  bool carried = false;       ///< a motion carries the body's fixed part: /rigid
   bool polynomial = false;    ///< internal force by /polynomial; false: by cubature
   EnergyReference energy_reference = EnergyReference::kExample;
 };

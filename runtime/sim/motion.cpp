@@ -83,6 +83,13 @@ MotionSample RigidMotion::sample(double time) const noexcept {
   return sample;
 }
 
+bool RigidMotion::has_key(double from, double to) const noexcept {
+  const auto within = [=](double time) { return from <= time && time < to; };
+  return std::any_of(segments_.begin(), segments_.end(), [&](const Segment& segment) {
+    return within(segment.start) || within(segment.start + segment.duration);
+  });
+}
+
 void RigidMotion::sample_position(const Segment& segment, double s, MotionSample& sample) noexcept {
   const double h = segment.duration;
   const Eigen::Vector3d step = segment.to - segment.from;

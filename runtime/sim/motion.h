@@ -47,6 +47,9 @@ class RigidMotion {
   /// Velocities and accelerations are the exact derivatives of the pose.
   MotionSample sample(double time) const noexcept;
 
+  /// Whether a key, where accelerations may jump, lies in [from, to).
+  bool has_key(double from, double to) const noexcept;
+
   /// Whether the pose changes at all.
   bool moves() const noexcept { return !segments_.empty(); }
 

@@ -3,7 +3,8 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr int kFirst[6] = {0, 1, 2, 1, 0, 0};  // of the pairs xx, yy, zz, yz, xz, xy
+constexpr int kFirst[6] = {0, 1, 2, 1, 0, 0};                    // of the pairs xx, yy, zz, yz, xz, xy
+constexpr double kMostSoftening = 0.25, kLeastSoftening = 1e-5;  // shares of inertia
 constexpr int kSecond[6] = {0, 1, 2, 2, 2, 1};
 
 /// d(1/2 w^T J w)/dP_ab of the six pairs, off-diagonal ones counted twice.
@@ -90,6 +91,12 @@ void RigidFrame::add_centrifugal(const Eigen::Vector3d& spin, double factor, Eig
     matrix.col(j).tail(below) +=
         slopes[0] * S(0) + slopes[1] * S(1) + slopes[2] * S(2) + slopes[3] * S(3) + slopes[4] * S(4) + slopes[5] * S(5);
   }
+}
+
+void RigidFrame::add_softening(const Eigen::Vector3d& spin, double velocity_factor,
+                               Eigen::MatrixXd& hessian) const noexcept {
+  const double share = spin.squaredNorm() / (velocity_factor * velocity_factor);
+  if (share >= kLeastSoftening && share <= kMostSoftening) add_centrifugal(spin, -1, hessian);
 }
 
 void RigidFrame::inertia_slope(const Moments& moments, const Eigen::Vector3d& spin,

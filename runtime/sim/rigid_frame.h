@@ -47,6 +47,10 @@ class RigidFrame {
   /// (d(J w)/dq)^T [r x 3] at fixed w.
   void inertia_slope(const Moments& moments, const Eigen::Vector3d& spin, Eigen::MatrixX3d& slope) const noexcept;
 
+  /// What the centrifugal force takes from the Hessian c_v^2 I + ..., where that is neither so much that it could leave
+  /// it indefinite nor too little to change an iteration.
+  void add_softening(const Eigen::Vector3d& spin, double velocity_factor, Eigen::MatrixXd& hessian) const noexcept;
+
  private:
   static constexpr int kSymmetric = 6;
   static constexpr int kProducts = 9;

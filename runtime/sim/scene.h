@@ -16,12 +16,12 @@ enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 
 /// A constant world-space force on each of some vertices that acts in every step whose midpoint lies in [start, end).
 struct ScriptedForce {
-  Eigen::VectorXd force;                                 ///< [r] generalised, of a body that does not rotate
+  Eigen::VectorXd force;                                 ///< [r] generalised, of a body that stays where it is
   double start = 0;                                      ///< [s]
   double end = std::numeric_limits<double>::infinity();  ///< [s]
   Eigen::Vector3d total = Eigen::Vector3d::Zero();       ///< sum over the vertices [N]
   Eigen::Vector3d lever = Eigen::Vector3d::Zero();       ///< mean of the vertices' X about the centre of mass [m]
-  Eigen::Matrix3Xd mean_basis{};                         ///< [3 x r] mean of their U; these three for a free body
+  Eigen::Matrix3Xd mean_basis{};                         ///< [3 x r] mean of their U; these three for a body that moves
 };
 
 /// The linear example force. method.md, section 5.
@@ -43,6 +43,7 @@ struct StepScene {
   Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
   std::vector<ScriptedForce> forces;
   std::vector<Obstacle> obstacles;
+  std::optional<RigidMotion> carrier;       ///< of a model with `carried`: what carries its fixed part
   std::optional<ExampleSettings> examples;  ///< absent: no weights, no target, no example force
 };
 

@@ -34,6 +34,10 @@ FreeMotion motion_of(const FreeState& body) {
   return {body.position, body.orientation, body.linear_momentum / body.mass, body.orientation * body.spin};
 }
 
+FreeMotion motion_of(const MotionSample& frame) {
+  return {frame.position, Eigen::Quaterniond(frame.rotation), frame.linear_velocity, frame.angular_velocity};
+}
+
 void set_motion(const Model& model, const FreeMotion& motion, State& state) {
   auto moments = model.rigid->make_moments();
   set_motion(model, motion, moments, state);

@@ -36,9 +36,10 @@ struct State {
   Eigen::VectorXd target;                  ///< [d] y of the last step, see TargetSolver; empty with a table
   bool has_target = false;
   bool target_converged = false;
-  ContactState contacts;          ///< what touches; sized for its scene by prepare_contacts()
-  bool begins_anew = true;        ///< the last step was no smooth one: the first, or one near obstacles
-  std::optional<FreeState> body;  ///< of a free body
+  ContactState contacts;                ///< what touches; sized for its scene by prepare_contacts()
+  bool begins_anew = true;              ///< the last step was no smooth one: the first, or one near obstacles
+  std::optional<FreeState> body;        ///< of a free body
+  std::optional<CarriedState> carried;  ///< of a body whose fixed part a motion carries
 
   /// [r] momentum of q: that of a free body, else qdot.
   const Eigen::VectorXd& momentum() const { return body ? body->momentum : v; }
@@ -54,6 +55,7 @@ struct FreeMotion {
 };
 
 FreeMotion motion_of(const FreeState& body);
+FreeMotion motion_of(const MotionSample& frame);
 
 /// Sets how a free body moves; its q and v stay. `moments` is scratch: with it nothing is allocated.
 void set_motion(const Model& model, const FreeMotion& motion, RigidFrame::Moments& moments, State& state);

@@ -9,15 +9,43 @@ namespace exmat::runtime {
 namespace {
 
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
+constexpr double kBesideKey = 1e-6;    // of a step
 
 bool acts(const ScriptedForce& force, double time) { return force.start <= time && time < force.end; }
 
-void gather_external_force(const StepScene& scene, const State& state, double midpoint,
-                           Eigen::VectorXd& external_force) {
-  external_force = scene.gravity_force + state.applied_force;
+/// Of a free body only what the caller applies; the rest acts on its momenta first.
+void gather_external_force(const Model& model, const StepScene& scene, const State& state, double midpoint,
+                           Workspace& workspace) {
+  Eigen::VectorXd& external_force = workspace.external_force;
+  external_force = state.applied_force;
+  if (!model.carried) external_force += scene.gravity_force;
+  if (model.carried)
+    add_carried_load(*model.carried, model.gravity_load, scene.gravity, *workspace.carried, external_force);
   if (state.body) return;
-  for (const ScriptedForce& force : scene.forces)
-    if (acts(force, midpoint)) external_force += force.force;
+  for (const ScriptedForce& force : scene.forces) {
+    if (!acts(force, midpoint)) continue;
+    if (model.carried)
+      external_force.noalias() +=
+          force.mean_basis.transpose() * (workspace.carried->frame.rotation.transpose() * force.total);
+    else
+      external_force += force.force;
+  }
+}
+
+/// The motion at `time`, with the accelerations `beside` [s] it: they may jump at keys, and a step has those within it.
+MotionSample sample_beside(const RigidMotion& motion, double time, double beside) {
+  MotionSample sample = motion.sample(time);
+  const MotionSample within = motion.sample(time + beside);
+  sample.linear_acceleration = within.linear_acceleration;
+  sample.angular_acceleration = within.angular_acceleration;
+  return sample;
+}
+
+/// The motion that carries a body at `frame`, and the external forces there, into the workspace.
+void take_frame(const Model& model, const StepScene& scene, const State& state, const MotionSample& frame,
+                double midpoint, Workspace& workspace) {
+  set_frame(frame, *workspace.carried);
+  gather_external_force(model, scene, state, midpoint, workspace);
 }
 
 /// Momenta and centre of mass of a free body at the end of the step, and its forces on q, into the workspace. Scripted
@@ -46,18 +74,22 @@ void move_free_body(const Model& model, const StepScene& scene, Integrator integ
   begin_rotation(body, dt, integrator == Integrator::kBackwardEuler, *workspace.free);
 }
 
-/// What resolves a step: backward Euler where the body turns too far in it for anything of second order.
+/// What resolves a step: backward Euler where a body that is not clamped in the world turns too far in it for anything
+/// of second order.
 Integrator integrator_of_step(const StepScene& scene, const State& state, bool near) {
-  const bool resolved = !near && (!state.body || state.body->spin.norm() * scene.time_step <= kResolvedTurn);
+  double spin = state.body ? state.body->spin.norm() : 0;
+  if (state.carried) spin = state.carried->frame.angular_velocity.norm();
+  const bool resolved = !near && spin * scene.time_step <= kResolvedTurn;
   return resolved ? scene.integrator : Integrator::kBackwardEuler;
 }
 
-/// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with.
+/// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with, or that a key
+/// of the motion that carries the body lies at.
 bool begins_anew(const StepScene& scene, const State& state, double midpoint) {
   if (state.begins_anew) return true;
   for (const ScriptedForce& force : scene.forces)
     if (acts(force, midpoint) != acts(force, midpoint - scene.time_step)) return true;
-  return false;
+  return scene.carrier && scene.carrier->has_key(midpoint - scene.time_step, midpoint);
 }
 
 /// w(q) after the bias, into the workspace. method.md, section 5.
@@ -108,6 +140,11 @@ void add_example_force(const Model& model, const StepScene& scene, const State& 
 /// a_n of Newmark's method from the equation of motion at the beginning of the step.
 void start_acceleration(const Model& model, const StepScene& scene, const State& state, Workspace& workspace,
                         StepReport& report) {
+  const double midpoint = state.time + 0.5 * scene.time_step;
+  const MotionSample end = model.carried ? workspace.carried->frame : MotionSample{};
+  if (model.carried)
+    take_frame(model, scene, state, sample_beside(*scene.carrier, state.time, kBesideKey * scene.time_step), midpoint,
+               workspace);
   Eigen::VectorXd& a = workspace.acceleration;
   if (scene.stiffness_damping > 0) {
     Eigen::MatrixXd& stiffness = workspace.newton.hessian;
@@ -126,6 +163,12 @@ void start_acceleration(const Model& model, const StepScene& scene, const State&
     model.rigid->moments(state.q, free.moments);
     rotation_force(*model.rigid, 0, free);
     a += free.force;
+  }
+  if (model.carried) {
+    workspace.carried->velocity = state.v;
+    carried_force(*model.carried, state.q, *workspace.carried);
+    a += workspace.carried->force;
+    take_frame(model, scene, state, end, midpoint, workspace);
   }
   if (!runs_examples(model, scene)) return;
   update_target(model, scene, state, state.q, workspace, report);
@@ -188,6 +231,9 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.v = workspace.offset;
   state.a = form.acceleration_factor * (state.q - form.acceleration_centre);
   if (state.body) commit_free_motion(workspace.form.velocity_factor, workspace.body.value(), *workspace.free, state);
+  if (model.carried)
+    state.carried =
+        carried_state(*model.carried, model.gravity_load, scene.gravity, state.q, state.v, *workspace.carried);
   state.elastic_energy = elastic_energy;
   ++state.step;
   state.time = static_cast<double>(state.step) * scene.time_step;
@@ -215,7 +261,12 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) {
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   StepReport report;
   const double midpoint = state.time + 0.5 * scene.time_step;
-  gather_external_force(scene, state, midpoint, workspace.external_force);
+  const double end = static_cast<double>(state.step + 1) * scene.time_step;
+  if (model.carried)
+    take_frame(model, scene, state, sample_beside(*scene.carrier, end, -kBesideKey * scene.time_step), midpoint,
+               workspace);
+  else
+    gather_external_force(model, scene, state, midpoint, workspace);
   const bool near = is_near_obstacles(model, scene, state, workspace);
   const Integrator integrator = integrator_of_step(scene, state, near);
   if (state.body) move_free_body(model, scene, integrator, near, state, midpoint, workspace);
@@ -256,8 +307,20 @@ void refresh_weights(const Model& model, const StepScene& scene, State& state, W
   state.weights = workspace.weights;
 }
 
+void place_on_carrier(const Model& model, const StepScene& scene, State& state) {
+  CarriedWorkspace workspace(*model.carried);
+  set_frame(scene.carrier->sample(state.time), workspace);
+  workspace.velocity = state.v;
+  carried_force(*model.carried, state.q, workspace);
+  state.carried = carried_state(*model.carried, model.gravity_load, scene.gravity, state.q, state.v, workspace);
+}
+
 Energies energies(const StepScene& scene, const State& state) noexcept {
   Energies energies{0.5 * state.v.squaredNorm(), state.elastic_energy, -scene.gravity_force.dot(state.q)};
+  if (state.carried) {
+    energies.kinetic = state.carried->kinetic_energy;
+    energies.potential += state.carried->potential_of_frame;
+  }
   if (!state.body) return energies;
   const FreeState& body = *state.body;
   // w . l = w . (J w + h) and (pi - v) . v = w . h.

@@ -40,6 +40,9 @@ struct StepReport {
 /// exception. docs/step_in_detail.md.
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
+/// Puts a body that a motion carries where it is at the time of `state`.
+void place_on_carrier(const Model& model, const StepScene& scene, State& state);
+
 /// Example weights of a state that no step has led to, for its output.
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 

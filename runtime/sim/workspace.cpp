@@ -22,6 +22,10 @@ Workspace::Workspace(const Model& model, const StepScene& scene)
     body->momentum = body->momentum_previous = zero;
     newton.lu.emplace(model.modes());
   }
+  if (model.carried) {
+    carried.emplace(*model.carried);
+    newton.lu.emplace(model.modes());
+  }
   if (touches(model, scene)) near.emplace(model, scene);
   product.setZero(padded(model.modes()));
   quadratic.setZero(padded(model.modes()), model.modes());

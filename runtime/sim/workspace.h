@@ -47,6 +47,7 @@ struct Workspace {
 
   std::optional<ContactProblemWorkspace> near;  ///< with obstacles
   std::optional<FreeMotionWorkspace> free;      ///< of a free body
+  std::optional<CarriedWorkspace> carried;      ///< of one that a motion carries
   std::optional<FreeState> body;                ///< and where it will be
 
   ExampleWeights::Workspace weights_solver;  // the rest only with examples

@@ -119,6 +119,26 @@ def steps(result):
     return table(("r", "", *titles), rows)
 
 
+def free_bodies(result):
+    rows = []
+    for name in sorted((name for name in result.best if name.startswith("free/")), key=by_size):
+        modes, elements = name.split("/")[1:]
+        free, clamped = result.microseconds(name), result.microseconds(f"step/{modes}/{elements}/table")
+        rows.append((modes[1:], elements[1:], number(clamped), number(free), f"{free / clamped:.2f}"))
+    return table(("r", "s", "clamped [us]", "free [us]", "ratio"), rows)
+
+
+def contacts(result):
+    found = sorted((name for name in result.best if name.startswith("contact/")),
+                   key=lambda name: result.best[name]["near_vertices"])
+    away = result.microseconds(found[0])
+    rows = []
+    for name in found:
+        near, time = int(result.best[name]["near_vertices"]), result.microseconds(name)
+        rows.append((near, number(time), number((time - away) / near) if near else ""))
+    return table(("vertices near the floor", "a step [us]", "a vertex [us]"), rows)
+
+
 def sizes(result):
     names = {int(name.split("/")[1].removesuffix("_tets")): name for name in result.best if name.startswith("size/")}
     first = result.microseconds(names[min(names)])
@@ -151,6 +171,10 @@ def report(results, compiler):
         f"### Whole steps ({fastest.name})\n\nMicroseconds of a step; in parentheses how many times as long as its "
         "flops at the DGEMM rate.",
         steps(fastest),
+        f"### Free bodies ({fastest.name})\n\nFour examples, table; the free bar spins at 2 rad/s.",
+        free_bodies(fastest),
+        f"### Contact ({fastest.name})\n\nA free bar, r = 20, s = 30, no examples, on a floor or 100 m above it.",
+        contacts(fastest),
         f"### Size of the mesh ({fastest.name})\n\nThe same reduced model (r = 20, s = 60, four examples, table) in "
         "bundles of meshes that differ in size alone,\nloaded as `exmat-runtime run` does without a trajectory.",
         sizes(fastest),

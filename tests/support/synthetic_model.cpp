@@ -169,6 +169,12 @@ RigidData rigid_data(const ObjectData& object, const FullMatrices& full, const M
   rigid.inertia = rigid.second_moments.trace() * Eigen::Matrix3d::Identity() - rigid.second_moments;
   rigid.linear_moments.resize(9, r);
   rigid.basis_moments.resize(9 * r, r);
+  rigid.spin_load.setZero(3, r);
+  for (Eigen::Index i = 0; i < n; ++i)  // (X_i x) by columns
+    for (Eigen::Index j = 0; j < n; ++j)
+      for (int axis = 0; axis < 3; ++axis)
+        rigid.spin_load +=
+            scalar(i, j) * Eigen::Vector3d(X.row(i)).cross(Eigen::Vector3d::Unit(axis)) * modal.basis.row(3 * j + axis);
   const auto rows = [&](int axis) { return Eigen::MatrixXd(modal.basis(Eigen::seqN(axis, n, 3), Eigen::all)); };
   for (int a = 0; a < 3; ++a)
     for (int b = 0; b < 3; ++b) {
@@ -297,7 +303,7 @@ Bar make_bar(const BarOptions& options) {
     bar.example_fields.push_back(example_field(k, model.object->mesh, options));
   model.modal = modal_basis(*model.object, full, bar.example_fields, options.linear_modes);
   model.cubature = all_elements(*model.object, *model.modal);
-  if (options.free) model.rigid = rigid_data(*model.object, full, *model.modal);
+  if (options.free || options.carried) model.rigid = rigid_data(*model.object, full, *model.modal);
   if (options.examples > 0) {
     model.shape_space = shape_space(*model.object, full, options.eigenfunctions);
     model.projection = projection(*model.shape_space, full, *model.modal);

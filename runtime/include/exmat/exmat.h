@@ -196,7 +196,8 @@ typedef struct exmat_motion {
   double angular_velocity[3];
 } exmat_motion;
 
-/* That of a body with fixed vertices is rest. */
+/* That of a body with fixed vertices is the motion that its scene carries them along: position and velocity of the
+   origin of the moving frame; rest where there is none. */
 EXMAT_API exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion) EXMAT_NOEXCEPT;
 
 /* Free bodies only; the shape and how fast it changes stay. The quaternion is normalised. */

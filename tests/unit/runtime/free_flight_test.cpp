@@ -1,5 +1,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <Eigen/SVD>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <numbers>
@@ -214,6 +215,62 @@ TEST(FreeFlight, OfAllModesIsTheFullSpace) {
     EXPECT_LE(errors[1], 5e-3 * body.bar.length);
     EXPECT_NEAR(errors[0] / errors[1], 4, 0.8);
   }
+}
+
+/// Centre of mass and the rotation that fits rest to x best in the mass: that of the mean-axis frame.
+struct Placement {
+  Eigen::Vector3d centre;
+  Eigen::Matrix3d rotation;
+  VertexArray deformation;  ///< R^T (x - centre) - X
+};
+
+Placement placement(const FreeBody& body, const VertexArray& x) {
+  const Eigen::Index n = x.rows();
+  const Eigen::MatrixXd mass = body.bar.mass(Eigen::seqN(0, n, 3), Eigen::seqN(0, n, 3));
+  const VertexArray X =
+      body.bar.model.object->mesh.vertices.rowwise() - body.bar.model.rigid->centre_of_mass.transpose();
+  Placement placement;
+  placement.centre = (mass * x).colwise().sum().transpose() / mass.sum();
+  const VertexArray centred = x.rowwise() - placement.centre.transpose();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(centred.transpose() * mass * X,
+                                              Eigen::ComputeFullU | Eigen::ComputeFullV);
+  placement.rotation = svd.matrixU() * svd.matrixV().transpose();
+  placement.deformation = centred * placement.rotation - X;
+  return placement;
+}
+
+// A soft bar that starts to spin: the centre of mass is exact, rotation and deformation come nearer as modes are added.
+// The figures are in docs/step_in_detail.md.
+TEST(FreeFlight, ComesNearerToTheFullSpaceWithMoreModes) {
+  constexpr double kTime = 0.2, kSpin = 10;
+  constexpr int kSteps = 2000;
+  std::vector<double> turns, deformations;
+  Placement expected;
+  for (const int modes : {6, 12, 24, 48}) {
+    test::BarOptions options{.free = true};
+    options.linear_modes = modes;
+    const FreeBody body(options);
+    State state = body.moving(kSpin, 0);
+    VertexArray x, velocity;
+    if (turns.empty()) {
+      body.vertices(state, x, velocity);
+      const Eigen::VectorXd end = full_space_positions(body.bar, x.reshaped<Eigen::RowMajor>(),
+                                                       velocity.reshaped<Eigen::RowMajor>(), kTime, kSteps);
+      expected = placement(body, end.reshaped<Eigen::RowMajor>(x.rows(), 3));
+    }
+    const StepScene scene = body.scene(kTime / kSteps, Integrator::kNewmark);
+    Workspace workspace(*body.model, scene);
+    for (int i = 0; i < kSteps; ++i) step(*body.model, scene, state, workspace);
+    body.vertices(state, x, velocity);
+    const Placement found = placement(body, x);
+    // 1e-12 of the numbers that it is the mean of.
+    EXPECT_LE((found.centre - expected.centre).norm(), 1e-12 * x.rowwise().norm().maxCoeff());
+    turns.push_back(Eigen::AngleAxisd(found.rotation.transpose() * expected.rotation).angle());
+    deformations.push_back((found.deformation - expected.deformation).norm() / expected.deformation.norm());
+    RecordProperty("rotation_error_r" + std::to_string(modes), std::to_string(turns.back()));
+    RecordProperty("deformation_error_r" + std::to_string(modes), std::to_string(deformations.back()));
+  }
+  for (std::size_t i = 1; i < turns.size(); ++i) EXPECT_LT(deformations[i], deformations[i - 1]) << i;
 }
 
 // Euler's equations of the torque-free top: spin about the middle axis flips with the period 4 K(k) / nu of Jacobi's

@@ -232,6 +232,49 @@ TEST_F(SceneRunTest, MomentaAreThoseOfTheMassMatrix) {
   EXPECT_LE((last_frame("/angular_momentum") - angular).norm(), 1e-11 * angular.norm());
 }
 
+// Clamped vertices go where the motion of the scene takes them, and momenta are those of the world.
+TEST_F(SceneRunTest, AMotionCarriesTheBody) {
+  const std::string motion = R"(, "body": { "motion": [ { "time": 0, "position": [0, 0, 0] },
+    { "time": 0.2, "position": [1, 2, 0], "orientation": [0.8, 0, 0.6, 0] } ] },
+    "output": { "trajectory": "run.h5", "every": 5 })";
+  EXPECT_THAT(failure_of([&] { load_run(scene(motion)); }), HasSubstr("bar.h5"));
+  bar_ = test::make_bar({.carried = true, .examples = 3});
+  write_bundle(bar_.model, folder_ / "bar.h5");
+  const SceneConfig config = scene(motion);
+  const LoadedScene loaded = load_run(config);
+  run(loaded, config, false);
+
+  const Hdf5File file = Hdf5File::open(folder_ / "run.h5");
+  const auto x = doubles(file, "/vertices"), place = doubles(file, "/body/position"),
+             p = doubles(file, "/linear_momentum");
+  const ObjectData& object = *bar_.model.object;
+  const Eigen::Index n = object.mesh.vertex_count(), frames = 5;
+  for (Eigen::Index frame = 0; frame < frames; ++frame) {
+    const MotionSample expected = loaded.scene.carrier->sample(0.05 * static_cast<double>(frame));
+    EXPECT_LE((Eigen::Vector3d(&place[static_cast<std::size_t>(3 * frame)]) - expected.position).norm(), 1e-14);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      if (object.fixed[i] == 0) continue;
+      const Eigen::Vector3d found(&x[static_cast<std::size_t>(3 * (frame * n + i))]);
+      // Positions are in single precision.
+      EXPECT_LE((found - expected.to_world(object.mesh.vertices.row(i).transpose())).norm(), 1e-6) << frame;
+    }
+  }
+  // p = sum of the mass matrix times the velocities in the world, here half-way.
+  const auto q = doubles(file, "/reduced"), v = doubles(file, "/reduced_velocity");
+  const Eigen::Index r = bar_.modes(), half = 2;
+  const MotionSample frame = loaded.scene.carrier->sample(0.1);
+  Eigen::VectorXd velocity = bar_.basis() * Eigen::Map<const Eigen::VectorXd>(&v[half * r], r);
+  const Eigen::VectorXd u = bar_.basis() * Eigen::Map<const Eigen::VectorXd>(&q[half * r], r);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Eigen::Vector3d rest = object.mesh.vertices.row(i).transpose();
+    velocity.segment<3>(3 * i) = frame.velocity_at(frame.to_world(rest + u.segment<3>(3 * i))) +
+                                 frame.rotation * Eigen::Vector3d(velocity.segment<3>(3 * i));
+  }
+  const Eigen::VectorXd momenta = bar_.mass * velocity;
+  const Eigen::Vector3d expected = momenta.reshaped(3, n).rowwise().sum();
+  EXPECT_LE((Eigen::Vector3d(&p[3 * half]) - expected).norm(), 1e-12 * expected.norm());
+}
+
 TEST_F(SceneRunTest, TwoRunsDifferInTheStepTimeAlone) {
   std::map<std::string, std::vector<double>> first;
   for (const char* name : {"a.h5", "b.h5"}) {

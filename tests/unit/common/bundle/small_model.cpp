@@ -121,7 +121,8 @@ RigidData small_rigid() {
           .inertia = factor * factor.transpose(),
           .second_moments = 2 * factor * factor.transpose(),
           .linear_moments = numbers(9, kModes, 4),
-          .basis_moments = numbers(9 * kModes, kModes, 5)};
+          .basis_moments = numbers(9 * kModes, kModes, 5),
+          .spin_load = numbers(3, kModes, 6)};
 }
 
 // Vertices 1 and 3.

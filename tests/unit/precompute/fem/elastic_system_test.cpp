@@ -152,6 +152,12 @@ TEST(RigidMoments, AgreeWithSumsOverTheVertices) {
       const double value = rigid.second_moments(a, b) + rigid.linear_moments.row(3 * a + b).dot(q) + quadratic;
       EXPECT_NEAR(value, P(a, b), 1e-12 * P.norm());
     }
+  // sum m (X x u), X - y = -u: the part of the angular momentum of the velocity u that is not of second order.
+  const VertexArray X = mesh.vertices.rowwise() - rigid.centre_of_mass.transpose();
+  const Eigen::Matrix3d moments = X.transpose() * (scalar_mass(mesh, density) * VertexArray(y - X));
+  const Eigen::Vector3d spin_load(moments(1, 2) - moments(2, 1), moments(2, 0) - moments(0, 2),
+                                  moments(0, 1) - moments(1, 0));
+  EXPECT_LE((rigid.spin_load * q - spin_load).norm(), 1e-12 * moments.norm());
   const Eigen::Matrix3d inertia = rigid.second_moments.trace() * Eigen::Matrix3d::Identity() - rigid.second_moments;
   EXPECT_LE((rigid.inertia - inertia).norm(), 1e-12 * inertia.norm());
 }
