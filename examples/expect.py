@@ -4,6 +4,7 @@
 Usage: expect.py EXPECTED.json TRAJECTORY.h5    (Debian: python3-h5py)
 
 EXPECTED.json: {"DATASET[last]" or "DATASET[max]": {"value": number or list, "margin": relative to the largest magnitude}, ...}.
+[last][ROW] is a row of the last frame, such as one vertex of /vertices.
 Exit status 0 when every value is within its margin.
 """
 import json
@@ -20,9 +21,10 @@ def main():
         expected = json.load(f)
     with h5py.File(sys.argv[2]) as trajectory:
         for name, entry in expected.items():
-            dataset, what = re.fullmatch(r"(.*)\[(last|max)\]", name).groups()
+            dataset, what, row = re.fullmatch(r"(.*)\[(last|max)\](?:\[(\d+)\])?", name).groups()
             values = trajectory[dataset][:]
             found = values[-1] if what == "last" else np.abs(values).max(0)
+            found = found if row is None else found[int(row)]
             wanted = np.asarray(entry["value"])
             error = np.abs(found - wanted).max() / np.abs(wanted).max()
             ok = error <= entry["margin"]

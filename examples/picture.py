@@ -66,7 +66,7 @@ def actor_of(data, colour=PLAIN, table=None, opacity=1, edges=True):
     look.SetAmbient(0.35)
     look.SetDiffuse(0.7)
     look.SetEdgeVisibility(edges)
-    look.SetEdgeColor(*((0.6 if data.GetNumberOfPoints() < 3000 else 0.85) * np.array(colour)))
+    look.SetEdgeColor(*((0.6 if data.GetNumberOfPoints() < 3000 else 0.75) * np.array(colour)))
     look.SetLineWidth(1.2)
     return actor
 
