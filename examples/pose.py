@@ -24,7 +24,8 @@ TET = 4  # Gmsh's number of the element type
 
 def read(path):
     """Vertices [n x 3] and tets [n_t x 4, from 0] of a mesh; vertices without a tet are left out."""
-    lines = open(path).read().splitlines()
+    with open(path) as f:
+        lines = f.read().splitlines()
     first = lines.index("$Nodes") + 2
     rows = [line.split() for line in lines[first : first + int(lines[first - 1])]]
     number = {row[0]: k for k, row in enumerate(rows)}
