@@ -36,12 +36,14 @@ class Pose(unittest.TestCase):
             a = ANGLE * t
             expected = [1 + radius * np.sin(a), 0, radius * (1 - np.cos(a))]
             across = [-0.2 * np.sin(a), 0.3, 0.2 * np.cos(a)]
-            self.check(deformed([[1 + LENGTH * t, 0, 0], [1 + LENGTH * t, 0.3, 0.2]], "arc", **LIMB), [expected, np.add(expected, across)])
+            found = deformed([[1 + LENGTH * t, 0, 0], [1 + LENGTH * t, 0.3, 0.2]], "arc", **LIMB)
+            self.check(found, [expected, np.add(expected, across)])
 
     def test_s_ends_parallel_to_its_start(self):
         end = [1 + LENGTH * quad(lambda t: np.cos(ANGLE * np.sin(np.pi * t) ** 2), 0, 1)[0], 0,
                LENGTH * quad(lambda t: np.sin(ANGLE * np.sin(np.pi * t) ** 2), 0, 1)[0]]
-        self.check(deformed([[4, 0, 0], [4, 0.3, 0.2], [4.7, 0, 0]], "s", **LIMB), [end, np.add(end, [0, 0.3, 0.2]), np.add(end, [0.7, 0, 0])])
+        found = deformed([[4, 0, 0], [4, 0.3, 0.2], [4.7, 0, 0]], "s", **LIMB)
+        self.check(found, [end, np.add(end, [0, 0.3, 0.2]), np.add(end, [0.7, 0, 0])])
 
     def test_twist_turns_cross_sections(self):
         c, s = np.cos(ANGLE / 2), np.sin(ANGLE / 2)
@@ -102,7 +104,8 @@ class Meshes(unittest.TestCase):
                 np.testing.assert_allclose(found, [dofs, tets, example_vertices], rtol=0.1)
                 for posed in examples[1:]:
                     np.testing.assert_array_equal(posed[1], examples[0][1])
-                self.assertEqual((asset["shape_space"]["eigenfunctions"], asset["basis"]["size"], asset["cubature"]["elements"]), (m, r, s))
+                asked = asset["shape_space"]["eigenfunctions"], asset["basis"]["size"], asset["cubature"]["elements"]
+                self.assertEqual(asked, (m, r, s))
 
 
 if __name__ == "__main__":
