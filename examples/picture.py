@@ -156,5 +156,5 @@ def main():
 
 if __name__ == "__main__":
     if "DISPLAY" not in os.environ:  # Debian's VTK draws through an X server
-        os.execvp("xvfb-run", ["xvfb-run", "-a", *sys.argv])
+        os.execvp("xvfb-run", ["xvfb-run", "-a", sys.executable, *sys.argv])
     main()

@@ -4,7 +4,7 @@
 Usage: pose.py REST.msh POSED.msh [KIND DEGREES [OPTION=VALUE]...]...    without a deformation: the tets alone, with short numbers
 
 Each deformation acts on the result of the one before, along a line:
-  twist     turns about the line by an angle that grows along it to DEGREES
+  twist     turns about the line by an angle that grows along it to DEGREES (evenly; from a given start smoothly)
   arc       bends the line by DEGREES from end to end
   s         the same, but forth in its first half and back in the second
 Options; a direction is x, y, z, -x, -y, -z or X,Y,Z:
@@ -20,6 +20,8 @@ import sys
 import numpy as np
 
 TET = 4  # Gmsh's number of the element type
+KINDS = ("twist", "arc", "s")
+OPTIONS = ("axis", "towards", "from", "length", "radius")
 
 
 def read(path):
@@ -122,19 +124,33 @@ def deformed(points, kind, degrees, options):
     return points + share[:, None] * (start + posed - points)
 
 
-def main():
-    rest, posed, *words = sys.argv[1:]
-    points, tets = read(rest)
+def deformations(words):
+    """(kind, degrees, options) of each deformation on a command line."""
     while words:
-        kind, degrees = words.pop(0), float(words.pop(0))
+        kind, degrees = words.pop(0), words.pop(0) if words else ""
         options = {}
         while words and "=" in words[0]:
-            name, options_value = words.pop(0).split("=")
-            if name not in ("axis", "towards", "from", "length", "radius"):
-                sys.exit(f"pose.py: no option {name}; there are axis, towards, from, length and radius")
-            options[name] = options_value
+            name, value = words.pop(0).split("=")
+            options[name] = value
+        if kind not in KINDS:
+            sys.exit(f"pose.py: no deformation {kind}; there are {', '.join(KINDS)}")
+        if strange := set(options) - set(OPTIONS):
+            sys.exit(f"pose.py: no option {strange.pop()}; there are {', '.join(OPTIONS)}")
+        if kind != "twist" and "towards" not in options:
+            sys.exit(f"pose.py: {kind} needs towards=DIRECTION")
+        try:
+            yield kind, float(degrees), options
+        except ValueError:
+            sys.exit(f"pose.py: {kind}: expected degrees, found {degrees or 'nothing'}")
+
+
+def main():
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
+    points, tets = read(sys.argv[1])
+    for kind, degrees, options in deformations(sys.argv[3:]):
         points = deformed(points, kind, degrees, options)
-    write(posed, points, tets)
+    write(sys.argv[2], points, tets)
 
 
 if __name__ == "__main__":
