@@ -108,19 +108,5 @@ if "examples" not in run:
   }
 }
 
-// The margins are the example's own.
-TEST_F(Acceptance, TwistedBarMovesAsItsExampleSays) {
-  if (const auto missing = what_is_missing("h5py, numpy"); !missing.empty()) GTEST_SKIP() << missing;
-  Json scene = Json::parse(read_file(kExample / "scene.json"));
-  scene["bundle"] = "bundle.h5";
-  const Outcome built = exmat_precompute({"bundle", kExample / "asset.json", "-o", folder_.path("bundle.h5")});
-  ASSERT_EQ(built.status, 0) << built.errors;
-  const auto trajectory = folder_.path("trajectory.h5");
-  const Outcome stepped = exmat_runtime({"run", folder_.write("scene.json", scene.dump(2)), "-o", trajectory});
-  ASSERT_EQ(stepped.status, 0) << stepped.errors;
-  const Outcome compared = python({EXMAT_SOURCE_DIR "/examples/expect.py", kExample / "expected.json", trajectory});
-  EXPECT_EQ(compared.status, 0) << compared.output << compared.errors;
-}
-
 }  // namespace
 }  // namespace exmat::test

@@ -1,0 +1,112 @@
+#!/usr/bin/python3
+"""The pose tool against closed forms, and the meshes of the paper's scenes against the sizes of its Table 2."""
+import importlib.machinery
+import importlib.util
+import pathlib
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+from scipy.integrate import quad
+
+EXAMPLES = pathlib.Path(__file__).resolve().parents[2] / "examples"
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(EXAMPLES))
+import pose  # noqa: E402
+
+LENGTH = 3.0
+ANGLE = np.radians(70)
+LIMB = {"axis": "x", "from": "1,0,0", "length": str(LENGTH), "towards": "z"}  # from x = 1 to x = 4
+# The line of a bend is integrated in 2,000 steps, midpoint rule: the error is (angle / 2000)^2 / 24 of the length, and less.
+CLOSE = 1e-6
+
+
+def deformed(points, kind, **options):
+    return pose.deformed(np.array(points, float), kind, np.degrees(ANGLE), options)
+
+
+class Pose(unittest.TestCase):
+    def check(self, found, expected):
+        np.testing.assert_allclose(found, expected, atol=CLOSE)
+
+    def test_arc_is_a_circle(self):
+        radius = LENGTH / ANGLE
+        for t in (0.25, 1.0):
+            a = ANGLE * t
+            expected = [1 + radius * np.sin(a), 0, radius * (1 - np.cos(a))]
+            across = [-0.2 * np.sin(a), 0.3, 0.2 * np.cos(a)]
+            found = deformed([[1 + LENGTH * t, 0, 0], [1 + LENGTH * t, 0.3, 0.2]], "arc", **LIMB)
+            self.check(found, [expected, np.add(expected, across)])
+
+    def test_s_ends_parallel_to_its_start(self):
+        end = [1 + LENGTH * quad(lambda t: np.cos(ANGLE * np.sin(np.pi * t) ** 2), 0, 1)[0], 0,
+               LENGTH * quad(lambda t: np.sin(ANGLE * np.sin(np.pi * t) ** 2), 0, 1)[0]]
+        found = deformed([[4, 0, 0], [4, 0.3, 0.2], [4.7, 0, 0]], "s", **LIMB)
+        self.check(found, [end, np.add(end, [0, 0.3, 0.2]), np.add(end, [0.7, 0, 0])])
+
+    def test_twist_turns_cross_sections(self):
+        c, s = np.cos(ANGLE / 2), np.sin(ANGLE / 2)
+        self.check(deformed([[1 + LENGTH / 2, 1, 0], [1 + LENGTH / 2, 0, 2]], "twist", **LIMB), [[2.5, c, s], [2.5, -2 * s, 2 * c]])
+
+    def test_what_lies_before_stays_and_what_lies_beyond_is_rigid(self):
+        generator = np.random.default_rng(1)
+        before, beyond = generator.uniform(-1, 1, (2, 20, 3)) + [[[0, 0, 0]], [[5.5, 0, 0]]]
+        for kind in ("arc", "s", "twist"):
+            self.check(deformed(before, kind, **LIMB), before)
+            posed = deformed(beyond, kind, **LIMB)
+            self.check(np.linalg.norm(posed - posed[0], axis=1), np.linalg.norm(beyond - beyond[0], axis=1))
+
+    def test_the_middle_of_a_whole_body_stays(self):
+        points = np.array([[x, y, z] for x in np.linspace(-2, 2, 2001) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
+        for kind in ("arc", "s"):
+            line = deformed(points, kind, towards="z").reshape(-1, 4, 3).mean(1)
+            turned = np.arctan2(*(line[-1] - line[0])[[2, 0]])
+            self.check(turned, 0)
+            self.check(line.mean(0), 0)
+
+    def test_radius_limits_what_follows(self):
+        inside, outside, between = [3, 0.1, 0.1], [3, 1.0, 0], [3, 0.6, 0]
+        everything = deformed([inside, outside, between], "arc", **LIMB)
+        limited = deformed([inside, outside, between], "arc", **LIMB, radius="0.5,0.2")
+        self.check(limited[:2], [everything[0], outside])
+        self.check(limited[2], (everything[2] + between) / 2)  # halfway through the falloff
+
+    def test_meshes_are_read_and_written(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = folder + "/m.msh"
+            with open(path, "w") as f:  # a triangle, a vertex that nothing uses, two tags
+                f.write("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n5\n1 0 0 0\n7 1 0 0\n3 0 1 0\n4 9 9 9\n5 0 0 1\n$EndNodes\n"
+                        "$Elements\n2\n1 2 2 0 1 1 7 3\n2 4 2 0 1 1 7 3 5\n$EndElements\n")
+            points, tets = pose.read(path)
+            pose.write(path, points, tets)
+            again, same = pose.read(path)
+        np.testing.assert_array_equal(points, [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+        np.testing.assert_array_equal(tets, [[0, 1, 2, 3]])
+        np.testing.assert_array_equal(again, points)
+        np.testing.assert_array_equal(same, tets)
+
+
+class Meshes(unittest.TestCase):
+    def setUp(self):
+        loader = importlib.machinery.SourceFileLoader("paper_table", str(EXAMPLES / "paper_table"))
+        self.table = importlib.util.module_from_spec(importlib.util.spec_from_loader("paper_table", loader))
+        loader.exec_module(self.table)
+
+    def test_sizes_are_near_the_papers(self):
+        for name, variant, (dofs, tets, example_vertices, m, r, s), *_ in self.table.PAPER.values():
+            folder = EXAMPLES / name
+            asset = self.table.json.loads((folder / f"asset_{variant.format('paper')}.json").read_text())
+            with self.subTest(name):
+                points, elements = pose.read(folder / asset["object"]["mesh"])
+                examples = [pose.read(folder / example["mesh"]) for example in asset["examples"]]
+                found = [3 * len(points), len(elements), len(examples[-1][0])]
+                np.testing.assert_allclose(found, [dofs, tets, example_vertices], rtol=0.1)
+                for posed in examples[1:]:
+                    np.testing.assert_array_equal(posed[1], examples[0][1])
+                asked = asset["shape_space"]["eigenfunctions"], asset["basis"]["size"], asset["cubature"]["elements"]
+                self.assertEqual(asked, (m, r, s))
+
+
+if __name__ == "__main__":
+    unittest.main()
