@@ -12,7 +12,6 @@ namespace {
 
 using ::benchmark::DoNotOptimize;
 using runtime::Kernels;
-using runtime::Material;
 using runtime::ReducedElasticity;
 using State = ::benchmark::State;
 
@@ -21,7 +20,7 @@ std::string sizes(int modes, int elements) { return "/r" + std::to_string(modes)
 Eigen::VectorXd pose(Eigen::Index modes) { return 0.1 * test::random_vector(modes, 1); }
 
 ReducedElasticity elasticity(int modes, int elements) {
-  return ReducedElasticity(Material::kStVenantKirchhoff, *bar_model(modes, elements).cubature);
+  return ReducedElasticity(MaterialModel::kStVenantKirchhoff, *bar_model(modes, elements).cubature);
 }
 
 void energy(State& state, int modes, int elements) {
