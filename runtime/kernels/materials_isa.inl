@@ -8,6 +8,12 @@ using IntVec = decltype(Vec{} > Vec{});
 inline Vec select(IntVec mask, Vec yes, Vec no) { return mask ? yes : no; }
 inline Vec larger(Vec a, Vec b) { return select(a > b, a, b); }
 
+inline bool all(IntVec mask) {
+  bool every = true;
+  for (Index i = 0; i < kWidth; ++i) every = every && mask[i] != 0;
+  return every;
+}
+
 inline Vec square_root(Vec v) {
   alignas(sizeof(Vec)) double lanes[kWidth];
   store(lanes, v);
@@ -118,9 +124,10 @@ struct StableNeoHookean {
 
 /// F = R S with R the rotation of the largest tr S. As a quaternion it is the eigenvector of the largest eigenvalue of
 /// a symmetric 4 x 4 K (Horn 1987), tr S, whose distance to the next one is 2 (s_1 + s_2), twice the least sum of two
-/// eigenvalues of S. All lanes take the same path: Laguerre's method from above on the characteristic polynomial,
-/// inverse iteration by the adjugate squared thrice, two steps of Newton's method. To rounding / distance where the
-/// distance is more than 1e-4 |F|; some rotation, of a trace as large to 1e-4 |F|, where it is less.
+/// eigenvalues of S. Newton's method from R = I finds it in a few steps as a rule. Where a lane does not get there:
+/// Laguerre's method from above on the characteristic polynomial, inverse iteration by the adjugate squared thrice, two
+/// steps of Newton's method. To rounding / distance where the distance is more than 1e-4 |F|; some rotation, of a trace
+/// as large to 1e-4 |F|, where it is less.
 struct NearestRotation {
   Vec turned[9];   ///< R - I
   Vec stretch[9];  ///< F - R
@@ -131,12 +138,13 @@ struct NearestRotation {
     Vec F[9], q[4];
     add_identity(H, F);
     size = square_root(larger(dot(F, F, 9), zero() + 1e-300));
-    const Vec inverse = 1.0 / size;
-    for (Index i = 0; i < 9; ++i) F[i] *= inverse;
-    start(F, q);
-    for (Index i = 0; i < kRefinements; ++i) {
-      set_rotation(H, q);
-      refine(q);
+    if (!converge(H, q)) {
+      for (Index i = 0; i < 9; ++i) F[i] /= size;
+      start(F, q);
+      for (Index i = 0; i < kRefinements; ++i) {
+        set_rotation(H, q);
+        refine(q);
+      }
     }
     set_rotation(H, q);
     trace = turned[0] * stretch[0] + stretch[0];
@@ -151,8 +159,8 @@ struct NearestRotation {
                        turned[6 + i] * stretch[6 + j];
   }
 
-  /// Inverse of G = tr(S) I - S of M = R^T F - I; G has the sums of two eigenvalues of S.
-  void inverse_sums(const Vec* M, Vec* inverse) const {
+  /// Inverse of G = tr(S) I - S of M = R^T F - I; G has the sums of two eigenvalues of S. Returns det G.
+  Vec inverse_sums(const Vec* M, Vec* inverse) const {
     Vec G[9];
     const Vec diagonal = 2.0 + M[0] + M[4] + M[8];
     for (Index i = 0; i < 3; ++i)
@@ -161,10 +169,12 @@ struct NearestRotation {
     const Vec determinant = dot(G, inverse, 3);
     const Vec factor = 1.0 / larger(determinant, kLeastDeterminant * size * size * size + 1e-300);
     for (Index i = 0; i < 9; ++i) inverse[i] *= factor;
+    return determinant;
   }
 
  private:
-  static constexpr Index kLaguerreSteps = 6, kSquarings = 3, kRefinements = 2;
+  static constexpr Index kDirectSteps = 5, kLaguerreSteps = 6, kSquarings = 3, kRefinements = 2;
+  static constexpr double kLastTurn = 1e-11;          // square of half the angle of a step whose cube is below rounding
   static constexpr double kShift = 1e-5;              // above the eigenvalue, so that the adjugate does not vanish
   static constexpr double kLeastDeterminant = 1e-12;  // of G
 
@@ -267,11 +277,23 @@ struct NearestRotation {
     for (Index i = 0; i < 9; ++i) stretch[i] = H[i] - turned[i];
   }
 
-  /// A step towards the largest tr(R^T F) from R^T (F - R), which has the digits of H.
-  void refine(Vec* q) const {
+  /// From R = I; false where a lane needs more steps, or would end in no maximum.
+  bool converge(const Vec* H, Vec* q) {
+    q[0] = zero() + 1.0;
+    for (Index i = 1; i < 4; ++i) q[i] = zero();
+    for (Index i = 0; i < kDirectSteps; ++i) {
+      set_rotation(H, q);
+      if (all(refine(q))) return true;
+    }
+    return false;
+  }
+
+  /// A step towards the largest tr(R^T F) from R^T (F - R), which has the digits of H. Tells the lanes where it was the
+  /// last one towards a maximum: short, and G positive definite.
+  IntVec refine(Vec* q) const {
     Vec M[9], inverse[9];
     rotated_stretch(M);
-    inverse_sums(M, inverse);
+    const Vec determinant = inverse_sums(M, inverse);
     const Vec skew[3] = {M[7] - M[5], M[2] - M[6], M[3] - M[1]};
     Vec turn[3];
     for (Index i = 0; i < 3; ++i) turn[i] = 0.5 * dot(inverse + 3 * i, skew, 3);
@@ -281,6 +303,8 @@ struct NearestRotation {
     q[2] = y + w * turn[1] + z * turn[0] - x * turn[2];
     q[3] = z + w * turn[2] + x * turn[1] - y * turn[0];
     normalize(q);
+    // Positive definite by the minors from the last: 1 x 1, 2 x 2 and 3 x 3.
+    return (dot(turn, turn, 3) <= kLastTurn) & (2.0 + M[0] + M[4] > 0.0) & (inverse[0] > 0.0) & (determinant > 0.0);
   }
 };
 
