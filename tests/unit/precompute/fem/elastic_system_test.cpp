@@ -65,8 +65,10 @@ TEST(ElasticSystem, BarOfTwoMaterialsStretchesAsTheSumOfItsParts) {
   const auto system = build_elastic_system(mesh, materials, clamp_x0(mesh));
   Eigen::VectorXd load = Eigen::VectorXd::Zero(system.full_mass.rows());
   const double traction = 100;
-  for (const auto& triangle : surface_triangles(mesh.tets).rowwise()) {
-    const bool at_end = (mesh.vertices({triangle[0], triangle[1], triangle[2]}, 0).array() > 1 - 1e-9).all();
+  const TriangleArray surface = surface_triangles(mesh.tets);
+  for (Eigen::Index f = 0; f < surface.rows(); ++f) {
+    const Eigen::RowVector3i triangle = surface.row(f);
+    const bool at_end = (mesh.vertices(triangle, 0).array() > 1 - 1e-9).all();
     if (at_end)
       for (const int vertex : triangle) load[3 * vertex] += traction * (0.3 * 0.2 / 8) / 3;
   }
