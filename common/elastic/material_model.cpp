@@ -14,7 +14,7 @@ constexpr std::array<Entry, 3> kEntries{{{MaterialModel::kStVenantKirchhoff, "st
                                          {MaterialModel::kStableNeoHookean, "stable_neo_hookean"},
                                          {MaterialModel::kCorotational, "corotational"}}};
 
-// Stable neo-Hookean shrunk to half its size has no more energy than at rest from -0.86 downwards.
+// Stable neo-Hookean has less energy than at rest when shrunk to 0.6 of its size from -0.88 downwards.
 constexpr double kLeastOfStableNeoHookean = -0.8;
 
 }  // namespace
