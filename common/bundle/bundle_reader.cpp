@@ -93,6 +93,8 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
     sizes_.set("K", std::ssize(model.examples->examples), "the groups of /examples");
   }
   visit_fields(model, *this);
+  if (model.object)
+    if (const auto material = material_from_name(model.object->material)) model.object->materials.model = *material;
   check_model(model);
   if (model.examples) std::ranges::stable_sort(model.examples->examples, {}, &ExampleData::index);
   return model;

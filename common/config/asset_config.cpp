@@ -48,6 +48,14 @@ class AssetReader {
     asset.material.youngs_modulus = optional_member<double>(material, "youngs_modulus");
     asset.material.poisson_ratio = optional_member<double>(material, "poisson_ratio");
     asset.material.density = optional_member<double>(material, "density");
+    const Json parts = member_or(json, "materials", Json::array());
+    for (std::size_t i = 0; i < parts.size(); ++i) {
+      const Json& part = parts[i];
+      asset.material_regions.push_back({read_selection(part["tets"], fmt::format("/object/materials/{}/tets", i)),
+                                        optional_member<double>(part, "youngs_modulus"),
+                                        optional_member<double>(part, "poisson_ratio"),
+                                        optional_member<double>(part, "density")});
+    }
     if (json.contains("fixed")) asset.fixed = read_selection(json["fixed"], "/object/fixed");
     asset.object_drop = read_drop(json);
   }

@@ -29,9 +29,18 @@ struct IdSelection {
 };
 using VertexSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection>;
 
+/// Tets by their centroids, or by their ids in the mesh file.
+using TetSelection = VertexSelection;
+
 struct MaterialConfig {
   std::string model = "stvk";
   std::optional<double> youngs_modulus, poisson_ratio, density;  ///< absent: the mesh file's own
+};
+
+/// A part of the object whose numbers replace those before; absent ones stay.
+struct MaterialRegionConfig {
+  TetSelection tets;
+  std::optional<double> youngs_modulus, poisson_ratio, density;
 };
 
 /// Faults of a mesh that are mended by dropping instead of refused.
@@ -54,7 +63,8 @@ struct AssetConfig {
   std::string name;
   std::filesystem::path object_mesh;
   MaterialConfig material;
-  std::optional<VertexSelection> fixed;  ///< absent: a free body
+  std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
+  std::optional<VertexSelection> fixed;                ///< absent: a free body
   DropConfig object_drop;
   std::vector<ExampleConfig> examples;
 

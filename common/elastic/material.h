@@ -21,11 +21,13 @@ constexpr LameParameters lame_parameters(double youngs_modulus, double poisson_r
 
 // A material is a struct of static functions of the displacement gradient H = F - I (small strains keep all their
 // digits):
-//   energy(H, lame)                     energy density Psi [Pa]
+//   energy(H, lame)                     energy density Psi [Pa], 0 at rest
 //   first_piola_kirchhoff(H, lame)      P = dPsi/dF [Pa], 3 x 3
 //   tangent(H, lame)                    dP/dF [Pa], 9 x 9 symmetric
 //   rest_second_derivative(A, B, lame)  d2P/dF2 [A, B] at F = I [Pa], 3 x 3, symmetric in A and B
-// and a new one is one file: see st_venant_kirchhoff.h.
+//   principal_tangent(s, lame)          the eigensystem of the tangent, see principal_tangent.h
+// with the tangent of linear elasticity at rest. A new one is one file (see st_venant_kirchhoff.h), its name in
+// material_model.cpp, its place in materials.h, and its lanes in runtime/kernels/materials_isa.inl.
 
 /// Nearest positive semi-definite matrix (Frobenius norm): negative eigenvalues set to zero.
 Matrix9 project_positive_semidefinite(const Matrix9& symmetric);

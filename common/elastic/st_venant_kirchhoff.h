@@ -1,6 +1,7 @@
 #pragma once
 
 #include "common/elastic/material.h"
+#include "common/elastic/principal_tangent.h"
 
 namespace exmat {
 
@@ -50,6 +51,20 @@ struct StVenantKirchhoff {
     };
     const Eigen::Matrix3d quadratic_strain = 0.5 * (A.transpose() * B + B.transpose() * A);
     return A * linear_stress(B) + B * linear_stress(A) + second_piola_kirchhoff(quadratic_strain, lame);
+  }
+
+  /// By Smith, de Goes and Kim 2019, of Psi_i = (lambda tr E - mu) s_i + mu s_i^3.
+  static PrincipalTangent principal_tangent(const Eigen::Vector3d& s, const LameParameters& lame) {
+    const double linear = 0.5 * lame.lambda * (s.squaredNorm() - 3) - lame.mu;
+    PrincipalTangent principal;
+    principal.stretch = lame.lambda * s * s.transpose();
+    for (int k = 0; k < 3; ++k) {
+      const double a = s[(k + 1) % 3], b = s[(k + 2) % 3];
+      principal.stretch(k, k) += linear + 3 * lame.mu * s[k] * s[k];
+      principal.twist[k] = linear + lame.mu * (a * a - a * b + b * b);
+      principal.flip[k] = linear + lame.mu * (a * a + a * b + b * b);
+    }
+    return principal;
   }
 };
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include "common/core/arrays.h"
+#include "common/elastic/material_model.h"
 
 namespace exmat {
 
@@ -13,11 +14,12 @@ struct TetMesh {
   Eigen::Index tet_count() const { return tets.rows(); }
 };
 
-/// Isotropic elastic parameters, one entry per tet.
+/// Isotropic elastic material: one model, parameters per tet.
 struct TetMaterials {
   Eigen::VectorXd density;         ///< [kg/m^3]
   Eigen::VectorXd youngs_modulus;  ///< [Pa]
   Eigen::VectorXd poisson_ratio;   ///< (-1, 0.5)
+  MaterialModel model = MaterialModel::kStVenantKirchhoff;
 };
 
 }  // namespace exmat

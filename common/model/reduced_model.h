@@ -19,7 +19,7 @@ struct ObjectData {
   TriangleArray surface;   ///< n_f x 3, outward
   FlagVector fixed;        ///< n, 1 where the vertex is clamped
   TetMaterials materials;  ///< n_t each
-  std::string material;    ///< "stvk"
+  std::string material;    ///< "stvk", "stable_neo_hookean" or "corotational"
 };
 
 /// Group /shape_space: Laplace-Beltrami eigenpairs of the object at centroid 0 and volume 1, the constant one dropped.

@@ -1,6 +1,6 @@
 #include "precompute/cubature/element_samples.h"
 
-#include "common/elastic/st_venant_kirchhoff.h"
+#include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {
@@ -34,11 +34,13 @@ ElementSamples::Response ElementSamples::response(Eigen::Index tet, const RowMat
   const auto parameters = lame(tet);
   Response result{{}, Eigen::VectorXd(poses.rows())};
   Eigen::MatrixXd stresses(9, poses.rows());
-  for (Eigen::Index p = 0; p < poses.rows(); ++p) {
-    const Eigen::Matrix3d H = RowMatrix3Map(gradients.col(p).data());
-    stresses.col(p) = volumes_[tet] * flatten(StVenantKirchhoff::first_piola_kirchhoff(H, parameters));
-    result.energies[p] = volumes_[tet] * StVenantKirchhoff::energy(H, parameters);
-  }
+  with_material(materials_.model, [&](auto material) {
+    for (Eigen::Index p = 0; p < poses.rows(); ++p) {
+      const Eigen::Matrix3d H = RowMatrix3Map(gradients.col(p).data());
+      stresses.col(p) = volumes_[tet] * flatten(material.first_piola_kirchhoff(H, parameters));
+      result.energies[p] = volumes_[tet] * material.energy(H, parameters);
+    }
+  });
   result.forces = B.transpose() * stresses;
   return result;
 }
@@ -47,7 +49,9 @@ Eigen::MatrixXd ElementSamples::stiffness(Eigen::Index tet, const Eigen::VectorX
   const RowMatrix B = gradient(tet);
   const Eigen::Matrix<double, 9, 1> flat = B * pose;
   const Eigen::Matrix3d H = RowMatrix3Map(flat.data());
-  return volumes_[tet] * (B.transpose() * (StVenantKirchhoff::tangent(H, lame(tet)) * B));
+  const Matrix9 tangent =
+      with_material(materials_.model, [&](auto material) { return material.tangent(H, lame(tet)); });
+  return volumes_[tet] * (B.transpose() * (tangent * B));
 }
 
 }  // namespace exmat::precompute

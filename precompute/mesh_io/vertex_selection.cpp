@@ -6,6 +6,7 @@
 
 #include "common/config/vertex_ids.h"
 #include "common/core/error.h"
+#include "common/mesh/geometry.h"
 
 namespace exmat::precompute {
 namespace {
@@ -14,27 +15,29 @@ std::string to_text(const Eigen::RowVector3d& point) {
   return fmt::format("({:.6g}, {:.6g}, {:.6g})", point[0], point[1], point[2]);
 }
 
-std::string bounding_box(const VertexArray& vertices) {
-  if (vertices.rows() == 0) return "the mesh has no vertices";
-  return fmt::format("the mesh lies in {} to {}", to_text(vertices.colwise().minCoeff()),
-                     to_text(vertices.colwise().maxCoeff()));
+std::string bounding_box(const VertexArray& points) {
+  if (points.rows() == 0) return "the mesh is empty";
+  return fmt::format("the mesh lies in {} to {}", to_text(points.colwise().minCoeff()),
+                     to_text(points.colwise().maxCoeff()));
 }
 
 template <typename Predicate>
-std::vector<std::int32_t> vertices_where(const VertexArray& vertices, Predicate is_inside) {
+std::vector<std::int32_t> points_where(const VertexArray& points, Predicate is_inside) {
   std::vector<std::int32_t> ids;
-  for (Eigen::Index v = 0; v < vertices.rows(); ++v)
-    if (is_inside(Eigen::RowVector3d(vertices.row(v)))) ids.push_back(static_cast<std::int32_t>(v));
+  for (Eigen::Index v = 0; v < points.rows(); ++v)
+    if (is_inside(Eigen::RowVector3d(points.row(v)))) ids.push_back(static_cast<std::int32_t>(v));
   return ids;
 }
 
+// Of points, which are the vertices or stand for the tets; `noun` says which.
 class Selector {
  public:
-  Selector(const VertexArray& vertices, const std::string& asset_file) : vertices_(vertices), asset_file_(asset_file) {}
+  Selector(const VertexArray& points, std::string_view noun, const std::string& asset_file)
+      : points_(points), noun_(noun), asset_file_(asset_file) {}
 
   std::vector<std::int32_t> operator()(const BoxSelection& box) const {
     const Eigen::RowVector3d min(box.min.data()), max(box.max.data());
-    auto ids = vertices_where(vertices_, [&](const Eigen::RowVector3d& x) {
+    auto ids = points_where(points_, [&](const Eigen::RowVector3d& x) {
       return (x.array() >= min.array()).all() && (x.array() <= max.array()).all();
     });
     return require_some(std::move(ids), asset_file_, fmt::format("the box {} to {}", to_text(min), to_text(max)));
@@ -42,8 +45,7 @@ class Selector {
 
   std::vector<std::int32_t> operator()(const SphereSelection& sphere) const {
     const Eigen::RowVector3d center(sphere.center.data());
-    auto ids =
-        vertices_where(vertices_, [&](const Eigen::RowVector3d& x) { return (x - center).norm() <= sphere.radius; });
+    auto ids = points_where(points_, [&](const Eigen::RowVector3d& x) { return (x - center).norm() <= sphere.radius; });
     const auto place = fmt::format("the sphere about {} of radius {:.6g}", to_text(center), sphere.radius);
     return require_some(std::move(ids), asset_file_, place);
   }
@@ -51,9 +53,9 @@ class Selector {
   std::vector<std::int32_t> operator()(const IdSelection& selection) const {
     std::vector<std::int32_t> ids;
     for (const std::int64_t id : selection.ids) {
-      if (id < 0 || id >= vertices_.rows())
-        throw InputError(
-            {asset_file_, "ids", fmt::format("0-based vertex ids below {}", vertices_.rows()), std::to_string(id), ""});
+      if (id < 0 || id >= points_.rows())
+        throw InputError({asset_file_, "ids", fmt::format("0-based {} ids below {}", noun_, points_.rows()),
+                          std::to_string(id), ""});
       ids.push_back(static_cast<std::int32_t>(id));
     }
     return require_some(std::move(ids), asset_file_, "ids");
@@ -61,7 +63,7 @@ class Selector {
 
   std::vector<std::int32_t> operator()(const FileSelection& selection) const {
     std::vector<std::int32_t> ids;
-    for (const std::int64_t id : read_vertex_ids(selection.file, vertices_.rows()))
+    for (const std::int64_t id : read_vertex_ids(selection.file, points_.rows(), noun_))
       ids.push_back(static_cast<std::int32_t>(id));
     return require_some(std::move(ids), selection.file.string(), "");
   }
@@ -70,13 +72,14 @@ class Selector {
   std::vector<std::int32_t> require_some(std::vector<std::int32_t> ids, const std::string& file,
                                          const std::string& place) const {
     if (ids.empty())
-      throw InputError({file, place, "at least one vertex of the mesh", "none", bounding_box(vertices_)});
+      throw InputError({file, place, fmt::format("at least one {} of the mesh", noun_), "none", bounding_box(points_)});
     std::sort(ids.begin(), ids.end());
     ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
     return ids;
   }
 
-  const VertexArray& vertices_;
+  const VertexArray& points_;
+  std::string_view noun_;
   const std::string& asset_file_;
 };
 
@@ -84,7 +87,14 @@ class Selector {
 
 std::vector<std::int32_t> select_vertices(const VertexArray& vertices, const VertexSelection& selection,
                                           const std::string& asset_file) {
-  return std::visit(Selector(vertices, asset_file), selection);
+  return std::visit(Selector(vertices, "vertex", asset_file), selection);
+}
+
+std::vector<std::int32_t> select_tets(const TetMesh& mesh, const TetSelection& selection,
+                                      const std::string& asset_file) {
+  VertexArray centroids(mesh.tet_count(), 3);
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) centroids.row(t) = tet_positions(mesh, t).colwise().mean();
+  return std::visit(Selector(centroids, "tet", asset_file), selection);
 }
 
 }  // namespace exmat::precompute

@@ -6,6 +6,7 @@
 
 #include "common/config/asset_config.h"
 #include "common/core/arrays.h"
+#include "common/mesh/tet_mesh.h"
 
 namespace exmat::precompute {
 
@@ -13,5 +14,9 @@ namespace exmat::precompute {
 /// read, or nothing is selected (the message then gives the mesh's bounding box). `asset_file` is for the message.
 std::vector<std::int32_t> select_vertices(const VertexArray& vertices, const VertexSelection& selection,
                                           const std::string& asset_file);
+
+/// The same of tets: those whose centroid the box or the sphere holds, or by id. `mesh` is that of the file.
+std::vector<std::int32_t> select_tets(const TetMesh& mesh, const TetSelection& selection,
+                                      const std::string& asset_file);
 
 }  // namespace exmat::precompute

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/core/progress.h"
-#include "common/elastic/st_venant_kirchhoff.h"
+#include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {
@@ -23,16 +23,17 @@ Eigen::Matrix3d displacement_gradient(const TetMesh& mesh, Eigen::Index tet,
 
 // [3n] nodal forces of the second derivative of the internal force in directions a and b, at rest.
 template <typename Material>
-Eigen::VectorXd second_derivative(const TetMesh& mesh, const TetMaterials& materials, const ElementGradients& gradients,
-                                  const Eigen::VectorXd& volumes, const Eigen::Ref<const Eigen::VectorXd>& a,
+Eigen::VectorXd second_derivative(Material material, const TetMesh& mesh, const TetMaterials& materials,
+                                  const ElementGradients& gradients, const Eigen::VectorXd& volumes,
+                                  const Eigen::Ref<const Eigen::VectorXd>& a,
                                   const Eigen::Ref<const Eigen::VectorXd>& b) {
   Eigen::VectorXd force = Eigen::VectorXd::Zero(a.size());
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
     const auto& shape = gradients[static_cast<std::size_t>(t)];
     const auto lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
     const Eigen::Matrix3d stress =
-        volumes[t] * Material::rest_second_derivative(displacement_gradient(mesh, t, shape, a),
-                                                      displacement_gradient(mesh, t, shape, b), lame);
+        volumes[t] * material.rest_second_derivative(displacement_gradient(mesh, t, shape, a),
+                                                     displacement_gradient(mesh, t, shape, b), lame);
     for (int corner = 0; corner < 4; ++corner)
       force.segment<3>(3 * mesh.tets(t, corner)) += stress * shape.row(corner).transpose();
   }
@@ -61,8 +62,10 @@ Eigen::MatrixXd modal_derivatives(const TetMesh& mesh, const TetMaterials& mater
   Progress progress("modal derivatives", static_cast<std::int64_t>(pairs.size()));
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    loads.col(static_cast<Eigen::Index>(p)) = -second_derivative<StVenantKirchhoff>(
-        mesh, materials, gradients, volumes, fields.col(pairs[p].first), fields.col(pairs[p].second));
+    loads.col(static_cast<Eigen::Index>(p)) = -with_material(materials.model, [&](auto material) {
+      return second_derivative(material, mesh, materials, gradients, volumes, fields.col(pairs[p].first),
+                               fields.col(pairs[p].second));
+    });
 #pragma omp critical(modal_derivatives_progress)
     progress.advance();
   }

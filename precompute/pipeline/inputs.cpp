@@ -13,6 +13,7 @@
 #include "common/mesh/geometry.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/vertex_selection.h"
+#include "precompute/pipeline/object_materials.h"
 
 namespace exmat::precompute {
 namespace {
@@ -57,18 +58,6 @@ CheckedMesh check(MeshFile file, const std::filesystem::path& path, const DropCo
   return checked;
 }
 
-// The asset's value for every tet, or the mesh file's own.
-Eigen::VectorXd resolve(const std::optional<double>& value, const char* name, const CheckedMesh& checked,
-                        Eigen::VectorXd TetMaterials::*member, const AssetConfig& asset) {
-  const auto& kept = checked.report.kept_tets;
-  if (value) return Eigen::VectorXd::Constant(static_cast<Eigen::Index>(kept.size()), *value);
-  if (!checked.file.materials)
-    throw InputError({asset.file.string(), "/object/material/" + std::string(name), "a value",
-                      "none here, and no material for every tet in " + asset.object_mesh.string(),
-                      "give it in the asset"});
-  return ((*checked.file.materials).*member)(kept);
-}
-
 // 1 for the selected vertices, whose ids are the file's; `absent` for all where none are selected.
 FlagVector flag(const std::optional<VertexSelection>& selection, std::uint8_t absent, const AssetConfig& asset,
                 const CheckedMesh& checked, InputFiles& files) {
@@ -105,11 +94,9 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
   const auto checked = check(read_recorded(asset.object_mesh, files), asset.object_mesh, asset.object_drop);
   ObjectInput object;
   object.mesh = checked.file.mesh;
-  object.materials.density = resolve(asset.material.density, "density", checked, &TetMaterials::density, asset);
-  object.materials.youngs_modulus =
-      resolve(asset.material.youngs_modulus, "youngs_modulus", checked, &TetMaterials::youngs_modulus, asset);
-  object.materials.poisson_ratio =
-      resolve(asset.material.poisson_ratio, "poisson_ratio", checked, &TetMaterials::poisson_ratio, asset);
+  const TetMesh file_mesh{checked.file_vertices,
+                          Eigen::Map<const TetArray>(checked.file_tets.data(), std::ssize(checked.file_tets) / 4, 4)};
+  object.materials = object_materials(asset, file_mesh, checked.file.materials, checked.report.kept_tets, files);
   object.fixed = flag(asset.fixed, 0, asset, checked, files);
   object.contact = flag(asset.contact_vertices, 1, asset, checked, files);
   object.file_tets = checked.file_tets;

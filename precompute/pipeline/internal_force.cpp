@@ -91,7 +91,7 @@ double modelled_ratio(const runtime::ReducedElasticity& cubature) {
 }
 
 runtime::ReducedElasticity elasticity_of(const ReducedModel& model) {
-  const auto material = runtime::material_from_name(model.object->material);
+  const auto material = material_from_name(model.object->material);
   return runtime::ReducedElasticity(material.value(), *model.cubature);
 }
 

@@ -212,8 +212,8 @@ std::optional<TargetTableData> build_target_table(const ReducedModel& model, con
   }
   const auto reference = runtime::energy_reference_from_name(options.energy_reference);
   TargetSolver target;
-  if (const auto complaint = target.build(*runtime::material_from_name(model.object->material), *model.cubature,
-                                          examples, model.projection->target_basis, reference)) {
+  if (const auto complaint = target.build(*material_from_name(model.object->material), *model.cubature, examples,
+                                          model.projection->target_basis, reference)) {
     report.message = "no table of targets: " + to_string(*complaint);
     return std::nullopt;
   }

@@ -27,22 +27,28 @@ struct ElementArrays {
 /// Energy of a panel's elements as a function of their displacement gradients H = F - I. Weighted: c_j Psi.
 struct ElementLaw {
   enum class Kind {
-    /// St.Venant-Kirchhoff: mu, lambda, each panels x kLanes, c_j mu and c_j lambda. With shifts (panels x count x 9 x
-    /// kLanes): sum_k shift_weights[k] Psi(I + H - H_k).
-    kIsotropic,
+    /// A material of common/elastic: mu, lambda, each panels x kLanes, c_j mu and c_j lambda. With shifts H_k (panels x
+    /// count x 9 x kLanes): sum_k shift_weights[k] Psi(I + H - H_k), and with inverses too (panels x count x 10 x
+    /// kLanes:
+    /// A_k = (I + H_k)^-1 and v_k): sum_k shift_weights[k] v_k Psi((I + H) A_k).
+    kStVenantKirchhoff,
+    kStableNeoHookean,
+    kCorotational,
     /// 1/2 E : C : E - S0 : E + constant, E the Green strain: panels x 28 x kLanes, the upper triangle of C by rows in
     /// the order xx, yy, zz, yz, xz, xy, then S0 and the constant. Strains count once, so shears twice in a double dot.
     kQuadraticInGreenStrain,
   };
-  Kind kind = Kind::kIsotropic;
+  Kind kind = Kind::kStVenantKirchhoff;
   const double* mu = nullptr;
   const double* lambda = nullptr;
   std::ptrdiff_t shift_count = 0;  ///< 0: Psi(I + H)
   const double* shifts = nullptr;
+  const double* inverses = nullptr;  ///< null: A_k = I, v_k = 1
   const double* shift_weights = nullptr;
   const double* quadratic = nullptr;
 };
 inline constexpr std::ptrdiff_t kQuadraticNumbers = 28;
+inline constexpr std::ptrdiff_t kInverseNumbers = 10;
 inline constexpr std::ptrdiff_t kTangentNumbers = 45;  ///< upper triangle by rows of a symmetric 9 x 9
 
 /// Scratch of the functions below.

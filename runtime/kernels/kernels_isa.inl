@@ -1,6 +1,8 @@
 // The kernels for one instruction set. The including file defines EXMAT_SIMD_WIDTH, doubles in a register (2, 4 or 8),
 // EXMAT_SIMD_NAME and EXMAT_SIMD_KERNELS, the name of the table to define.
 
+#include <type_traits>
+
 #include "runtime/kernels/kernels.h"
 
 namespace exmat::runtime {
@@ -76,9 +78,25 @@ inline void add_stress(const Vec* H, const Vec* S, Vec* P) {
                       H[3 * a + 2] * S[kVoigt[2][b]];
 }
 
-struct Isotropic {
+enum class Want { kEnergy, kForce, kStiffness };
+
+struct StVenantKirchhoff {
   Vec mu, lambda;
 
+  /// Energy; adds the stress to P and the tangent to `tangent`, as wanted.
+  template <Want want>
+  Vec evaluate(const Vec* H, Vec* P, double* tangent) const {
+    Vec E[6], S[6];
+    green_strain(H, E);
+    if constexpr (want != Want::kEnergy) {
+      second_piola_kirchhoff(E, S);
+      add_stress(H, S, P);
+    }
+    if constexpr (want == Want::kStiffness) add_tangent(H, S, tangent);
+    return energy(E);
+  }
+
+ private:
   Vec energy(const Vec* E) const {
     const Vec trace = E[0] + E[1] + E[2];
     const Vec square = E[0] * E[0] + E[1] * E[1] + E[2] * E[2] + 2.0 * (E[3] * E[3] + E[4] * E[4] + E[5] * E[5]);
@@ -92,21 +110,20 @@ struct Isotropic {
   }
 
   /// tangent += delta_ac S_bd + lambda F_ab F_cd + mu F_ad F_cb + mu delta_bd (F F^T)_ac.
-  void add_tangent(const Vec* H, const Vec* S, double* tangent, Vec factor) const {
+  void add_tangent(const Vec* H, const Vec* S, double* tangent) const {
     Vec F[9], left[6];
     for (Index i = 0; i < 9; ++i) F[i] = H[i] + (i % 4 == 0 ? 1.0 : 0.0);
-    const Vec m = factor * mu, l = factor * lambda;
     for (Index a = 0; a < 3; ++a)
       for (Index c = a; c < 3; ++c)
-        left[kVoigt[a][c]] = m * (F[3 * a] * F[3 * c] + F[3 * a + 1] * F[3 * c + 1] + F[3 * a + 2] * F[3 * c + 2]);
+        left[kVoigt[a][c]] = mu * (F[3 * a] * F[3 * c] + F[3 * a + 1] * F[3 * c + 1] + F[3 * a + 2] * F[3 * c + 2]);
     Index entry = 0;
     for (Index i = 0; i < 9; ++i) {
       const Index a = i / 3, b = i % 3;
-      const Vec lF = l * F[i];
+      const Vec lF = lambda * F[i];
       for (Index j = i; j < 9; ++j, ++entry) {
         const Index c = j / 3, d = j % 3;
-        Vec value = lF * F[j] + m * F[3 * a + d] * F[3 * c + b];
-        if (a == c) value += factor * S[kVoigt[b][d]];
+        Vec value = lF * F[j] + mu * F[3 * a + d] * F[3 * c + b];
+        if (a == c) value += S[kVoigt[b][d]];
         if (b == d) value += left[kVoigt[a][c]];
         store(tangent + entry * kLanes, load(tangent + entry * kLanes) + value);
       }
@@ -118,6 +135,19 @@ struct Isotropic {
 struct Quadratic {
   const double* numbers;
 
+  template <Want want>
+  Vec evaluate(const Vec* H, Vec* P, double* tangent) const {
+    Vec E[6], S[6];
+    green_strain(H, E);
+    if constexpr (want != Want::kEnergy) {
+      second_piola_kirchhoff(E, S);
+      add_stress(H, S, P);
+    }
+    if constexpr (want == Want::kStiffness) set_tangent(H, S, tangent);
+    return energy(E);
+  }
+
+ private:
   Vec number(Index i) const { return load(numbers + i * kLanes); }
 
   void linear_stress(const Vec* E, Vec* S) const {
@@ -168,50 +198,121 @@ struct Quadratic {
   }
 };
 
-enum class Want { kEnergy, kForce, kStiffness };
+#include "runtime/kernels/materials_isa.inl"
 
-/// Energy of one register's elements; adds the stress to P and writes (Quadratic) or adds (Isotropic) the tangent.
-template <Want want>
-inline Vec evaluate(const ElementLaw& law, Index at, Index shift, const Vec* H, Vec* P, double* tangent) {
-  Vec E[6], S[6];
-  green_strain(H, E);
-  if (law.kind == ElementLaw::Kind::kQuadraticInGreenStrain) {
-    const Quadratic quadratic{law.quadratic + (at / kLanes * kQuadraticNumbers) * kLanes + at % kLanes};
-    if constexpr (want != Want::kEnergy) {
-      quadratic.second_piola_kirchhoff(E, S);
-      add_stress(H, S, P);
+/// One of the examples of a law: H - H_k, times A_k where there is one, and its weight.
+struct Reference {
+  const double* shift;
+  const double* inverse;  ///< null: the identity, of volume 1
+  Vec weight;
+
+  Reference(const ElementLaw& law, Index at, Index k)
+      : shift(law.shifts + place(law, at, k, 9)),
+        inverse(law.inverses == nullptr ? nullptr : law.inverses + place(law, at, k, kInverseNumbers)),
+        weight(zero() + law.shift_weights[k]) {
+    if (inverse != nullptr) weight *= load(inverse + 9 * kLanes);
+  }
+
+  void displacement_gradient(const Vec* H, Vec* own) const {
+    Vec shifted[9];
+    for (Index i = 0; i < 9; ++i) shifted[i] = H[i] - load(shift + i * kLanes);
+    for (Index a = 0; a < 3; ++a)
+      for (Index b = 0; b < 3; ++b)
+        own[3 * a + b] = inverse == nullptr
+                             ? shifted[3 * a + b]
+                             : shifted[3 * a] * A(0, b) + shifted[3 * a + 1] * A(1, b) + shifted[3 * a + 2] * A(2, b);
+  }
+
+  /// P += P' A^T, tangent += (I (x) A) tangent' (I (x) A^T).
+  template <Want want>
+  void add(const Vec* own_P, const double* own_tangent, Vec* P, double* tangent) const {
+    for (Index a = 0; a < 3; ++a)
+      for (Index b = 0; b < 3; ++b)
+        P[3 * a + b] += own_P[3 * a] * A(b, 0) + own_P[3 * a + 1] * A(b, 1) + own_P[3 * a + 2] * A(b, 2);
+    if constexpr (want == Want::kStiffness)
+      for (Index a = 0; a < 3; ++a)
+        for (Index c = a; c < 3; ++c) add_block(own_tangent, a, c, tangent);
+  }
+
+ private:
+  static Index place(const ElementLaw& law, Index at, Index k, Index numbers) {
+    return (at / kLanes * law.shift_count + k) * numbers * kLanes + at % kLanes;
+  }
+
+  Vec A(Index i, Index j) const { return load(inverse + (3 * i + j) * kLanes); }
+
+  /// The 3 x 3 block of rows 3a and columns 3c: A times the block times A^T.
+  void add_block(const double* own_tangent, Index a, Index c, double* tangent) const {
+    Vec left[9];  // A times the block
+    for (Index l = 0; l < 3; ++l) {
+      Vec column[3];
+      for (Index k = 0; k < 3; ++k) column[k] = load(own_tangent + triangle_entry<9>(3 * a + k, 3 * c + l) * kLanes);
+      for (Index b = 0; b < 3; ++b) left[3 * b + l] = A(b, 0) * column[0] + A(b, 1) * column[1] + A(b, 2) * column[2];
     }
-    if constexpr (want == Want::kStiffness) quadratic.set_tangent(H, S, tangent);
-    return quadratic.energy(E);
+    for (Index b = 0; b < 3; ++b)
+      for (Index d = a == c ? b : 0; d < 3; ++d)
+        add_to(tangent + triangle_entry<9>(3 * a + b, 3 * c + d) * kLanes,
+               left[3 * b] * A(d, 0) + left[3 * b + 1] * A(d, 1) + left[3 * b + 2] * A(d, 2));
   }
-  const Isotropic isotropic{load(law.mu + at), load(law.lambda + at)};
-  const double factor = law.shift_count > 0 ? law.shift_weights[shift] : 1.0;
-  if constexpr (want != Want::kEnergy) {
-    isotropic.second_piola_kirchhoff(E, S);
-    Vec scaled[6];
-    for (Index i = 0; i < 6; ++i) scaled[i] = factor * S[i];
-    add_stress(H, scaled, P);
-  }
-  if constexpr (want == Want::kStiffness) isotropic.add_tangent(H, S, tangent, zero() + factor);
-  return factor * isotropic.energy(E);
-}
+};
 
-/// All shifts of the law, or the law itself.
 template <Want want>
-inline Vec evaluate_all(const ElementLaw& law, Index at, const Vec* H, Vec* P, double* tangent) {
+inline void clear_result(Vec* P, double* tangent) {
   for (Index i = 0; i < 9; ++i) P[i] = zero();
   if constexpr (want == Want::kStiffness)
     for (Index i = 0; i < kTangentNumbers; ++i) store(tangent + i * kLanes, zero());
-  if (law.shift_count == 0) return evaluate<want>(law, at, 0, H, P, tangent);
+}
+
+/// The sum over the law's examples.
+template <Want want, class Material>
+inline Vec evaluate_examples(const ElementLaw& law, Index at, const Vec* H, Vec* P, double* tangent) {
+  alignas(kAlignment) double own_tangent[want == Want::kStiffness ? kTangentNumbers * kLanes : kLanes];
   Vec energy = zero();
   for (Index k = 0; k < law.shift_count; ++k) {
     if (law.shift_weights[k] == 0) continue;
-    const double* shift = law.shifts + (at / kLanes * law.shift_count + k) * 9 * kLanes + at % kLanes;
-    Vec shifted[9];
-    for (Index i = 0; i < 9; ++i) shifted[i] = H[i] - load(shift + i * kLanes);
-    energy += evaluate<want>(law, at, k, shifted, P, tangent);
+    const Reference reference(law, at, k);
+    const Material material{reference.weight * load(law.mu + at), reference.weight * load(law.lambda + at)};
+    Vec own[9], own_P[9];
+    reference.displacement_gradient(H, own);
+    if (reference.inverse == nullptr) {
+      energy += material.template evaluate<want>(own, P, tangent);
+      continue;
+    }
+    clear_result<want>(own_P, own_tangent);
+    energy += material.template evaluate<want>(own, own_P, own_tangent);
+    if constexpr (want != Want::kEnergy) reference.add<want>(own_P, own_tangent, P, tangent);
   }
   return energy;
+}
+
+/// Energy of one register's elements by the law; sets P and the tangent, as wanted.
+template <Want want, class Law>
+inline Vec evaluate_law(const ElementLaw& law, Index at, const Vec* H, Vec* P, double* tangent) {
+  clear_result<want>(P, tangent);
+  if constexpr (std::is_same_v<Law, Quadratic>) {
+    const Quadratic quadratic{law.quadratic + (at / kLanes * kQuadraticNumbers) * kLanes + at % kLanes};
+    return quadratic.evaluate<want>(H, P, tangent);
+  } else {
+    if (law.shift_count > 0) return evaluate_examples<want, Law>(law, at, H, P, tangent);
+    const Law material{load(law.mu + at), load(law.lambda + at)};
+    return material.template evaluate<want>(H, P, tangent);
+  }
+}
+
+/// work with the type of the law: chosen once for all elements.
+template <class Work>
+inline auto with_law(const ElementLaw& law, Work work) {
+  switch (law.kind) {
+    case ElementLaw::Kind::kQuadraticInGreenStrain:
+      return work.template operator()<Quadratic>();
+    case ElementLaw::Kind::kStableNeoHookean:
+      return work.template operator()<StableNeoHookean>();
+    case ElementLaw::Kind::kCorotational:
+      return work.template operator()<Corotational>();
+    case ElementLaw::Kind::kStVenantKirchhoff:
+      break;
+  }
+  return work.template operator()<StVenantKirchhoff>();
 }
 
 // --- stiffness -------------------------------------------------------------------------------------------------------
@@ -322,18 +423,23 @@ inline void copy_triangle(const double* from, Index stride, Index modes, double*
 
 // --- the table -------------------------------------------------------------------------------------------------------
 
-double energy(const ElementArrays& elements, const ElementLaw& law, const double* q) {
+template <class Law>
+inline double energy_of_elements(const ElementArrays& elements, const ElementLaw& law, const double* q) {
   Vec total = zero();
   for (Index panel = 0; panel < elements.panels; ++panel)
     for (Index part = 0; part < kParts; ++part) {
       Vec H[9], P[9];
       gradient(elements.by_mode + panel * elements.modes * 9 * kLanes + part * kWidth, elements.modes, q, H);
-      total += evaluate_all<Want::kEnergy>(law, panel * kLanes + part * kWidth, H, P, nullptr);
+      total += evaluate_law<Want::kEnergy, Law>(law, panel * kLanes + part * kWidth, H, P, nullptr);
     }
   return sum(total);
 }
 
-template <Want want>
+double energy(const ElementArrays& elements, const ElementLaw& law, const double* q) {
+  return with_law(law, [&]<class Law>() { return energy_of_elements<Law>(elements, law, q); });
+}
+
+template <Want want, class Law>
 inline double evaluate_elements(const ElementArrays& elements, const ElementLaw& law, const double* q,
                                 const ElementScratch& scratch, double* force) {
   alignas(kAlignment) double tangents[kTangentNumbers * kLanes];
@@ -344,7 +450,7 @@ inline double evaluate_elements(const ElementArrays& elements, const ElementLaw&
     for (Index part = 0; part < kParts; ++part) {
       Vec H[9], P[9];
       gradient(by_mode + part * kWidth, elements.modes, q, H);
-      total += evaluate_all<want>(law, panel * kLanes + part * kWidth, H, P, tangents + part * kWidth);
+      total += evaluate_law<want, Law>(law, panel * kLanes + part * kWidth, H, P, tangents + part * kWidth);
       add_force(by_mode + part * kWidth, elements.modes, P, scratch.force);
     }
     if constexpr (want == Want::kStiffness) add_panel_stiffness(elements, panel, tangents, scratch);
@@ -355,13 +461,15 @@ inline double evaluate_elements(const ElementArrays& elements, const ElementLaw&
 
 double force(const ElementArrays& elements, const ElementLaw& law, const double* q, const ElementScratch& scratch,
              double* force) {
-  return evaluate_elements<Want::kForce>(elements, law, q, scratch, force);
+  return with_law(law,
+                  [&]<class Law>() { return evaluate_elements<Want::kForce, Law>(elements, law, q, scratch, force); });
 }
 
 double force_and_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q,
                            const ElementScratch& scratch, double* force, double* stiffness, Index outer) {
   clear(scratch.stiffness, elements.stride * elements.stride);
-  const double energy = evaluate_elements<Want::kStiffness>(elements, law, q, scratch, force);
+  const double energy = with_law(
+      law, [&]<class Law>() { return evaluate_elements<Want::kStiffness, Law>(elements, law, q, scratch, force); });
   copy_triangle(scratch.stiffness, elements.stride, elements.modes, stiffness, outer);
   return energy;
 }
@@ -374,14 +482,20 @@ void stiffness_of_tangents(const ElementArrays& elements, const double* tangents
   copy_triangle(scratch.stiffness, elements.stride, elements.modes, stiffness, outer);
 }
 
-void tangents(const ElementArrays& elements, const ElementLaw& law, const double* q, double* tangents) {
+template <class Law>
+inline void tangents_of_elements(const ElementArrays& elements, const ElementLaw& law, const double* q,
+                                 double* tangents) {
   for (Index panel = 0; panel < elements.panels; ++panel)
     for (Index part = 0; part < kParts; ++part) {
       Vec H[9], P[9];
       gradient(elements.by_mode + panel * elements.modes * 9 * kLanes + part * kWidth, elements.modes, q, H);
-      evaluate_all<Want::kStiffness>(law, panel * kLanes + part * kWidth, H, P,
-                                     tangents + panel * kTangentNumbers * kLanes + part * kWidth);
+      evaluate_law<Want::kStiffness, Law>(law, panel * kLanes + part * kWidth, H, P,
+                                          tangents + panel * kTangentNumbers * kLanes + part * kWidth);
     }
+}
+
+void tangents(const ElementArrays& elements, const ElementLaw& law, const double* q, double* tangents) {
+  with_law(law, [&]<class Law>() { tangents_of_elements<Law>(elements, law, q, tangents); });
 }
 
 /// Off the diagonal each block serves its rows and, transposed, its columns, whose sums stay in registers.

@@ -1,8 +1,9 @@
 #include "runtime/sim/element_potential.h"
 
 #include <algorithm>
+#include <optional>
 
-#include "common/elastic/material.h"
+#include "common/elastic/materials.h"
 
 namespace exmat::runtime {
 namespace {
@@ -11,20 +12,56 @@ ElementScratch scratch_of(ElementPotential::Workspace& workspace) {
   return {workspace.force.data(), workspace.product.data(), workspace.stiffness.data()};
 }
 
-/// Projects the tangents of all elements, panels x 45 x kLanes.
+/// Numbers of one element among tangents, panels x 45 x kLanes.
+double* numbers_of(Eigen::Index element, AlignedArray& tangents) {
+  return tangents.data() + element / kLanes * kTangentNumbers * kLanes + element % kLanes;
+}
+
+void write_tangent(const Matrix9& D, double* numbers) {
+  for (int i = 0, entry = 0; i < 9; ++i)
+    for (int j = i; j < 9; ++j, ++entry) numbers[entry * kLanes] = D(i, j);
+}
+
+/// Projects the tangents of all elements.
 void project(Eigen::Index panels, AlignedArray& tangents) {
   for (Eigen::Index at = 0; at < panels * kLanes; ++at) {
-    double* numbers = tangents.data() + at / kLanes * kTangentNumbers * kLanes + at % kLanes;
+    double* numbers = numbers_of(at, tangents);
     Matrix9 D;
     for (int i = 0, entry = 0; i < 9; ++i)
       for (int j = i; j < 9; ++j, ++entry) D(i, j) = D(j, i) = numbers[entry * kLanes];
-    D = project_positive_semidefinite(D);
-    for (int i = 0, entry = 0; i < 9; ++i)
-      for (int j = i; j < 9; ++j, ++entry) numbers[entry * kLanes] = D(i, j);
+    write_tangent(project_positive_semidefinite(D), numbers);
   }
 }
 
+/// Of a law that is one material at F itself, whose eigensystem is known.
+std::optional<MaterialModel> material_of(const ElementLaw& law) {
+  if (law.shift_count > 0) return std::nullopt;
+  switch (law.kind) {
+    case ElementLaw::Kind::kStVenantKirchhoff:
+      return MaterialModel::kStVenantKirchhoff;
+    case ElementLaw::Kind::kStableNeoHookean:
+      return MaterialModel::kStableNeoHookean;
+    case ElementLaw::Kind::kCorotational:
+      return MaterialModel::kCorotational;
+    case ElementLaw::Kind::kQuadraticInGreenStrain:
+      break;
+  }
+  return std::nullopt;
+}
+
 }  // namespace
+
+ElementLaw::Kind law_kind(MaterialModel model) {
+  switch (model) {
+    case MaterialModel::kStableNeoHookean:
+      return ElementLaw::Kind::kStableNeoHookean;
+    case MaterialModel::kCorotational:
+      return ElementLaw::Kind::kCorotational;
+    case MaterialModel::kStVenantKirchhoff:
+      break;
+  }
+  return ElementLaw::Kind::kStVenantKirchhoff;
+}
 
 ElementPotential::ElementPotential(const RowMatrix& gradient)
     : elements_(gradient.rows() / 9),
@@ -65,14 +102,33 @@ double ElementPotential::force_and_stiffness(const ElementLaw& law, const Eigen:
                                        stiffness.outerStride());
 }
 
+void ElementPotential::projected_tangents(const ElementLaw& law, const Eigen::VectorXd& x,
+                                          AlignedArray& tangents) const noexcept {
+  const auto material = material_of(law);
+  if (!material) {
+    kernels().tangents(arrays(), law, x.data(), tangents.data());
+    project(panels(), tangents);
+    return;
+  }
+  using Gradient = Eigen::Map<const RowMatrix, Eigen::Unaligned, Eigen::OuterStride<>>;
+  with_material(*material, [&](auto own) {
+    for (Eigen::Index j = 0; j < panels() * kLanes; ++j) {
+      const Gradient B(by_element_.data() + 9 * j * padded(modes_), 9, modes_, Eigen::OuterStride<>(padded(modes_)));
+      Eigen::Matrix<double, 9, 1> H;
+      H.noalias() = B * x;
+      const Eigen::Matrix3d gradient = H.reshaped<Eigen::RowMajor>(3, 3);
+      write_tangent(projected_tangent<decltype(own)>(gradient, {law.mu[j], law.lambda[j]}), numbers_of(j, tangents));
+    }
+  });
+}
+
 void ElementPotential::stiffness(const ElementLaw& law, const Eigen::VectorXd& x, Tangent tangent, Workspace& workspace,
                                  Eigen::MatrixXd& stiffness) const noexcept {
   if (tangent == Tangent::kExact) {
     force_and_stiffness(law, x, workspace, workspace.unused_force, stiffness);
     return;
   }
-  kernels().tangents(arrays(), law, x.data(), workspace.tangents.data());
-  project(panels(), workspace.tangents);
+  projected_tangents(law, x, workspace.tangents);
   kernels().stiffness_of_tangents(arrays(), workspace.tangents.data(), scratch_of(workspace), stiffness.data(),
                                   stiffness.outerStride());
 }

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "common/core/arrays.h"
+#include "common/elastic/material_model.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/kernels/kernels.h"
 
@@ -11,8 +12,12 @@ namespace exmat::runtime {
 /// Which tangent dP/dF a stiffness is built of.
 enum class Tangent {
   kExact,
-  kPositiveSemidefinite,  ///< negative eigenvalues of every element's 9 x 9 tangent set to zero
+  kPositiveSemidefinite,  ///< negative eigenvalues of every element's 9 x 9 tangent set to zero, by its
+                          ///< eigensystem where it is that of one material
 };
+
+/// The law of a material; its parameters are the caller's to set.
+ElementLaw::Kind law_kind(MaterialModel model);
 
 /// Sum over s elements of a law of the displacement gradients H_j = B_j x, x [r]: value, gradient and Hessian. Holds B
 /// alone; the law comes with each call. Immutable; all scratch is the caller's, no call allocates or throws.
@@ -61,6 +66,7 @@ class ElementPotential {
 
  private:
   ElementArrays arrays() const noexcept;
+  void projected_tangents(const ElementLaw& law, const Eigen::VectorXd& x, AlignedArray& tangents) const noexcept;
 
   Eigen::Index elements_ = 0, modes_ = 0;
   AlignedArray by_mode_, by_element_;

@@ -18,7 +18,7 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   const auto material = material_from_name(reduced.object->material);
   if (!material) {
     const std::string found = '"' + reduced.object->material + '"';
-    return {nullptr, {"", "/object: attribute material", "\"stvk\"", found, "use a newer exmat-runtime"}};
+    return {nullptr, {"", "/object: attribute material", material_names(), found, "use a newer exmat-runtime"}};
   }
   auto model = std::make_unique<Model>();
   const CubatureData& cubature = *reduced.cubature;

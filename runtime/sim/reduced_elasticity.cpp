@@ -2,11 +2,6 @@
 
 namespace exmat::runtime {
 
-std::optional<Material> material_from_name(std::string_view name) {
-  if (name == "stvk") return Material::kStVenantKirchhoff;
-  return std::nullopt;
-}
-
 std::vector<LameParameters> cubature_lame(const CubatureData& cubature) {
   std::vector<LameParameters> lame;
   for (Eigen::Index j = 0; j < cubature.weights.size(); ++j)
@@ -23,16 +18,17 @@ WeightedLame::WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::v
   }
 }
 
-ReducedElasticity::ReducedElasticity(Material, const RowMatrix& gradient, const Eigen::VectorXd& weighted_volumes,
-                                     const std::vector<LameParameters>& lame)
-    : potential_(gradient), lame_(weighted_volumes, lame) {}
+ReducedElasticity::ReducedElasticity(MaterialModel material, const RowMatrix& gradient,
+                                     const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame)
+    : kind_(law_kind(material)), potential_(gradient), lame_(weighted_volumes, lame) {}
 
-ReducedElasticity::ReducedElasticity(Material material, const CubatureData& cubature)
+ReducedElasticity::ReducedElasticity(MaterialModel material, const CubatureData& cubature)
     : ReducedElasticity(material, cubature.gradient, cubature.weights.cwiseProduct(cubature.volumes),
                         cubature_lame(cubature)) {}
 
 ElementLaw ReducedElasticity::law() const noexcept {
   ElementLaw law;
+  law.kind = kind_;
   law.mu = lame_.mu.data();
   law.lambda = lame_.lambda.data();
   return law;

@@ -1,21 +1,15 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
-#include <string_view>
 #include <vector>
 
 #include "common/core/arrays.h"
 #include "common/elastic/material.h"
+#include "common/elastic/material_model.h"
 #include "common/model/reduced_model.h"
 #include "runtime/sim/element_potential.h"
 
 namespace exmat::runtime {
-
-enum class Material { kStVenantKirchhoff };
-
-/// "stvk"; nothing for a name that this version does not know.
-std::optional<Material> material_from_name(std::string_view name);
 
 /// [s] Lame parameters of the cubature elements.
 std::vector<LameParameters> cubature_lame(const CubatureData& cubature);
@@ -37,10 +31,10 @@ class ReducedElasticity {
   ReducedElasticity() = default;
 
   /// `gradient` [9s x r] is B, `weighted_volumes` [s] the c_j [m^3], `lame` [s].
-  ReducedElasticity(Material material, const RowMatrix& gradient, const Eigen::VectorXd& weighted_volumes,
+  ReducedElasticity(MaterialModel material, const RowMatrix& gradient, const Eigen::VectorXd& weighted_volumes,
                     const std::vector<LameParameters>& lame);
 
-  explicit ReducedElasticity(Material material, const CubatureData& cubature);
+  explicit ReducedElasticity(MaterialModel material, const CubatureData& cubature);
 
   Workspace make_workspace() const { return potential_.make_workspace(); }
 
@@ -71,6 +65,7 @@ class ReducedElasticity {
  private:
   ElementLaw law() const noexcept;
 
+  ElementLaw::Kind kind_ = ElementLaw::Kind::kStVenantKirchhoff;
   ElementPotential potential_;
   WeightedLame lame_;
 };

@@ -14,7 +14,7 @@ constexpr double kTolerance = 1e-10;       // of the largest example, in the ene
 constexpr double kRegularisation = 1e-12;  // of the stiffest direction
 
 /// target_basis L^-T with the rest stiffness L L^T in it: coordinates of unit stiffness at rest.
-RowMatrix unit_stiffness_basis(Material material, const CubatureData& cubature, const RowMatrix& target_basis) {
+RowMatrix unit_stiffness_basis(MaterialModel material, const CubatureData& cubature, const RowMatrix& target_basis) {
   const ReducedElasticity elasticity(material, cubature.gradient * target_basis,
                                      cubature.weights.cwiseProduct(cubature.volumes), cubature_lame(cubature));
   auto workspace = elasticity.make_workspace();
@@ -52,10 +52,19 @@ void set_quadratic(const Eigen::Matrix3d& F, double volume, const LameParameters
   numbers[27 * kLanes] = constant;
 }
 
-Complaint inverted_element(const ExampleData& example, Eigen::Index element, double determinant) {
-  return {"", "/examples/" + example.name, "no inverted cubature element",
-          "determinant " + std::to_string(determinant) + " in cubature element " + std::to_string(element),
-          "use a milder example, or energy_reference \"rest\" in the scene"};
+Eigen::Matrix3d deformation_gradient(const Eigen::VectorXd& displacement_gradients, Eigen::Index element) {
+  return Eigen::Matrix3d::Identity() + Eigen::Map<const RowMatrix3>(displacement_gradients.data() + 9 * element);
+}
+
+std::optional<Complaint> inverted_element(const ExampleData& example, const Eigen::VectorXd& displacement_gradients) {
+  for (Eigen::Index j = 0; j < displacement_gradients.size() / 9; ++j) {
+    const double determinant = deformation_gradient(displacement_gradients, j).determinant();
+    if (!(determinant > 0))
+      return Complaint{"", "/examples/" + example.name, "no inverted cubature element",
+                       "determinant " + std::to_string(determinant) + " in cubature element " + std::to_string(j),
+                       "use a milder example, or energy_reference \"rest\" in the scene"};
+  }
+  return std::nullopt;
 }
 
 }  // namespace
@@ -64,46 +73,63 @@ EnergyReference energy_reference_from_name(std::string_view name) {
   return name == "rest" ? EnergyReference::kRest : EnergyReference::kExample;
 }
 
-std::optional<Complaint> TargetSolver::add_quadratic(const CubatureData& cubature, const ExampleData& example) {
+void TargetSolver::set_quadratic(const CubatureData& cubature, const Eigen::VectorXd& displacement_gradients) {
   const std::vector<LameParameters> lame = cubature_lame(cubature);
-  const Eigen::VectorXd displacement_gradients = cubature.gradient * example.reduced;
   AlignedArray& numbers = quadratics_.emplace_back(quadratic_size());
   for (Eigen::Index j = 0; j < cubature.weights.size(); ++j) {
-    const Eigen::Map<const RowMatrix3> H(displacement_gradients.data() + 9 * j);
-    const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + H;
-    const double determinant = F.determinant();
-    if (!(determinant > 0)) return inverted_element(example, j, determinant);
-    set_quadratic(F, cubature.weights[j] * cubature.volumes[j] * determinant, lame[static_cast<std::size_t>(j)],
-                  numbers.data() + j / kLanes * kQuadraticNumbers * kLanes + j % kLanes);
+    const Eigen::Matrix3d F = deformation_gradient(displacement_gradients, j);
+    runtime::set_quadratic(F, cubature.weights[j] * cubature.volumes[j] * F.determinant(),
+                           lame[static_cast<std::size_t>(j)],
+                           numbers.data() + j / kLanes * kQuadraticNumbers * kLanes + j % kLanes);
   }
-  return std::nullopt;
 }
 
-void TargetSolver::add_shift(const Eigen::VectorXd& displacement_gradients) {
-  const Eigen::Index k = examples(), count = shifts_.size() / (potential_.panels() * 9 * kLanes);
+void TargetSolver::set_shift(Eigen::Index k, const Eigen::VectorXd& displacement_gradients) {
+  const Eigen::Index count = shifts_.size() / (potential_.panels() * 9 * kLanes);
   for (Eigen::Index i = 0; i < displacement_gradients.size(); ++i) {
     const Eigen::Index element = i / 9;
     shifts_[((element / kLanes * count + k) * 9 + i % 9) * kLanes + element % kLanes] = displacement_gradients[i];
   }
 }
 
-std::optional<Complaint> TargetSolver::build(Material material, const CubatureData& cubature,
+void TargetSolver::set_inverse(Eigen::Index k, const Eigen::VectorXd& displacement_gradients) {
+  const Eigen::Index count = inverses_.size() / (potential_.panels() * kInverseNumbers * kLanes);
+  for (Eigen::Index j = 0; j < elements(); ++j) {
+    const Eigen::Matrix3d F = deformation_gradient(displacement_gradients, j);
+    const Eigen::Matrix3d inverse = F.inverse();
+    double* numbers = inverses_.data() + (j / kLanes * count + k) * kInverseNumbers * kLanes + j % kLanes;
+    for (int i = 0; i < 9; ++i) numbers[i * kLanes] = inverse(i / 3, i % 3);
+    numbers[9 * kLanes] = F.determinant();
+  }
+}
+
+std::optional<Complaint> TargetSolver::build(MaterialModel material, const CubatureData& cubature,
                                              const std::vector<ExampleData>& examples, const RowMatrix& target_basis,
                                              EnergyReference reference) {
   if (target_basis.cols() == 0)
     return Complaint{"", "/projection/target_basis", "at least one column", "none", "precompute the bundle again"};
-  reference_ = reference;
+  const bool from_example = reference == EnergyReference::kExample;
+  quadratic_ = from_example && material == MaterialModel::kStVenantKirchhoff;
+  material_ = law_kind(material);
   basis_ = unit_stiffness_basis(material, cubature, target_basis);
   potential_ = ElementPotential(cubature.gradient * basis_);
-  if (reference == EnergyReference::kRest) {
+  const auto count = static_cast<Eigen::Index>(examples.size());
+  if (!quadratic_) {
     lame_ = WeightedLame(cubature.weights.cwiseProduct(cubature.volumes), cubature_lame(cubature));
-    shifts_ = AlignedArray(potential_.panels() * static_cast<Eigen::Index>(examples.size()) * 9 * kLanes);
+    shifts_ = AlignedArray(potential_.panels() * count * 9 * kLanes);
+    if (from_example) inverses_ = AlignedArray(potential_.panels() * count * kInverseNumbers * kLanes);
   }
-  for (const ExampleData& example : examples) {
-    if (reference == EnergyReference::kRest)
-      add_shift(cubature.gradient * example.reduced);
-    else if (auto complaint = add_quadratic(cubature, example))
-      return complaint;
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const ExampleData& example = examples[static_cast<std::size_t>(k)];
+    const Eigen::VectorXd displacement_gradients = cubature.gradient * example.reduced;
+    if (from_example)
+      if (auto complaint = inverted_element(example, displacement_gradients)) return complaint;
+    if (quadratic_) {
+      set_quadratic(cubature, displacement_gradients);
+    } else {
+      set_shift(k, displacement_gradients);
+      if (from_example) set_inverse(k, displacement_gradients);
+    }
     centres_.emplace_back(basis_.householderQr().solve(example.reduced));
     force_tolerance_ = std::max(force_tolerance_, kTolerance * centres_.back().norm());
   }
@@ -111,20 +137,22 @@ std::optional<Complaint> TargetSolver::build(Material material, const CubatureDa
 }
 
 TargetSolver::Workspace TargetSolver::make_workspace() const {
-  return {NewtonWorkspace(dimension()), potential_.make_workspace(),
-          AlignedArray(reference_ == EnergyReference::kExample ? quadratic_size() : 0), AlignedArray(examples())};
+  return {NewtonWorkspace(dimension()), potential_.make_workspace(), AlignedArray(quadratic_ ? quadratic_size() : 0),
+          AlignedArray(examples())};
 }
 
 /// sum_k w_k E_k as a law of the workspace.
 ElementLaw TargetSolver::law(const Eigen::VectorXd& weights, Workspace& workspace) const noexcept {
   ElementLaw law;
-  if (reference_ == EnergyReference::kRest) {
+  if (!quadratic_) {
     std::copy(weights.data(), weights.data() + weights.size(), workspace.shift_weights.data());
+    law.kind = material_;
     law.mu = lame_.mu.data();
     law.lambda = lame_.lambda.data();
     law.shift_count = examples();
     law.shifts = shifts_.data();
     law.shift_weights = workspace.shift_weights.data();
+    if (inverses_.size() > 0) law.inverses = inverses_.data();
     return law;
   }
   Eigen::Map<Eigen::VectorXd> blended(workspace.quadratic.data(), workspace.quadratic.size());

@@ -29,6 +29,7 @@ EnergyReference energy_reference_from_name(std::string_view name);
 ///
 /// With F_jk as the undeformed shape, the Green strain of E_k is F_jk^-T (E - E_jk) F_jk^-1, linear in that of F_j(p):
 /// sum_k w_k E_k of St.Venant-Kirchhoff is one quadratic form of E for each element, whatever the number of examples.
+/// Other materials add up the examples, those of weight zero left out.
 class TargetSolver {
  public:
   static constexpr int kMaxIterations = 50;
@@ -44,7 +45,7 @@ class TargetSolver {
 
   /// For K >= 1 examples. A complaint (without a file) where an example inverts a cubature element, det F_jk <= 0:
   /// names both.
-  std::optional<Complaint> build(Material material, const CubatureData& cubature,
+  std::optional<Complaint> build(MaterialModel material, const CubatureData& cubature,
                                  const std::vector<ExampleData>& examples, const RowMatrix& target_basis,
                                  EnergyReference reference);
 
@@ -77,16 +78,19 @@ class TargetSolver {
   Eigen::Index examples() const { return static_cast<Eigen::Index>(centres_.size()); }
   Eigen::Index quadratic_size() const { return potential_.panels() * kQuadraticNumbers * kLanes; }
   ElementLaw law(const Eigen::VectorXd& weights, Workspace& workspace) const noexcept;
-  std::optional<Complaint> add_quadratic(const CubatureData& cubature, const ExampleData& example);
-  void add_shift(const Eigen::VectorXd& displacement_gradients);
+  void set_quadratic(const CubatureData& cubature, const Eigen::VectorXd& displacement_gradients);
+  void set_shift(Eigen::Index k, const Eigen::VectorXd& displacement_gradients);
+  void set_inverse(Eigen::Index k, const Eigen::VectorXd& displacement_gradients);
 
-  EnergyReference reference_ = EnergyReference::kExample;
+  bool quadratic_ = false;  ///< one quadratic form serves: St.Venant-Kirchhoff and kExample
+  ElementLaw::Kind material_ = ElementLaw::Kind::kStVenantKirchhoff;
   RowMatrix basis_;
   ElementPotential potential_;
   std::vector<Eigen::VectorXd> centres_;  ///< K, y_k [d]
-  std::vector<AlignedArray> quadratics_;  ///< K, see ElementLaw; kExample only
-  WeightedLame lame_;                     ///< kRest only
-  AlignedArray shifts_;                   ///< kRest only
+  std::vector<AlignedArray> quadratics_;  ///< K, see ElementLaw; where one quadratic form serves
+  WeightedLame lame_;                     ///< otherwise
+  AlignedArray shifts_;                   ///< otherwise
+  AlignedArray inverses_;                 ///< otherwise, kExample only
   double force_tolerance_ = 0;            ///< [J^1/2]
 };
 

@@ -12,7 +12,6 @@ namespace {
 
 using ::benchmark::DoNotOptimize;
 using runtime::Kernels;
-using runtime::Material;
 using runtime::ReducedElasticity;
 using State = ::benchmark::State;
 
@@ -20,19 +19,22 @@ std::string sizes(int modes, int elements) { return "/r" + std::to_string(modes)
 
 Eigen::VectorXd pose(Eigen::Index modes) { return 0.1 * test::random_vector(modes, 1); }
 
-ReducedElasticity elasticity(int modes, int elements) {
-  return ReducedElasticity(Material::kStVenantKirchhoff, *bar_model(modes, elements).cubature);
+constexpr MaterialModel kMaterials[] = {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
+                                        MaterialModel::kCorotational};
+
+ReducedElasticity elasticity(MaterialModel material, int modes, int elements) {
+  return ReducedElasticity(material, *bar_model(modes, elements).cubature);
 }
 
-void energy(State& state, int modes, int elements) {
-  const ReducedElasticity kernel = elasticity(modes, elements);
+void energy(State& state, MaterialModel material, int modes, int elements) {
+  const ReducedElasticity kernel = elasticity(material, modes, elements);
   const Eigen::VectorXd q = pose(modes);
   for (auto _ : state) DoNotOptimize(kernel.energy(q));
   compare_with_dgemm(state, kernel.potential().force_flops() / 2);
 }
 
-void force(State& state, int modes, int elements) {
-  const ReducedElasticity kernel = elasticity(modes, elements);
+void force(State& state, MaterialModel material, int modes, int elements) {
+  const ReducedElasticity kernel = elasticity(material, modes, elements);
   auto workspace = kernel.make_workspace();
   const Eigen::VectorXd q = pose(modes);
   Eigen::VectorXd force(modes);
@@ -40,8 +42,8 @@ void force(State& state, int modes, int elements) {
   compare_with_dgemm(state, kernel.potential().force_flops());
 }
 
-void force_and_stiffness(State& state, int modes, int elements) {
-  const ReducedElasticity kernel = elasticity(modes, elements);
+void force_and_stiffness(State& state, MaterialModel material, int modes, int elements) {
+  const ReducedElasticity kernel = elasticity(material, modes, elements);
   auto workspace = kernel.make_workspace();
   const Eigen::VectorXd q = pose(modes);
   Eigen::VectorXd force(modes);
@@ -152,9 +154,14 @@ void register_kernels() {
   for (const int r : kModes) {
     const std::string size = "/r" + std::to_string(r);
     for (const int s : kElements) {
-      add("kernel/energy" + sizes(r, s), [=](State& state) { energy(state, r, s); });
-      add("kernel/force" + sizes(r, s), [=](State& state) { force(state, r, s); });
-      add("kernel/force_and_stiffness" + sizes(r, s), [=](State& state) { force_and_stiffness(state, r, s); });
+      for (const MaterialModel material : kMaterials) {
+        const std::string own =
+            material == MaterialModel::kStVenantKirchhoff ? "" : "_" + std::string(name_of(material));
+        add("kernel/energy" + own + sizes(r, s), [=](State& state) { energy(state, material, r, s); });
+        add("kernel/force" + own + sizes(r, s), [=](State& state) { force(state, material, r, s); });
+        add("kernel/force_and_stiffness" + own + sizes(r, s),
+            [=](State& state) { force_and_stiffness(state, material, r, s); });
+      }
       add("kernel/target_solve" + sizes(r, s), [=](State& state) { target_solve(state, r, s); });
     }
     add("kernel/polynomial" + size, [=](State& state) { polynomial(state, r); });

@@ -19,6 +19,7 @@ KERNELS = {
     "polynomial": "polynomial (force and stiffness)", "cholesky": "Cholesky", "solve": "solve",
     "target_table": "target, table", "target_solve": "target, solve", "weights": "weights",
     "positions_1000": "positions of 1,000 vertices", "positions_100000": "positions of 100,000 vertices"}
+MATERIALS = {"stable_neo_hookean": "stable neo-Hookean", "corotational": "corotational"}
 TARGETS = {"no_examples": "no examples", "table": "examples, table", "solve": "examples, solve"}
 
 
@@ -107,6 +108,20 @@ def kernels(results):
     return table(("kernel", "r", "s", *(result.name for result in results)), rows)
 
 
+def materials(results):
+    """Times over those of St.Venant-Kirchhoff, of 60 elements."""
+    rows = []
+    for material, title in MATERIALS.items():
+        for kernel in list(KERNELS)[:3]:
+            suffix = f"kernel/{kernel}_{material}/"
+            found = (name for name in results[0].best if name.startswith(suffix) and name.endswith("/s60"))
+            for name in sorted(found, key=by_size):
+                base = name.replace(f"_{material}", "")
+                ratios = (result.microseconds(name) / result.microseconds(base) for result in results)
+                rows.append((title, KERNELS[kernel], *by_size(name), *(f"{ratio:.2f}" for ratio in ratios)))
+    return table(("material", "kernel", "r", "s", *(result.name for result in results)), rows)
+
+
 def steps(result):
     found = {tuple(name.split("/")[1:]) for name in result.best if name.startswith("step/")}
     cubature = sorted((force for _, force, _ in found if force[1:].isdigit()), key=lambda force: int(force[1:]))
@@ -183,7 +198,9 @@ def report(results, compiler):
         instances(fastest),
         "### Kernels\n\nMicroseconds; in parentheses how many times as long as its flops at the DGEMM rate of the same "
         "instruction set.",
-        kernels(results)))
+        kernels(results),
+        "### Materials\n\nThe kernels of other materials: times over those of St.Venant-Kirchhoff in the same run.",
+        materials(results)))
 
 
 def main():

@@ -3,8 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
+#include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 #include "common/mesh/geometry.h"
 
@@ -56,6 +58,19 @@ Eigen::Matrix<double, 9, 12> tet_gradient(const TetMesh& mesh, Eigen::Index tet)
   return gradient;
 }
 
+/// mu, lambda.
+std::pair<double, double> lame(double youngs_modulus, double poisson_ratio) {
+  return {youngs_modulus / 2 / (1 + poisson_ratio),
+          youngs_modulus * poisson_ratio / (1 + poisson_ratio) / (1 - 2 * poisson_ratio)};
+}
+
+/// Of the polar decomposition, a proper one also where F is inverted.
+Eigen::Matrix3d rotation(const Eigen::Matrix3d& F) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Vector3d signs(1, 1, F.determinant() < 0 ? -1 : 1);
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
 struct FullMatrices {
   Eigen::MatrixXd scalar_mass, laplacian;  ///< n x n
   Eigen::MatrixXd mass, stiffness;         ///< 3n x 3n
@@ -68,8 +83,7 @@ FullMatrices assemble(const ObjectData& object) {
                     Eigen::MatrixXd::Zero(3 * n, 3 * n)};
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    const double young = object.materials.youngs_modulus[t], poisson = object.materials.poisson_ratio[t];
-    const double mu = young / 2 / (1 + poisson), lambda = young * poisson / (1 + poisson) / (1 - 2 * poisson);
+    const auto [mu, lambda] = lame(object.materials.youngs_modulus[t], object.materials.poisson_ratio[t]);
     Eigen::Matrix<double, 9, 9> hooke = Eigen::Matrix<double, 9, 9>::Zero();
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) {
@@ -285,7 +299,8 @@ ObjectData bar_object(const BarOptions& options) {
   }
   object.materials.youngs_modulus = Eigen::VectorXd::Constant(tets, options.youngs_modulus);
   object.materials.poisson_ratio = Eigen::VectorXd::Constant(tets, options.poisson_ratio);
-  object.material = "stvk";
+  object.materials.model = options.material;
+  object.material = name_of(options.material);
   return object;
 }
 
@@ -315,12 +330,43 @@ Bar make_bar(const BarOptions& options) {
   return bar;
 }
 
+double energy_density(MaterialModel model, const Eigen::Matrix3d& F, double youngs_modulus, double poisson_ratio) {
+  const auto [mu, lambda] = lame(youngs_modulus, poisson_ratio);
+  if (model == MaterialModel::kStableNeoHookean) {
+    const double own_mu = 4 * mu / 3, own_lambda = lambda + 5 * mu / 6, alpha = 1 + 0.75 * own_mu / own_lambda;
+    const double invariant = F.squaredNorm(), J = F.determinant() - alpha;
+    return own_mu / 2 * (invariant - 3) + own_lambda / 2 * (J * J - (1 - alpha) * (1 - alpha)) -
+           own_mu / 2 * std::log((invariant + 1) / 4);
+  }
+  const Eigen::Matrix3d strain = model == MaterialModel::kCorotational
+                                     ? Eigen::Matrix3d(rotation(F).transpose() * F - Eigen::Matrix3d::Identity())
+                                     : Eigen::Matrix3d(0.5 * (F.transpose() * F - Eigen::Matrix3d::Identity()));
+  return mu * strain.squaredNorm() + lambda / 2 * strain.trace() * strain.trace();
+}
+
+Eigen::Matrix3d first_piola_kirchhoff(MaterialModel model, const Eigen::Matrix3d& F, double youngs_modulus,
+                                      double poisson_ratio) {
+  const auto [mu, lambda] = lame(youngs_modulus, poisson_ratio);
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  if (model == MaterialModel::kStableNeoHookean) {
+    const double own_mu = 4 * mu / 3, own_lambda = lambda + 5 * mu / 6, alpha = 1 + 0.75 * own_mu / own_lambda;
+    Eigen::Matrix3d cofactor;
+    for (int a = 0; a < 3; ++a) cofactor.row(a) = F.row((a + 1) % 3).cross(F.row((a + 2) % 3));
+    return own_mu * (1 - 1 / (F.squaredNorm() + 1)) * F + own_lambda * (F.determinant() - alpha) * cofactor;
+  }
+  if (model == MaterialModel::kCorotational) {
+    const Eigen::Matrix3d R = rotation(F);
+    return 2 * mu * (F - R) + lambda * ((R.transpose() * F).trace() - 3) * R;
+  }
+  const Eigen::Matrix3d E = 0.5 * (F.transpose() * F - I);
+  return F * (2 * mu * E + lambda * E.trace() * I);
+}
+
 Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displacement) {
   const ObjectData& object = *bar.model.object;
   Eigen::VectorXd force = Eigen::VectorXd::Zero(displacement.size());
   for (Eigen::Index t = 0; t < object.mesh.tet_count(); ++t) {
     const double young = object.materials.youngs_modulus[t], poisson = object.materials.poisson_ratio[t];
-    const double mu = young / 2 / (1 + poisson), lambda = young * poisson / (1 + poisson) / (1 - 2 * poisson);
     Eigen::Matrix3d rest, now;
     for (int c = 0; c < 3; ++c) {
       const auto vertex = object.mesh.tets(t, c + 1), origin = object.mesh.tets(t, 0);
@@ -329,8 +375,7 @@ Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displ
     }
     const Eigen::Matrix3d rest_inverse = rest.inverse();
     const Eigen::Matrix3d F = now * rest_inverse;
-    const Eigen::Matrix3d E = 0.5 * (F.transpose() * F - Eigen::Matrix3d::Identity());
-    const Eigen::Matrix3d P = F * (2 * mu * E + lambda * E.trace() * Eigen::Matrix3d::Identity());
+    const Eigen::Matrix3d P = first_piola_kirchhoff(object.materials.model, F, young, poisson);
     const Eigen::Matrix3d corner_forces = rest.determinant() / 6 * P * rest_inverse.transpose();
     for (int c = 0; c < 3; ++c) {
       force.segment<3>(3 * object.mesh.tets(t, c + 1)) += corner_forces.col(c);

@@ -15,6 +15,7 @@ struct BarOptions {
   std::array<double, 3> lengths{1.0, 0.25, 0.25};  ///< [m]
   double youngs_modulus = 1e5;                     ///< [Pa]
   double poisson_ratio = 0.35;
+  MaterialModel material = MaterialModel::kStVenantKirchhoff;
   double density = 1000;        ///< [kg/m^3]
   double density_gradient = 0;  ///< density * (1 + density_gradient * x / length)
   bool free = false;            ///< not clamped: the six rigid modes are left out and /rigid is filled
@@ -37,7 +38,12 @@ struct Bar {
 };
 Bar make_bar(const BarOptions& options = {});
 
-/// 3n internal force of St.Venant-Kirchhoff at the displacement u [3n], by nodes: f_i = V P grad N_i.
+/// Energy density and first Piola-Kirchhoff stress as the definitions have them, term by term.
+double energy_density(MaterialModel model, const Eigen::Matrix3d& F, double youngs_modulus, double poisson_ratio);
+Eigen::Matrix3d first_piola_kirchhoff(MaterialModel model, const Eigen::Matrix3d& F, double youngs_modulus,
+                                      double poisson_ratio);
+
+/// 3n internal force at the displacement u [3n], by nodes: f_i = V P grad N_i.
 Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displacement);
 
 /// Contact at all surface vertices, a third of the area of their triangles each.

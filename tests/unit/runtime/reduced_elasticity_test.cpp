@@ -115,10 +115,5 @@ TEST_F(ReducedElasticityTest, ProjectedStiffnessIsPositiveSemidefiniteAndEqualWh
   EXPECT_LE((exact - projected).norm(), 1e-12 * exact.norm());
 }
 
-TEST_F(ReducedElasticityTest, MaterialsAreKnownByName) {
-  EXPECT_TRUE(material_from_name("stvk"));
-  EXPECT_FALSE(material_from_name("rubber"));
-}
-
 }  // namespace
 }  // namespace exmat::runtime

@@ -18,7 +18,7 @@ class ReducedPolynomialTest : public ::testing::TestWithParam<int> {
   ReducedPolynomialTest()
       : bar_(test::make_bar({.linear_modes = GetParam(), .examples = GetParam() > 5 ? 4 : 0})),
         polynomial_(test::make_polynomial(*bar_.model.cubature)),
-        elasticity_(Material::kStVenantKirchhoff, *bar_.model.cubature),
+        elasticity_(MaterialModel::kStVenantKirchhoff, *bar_.model.cubature),
         scratch_(polynomial_.make_workspace()),
         elasticity_scratch_(elasticity_.make_workspace()) {}
 

@@ -272,7 +272,7 @@ const BadModel kBadModels[] = {
      "/examples/gram"},
     {"ExampleTwice", [](ReducedModel& model) { model.examples->examples[1].name = "z rest"; }, "/examples/z rest"},
     {"UnknownMaterial", [](ReducedModel& model) { model.object->material = "rubber"; },
-     "/object@material: expected \"stvk\", found \"rubber\""},
+     "/object@material: expected \"stvk\" or \"stable_neo_hookean\" or \"corotational\", found \"rubber\""},
 };
 INSTANTIATE_TEST_SUITE_P(Each, UnsoundModel, ::testing::ValuesIn(kBadModels),
                          [](const auto& test) { return std::string(test.param.name); });

@@ -262,5 +262,21 @@ TEST(VertexIds, AreReadFromBouFiles) {
   EXPECT_THAT(read_vertex_ids(folder / "a.bou"), ElementsAre(0, 1, 2, 9, 6, 8));
 }
 
+TEST(LoadAsset, MaterialsOfPartsComeInOrder) {
+  const TemporaryFolder folder;
+  const auto asset = load(folder, load_asset, R"({"name": "a", "object": {"mesh": "m",
+    "material": {"model": "stable_neo_hookean"},
+    "materials": [{"tets": {"box": {"min": [0, 0, 0], "max": [1, 1, 1]}}, "youngs_modulus": 2e5},
+                  {"tets": {"file": "hard.txt"}, "poisson_ratio": -0.2, "density": 7}]}})");
+  EXPECT_EQ(asset.material.model, "stable_neo_hookean");
+  ASSERT_EQ(asset.material_regions.size(), 2U);
+  EXPECT_EQ(std::get<BoxSelection>(asset.material_regions[0].tets).max[0], 1);
+  EXPECT_EQ(asset.material_regions[0].youngs_modulus, 2e5);
+  EXPECT_FALSE(asset.material_regions[0].density || asset.material_regions[1].youngs_modulus);
+  EXPECT_EQ(std::get<FileSelection>(asset.material_regions[1].tets).file, folder / "hard.txt");
+  EXPECT_EQ(asset.material_regions[1].poisson_ratio, -0.2);
+  EXPECT_EQ(asset.material_regions[1].density, 7);
+}
+
 }  // namespace
 }  // namespace exmat

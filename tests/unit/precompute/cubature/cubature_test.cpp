@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "common/core/error.h"
-#include "common/elastic/st_venant_kirchhoff.h"
+#include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
 #include "precompute/modes/basis.h"
 #include "tests/support/box_mesh.h"
@@ -13,12 +13,12 @@
 namespace exmat::precompute {
 namespace {
 
-class Cubature : public testing::Test {
+class Cubature : public testing::TestWithParam<MaterialModel> {
  protected:
   Cubature() {
     const Eigen::Index count = mesh_.tet_count();
     materials_ = {Eigen::VectorXd::Constant(count, 1000), Eigen::VectorXd::LinSpaced(count, 1e5, 2e5),
-                  Eigen::VectorXd::Constant(count, 0.35)};
+                  Eigen::VectorXd::Constant(count, 0.35), GetParam()};
     FlagVector fixed = FlagVector::Zero(mesh_.vertex_count());
     for (Eigen::Index v = 0; v < fixed.size(); ++v) fixed[v] = mesh_.vertices(v, 0) < 1e-9 ? 1 : 0;
     const auto system = build_elastic_system(mesh_, materials_, fixed);
@@ -42,8 +42,11 @@ class Cubature : public testing::Test {
       const auto lame = lame_parameters(materials_.youngs_modulus[t], materials_.poisson_ratio[t]);
       Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
       for (int c = 0; c < 4; ++c) H += u.segment<3>(3 * mesh_.tets(t, c)) * gradients.row(c);
-      const Eigen::Matrix3d P = StVenantKirchhoff::first_piola_kirchhoff(H, lame);
-      energy += tet_weights[t] * volumes[t] * StVenantKirchhoff::energy(H, lame);
+      Eigen::Matrix3d P;
+      with_material(GetParam(), [&](auto material) {
+        P = material.first_piola_kirchhoff(H, lame);
+        energy += tet_weights[t] * volumes[t] * material.energy(H, lame);
+      });
       for (int c = 0; c < 4; ++c)
         force.segment<3>(3 * mesh_.tets(t, c)) += tet_weights[t] * volumes[t] * P * gradients.row(c).transpose();
     }
@@ -55,7 +58,12 @@ class Cubature : public testing::Test {
   PoseSource source_;
 };
 
-TEST_F(Cubature, HeldoutErrorsAreWhatAnIndependentEvaluationGets) {
+INSTANTIATE_TEST_SUITE_P(Materials, Cubature,
+                         testing::Values(MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
+                                         MaterialModel::kCorotational),
+                         [](const auto& model) { return std::string(name_of(model.param)); });
+
+TEST_P(Cubature, HeldoutErrorsAreWhatAnIndependentEvaluationGets) {
   const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, "greedy_swap", 60, 3});
   ASSERT_EQ(data.elements.size(), 20);
   EXPECT_GE(data.weights.minCoeff(), 0);
@@ -75,7 +83,7 @@ TEST_F(Cubature, HeldoutErrorsAreWhatAnIndependentEvaluationGets) {
   EXPECT_NEAR(data.heldout_energy_error / std::sqrt(energy_squares / count), 1, 1e-10);
 }
 
-TEST_F(Cubature, StiffnessErrorIsThatOfTheForceDerivative) {
+TEST_P(Cubature, StiffnessErrorIsThatOfTheForceDerivative) {
   const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, "greedy_swap", 60, 3});
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(mesh_.tet_count());
   for (Eigen::Index j = 0; j < data.elements.size(); ++j) weights[data.elements[j]] = data.weights[j];
@@ -96,7 +104,7 @@ TEST_F(Cubature, StiffnessErrorIsThatOfTheForceDerivative) {
   EXPECT_NEAR(data.heldout_stiffness_error / std::sqrt(squares / 10), 1, 1e-6);
 }
 
-TEST_F(Cubature, AllElementsWithWeightOneHaveNoError) {
+TEST_P(Cubature, AllElementsWithWeightOneHaveNoError) {
   std::vector<Eigen::Index> all(static_cast<std::size_t>(mesh_.tet_count()));
   for (std::size_t t = 0; t < all.size(); ++t) all[t] = static_cast<Eigen::Index>(t);
   const auto errors = cubature_errors(mesh_, materials_, source_, all, Eigen::VectorXd::Ones(mesh_.tet_count()),
@@ -106,14 +114,14 @@ TEST_F(Cubature, AllElementsWithWeightOneHaveNoError) {
   EXPECT_LE(errors.stiffness, 1e-12);
 }
 
-TEST_F(Cubature, ToleranceIsMetOrRefused) {
+TEST_P(Cubature, ToleranceIsMetOrRefused) {
   const auto data = build_cubature(mesh_, materials_, source_, {std::nullopt, 0.02, "greedy_swap", 60, 3});
   EXPECT_LE(data.heldout_error, 0.02);
   EXPECT_LT(data.elements.size(), mesh_.tet_count() / 2);
   EXPECT_THROW(build_cubature(mesh_, materials_, source_, {std::nullopt, 1e-9, "greedy_swap", 20, 3}), WorkError);
 }
 
-TEST_F(Cubature, PosesAreAsLargeAsTheRecipeSays) {
+TEST_P(Cubature, PosesAreAsLargeAsTheRecipeSays) {
   const RowMatrix poses = draw_poses(source_, 200, 9);
   int large = 0;
   for (Eigen::Index p = 0; p < poses.rows(); ++p) {

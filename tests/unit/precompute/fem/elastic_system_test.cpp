@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "common/core/error.h"
+#include "common/mesh/geometry.h"
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/linear_modes.h"
 #include "tests/support/box_mesh.h"
@@ -52,6 +53,33 @@ double timoshenko_frequency(double L, double E, double G, double rho, double A, 
   // Below Euler-Bernoulli's 3.516, where the function changes sign once.
   const double b = bisect(characteristic, 1.0, 3.6);
   return b * std::sqrt(E * I / (rho * A)) / (L * L);
+}
+
+// Two bars in series, stretched by a traction: nothing narrows with a Poisson ratio of 0, each stretches by F l / (E
+// A).
+TEST(ElasticSystem, BarOfTwoMaterialsStretchesAsTheSumOfItsParts) {
+  const auto mesh = test::box_mesh({5, 2, 2}, {1.0, 0.3, 0.2});
+  TetMaterials materials = uniform(mesh, 1000, 2e5, 0.0);
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    if (tet_positions(mesh, t).col(0).mean() > 0.6) materials.youngs_modulus[t] = 7e5;
+  const auto system = build_elastic_system(mesh, materials, clamp_x0(mesh));
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(system.full_mass.rows());
+  const double traction = 100;
+  const TriangleArray surface = surface_triangles(mesh.tets);
+  for (Eigen::Index f = 0; f < surface.rows(); ++f) {
+    const Eigen::RowVector3i triangle = surface.row(f);
+    const bool at_end = (mesh.vertices(triangle, 0).array() > 1 - 1e-9).all();
+    if (at_end)
+      for (const int vertex : triangle) load[3 * vertex] += traction * (0.3 * 0.2 / 8) / 3;
+  }
+  const SemidefiniteSolver solver(system.stiffness, system.mass * system.null_space, "test");
+  const Eigen::VectorXd u = system.extend(solver.solve(system.restrict(load)));
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
+    const double x = mesh.vertices(v, 0);
+    const double expected = traction * (std::min(x, 0.6) / 2e5 + std::max(x - 0.6, 0.0) / 7e5);
+    EXPECT_NEAR(u[3 * v], expected, 1e-12) << x;
+    EXPECT_NEAR(u[3 * v + 1], 0, 1e-15);
+  }
 }
 
 TEST(ElasticSystem, FreeBodyHasExactlySixRigidModes) {

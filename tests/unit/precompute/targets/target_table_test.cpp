@@ -31,7 +31,7 @@ ReducedModel small_model(int examples, double strength) {
 
 TargetSolver solver_of(const ReducedModel& model, const std::string& reference) {
   TargetSolver solver;
-  const auto complaint = solver.build(runtime::Material::kStVenantKirchhoff, *model.cubature, model.examples->examples,
+  const auto complaint = solver.build(MaterialModel::kStVenantKirchhoff, *model.cubature, model.examples->examples,
                                       model.projection->target_basis,
                                       reference == "rest" ? EnergyReference::kRest : EnergyReference::kExample);
   EXPECT_FALSE(complaint) << to_string(*complaint);
