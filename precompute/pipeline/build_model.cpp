@@ -18,37 +18,19 @@
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/basis.h"
 #include "precompute/modes/linear_modes.h"
+#include "precompute/pipeline/example_stage.h"
 #include "precompute/pipeline/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
-#include "precompute/shape_space/projection.h"
-#include "precompute/shape_space/transfer.h"
-#include "precompute/solvers/eigenpairs.h"
 #include "precompute/targets/target_table.h"
 
 namespace exmat::precompute {
 namespace {
-
-// Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
-constexpr Eigen::Index kExtraEigenfunctions = 4;
-constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
-// A share of an example's displacement lost to truncation that is worth a warning.
-constexpr double kTruncationWarning = 0.25;
 
 // The rest pose among them, which is the object where no example is marked rest.
 std::int64_t example_count(const AssetConfig& asset) {
   if (asset.examples.empty()) return 0;
   return std::ssize(asset.examples) + (std::ranges::any_of(asset.examples, &ExampleConfig::rest) ? 0 : 1);
 }
-
-// The object's shape space and its examples in it, before there is a basis.
-struct ShapeStage {
-  LaplaceBasis object;
-  Eigen::MatrixXd rest_coefficients;  ///< m x 3, of the object
-  Eigen::VectorXd weights;            ///< Lambda
-  ShapeSpaceData data;
-  ExampleSet examples;
-  Eigen::MatrixXd displacements;  ///< 3n x (K-1)
-};
 
 class Pipeline {
  public:
@@ -67,20 +49,8 @@ class Pipeline {
     log::info(fmt::format("{}: {:.3f} s", stage, timer.seconds()));
     return result;
   }
-  void warn(const std::string& message) {
-    report_.warnings.push_back(message);
-    log::warning(message);
-  }
 
   ObjectData object_data() const;
-  ShapeStage shape_stage(const ExampleInput& input);
-  void set_shape_data(ShapeStage& stage, const Eigen::VectorXd& eigenvalues);
-  RestMap map_rest(const LaplaceBasis& object, const ExampleInput& input, const LaplaceBasis& rest_basis);
-  bool free_example(const RestMap& map);
-  ExampleData posed_example(const ShapeStage& stage, const PoseInput& pose, const TransferredPose& transferred,
-                            const RestMap& map, double scale) const;
-  void add_examples(ShapeStage& stage, const ExampleInput& input);
-  void finish_examples(ReducedModel& model, ShapeStage& stage, const ElasticSystem& system);
   void require_modes(const ElasticSystem& system) const;
   void require_upright(const ReducedModel& model) const;
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
@@ -97,112 +67,6 @@ class Pipeline {
 
 ObjectData Pipeline::object_data() const {
   return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials, asset_.material.model};
-}
-
-void Pipeline::set_shape_data(ShapeStage& stage, const Eigen::VectorXd& eigenvalues) {
-  const Eigen::Index m = asset_.eigenfunctions;
-  stage.weights = descriptor_weights(stage.object, asset_.weighting);
-  stage.rest_coefficients = coefficients(stage.object, stage.object.vertices);
-  stage.data = {stage.object.eigenvalues,
-                stage.object.eigenfunctions,
-                stage.weights.asDiagonal() * stage.rest_coefficients,
-                stage.object.volume,
-                stage.object.centroid,
-                asset_.weighting,
-                splits_cluster(eigenvalues, m) ? 1 : 0};
-  if (stage.data.splits_cluster != 0)
-    warn(fmt::format(
-        "shape_space.eigenfunctions: {} splits a cluster of nearly equal eigenvalues ({:.4g} and {:.4g}); {} would not",
-        m, eigenvalues[m - 1], eigenvalues[m], next_uncut(eigenvalues, m)));
-}
-
-RestMap Pipeline::map_rest(const LaplaceBasis& object, const ExampleInput& input, const LaplaceBasis& rest_basis) {
-  if (input.object_is_rest) return identity_map(object.eigenvalues.size(), object.vertices.rows());
-  const RestMap map = rest_map(object, input.rest, rest_basis);
-  log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)", input.rest_name,
-                        100 * map.residual, map.confidence));
-  const std::string advice = "expected a rest example that lies where the object does and has about its shape";
-  if (map.confidence > kConfidenceRefusal)
-    throw WorkError(fmt::format("example {}: alignment refused, confidence {:.2f} (limit {}): {}", input.rest_name,
-                                map.confidence, kConfidenceRefusal, advice));
-  if (map.confidence > kConfidenceWarning)
-    warn(fmt::format("example {}: doubtful alignment, confidence {:.2f}: {}", input.rest_name, map.confidence, advice));
-  return map;
-}
-
-bool Pipeline::free_example(const RestMap& map) {
-  if (asset_.frame != "auto") return asset_.frame == "free";
-  log::info(map.same_frame ? "examples share the object's frame: the rest example coincides with it"
-                           : "examples are rotated to the object's frame: the rest example does not coincide with it");
-  return !map.same_frame;
-}
-
-ExampleData Pipeline::posed_example(const ShapeStage& stage, const PoseInput& pose, const TransferredPose& transferred,
-                                    const RestMap& map, double scale) const {
-  ExampleData example;
-  example.name = pose.name;
-  example.index = static_cast<std::int64_t>(stage.examples.examples.size());
-  example.rotation = transferred.rotation;
-  example.scale = scale;
-  example.method = "same_connectivity";
-  example.alignment_residual = map.residual;
-  example.confidence = map.confidence;
-  example.shape_space_error = transferred.shape_space_error;
-  example.descriptor = stage.weights.asDiagonal() * transferred.coefficients;
-  return example;
-}
-
-void Pipeline::add_examples(ShapeStage& stage, const ExampleInput& input) {
-  const Eigen::Index m = asset_.eigenfunctions;
-  const LaplaceBasis rest_basis =
-      input.object_is_rest
-          ? stage.object
-          : laplace_basis(input.rest, example_function_count(m, input.rest.vertex_count()), input.rest_name);
-  const RestMap map = map_rest(stage.object, input, rest_basis);
-
-  ExampleData rest;
-  rest.name = input.rest_name;
-  rest.is_rest = true;
-  rest.method = input.object_is_rest ? "object" : "rest_map";
-  rest.scale = std::cbrt(stage.object.volume / rest_basis.volume);
-  rest.alignment_residual = map.residual;
-  rest.confidence = map.confidence;
-  rest.descriptor = stage.data.rest_descriptor;
-  stage.examples.examples.push_back(rest);
-
-  PoseFrame frame;
-  frame.free_example = free_example(map);
-  if (object_.fixed.any())
-    frame.fit_weights = Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal();
-  else
-    frame.fit_weights = scalar_mass(object_.mesh, object_.materials.density);
-  stage.displacements.resize(3 * object_.mesh.vertex_count(), static_cast<Eigen::Index>(input.poses.size()));
-  for (std::size_t k = 0; k < input.poses.size(); ++k) {
-    const TetMesh posed{input.poses[k].vertices, input.rest.tets};
-    const auto transferred =
-        transfer_pose(stage.object, stage.rest_coefficients, map, rest_basis, normalised_positions(posed), frame);
-    const double scale = std::cbrt(stage.object.volume / tet_volumes(posed).sum());
-    stage.examples.examples.push_back(posed_example(stage, input.poses[k], transferred, map, scale));
-    stage.displacements.col(static_cast<Eigen::Index>(k)) = reconstruct_displacement(
-        stage.object, stage.weights, stage.examples.examples.back().descriptor - stage.data.rest_descriptor);
-  }
-}
-
-ShapeStage Pipeline::shape_stage(const ExampleInput& input) {
-  const Eigen::Index m = asset_.eigenfunctions;
-  const Eigen::Index available = object_.mesh.vertex_count() - 2;
-  if (m >= available)
-    throw InputError({asset_.file.string(), "/shape_space/eigenfunctions",
-                      fmt::format("at most {} for a mesh of {} vertices", available - 1, object_.mesh.vertex_count()),
-                      std::to_string(m), "ask for fewer or refine the mesh"});
-  ShapeStage stage;
-  stage.object = laplace_basis(object_.mesh, std::min(m + kExtraEigenfunctions, available), asset_.name);
-  const Eigen::VectorXd eigenvalues = stage.object.eigenvalues;
-  stage.object.eigenvalues.conservativeResize(m);
-  stage.object.eigenfunctions.conservativeResize(Eigen::NoChange, m);
-  set_shape_data(stage, eigenvalues);
-  add_examples(stage, input);
-  return stage;
 }
 
 // One more than is asked for must be there, to see that none was missed.
@@ -228,29 +92,6 @@ void Pipeline::require_upright(const ReducedModel& model) const {
                         "use a milder pose, more shape_space.eigenfunctions, or another seed"});
     }
   }
-}
-
-void Pipeline::finish_examples(ReducedModel& model, ShapeStage& stage, const ElasticSystem& system) {
-  model.projection = direct_projection(stage.object, stage.weights, system.full_mass, model.modal->basis);
-  fill_weights_problem(stage.data.rest_descriptor, *model.projection, stage.examples);
-  for (Eigen::Index k = 0; k < stage.displacements.cols(); ++k) {
-    auto& example = stage.examples.examples[static_cast<std::size_t>(k + 1)];
-    const Eigen::VectorXd field = stage.displacements.col(k);
-    const Eigen::VectorXd rest = field - model.modal->basis * example.reduced;
-    const double norm = field.dot(system.full_mass * field);
-    example.basis_error = norm > 0 ? std::sqrt(std::max(0.0, rest.dot(system.full_mass * rest) / norm)) : 0;
-    log::info(fmt::format(
-        "example {}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
-        example.name, asset_.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
-    if (example.shape_space_error > kTruncationWarning)
-      warn(
-          fmt::format("example {}: {} eigenfunctions lose {:.0f} % of its displacement; more "
-                      "shape_space.eigenfunctions (20 is usual) "
-                      "keep more",
-                      example.name, asset_.eigenfunctions, 100 * example.shape_space_error));
-  }
-  model.shape_space = std::move(stage.data);
-  model.examples = std::move(stage.examples);
 }
 
 ModalData Pipeline::modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const {
@@ -326,7 +167,9 @@ ReducedModel Pipeline::run() {
   model.object = object_data();
 
   std::optional<ShapeStage> shape;
-  if (with_examples) shape = timed("shape space and examples", [&] { return shape_stage(*example_input); });
+  if (with_examples)
+    shape = timed("shape space and examples",
+                  [&] { return build_shape_stage(asset_, object_, *example_input, report_.warnings); });
 
   const auto system =
       timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
@@ -348,7 +191,7 @@ ReducedModel Pipeline::run() {
     return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) finish_examples(model, *shape, system);
+  if (shape) finish_examples(asset_, system, *shape, model, report_.warnings);
 
   model.cubature = timed("cubature", [&] {
     Eigen::MatrixXd poses(basis.cols(), 0);

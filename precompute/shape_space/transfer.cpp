@@ -23,19 +23,13 @@ Eigen::Matrix3d fit_rotation(const VertexArray& posed, const VertexArray& rest, 
   return procrustes_rotation((rest.rowwise() - rest_mean).transpose() * (weights * centred));
 }
 
-// |d - d_m| / |d| in the object's mass, d the displacement [n_e x 3] of the rest example pulled back to the object, its
-// mean left out, and d_m what the object's functions have of it.
-double lost_share(const LaplaceBasis& object, const RestMap& map, const LaplaceBasis& rest_basis,
-                  const VertexArray& displacement) {
-  const auto norm = [&object](const VertexArray& field) {
-    return std::sqrt((field.transpose() * (object.mass * field)).trace());
+// |d - d_m| / |d| in the object's mass, both [n x 3]; nothing is lost of no displacement.
+double lost_share(const SparseMatrix& mass, const VertexArray& displacement, const VertexArray& carried) {
+  const auto norm = [&mass](const VertexArray& field) {
+    return std::sqrt((field.transpose() * (mass * field)).trace());
   };
-  VertexArray pulled_back = map.pull_back * displacement;
-  pulled_back.rowwise() -= (object.mass * pulled_back).colwise().sum();
-  const double full = norm(pulled_back);
-  if (full <= kNoDisplacement) return 0;
-  const Eigen::MatrixXd carried = map.functional_map * coefficients(rest_basis, displacement);
-  return norm(pulled_back - object.eigenfunctions * carried) / full;
+  const double full = norm(displacement);
+  return full <= kNoDisplacement ? 0 : norm(displacement - carried) / full;
 }
 
 }  // namespace
@@ -90,7 +84,11 @@ TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd&
   TransferredPose pose;
   pose.coefficients = (rest_coefficients + change) * fit.transpose();
   pose.rotation = fit * to_rest;
-  pose.shape_space_error = lost_share(object, map, rest_basis, posed * pose.rotation.transpose() - rest_basis.vertices);
+  const VertexArray displacement = posed * pose.rotation.transpose() - rest_basis.vertices;
+  pose.displacement = map.pull_back * displacement;
+  pose.displacement.rowwise() -= (object.mass * pose.displacement).colwise().sum();
+  const Eigen::MatrixXd carried = map.functional_map * coefficients(rest_basis, displacement);
+  pose.shape_space_error = lost_share(object.mass, pose.displacement, object.eigenfunctions * carried);
   return pose;
 }
 

@@ -34,6 +34,8 @@ RestMap identity_map(Eigen::Index m, Eigen::Index vertices);
 struct TransferredPose {
   Eigen::MatrixXd coefficients;                  ///< m x 3, of the posed object
   RowMatrix3 rotation = RowMatrix3::Identity();  ///< from the example's frame to the object's
+  VertexArray
+      displacement;  ///< n x 3, of the object to the pose, normalised and with zero mean, not cut to m functions
   double shape_space_error =
       0;  ///< |d - d_m|_M / |d|_M on the object: d the example's displacement, d_m what came over
 };
