@@ -93,6 +93,9 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
     sizes_.set("K", std::ssize(model.examples->examples), "the groups of /examples");
   }
   visit_fields(model, *this);
+  if (model.examples)  // before version 3
+    for (ExampleData& example : model.examples->examples)
+      if (example.pose.size() == 0) example.pose = example.reduced;
   if (model.object)
     if (const auto material = material_from_name(model.object->material)) model.object->materials.model = *material;
   check_model(model);

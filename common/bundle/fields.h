@@ -58,6 +58,7 @@ void visit_example(Example& example, Visitor& visit) {
   visit.attribute("basis_error", example.basis_error);
   visit.dataset("descriptor", example.descriptor);
   visit.dataset("reduced", example.reduced);
+  visit.dataset("pose", example.pose);
 }
 
 template <typename Examples, typename Visitor>

@@ -47,6 +47,7 @@ struct ExampleData {
   double basis_error = 0;         ///< share of its transferred displacement that U loses, relative M-norm
   RowMatrix descriptor;           ///< m x 3
   Eigen::VectorXd reduced;        ///< r, T^+ (e_k - e_0)
+  Eigen::VectorXd pose;           ///< r, p_k: the same with the fixed vertices of a clamped body put back
 };
 
 /// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex. method.md, section 5.
@@ -108,7 +109,7 @@ struct TargetTableData {
 struct ProjectionData {
   RowMatrix shape_from_reduced;  ///< 3m x r, T, row 3i + axis
   RowMatrix reduced_from_shape;  ///< r x 3m, T^+
-  RowMatrix target_basis;        ///< r x d, orthonormal basis of the range of T^+, d <= min(r, 3m)
+  RowMatrix target_basis;        ///< r x d, orthonormal basis of the poses that descriptors stand for, d <= min(r, 3m)
 };
 
 /// Group /rigid: moments about the centre of mass, X centred there, of a free body or of one whose fixed part is

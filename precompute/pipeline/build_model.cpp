@@ -81,7 +81,7 @@ void Pipeline::require_modes(const ElasticSystem& system) const {
 
 void Pipeline::require_upright(const ReducedModel& model) const {
   for (const auto& example : model.examples->examples) {
-    const Eigen::VectorXd H = model.cubature->gradient * example.reduced;
+    const Eigen::VectorXd H = model.cubature->gradient * example.pose;
     for (Eigen::Index j = 0; j < model.cubature->elements.size(); ++j) {
       const RowMatrix3 F = Eigen::Map<const RowMatrix3>(H.data() + 9 * j) + RowMatrix3::Identity();
       if (F.determinant() > 0) continue;
@@ -191,14 +191,14 @@ ReducedModel Pipeline::run() {
     return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) finish_examples(asset_, system, *shape, model, report_.warnings);
+  if (shape) finish_examples(asset_, system, solver, *shape, model, report_.warnings);
 
   model.cubature = timed("cubature", [&] {
     Eigen::MatrixXd poses(basis.cols(), 0);
     if (model.examples) {
       poses.resize(basis.cols(), static_cast<Eigen::Index>(model.examples->examples.size()) - 1);
       for (Eigen::Index k = 0; k < poses.cols(); ++k)
-        poses.col(k) = model.examples->examples[static_cast<std::size_t>(k + 1)].reduced;
+        poses.col(k) = model.examples->examples[static_cast<std::size_t>(k + 1)].pose;
     }
     const auto source = pose_source(system, modes, derivatives, basis, size, poses);
     return build_cubature(object_.mesh, object_.materials, source,

@@ -8,6 +8,7 @@
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
+#include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/transfer.h"
 #include "precompute/solvers/eigenpairs.h"
@@ -141,6 +142,7 @@ void ShapeStageBuilder::add_pose(const PoseInput& pose, const TransferredPose& t
   stage_.fields.col(column) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
   stage_.displacements.col(column) =
       reconstruct_displacement(stage_.object, stage_.weights, example.descriptor - stage_.data.rest_descriptor);
+  hold_fixed_mean(object_.fixed, stage_.displacements.col(column));
   stage_.examples.examples.push_back(std::move(example));
 }
 
@@ -176,14 +178,17 @@ ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object
   return ShapeStageBuilder(asset, object, input, warnings).build();
 }
 
-void finish_examples(const AssetConfig& asset, const ElasticSystem& system, ShapeStage& stage, ReducedModel& model,
-                     std::vector<std::string>& warnings) {
+void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const SemidefiniteSolver& solver,
+                     ShapeStage& stage, ReducedModel& model, std::vector<std::string>& warnings) {
   model.projection = direct_projection(stage.object, stage.weights, system.full_mass, model.modal->basis);
-  fill_weights_problem(stage.data.rest_descriptor, *model.projection, stage.examples);
+  const RowMatrix map = pose_map(stage.object, stage.weights, model.object->fixed, system, solver, model.modal->basis,
+                                 model.projection->reduced_from_shape);
+  model.projection->target_basis = range_basis(map);
+  fill_weights_problem(stage.data.rest_descriptor, *model.projection, map, stage.examples);
   for (Eigen::Index k = 0; k < stage.displacements.cols(); ++k) {
     auto& example = stage.examples.examples[static_cast<std::size_t>(k + 1)];
     const Eigen::VectorXd field = stage.displacements.col(k);
-    const Eigen::VectorXd rest = field - model.modal->basis * example.reduced;
+    const Eigen::VectorXd rest = field - model.modal->basis * example.pose;
     const double norm = field.dot(system.full_mass * field);
     example.basis_error = norm > 0 ? std::sqrt(std::max(0.0, rest.dot(system.full_mass * rest) / norm)) : 0;
     log::info(fmt::format(

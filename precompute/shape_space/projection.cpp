@@ -6,7 +6,7 @@
 namespace exmat::precompute {
 namespace {
 
-// Directions of T^+ that are this much weaker than the strongest are outside its range.
+// Directions of a matrix that are this much weaker than the strongest are outside its range.
 constexpr double kRangeTolerance = 1e-8;
 
 // [m x 3] row-major as a vector of 3m, entry 3i + axis.
@@ -36,11 +36,14 @@ ProjectionData direct_projection(const LaplaceBasis& object, const Eigen::Vector
     projection.shape_from_reduced(shape_rows, Eigen::all) = forward.transpose() * basis_rows;
     projection.reduced_from_shape(Eigen::all, shape_rows) = mass_basis_rows.transpose() * backward;
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(projection.reduced_from_shape, Eigen::ComputeThinU);
+  return projection;
+}
+
+RowMatrix range_basis(const RowMatrix& matrix) {
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(matrix, Eigen::ComputeThinU);
   const auto& sigma = svd.singularValues();
   const Eigen::Index rank = (sigma.array() > kRangeTolerance * sigma[0]).count();
-  projection.target_basis = svd.matrixU().leftCols(rank);
-  return projection;
+  return svd.matrixU().leftCols(rank);
 }
 
 Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen::VectorXd& weights,
@@ -50,12 +53,16 @@ Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen
   return flatten(field);
 }
 
-void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, ExampleSet& set) {
+void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,
+                          const RowMatrix& pose_map, ExampleSet& set) {
   const auto count = static_cast<Eigen::Index>(set.examples.size());
   Eigen::MatrixXd E(rest_descriptor.size(), count);
   for (Eigen::Index k = 0; k < count; ++k) E.col(k) = flatten(set.examples[static_cast<std::size_t>(k)].descriptor);
-  for (auto& example : set.examples)
-    example.reduced = projection.reduced_from_shape * (flatten(example.descriptor) - flatten(rest_descriptor));
+  for (auto& example : set.examples) {
+    const Eigen::VectorXd change = flatten(example.descriptor) - flatten(rest_descriptor);
+    example.reduced = projection.reduced_from_shape * change;
+    example.pose = pose_map * change;
+  }
   set.gram = E.transpose() * E;
   set.h0 = E.transpose() * flatten(rest_descriptor);
   set.hq = E.transpose() * projection.shape_from_reduced;

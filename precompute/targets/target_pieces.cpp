@@ -211,8 +211,8 @@ bool PieceBuilder::may_halve(const std::vector<Piece>& pieces, const std::vector
 
 std::optional<TargetTableData> PieceBuilder::run() {
   Piece whole{knot(0, target_.example(0)), knot(1, target_.example(1)), {}};
-  whole.begin.value = examples_[0].reduced;
-  whole.end.value = examples_[1].reduced;
+  whole.begin.value = examples_[0].pose;
+  whole.end.value = examples_[1].pose;
   for (std::vector<Piece> pieces{whole};;) {
     fit_new(pieces);
     report_.lost = is_lost(pieces);

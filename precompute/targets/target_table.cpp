@@ -102,7 +102,7 @@ TargetTableData TableBuilder::fit(int degree, const TargetSamples& nodes) const 
   data.degree = degree;
   data.energy_reference = options_.energy_reference;
   data.exponents = basis.exponents();
-  data.control_points.resize(basis.size(), example_data_.front().reduced.size());
+  data.control_points.resize(basis.size(), example_data_.front().pose.size());
   const Eigen::MatrixXd values = collocation(basis, nodes.weights);
   Eigen::MatrixXd rest = nodes.minima;
   std::vector<Eigen::Index> free;
@@ -112,7 +112,7 @@ TargetTableData TableBuilder::fit(int degree, const TargetSamples& nodes) const 
       free.push_back(n);
       continue;
     }
-    data.control_points.row(n) = example_data_[static_cast<std::size_t>(k)].reduced.transpose();
+    data.control_points.row(n) = example_data_[static_cast<std::size_t>(k)].pose.transpose();
     rest -= values.col(n) * target_.example(k).transpose();
   }
   const Eigen::HouseholderQR<Eigen::MatrixXd> solver(values(Eigen::all, free));

@@ -34,7 +34,7 @@ Eigen::VectorXd example_coordinates(const SceneConfig& config, const ReducedMode
     throw InputError({config.file.string(), "/body/pose/example",
                       fmt::format("an example of {}; {}", config.bundle.string(), example_names(data)),
                       '"' + pose.example + '"', ""});
-  return pose.weight * example->reduced;
+  return pose.weight * example->pose;
 }
 
 }  // namespace

@@ -23,12 +23,12 @@ class ShapeFilter {
   bool is_symmetric_ = true;
 };
 
-/// The linear example force within one step, where qdot = c_v (q - q_v): f = -kappa (P_s q - p*) - c_kappa P_s qdot
-/// = -k P_s (q - q_c) + kappa p*, k = kappa + c_kappa c_v, q_c = c_kappa c_v q_v / k. method.md, section 5.
+/// The linear example force within one step, where qdot = c_v (q - q_v): f = -kappa P_s (q - p*) - c_kappa P_s qdot
+/// = -k P_s (q - q_c) + kappa P_s p*, k = kappa + c_kappa c_v, q_c = c_kappa c_v q_v / k. method.md, section 5.
 struct ExampleForce {
   double stiffness = 0;    ///< k > 0
   Eigen::VectorXd centre;  ///< q_c [r]
-  Eigen::VectorXd pull;    ///< kappa p* [r]
+  Eigen::VectorXd pull;    ///< kappa P_s p* [r]
 };
 
 }  // namespace exmat::runtime

@@ -44,11 +44,14 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
     examples.filter = ShapeFilter(*reduced.projection);
     if (options.target_table) {
       if (!reduced.targets) return {nullptr, missing_group("/targets")};
-      examples.table.emplace(*reduced.targets);
+      TargetTableData filtered = *reduced.targets;
+      filtered.control_points *= examples.filter.matrix().transpose();
+      examples.table.emplace(filtered);
     } else if (auto complaint = examples.target.emplace().build(
                    *material, cubature, set.examples, reduced.projection->target_basis, options.energy_reference)) {
       return {nullptr, std::move(*complaint)};
     }
+    if (examples.target) examples.filtered_basis = examples.filter.matrix() * examples.target->basis();
   }
   return {std::move(model), {}};
 }

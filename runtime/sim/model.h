@@ -21,9 +21,10 @@ namespace exmat::runtime {
 /// What example forces need. K examples.
 struct ExampleModel {
   ExampleWeights weights;
-  std::optional<TargetTable> table;    ///< serves the targets if there is one
+  std::optional<TargetTable> table;    ///< of P_s p*, serves the targets if there is one
   std::optional<TargetSolver> target;  ///< otherwise
-  ShapeFilter filter;
+  Eigen::MatrixXd filtered_basis;      ///< r x d, P_s Z, with `target`
+  ShapeFilter filter;                  ///< P_s
 };
 
 /// A reduced body prepared for stepping: immutable, shared by any number of States.

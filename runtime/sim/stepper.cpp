@@ -99,9 +99,10 @@ void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::V
   apply_example_bias(scene.examples->bias, workspace.weights);
 }
 
-/// p* by Newton's method from the last target, into the workspace.
-void solve_target(const TargetSolver& solver, const StepScene& scene, const State& state, Workspace& workspace,
+/// P_s p*, p* by Newton's method from the last target, into the workspace.
+void solve_target(const ExampleModel& examples, const StepScene& scene, const State& state, Workspace& workspace,
                   StepReport& report) {
+  const TargetSolver& solver = *examples.target;
   Eigen::VectorXd& y = workspace.solved_target;
   y = state.target;
   if (!state.has_target) solver.start(workspace.weights, y);
@@ -114,7 +115,7 @@ void solve_target(const TargetSolver& solver, const StepScene& scene, const Stat
     if (!workspace.target_converged) report.status |= kTargetNotConverged;
     if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
   }
-  workspace.target.noalias() = solver.basis() * y;
+  workspace.target.noalias() = examples.filtered_basis * y;
 }
 
 /// Weights and target at the pose q, into the workspace. method.md, section 5.
@@ -126,10 +127,10 @@ void update_target(const Model& model, const StepScene& scene, const State& stat
   if (examples.table)
     examples.table->evaluate(workspace.weights, workspace.target_table, workspace.target);
   else
-    solve_target(*examples.target, scene, state, workspace, report);
+    solve_target(examples, scene, state, workspace, report);
 }
 
-/// f_example = -kappa (P_s q - p*) - c_kappa P_s qdot added to `force`.
+/// f_example = -kappa P_s (q - p*) - c_kappa P_s qdot added to `force`.
 void add_example_force(const Model& model, const StepScene& scene, const State& state, Workspace& workspace,
                        Eigen::VectorXd& force) {
   workspace.offset = scene.examples->stiffness * state.q + scene.examples->damping * state.v;

@@ -121,7 +121,7 @@ std::optional<Complaint> TargetSolver::build(MaterialModel material, const Cubat
   }
   for (Eigen::Index k = 0; k < count; ++k) {
     const ExampleData& example = examples[static_cast<std::size_t>(k)];
-    const Eigen::VectorXd displacement_gradients = cubature.gradient * example.reduced;
+    const Eigen::VectorXd displacement_gradients = cubature.gradient * example.pose;
     if (from_example)
       if (auto complaint = inverted_element(example, displacement_gradients)) return complaint;
     if (quadratic_) {
@@ -130,7 +130,7 @@ std::optional<Complaint> TargetSolver::build(MaterialModel material, const Cubat
       set_shift(k, displacement_gradients);
       if (from_example) set_inverse(k, displacement_gradients);
     }
-    centres_.emplace_back(basis_.householderQr().solve(example.reduced));
+    centres_.emplace_back(basis_.householderQr().solve(example.pose));
     force_tolerance_ = std::max(force_tolerance_, kTolerance * centres_.back().norm());
   }
   return std::nullopt;

@@ -56,7 +56,7 @@ struct Workspace {
   Eigen::VectorXd weights;        ///< K
   Eigen::VectorXd solved_target;  ///< d
   bool target_converged = false;  ///< of solved_target
-  Eigen::VectorXd target;         ///< r, p*
+  Eigen::VectorXd target;         ///< r, P_s p*
   ExampleForce example_force;
 };
 

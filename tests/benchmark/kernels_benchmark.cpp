@@ -127,7 +127,7 @@ void example_weights(State& state, int modes) {
   const runtime::ExampleWeights kernel(set.gram, set.h0, set.hq);
   auto workspace = kernel.make_workspace();
   Eigen::VectorXd q = Eigen::VectorXd::Zero(modes), weights(kExamples);
-  for (std::size_t k = 0; k < kExamples; ++k) q += kWeights[static_cast<Eigen::Index>(k)] * set.examples[k].reduced;
+  for (std::size_t k = 0; k < kExamples; ++k) q += kWeights[static_cast<Eigen::Index>(k)] * set.examples[k].pose;
   for (auto _ : state) {
     kernel.solve(q, workspace, weights);
     ::benchmark::ClobberMemory();

@@ -128,7 +128,7 @@ TEST_P(MaterialPipeline, BodySettlesAtItsExample) {
     runtime::State state = make_state(*loaded.model);
     for (int i = 0; i < config.steps; ++i)
       ASSERT_EQ(runtime::step(*loaded.model, loaded.scene, state, workspace).status & runtime::kStepNonFinite, 0U);
-    const Eigen::VectorXd& example = model.examples->examples[1].reduced;
+    const Eigen::VectorXd& example = model.examples->examples[1].pose;
     EXPECT_LE(
         (model.projection->reduced_from_shape * (model.projection->shape_from_reduced * state.q) - example).norm(),
         0.05 * example.norm())

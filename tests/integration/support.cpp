@@ -95,6 +95,10 @@ VertexArray twisted(const VertexArray& vertices, const BarFiles& bar) {
     const double angle = bar.twist * x[0] / bar.lengths[0], y = x[1] - y0, z = x[2] - z0;
     x[1] = y0 + std::cos(angle) * y - std::sin(angle) * z;
     x[2] = z0 + std::sin(angle) * y + std::cos(angle) * z;
+    if (bar.bend == 0) continue;
+    const double radius = bar.lengths[0] / bar.bend, turn = bar.bend * x[0] / bar.lengths[0], away = radius + z0 - x[2];
+    x[0] = away * std::sin(turn);
+    x[2] = z0 + radius - away * std::cos(turn);
   }
   return posed;
 }

@@ -38,11 +38,12 @@ struct BarFiles {
   std::array<int, 3> cells{14, 4, 3};            ///< of six tets: 1,008 tets
   std::array<int, 3> example_cells{11, 3, 3};    ///< 594 tets
   double twist = 1.0;                            ///< at the far end [rad]
+  double bend = 0;                               ///< then into an arc of this angle, towards z [rad]
   /// Turns the pose in space before it is written.
   Eigen::Matrix3d pose_rotation = Eigen::Matrix3d::Identity();
 };
 
-/// The twist at each vertex.
+/// The pose of each vertex.
 VertexArray twisted(const VertexArray& vertices, const BarFiles& bar);
 
 /// Writes bar.msh, rest.msh and twist.msh, and asset.json: r = 30, s = 60, m = 20 with `changes` merged in (null

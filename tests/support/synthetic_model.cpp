@@ -277,7 +277,7 @@ ExampleSet example_set(const ShapeSpaceData& space, const ProjectionData& projec
     example.is_rest = k == 0;
     example.method = "correspondence";
     example.descriptor = descriptors.col(k).reshaped<Eigen::RowMajor>(rest.size() / 3, 3);
-    example.reduced = project.reduced_from_shape * change;
+    example.pose = example.reduced = project.reduced_from_shape * change;
     set.examples.push_back(example);
   }
   set.gram = descriptors.transpose() * descriptors;

@@ -11,9 +11,9 @@ inline TargetTableData linear_targets(const std::vector<ExampleData>& examples, 
   TargetTableData data;
   data.degree = degree;
   data.exponents = runtime::BernsteinBasis(degree, count).exponents();
-  data.control_points = RowMatrix::Zero(data.exponents.rows(), examples.front().reduced.size());
+  data.control_points = RowMatrix::Zero(data.exponents.rows(), examples.front().pose.size());
   for (int k = 0; k < count; ++k)
-    data.control_points += data.exponents.col(k).cast<double>() / degree * examples[k].reduced.transpose();
+    data.control_points += data.exponents.col(k).cast<double>() / degree * examples[k].pose.transpose();
   data.energy_reference = "example";
   return data;
 }

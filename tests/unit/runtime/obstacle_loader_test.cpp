@@ -32,9 +32,9 @@ ReducedModel with_examples() {
   ExampleSet& set = data.examples.emplace();
   set.examples.resize(2);
   set.examples[0].name = "rest";
-  set.examples[0].reduced = Eigen::VectorXd::Zero(3);
+  set.examples[0].pose = Eigen::VectorXd::Zero(3);
   set.examples[1].name = "bend";
-  set.examples[1].reduced = Eigen::Vector3d(1, 2, 4);
+  set.examples[1].pose = Eigen::Vector3d(1, 2, 4);
   return data;
 }
 

@@ -142,7 +142,7 @@ TEST_F(SceneRunTest, BadInputIsNamed) {
               ::testing::AllOf(HasSubstr("/forces/0/vertices"), HasSubstr("0 to 62"), HasSubstr("found 63")));
 
   Bar inverted = test::make_bar({.examples = 4});
-  inverted.model.examples->examples[3].reduced *= -20;
+  inverted.model.examples->examples[3].pose *= -20;
   write_bundle(inverted.model, folder_ / "bar.h5");
   EXPECT_THAT(load(", \"examples\": {\"stiffness\": 1}"),
               ::testing::AllOf(HasSubstr("bar.h5: /examples/pose3"), HasSubstr("cubature element")));

@@ -44,7 +44,7 @@ double defined_energy(const ReducedModel& model, const Eigen::VectorXd& weights,
   };
   double sum = 0;
   for (Eigen::Index k = 0; k < weights.size(); ++k) {
-    const Eigen::VectorXd& example = model.examples->examples[k].reduced;
+    const Eigen::VectorXd& example = model.examples->examples[k].pose;
     for (Eigen::Index j = 0; j < cubature.weights.size(); ++j) {
       const Eigen::Matrix3d example_gradient = gradient(example, j);
       const bool from_example = reference == EnergyReference::kExample;
@@ -153,8 +153,8 @@ TEST_P(TargetTest, OneExampleAloneIsReturnedFromAnyStart) {
     for (int from = 0; from < 4; ++from) {
       const Eigen::VectorXd y = solve(target_, Eigen::VectorXd::Unit(4, k), example(from));
       const std::vector<ExampleData>& examples = bar_.model.examples->examples;
-      EXPECT_LE((target_.basis() * y - examples[static_cast<std::size_t>(k)].reduced).norm(),
-                1e-8 * examples[2].reduced.norm())
+      EXPECT_LE((target_.basis() * y - examples[static_cast<std::size_t>(k)].pose).norm(),
+                1e-8 * examples[2].pose.norm())
           << k << " from " << from;
     }
 }
@@ -196,7 +196,7 @@ TEST_P(TargetTest, AgreesWithAnIndependentMinimiser) {
   };
   Eigen::VectorXd start = Eigen::VectorXd::Zero(basis.cols());
   for (std::size_t k = 0; k < 3; ++k)
-    start += weights[static_cast<Eigen::Index>(k)] * basis.transpose() * small.model.examples->examples[k].reduced;
+    start += weights[static_cast<Eigen::Index>(k)] * basis.transpose() * small.model.examples->examples[k].pose;
   const Eigen::VectorXd expected = basis * independent_minimum(energy, start, 1e-2 * start.norm());
   EXPECT_LE((target.basis() * cold_solve(target, weights) - expected).norm(),
             (1e-7 + difference_error()) * expected.norm());
@@ -204,7 +204,7 @@ TEST_P(TargetTest, AgreesWithAnIndependentMinimiser) {
 
 TEST(TargetBuildTest, AnInvertedElementIsNamedWithItsExample) {
   Bar bar = test::make_bar({.examples = 4});
-  bar.model.examples->examples[3].reduced *= -20;
+  bar.model.examples->examples[3].pose *= -20;
   const auto result = build_model(bar.model, {});
   ASSERT_FALSE(result.model);
   EXPECT_EQ(result.complaint.place, "/examples/pose3");

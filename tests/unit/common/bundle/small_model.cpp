@@ -58,6 +58,7 @@ ExampleData small_example(const std::string& name, std::int64_t index) {
   example.basis_error = 0.0625;
   example.descriptor = numbers(kEigenfunctions, 3, static_cast<double>(index));
   example.reduced = numbers(kModes, 1, static_cast<double>(index));
+  example.pose = 2 * example.reduced;
   return example;
 }
 

@@ -25,7 +25,7 @@ using runtime::TargetTable;
 /// so strong ones have no table.
 ReducedModel small_model(int examples, double strength) {
   test::Bar bar = test::make_bar({.cells = {4, 1, 1}, .linear_modes = 6, .eigenfunctions = 4, .examples = examples});
-  for (ExampleData& example : bar.model.examples->examples) example.reduced *= strength;
+  for (ExampleData& example : bar.model.examples->examples) example.pose *= strength;
   return bar.model;
 }
 
@@ -147,7 +147,7 @@ TEST_P(TargetTablePrecompute, CornersAreTheExamplesExactly) {
   Eigen::VectorXd target(table.modes());
   for (int k = 0; k < examples(); ++k) {
     table.evaluate(Eigen::VectorXd::Unit(examples(), k), workspace, target);
-    EXPECT_EQ(target, model_.examples->examples[static_cast<std::size_t>(k)].reduced);
+    EXPECT_EQ(target, model_.examples->examples[static_cast<std::size_t>(k)].pose);
   }
 }
 
@@ -335,7 +335,7 @@ TEST_P(SharpBend, EndsAreTheExamplesExactly) {
   Eigen::VectorXd target(table.modes());
   for (int k = 0; k < 2; ++k) {
     table.evaluate(Eigen::VectorXd::Unit(2, k), workspace, target);
-    EXPECT_EQ(target, model_.examples->examples[static_cast<std::size_t>(k)].reduced);
+    EXPECT_EQ(target, model_.examples->examples[static_cast<std::size_t>(k)].pose);
   }
 }
 
@@ -394,7 +394,7 @@ TEST(TargetTableRefusal, OfTooFewAndTooManyExamples) {
 
 TEST(TargetTableRefusal, OfAnInvertedExampleNamesIt) {
   ReducedModel model = small_model(4, 1);
-  model.examples->examples[3].reduced *= -20;
+  model.examples->examples[3].pose *= -20;
   TargetTableReport report;
   EXPECT_FALSE(build_target_table(model, {}, report));
   EXPECT_NE(report.message.find("/examples/pose3"), std::string::npos) << report.message;

@@ -1,0 +1,21 @@
+#pragma once
+
+#include "precompute/fem/elastic_system.h"
+#include "precompute/shape_space/laplace_basis.h"
+#include "precompute/solvers/semidefinite_solver.h"
+
+namespace exmat::precompute {
+
+/// [3n x k] displacements of a clamped body about the mean of its fixed vertices: the constant function, which the
+/// shape space leaves out, put back. Those of a free body, whose mean is 0, stay.
+void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements);
+
+/// [r x 3m] reduced coordinates of the pose that a change of descriptor stands for, U^T M C V^(1/3) (Phi Lambda^-1 (x)
+/// I_3): C puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by the elastic
+/// displacement of clamp_fields(). T^+ without C, and so for a free body, where `reduced_from_shape` is returned.
+/// `basis` is U, 3n x r. method.md, sections 4 and 5.
+RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                   const ElasticSystem& system, const SemidefiniteSolver& solver, const RowMatrix& basis,
+                   const RowMatrix& reduced_from_shape);
+
+}  // namespace exmat::precompute
