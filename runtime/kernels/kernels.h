@@ -29,8 +29,7 @@ struct ElementLaw {
   enum class Kind {
     /// A material of common/elastic: mu, lambda, each panels x kLanes, c_j mu and c_j lambda. With shifts H_k (panels x
     /// count x 9 x kLanes): sum_k shift_weights[k] Psi(I + H - H_k), and with inverses too (panels x count x 10 x
-    /// kLanes:
-    /// A_k = (I + H_k)^-1 and v_k): sum_k shift_weights[k] v_k Psi((I + H) A_k).
+    /// kLanes: A_k = (I + H_k)^-1 and v_k): sum_k shift_weights[k] v_k Psi((I + H) A_k).
     kStVenantKirchhoff,
     kStableNeoHookean,
     kCorotational,
