@@ -6,6 +6,26 @@
 #include "precompute/shape_space/transfer.h"
 
 namespace exmat::precompute {
+namespace {
+
+// Newton's iteration for the polar factor [Higham 1986], which is the nearest rotation where det F > 0; the singular
+// value decomposition for the rest.
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& F) {
+  constexpr int kMostIterations = 12;
+  constexpr double kConverged = 1e-14;
+  const double size = F.norm();
+  if (F.determinant() <= 1e-3 * size * size * size) return procrustes_rotation(F);
+  Eigen::Matrix3d R = F;
+  for (int k = 0; k < kMostIterations; ++k) {
+    const Eigen::Matrix3d next = 0.5 * (R + R.inverse().transpose());
+    const double change = (next - R).squaredNorm();
+    R = next;
+    if (change < kConverged * kConverged) return R;
+  }
+  return procrustes_rotation(F);
+}
+
+}  // namespace
 
 ArapEnergy::ArapEnergy(const TetMesh& rest) : tets_(rest.tets), volumes_(tet_volumes(rest)) {
   const double volume = volumes_.sum();
@@ -27,7 +47,7 @@ std::vector<Eigen::Matrix3d> ArapEnergy::rotations(const VertexArray& positions)
   std::vector<Eigen::Matrix3d> result(gradients_.size());
 #pragma omp parallel for schedule(static)
   for (std::size_t t = 0; t < result.size(); ++t)
-    result[t] = procrustes_rotation(deformation_gradient(positions, static_cast<Eigen::Index>(t)));
+    result[t] = nearest_rotation(deformation_gradient(positions, static_cast<Eigen::Index>(t)));
   return result;
 }
 

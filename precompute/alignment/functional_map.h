@@ -11,12 +11,12 @@ namespace exmat::precompute {
 // A functional map C [k_a x k_b] takes coefficients of a function on b to those of the function pulled back to a:
 // Phi_b[p] ~ Phi_a C for a map p from points of a to points of b. Ovsjanikov et al. 2012.
 
-/// ZoomOut [Melzi et al. 2019] between two shapes: alternately p = nearest rows of Phi_b to those of Phi_a C, and C from
-/// p with more functions. Maps use samples of a, all vertices of b.
+/// ZoomOut [Melzi et al. 2019] between two shapes: alternately p = nearest rows of Phi_b to those of Phi_a C, and C
+/// from p with more functions. Maps use samples of a, all vertices of b.
 class ZoomOut {
  public:
   /// The sizes k of the maps, ascending; `samples` bounds the vertices of a that are used.
-  ZoomOut(const AlignedShape& a, const AlignedShape& b, std::vector<Eigen::Index> sizes, Eigen::Index samples = 1000);
+  ZoomOut(const AlignedShape& a, const AlignedShape& b, std::vector<Eigen::Index> sizes, Eigen::Index samples = 600);
 
   /// From a map of any size up to the first of the sizes (a smaller one is used as it is) to one of the last size.
   Eigen::MatrixXd refine(Eigen::MatrixXd map) const;

@@ -26,8 +26,8 @@ class KdTree {
   /// The `count` points nearest to a query of d numbers (all of them where there are fewer), nearest first.
   std::vector<std::int32_t> nearest(const double* query, Eigen::Index count) const;
 
-  /// Distance of the nearest point from a query of d numbers.
-  double distance(const double* query) const;
+  /// The points nearer than `radius` to a query of d numbers, in no particular order.
+  std::vector<std::int32_t> within(const double* query, double radius) const;
 
  private:
   struct Tree;

@@ -14,13 +14,13 @@ namespace {
 constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30;
 constexpr std::size_t kTreeMaps = 12;
 constexpr std::size_t kPolished = 6;
-constexpr double kMostInverted = 0.2;      // of a start's volume
-constexpr double kCompeting = 1.4;         // times the least F
-constexpr double kCompetingFloor = 0.003;  // added to it: below, fits differ by their tessellation alone
-constexpr double kSamePose = 0.25;         // difference of displacements, relative to the larger
-constexpr double kSameStart = 0.1;         // difference of starts, relative to the body's size
-constexpr double kNoPose = 0.03;           // a displacement from rest, relative to the body's size, that is none
-constexpr double kClearlyFarther = 1.2;    // times the displacement of the pose that is taken
+constexpr double kMostInverted = 0.2;        // of a start's volume
+constexpr double kCompeting = 1.4;           // times the least F
+constexpr double kCompetingFloor = 0.003;    // added to it: below, fits differ by their tessellation alone
+constexpr double kSamePose = 0.25;           // difference of displacements, relative to the larger
+constexpr double kSameStart = 0.1;           // difference of starts, relative to the body's size
+constexpr double kNoPose = 0.03;             // a displacement from rest, relative to the body's size, that is none
+constexpr double kClearlyFarther = 1.2;      // times the displacement of the pose that is taken
 constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
 constexpr double kMirrorMargin = 0.5;        // of the best F, from which on a mirror image is believed
 constexpr double kMirrorWorthwhile = 0.05;   // F above which it is looked for
@@ -128,7 +128,7 @@ std::vector<Start> PoseAligner::mapped_starts() {
     if (hints_.free_frame) {
       const Eigen::Matrix3d ours = principal_axes(rest_), theirs = principal_axes(pose_);
       for (const Eigen::Vector3d& signs : {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, -1, -1),
-                                          Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(-1, -1, 1)}) {
+                                           Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(-1, -1, 1)}) {
         const Eigen::Matrix3d R = theirs * signs.asDiagonal() * ours.transpose();
         maps.push_back({"principal axes", spatial_map(rest_.mesh.vertices * R.transpose()), true});
       }
@@ -136,12 +136,13 @@ std::vector<Start> PoseAligner::mapped_starts() {
       maps.push_back({"spatial", spatial_map(rest_.mesh.vertices), false});
       maps.push_back({"spatial, ZoomOut", maps.back().map, true});
     }
-    for (auto& map : spectral_maps(rest_, pose_, available, kTreeMaps)) maps.push_back({"spectral", std::move(map), true});
+    for (auto& map : spectral_maps(rest_, pose_, available, kTreeMaps))
+      maps.push_back({"spectral", std::move(map), true});
   }
   if (has_landmarks() && hints_.correspondences.count() <= kFewLandmarks)
-    maps.push_back({"landmark map",
-                    landmark_map(rest_, hints_.correspondences.on_rest, pose_, hints_.correspondences.on_pose, available),
-                    true});
+    maps.push_back(
+        {"landmark map",
+         landmark_map(rest_, hints_.correspondences.on_rest, pose_, hints_.correspondences.on_pose, available), true});
   std::vector<Start> starts;
   // In order, so that ties do not depend on threads.
   std::vector<Eigen::MatrixXd> refined(maps.size());
@@ -165,8 +166,7 @@ void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
     Eigen::MatrixXd functions_at(given.count(), size + 1);
     functions_at << given.points * rest_.basis.eigenfunctions.leftCols(size), Eigen::VectorXd::Ones(given.count());
     const VertexArray rigid = given.points * start;
-    const Eigen::MatrixXd fitted =
-        functions_at.colPivHouseholderQr().solve(Eigen::MatrixXd(given.targets - rigid));
+    const Eigen::MatrixXd fitted = functions_at.colPivHouseholderQr().solve(Eigen::MatrixXd(given.targets - rigid));
     start += rest_.basis.eigenfunctions.leftCols(size) * fitted.topRows(size);
     start.rowwise() += fitted.row(size);
   }
@@ -205,8 +205,7 @@ Fit PoseAligner::fit(const std::string& start, Registered registered) const {
 std::vector<Fit> PoseAligner::polish(const std::vector<Start>& starts) const {
   std::vector<Fit> fits(starts.size());
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t k = 0; k < starts.size(); ++k)
-    fits[k] = fit(starts[k].name, registration_.run(starts[k].positions));
+  for (std::size_t k = 0; k < starts.size(); ++k) fits[k] = fit(starts[k].name, registration_.run(starts[k].positions));
   return fits;
 }
 
@@ -216,9 +215,8 @@ bool PoseAligner::same_pose(const Fit& a, const Fit& b) const {
 
 // The best fit of each pose, best first.
 std::vector<Fit> PoseAligner::distinct_poses(std::vector<Fit> fits) const {
-  std::stable_sort(fits.begin(), fits.end(), [](const Fit& a, const Fit& b) {
-    return a.registered.objective() < b.registered.objective();
-  });
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const Fit& a, const Fit& b) { return a.registered.objective() < b.registered.objective(); });
   std::vector<Fit> poses;
   for (Fit& candidate : fits)
     if (std::ranges::none_of(poses, [&](const Fit& pose) { return same_pose(pose, candidate); }))
@@ -273,10 +271,9 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   alignment.positions = registered.positions;
   alignment.start = taken.start;
   alignment.residual = std::sqrt(registered.chamfer) / size_;
-  alignment.confidence =
-      MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)), registered.distortion,
-               registered.inverted}
-          .J();
+  alignment.confidence = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)),
+                                  registered.distortion, registered.inverted}
+                             .J();
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const double most = limit(poses);

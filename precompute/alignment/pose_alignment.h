@@ -26,16 +26,16 @@ struct AlignmentHints {
 
 /// A posed example registered from the rest example: the positions of the rest example's vertices in the pose.
 struct PoseAlignment {
-  VertexArray positions;           ///< n_0 x 3, normalised, in the frame of the pose
-  std::string start;               ///< what the registration began with
-  double residual = 0;             ///< RMS distance of the two surfaces, over the RMS radius of the rest example
-  double confidence = 0;           ///< J of alignment.md; 0 is certain
-  double inverted_fraction = 0;    ///< of the rest example's volume
+  VertexArray positions;            ///< n_0 x 3, normalised, in the frame of the pose
+  std::string start;                ///< what the registration began with
+  double residual = 0;              ///< RMS distance of the two surfaces, over the RMS radius of the rest example
+  double confidence = 0;            ///< J of alignment.md; 0 is certain
+  double inverted_fraction = 0;     ///< of the rest example's volume
   std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
-  bool ambiguous = false;          ///< one of them is as near the rest pose, or nothing can tell which is
-  bool mirrored = false;           ///< the mirror image of the rest example fits much better
-  bool hides_twist = false;        ///< a body of revolution: a turn about its axis leaves no trace
-  double displacement = 0;         ///< RMS from rest, over the RMS radius
+  bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is
+  bool mirrored = false;            ///< the mirror image of the rest example fits much better
+  bool hides_twist = false;         ///< a body of revolution: a turn about its axis leaves no trace
+  double displacement = 0;          ///< RMS from rest, over the RMS radius
 };
 
 /// Step 4 of alignment.md. Both shapes normalised; `symmetry` is that of the rest example.

@@ -19,10 +19,10 @@ struct PointPairs {
 
 /// A moving body laid over a fixed one, and how well.
 struct Registered {
-  VertexArray positions;   ///< n x 3, of the moving body's vertices in the frame of the fixed one
-  double distortion = 0;   ///< mean |F - R|^2
-  double chamfer = 0;      ///< two-way, mean squared distance of the surfaces
-  double inverted = 0;     ///< share of the volume with det F < 0
+  VertexArray positions;    ///< n x 3, of the moving body's vertices in the frame of the fixed one
+  double distortion = 0;    ///< mean |F - R|^2
+  double chamfer = 0;       ///< two-way, mean squared distance of the surfaces
+  double inverted = 0;      ///< share of the volume with det F < 0
   double landmark_rms = 0;  ///< distance of the pairs
 
   /// F of alignment.md: E_ARAP + 20 Chamfer^2 + 2 inverted + 2 landmark RMS.

@@ -10,7 +10,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGap = 0.08;          // relative, within a cluster
+constexpr double kGap = 0.08;           // relative, within a cluster
 constexpr Eigen::Index kSamples = 300;  // vertices of each shape
 constexpr std::size_t kBeam = 48;
 constexpr Eigen::Index kLargestCluster = 3;

@@ -10,6 +10,8 @@ namespace {
 
 // Triangles tried for a nearest point in the metric of positions and normals.
 constexpr Eigen::Index kFacingTriangles = 6;
+// Triangles tried first, to bound the search for the nearest.
+constexpr Eigen::Index kFirstTriangles = 3;
 
 Eigen::Matrix3d corners_of(const VertexArray& vertices, const TriangleArray& triangles, Eigen::Index triangle) {
   Eigen::Matrix3d corners;
@@ -97,23 +99,19 @@ SurfacePoint SurfaceTree::nearest_on(Eigen::Index triangle, const Eigen::Vector3
 SurfacePoint SurfaceTree::nearest(const Eigen::Vector3d& point) const {
   SurfacePoint best;
   double least = std::numeric_limits<double>::infinity();
-  // A triangle is at most its radius nearer than its centre; more of them until no other one can win.
-  for (Eigen::Index count = 8, tried = 0;; count *= 4) {
-    const auto candidates = centres_.nearest(point.data(), count);
-    const auto found = static_cast<Eigen::Index>(candidates.size());
-    double centre_distance = 0;
-    for (; tried < found; ++tried) {
-      const Eigen::Index triangle = candidates[static_cast<std::size_t>(tried)];
-      centre_distance = (samples_.centres.row(triangle).transpose() - point).norm();
+  const auto offer = [&](const std::vector<std::int32_t>& triangles) {
+    for (const Eigen::Index triangle : triangles) {
       const SurfacePoint candidate = nearest_on(triangle, point);
       const double squared = (candidate.position - point).squaredNorm();
-      if (squared < least) {
-        least = squared;
-        best = candidate;
-      }
+      if (squared > least || (squared == least && triangle > best.triangle)) continue;
+      least = squared;
+      best = candidate;
     }
-    if (found == triangles_.rows() || centre_distance - largest_radius_ > std::sqrt(least)) return best;
-  }
+  };
+  offer(centres_.nearest(point.data(), kFirstTriangles));
+  // A triangle is at most its radius nearer than its centre: no other one can win.
+  offer(centres_.within(point.data(), std::sqrt(least) + largest_radius_));
+  return best;
 }
 
 SurfacePoint SurfaceTree::nearest_facing(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const {

@@ -13,8 +13,8 @@ struct Symmetry {
   bool of_revolution = false;              ///< some axis admits any angle
 };
 
-/// Tries half and quarter turns about the principal axes and their combinations, and other angles about each of these
-/// axes. Two bodies count as one where their surfaces are `tolerance` apart (RMS, over the RMS radius).
+/// Looks about the principal axes, and refines by iterated closest points; of a body of revolution only some of its
+/// many. Two bodies count as one where their surfaces are `tolerance` apart (RMS, over the RMS radius).
 Symmetry rest_symmetry(const AlignedShape& shape, double tolerance = 0.02);
 
 /// Columns: principal axes of the second moments of mass, right-handed, moments ascending.
