@@ -12,6 +12,7 @@ namespace {
 
 constexpr Eigen::Index kScoredFunctions = 20;
 constexpr double kCommutativity = 1e-3;  // weight of |C Lambda_b - Lambda_a C|^2 relative to the descriptors
+constexpr double kRidge = 1e-9;
 
 }  // namespace
 
@@ -77,22 +78,30 @@ Eigen::MatrixXd heat_kernels(const Eigen::VectorXd& eigenvalues, const Eigen::Ma
   return kernels.colwise().normalized();
 }
 
-Eigen::MatrixXd landmark_map(const AlignedShape& a, const SparseMatrix& on_a, const AlignedShape& b,
-                             const SparseMatrix& on_b, Eigen::Index size) {
-  const Eigen::VectorXd lambda_a = a.basis.eigenvalues.head(size), lambda_b = b.basis.eigenvalues.head(size);
-  const Eigen::Vector4d times = Eigen::Vector4d(0.05, 0.1, 0.2, 0.4);
-  const Eigen::MatrixXd F = heat_kernels(lambda_a, on_a * a.basis.eigenfunctions.leftCols(size), times / lambda_a[0]);
-  const Eigen::MatrixXd G = heat_kernels(lambda_b, on_b * b.basis.eigenfunctions.leftCols(size), times / lambda_b[0]);
+Eigen::MatrixXd descriptor_map(const Eigen::VectorXd& lambda_a, const Eigen::MatrixXd& F,
+                               const Eigen::VectorXd& lambda_b, const Eigen::MatrixXd& G) {
   const Eigen::MatrixXd gram = G * G.transpose(), right = G * F.transpose();
-  // The rows of C are independent: gaps of eigenvalues, relative to the largest, penalise its entries.
-  Eigen::MatrixXd map(size, size);
-  for (Eigen::Index row = 0; row < size; ++row) {
-    const Eigen::VectorXd gaps = (lambda_b.array() - lambda_a[row]).square() / std::pow(lambda_a[size - 1], 2);
-    const Eigen::MatrixXd system = gram + kCommutativity * gram.trace() * Eigen::MatrixXd(gaps.asDiagonal()) +
-                                   1e-9 * gram.trace() * Eigen::MatrixXd::Identity(size, size);
+  const double weight = kCommutativity * gram.trace() / std::pow(lambda_a[lambda_a.size() - 1], 2);
+  // The rows of C are independent: gaps of eigenvalues penalise its entries.
+  Eigen::MatrixXd map(lambda_a.size(), lambda_b.size());
+  for (Eigen::Index row = 0; row < map.rows(); ++row) {
+    Eigen::MatrixXd system = gram;
+    system.diagonal().array() += weight * (lambda_b.array() - lambda_a[row]).square() + kRidge * gram.trace();
     map.row(row) = system.llt().solve(right.col(row)).transpose();
   }
   return polar_factor(map);
+}
+
+Eigen::MatrixXd landmark_kernels(const LaplaceBasis& basis, const SparseMatrix& points) {
+  const Eigen::Vector4d times(0.05, 0.1, 0.2, 0.4);
+  return heat_kernels(basis.eigenvalues, points * basis.eigenfunctions, times / basis.eigenvalues[0]);
+}
+
+Eigen::MatrixXd landmark_map(const AlignedShape& a, const SparseMatrix& on_a, const AlignedShape& b,
+                             const SparseMatrix& on_b, Eigen::Index size) {
+  const LaplaceBasis basis_a = first_functions(a.basis, size), basis_b = first_functions(b.basis, size);
+  return descriptor_map(basis_a.eigenvalues, landmark_kernels(basis_a, on_a), basis_b.eigenvalues,
+                        landmark_kernels(basis_b, on_b));
 }
 
 }  // namespace exmat::precompute

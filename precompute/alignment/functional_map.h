@@ -60,8 +60,16 @@ MapScore score_map(const ArapEnergy& arap, const Eigen::MatrixXd& map, const Ver
 Eigen::MatrixXd heat_kernels(const Eigen::VectorXd& eigenvalues, const Eigen::MatrixXd& values,
                              const Eigen::VectorXd& times);
 
-/// Map of size x size from l corresponding points: least squares on their heat kernels at t = {.05, .1, .2, .4} /
-/// lambda_1, regularised to commute with the Laplacians. `on_a` [l x n_a], `on_b` [l x n_b] interpolate.
+/// [k x 4 l] heat kernels of the k functions of a basis at l points, at t = {.05, .1, .2, .4} / lambda_1. `points`
+/// [l x n] interpolates.
+Eigen::MatrixXd landmark_kernels(const LaplaceBasis& basis, const SparseMatrix& points);
+
+/// Map [k_a x k_b] with orthonormal rows or columns from coefficients F [k_a x q], G [k_b x q] of corresponding
+/// functions: least squares C G ~ F, regularised to commute with the Laplacians, then the polar factor.
+Eigen::MatrixXd descriptor_map(const Eigen::VectorXd& lambda_a, const Eigen::MatrixXd& F,
+                               const Eigen::VectorXd& lambda_b, const Eigen::MatrixXd& G);
+
+/// descriptor_map of size x size of the landmark_kernels of corresponding points.
 Eigen::MatrixXd landmark_map(const AlignedShape& a, const SparseMatrix& on_a, const AlignedShape& b,
                              const SparseMatrix& on_b, Eigen::Index size);
 

@@ -1,5 +1,6 @@
 #include "precompute/alignment/pose_alignment.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
@@ -47,7 +48,7 @@ class PoseAligner {
         symmetry_(symmetry),
         pose_(pose),
         hints_(hints),
-        size_(rms_radius(rest)),
+        size_(rms_radius(rest.basis)),
         registration_(rest.mesh, pose.mesh, pairs()),
         zoom_out_(rest, pose, zoom_out_sizes(std::min(functions(rest), functions(pose)))) {}
 
@@ -126,7 +127,7 @@ std::vector<Start> PoseAligner::mapped_starts() {
   const Eigen::Index available = std::min({kTreeFunctions, functions(rest_), functions(pose_)});
   if (!hints_.landmarks_alone) {
     if (hints_.free_frame) {
-      const Eigen::Matrix3d ours = principal_axes(rest_), theirs = principal_axes(pose_);
+      const Eigen::Matrix3d ours = principal_axes(rest_.basis), theirs = principal_axes(pose_.basis);
       for (const Eigen::Vector3d& signs : {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, -1, -1),
                                            Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(-1, -1, 1)}) {
         const Eigen::Matrix3d R = theirs * signs.asDiagonal() * ours.transpose();
@@ -276,6 +277,9 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
                              .J();
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
+  const Eigen::Matrix3d turn =
+      procrustes_rotation(registered.positions.transpose() * (rest_.basis.mass * rest_.mesh.vertices));
+  alignment.turn = Eigen::AngleAxisd(turn).angle();
   const double most = limit(poses);
   for (const Fit& pose : poses) {
     if (same_pose(pose, taken) || pose.registered.objective() > most) continue;

@@ -36,6 +36,7 @@ struct PoseAlignment {
   bool mirrored = false;            ///< the mirror image of the rest example fits much better
   bool hides_twist = false;         ///< a body of revolution: a turn about its axis leaves no trace
   double displacement = 0;          ///< RMS from rest, over the RMS radius
+  double turn = 0;                  ///< angle of the rotation that lays the rest example best over the pose [rad]
 };
 
 /// Step 4 of alignment.md. Both shapes normalised; `symmetry` is that of the rest example.

@@ -82,15 +82,15 @@ std::vector<Eigen::Matrix3d> guesses(const Eigen::Matrix3d& axes, const Eigen::V
 
 }  // namespace
 
-Eigen::Matrix3d principal_axes(const AlignedShape& shape) {
-  const Eigen::Matrix3d moments = shape.mesh.vertices.transpose() * (shape.basis.mass * shape.mesh.vertices);
+Eigen::Matrix3d principal_axes(const LaplaceBasis& basis) {
+  const Eigen::Matrix3d moments = basis.vertices.transpose() * (basis.mass * basis.vertices);
   Eigen::Matrix3d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments).eigenvectors();
   if (axes.determinant() < 0) axes.col(0) *= -1;
   return axes;
 }
 
-double rms_radius(const AlignedShape& shape) {
-  return std::sqrt((shape.mesh.vertices.transpose() * (shape.basis.mass * shape.mesh.vertices)).trace());
+double rms_radius(const LaplaceBasis& basis) {
+  return std::sqrt((basis.vertices.transpose() * (basis.mass * basis.vertices)).trace());
 }
 
 std::vector<Eigen::Matrix3d> cube_rotations() {
@@ -111,8 +111,8 @@ std::vector<Eigen::Matrix3d> cube_rotations() {
 
 Symmetry rest_symmetry(const AlignedShape& shape, double tolerance) {
   const SelfFit self(shape);
-  const double limit = tolerance * rms_radius(shape);
-  const Eigen::Matrix3d axes = principal_axes(shape);
+  const double limit = tolerance * rms_radius(shape.basis);
+  const Eigen::Matrix3d axes = principal_axes(shape.basis);
   const Eigen::Vector3d moments =
       (axes.transpose() * shape.mesh.vertices.transpose() * (shape.basis.mass * shape.mesh.vertices) * axes).diagonal();
   Symmetry symmetry;

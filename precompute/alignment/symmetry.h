@@ -18,12 +18,12 @@ struct Symmetry {
 Symmetry rest_symmetry(const AlignedShape& shape, double tolerance = 0.02);
 
 /// Columns: principal axes of the second moments of mass, right-handed, moments ascending.
-Eigen::Matrix3d principal_axes(const AlignedShape& shape);
+Eigen::Matrix3d principal_axes(const LaplaceBasis& basis);
 
 /// The 24 rotations of a cube.
 std::vector<Eigen::Matrix3d> cube_rotations();
 
 /// RMS distance of the vertices of a body of volume 1 from its centroid, by mass.
-double rms_radius(const AlignedShape& shape);
+double rms_radius(const LaplaceBasis& basis);
 
 }  // namespace exmat::precompute

@@ -72,7 +72,7 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_EQ(asset.examples[1].name, "bend");
   EXPECT_EQ(asset.examples[1].mesh, folder / "sub/ex1.veg");
   EXPECT_TRUE(asset.examples[1].drop.unreferenced_vertices);
-  EXPECT_EQ(asset.frame, "free");
+  EXPECT_EQ(asset.alignment.frame, "free");
   EXPECT_EQ(asset.basis_size, 20);
   EXPECT_EQ(asset.linear_modes, 12);
   EXPECT_FALSE(asset.example_fields);
