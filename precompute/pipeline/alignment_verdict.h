@@ -21,7 +21,7 @@ struct AlignmentOutcome {
   std::int64_t competing_maps = 0;
   double shape_space_error = 0;  ///< filled in where the pose is transferred
   AlignmentVerdict verdict = AlignmentVerdict::kGood;
-  std::string message;  ///< why it is not good, and what input would help
+  std::string message{};  ///< why it is not good, and what input would help
 };
 
 /// Raises the verdict to `verdict` with a message; one as grave or graver stands.

@@ -245,12 +245,20 @@ Eigen::MatrixXd ExampleAligner::coupled_map(const PoseInput& example, const Lapl
       .functional_map();
 }
 
-AlignedPose ExampleAligner::coupled(const PoseInput& pose) const {
+AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& pose) const {
   AlignedPose aligned;
   aligned.basis = laplace_basis(pose.mesh, example_function_count(functions(), pose.mesh.vertex_count()), pose.name);
-  aligned.functional_map = coupled_map(pose, aligned.basis);
+  const Eigen::MatrixXd map = coupled_map(pose, aligned.basis);
+  const Eigen::MatrixXd change = map * coefficients(aligned.basis, aligned.basis.vertices) -
+                                 rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices);
+  const MapScore score = score_map(ArapEnergy({object_.vertices, object_input_.mesh.tets}), map,
+                                   object_.vertices + object_.eigenfunctions * change);
+  aligned.functional_map = map;
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
+  aligned.outcome.confidence = score.J();
+  aligned.outcome.inverted_fraction = score.inverted;
+  judge_confidence(aligned.outcome, "give more landmarks or regions, or take alignment.method \"auto\"");
   return aligned;
 }
 
@@ -262,7 +270,7 @@ AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput&
                        pose.inverted_fraction};
     return aligned;
   }
-  return asset_.alignment.method == "coupled" ? coupled(pose) : registered(rest, pose);
+  return asset_.alignment.method == "coupled" ? coupled(rest, pose) : registered(rest, pose);
 }
 
 }  // namespace exmat::precompute

@@ -48,7 +48,7 @@ class ExampleAligner {
   const AlignedShape& rest_shape(const AlignedRest& rest);
   Correspondences correspondences(const AlignedRest& rest, const PoseInput& pose) const;
   AlignedPose registered(const AlignedRest& rest, const PoseInput& pose);
-  AlignedPose coupled(const PoseInput& pose) const;
+  AlignedPose coupled(const AlignedRest& rest, const PoseInput& pose) const;
   Eigen::MatrixXd coupled_map(const PoseInput& example, const LaplaceBasis& basis) const;
 
   const AssetConfig& asset_;

@@ -27,8 +27,9 @@ struct PoseInput {
   TetMesh mesh;
   bool same_connectivity = true;  ///< `mesh` has the tets of the rest example
   double inverted_fraction = 0;   ///< share of the volume in tets that the pose turns inside out
-  IndexVector on_object{};  ///< dense map: for each vertex of the object one of `mesh`, or -1; empty where none is given
-  Eigen::Index column = 0;         ///< in ExampleInput::landmarks
+  IndexVector
+      on_object{};  ///< dense map: for each vertex of the object one of `mesh`, or -1; empty where none is given
+  Eigen::Index column = 0;           ///< in ExampleInput::landmarks
   std::vector<IndexVector> parts{};  ///< for each of ExampleInput::parts its vertices of `mesh`; none where not given
 };
 

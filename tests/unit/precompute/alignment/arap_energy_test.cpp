@@ -43,8 +43,7 @@ TEST(ArapEnergy, GradientAgreesWithDifferences) {
   const ArapEnergy arap(body());
   const VertexArray x = shaken(0.05), direction = test::random_matrix(x.rows(), 3, 4);
   constexpr double kStep = 1e-5;
-  const double difference =
-      (arap.energy(x + kStep * direction) - arap.energy(x - kStep * direction)) / (2 * kStep);
+  const double difference = (arap.energy(x + kStep * direction) - arap.energy(x - kStep * direction)) / (2 * kStep);
   EXPECT_NEAR(arap.gradient(x).cwiseProduct(direction).sum(), difference, 1e-7 * std::abs(difference) + 1e-9);
 }
 

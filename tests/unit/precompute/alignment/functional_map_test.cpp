@@ -92,13 +92,13 @@ TEST(SpectralMaps, ChoicesOfClustersAreOrthogonalAndDistinct) {
 // The heat kernel of a vertex is exp(-t M^-1 S) M^-1 e_l; a dense matrix exponential shares nothing with the
 // eigenpairs. The one function that the eigensolver leaves out decays by exp(-t lambda_max) < 1e-9.
 TEST(HeatKernels, AgreeWithTheDenseExponential) {
-  const TetMesh mesh{normalised_positions(test::shaken_box({3, 2, 2}, {2, 1, 0.8}, 2)), test::box_mesh({3, 2, 2}, {2, 1, 0.8}).tets};
+  const TetMesh mesh{normalised_positions(test::shaken_box({3, 2, 2}, {2, 1, 0.8}, 2)),
+                     test::box_mesh({3, 2, 2}, {2, 1, 0.8}).tets};
   const LaplaceBasis basis = laplace_basis(mesh, mesh.vertex_count() - 2, "mesh");
   const Eigen::MatrixXd M = scalar_mass(mesh), S = laplacian_stiffness(mesh);
   const Eigen::Vector2d times(0.1, 0.3);
   const Eigen::Vector2i vertices(4, 17);
-  const Eigen::MatrixXd kernels =
-      heat_kernels(basis.eigenvalues, basis.eigenfunctions(vertices, Eigen::all), times);
+  const Eigen::MatrixXd kernels = heat_kernels(basis.eigenvalues, basis.eigenfunctions(vertices, Eigen::all), times);
   for (int s = 0; s < 2; ++s) {
     const Eigen::MatrixXd generator = -times[s] * M.llt().solve(S);
     const Eigen::MatrixXd heat = generator.exp() * M.inverse();
