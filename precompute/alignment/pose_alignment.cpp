@@ -12,19 +12,21 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30;
+constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30, kSmoothFunctions = 60;
 constexpr std::size_t kTreeMaps = 12;
 constexpr std::size_t kPolished = 6;
-constexpr double kMostInverted = 0.2;        // of a start's volume
-constexpr double kCompeting = 1.4;           // times the least F
-constexpr double kCompetingFloor = 0.003;    // added to it: below, fits differ by their tessellation alone
-constexpr double kSamePose = 0.25;           // difference of displacements, relative to the larger
-constexpr double kSameStart = 0.1;           // difference of starts, relative to the body's size
-constexpr double kNoPose = 0.03;             // a displacement from rest, relative to the body's size, that is none
-constexpr double kClearlyFarther = 1.2;      // times the displacement of the pose that is taken
-constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
-constexpr double kMirrorMargin = 0.5;        // of the best F, from which on a mirror image is believed
-constexpr double kMirrorWorthwhile = 0.05;   // F above which it is looked for
+constexpr double kMostInverted = 0.2;          // of a start's volume
+constexpr double kCompeting = 1.4;             // times the least F
+constexpr double kCompetingFloor = 0.003;      // added to it: below, fits differ by their tessellation alone
+constexpr double kSamePose = 0.25;             // difference of displacements, relative to the larger
+constexpr double kSameStart = 0.1;             // difference of starts, relative to the body's size
+constexpr double kNoPose = 0.03;               // a displacement from rest, relative to the body's size, that is none
+constexpr double kClearlyFarther = 1.2;        // times the displacement of the pose that is taken
+constexpr Eigen::Index kFewLandmarks = 100;    // more pairs than this are a dense map
+constexpr Eigen::Index kPairsPerFunction = 4;  // at least, in a fit to a dense map
+constexpr double kDenseWeight = 100;           // of a dense map in the registration
+constexpr double kMirrorMargin = 0.5;          // of the best F, from which on a mirror image is believed
+constexpr double kMirrorWorthwhile = 0.05;     // F above which it is looked for
 
 // Where a registration begins.
 struct Start {
@@ -57,10 +59,9 @@ class PoseAligner {
  private:
   static Eigen::Index functions(const AlignedShape& shape) { return shape.basis.eigenvalues.size(); }
   bool has_landmarks() const { return hints_.correspondences.count() > 0; }
-  PointPairs pairs() const {
-    if (!has_landmarks()) return {};
-    return {hints_.correspondences.on_rest, hints_.correspondences.on_pose * pose_.mesh.vertices};
-  }
+  bool has_dense_map() const { return hints_.correspondences.count() > kFewLandmarks; }
+  PointPairs pairs() const;
+  VertexArray laid_over(const PointPairs& pairs, Eigen::Index functions) const;
   double norm(const VertexArray& field) const {
     return std::sqrt(std::max(0.0, (field.transpose() * (rest_.basis.mass * field)).trace()));
   }
@@ -140,7 +141,7 @@ std::vector<Start> PoseAligner::mapped_starts() {
     for (auto& map : spectral_maps(rest_, pose_, available, kTreeMaps))
       maps.push_back({"spectral", std::move(map), true});
   }
-  if (has_landmarks() && hints_.correspondences.count() <= kFewLandmarks)
+  if (has_landmarks() && !has_dense_map())
     maps.push_back(
         {"landmark map",
          landmark_map(rest_, hints_.correspondences.on_rest, pose_, hints_.correspondences.on_pose, available), true});
@@ -153,25 +154,38 @@ std::vector<Start> PoseAligner::mapped_starts() {
   return starts;
 }
 
-// Rigidly by the landmarks; with many of them, by the low-pass positions that they determine.
-void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
-  const PointPairs given = pairs();
-  const VertexArray at_rest = given.points * rest_.mesh.vertices;
-  const Eigen::RowVector3d from = at_rest.colwise().mean(), to = given.targets.colwise().mean();
+// [n_0 x 3] the rest example laid over the pairs rigidly, and as its first `functions` functions fit them best.
+VertexArray PoseAligner::laid_over(const PointPairs& pairs, Eigen::Index functions) const {
+  const VertexArray at_rest = pairs.points * rest_.mesh.vertices;
+  const Eigen::RowVector3d from = at_rest.colwise().mean(), to = pairs.targets.colwise().mean();
   const Eigen::Matrix3d R =
-      procrustes_rotation((given.targets.rowwise() - to).transpose() * (at_rest.rowwise() - from));
-  VertexArray start = (rest_.mesh.vertices.rowwise() - from) * R.transpose();
-  start.rowwise() += to;
-  if (given.count() > kFewLandmarks) {
-    const Eigen::Index size = std::min(kStartFunctions, functions(rest_));
-    Eigen::MatrixXd functions_at(given.count(), size + 1);
-    functions_at << given.points * rest_.basis.eigenfunctions.leftCols(size), Eigen::VectorXd::Ones(given.count());
-    const VertexArray rigid = given.points * start;
-    const Eigen::MatrixXd fitted = functions_at.colPivHouseholderQr().solve(Eigen::MatrixXd(given.targets - rigid));
-    start += rest_.basis.eigenfunctions.leftCols(size) * fitted.topRows(size);
-    start.rowwise() += fitted.row(size);
-  }
-  starts.push_back({"correspondences", start, 0});
+      procrustes_rotation((pairs.targets.rowwise() - to).transpose() * (at_rest.rowwise() - from));
+  VertexArray positions = (rest_.mesh.vertices.rowwise() - from) * R.transpose();
+  positions.rowwise() += to;
+  if (functions == 0) return positions;
+  Eigen::MatrixXd values(pairs.count(), functions + 1);
+  values << pairs.points * rest_.basis.eigenfunctions.leftCols(functions), Eigen::VectorXd::Ones(pairs.count());
+  const Eigen::MatrixXd misses = pairs.targets - pairs.points * positions;
+  const Eigen::MatrixXd fitted = values.colPivHouseholderQr().solve(misses);
+  positions += rest_.basis.eigenfunctions.leftCols(functions) * fitted.topRows(functions);
+  positions.rowwise() += fitted.row(functions);
+  return positions;
+}
+
+// A dense map names whole vertices: what it says is as precise as the pose's mesh, and smoothing takes that off.
+PointPairs PoseAligner::pairs() const {
+  if (!has_landmarks()) return {};
+  PointPairs pairs{hints_.correspondences.on_rest, hints_.correspondences.on_pose * pose_.mesh.vertices};
+  if (!has_dense_map()) return pairs;
+  pairs.targets = pairs.points *
+                  laid_over(pairs, std::min({kSmoothFunctions, functions(rest_), pairs.count() / kPairsPerFunction}));
+  pairs.weight = kDenseWeight;
+  return pairs;
+}
+
+void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
+  const Eigen::Index functions = has_dense_map() ? kStartFunctions : 0;
+  starts.push_back({"correspondences", laid_over(pairs(), std::min(functions, this->functions(rest_))), 0});
 }
 
 // Starts that are polished whatever their score.
@@ -281,10 +295,12 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
       procrustes_rotation(registered.positions.transpose() * (rest_.basis.mass * rest_.mesh.vertices));
   alignment.turn = Eigen::AngleAxisd(turn).angle();
   const double most = limit(poses);
+  // Turns of a body of revolution about its axis are many and near; the least of them is what is meant.
+  const double farther = symmetry_.of_revolution ? 1 : kClearlyFarther;
   for (const Fit& pose : poses) {
     if (same_pose(pose, taken) || pose.registered.objective() > most) continue;
     ++alignment.competing_maps;
-    if (!has_landmarks() && (hints_.free_frame || pose.size < kClearlyFarther * taken.size)) alignment.ambiguous = true;
+    if (!has_landmarks() && (hints_.free_frame || pose.size < farther * taken.size)) alignment.ambiguous = true;
   }
   alignment.hides_twist = symmetry_.of_revolution && !has_landmarks();
   alignment.mirrored = mirror_fits_better(registered.objective());
