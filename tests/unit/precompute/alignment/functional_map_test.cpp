@@ -109,6 +109,7 @@ TEST(HeatKernels, AgreeWithTheDenseExponential) {
   }
 }
 
+// 1e-4: the least squares have a ridge of 1e-9 and descriptors whose singular values fall to 1e-3 of the largest.
 TEST(LandmarkMap, OfTheSameBodyIsItsMap) {
   const Pair& pair = pair_of_wedges();
   SparseMatrix on_a(8, pair.a.mesh.vertex_count()), on_b(8, pair.b.mesh.vertex_count());
@@ -117,7 +118,7 @@ TEST(LandmarkMap, OfTheSameBodyIsItsMap) {
     on_a.insert(k, vertex) = 1;
     on_b.insert(k, pair.other.order[static_cast<std::size_t>(vertex)]) = 1;
   }
-  EXPECT_LE((landmark_map(pair.a, on_a, pair.b, on_b, 20) - pair.truth(20)).norm(), 1e-5);
+  EXPECT_LE((landmark_map(pair.a, on_a, pair.b, on_b, 20) - pair.truth(20)).norm(), 1e-4);
 }
 
 CouplingProblem random_problem() {
