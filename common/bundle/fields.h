@@ -54,6 +54,8 @@ void visit_example(Example& example, Visitor& visit) {
   visit.attribute("method", example.method);
   visit.attribute("alignment_residual", example.alignment_residual);
   visit.attribute("confidence", example.confidence);
+  visit.attribute("inverted_fraction", example.inverted_fraction);
+  visit.attribute("competing_maps", example.competing_maps);
   visit.attribute("shape_space_error", example.shape_space_error);
   visit.attribute("basis_error", example.basis_error);
   visit.dataset("descriptor", example.descriptor);

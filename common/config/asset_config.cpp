@@ -27,6 +27,7 @@ class AssetReader {
     read_object(json["object"], asset);
     read_shape_space(json, asset);
     read_examples(member_or(json, "examples", Json::array()), asset);
+    read_alignment(member_or(json, "alignment", Json::object()), asset);
     read_basis(member_or(json, "basis", Json::object()), asset);
     read_cubature(member_or(json, "cubature", Json::object()), asset);
     const Json targets = member_or(json, "targets", Json::object());
@@ -87,7 +88,6 @@ class AssetReader {
     const Json shape_space = member_or(json, "shape_space", Json::object());
     asset.eigenfunctions = shape_space.value("eigenfunctions", asset.eigenfunctions);
     asset.weighting = shape_space.value("weighting", asset.weighting);
-    asset.frame = member_or(json, "alignment", Json::object()).value("frame", asset.frame);
   }
 
   void read_examples(const Json& json, AssetConfig& asset) const {
@@ -114,6 +114,56 @@ class AssetReader {
       if (earlier[i].rest && example.rest)
         refuse(place + "/rest", "at most one rest example", fmt::format("another one: /examples/{}", i));
     }
+  }
+
+  void read_alignment(const Json& json, AssetConfig& asset) const {
+    AlignmentConfig& alignment = asset.alignment;
+    alignment.method = json.value("method", alignment.method);
+    alignment.frame = json.value("frame", alignment.frame);
+    if (json.contains("landmarks")) alignment.landmarks = resolve_path(file_, json["landmarks"]);
+    const Json maps = member_or(json, "map", Json::array());
+    for (std::size_t i = 0; i < maps.size(); ++i) {
+      const std::string place = fmt::format("/alignment/map/{}/example", i);
+      alignment.maps.push_back({example_name(maps[i]["example"], asset, place), resolve_path(file_, maps[i]["file"])});
+      for (std::size_t j = 0; j < i; ++j)
+        if (alignment.maps[j].example == alignment.maps[i].example)
+          refuse(place, "one map for each example", fmt::format("\"{}\" again", alignment.maps[i].example));
+    }
+    const Json regions = member_or(json, "regions", Json::array());
+    for (std::size_t i = 0; i < regions.size(); ++i)
+      alignment.regions.push_back(read_region(regions[i], asset, fmt::format("/alignment/regions/{}", i)));
+    alignment.accept = json.value("accept", alignment.accept);
+    check_alignment(alignment);
+  }
+
+  CorrespondingRegionConfig read_region(const Json& json, const AssetConfig& asset, const std::string& place) const {
+    CorrespondingRegionConfig region{read_selection(json["object"], place + "/object"), {}};
+    for (std::size_t i = 0; i < json["examples"].size(); ++i) {
+      const Json& example = json["examples"][i];
+      const std::string here = fmt::format("{}/examples/{}", place, i);
+      region.examples.push_back({example_name(example["example"], asset, here + "/example"),
+                                 read_selection(example["vertices"], here + "/vertices")});
+    }
+    return region;
+  }
+
+  std::string example_name(const std::string& name, const AssetConfig& asset, const std::string& place) const {
+    if (std::ranges::find(asset.examples, name, &ExampleConfig::name) == asset.examples.end())
+      refuse(place, "the name of an example", fmt::format("\"{}\"", name));
+    return name;
+  }
+
+  void check_alignment(const AlignmentConfig& alignment) const {
+    const auto require = [&](bool is_there, const char* method, const char* what) {
+      if (alignment.method == method && !is_there)
+        refuse("/alignment/method", fmt::format("{} beside the method \"{}\"", what, method), "none");
+    };
+    require(alignment.landmarks.has_value(), "landmarks", "alignment.landmarks");
+    require(!alignment.maps.empty(), "map", "alignment.map");
+    require(alignment.landmarks || !alignment.regions.empty(), "coupled", "alignment.landmarks or alignment.regions");
+    if (!alignment.regions.empty() && alignment.method != "coupled")
+      refuse("/alignment/regions", "none but with the method \"coupled\"",
+             fmt::format("the method \"{}\"", alignment.method));
   }
 
   static void read_basis(const Json& json, AssetConfig& asset) {

@@ -57,6 +57,31 @@ struct ExampleConfig {
   DropConfig drop;
 };
 
+/// The vertex of an example for every vertex of the object, in a text file.
+struct ExampleMapConfig {
+  std::string example;
+  std::filesystem::path file;
+};
+
+/// Corresponding parts of the object and of examples.
+struct CorrespondingRegionConfig {
+  struct OnExample {
+    std::string example;
+    VertexSelection vertices;
+  };
+  VertexSelection object;
+  std::vector<OnExample> examples;
+};
+
+struct AlignmentConfig {
+  std::string method = "auto";  ///< "auto", "coupled", "landmarks" or "map"
+  std::string frame = "auto";   ///< "auto", "shared" or "free"
+  std::optional<std::filesystem::path> landmarks;
+  std::vector<ExampleMapConfig> maps;
+  std::vector<CorrespondingRegionConfig> regions;
+  bool accept = false;  ///< takes what is refused otherwise, with a warning
+};
+
 /// ASSET.json after validation, paths resolved against its folder. interfaces.md, "ASSET.json".
 struct AssetConfig {
   std::filesystem::path file;
@@ -70,7 +95,7 @@ struct AssetConfig {
 
   int eigenfunctions = 20;               ///< m
   std::string weighting = "eigenvalue";  ///< or "none"
-  std::string frame = "auto";            ///< "auto", "shared" or "free"
+  AlignmentConfig alignment;
 
   int basis_size = 30;  ///< r
   int linear_modes = 15;

@@ -39,15 +39,17 @@ struct ExampleData {
   std::int64_t index = 0;  ///< 0 is the rest pose
   bool is_rest = false;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< from the example's frame to the object's
-  double scale = 1;               ///< object's length unit over the example's: (V_object / V_example)^(1/3)
-  std::string method;             ///< how it was mapped to the object
-  double alignment_residual = 0;  ///< relative
-  double confidence = 0;          ///< J of alignment.md; 0 is certain, above 1.2 refused
-  double shape_space_error = 0;   ///< share of its displacement that the m functions lose, relative M-norm
-  double basis_error = 0;         ///< share of its transferred displacement that U loses, relative M-norm
-  RowMatrix descriptor;           ///< m x 3
-  Eigen::VectorXd reduced;        ///< r, T^+ (e_k - e_0)
-  Eigen::VectorXd pose;           ///< r, p_k: the same with the fixed vertices of a clamped body put back
+  double scale = 1;                 ///< object's length unit over the example's: (V_object / V_example)^(1/3)
+  std::string method;               ///< how it was mapped to the object
+  double alignment_residual = 0;    ///< relative
+  double confidence = 0;            ///< J of alignment.md; 0 is certain, above 1.2 refused
+  double inverted_fraction = 0;     ///< share of the volume that the pose turns inside out
+  std::int64_t competing_maps = 0;  ///< other poses that fit the example about as well
+  double shape_space_error = 0;     ///< share of its displacement that the m functions lose, relative M-norm
+  double basis_error = 0;           ///< share of its transferred displacement that U loses, relative M-norm
+  RowMatrix descriptor;             ///< m x 3
+  Eigen::VectorXd reduced;          ///< r, T^+ (e_k - e_0)
+  Eigen::VectorXd pose;             ///< r, p_k: the same with the fixed vertices of a clamped body put back
 };
 
 /// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex. method.md, section 5.

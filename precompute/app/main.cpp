@@ -21,6 +21,7 @@ struct Options {
   std::string asset;
   std::string bundle;
   std::string scene;
+  std::string alignment_report;
 };
 
 void print_stages(const precompute::BuildReport& report) {
@@ -53,7 +54,8 @@ void bundle(const Options& options) {
   if (!options.scene.empty()) scene_needs = needs_of(load_scene(options.scene));
   { const AtomicFile writable(options.bundle); }  // better refused now than after the work
   precompute::BuildReport report;
-  const ReducedModel model = precompute::build_model(asset, precompute::resolve_needs(asset, scene_needs), report);
+  const ReducedModel model =
+      precompute::build_model(asset, precompute::resolve_needs(asset, scene_needs), report, options.alignment_report);
   const Timer timer;
   write_bundle(model, options.bundle);
   report.stages.push_back({"writing the bundle", timer.seconds()});
@@ -73,9 +75,21 @@ void bundle(const Options& options) {
   print_stages(report);
 }
 
+void print_alignments(const std::vector<precompute::AlignmentOutcome>& outcomes) {
+  fmt::print("\n{:<20}{:<20}{:>12}{:>14}{:>14}{:>12}{:>16}  {}\n", "example", "method", "confidence", "residual [%]",
+             "inverted [%]", "competing", "lost by m [%]", "alignment");
+  for (const auto& outcome : outcomes)
+    fmt::print("{:<20}{:<20}{:>12.3f}{:>14.2f}{:>14.2f}{:>12}{:>16.2f}  {}\n", outcome.name, outcome.method,
+               outcome.confidence, 100 * outcome.residual, 100 * outcome.inverted_fraction, outcome.competing_maps,
+               100 * outcome.shape_space_error, precompute::name_of(outcome.verdict));
+}
+
 void check(const Options& options) {
   precompute::BuildReport report;
-  precompute::check_inputs(load_asset(options.asset), report);
+  const AssetConfig asset = load_asset(options.asset);
+  const auto outcomes = precompute::check_inputs(asset, options.alignment_report, report);
+  if (!outcomes.empty()) print_alignments(outcomes);
+  precompute::require_aligned(asset, outcomes, report.warnings);
   fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
 }
 
@@ -94,8 +108,12 @@ int main(int argc, char** argv) {
   bundle_command->add_option("-o,--output", options.bundle, "bundle to write (HDF5)")->required();
   bundle_command->add_option("--scene", options.scene, "write only what this scene needs");
 
-  auto* check_command = app.add_subcommand("check", "read and check the inputs, compute nothing");
+  auto* check_command =
+      app.add_subcommand("check", "read and check the inputs and align the examples, compute nothing else");
   check_command->add_option("ASSET", options.asset, "asset file (JSON)")->required();
+  for (auto* command : {bundle_command, check_command})
+    command->add_option("--alignment-report", options.alignment_report,
+                        "folder to write each transferred pose beside its example into (.vtk and .svg)");
 
   return run_program(app, argc, argv, [&] {
     apply(options.common);

@@ -18,6 +18,7 @@
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/basis.h"
 #include "precompute/modes/linear_modes.h"
+#include "precompute/pipeline/alignment_report.h"
 #include "precompute/pipeline/example_stage.h"
 #include "precompute/pipeline/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
@@ -34,8 +35,9 @@ std::int64_t example_count(const AssetConfig& asset) {
 
 class Pipeline {
  public:
-  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report)
-      : asset_(asset), needs_(needs), report_(report) {}
+  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report,
+           const std::filesystem::path& alignment_folder)
+      : asset_(asset), needs_(needs), report_(report), alignment_folder_(alignment_folder) {}
 
   ReducedModel run();
 
@@ -62,6 +64,7 @@ class Pipeline {
   const AssetConfig& asset_;
   const Needs& needs_;
   BuildReport& report_;
+  const std::filesystem::path& alignment_folder_;
   ObjectInput object_;
 };
 
@@ -170,6 +173,9 @@ ReducedModel Pipeline::run() {
   if (with_examples)
     shape = timed("shape space and examples",
                   [&] { return build_shape_stage(asset_, object_, *example_input, report_.warnings); });
+  if (shape && !alignment_folder_.empty())
+    write_alignment_report(object_.mesh, *example_input, *shape, alignment_folder_);
+  if (shape) require_aligned(asset_, shape->alignments, report_.warnings);
 
   const auto system =
       timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
@@ -218,6 +224,18 @@ ReducedModel Pipeline::run() {
   return model;
 }
 
+// What the numerical stages refuse is a member of the asset; they do not know its file.
+template <typename Work>
+auto with_file_named(const AssetConfig& asset, Work work) {
+  try {
+    return work();
+  } catch (const InputError& error) {
+    Complaint complaint = error.complaint();
+    if (complaint.file.empty()) complaint.file = asset.file.string();
+    throw InputError(std::move(complaint));
+  }
+}
+
 }  // namespace
 
 Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs) {
@@ -234,22 +252,22 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   return needs;
 }
 
-ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report) {
+ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
+                         const std::filesystem::path& alignment_folder) {
   report.inputs.push_back(asset.file);
-  try {
-    return Pipeline(asset, needs, report).run();
-  } catch (const InputError& error) {
-    // What the numerical stages refuse is a member of the asset; they do not know its file.
-    Complaint complaint = error.complaint();
-    if (complaint.file.empty()) complaint.file = asset.file.string();
-    throw InputError(std::move(complaint));
-  }
+  return with_file_named(asset, [&] { return Pipeline(asset, needs, report, alignment_folder).run(); });
 }
 
-void check_inputs(const AssetConfig& asset, BuildReport& report) {
+std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::filesystem::path& alignment_folder,
+                                           BuildReport& report) {
   report.inputs.push_back(asset.file);
   const auto object = read_object(asset, report.inputs);
-  if (!asset.examples.empty()) read_examples(asset, object, report.inputs);
+  if (asset.examples.empty()) return {};
+  const auto input = read_examples(asset, object, report.inputs);
+  const ShapeStage stage =
+      with_file_named(asset, [&] { return build_shape_stage(asset, object, input, report.warnings); });
+  if (!alignment_folder.empty()) write_alignment_report(object.mesh, input, stage, alignment_folder);
+  return stage.alignments;
 }
 
 }  // namespace exmat::precompute

@@ -3,14 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <optional>
 #include <utility>
 
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
+#include "precompute/pipeline/example_alignment.h"
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
-#include "precompute/shape_space/transfer.h"
 #include "precompute/solvers/eigenpairs.h"
 
 namespace exmat::precompute {
@@ -18,14 +19,11 @@ namespace {
 
 // Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
 constexpr Eigen::Index kExtraEigenfunctions = 4;
-constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
 // A share of an example's displacement lost to truncation that is worth a warning.
 constexpr double kTruncationWarning = 0.25;
 
-void warn(std::vector<std::string>& warnings, const std::string& message) {
-  warnings.push_back(message);
-  log::warning(message);
-}
+// Functions of the object looked through for how many would carry a pose.
+constexpr Eigen::Index kMostFunctions = 100;
 
 class ShapeStageBuilder {
  public:
@@ -39,11 +37,11 @@ class ShapeStageBuilder {
   Eigen::VectorXd object_basis();
   void set_shape_data(const Eigen::VectorXd& eigenvalues);
   void add_examples();
-  RestMap map_rest(const LaplaceBasis& rest_basis);
-  bool free_example(const RestMap& map) const;
   SparseMatrix fit_weights() const;
-  void add_rest(const RestMap& map, const LaplaceBasis& rest_basis);
-  void add_pose(const PoseInput& pose, const TransferredPose& transferred, const RestMap& map, double scale);
+  void add_rest(const AlignedRest& rest);
+  TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
+  void add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred);
+  ExampleData example_data(const AlignmentOutcome& outcome, double volume) const;
 
   const AssetConfig& asset_;
   const ObjectInput& object_;
@@ -86,56 +84,45 @@ void ShapeStageBuilder::set_shape_data(const Eigen::VectorXd& eigenvalues) {
                      m, eigenvalues[m - 1], eigenvalues[m], next_uncut(eigenvalues, m)));
 }
 
-RestMap ShapeStageBuilder::map_rest(const LaplaceBasis& rest_basis) {
-  const LaplaceBasis& object = stage_.object;
-  if (input_.object_is_rest) return identity_map(object.eigenvalues.size(), object.vertices.rows());
-  const RestMap map = rest_map(object, input_.rest, rest_basis);
-  log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)", input_.rest_name,
-                        100 * map.residual, map.confidence));
-  const std::string advice = "expected a rest example that lies where the object does and has about its shape";
-  if (map.confidence > kConfidenceRefusal)
-    throw WorkError(fmt::format("example {}: alignment refused, confidence {:.2f} (limit {}): {}", input_.rest_name,
-                                map.confidence, kConfidenceRefusal, advice));
-  if (map.confidence > kConfidenceWarning)
-    warn(warnings_, fmt::format("example {}: doubtful alignment, confidence {:.2f}: {}", input_.rest_name,
-                                map.confidence, advice));
-  return map;
-}
-
-bool ShapeStageBuilder::free_example(const RestMap& map) const {
-  if (asset_.frame != "auto") return asset_.frame == "free";
-  log::info(map.same_frame ? "examples share the object's frame: the rest example coincides with it"
-                           : "examples are rotated to the object's frame: the rest example does not coincide with it");
-  return !map.same_frame;
-}
-
 SparseMatrix ShapeStageBuilder::fit_weights() const {
   if (!object_.fixed.any()) return scalar_mass(object_.mesh, object_.materials.density);
   return SparseMatrix(Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal());
 }
 
-void ShapeStageBuilder::add_rest(const RestMap& map, const LaplaceBasis& rest_basis) {
-  ExampleData rest;
-  rest.name = input_.rest_name;
-  rest.is_rest = true;
-  rest.method = input_.object_is_rest ? "object" : "rest_map";
-  rest.scale = std::cbrt(stage_.object.volume / rest_basis.volume);
-  rest.alignment_residual = map.residual;
-  rest.confidence = map.confidence;
-  rest.descriptor = stage_.data.rest_descriptor;
-  stage_.examples.examples.push_back(std::move(rest));
+ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, double volume) const {
+  ExampleData example;
+  example.name = outcome.name;
+  example.index = std::ssize(stage_.examples.examples);
+  example.scale = std::cbrt(stage_.object.volume / volume);
+  example.method = outcome.method;
+  example.alignment_residual = outcome.residual;
+  example.confidence = outcome.confidence;
+  example.inverted_fraction = outcome.inverted_fraction;
+  example.competing_maps = outcome.competing_maps;
+  return example;
 }
 
-void ShapeStageBuilder::add_pose(const PoseInput& pose, const TransferredPose& transferred, const RestMap& map,
-                                 double scale) {
-  ExampleData example;
-  example.name = pose.name;
-  example.index = std::ssize(stage_.examples.examples);
+void ShapeStageBuilder::add_rest(const AlignedRest& rest) {
+  ExampleData example = example_data(rest.outcome, rest.basis.volume);
+  example.is_rest = true;
+  example.rotation = rest.rotation;
+  example.descriptor = stage_.data.rest_descriptor;
+  stage_.examples.examples.push_back(std::move(example));
+  stage_.alignments.push_back(rest.outcome);
+}
+
+TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const AlignedPose& pose,
+                                            const PoseFrame& frame) const {
+  if (!pose.functional_map)
+    return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
+  return transfer_coefficients(stage_.object, stage_.rest_coefficients,
+                               rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
+                               *pose.functional_map * coefficients(pose.basis, pose.basis.vertices), frame);
+}
+
+void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred) {
+  ExampleData example = example_data(pose.outcome, tet_volumes(input.mesh).sum());
   example.rotation = transferred.rotation;
-  example.scale = scale;
-  example.method = "same_connectivity";
-  example.alignment_residual = map.residual;
-  example.confidence = map.confidence;
   example.shape_space_error = transferred.shape_space_error;
   example.descriptor = stage_.weights.asDiagonal() * transferred.coefficients;
   const Eigen::Index column = example.index - 1;
@@ -144,26 +131,48 @@ void ShapeStageBuilder::add_pose(const PoseInput& pose, const TransferredPose& t
       reconstruct_displacement(stage_.object, stage_.weights, example.descriptor - stage_.data.rest_descriptor);
   hold_fixed_mean(object_.fixed, stage_.displacements.col(column));
   stage_.examples.examples.push_back(std::move(example));
+  stage_.alignments.push_back(pose.outcome);
+  stage_.alignments.back().shape_space_error = transferred.shape_space_error;
 }
 
 void ShapeStageBuilder::add_examples() {
-  const LaplaceBasis rest_basis =
-      input_.object_is_rest
-          ? stage_.object
-          : laplace_basis(input_.rest, example_function_count(asset_.eigenfunctions, input_.rest.vertex_count()),
-                          input_.rest_name);
-  const RestMap map = map_rest(rest_basis);
-  add_rest(map, rest_basis);
-  const PoseFrame frame{free_example(map), fit_weights()};
+  ExampleAligner aligner(asset_, stage_.object, object_, input_);
+  const AlignedRest rest = aligner.align_rest();
+  add_rest(rest);
+  const PoseFrame frame{rest.free_poses, fit_weights()};
   stage_.fields.resize(3 * object_.mesh.vertex_count(), std::ssize(input_.poses));
   stage_.displacements.resizeLike(stage_.fields);
-  for (const PoseInput& pose : input_.poses) {
-    const TetMesh posed{pose.vertices, input_.rest.tets};
-    const auto transferred =
-        transfer_pose(stage_.object, stage_.rest_coefficients, map, rest_basis, normalised_positions(posed), frame);
-    add_pose(pose, transferred, map, std::cbrt(stage_.object.volume / tet_volumes(posed).sum()));
+  for (const PoseInput& input : input_.poses) {
+    const AlignedPose pose = aligner.align_pose(rest, input);
+    add_pose(input, pose, transfer(rest, pose, frame));
   }
 }
+
+// The least number of the object's functions, no cluster cut, that loses at most the share worth a warning of a
+// displacement [3n]; 0 where kMostFunctions do not do.
+class FunctionCounter {
+ public:
+  FunctionCounter(const TetMesh& mesh, const std::string& name) : mesh_(mesh), name_(name) {}
+
+  Eigen::Index needed(const Eigen::VectorXd& field) {
+    if (!basis_) basis_ = laplace_basis(mesh_, std::min(kMostFunctions, mesh_.vertex_count() - 2), name_);
+    const VertexArray displacement = field.reshaped<Eigen::RowMajor>(field.size() / 3, 3);
+    const double whole = (displacement.transpose() * (basis_->mass * displacement)).trace();
+    const Eigen::VectorXd shares = coefficients(*basis_, displacement).rowwise().squaredNorm() / whole;
+    double carried = 0;
+    for (Eigen::Index count = 1; count < shares.size(); ++count) {
+      carried += shares[count - 1];
+      if (1 - carried <= kTruncationWarning * kTruncationWarning && !splits_cluster(basis_->eigenvalues, count))
+        return count;
+    }
+    return 0;
+  }
+
+ private:
+  const TetMesh& mesh_;
+  const std::string& name_;
+  std::optional<LaplaceBasis> basis_;
+};
 
 ShapeStage ShapeStageBuilder::build() {
   set_shape_data(object_basis());
@@ -185,6 +194,7 @@ void finish_examples(const AssetConfig& asset, const ElasticSystem& system, cons
                                  model.projection->reduced_from_shape);
   model.projection->target_basis = range_basis(map);
   fill_weights_problem(stage.data.rest_descriptor, *model.projection, map, stage.examples);
+  FunctionCounter counter(model.object->mesh, asset.name);
   for (Eigen::Index k = 0; k < stage.displacements.cols(); ++k) {
     auto& example = stage.examples.examples[static_cast<std::size_t>(k + 1)];
     const Eigen::VectorXd field = stage.displacements.col(k);
@@ -194,10 +204,14 @@ void finish_examples(const AssetConfig& asset, const ElasticSystem& system, cons
     log::info(fmt::format(
         "example {}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
         example.name, asset.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
-    if (example.shape_space_error > kTruncationWarning)
-      warn(warnings, fmt::format("example {}: {} eigenfunctions lose {:.0f} % of its displacement; more "
-                                 "shape_space.eigenfunctions (20 is usual) keep more",
-                                 example.name, asset.eigenfunctions, 100 * example.shape_space_error));
+    if (example.shape_space_error <= kTruncationWarning) continue;
+    const Eigen::Index needed = counter.needed(stage.fields.col(k));
+    warn(warnings, fmt::format("example {}: {} eigenfunctions lose {:.0f} % of its displacement; {}", example.name,
+                               asset.eigenfunctions, 100 * example.shape_space_error,
+                               needed > asset.eigenfunctions
+                                   ? fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
+                                                 100 * kTruncationWarning)
+                                   : "more than the mesh resolves would be needed"));
   }
   model.shape_space = std::move(stage.data);
   model.examples = std::move(stage.examples);

@@ -4,6 +4,7 @@
 #include <array>
 #include <fmt/format.h>
 #include <fstream>
+#include <map>
 #include <memory>
 #include <openssl/evp.h>
 
@@ -13,6 +14,7 @@
 #include "common/mesh/geometry.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/vertex_selection.h"
+#include "precompute/pipeline/correspondence_files.h"
 #include "precompute/pipeline/object_materials.h"
 
 namespace exmat::precompute {
@@ -68,24 +70,178 @@ FlagVector flag(const std::optional<VertexSelection>& selection, std::uint8_t ab
   return in_file(checked.report.kept_vertices);
 }
 
-VertexArray posed_vertices(const VertexArray& file_vertices, const std::vector<std::int32_t>& kept) {
-  return file_vertices(kept, Eigen::all);
+// How the vertices of a mesh are numbered in its file.
+struct FileNumbers {
+  std::vector<std::int32_t> kept;  // new index -> index in the file
+  Eigen::Index count = 0;          // in the file
+
+  // File index -> new index, -1 for a vertex that was dropped.
+  IndexVector inverse() const {
+    IndexVector result = IndexVector::Constant(count, -1);
+    for (std::size_t v = 0; v < kept.size(); ++v) result[kept[v]] = static_cast<std::int32_t>(v);
+    return result;
+  }
+};
+
+FileNumbers numbers_of(const CheckedMesh& checked) {
+  return {checked.report.kept_vertices, checked.file_vertices.rows()};
 }
 
-PoseInput make_pose(const ExampleConfig& example, const VertexArray& vertices, const TetArray& tets) {
-  if (!vertices.allFinite())
-    throw InputError({example.mesh.string(), "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
-  const Eigen::VectorXd volumes = tet_volumes({vertices, tets});
-  const double inverted = -volumes.cwiseMin(0).sum();
-  const double total = volumes.cwiseAbs().sum();
-  PoseInput pose{example.name, vertices, inverted / total};
+// The examples as they are read, with what finds vertices of their files in their meshes.
+class ExampleReader {
+ public:
+  ExampleReader(const AssetConfig& asset, const ObjectInput& object, InputFiles& files)
+      : asset_(asset),
+        object_(object),
+        files_(files),
+        object_numbers_{object.kept_vertices, object.file_positions.rows()} {}
+
+  ExampleInput read();
+
+ private:
+  struct Mesh {
+    FileNumbers numbers;
+    VertexArray file_vertices;
+  };
+
+  void read_rest();
+  void read_pose(const ExampleConfig& example);
+  bool poses_rest(const MeshFile& file) const;
+  void read_correspondences(PoseInput& example);
+  void read_landmark_file();
+  IndexVector selected(const VertexArray& file_vertices, const FileNumbers& numbers, const VertexSelection& selection);
+
+  const AssetConfig& asset_;
+  const ObjectInput& object_;
+  InputFiles& files_;
+  FileNumbers object_numbers_;
+  std::map<std::string, Mesh> meshes_;  // of the examples, by name
+  std::vector<std::int32_t> rest_file_tets_;
+  FileNumbers rest_numbers_;
+  ExampleInput input_;
+};
+
+void refuse_inverted(const PoseInput& pose) {
   if (pose.inverted_fraction > kInvertedLimit)
-    throw InputError({example.mesh.string(), "tets", "a pose that turns less than 5 % of the volume inside out",
+    throw InputError({pose.file.string(), "tets", "a pose that turns less than 5 % of the volume inside out",
                       fmt::format("{:.1f} %", 100 * pose.inverted_fraction), "mend the pose"});
-  if (inverted > 0)
+  if (pose.inverted_fraction > 0)
     log::warning(
-        fmt::format("example {}: {:.2f} % of its volume is inverted", example.name, 100 * pose.inverted_fraction));
-  return pose;
+        fmt::format("example {}: {:.2f} % of its volume is inverted", pose.name, 100 * pose.inverted_fraction));
+}
+
+// Also of fewer vertices than the rest example's file, where those left out are not of its tets.
+bool ExampleReader::poses_rest(const MeshFile& file) const {
+  const auto& kept = rest_numbers_.kept;
+  return flat_tets(file.mesh.tets) == rest_file_tets_ &&
+         file.mesh.vertex_count() > *std::max_element(kept.begin(), kept.end());
+}
+
+void ExampleReader::read_rest() {
+  input_.rest = {"rest", asset_.object_mesh, object_.mesh};
+  input_.rest.column = -1;
+  rest_file_tets_ = object_.file_tets;
+  rest_numbers_ = object_numbers_;
+  for (std::size_t k = 0; k < asset_.examples.size(); ++k) {
+    const ExampleConfig& example = asset_.examples[k];
+    if (!example.rest) continue;
+    const auto checked = check(read_recorded(example.mesh, files_), example.mesh, example.drop);
+    input_.object_is_rest = false;
+    input_.rest = {example.name, example.mesh, checked.file.mesh};
+    rest_file_tets_ = checked.file_tets;
+    rest_numbers_ = numbers_of(checked);
+    meshes_[example.name] = {rest_numbers_, checked.file_vertices};
+    read_correspondences(input_.rest);
+  }
+  const bool name_is_taken = std::ranges::find(asset_.examples, "rest", &ExampleConfig::name) != asset_.examples.end();
+  if (input_.object_is_rest && name_is_taken) input_.rest.name = "object_rest";
+}
+
+void ExampleReader::read_pose(const ExampleConfig& example) {
+  MeshFile file = read_recorded(example.mesh, files_);
+  PoseInput pose{example.name, example.mesh, {}};
+  pose.same_connectivity = poses_rest(file);
+  if (pose.same_connectivity) {
+    pose.mesh = {file.mesh.vertices(rest_numbers_.kept, Eigen::all), input_.rest.mesh.tets};
+    meshes_[example.name] = {{rest_numbers_.kept, file.mesh.vertex_count()}, file.mesh.vertices};
+    if (!pose.mesh.vertices.allFinite())
+      throw InputError(
+          {example.mesh.string(), "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
+    const Eigen::VectorXd volumes = tet_volumes(pose.mesh);
+    pose.inverted_fraction = -volumes.cwiseMin(0).sum() / volumes.cwiseAbs().sum();
+    refuse_inverted(pose);
+  } else {
+    const auto checked = check(std::move(file), example.mesh, example.drop);
+    pose.mesh = checked.file.mesh;
+    meshes_[example.name] = {numbers_of(checked), checked.file_vertices};
+  }
+  read_correspondences(pose);
+  input_.poses.push_back(std::move(pose));
+}
+
+IndexVector ExampleReader::selected(const VertexArray& file_vertices, const FileNumbers& numbers,
+                                    const VertexSelection& selection) {
+  const auto ids = select_vertices(file_vertices, selection, asset_.file.string());
+  if (const auto* file = std::get_if<FileSelection>(&selection)) files_.push_back(file->file);
+  const IndexVector inverse = numbers.inverse();
+  std::vector<std::int32_t> kept;
+  for (const auto id : ids)
+    if (inverse[id] >= 0) kept.push_back(inverse[id]);
+  return Eigen::Map<const IndexVector>(kept.data(), std::ssize(kept));
+}
+
+// The dense map and the corresponding parts of one example.
+void ExampleReader::read_correspondences(PoseInput& example) {
+  const Mesh& mesh = meshes_.at(example.name);
+  const auto at = std::ranges::find(asset_.examples, example.name, &ExampleConfig::name);
+  example.column = 1 + (at - asset_.examples.begin());
+  for (const ExampleMapConfig& map : asset_.alignment.maps) {
+    if (map.example != example.name) continue;
+    const IndexVector in_file = read_vertex_map(map.file, object_numbers_.count, mesh.numbers.count);
+    files_.push_back(map.file);
+    const IndexVector inverse = mesh.numbers.inverse();
+    example.on_object = in_file(object_numbers_.kept);
+    for (auto& vertex : example.on_object)
+      if (vertex >= 0) vertex = inverse[vertex];
+  }
+  for (const CorrespondingRegionConfig& region : asset_.alignment.regions) {
+    example.parts.emplace_back();
+    for (const auto& [name, vertices] : region.examples)
+      if (name == example.name) example.parts.back() = selected(mesh.file_vertices, mesh.numbers, vertices);
+  }
+}
+
+void ExampleReader::read_landmark_file() {
+  if (!asset_.alignment.landmarks) return;
+  const auto& file = *asset_.alignment.landmarks;
+  std::vector<Eigen::Index> sizes{object_numbers_.count};
+  std::vector<IndexVector> inverses{object_numbers_.inverse()};
+  for (const ExampleConfig& example : asset_.examples) {
+    const FileNumbers& numbers = meshes_.at(example.name).numbers;
+    sizes.push_back(numbers.count);
+    inverses.push_back(numbers.inverse());
+  }
+  input_.landmarks = read_landmarks(file, sizes);
+  files_.push_back(file);
+  for (Eigen::Index column = 0; column < input_.landmarks.cols(); ++column)
+    for (auto& vertex : input_.landmarks.col(column)) {
+      if (vertex < 0) continue;
+      const auto in_file = vertex;
+      vertex = inverses[static_cast<std::size_t>(column)][in_file];
+      if (vertex < 0)
+        throw InputError({file.string(), "", "vertices that belong to tets",
+                          fmt::format("{}, which was dropped from its mesh", in_file + 1), ""});
+    }
+}
+
+ExampleInput ExampleReader::read() {
+  read_rest();
+  for (const auto& example : asset_.examples)
+    if (!example.rest) read_pose(example);
+  read_landmark_file();
+  for (const CorrespondingRegionConfig& region : asset_.alignment.regions)
+    input_.parts.push_back(selected(object_.file_positions, object_numbers_, region.object));
+  return std::move(input_);
 }
 
 }  // namespace
@@ -102,34 +258,12 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
   object.file_tets = checked.file_tets;
   object.kept_vertices = checked.report.kept_vertices;
   object.kept_tets = checked.report.kept_tets;
+  object.file_positions = checked.file_vertices;
   return object;
 }
 
 ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, InputFiles& files) {
-  ExampleInput input{true, "rest", object.mesh, {}};
-  std::vector<std::int32_t> rest_file_tets = object.file_tets, kept_vertices = object.kept_vertices;
-  for (const auto& example : asset.examples) {
-    if (!example.rest) continue;
-    const auto checked = check(read_recorded(example.mesh, files), example.mesh, example.drop);
-    input = {false, example.name, checked.file.mesh, {}};
-    rest_file_tets = checked.file_tets;
-    kept_vertices = checked.report.kept_vertices;
-  }
-  for (const auto& example : asset.examples) {
-    if (example.rest) continue;
-    if (input.object_is_rest && example.name == input.rest_name) input.rest_name = "object_rest";
-    const MeshFile file = read_recorded(example.mesh, files);
-    if (flat_tets(file.mesh.tets) != rest_file_tets)
-      throw InputError(
-          {example.mesh.string(), "tets",
-           "the connectivity of " + (input.object_is_rest ? "the object" : "the rest example " + input.rest_name),
-           "another mesh", "pose the rest example's own mesh; this version does not register poses on other meshes"});
-    if (file.mesh.vertex_count() <= *std::max_element(kept_vertices.begin(), kept_vertices.end()))
-      throw InputError({example.mesh.string(), "vertices", "as many as its rest example",
-                        std::to_string(file.mesh.vertex_count()), "export the pose again"});
-    input.poses.push_back(make_pose(example, posed_vertices(file.mesh.vertices, kept_vertices), input.rest.tets));
-  }
-  return input;
+  return ExampleReader(asset, object, files).read();
 }
 
 std::string hash_inputs(const InputFiles& files, const std::string& salt) {

@@ -17,21 +17,29 @@ struct ObjectInput {
   std::vector<std::int32_t>
       file_tets;  ///< corner indices as in the file, 4 n_t of it: what "same connectivity" compares
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file
+  VertexArray file_positions;                          ///< of all vertices in the file
 };
 
-/// One posed example on the vertices of the rest example.
+/// One posed example, on the mesh of the rest example or another.
 struct PoseInput {
   std::string name;
-  VertexArray vertices;
-  double inverted_fraction = 0;  ///< share of the volume in tets that the pose turns inside out
+  std::filesystem::path file;
+  TetMesh mesh;
+  bool same_connectivity = true;  ///< `mesh` has the tets of the rest example
+  double inverted_fraction = 0;   ///< share of the volume in tets that the pose turns inside out
+  IndexVector
+      on_object{};  ///< dense map: for each vertex of the object one of `mesh`, or -1; empty where none is given
+  Eigen::Index column = 0;           ///< in ExampleInput::landmarks
+  std::vector<IndexVector> parts{};  ///< for each of ExampleInput::parts its vertices of `mesh`; none where not given
 };
 
-/// The asset's examples: one rest mesh, and poses of it.
+/// The asset's examples: one rest mesh, and poses.
 struct ExampleInput {
   bool object_is_rest = true;  ///< no rest example was named: `rest` is the object's own mesh
-  std::string rest_name;
-  TetMesh rest;
+  PoseInput rest;              ///< column -1 where the object is the rest example
   std::vector<PoseInput> poses;
+  IndexMatrix landmarks;           ///< l x (1 + examples), vertices of the object and the examples as read, -1 for none
+  std::vector<IndexVector> parts;  ///< corresponding regions: their vertices of the object
 };
 
 /// Every file that was read, in order, for the hash and for build dependencies.

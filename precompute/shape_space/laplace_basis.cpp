@@ -26,6 +26,12 @@ LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::s
   return basis;
 }
 
+LaplaceBasis first_functions(LaplaceBasis basis, Eigen::Index count) {
+  basis.eigenvalues.conservativeResize(count);
+  basis.eigenfunctions.conservativeResize(Eigen::NoChange, count);
+  return basis;
+}
+
 VertexArray normalised_positions(const TetMesh& mesh) {
   const double unit = std::cbrt(tet_volumes(mesh).sum());
   return (mesh.vertices.rowwise() - centroid(mesh).transpose()) / unit;

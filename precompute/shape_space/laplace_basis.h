@@ -21,6 +21,9 @@ struct LaplaceBasis {
 /// The first `count` eigenpairs; `name` is for messages.
 LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::string& name);
 
+/// The first `count` of its functions.
+LaplaceBasis first_functions(LaplaceBasis basis, Eigen::Index count);
+
 /// [n x 3] positions of a mesh of positive volume, moved to centroid 0 and scaled to volume 1.
 VertexArray normalised_positions(const TetMesh& mesh);
 

@@ -32,6 +32,17 @@ double lost_share(const SparseMatrix& mass, const VertexArray& displacement, con
   return full <= kNoDisplacement ? 0 : norm(displacement - carried) / full;
 }
 
+// The change of coefficients [m x 3] of a pose that `to_rest` has turned, fitted to the object as the frame says.
+TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                           const Eigen::MatrixXd& change, const Eigen::Matrix3d& to_rest, const PoseFrame& frame) {
+  const VertexArray posed_object = object.vertices + object.eigenfunctions * change;
+  const Eigen::Matrix3d fit = fit_rotation(posed_object, object.vertices, frame.fit_weights);
+  TransferredPose pose;
+  pose.coefficients = (rest_coefficients + change) * fit.transpose();
+  pose.rotation = fit * to_rest;
+  return pose;
+}
+
 }  // namespace
 
 Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments) {
@@ -77,18 +88,25 @@ TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd&
   const Eigen::MatrixXd example_posed = coefficients(rest_basis, posed);
   Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
   if (frame.free_example) to_rest = procrustes_rotation(example_rest.transpose() * example_posed);
-  const Eigen::MatrixXd change = map.functional_map * (example_posed * to_rest.transpose() - example_rest);
-
-  const VertexArray posed_object = object.vertices + object.eigenfunctions * change;
-  const Eigen::Matrix3d fit = fit_rotation(posed_object, object.vertices, frame.fit_weights);
-  TransferredPose pose;
-  pose.coefficients = (rest_coefficients + change) * fit.transpose();
-  pose.rotation = fit * to_rest;
+  TransferredPose pose =
+      place_pose(object, rest_coefficients, map.functional_map * (example_posed * to_rest.transpose() - example_rest),
+                 to_rest, frame);
   const VertexArray displacement = posed * pose.rotation.transpose() - rest_basis.vertices;
   pose.displacement = map.pull_back * displacement;
   pose.displacement.rowwise() -= (object.mass * pose.displacement).colwise().sum();
   const Eigen::MatrixXd carried = map.functional_map * coefficients(rest_basis, displacement);
   pose.shape_space_error = lost_share(object.mass, pose.displacement, object.eigenfunctions * carried);
+  return pose;
+}
+
+TransferredPose transfer_coefficients(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                                      const Eigen::MatrixXd& carried_rest, const Eigen::MatrixXd& carried_posed,
+                                      const PoseFrame& frame) {
+  Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
+  if (frame.free_example) to_rest = procrustes_rotation(carried_rest.transpose() * carried_posed);
+  TransferredPose pose =
+      place_pose(object, rest_coefficients, carried_posed * to_rest.transpose() - carried_rest, to_rest, frame);
+  pose.displacement = object.eigenfunctions * (pose.coefficients - rest_coefficients);
   return pose;
 }
 

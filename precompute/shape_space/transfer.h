@@ -53,6 +53,12 @@ struct PoseFrame {
 TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients, const RestMap& map,
                               const LaplaceBasis& rest_basis, const VertexArray& posed, const PoseFrame& frame);
 
+/// The same from coefficients alone: those of the rest and the posed example, carried to the object's functions by a
+/// functional map [m x 3 each]. What these lose of the pose is not known: shape_space_error is 0.
+TransferredPose transfer_coefficients(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                                      const Eigen::MatrixXd& carried_rest, const Eigen::MatrixXd& carried_posed,
+                                      const PoseFrame& frame);
+
 /// Proper rotation R that minimises sum_i w_i |R a_i - b_i|^2 for [3 x 3] moments sum_i w_i b_i a_i^T. Where the
 /// moments leave the angle about an axis open (rank one), the smallest rotation is taken. Kabsch 1976; Umeyama 1991.
 Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments);

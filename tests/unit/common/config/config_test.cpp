@@ -47,7 +47,10 @@ TEST(LoadAsset, ReadsEveryMember) {
     "shape_space": {"eigenfunctions": 6, "weighting": "none"},
     "examples": [{"name": "rest", "mesh": "../ex0.veg", "rest": true},
                  {"name": "bend", "mesh": "sub/./ex1.veg", "drop": ["unreferenced_vertices"]}],
-    "alignment": {"method": "auto", "frame": "free"},
+    "alignment": {"method": "coupled", "frame": "free", "landmarks": "marks.txt", "accept": true,
+                  "map": [{"example": "bend", "file": "bend.txt"}],
+                  "regions": [{"object": {"ids": [1, 2]},
+                               "examples": [{"example": "bend", "vertices": {"file": "end.txt"}}]}]},
     "basis": {"size": 20, "linear_modes": 12, "example_fields": false},
     "cubature": {"elements": 23, "method": "nn_htp", "training_poses": 50},
     "targets": {"tolerance": 1e-3},
@@ -72,7 +75,16 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_EQ(asset.examples[1].name, "bend");
   EXPECT_EQ(asset.examples[1].mesh, folder / "sub/ex1.veg");
   EXPECT_TRUE(asset.examples[1].drop.unreferenced_vertices);
-  EXPECT_EQ(asset.frame, "free");
+  EXPECT_EQ(asset.alignment.method, "coupled");
+  EXPECT_EQ(asset.alignment.frame, "free");
+  EXPECT_EQ(asset.alignment.landmarks, folder / "marks.txt");
+  EXPECT_TRUE(asset.alignment.accept);
+  ASSERT_EQ(asset.alignment.maps.size(), 1U);
+  EXPECT_EQ(asset.alignment.maps[0].example, "bend");
+  EXPECT_EQ(asset.alignment.maps[0].file, folder / "bend.txt");
+  ASSERT_EQ(asset.alignment.regions.size(), 1U);
+  EXPECT_EQ(std::get<IdSelection>(asset.alignment.regions[0].object).ids, (std::vector<std::int64_t>{1, 2}));
+  EXPECT_EQ(std::get<FileSelection>(asset.alignment.regions[0].examples[0].vertices).file, folder / "end.txt");
   EXPECT_EQ(asset.basis_size, 20);
   EXPECT_EQ(asset.linear_modes, 12);
   EXPECT_FALSE(asset.example_fields);

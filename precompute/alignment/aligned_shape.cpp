@@ -1,0 +1,28 @@
+#include "precompute/alignment/aligned_shape.h"
+
+#include <Eigen/SVD>
+#include <algorithm>
+
+#include "common/mesh/geometry.h"
+
+namespace exmat::precompute {
+
+AlignedShape aligned_shape(const TetMesh& mesh, Eigen::Index functions, const std::string& name) {
+  const Eigen::Index count = std::min(std::max(functions, kAlignmentFunctions), mesh.vertex_count() - 2);
+  AlignedShape shape{{}, laplace_basis(mesh, count, name), surface_triangles(mesh.tets)};
+  shape.mesh = {shape.basis.vertices, mesh.tets};
+  return shape;
+}
+
+Eigen::MatrixXd polar_factor(const Eigen::MatrixXd& matrix) {
+  const Eigen::BDCSVD<Eigen::MatrixXd> svd(matrix, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  return svd.matrixU() * svd.matrixV().transpose();
+}
+
+VertexArray carried_positions(const AlignedShape& a, const AlignedShape& b, const Eigen::MatrixXd& map) {
+  const auto functions = b.basis.eigenfunctions.leftCols(map.cols());
+  const Eigen::MatrixXd carried = map * (functions.transpose() * (b.basis.mass * b.basis.vertices));
+  return a.basis.eigenfunctions.leftCols(map.rows()) * carried;
+}
+
+}  // namespace exmat::precompute

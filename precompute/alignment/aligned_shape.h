@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+
+#include "precompute/shape_space/laplace_basis.h"
+
+namespace exmat::precompute {
+
+/// A mesh as alignment sees it: at centroid 0 and volume 1, with its first functions and its surface.
+struct AlignedShape {
+  TetMesh mesh;           ///< normalised
+  LaplaceBasis basis;     ///< K functions of it
+  TriangleArray surface;  ///< outward
+};
+
+/// Number of eigenpairs that alignment works with; fewer where the mesh has fewer.
+constexpr Eigen::Index kAlignmentFunctions = 60;
+
+/// At least kAlignmentFunctions and `functions`, bounded by the mesh. `name` is for messages.
+AlignedShape aligned_shape(const TetMesh& mesh, Eigen::Index functions, const std::string& name);
+
+/// The orthogonal factor of a matrix with orthonormal rows or columns, whichever are fewer.
+Eigen::MatrixXd polar_factor(const Eigen::MatrixXd& matrix);
+
+/// [n_a x 3] positions of b carried to the vertices of a by a functional map C [k_a x k_b]: Phi_a C Phi_b^T M_b X_b. In
+/// the frame of b, centroid 0.
+VertexArray carried_positions(const AlignedShape& a, const AlignedShape& b, const Eigen::MatrixXd& map);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,330 @@
+#include "precompute/alignment/pose_alignment.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "precompute/alignment/spectral_tree.h"
+#include "precompute/shape_space/nearest_point.h"
+#include "precompute/shape_space/transfer.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30, kSmoothFunctions = 60;
+constexpr std::size_t kTreeMaps = 12;
+constexpr std::size_t kPolished = 6;
+constexpr double kMostInverted = 0.2;          // of a start's volume
+constexpr double kCompeting = 1.4;             // times the least F
+constexpr double kCompetingFloor = 0.003;      // added to it: below, fits differ by their tessellation alone
+constexpr double kSamePose = 0.25;             // difference of displacements, relative to the larger
+constexpr double kSameStart = 0.1;             // difference of starts, relative to the body's size
+constexpr double kNoPose = 0.03;               // a displacement from rest, relative to the body's size, that is none
+constexpr double kClearlyFarther = 1.2;        // times the displacement of the pose that is taken
+constexpr Eigen::Index kFewLandmarks = 100;    // more pairs than this are a dense map
+constexpr Eigen::Index kPairsPerFunction = 4;  // at least, in a fit to a dense map
+constexpr double kDenseWeight = 100;           // of a dense map in the registration
+constexpr double kMirrorMargin = 0.5;          // of the best F, from which on a mirror image is believed
+constexpr double kMirrorWorthwhile = 0.05;     // F above which it is looked for
+
+// Where a registration begins.
+struct Start {
+  std::string name;
+  VertexArray positions;
+  double J = 0;
+};
+
+// A registered pose, and the displacement of the rest example to it in the frame of the rest.
+struct Fit {
+  std::string start;
+  Registered registered;
+  VertexArray displacement;
+  double size = 0;  // of the displacement
+};
+
+class PoseAligner {
+ public:
+  PoseAligner(const AlignedShape& rest, const Symmetry& symmetry, const AlignedShape& pose, const AlignmentHints& hints)
+      : rest_(rest),
+        symmetry_(symmetry),
+        pose_(pose),
+        hints_(hints),
+        size_(rms_radius(rest.basis)),
+        registration_(rest.mesh, pose.mesh, pairs()),
+        zoom_out_(rest, pose, zoom_out_sizes(std::min(functions(rest), functions(pose)))) {}
+
+  PoseAlignment align();
+
+ private:
+  static Eigen::Index functions(const AlignedShape& shape) { return shape.basis.eigenvalues.size(); }
+  bool has_landmarks() const { return hints_.correspondences.count() > 0; }
+  bool has_dense_map() const { return hints_.correspondences.count() > kFewLandmarks; }
+  PointPairs pairs() const;
+  VertexArray laid_over(const PointPairs& pairs, Eigen::Index functions) const;
+  double norm(const VertexArray& field) const {
+    return std::sqrt(std::max(0.0, (field.transpose() * (rest_.basis.mass * field)).trace()));
+  }
+  VertexArray centred(const VertexArray& field) const {
+    return field.rowwise() - (rest_.basis.mass * field).colwise().sum();
+  }
+
+  std::vector<Start> mapped_starts();
+  std::vector<Start> sure_starts() const;
+  void add_map(const std::string& name, const Eigen::MatrixXd& map, std::vector<Start>& starts);
+  Eigen::MatrixXd spatial_map(const VertexArray& rest_positions) const;
+  void add_landmark_starts(std::vector<Start>& starts) const;
+  std::vector<Start> best_distinct(std::vector<Start> starts) const;
+  Fit fit(const std::string& start, Registered registered) const;
+  std::vector<Fit> polish(const std::vector<Start>& starts) const;
+  bool same_pose(const Fit& a, const Fit& b) const;
+  std::vector<Fit> distinct_poses(std::vector<Fit> fits) const;
+  std::vector<Fit> symmetric_copies(const Fit& taken) const;
+  double limit(const std::vector<Fit>& fits) const;
+  const Fit& choose(const std::vector<Fit>& poses) const;
+  bool mirror_fits_better(double objective) const;
+  PoseAlignment result(const Fit& taken, const std::vector<Fit>& poses) const;
+
+  const AlignedShape& rest_;
+  const Symmetry& symmetry_;
+  const AlignedShape& pose_;
+  const AlignmentHints& hints_;
+  double size_;
+  Registration registration_;
+  ZoomOut zoom_out_;
+  // Of the starts that turn the body inside out, the best as a map: what a mirror image would begin with.
+  VertexArray reflected_start_;
+  double reflected_score_ = std::numeric_limits<double>::infinity();
+};
+
+// Values of the pose at its point nearest to each vertex of the rest example, as a map of functions.
+Eigen::MatrixXd PoseAligner::spatial_map(const VertexArray& rest_positions) const {
+  const auto nearest = nearest_points(pose_.mesh, rest_positions);
+  return map_of_points(rest_, pose_, nearest.interpolation(pose_.mesh),
+                       std::min({kTreeFunctions, functions(rest_), functions(pose_)}));
+}
+
+void PoseAligner::add_map(const std::string& name, const Eigen::MatrixXd& map, std::vector<Start>& starts) {
+  const Eigen::Index size = std::min(kStartFunctions, map.rows());
+  const VertexArray carried = carried_positions(rest_, pose_, map.topLeftCorner(size, size));
+  const MapScore score = score_map(registration_.arap(), map, carried);
+#pragma omp critical(exmat_pose_starts)
+  {
+    if (score.inverted <= kMostInverted) starts.push_back({name, carried, score.J()});
+    if (score.inverted > 0.5 && score.orthogonality < reflected_score_) {
+      reflected_score_ = score.orthogonality;
+      reflected_start_ = carried;
+    }
+  }
+}
+
+std::vector<Start> PoseAligner::mapped_starts() {
+  struct Named {
+    std::string name;
+    Eigen::MatrixXd map;
+    bool zoom;
+  };
+  std::vector<Named> maps;
+  const Eigen::Index available = std::min({kTreeFunctions, functions(rest_), functions(pose_)});
+  if (!hints_.landmarks_alone) {
+    if (hints_.free_frame) {
+      const Eigen::Matrix3d ours = principal_axes(rest_.basis), theirs = principal_axes(pose_.basis);
+      for (const Eigen::Vector3d& signs : {Eigen::Vector3d(1, 1, 1), Eigen::Vector3d(1, -1, -1),
+                                           Eigen::Vector3d(-1, 1, -1), Eigen::Vector3d(-1, -1, 1)}) {
+        const Eigen::Matrix3d R = theirs * signs.asDiagonal() * ours.transpose();
+        maps.push_back({"principal axes", spatial_map(rest_.mesh.vertices * R.transpose()), true});
+      }
+    } else {
+      maps.push_back({"spatial", spatial_map(rest_.mesh.vertices), false});
+      maps.push_back({"spatial, ZoomOut", maps.back().map, true});
+    }
+    for (auto& map : spectral_maps(rest_, pose_, available, kTreeMaps))
+      maps.push_back({"spectral", std::move(map), true});
+  }
+  if (has_landmarks() && !has_dense_map())
+    maps.push_back(
+        {"landmark map",
+         landmark_map(rest_, hints_.correspondences.on_rest, pose_, hints_.correspondences.on_pose, available), true});
+  std::vector<Start> starts;
+  // In order, so that ties do not depend on threads.
+  std::vector<Eigen::MatrixXd> refined(maps.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t k = 0; k < maps.size(); ++k) refined[k] = maps[k].zoom ? zoom_out_.refine(maps[k].map) : maps[k].map;
+  for (std::size_t k = 0; k < maps.size(); ++k) add_map(maps[k].name, refined[k], starts);
+  return starts;
+}
+
+// [n_0 x 3] the rest example laid over the pairs rigidly, and as its first `functions` functions fit them best.
+VertexArray PoseAligner::laid_over(const PointPairs& pairs, Eigen::Index functions) const {
+  const VertexArray at_rest = pairs.points * rest_.mesh.vertices;
+  const Eigen::RowVector3d from = at_rest.colwise().mean(), to = pairs.targets.colwise().mean();
+  const Eigen::Matrix3d R =
+      procrustes_rotation((pairs.targets.rowwise() - to).transpose() * (at_rest.rowwise() - from));
+  VertexArray positions = (rest_.mesh.vertices.rowwise() - from) * R.transpose();
+  positions.rowwise() += to;
+  if (functions == 0) return positions;
+  Eigen::MatrixXd values(pairs.count(), functions + 1);
+  values << pairs.points * rest_.basis.eigenfunctions.leftCols(functions), Eigen::VectorXd::Ones(pairs.count());
+  const Eigen::MatrixXd misses = pairs.targets - pairs.points * positions;
+  const Eigen::MatrixXd fitted = values.colPivHouseholderQr().solve(misses);
+  positions += rest_.basis.eigenfunctions.leftCols(functions) * fitted.topRows(functions);
+  positions.rowwise() += fitted.row(functions);
+  return positions;
+}
+
+// A dense map names whole vertices: what it says is as precise as the pose's mesh, and smoothing takes that off.
+PointPairs PoseAligner::pairs() const {
+  if (!has_landmarks()) return {};
+  PointPairs pairs{hints_.correspondences.on_rest, hints_.correspondences.on_pose * pose_.mesh.vertices};
+  if (!has_dense_map()) return pairs;
+  pairs.targets = pairs.points *
+                  laid_over(pairs, std::min({kSmoothFunctions, functions(rest_), pairs.count() / kPairsPerFunction}));
+  pairs.weight = kDenseWeight;
+  return pairs;
+}
+
+void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
+  const Eigen::Index functions = has_dense_map() ? kStartFunctions : 0;
+  starts.push_back({"correspondences", laid_over(pairs(), std::min(functions, this->functions(rest_))), 0});
+}
+
+// Starts that are polished whatever their score.
+std::vector<Start> PoseAligner::sure_starts() const {
+  std::vector<Start> starts;
+  if (has_landmarks()) add_landmark_starts(starts);
+  if (!hints_.free_frame && !hints_.landmarks_alone) starts.push_back({"rest", rest_.mesh.vertices, 0});
+  return starts;
+}
+
+std::vector<Start> PoseAligner::best_distinct(std::vector<Start> starts) const {
+  std::stable_sort(starts.begin(), starts.end(), [](const Start& a, const Start& b) { return a.J < b.J; });
+  std::vector<Start> best;
+  for (Start& start : starts) {
+    const bool is_new = std::ranges::none_of(best, [&](const Start& other) {
+      return norm(centred(start.positions - other.positions)) < kSameStart * size_;
+    });
+    if (is_new && best.size() < kPolished) best.push_back(std::move(start));
+  }
+  return best;
+}
+
+Fit PoseAligner::fit(const std::string& start, Registered registered) const {
+  VertexArray positions = centred(registered.positions);
+  if (hints_.free_frame)
+    positions *= procrustes_rotation(rest_.mesh.vertices.transpose() * (rest_.basis.mass * positions)).transpose();
+  VertexArray displacement = positions - rest_.mesh.vertices;
+  const double size = norm(displacement);
+  return {start, std::move(registered), std::move(displacement), size};
+}
+
+std::vector<Fit> PoseAligner::polish(const std::vector<Start>& starts) const {
+  std::vector<Fit> fits(starts.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t k = 0; k < starts.size(); ++k) fits[k] = fit(starts[k].name, registration_.run(starts[k].positions));
+  return fits;
+}
+
+bool PoseAligner::same_pose(const Fit& a, const Fit& b) const {
+  return norm(a.displacement - b.displacement) < std::max(kSamePose * std::max(a.size, b.size), kNoPose * size_);
+}
+
+// The best fit of each pose, best first.
+std::vector<Fit> PoseAligner::distinct_poses(std::vector<Fit> fits) const {
+  std::stable_sort(fits.begin(), fits.end(),
+                   [](const Fit& a, const Fit& b) { return a.registered.objective() < b.registered.objective(); });
+  std::vector<Fit> poses;
+  for (Fit& candidate : fits)
+    if (std::ranges::none_of(poses, [&](const Fit& pose) { return same_pose(pose, candidate); }))
+      poses.push_back(std::move(candidate));
+  return poses;
+}
+
+double PoseAligner::limit(const std::vector<Fit>& poses) const {
+  const double least = poses.front().registered.objective();
+  return std::max(kCompeting * least, least + kCompetingFloor);
+}
+
+// Of the poses that fit, the one nearest to rest; with landmarks, the one that fits best.
+const Fit& PoseAligner::choose(const std::vector<Fit>& poses) const {
+  if (has_landmarks()) return poses.front();
+  const double most = limit(poses);
+  const Fit* taken = &poses.front();
+  for (const Fit& pose : poses)
+    if (pose.registered.objective() <= most && pose.size < taken->size) taken = &pose;
+  return *taken;
+}
+
+// The same surface reached from the rest example turned upon itself.
+std::vector<Fit> PoseAligner::symmetric_copies(const Fit& taken) const {
+  std::vector<Fit> copies(symmetry_.rotations.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t k = 0; k < copies.size(); ++k) {
+    const VertexArray turned = rest_.mesh.vertices * symmetry_.rotations[k].transpose();
+    const auto nearest = nearest_points(rest_.mesh, turned);
+    const VertexArray start = nearest.interpolation(rest_.mesh) * taken.registered.positions;
+    copies[k] = fit(taken.start + ", turned", registration_.refine(start));
+  }
+  return copies;
+}
+
+bool PoseAligner::mirror_fits_better(double objective) const {
+  if (objective < kMirrorWorthwhile) return false;
+  TetMesh mirrored = rest_.mesh;
+  mirrored.vertices.col(0) *= -1;
+  mirrored.tets.col(0).swap(mirrored.tets.col(1));
+  const Registration registration(mirrored, pose_.mesh);
+  double least = std::numeric_limits<double>::infinity();
+  if (reflected_start_.rows() > 0) least = registration.run(reflected_start_).objective();
+  return least < kMirrorMargin * objective;
+}
+
+PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& poses) const {
+  PoseAlignment alignment;
+  const Registered& registered = taken.registered;
+  const SparseMatrix points = nearest_points(pose_.mesh, registered.positions).interpolation(pose_.mesh);
+  const Eigen::Index size = std::min({kTreeFunctions, functions(rest_), functions(pose_)});
+  alignment.positions = registered.positions;
+  alignment.start = taken.start;
+  alignment.residual = std::sqrt(registered.chamfer) / size_;
+  alignment.confidence = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)),
+                                  registered.distortion, registered.inverted}
+                             .J();
+  alignment.inverted_fraction = registered.inverted;
+  alignment.displacement = taken.size / size_;
+  const Eigen::Matrix3d turn =
+      procrustes_rotation(registered.positions.transpose() * (rest_.basis.mass * rest_.mesh.vertices));
+  alignment.turn = Eigen::AngleAxisd(turn).angle();
+  const double most = limit(poses);
+  // Turns of a body of revolution about its axis are many and near; the least of them is what is meant.
+  const double farther = symmetry_.of_revolution ? 1 : kClearlyFarther;
+  for (const Fit& pose : poses) {
+    if (same_pose(pose, taken) || pose.registered.objective() > most) continue;
+    ++alignment.competing_maps;
+    if (!has_landmarks() && (hints_.free_frame || pose.size < farther * taken.size)) alignment.ambiguous = true;
+  }
+  alignment.hides_twist = symmetry_.of_revolution && !has_landmarks();
+  alignment.mirrored = mirror_fits_better(registered.objective());
+  return alignment;
+}
+
+PoseAlignment PoseAligner::align() {
+  std::vector<Start> starts = best_distinct(mapped_starts());
+  for (Start& sure : sure_starts()) starts.push_back(std::move(sure));
+  std::vector<Fit> poses = distinct_poses(polish(starts));
+  if (!has_landmarks()) {
+    for (Fit& copy : symmetric_copies(choose(poses))) poses.push_back(std::move(copy));
+    poses = distinct_poses(std::move(poses));
+  }
+  const Fit& chosen = choose(poses);
+  const Fit taken = fit(chosen.start, registration_.refine(chosen.registered.positions));
+  return result(taken, poses);
+}
+
+}  // namespace
+
+PoseAlignment align_pose(const AlignedShape& rest, const Symmetry& symmetry, const AlignedShape& pose,
+                         const AlignmentHints& hints) {
+  return PoseAligner(rest, symmetry, pose, hints).align();
+}
+
+}  // namespace exmat::precompute

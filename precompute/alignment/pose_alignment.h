@@ -1,0 +1,46 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "precompute/alignment/functional_map.h"
+#include "precompute/alignment/registration.h"
+#include "precompute/alignment/symmetry.h"
+
+namespace exmat::precompute {
+
+/// Corresponding points of the rest example and a posed one.
+struct Correspondences {
+  SparseMatrix on_rest;  ///< l x n_0 interpolation
+  SparseMatrix on_pose;  ///< l x n_k interpolation
+
+  Eigen::Index count() const { return on_rest.rows(); }
+};
+
+/// What is known about a pose beforehand.
+struct AlignmentHints {
+  bool free_frame = false;          ///< the pose may be rotated in space
+  Correspondences correspondences;  ///< landmarks, or a dense map
+  bool landmarks_alone = false;     ///< no starts but from the correspondences
+};
+
+/// A posed example registered from the rest example: the positions of the rest example's vertices in the pose.
+struct PoseAlignment {
+  VertexArray positions;            ///< n_0 x 3, normalised, in the frame of the pose
+  std::string start;                ///< what the registration began with
+  double residual = 0;              ///< RMS distance of the two surfaces, over the RMS radius of the rest example
+  double confidence = 0;            ///< J of alignment.md; 0 is certain
+  double inverted_fraction = 0;     ///< of the rest example's volume
+  std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
+  bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is
+  bool mirrored = false;            ///< the mirror image of the rest example fits much better
+  bool hides_twist = false;         ///< a body of revolution: a turn about its axis leaves no trace
+  double displacement = 0;          ///< RMS from rest, over the RMS radius
+  double turn = 0;                  ///< angle of the rotation that lays the rest example best over the pose [rad]
+};
+
+/// Step 4 of alignment.md. Both shapes normalised; `symmetry` is that of the rest example.
+PoseAlignment align_pose(const AlignedShape& rest, const Symmetry& symmetry, const AlignedShape& pose,
+                         const AlignmentHints& hints);
+
+}  // namespace exmat::precompute

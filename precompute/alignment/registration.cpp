@@ -1,0 +1,168 @@
+#include "precompute/alignment/registration.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "common/core/error.h"
+#include "common/mesh/geometry.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr int kRounds = 25, kRefiningRounds = 8;
+constexpr int kStepsPerRound = 2;  // local and global
+constexpr double kFirstWeight = 20, kLastWeight = 400;
+constexpr double kPointToPoint = 0.1;    // beside point-to-plane
+constexpr int kFactors = 4;              // weights between the first and the last that are factored
+constexpr double kIsotropicShare = 0.4;  // of the preconditioner, between kPointToPoint and 1 + kPointToPoint
+constexpr double kTolerance = 1e-5;      // of conjugate gradients, on the residual
+constexpr int kMostIterations = 60;
+
+double factored_weight(int factor) {
+  return kFirstWeight * std::pow(kLastWeight / kFirstWeight, factor / static_cast<double>(kFactors - 1));
+}
+
+}  // namespace
+
+// A point of a moving triangle and the plane that it belongs on.
+struct Registration::SurfacePair {
+  std::array<std::int32_t, 3> corners{};
+  Eigen::Vector3d weights;
+  Eigen::Vector3d target, normal;
+  double share = 0;  // of all pairs
+
+  Eigen::Vector3d pull(const Eigen::Vector3d& distance) const {
+    return share * (normal * normal.dot(distance) + kPointToPoint * distance);
+  }
+  Eigen::Vector3d point(const VertexArray& positions) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (int k = 0; k < 3; ++k) sum += weights[k] * positions.row(corners[static_cast<std::size_t>(k)]).transpose();
+    return sum;
+  }
+  void add(const Eigen::Vector3d& force, VertexArray& forces) const {
+    for (int k = 0; k < 3; ++k) forces.row(corners[static_cast<std::size_t>(k)]) += weights[k] * force.transpose();
+  }
+};
+
+Registration::Registration(const TetMesh& moving, const TetMesh& fixed, PointPairs pairs)
+    : arap_(moving),
+      triangles_(surface_triangles(moving.tets)),
+      areas_(triangle_samples(moving.vertices, triangles_).areas),
+      fixed_(fixed.vertices, surface_triangles(fixed.tets)),
+      pairs_(std::move(pairs)) {
+  areas_ /= areas_.sum();
+  std::vector<Eigen::Triplet<double>> entries;
+  for (Eigen::Index k = 0; k < triangles_.rows(); ++k)
+    for (int i = 0; i < 3; ++i)
+      for (int j = 0; j < 3; ++j) entries.emplace_back(triangles_(k, i), triangles_(k, j), areas_[k] / 9);
+  const Eigen::Index n = arap_.stiffness().rows();
+  Eigen::SparseMatrix<double> surface(n, n);
+  surface.setFromTriplets(entries.begin(), entries.end());
+  Eigen::SparseMatrix<double> base = arap_.stiffness();
+  if (pairs_.count() > 0)
+    base += Eigen::SparseMatrix<double>(pairs_.points.transpose() * pairs_.points) *
+            (pairs_.weight / static_cast<double>(pairs_.count()));
+  for (int factor = 0; factor < kFactors; ++factor) {
+    factors_.push_back(std::make_unique<Factor>(base + kIsotropicShare * factored_weight(factor) * surface));
+    if (factors_.back()->info() != Eigen::Success) throw WorkError("registration: the global step is singular");
+  }
+}
+
+const Registration::Factor& Registration::preconditioner(double weight) const {
+  const double step = std::log(kLastWeight / kFirstWeight) / (kFactors - 1);
+  const auto index = std::lround(std::log(weight / kFirstWeight) / step);
+  return *factors_[static_cast<std::size_t>(index)];
+}
+
+std::vector<Registration::SurfacePair> Registration::surface_pairs(const VertexArray& positions) const {
+  const SurfaceTree moved(positions, triangles_);
+  const auto& ours = moved.samples();
+  const auto& theirs = fixed_.samples();
+  const Eigen::Index forward = triangles_.rows(), count = forward + theirs.areas.size();
+  const double their_area = theirs.areas.sum();
+  std::vector<SurfacePair> pairs(static_cast<std::size_t>(count));
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index k = 0; k < count; ++k) {
+    SurfacePair& pair = pairs[static_cast<std::size_t>(k)];
+    Eigen::Index triangle = k;
+    if (k < forward) {
+      const auto found = fixed_.nearest_facing(ours.centres.row(k).transpose(), ours.normals.row(k).transpose());
+      pair.weights.setConstant(1.0 / 3);
+      pair.target = found.position;
+      pair.normal = theirs.normals.row(found.triangle);
+      pair.share = 0.5 * areas_[k];
+    } else {
+      const Eigen::Index sample = k - forward;
+      pair.target = theirs.centres.row(sample);
+      pair.normal = theirs.normals.row(sample);
+      const auto found = moved.nearest_facing(pair.target, pair.normal);
+      pair.weights = found.weights;
+      pair.share = 0.5 * theirs.areas[sample] / their_area;
+      triangle = found.triangle;
+    }
+    for (int corner = 0; corner < 3; ++corner)
+      pair.corners[static_cast<std::size_t>(corner)] = triangles_(triangle, corner);
+  }
+  return pairs;
+}
+
+void Registration::round(double weight, VertexArray& positions) const {
+  const auto pairs = surface_pairs(positions);
+  const double pair_weight = pairs_.count() > 0 ? pairs_.weight / static_cast<double>(pairs_.count()) : 0;
+  const auto apply = [&](const VertexArray& x) {
+    VertexArray y = VertexArray::Zero(x.rows(), 3);
+    for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.point(x)), y);
+    y += arap_.stiffness() * x;
+    if (pair_weight > 0) y += pairs_.points.transpose() * (pair_weight * (pairs_.points * x));
+    return y;
+  };
+  VertexArray targets = VertexArray::Zero(positions.rows(), 3);
+  for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.target), targets);
+  if (pair_weight > 0) targets += pairs_.points.transpose() * (pair_weight * pairs_.targets);
+  const Factor& factor = preconditioner(weight);
+  for (int step = 0; step < kStepsPerRound; ++step) {
+    const VertexArray load = arap_.load(arap_.rotations(positions)) + targets;
+    VertexArray residual = load - apply(positions);
+    VertexArray preconditioned = factor.solve(Eigen::MatrixXd(residual));
+    VertexArray direction = preconditioned;
+    double product = residual.cwiseProduct(preconditioned).sum();
+    for (int k = 0; k < kMostIterations && residual.norm() > kTolerance * load.norm(); ++k) {
+      const VertexArray applied = apply(direction);
+      const double length = product / direction.cwiseProduct(applied).sum();
+      positions += length * direction;
+      residual -= length * applied;
+      preconditioned = factor.solve(Eigen::MatrixXd(residual));
+      const double next = residual.cwiseProduct(preconditioned).sum();
+      direction = preconditioned + next / product * direction;
+      product = next;
+    }
+  }
+}
+
+Registered Registration::run(const VertexArray& start) const {
+  VertexArray positions = start;
+  for (int k = 0; k < kRounds; ++k)
+    round(kFirstWeight * std::pow(kLastWeight / kFirstWeight, k / (kRounds - 1.0)), positions);
+  return assess(positions);
+}
+
+Registered Registration::refine(const VertexArray& start) const {
+  VertexArray positions = start;
+  for (int k = 0; k < kRefiningRounds; ++k) round(kLastWeight, positions);
+  return assess(positions);
+}
+
+Registered Registration::assess(const VertexArray& positions) const {
+  Registered result;
+  result.positions = positions;
+  result.distortion = arap_.energy(positions);
+  result.chamfer = two_way_chamfer(SurfaceTree(positions, triangles_), fixed_);
+  result.inverted = arap_.inverted_fraction(positions);
+  if (pairs_.count() > 0)
+    result.landmark_rms =
+        (pairs_.points * positions - pairs_.targets).norm() / std::sqrt(static_cast<double>(pairs_.count()));
+  return result;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/SparseCholesky>
+#include <memory>
+#include <vector>
+
+#include "precompute/alignment/arap_energy.h"
+#include "precompute/alignment/surface_tree.h"
+
+namespace exmat::precompute {
+
+/// Points of a moving body and where they belong on a fixed one.
+struct PointPairs {
+  SparseMatrix points;  ///< l x n, values at the points from values at the vertices
+  VertexArray targets;  ///< l x 3
+  double weight = 20;   ///< of their mean squared distance, in every round
+
+  Eigen::Index count() const { return targets.rows(); }
+};
+
+/// A moving body laid over a fixed one, and how well.
+struct Registered {
+  VertexArray positions;    ///< n x 3, of the moving body's vertices in the frame of the fixed one
+  double distortion = 0;    ///< mean |F - R|^2
+  double chamfer = 0;       ///< two-way, mean squared distance of the surfaces
+  double inverted = 0;      ///< share of the volume with det F < 0
+  double landmark_rms = 0;  ///< distance of the pairs
+
+  /// F of alignment.md: E_ARAP + 20 Chamfer^2 + 2 inverted + 2 landmark RMS.
+  double objective() const { return distortion + 20 * chamfer + 2 * inverted + 2 * landmark_rms; }
+};
+
+/// As-rigid-as-possible registration of one body's surface to another's, both of volume 1 at centroid 0. Each round
+/// pairs samples of both surfaces with the nearest points that face the same way, then takes local and global steps
+/// of E_ARAP + w (point-to-plane + a little point-to-point) + pairs given. The global step is solved by conjugate
+/// gradients, preconditioned by prefactored sparse Cholesky. alignment.md, "Default", step 4.
+class Registration {
+ public:
+  Registration(const TetMesh& moving, const TetMesh& fixed, PointPairs pairs = {});
+
+  /// From a start [n x 3], the weight growing from 20 to 400. Several may run at once.
+  Registered run(const VertexArray& start) const;
+
+  /// From a start that is nearly there, at the last weight.
+  Registered refine(const VertexArray& start) const;
+
+  Registered assess(const VertexArray& positions) const;
+
+  const ArapEnergy& arap() const { return arap_; }
+  const SurfaceTree& fixed_surface() const { return fixed_; }
+  const TriangleArray& moving_triangles() const { return triangles_; }
+
+ private:
+  using Factor = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>;
+  struct SurfacePair;
+
+  void round(double weight, VertexArray& positions) const;
+  std::vector<SurfacePair> surface_pairs(const VertexArray& positions) const;
+  const Factor& preconditioner(double weight) const;
+
+  ArapEnergy arap_;
+  TriangleArray triangles_;
+  Eigen::VectorXd areas_;  // of the moving triangles at rest, of sum 1
+  SurfaceTree fixed_;
+  PointPairs pairs_;
+  std::vector<std::unique_ptr<Factor>> factors_;
+};
+
+}  // namespace exmat::precompute

@@ -1,0 +1,225 @@
+// Errors of transferred poses against analytic ones, by method of alignment. Prints the table of docs/alignment.md, and
+// renews it where the page is named: alignment_benchmark [PAGE.md]
+
+#include <fmt/format.h>
+#include <fstream>
+#include <iostream>
+#include <vector>
+
+#include "common/core/error.h"
+#include "common/core/timer.h"
+#include "common/mesh/geometry.h"
+#include "precompute/alignment/kd_tree.h"
+#include "precompute/pipeline/example_stage.h"
+#include "precompute/shape_space/transfer.h"
+#include "tests/support/posed_bodies.h"
+#include "tests/support/temporary_folder.h"
+
+namespace exmat::benchmarks {
+namespace {
+
+using precompute::AlignmentVerdict;
+using precompute::ExampleInput;
+using precompute::ObjectInput;
+using precompute::PoseInput;
+
+constexpr double kLength = 4;
+constexpr double kWrong = 0.35;  // above the error of the ideal projection: another pose, not a worse one
+const std::string kBegin = "<!-- results: begin -->", kEnd = "<!-- results: end -->";
+
+struct NamedPose {
+  std::string name;
+  test::Pose pose;
+};
+const std::vector<NamedPose>& poses() {
+  static const std::vector<NamedPose> all{
+      {"bend", test::bend(kLength, 1.57)}, {"twist", test::twist(kLength, 1.2)}, {"S", test::s_bend(kLength, 0.8)}};
+  return all;
+}
+
+// Three tessellations: of the object, of its rest example and of the posed examples, all at rest.
+struct Body {
+  std::string name;
+  TetMesh object, rest, posed;
+  std::array<int, 3> object_cells, rest_cells, posed_cells;
+};
+
+std::vector<Body> bodies() {
+  const std::array<int, 3> a{16, 5, 4}, b{14, 4, 4}, c{15, 5, 3}, d{16, 6, 6}, e{13, 5, 5};
+  const auto bar = [](const std::array<int, 3>& cells, double height, std::uint32_t seed) {
+    return test::centred(test::shaken_box(cells, {kLength, 1, height}, seed));
+  };
+  const double radius = 1 / std::sqrt(M_PI);
+  return {{"rectangular bar", bar(a, 0.6, 1), bar(b, 0.6, 2), bar(c, 0.6, 3), a, b, c},
+          {"square bar", bar(a, 1, 1), bar(b, 1, 2), bar(c, 1, 3), a, b, c},
+          {"cylinder for a square bar", bar(a, 1, 1), test::cylinder_mesh(16, 6, kLength, radius, 2),
+           test::cylinder_mesh(13, 5, kLength, radius, 3), a, d, e}};
+}
+
+struct Method {
+  std::string name;
+  std::string method = "auto", frame = "shared";
+  bool same_connectivity = false, landmarks = false, map = false, moved = false;
+};
+const std::vector<Method>& methods() {
+  static const std::vector<Method> all{
+      {.name = "same connectivity", .same_connectivity = true},
+      {.name = "auto, same frame"},
+      {.name = "8 landmarks, unknown frame and scale",
+       .method = "landmarks",
+       .frame = "free",
+       .landmarks = true,
+       .moved = true},
+      {.name = "auto, unknown frame and scale", .frame = "free", .moved = true},
+      {.name = "dense map, same frame", .method = "map", .map = true},
+      {.name = "coupled bases, 8 landmarks, same frame", .method = "coupled", .landmarks = true}};
+  return all;
+}
+
+// The vertex of a box_mesh at each of its corners.
+std::vector<std::int32_t> corners(const std::array<int, 3>& cells) {
+  std::vector<std::int32_t> ids;
+  for (int k = 0; k < 8; ++k)
+    ids.push_back(((k >> 2 & 1) * cells[2] * (cells[1] + 1) + (k >> 1 & 1) * cells[1]) * (cells[0] + 1) +
+                  (k & 1) * cells[0]);
+  return ids;
+}
+
+TetMesh moved(TetMesh mesh) {
+  const Eigen::AngleAxisd turn(2.0, Eigen::Vector3d(1, 2, 3).normalized());
+  mesh.vertices = 37 * mesh.vertices * turn.toRotationMatrix().transpose();
+  mesh.vertices.rowwise() += Eigen::RowVector3d(50, -20, 7);
+  return mesh;
+}
+
+ExampleInput example_input(const Body& body, const Method& method) {
+  ExampleInput input;
+  input.object_is_rest = false;
+  input.rest.name = "rest";
+  input.rest.mesh = body.rest;
+  input.rest.column = 1;
+  const IndexVector nearest = precompute::KdTree(RowMatrix(body.posed.vertices)).nearest(body.object.vertices);
+  for (const NamedPose& named : poses()) {
+    PoseInput pose;
+    pose.name = named.name;
+    pose.same_connectivity = method.same_connectivity;
+    pose.mesh = test::posed(method.same_connectivity ? body.rest : body.posed, named.pose);
+    if (method.moved) pose.mesh = moved(pose.mesh);
+    if (method.map) pose.on_object = nearest;
+    pose.column = 2 + std::ssize(input.poses);
+    input.poses.push_back(std::move(pose));
+  }
+  if (!method.landmarks) return input;
+  const auto object = corners(body.object_cells), rest = corners(body.rest_cells), posed = corners(body.posed_cells);
+  input.landmarks.resize(8, 5);
+  for (Eigen::Index k = 0; k < 8; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    input.landmarks.row(k) << object[at], rest[at], posed[at], posed[at], posed[at];
+  }
+  return input;
+}
+
+struct Counts {
+  int cases = 0, refused = 0, doubtful = 0, wrong_and_refused = 0, wrong_and_doubtful = 0, silent = 0;
+};
+
+struct Errors {
+  double ideal = 0, ours = 0;
+};
+
+// Relative M-norm against the analytic displacement in the mean axes of the body.
+Errors errors(const precompute::ShapeStage& stage, const TetMesh& object, std::size_t k) {
+  const auto& basis = stage.object;
+  const VertexArray posed = precompute::normalised_positions(test::posed(object, poses()[k].pose));
+  const auto axes = precompute::procrustes_rotation(basis.vertices.transpose() * (basis.mass * posed));
+  const VertexArray exact = posed * axes.transpose() - basis.vertices;
+  const VertexArray ours =
+      stage.displacements.col(static_cast<Eigen::Index>(k)).reshaped<Eigen::RowMajor>(exact.rows(), 3) /
+      std::cbrt(basis.volume);
+  const VertexArray ideal = basis.eigenfunctions * precompute::coefficients(basis, exact);
+  const auto norm = [&](const VertexArray& field) {
+    return std::sqrt((field.transpose() * (basis.mass * field)).trace());
+  };
+  return {norm(ideal - exact) / norm(exact), norm(ours - exact) / norm(exact)};
+}
+
+struct Row {
+  std::string ideal, ours;
+};
+
+Row row(const Body& body, const Method& method, int m, Counts& counts) {
+  AssetConfig asset;
+  asset.name = "benchmark";
+  asset.eigenfunctions = m;
+  asset.alignment.method = method.method;
+  asset.alignment.frame = method.frame;
+  ObjectInput object;
+  object.mesh = body.object;
+  object.materials.density.setOnes(body.object.tet_count());
+  object.fixed = FlagVector::Zero(body.object.vertex_count());
+  std::vector<std::string> warnings;
+  const auto stage = precompute::build_shape_stage(asset, object, example_input(body, method), warnings);
+  Row result;
+  for (std::size_t k = 0; k < poses().size(); ++k) {
+    const auto [ideal, ours] = errors(stage, body.object, k);
+    const auto& outcome = stage.alignments[k + 1];
+    const bool wrong = ours > ideal + kWrong, refused = outcome.verdict == AlignmentVerdict::kRefused,
+               doubtful = outcome.verdict == AlignmentVerdict::kDoubtful;
+    ++counts.cases;
+    counts.refused += refused ? 1 : 0;
+    counts.doubtful += doubtful ? 1 : 0;
+    counts.wrong_and_refused += wrong && refused ? 1 : 0;
+    counts.wrong_and_doubtful += wrong && doubtful ? 1 : 0;
+    counts.silent += wrong && outcome.verdict == AlignmentVerdict::kGood ? 1 : 0;
+    const char* separator = k == 0 ? "" : " / ";
+    result.ideal += fmt::format("{}{:.2f}", separator, ideal);
+    result.ours += refused ? fmt::format("{}refused ({:.2f})", separator, ours)
+                           : fmt::format("{}{:.2f}{}", separator, ours, doubtful ? "?" : "");
+  }
+  return result;
+}
+
+std::string table() {
+  std::string text = "| body | m | method | bend / twist / S |\n| --- | --- | --- | --- |\n";
+  Counts counts;
+  for (const Body& body : bodies())
+    for (const int m : {6, 10, 20})
+      for (const Method& method : methods()) {
+        const Timer timer;
+        const Row result = row(body, method, m, counts);
+        if (&method == &methods().front())
+          text += fmt::format("| {} | {} | ideal projection | {} |\n", body.name, m, result.ideal);
+        text += fmt::format("| {} | {} | {} | {} |\n", body.name, m, method.name, result.ours);
+        fmt::print(stderr, "{}, m = {}, {}: {} ({:.1f} s)\n", body.name, m, method.name, result.ours, timer.seconds());
+      }
+  text += fmt::format(
+      "\n{} cases: {} refused (of these {} wrong by more than {} over the ideal projection), {} taken with a warning "
+      "({} wrong),\nthe rest taken as good: {} wrong.\n",
+      counts.cases, counts.refused, counts.wrong_and_refused, kWrong, counts.doubtful, counts.wrong_and_doubtful,
+      counts.silent);
+  return text;
+}
+
+int run(int argc, char** argv) {
+  const std::string results = table();
+  std::cout << results;
+  if (argc < 2) return 0;
+  const std::string page = test::read_file(argv[1]);
+  const auto begin = page.find(kBegin), end = page.find(kEnd);
+  if (begin == std::string::npos || end == std::string::npos)
+    throw WorkError(std::string(argv[1]) + ": no place for the results");
+  test::write_file(argv[1], page.substr(0, begin + kBegin.size()) + "\n" + results + page.substr(end));
+  return 0;
+}
+
+}  // namespace
+}  // namespace exmat::benchmarks
+
+int main(int argc, char** argv) {
+  try {
+    return exmat::benchmarks::run(argc, argv);
+  } catch (const std::exception& error) {
+    std::cerr << error.what() << '\n';
+    return 1;
+  }
+}
