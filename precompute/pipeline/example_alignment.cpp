@@ -7,6 +7,7 @@
 
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/mesh/geometry.h"
 #include "precompute/alignment/coupled_bases.h"
 
 namespace exmat::precompute {
@@ -272,13 +273,18 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
   const VertexArray displacement = object_.eigenfunctions * (carried * to_rest.transpose() - carried_rest);
   const MapScore score =
       score_map(ArapEnergy({object_.vertices, object_input_.mesh.tets}), map, object_.vertices + displacement);
-  aligned.outcome.residual = missed_landmarks(rest, pose, aligned.basis.vertices * to_rest.transpose(), displacement);
+  const VertexArray posed = aligned.basis.vertices * to_rest.transpose();
+  const SurfaceTree found(object_.vertices + displacement, surface_triangles(object_input_.mesh.tets)),
+      given(posed, surface_triangles(pose.mesh.tets));
+  aligned.outcome.residual = std::sqrt(two_way_chamfer(found, given)) / rms_radius(object_);
   aligned.functional_map = map;
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
-  aligned.outcome.confidence = score.J() + aligned.outcome.residual;
+  aligned.outcome.confidence = score.J() + missed_landmarks(rest, pose, posed, displacement);
   aligned.outcome.inverted_fraction = score.inverted;
-  judge_confidence(aligned.outcome, "give more landmarks or regions, or take alignment.method \"auto\"");
+  const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
+  judge_confidence(aligned.outcome, advice);
+  judge_residual(aligned.outcome, advice);
   return aligned;
 }
 
