@@ -12,21 +12,19 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30, kSmoothFunctions = 60;
+constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30;
 constexpr std::size_t kTreeMaps = 12;
 constexpr std::size_t kPolished = 6;
-constexpr double kMostInverted = 0.2;          // of a start's volume
-constexpr double kCompeting = 1.4;             // times the least F
-constexpr double kCompetingFloor = 0.003;      // added to it: below, fits differ by their tessellation alone
-constexpr double kSamePose = 0.25;             // difference of displacements, relative to the larger
-constexpr double kSameStart = 0.1;             // difference of starts, relative to the body's size
-constexpr double kNoPose = 0.03;               // a displacement from rest, relative to the body's size, that is none
-constexpr double kClearlyFarther = 1.2;        // times the displacement of the pose that is taken
-constexpr Eigen::Index kFewLandmarks = 100;    // more pairs than this are a dense map
-constexpr Eigen::Index kPairsPerFunction = 4;  // at least, in a fit to a dense map
-constexpr double kDenseWeight = 100;           // of a dense map in the registration
-constexpr double kMirrorMargin = 0.5;          // of the best F, from which on a mirror image is believed
-constexpr double kMirrorWorthwhile = 0.05;     // F above which it is looked for
+constexpr double kMostInverted = 0.2;        // of a start's volume
+constexpr double kCompeting = 1.4;           // times the least F
+constexpr double kCompetingFloor = 0.003;    // added to it: below, fits differ by their tessellation alone
+constexpr double kSamePose = 0.25;           // difference of displacements, relative to the larger
+constexpr double kSameStart = 0.1;           // difference of starts, relative to the body's size
+constexpr double kNoPose = 0.03;             // a displacement from rest, relative to the body's size, that is none
+constexpr double kClearlyFarther = 1.2;      // times the displacement of the pose that is taken
+constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
+constexpr double kMirrorMargin = 0.5;        // of the best F, from which on a mirror image is believed
+constexpr double kMirrorWorthwhile = 0.05;   // F above which it is looked for
 
 // Where a registration begins.
 struct Start {
@@ -82,6 +80,7 @@ class PoseAligner {
   std::vector<Fit> symmetric_copies(const Fit& taken) const;
   double limit(const std::vector<Fit>& fits) const;
   const Fit& choose(const std::vector<Fit>& poses) const;
+  Registered settle(const VertexArray& positions) const;
   bool mirror_fits_better(double objective) const;
   PoseAlignment result(const Fit& taken, const std::vector<Fit>& poses) const;
 
@@ -172,15 +171,9 @@ VertexArray PoseAligner::laid_over(const PointPairs& pairs, Eigen::Index functio
   return positions;
 }
 
-// A dense map names whole vertices: what it says is as precise as the pose's mesh, and smoothing takes that off.
 PointPairs PoseAligner::pairs() const {
   if (!has_landmarks()) return {};
-  PointPairs pairs{hints_.correspondences.on_rest, hints_.correspondences.on_pose * pose_.mesh.vertices};
-  if (!has_dense_map()) return pairs;
-  pairs.targets = pairs.points *
-                  laid_over(pairs, std::min({kSmoothFunctions, functions(rest_), pairs.count() / kPairsPerFunction}));
-  pairs.weight = kDenseWeight;
-  return pairs;
+  return {hints_.correspondences.on_rest, hints_.correspondences.on_pose * pose_.mesh.vertices};
 }
 
 void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
@@ -307,6 +300,13 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   return alignment;
 }
 
+// Landmarks and maps name vertices, near which a point belongs: they decide which pose it is, the surface where it
+// lies. A body of revolution slips, so there they stay.
+Registered PoseAligner::settle(const VertexArray& positions) const {
+  if (!has_landmarks() || symmetry_.of_revolution) return registration_.refine(positions);
+  return Registration(rest_.mesh, pose_.mesh).run(positions);
+}
+
 PoseAlignment PoseAligner::align() {
   std::vector<Start> starts = best_distinct(mapped_starts());
   for (Start& sure : sure_starts()) starts.push_back(std::move(sure));
@@ -316,8 +316,7 @@ PoseAlignment PoseAligner::align() {
     poses = distinct_poses(std::move(poses));
   }
   const Fit& chosen = choose(poses);
-  const Fit taken = fit(chosen.start, registration_.refine(chosen.registered.positions));
-  return result(taken, poses);
+  return result(fit(chosen.start, settle(chosen.registered.positions)), poses);
 }
 
 }  // namespace

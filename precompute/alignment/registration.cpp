@@ -13,6 +13,7 @@ namespace {
 constexpr int kRounds = 25, kRefiningRounds = 8;
 constexpr int kStepsPerRound = 2;  // local and global
 constexpr double kFirstWeight = 20, kLastWeight = 400;
+constexpr double kPairWeight = 20;       // of pairs given, whatever the round
 constexpr double kPointToPoint = 0.1;    // beside point-to-plane
 constexpr int kFactors = 4;              // weights between the first and the last that are factored
 constexpr double kIsotropicShare = 0.4;  // of the preconditioner, between kPointToPoint and 1 + kPointToPoint
@@ -62,7 +63,7 @@ Registration::Registration(const TetMesh& moving, const TetMesh& fixed, PointPai
   Eigen::SparseMatrix<double> base = arap_.stiffness();
   if (pairs_.count() > 0)
     base += Eigen::SparseMatrix<double>(pairs_.points.transpose() * pairs_.points) *
-            (pairs_.weight / static_cast<double>(pairs_.count()));
+            (kPairWeight / static_cast<double>(pairs_.count()));
   for (int factor = 0; factor < kFactors; ++factor) {
     factors_.push_back(std::make_unique<Factor>(base + kIsotropicShare * factored_weight(factor) * surface));
     if (factors_.back()->info() != Eigen::Success) throw WorkError("registration: the global step is singular");
@@ -109,7 +110,7 @@ std::vector<Registration::SurfacePair> Registration::surface_pairs(const VertexA
 
 void Registration::round(double weight, VertexArray& positions) const {
   const auto pairs = surface_pairs(positions);
-  const double pair_weight = pairs_.count() > 0 ? pairs_.weight / static_cast<double>(pairs_.count()) : 0;
+  const double pair_weight = pairs_.count() > 0 ? kPairWeight / static_cast<double>(pairs_.count()) : 0;
   const auto apply = [&](const VertexArray& x) {
     VertexArray y = VertexArray::Zero(x.rows(), 3);
     for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.point(x)), y);

@@ -13,7 +13,6 @@ namespace exmat::precompute {
 struct PointPairs {
   SparseMatrix points;  ///< l x n, values at the points from values at the vertices
   VertexArray targets;  ///< l x 3
-  double weight = 20;   ///< of their mean squared distance, in every round
 
   Eigen::Index count() const { return targets.rows(); }
 };

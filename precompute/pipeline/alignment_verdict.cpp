@@ -79,6 +79,13 @@ void judge_confidence(AlignmentOutcome& outcome, const std::string& advice) {
   if (outcome.confidence > kConfidenceWarning) object_to(outcome, AlignmentVerdict::kDoubtful, doubt);
 }
 
+void judge_residual(AlignmentOutcome& outcome, const std::string& advice) {
+  const auto misfit = fmt::format("its surface is {:.1f} % from what was found (of the body's size); {}",
+                                  100 * outcome.residual, advice);
+  if (outcome.residual > kResidualRefusal) object_to(outcome, AlignmentVerdict::kRefused, misfit);
+  if (outcome.residual > kResidualWarning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
+}
+
 void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome) {
   outcome.residual = alignment.residual;
   outcome.confidence = alignment.confidence;
@@ -88,16 +95,12 @@ void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool f
     object_to(outcome, AlignmentVerdict::kRefused,
               fmt::format("the mirror image of the rest example fits much better; mirror the example back, or give {}",
                           kSameMesh));
-  judge_confidence(outcome, fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh));
-  const auto misfit = fmt::format(
-      "its surface is {:.1f} % from the registered one (of the body's size); is it the "
-      "rest example's body? If so, give {}, or {}",
-      100 * alignment.residual, kLandmarks, kSameMesh);
-  if (alignment.residual > kResidualRefusal) object_to(outcome, AlignmentVerdict::kRefused, misfit);
+  const auto advice = fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
+  judge_confidence(outcome, advice);
+  judge_residual(outcome, advice);
   judge_competitors(alignment, free_frame, outcome);
   judge_revolution(alignment, outcome);
   if (frame == "auto" && !free_frame) judge_turn(alignment, outcome);
-  if (alignment.residual > kResidualWarning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
 }
 
 void require_aligned(const AssetConfig& asset, const std::vector<AlignmentOutcome>& outcomes,

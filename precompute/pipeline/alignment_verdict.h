@@ -30,6 +30,9 @@ void object_to(AlignmentOutcome& outcome, AlignmentVerdict verdict, const std::s
 /// Confidence J and share of inverted volume against their limits; `advice` says what input would help.
 void judge_confidence(AlignmentOutcome& outcome, const std::string& advice);
 
+/// Residual, the distance of the pose's surface from what was found, against its limits.
+void judge_residual(AlignmentOutcome& outcome, const std::string& advice);
+
 /// Fills in an outcome from a registered pose. `frame` is that of the asset; `free_frame` what it came to.
 void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome);
 

@@ -7,6 +7,7 @@
 
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/mesh/geometry.h"
 #include "precompute/alignment/coupled_bases.h"
 
 namespace exmat::precompute {
@@ -245,20 +246,45 @@ Eigen::MatrixXd ExampleAligner::coupled_map(const PoseInput& example, const Lapl
       .functional_map();
 }
 
+// How far the displacement carried to the object [n x 3] misses that of the example's landmarks, RMS, over the size of
+// theirs; 0 without landmarks. `posed` are the pose's vertices in the rest example's frame.
+double ExampleAligner::missed_landmarks(const AlignedRest& rest, const PoseInput& pose, const VertexArray& posed,
+                                        const VertexArray& displacement) const {
+  const VertexArray at_rest = rest.map.pull_back * rest.basis.vertices;
+  double missed = 0, size = 0;
+  for (Eigen::Index k = 0; k < examples_.landmarks.rows(); ++k) {
+    const auto on_object = examples_.landmarks(k, 0), on_pose = examples_.landmarks(k, pose.column);
+    if (on_object < 0 || on_pose < 0) continue;
+    const Eigen::RowVector3d truth = posed.row(on_pose) - at_rest.row(on_object);
+    missed += (displacement.row(on_object) - truth).squaredNorm();
+    size += truth.squaredNorm();
+  }
+  return size > 0 ? std::sqrt(missed / size) : 0;
+}
+
 AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& pose) const {
   AlignedPose aligned;
   aligned.basis = laplace_basis(pose.mesh, example_function_count(functions(), pose.mesh.vertex_count()), pose.name);
   const Eigen::MatrixXd map = coupled_map(pose, aligned.basis);
-  const Eigen::MatrixXd change = map * coefficients(aligned.basis, aligned.basis.vertices) -
-                                 rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices);
-  const MapScore score = score_map(ArapEnergy({object_.vertices, object_input_.mesh.tets}), map,
-                                   object_.vertices + object_.eigenfunctions * change);
+  const Eigen::MatrixXd carried_rest = rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices);
+  const Eigen::MatrixXd carried = map * coefficients(aligned.basis, aligned.basis.vertices);
+  Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
+  if (rest.free_poses) to_rest = procrustes_rotation(carried_rest.transpose() * carried);
+  const VertexArray displacement = object_.eigenfunctions * (carried * to_rest.transpose() - carried_rest);
+  const MapScore score =
+      score_map(ArapEnergy({object_.vertices, object_input_.mesh.tets}), map, object_.vertices + displacement);
+  const VertexArray posed = aligned.basis.vertices * to_rest.transpose();
+  const SurfaceTree found(object_.vertices + displacement, surface_triangles(object_input_.mesh.tets)),
+      given(posed, surface_triangles(pose.mesh.tets));
+  aligned.outcome.residual = std::sqrt(two_way_chamfer(found, given)) / rms_radius(object_);
   aligned.functional_map = map;
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
-  aligned.outcome.confidence = score.J();
+  aligned.outcome.confidence = score.J() + missed_landmarks(rest, pose, posed, displacement);
   aligned.outcome.inverted_fraction = score.inverted;
-  judge_confidence(aligned.outcome, "give more landmarks or regions, or take alignment.method \"auto\"");
+  const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
+  judge_confidence(aligned.outcome, advice);
+  judge_residual(aligned.outcome, advice);
   return aligned;
 }
 

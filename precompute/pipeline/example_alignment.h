@@ -48,6 +48,8 @@ class ExampleAligner {
   const AlignedShape& rest_shape(const AlignedRest& rest);
   Correspondences correspondences(const AlignedRest& rest, const PoseInput& pose) const;
   AlignedPose registered(const AlignedRest& rest, const PoseInput& pose);
+  double missed_landmarks(const AlignedRest& rest, const PoseInput& pose, const VertexArray& posed,
+                          const VertexArray& displacement) const;
   AlignedPose coupled(const AlignedRest& rest, const PoseInput& pose) const;
   Eigen::MatrixXd coupled_map(const PoseInput& example, const LaplaceBasis& basis) const;
 

@@ -168,7 +168,7 @@ void ExampleReader::read_pose(const ExampleConfig& example) {
       throw InputError(
           {example.mesh.string(), "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
     const Eigen::VectorXd volumes = tet_volumes(pose.mesh);
-    pose.inverted_fraction = -volumes.cwiseMin(0).sum() / volumes.cwiseAbs().sum();
+    pose.inverted_fraction = (-volumes).cwiseMax(0).sum() / volumes.cwiseAbs().sum();
     refuse_inverted(pose);
   } else {
     const auto checked = check(std::move(file), example.mesh, example.drop);

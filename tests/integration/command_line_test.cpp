@@ -147,9 +147,6 @@ TEST_F(CommandLine, FaultsOfAnAssetAreNamed) {
   expect_asset_refused(R"({ "basis": { "siz": 3 } })", {asset, "/basis/siz", "did you mean \"size\"?"});
   expect_asset_refused(R"({ "object": { "mesh": "none.msh" } })", {folder_.path("none.msh"), "no such file"});
   expect_asset_refused(R"({ "object": { "mesh": "asset.json" } })", {asset, ".msh", "'.json'"});
-  expect_asset_refused(R"({ "examples": [ { "name": "rest", "mesh": "rest.msh", "rest": true },
-                                          { "name": "pose", "mesh": "bar.msh" } ] })",
-                       {folder_.path("bar.msh"), "tets", "connectivity of the rest example rest"});
 }
 
 TEST_F(CommandLine, FaultsOfAClampAreNamed) {
