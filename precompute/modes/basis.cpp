@@ -54,12 +54,6 @@ void orthonormalise(const SparseMatrix& mass, Eigen::MatrixXd& columns) {
 
 }  // namespace
 
-Eigen::MatrixXd clamp_fields(const ElasticSystem& system, const SemidefiniteSolver& solver,
-                             const Eigen::MatrixXd& fields) {
-  const Eigen::MatrixXd moved = fields - system.extend(system.restrict(fields));
-  return system.restrict(fields) + solver.solve(system.restrict(system.full_stiffness * moved));
-}
-
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
   const auto& mass = input.system.mass;
   Eigen::MatrixXd basis(mass.rows(), 0);

@@ -18,9 +18,4 @@ struct BasisInput {
 /// InputError (without a file) where the snapshots span fewer than r dimensions.
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 
-/// [f x K-1] fields made fit for a clamped body: each plus the elastic displacement that brings its fixed vertices back
-/// to rest.
-Eigen::MatrixXd clamp_fields(const ElasticSystem& system, const SemidefiniteSolver& solver,
-                             const Eigen::MatrixXd& fields);
-
 }  // namespace exmat::precompute

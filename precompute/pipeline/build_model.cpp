@@ -191,13 +191,16 @@ ReducedModel Pipeline::run() {
   });
 
   const double size = bounding_box_diagonal(object_.mesh.vertices);
+  // As fine as the linear modes resolve.
+  std::optional<FieldClamp> clamp;
+  if (shape) clamp.emplace(system, modes.eigenvalues.tail(1)[0], asset_.name);
   const auto basis = timed("basis", [&] {
     Eigen::MatrixXd fields;
-    if (shape && asset_.example_fields) fields = clamp_fields(system, solver, shape->displacements);
+    if (shape && asset_.example_fields) fields = clamp->apply(shape->displacements);
     return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) finish_examples(asset_, system, solver, *shape, model, report_.warnings);
+  if (shape) finish_examples(asset_, system, *clamp, *shape, model, report_.warnings);
 
   model.cubature = timed("cubature", [&] {
     Eigen::MatrixXd poses(basis.cols(), 0);

@@ -18,6 +18,7 @@ constexpr double kBetterRotation = 0.5;     // of the confidence as it stands, f
 constexpr double kCompetingRotation = 1.4;  // of the best one's confidence
 constexpr double kSameRotation = 0.5;       // [rad]
 constexpr Eigen::Index kFewestLandmarks = 4;
+constexpr double kMissedLandmarks = 0.25;  // share of their displacement, RMS, that coupled bases may miss unremarked
 
 // [l x n] interpolation that takes the values at vertices.
 SparseMatrix at_vertices(const std::vector<std::int32_t>& vertices, Eigen::Index n) {
@@ -131,6 +132,7 @@ AlignedRest ExampleAligner::align_rest() {
     use_vertex_map(rest);
     if (asset_.alignment.method == "coupled") {
       rest.map.functional_map = coupled_map(examples_.rest, rest.basis);
+      rest.map.by_functions = true;
       rest.outcome.method = "coupled";
     }
     log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)",
@@ -280,11 +282,16 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
   aligned.functional_map = map;
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
-  aligned.outcome.confidence = score.J() + missed_landmarks(rest, pose, posed, displacement);
+  const double missed = missed_landmarks(rest, pose, posed, displacement);
+  aligned.outcome.confidence = score.J() + missed;
   aligned.outcome.inverted_fraction = score.inverted;
   const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
   judge_confidence(aligned.outcome, advice);
   judge_residual(aligned.outcome, advice);
+  if (missed > kMissedLandmarks)
+    object_to(aligned.outcome, AlignmentVerdict::kDoubtful,
+              fmt::format("what was carried over misses the displacement of the landmarks by {:.0f} %; {}",
+                          100 * missed, advice));
   return aligned;
 }
 

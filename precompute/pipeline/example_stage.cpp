@@ -22,6 +22,9 @@ constexpr Eigen::Index kExtraEigenfunctions = 4;
 // A share of an example's displacement lost to truncation that is worth a warning.
 constexpr double kTruncationWarning = 0.25;
 
+// A displacement, over the object's size, that is none.
+constexpr double kNoPose = 1e-6;
+
 // Functions of the object looked through for how many would carry a pose.
 constexpr Eigen::Index kMostFunctions = 100;
 
@@ -127,6 +130,9 @@ void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose
   example.descriptor = stage_.weights.asDiagonal() * transferred.coefficients;
   const Eigen::Index column = example.index - 1;
   stage_.fields.col(column) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
+  if (transferred.displacement.norm() <= kNoPose * stage_.object.vertices.norm())
+    throw InputError({"", "/examples, " + input.name, "a pose that differs from the rest pose", "the rest pose",
+                      "leave it out: the rest pose is always an example"});
   stage_.displacements.col(column) =
       reconstruct_displacement(stage_.object, stage_.weights, example.descriptor - stage_.data.rest_descriptor);
   hold_fixed_mean(object_.fixed, stage_.displacements.col(column));
@@ -139,7 +145,7 @@ void ShapeStageBuilder::add_examples() {
   ExampleAligner aligner(asset_, stage_.object, object_, input_);
   const AlignedRest rest = aligner.align_rest();
   add_rest(rest);
-  const PoseFrame frame{rest.free_poses, fit_weights()};
+  const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
   stage_.fields.resize(3 * object_.mesh.vertex_count(), std::ssize(input_.poses));
   stage_.displacements.resizeLike(stage_.fields);
   for (const PoseInput& input : input_.poses) {
@@ -187,10 +193,10 @@ ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object
   return ShapeStageBuilder(asset, object, input, warnings).build();
 }
 
-void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const SemidefiniteSolver& solver,
-                     ShapeStage& stage, ReducedModel& model, std::vector<std::string>& warnings) {
+void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const FieldClamp& clamp, ShapeStage& stage,
+                     ReducedModel& model, std::vector<std::string>& warnings) {
   model.projection = direct_projection(stage.object, stage.weights, system.full_mass, model.modal->basis);
-  const RowMatrix map = pose_map(stage.object, stage.weights, model.object->fixed, system, solver, model.modal->basis,
+  const RowMatrix map = pose_map(stage.object, stage.weights, model.object->fixed, system, clamp, model.modal->basis,
                                  model.projection->reduced_from_shape);
   model.projection->target_basis = range_basis(map);
   fill_weights_problem(stage.data.rest_descriptor, *model.projection, map, stage.examples);

@@ -6,10 +6,10 @@
 #include "common/config/asset_config.h"
 #include "common/model/reduced_model.h"
 #include "precompute/fem/elastic_system.h"
+#include "precompute/modes/field_clamp.h"
 #include "precompute/pipeline/alignment_verdict.h"
 #include "precompute/pipeline/inputs.h"
 #include "precompute/shape_space/laplace_basis.h"
-#include "precompute/solvers/semidefinite_solver.h"
 
 namespace exmat::precompute {
 
@@ -33,7 +33,7 @@ ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object
 
 /// Puts shape space, projection and examples into a model that has its modal basis, logs and records what of each
 /// example is lost. `stage` is used up.
-void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const SemidefiniteSolver& solver,
-                     ShapeStage& stage, ReducedModel& model, std::vector<std::string>& warnings);
+void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const FieldClamp& clamp, ShapeStage& stage,
+                     ReducedModel& model, std::vector<std::string>& warnings);
 
 }  // namespace exmat::precompute

@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "precompute/modes/basis.h"
-
 namespace exmat::precompute {
 
 void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements) {
@@ -18,7 +16,7 @@ void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displa
 }
 
 RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
-                   const ElasticSystem& system, const SemidefiniteSolver& solver, const RowMatrix& basis,
+                   const ElasticSystem& system, const FieldClamp& clamp, const RowMatrix& basis,
                    const RowMatrix& reduced_from_shape) {
   if (!system.constrained()) return reduced_from_shape;
   const Eigen::Index n = object.vertices.rows();
@@ -29,7 +27,7 @@ RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, c
     Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(3 * n, 3);
     for (int axis = 0; axis < 3; ++axis) fields(Eigen::seqN(axis, n, 3), axis) = function;
     hold_fixed_mean(fixed, fields);
-    map.middleCols(3 * i, 3) = projector.transpose() * clamp_fields(system, solver, fields);
+    map.middleCols(3 * i, 3) = projector.transpose() * clamp.apply(fields);
   }
   return map;
 }

@@ -1,8 +1,8 @@
 #pragma once
 
 #include "precompute/fem/elastic_system.h"
+#include "precompute/modes/field_clamp.h"
 #include "precompute/shape_space/laplace_basis.h"
-#include "precompute/solvers/semidefinite_solver.h"
 
 namespace exmat::precompute {
 
@@ -11,11 +11,11 @@ namespace exmat::precompute {
 void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements);
 
 /// [r x 3m] reduced coordinates of the pose that a change of descriptor stands for, U^T M C V^(1/3) (Phi Lambda^-1 (x)
-/// I_3): C puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by the elastic
-/// displacement of clamp_fields(). T^+ without C, and so for a free body, where `reduced_from_shape` is returned.
+/// I_3): C puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by a
+/// FieldClamp. T^+ without C, and so for a free body, where `reduced_from_shape` is returned.
 /// `basis` is U, 3n x r. method.md, sections 4 and 5.
 RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
-                   const ElasticSystem& system, const SemidefiniteSolver& solver, const RowMatrix& basis,
+                   const ElasticSystem& system, const FieldClamp& clamp, const RowMatrix& basis,
                    const RowMatrix& reduced_from_shape);
 
 }  // namespace exmat::precompute

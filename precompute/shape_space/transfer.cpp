@@ -32,11 +32,12 @@ double lost_share(const SparseMatrix& mass, const VertexArray& displacement, con
   return full <= kNoDisplacement ? 0 : norm(displacement - carried) / full;
 }
 
-// The change of coefficients [m x 3] of a pose that `to_rest` has turned, fitted to the object as the frame says.
+// The change of coefficients [m x 3] of a pose that `to_rest` has turned, fitted to the object as the frame says;
+// `displacement` [n x 3] is what is fitted.
 TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
-                           const Eigen::MatrixXd& change, const Eigen::Matrix3d& to_rest, const PoseFrame& frame) {
-  const VertexArray posed_object = object.vertices + object.eigenfunctions * change;
-  const Eigen::Matrix3d fit = fit_rotation(posed_object, object.vertices, frame.fit_weights);
+                           const Eigen::MatrixXd& change, const VertexArray& displacement,
+                           const Eigen::Matrix3d& to_rest, const PoseFrame& frame) {
+  const Eigen::Matrix3d fit = fit_rotation(object.vertices + displacement, object.vertices, frame.fit_weights);
   TransferredPose pose;
   pose.coefficients = (rest_coefficients + change) * fit.transpose();
   pose.rotation = fit * to_rest;
@@ -57,6 +58,12 @@ Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments) {
 
 Eigen::Index example_function_count(Eigen::Index m, Eigen::Index vertices) {
   return std::min(m + m / 2 + 5, vertices - 2);
+}
+
+Eigen::MatrixXd RestMap::carried(const LaplaceBasis& object, const LaplaceBasis& rest_basis,
+                                 const VertexArray& field) const {
+  if (by_functions) return functional_map * coefficients(rest_basis, field);
+  return coefficients(object, pull_back * field);
 }
 
 RestMap identity_map(Eigen::Index m, Eigen::Index vertices) {
@@ -84,18 +91,21 @@ RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const Lap
 
 TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients, const RestMap& map,
                               const LaplaceBasis& rest_basis, const VertexArray& posed, const PoseFrame& frame) {
-  const Eigen::MatrixXd example_rest = coefficients(rest_basis, rest_basis.vertices);
-  const Eigen::MatrixXd example_posed = coefficients(rest_basis, posed);
   Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
-  if (frame.free_example) to_rest = procrustes_rotation(example_rest.transpose() * example_posed);
+  if (frame.free_example)
+    to_rest = procrustes_rotation(coefficients(rest_basis, rest_basis.vertices).transpose() *
+                                  coefficients(rest_basis, posed));
+  const auto carry = [&](const VertexArray& field) { return map.carried(object, rest_basis, field); };
+  const VertexArray whole = posed * to_rest.transpose() - rest_basis.vertices;
+  const Eigen::MatrixXd change = carry(whole);
   TransferredPose pose =
-      place_pose(object, rest_coefficients, map.functional_map * (example_posed * to_rest.transpose() - example_rest),
+      place_pose(object, rest_coefficients, change,
+                 frame.fit_whole ? VertexArray(map.pull_back * whole) : VertexArray(object.eigenfunctions * change),
                  to_rest, frame);
   const VertexArray displacement = posed * pose.rotation.transpose() - rest_basis.vertices;
   pose.displacement = map.pull_back * displacement;
   pose.displacement.rowwise() -= (object.mass * pose.displacement).colwise().sum();
-  const Eigen::MatrixXd carried = map.functional_map * coefficients(rest_basis, displacement);
-  pose.shape_space_error = lost_share(object.mass, pose.displacement, object.eigenfunctions * carried);
+  pose.shape_space_error = lost_share(object.mass, pose.displacement, object.eigenfunctions * carry(displacement));
   return pose;
 }
 
@@ -104,8 +114,8 @@ TransferredPose transfer_coefficients(const LaplaceBasis& object, const Eigen::M
                                       const PoseFrame& frame) {
   Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
   if (frame.free_example) to_rest = procrustes_rotation(carried_rest.transpose() * carried_posed);
-  TransferredPose pose =
-      place_pose(object, rest_coefficients, carried_posed * to_rest.transpose() - carried_rest, to_rest, frame);
+  const Eigen::MatrixXd change = carried_posed * to_rest.transpose() - carried_rest;
+  TransferredPose pose = place_pose(object, rest_coefficients, change, object.eigenfunctions * change, to_rest, frame);
   pose.displacement = object.eigenfunctions * (pose.coefficients - rest_coefficients);
   return pose;
 }

@@ -14,7 +14,11 @@ struct RestMap {
   SparseMatrix pull_back;          ///< n x n_e, values at the nearest point of the rest example for each object vertex
   double residual = 0;    ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
   double confidence = 0;  ///< residual + |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 is certain
-  bool same_frame = true;  ///< the rest example coincides with the object within kSameFrame
+  bool same_frame = true;     ///< the rest example coincides with the object within kSameFrame
+  bool by_functions = false;  ///< fields come over by the functional map, not by the pull-back
+
+  /// [m x 3] coefficients on the object of a field [n_e x 3] on the rest example.
+  Eigen::MatrixXd carried(const LaplaceBasis& object, const LaplaceBasis& rest_basis, const VertexArray& field) const;
 };
 
 /// Residual up to which the rest example is taken to share the object's frame.
@@ -46,6 +50,9 @@ struct PoseFrame {
   /// n x n weights of the fit of the posed to the rest object: the mass of a free body; ones at the fixed vertices of a
   /// clamped one.
   SparseMatrix fit_weights;
+  /// Fit the whole pose, where it is known, not what the m functions have of it: theirs turns at a clamp. For a free
+  /// body theirs leaves no rigid rotation that the modal basis could not hold.
+  bool fit_whole = false;
 };
 
 /// `rest_coefficients` [m x 3] of the object; `posed` [n_e x 3] normalised positions on the vertices of the rest
