@@ -292,6 +292,8 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
     object_to(aligned.outcome, AlignmentVerdict::kDoubtful,
               fmt::format("what was carried over misses the displacement of the landmarks by {:.0f} %; {}",
                           100 * missed, advice));
+  object_to(aligned.outcome, AlignmentVerdict::kDoubtful,
+            "nothing in coupled bases shows for certain that they are right; compare with alignment.method \"auto\"");
   return aligned;
 }
 

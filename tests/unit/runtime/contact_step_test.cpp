@@ -71,7 +71,7 @@ TEST(ContactStep, SlidesOrStaysOnASlope) {
     for (int i = 0; i < 500; ++i) step(*body.model, body.scene, body.state, workspace);
     const Eigen::Vector3d position = body.state.body->position;
     const double velocity = body.state.body->linear_momentum[0] / body.mass();
-    constexpr int kSteps = 2500;
+    constexpr int kSteps = 5000;
     for (int i = 0; i < kSteps; ++i) step(*body.model, body.scene, body.state, workspace);
     const double time = kSteps * body.scene.time_step;
     if (friction > std::tan(kSlope)) {
