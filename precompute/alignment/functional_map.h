@@ -50,7 +50,8 @@ struct MapScore {
   double distortion = 0;     ///< mean |F - R|^2 of the low-pass pull-back
   double inverted = 0;       ///< share of the volume with det F < 0
 
-  double J() const { return orthogonality + distortion + 2 * inverted; }
+  /// J of the selection.
+  double total() const { return orthogonality + distortion + 2 * inverted; }
 };
 /// `pull_back` [n_a x 3] positions of b carried to a; `arap` that of a at rest.
 MapScore score_map(const ArapEnergy& arap, const Eigen::MatrixXd& map, const VertexArray& pull_back);

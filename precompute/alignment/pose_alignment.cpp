@@ -109,7 +109,7 @@ void PoseAligner::add_map(const std::string& name, const Eigen::MatrixXd& map, s
   const MapScore score = score_map(registration_.arap(), map, carried);
 #pragma omp critical(exmat_pose_starts)
   {
-    if (score.inverted <= kMostInverted) starts.push_back({name, carried, score.J()});
+    if (score.inverted <= kMostInverted) starts.push_back({name, carried, score.total()});
     if (score.inverted > 0.5 && score.orthogonality < reflected_score_) {
       reflected_score_ = score.orthogonality;
       reflected_start_ = carried;
@@ -281,7 +281,7 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   alignment.residual = std::sqrt(registered.chamfer) / size_;
   alignment.confidence = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)),
                                   registered.distortion, registered.inverted}
-                             .J();
+                             .total();
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const Eigen::Matrix3d turn =

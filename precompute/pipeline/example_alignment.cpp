@@ -283,7 +283,7 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
   const double missed = missed_landmarks(rest, pose, posed, displacement);
-  aligned.outcome.confidence = score.J() + missed;
+  aligned.outcome.confidence = score.total() + missed;
   aligned.outcome.inverted_fraction = score.inverted;
   const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
   judge_confidence(aligned.outcome, advice);
