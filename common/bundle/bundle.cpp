@@ -9,8 +9,6 @@
 namespace exmat {
 namespace {
 
-constexpr std::string_view kPlaceholder = "{example}";
-
 std::int64_t value_of(const SymbolSizes& sizes, std::string_view symbol) {
   const auto* binding = sizes.find(symbol);
   return binding == nullptr ? 0 : binding->value;
@@ -19,8 +17,21 @@ std::int64_t value_of(const SymbolSizes& sizes, std::string_view symbol) {
 // Binds all sizes from the table of contents.
 void open_listed(BundleReader& reader, const std::vector<LedgerEntry>& groups) {
   for (const DatasetSchema& schema : bundle_schema().datasets)
-    if (includes(groups, schema.group) && schema.path.find(kPlaceholder) == std::string::npos)
-      reader.open_checked(schema, schema.path);
+    if (includes(groups, schema.group) && is_single(schema.path)) reader.open_checked(schema, schema.path);
+}
+
+RegionSummary summarise_region(BundleReader& reader, const std::string& name) {
+  RegionSummary summary{name};
+  const std::string path = "/regions/" + name;
+  summary.examples = std::ssize(reader.example_names(path + "/examples"));
+  summary.has_targets = reader.file().has_group(path + "/targets");
+  if (summary.has_targets)
+    reader.read_text("/regions/{region}/targets", path + "/targets", "energy_reference", summary.energy_reference);
+  return summary;
+}
+
+bool serves(bool has_targets, const std::string& table, const std::string& wanted) {
+  return has_targets && table == wanted;
 }
 
 }  // namespace
@@ -47,14 +58,23 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   summary.has_polynomial = includes(groups, "polynomial");
   summary.has_targets = includes(groups, "targets");
   summary.internal_force = CubatureData{}.internal_force;
-  if (includes(groups, "cubature")) reader.read_text("/cubature", "internal_force", summary.internal_force);
-  if (summary.has_targets) reader.read_text("/targets", "energy_reference", summary.energy_reference);
+  if (includes(groups, "cubature"))
+    reader.read_text("/cubature", "/cubature", "internal_force", summary.internal_force);
+  if (summary.has_targets) reader.read_text("/targets", "/targets", "energy_reference", summary.energy_reference);
+  if (includes(groups, "regions"))
+    for (const std::string& name : reader.region_names()) summary.regions.push_back(summarise_region(reader, name));
   return summary;
 }
 
 Needs fit_needs(Needs needs, const BundleSummary& summary) {
   if (needs.internal_force == "auto") needs.internal_force = summary.internal_force;
-  needs.targets = needs.targets && summary.has_targets && summary.energy_reference == needs.energy_reference;
+  needs.targets = needs.targets && serves(summary.has_targets, summary.energy_reference, needs.energy_reference);
+  if (!needs.regions) return needs;
+  for (RegionNeeds& region : *needs.regions) {
+    const auto found = std::ranges::find(summary.regions, region.name, &RegionSummary::name);
+    region.targets = region.targets && found != summary.regions.end() &&
+                     serves(found->has_targets, found->energy_reference, region.energy_reference);
+  }
   return needs;
 }
 

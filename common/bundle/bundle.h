@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -18,6 +19,14 @@ void write_bundle(const ReducedModel& model, const std::filesystem::path& path);
 /// Sets the bytes of each included group's datasets as write_bundle would write them.
 void fill_bytes(const ReducedModel& model, std::vector<LedgerEntry>& ledger);
 
+/// One region, as a bundle lists it.
+struct RegionSummary {
+  std::string name;
+  std::int64_t examples = 0;       ///< K
+  bool has_targets = false;        ///< /regions/NAME/targets is there
+  std::string energy_reference{};  ///< of its targets; empty where there are none
+};
+
 /// What a bundle says of itself: read from its attributes and table of contents alone.
 struct BundleSummary {
   std::string asset_name, generator, input_sha256;
@@ -29,11 +38,12 @@ struct BundleSummary {
   std::string energy_reference;  ///< of /targets; empty where there are none
   bool has_polynomial = false;   ///< /polynomial is there
   bool has_targets = false;      ///< /targets is there
+  std::vector<RegionSummary> regions;
 };
 BundleSummary summarise_bundle(const std::filesystem::path& path);
 
 /// What of these needs the bundle serves: internal_force `auto` becomes its choice, and targets are not needed where it
-/// has none of that energy_reference.
+/// has none of that energy_reference. Of the regions likewise; all of them where the needs name none.
 Needs fit_needs(Needs needs, const BundleSummary& summary);
 
 /// What was read from a bundle: dataset path and bytes, in order.
@@ -46,6 +56,8 @@ struct ReadRecord {
 struct BundleRequest {
   /// From plan_groups(). An included group that the file lacks is an InputError that names it.
   std::vector<LedgerEntry> groups;
+  /// Which regions, with their targets or not. One that the file lacks is an InputError. Absent: all that there is.
+  std::optional<std::vector<RegionNeeds>> regions{};
   bool step_only = false;  ///< only datasets whose schema `use` is "step": what stepping needs
   bool positions = false;  ///< with step_only: also those with `use` "positions": what writing positions needs
 };

@@ -19,7 +19,7 @@ const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attrib
 // What of an asset brings a group.
 std::string asset_member(std::string_view group) {
   if (group == "polynomial") return "\"polynomial\" as internal_force";
-  const bool is_need = group == "targets" || group == "rigid" || group == "contact";
+  const bool is_need = group == "targets" || group == "rigid" || group == "contact" || group == "regions";
   return fmt::format("\"{}\" among the needs", is_need ? group : "examples");
 }
 
@@ -56,8 +56,9 @@ std::string BundleReader::text_attribute(const std::string& name) const {
   return std::get<std::string>(header_value(name));
 }
 
-void BundleReader::read_text(const std::string& group_path, const std::string& name, std::string& text) {
-  group(group_path, "");
+void BundleReader::read_text(std::string_view schema_path, std::string_view path, const std::string& name,
+                             std::string& text) {
+  group(schema_path, path);
   attribute(name, text);
 }
 
@@ -70,12 +71,43 @@ std::vector<LedgerEntry> BundleReader::listed_groups() const {
   return ledger;
 }
 
-std::vector<std::string> BundleReader::example_names() const {
+std::vector<std::string> BundleReader::example_names(const std::string& folder) const {
   std::vector<std::string> names;
-  for (std::string& name : file_.list("/examples"))
-    if (std::ranges::find(kExampleDatasets, name) == std::end(kExampleDatasets) && file_.has_group("/examples/" + name))
+  for (std::string& name : file_.list(folder))
+    if (std::ranges::find(kExampleDatasets, name) == std::end(kExampleDatasets) && file_.has_group(folder + "/" + name))
       names.push_back(std::move(name));
   return names;
+}
+
+std::vector<std::string> BundleReader::region_names() const {
+  std::vector<std::string> names;
+  for (std::string& name : file_.list("/regions"))
+    if (file_.has_group("/regions/" + name)) names.push_back(std::move(name));
+  return names;
+}
+
+void BundleReader::add_examples(const std::string& folder, ExampleSet& set) const {
+  if (!file_.has_group(folder)) refuse(folder, "the group", "none");
+  for (const std::string& name : example_names(folder)) set.examples.emplace_back().name = name;
+}
+
+void BundleReader::add_regions(ReducedModel& model) const {
+  const auto names = region_names();
+  const auto add = [&](const RegionNeeds& needs) {
+    const std::string path = "/regions/" + needs.name;
+    if (std::ranges::find(names, needs.name) == names.end())
+      refuse(path, "the group (the scene names this region)",
+             names.empty() ? "none" : fmt::format("the regions {}", fmt::join(names, ", ")));
+    RegionData region;
+    region.name = needs.name;
+    add_examples(path + "/examples", region.examples);
+    if (needs.targets && file_.has_group(path + "/targets")) region.targets.emplace();
+    model.regions.push_back(std::move(region));
+  };
+  if (request_.regions)
+    std::ranges::for_each(*request_.regions, add);
+  else
+    for (const std::string& name : names) add({name});
 }
 
 ReducedModel BundleReader::read(const BundleRequest& request) {
@@ -88,10 +120,8 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
       add_group(model, entry.group);
     });
   }
-  if (model.examples) {
-    for (const std::string& name : example_names()) model.examples->examples.emplace_back().name = name;
-    sizes_.set("K", std::ssize(model.examples->examples), "the groups of /examples");
-  }
+  if (model.examples) attempt([&] { add_examples("/examples", *model.examples); });
+  if (includes(request.groups, "regions") && file_.has_group("/regions")) attempt([&] { add_regions(model); });
   visit_fields(model, *this);
   if (model.examples)  // before version 3
     for (ExampleData& example : model.examples->examples)
@@ -100,6 +130,8 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
     if (const auto material = material_from_name(model.object->material)) model.object->materials.model = *material;
   check_model(model);
   if (model.examples) std::ranges::stable_sort(model.examples->examples, {}, &ExampleData::index);
+  for (RegionData& region : model.regions) std::ranges::stable_sort(region.examples.examples, {}, &ExampleData::index);
+  std::ranges::stable_sort(model.regions, {}, &RegionData::index);
   return model;
 }
 
@@ -136,9 +168,12 @@ void BundleReader::attempt(const std::function<void()>& check) {
   }
 }
 
-void BundleReader::group(std::string_view schema_path, std::string_view example) {
+void BundleReader::group(std::string_view schema_path, std::string_view path) {
   schema_path_ = schema_path;
-  path_ = fill_example(schema_path, example);
+  path_ = path;
+  if (schema_path_ == "/") return;
+  sizes_.forget(bundle_schema().group(schema_path_).symbols);
+  if (schema_path_.ends_with("/examples")) sizes_.set("K", std::ssize(example_names(path_)), "the groups of " + path_);
 }
 
 const AttributeSchema& BundleReader::attribute_schema(std::string_view name) const {
@@ -192,18 +227,27 @@ void BundleReader::read_checked(const Hdf5Dataset& dataset, const DatasetSchema&
 }
 
 void BundleReader::check_model(const ReducedModel& model) {
-  if (model.examples) attempt([&] { check_example_indices(*model.examples); });
+  if (model.examples) attempt([&] { check_example_indices("/examples", *model.examples); });
   attempt([&] { check_fixed_vertices(model); });
-  if (model.targets) attempt([&] { check_exponents(*model.targets); });
-  if (model.targets) attempt([&] { check_target_knots(*model.targets); });
+  if (model.targets) check_targets("/targets", *model.targets);
+  for (const RegionData& region : model.regions) {
+    const std::string path = "/regions/" + region.name;
+    attempt([&] { check_example_indices(path + "/examples", region.examples); });
+    if (region.targets) check_targets(path + "/targets", *region.targets);
+  }
 }
 
-void BundleReader::check_example_indices(const ExampleSet& set) const {
+void BundleReader::check_targets(const std::string& folder, const TargetTableData& targets) {
+  attempt([&] { check_exponents(folder, targets); });
+  attempt([&] { check_target_knots(folder, targets); });
+}
+
+void BundleReader::check_example_indices(const std::string& folder, const ExampleSet& set) const {
   const auto count = set.examples.size();
-  if (count == 0) refuse("/examples", "at least the rest pose", "no example");
+  if (count == 0) refuse(folder, "at least the rest pose", "no example");
   std::vector<const ExampleData*> by_index(count, nullptr);
   for (const ExampleData& example : set.examples) {
-    const std::string path = "/examples/" + example.name;
+    const std::string path = folder + "/" + example.name;
     if (!is_sound(path + "@index") || !is_sound(path + "@is_rest")) return;
     const ExampleData*& slot = by_index[static_cast<std::size_t>(example.index)];
     if (slot != nullptr)
@@ -229,16 +273,16 @@ void BundleReader::check_fixed_vertices(const ReducedModel& model) const {
       refuse("/modal/basis", fmt::format("zeros on vertex {}, fixed by /object/fixed", v), "other numbers");
 }
 
-void BundleReader::check_exponents(const TargetTableData& targets) const {
-  const std::string path = "/targets/exponents";
-  if (!is_sound(path) || !is_sound("/targets@degree")) return;
+void BundleReader::check_exponents(const std::string& folder, const TargetTableData& targets) const {
+  const std::string path = folder + "/exponents";
+  if (!is_sound(path) || !is_sound(folder + "@degree")) return;
   if (const auto fault = check_exponent_rows(targets.degree, targets.exponents))
     refuse(path, fault->expected, fault->found);
 }
 
-void BundleReader::check_target_knots(const TargetTableData& targets) const {
-  const std::string path = "/targets/knots";
-  if (!is_sound(path) || !is_sound("/targets/exponents")) return;
+void BundleReader::check_target_knots(const std::string& folder, const TargetTableData& targets) const {
+  const std::string path = folder + "/knots";
+  if (!is_sound(path) || !is_sound(folder + "/exponents")) return;
   if (const auto fault = check_knots(targets.knots, targets.exponents.cols()))
     refuse(path, fault->expected, fault->found);
 }

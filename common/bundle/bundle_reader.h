@@ -32,21 +32,22 @@ class BundleReader {
 
   /// Ledger of the groups that the header lists, in bundle order.
   std::vector<LedgerEntry> listed_groups() const;
-  /// Names of the groups in /examples.
-  std::vector<std::string> example_names() const;
+  /// Names of the groups in `folder`, /examples or a region's.
+  std::vector<std::string> example_names(const std::string& folder) const;
+  std::vector<std::string> region_names() const;
 
   ReducedModel read(const BundleRequest& request);
   /// Of the root.
   std::string text_attribute(const std::string& name) const;
   /// Of another group; `text` stays as it is where the file is older than the attribute.
-  void read_text(const std::string& group_path, const std::string& name, std::string& text);
+  void read_text(std::string_view schema_path, std::string_view path, const std::string& name, std::string& text);
   /// Opens a dataset and checks its type and sizes, which binds its symbols; reads no data.
   Hdf5Dataset open_checked(const DatasetSchema& schema, const std::string& path);
   void note(const std::string& dataset, std::size_t bytes);
   /// Runs `check`; with `problems`, an InputError of it is noted there.
   void attempt(const std::function<void()>& check);
 
-  void group(std::string_view schema_path, std::string_view example);
+  void group(std::string_view schema_path, std::string_view path);
 
   template <typename T>
   void attribute(std::string_view name, T& member) {
@@ -78,10 +79,13 @@ class BundleReader {
   static std::pair<std::int64_t, std::int64_t> matrix_sizes(const Hdf5Dataset& dataset);
   void read_checked(const Hdf5Dataset& dataset, const DatasetSchema& schema, void* memory);
   void check_model(const ReducedModel& model);
-  void check_example_indices(const ExampleSet& set) const;
+  void add_examples(const std::string& folder, ExampleSet& set) const;
+  void add_regions(ReducedModel& model) const;
+  void check_example_indices(const std::string& folder, const ExampleSet& set) const;
   void check_fixed_vertices(const ReducedModel& model) const;
-  void check_exponents(const TargetTableData& targets) const;
-  void check_target_knots(const TargetTableData& targets) const;
+  void check_targets(const std::string& folder, const TargetTableData& targets);
+  void check_exponents(const std::string& folder, const TargetTableData& targets) const;
+  void check_target_knots(const std::string& folder, const TargetTableData& targets) const;
   bool is_sound(const std::string& place) const { return sound_.contains(place); }
   [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,
                            const std::string& advice = "") const;

@@ -43,10 +43,13 @@ class BundleWriter {
  public:
   BundleWriter(Hdf5File& file) : file_(file) {}
 
-  void group(std::string_view schema_path, std::string_view example) {
+  void group(std::string_view schema_path, std::string_view path) {
     schema_path_ = schema_path;
-    path_ = fill_example(schema_path, example);
-    if (schema_path_ != "/") write_group(file_, bundle_schema().group(schema_path_), path_);
+    path_ = path;
+    if (schema_path_ == "/") return;
+    const GroupSchema& schema = bundle_schema().group(schema_path_);
+    sizes_.forget(schema.symbols);
+    write_group(file_, schema, path_);
   }
 
   template <typename T>
@@ -57,10 +60,6 @@ class BundleWriter {
   template <typename T>
   void dataset(std::string_view name, const T& member) {
     write_array(name, view_of(member));
-  }
-
-  void set_size(const std::string& symbol, std::int64_t value, const std::string& source) {
-    sizes_.set(symbol, value, source);
   }
 
  private:
@@ -143,7 +142,6 @@ void write_bundle(const ReducedModel& model, const std::filesystem::path& path) 
   file.write_attribute("/", "constrained", std::int64_t{constrained ? 1 : 0});
 
   BundleWriter writer(file);
-  if (model.examples) writer.set_size("K", std::ssize(model.examples->examples), "the groups of /examples");
   visit_fields(model, writer);
   file.close();
   output.commit();

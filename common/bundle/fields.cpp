@@ -11,6 +11,9 @@ ReducedModel model_of_all_groups() {
   ReducedModel model;
   for (const GroupSchema& group : bundle_schema().groups) add_group(model, group.group);
   model.examples->examples.emplace_back();
+  RegionData& region = model.regions.emplace_back();
+  region.examples = *model.examples;
+  region.targets.emplace();
   return model;
 }
 
@@ -69,6 +72,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.projection.emplace();
   else if (group == "targets")
     model.targets.emplace();
+  else if (group == "regions")
+    return;
   else if (group == "rigid")
     model.rigid.emplace();
   else if (group == "contact")

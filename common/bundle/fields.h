@@ -15,13 +15,25 @@ namespace exmat {
 
 // The one list that binds every dataset and attribute of schemas/bundle.json to a member of ReducedModel. The writer,
 // the reader and the drift test all visit it. A visitor has
-//   void group(std::string_view schema_path, std::string_view example);  the fields that follow are in it
+//   void group(std::string_view schema_path, std::string_view path);  the fields that follow are in it
 //   void attribute(std::string_view name, T& member);
 //   void dataset(std::string_view name, T& member);
 
+/// A place in the schema and in the file: where groups of one kind are held.
+struct FieldPlace {
+  std::string schema, file;
+};
+inline const FieldPlace kTopPlace{};
+
+/// Enters a group of the same name in the schema and the file.
+template <typename Visitor>
+void enter(const FieldPlace& place, std::string_view group, Visitor& visit) {
+  visit.group(place.schema + std::string(group), place.file + std::string(group));
+}
+
 template <typename Object, typename Visitor>
 void visit_object(Object& object, Visitor& visit) {
-  visit.group("/object", "");
+  enter(kTopPlace, "/object", visit);
   visit.attribute("material", object.material);
   visit.dataset("vertices", object.mesh.vertices);
   visit.dataset("tets", object.mesh.tets);
@@ -34,7 +46,7 @@ void visit_object(Object& object, Visitor& visit) {
 
 template <typename ShapeSpace, typename Visitor>
 void visit_shape_space(ShapeSpace& shape_space, Visitor& visit) {
-  visit.group("/shape_space", "");
+  enter(kTopPlace, "/shape_space", visit);
   visit.attribute("volume", shape_space.volume);
   visit.attribute("centroid", shape_space.centroid);
   visit.attribute("weighting", shape_space.weighting);
@@ -45,8 +57,8 @@ void visit_shape_space(ShapeSpace& shape_space, Visitor& visit) {
 }
 
 template <typename Example, typename Visitor>
-void visit_example(Example& example, Visitor& visit) {
-  visit.group("/examples/{example}", example.name);
+void visit_example(const FieldPlace& place, Example& example, Visitor& visit) {
+  visit.group(place.schema + "/examples/{example}", place.file + "/examples/" + example.name);
   visit.attribute("index", example.index);
   visit.attribute("is_rest", example.is_rest);
   visit.attribute("rotation", example.rotation);
@@ -64,17 +76,17 @@ void visit_example(Example& example, Visitor& visit) {
 }
 
 template <typename Examples, typename Visitor>
-void visit_examples(Examples& examples, Visitor& visit) {
-  visit.group("/examples", "");
+void visit_examples(const FieldPlace& place, Examples& examples, Visitor& visit) {
+  enter(place, "/examples", visit);
   visit.dataset("gram", examples.gram);
   visit.dataset("h0", examples.h0);
   visit.dataset("hq", examples.hq);
-  for (auto& example : examples.examples) visit_example(example, visit);
+  for (auto& example : examples.examples) visit_example(place, example, visit);
 }
 
 template <typename Modal, typename Visitor>
 void visit_modal(Modal& modal, Visitor& visit) {
-  visit.group("/modal", "");
+  enter(kTopPlace, "/modal", visit);
   visit.dataset("basis", modal.basis);
   visit.dataset("frequencies", modal.frequencies);
   visit.dataset("gravity_load", modal.gravity_load);
@@ -82,7 +94,7 @@ void visit_modal(Modal& modal, Visitor& visit) {
 
 template <typename Cubature, typename Visitor>
 void visit_cubature(Cubature& cubature, Visitor& visit) {
-  visit.group("/cubature", "");
+  enter(kTopPlace, "/cubature", visit);
   visit.attribute("internal_force", cubature.internal_force);
   visit.attribute("internal_force_reason", cubature.internal_force_reason);
   visit.attribute("method", cubature.method);
@@ -101,23 +113,23 @@ void visit_cubature(Cubature& cubature, Visitor& visit) {
 
 template <typename Polynomial, typename Visitor>
 void visit_polynomial(Polynomial& polynomial, Visitor& visit) {
-  visit.group("/polynomial", "");
+  enter(kTopPlace, "/polynomial", visit);
   visit.dataset("stiffness", polynomial.stiffness);
   visit.dataset("cubic", polynomial.cubic);
   visit.dataset("quartic", polynomial.quartic);
 }
 
 template <typename Projection, typename Visitor>
-void visit_projection(Projection& projection, Visitor& visit) {
-  visit.group("/projection", "");
+void visit_projection(const FieldPlace& place, Projection& projection, Visitor& visit) {
+  enter(place, "/projection", visit);
   visit.dataset("shape_from_reduced", projection.shape_from_reduced);
   visit.dataset("reduced_from_shape", projection.reduced_from_shape);
   visit.dataset("target_basis", projection.target_basis);
 }
 
 template <typename Targets, typename Visitor>
-void visit_targets(Targets& targets, Visitor& visit) {
-  visit.group("/targets", "");
+void visit_targets(const FieldPlace& place, Targets& targets, Visitor& visit) {
+  enter(place, "/targets", visit);
   visit.attribute("degree", targets.degree);
   visit.attribute("error", targets.error);
   visit.attribute("energy_reference", targets.energy_reference);
@@ -126,9 +138,26 @@ void visit_targets(Targets& targets, Visitor& visit) {
   visit.dataset("knots", targets.knots);
 }
 
+template <typename Region, typename Visitor>
+void visit_region(Region& region, Visitor& visit) {
+  const FieldPlace place{"/regions/{region}", "/regions/" + region.name};
+  enter(place, "", visit);
+  visit.attribute("index", region.index);
+  visit.dataset("vertices", region.vertices);
+  visit_examples(place, region.examples, visit);
+  visit_projection(place, region.projection, visit);
+  if (region.targets) visit_targets(place, *region.targets, visit);
+}
+
+template <typename Regions, typename Visitor>
+void visit_regions(Regions& regions, Visitor& visit) {
+  enter(kTopPlace, "/regions", visit);
+  for (auto& region : regions) visit_region(region, visit);
+}
+
 template <typename Rigid, typename Visitor>
 void visit_rigid(Rigid& rigid, Visitor& visit) {
-  visit.group("/rigid", "");
+  enter(kTopPlace, "/rigid", visit);
   visit.dataset("mass", rigid.mass);
   visit.dataset("centre_of_mass", rigid.centre_of_mass);
   visit.dataset("inertia", rigid.inertia);
@@ -140,7 +169,7 @@ void visit_rigid(Rigid& rigid, Visitor& visit) {
 
 template <typename Contact, typename Visitor>
 void visit_contact(Contact& contact, Visitor& visit) {
-  visit.group("/contact", "");
+  enter(kTopPlace, "/contact", visit);
   visit.dataset("vertices", contact.vertices);
   visit.dataset("positions", contact.positions);
   visit.dataset("areas", contact.areas);
@@ -150,18 +179,19 @@ void visit_contact(Contact& contact, Visitor& visit) {
 /// Visits the groups that the model holds, in bundle order. Model is ReducedModel or const ReducedModel.
 template <typename Model, typename Visitor>
 void visit_fields(Model& model, Visitor& visit) {
-  visit.group("/", "");
+  visit.group("/", "/");
   visit.attribute("asset_name", model.asset_name);
   visit.attribute("generator", model.generator);
   visit.attribute("input_sha256", model.input_sha256);
   if (model.object) visit_object(*model.object, visit);
   if (model.shape_space) visit_shape_space(*model.shape_space, visit);
-  if (model.examples) visit_examples(*model.examples, visit);
+  if (model.examples) visit_examples(kTopPlace, *model.examples, visit);
   if (model.modal) visit_modal(*model.modal, visit);
   if (model.cubature) visit_cubature(*model.cubature, visit);
   if (model.polynomial) visit_polynomial(*model.polynomial, visit);
-  if (model.projection) visit_projection(*model.projection, visit);
-  if (model.targets) visit_targets(*model.targets, visit);
+  if (model.projection) visit_projection(kTopPlace, *model.projection, visit);
+  if (model.targets) visit_targets(kTopPlace, *model.targets, visit);
+  if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);
   if (model.contact) visit_contact(*model.contact, visit);
 }
@@ -172,7 +202,8 @@ inline constexpr std::string_view kHeaderAttributes[] = {"format", "format_versi
 /// Names of /examples that are not examples.
 inline constexpr std::string_view kExampleDatasets[] = {"gram", "h0", "hq"};
 
-/// Adds the empty group of that name ("object", ...) to a model. std::logic_error if there is none.
+/// Adds the empty group of that name ("object", ...) to a model; regions are the reader's to add. std::logic_error if
+/// there is none.
 void add_group(ReducedModel& model, std::string_view group);
 
 /// How the list above and a schema differ, one message each; empty where each schema entry is bound to a member of its

@@ -69,8 +69,18 @@ bool has_datasets(const FileSchema& schema, const std::string& group) {
   });
 }
 
+// Symbols and groups that it has of its own.
+std::string own_parts(const GroupSchema& group) {
+  if (group.holds.empty()) return "";
+  std::string groups;
+  for (const std::string& held : group.holds) groups += (groups.empty() ? "" : ", ") + code(group.path + held);
+  return fmt::format("\nIt holds {}, all as above, since version {}; its sizes {} are its own.\n", groups, group.since,
+                     fmt::join(group.symbols, ", "));
+}
+
 std::string group_section(const FileSchema& schema, const GroupSchema& group) {
-  std::string text = fmt::format("\n### {}\n{}.\n", code(group.path), group.description);
+  if (!group.like.empty()) return "";
+  std::string text = fmt::format("\n### {}\n{}.\n{}", code(group.path), group.description, own_parts(group));
   if (!group.attributes.empty()) text += "\n" + attribute_table(group.attributes);
   if (has_datasets(schema, group.path)) text += "\n" + dataset_table(schema, group.path);
   return text;

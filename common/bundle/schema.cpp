@@ -5,9 +5,11 @@
 #include <charconv>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <iterator>
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "common/config/embedded_schema.h"
 
@@ -17,7 +19,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr std::string_view kAnySize = "*";
-constexpr std::string_view kPlaceholder = "{example}";
 
 struct TypeInfo {
   ElementType type;
@@ -132,6 +133,8 @@ GroupSchema parse_group(const Json& json) {
   group.description = json.at("description");
   group.since = json.at("since");
   for (const Json& attribute : json.at("attributes")) group.attributes.push_back(parse_attribute(attribute));
+  group.symbols = json.value("symbols", group.symbols);
+  group.holds = json.value("holds", group.holds);
   return group;
 }
 
@@ -157,6 +160,35 @@ std::vector<Entry> parse_list(const Json& json, const char* member, Parse parse)
     }
   }
   return entries;
+}
+
+std::string folder_of(std::string_view path) { return std::string(path.substr(0, path.rfind('/'))); }
+
+// The groups that each group holds, as entries of their own.
+void expand_holds(FileSchema& schema) {
+  std::vector<GroupSchema> groups;
+  for (const GroupSchema& holder : schema.groups) {
+    groups.push_back(holder);
+    for (const std::string& held : holder.holds) {
+      GroupSchema group = schema.group(held);
+      group.like = std::exchange(group.path, holder.path + held);
+      group.group = holder.group;
+      group.since = std::max(group.since, holder.since);
+      for (AttributeSchema& attribute : group.attributes) attribute.since = std::max(attribute.since, group.since);
+      groups.push_back(std::move(group));
+    }
+  }
+  schema.groups = std::move(groups);
+  std::vector<DatasetSchema> added;
+  for (const GroupSchema& group : schema.groups)
+    for (const DatasetSchema& dataset : schema.datasets) {
+      if (group.like.empty() || folder_of(dataset.path) != group.like) continue;
+      DatasetSchema& copy = added.emplace_back(dataset);
+      copy.path = group.path + dataset.path.substr(group.like.size());
+      copy.group = group.group;
+      copy.since = std::max(copy.since, group.since);
+    }
+  std::ranges::move(added, std::back_inserter(schema.datasets));
 }
 
 template <typename Entry>
@@ -193,6 +225,7 @@ FileSchema parse_file_schema(std::string_view text) {
   schema.attributes = parse_list<AttributeSchema>(json, "attributes", parse_attribute);
   schema.groups = parse_list<GroupSchema>(json, "groups", parse_group);
   schema.datasets = parse_list<DatasetSchema>(json, "datasets", parse_dataset);
+  expand_holds(schema);
   return schema;
 }
 
@@ -206,16 +239,24 @@ const FileSchema& trajectory_schema() {
   return schema;
 }
 
-std::string fill_example(std::string_view schema_path, std::string_view example) {
+std::string fill_name(std::string_view schema_path, std::string_view placeholder, std::string_view name) {
   std::string path(schema_path);
-  const auto at = path.find(kPlaceholder);
-  if (at != std::string::npos) path.replace(at, kPlaceholder.size(), example);
+  const auto at = path.find(placeholder);
+  if (at != std::string::npos) path.replace(at, placeholder.size(), name);
   return path;
 }
+
+bool is_single(std::string_view schema_path) { return schema_path.find('{') == std::string_view::npos; }
 
 void SymbolSizes::set(const std::string& symbol, std::int64_t value, std::string bound_by) {
   bindings_[symbol] = {value, std::move(bound_by)};
   bind_derived();
+}
+
+void SymbolSizes::forget(std::span<const std::string> symbols) {
+  for (const std::string& symbol : symbols) bindings_.erase(symbol);
+  for (const auto& [name, from, value] : kDerivedSymbols)
+    if (find(from) == nullptr) bindings_.erase(std::string(name));
 }
 
 void SymbolSizes::bind_derived() {

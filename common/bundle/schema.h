@@ -80,11 +80,14 @@ struct AttributeSchema {
 };
 
 struct GroupSchema {
-  std::string path;   ///< "/examples/{example}": one for each example
+  std::string path;   ///< "/examples/{example}": one for each example; "/regions/{region}/examples", ... likewise
   std::string group;  ///< of the ledger, e.g. "examples"
   std::string description;
   std::int64_t since = 1;
   std::vector<AttributeSchema> attributes;
+  std::vector<std::string> symbols;  ///< sizes that each group of this path has of its own
+  std::vector<std::string> holds;    ///< paths of groups before this one, whose like it holds
+  std::string like;                  ///< the path of the group that this one repeats; empty for most
 };
 
 struct DatasetSchema {
@@ -118,8 +121,14 @@ FileSchema parse_file_schema(std::string_view json);
 const FileSchema& bundle_schema();
 const FileSchema& trajectory_schema();
 
-/// "/examples/{example}/reduced" with the name filled in.
-std::string fill_example(std::string_view schema_path, std::string_view example);
+inline constexpr std::string_view kExamplePlaceholder = "{example}";
+inline constexpr std::string_view kRegionPlaceholder = "{region}";
+
+/// "/examples/{example}/reduced" with the placeholder's name filled in; other paths stay.
+std::string fill_name(std::string_view schema_path, std::string_view placeholder, std::string_view name);
+
+/// Whether a path of the schema stands for one in the file, and no more.
+bool is_single(std::string_view schema_path);
 
 /// Values of symbols such as n and r, each with what gave it its value, for messages. With r come R = r (r + 1) / 2 and
 /// Q = R (R + 1) / 2.
@@ -131,6 +140,8 @@ class SymbolSizes {
   };
 
   void set(const std::string& symbol, std::int64_t value, std::string bound_by);
+  /// Forgets symbols and what follows from them.
+  void forget(std::span<const std::string> symbols);
   /// Null where the symbol is not bound.
   const Binding* find(std::string_view symbol) const;
 

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <iterator>
 #include <optional>
 #include <set>
 
@@ -35,11 +36,19 @@ class Validator {
   }
 
   static std::vector<std::string> instances(const std::string& schema_path, const ReducedModel& model) {
-    if (fill_example(schema_path, "") == schema_path) return {schema_path};
+    if (schema_path.find(kRegionPlaceholder) == std::string::npos)
+      return of_examples(schema_path, model.examples.value_or(ExampleSet{}));
     std::vector<std::string> paths;
-    if (model.examples)
-      for (const ExampleData& example : model.examples->examples)
-        paths.push_back(fill_example(schema_path, example.name));
+    for (const RegionData& region : model.regions)
+      std::ranges::copy(of_examples(fill_name(schema_path, kRegionPlaceholder, region.name), region.examples),
+                        std::back_inserter(paths));
+    return paths;
+  }
+
+  static std::vector<std::string> of_examples(const std::string& path, const ExampleSet& set) {
+    if (path.find(kExamplePlaceholder) == std::string::npos) return {path};
+    std::vector<std::string> paths;
+    for (const ExampleData& example : set.examples) paths.push_back(fill_name(path, kExamplePlaceholder, example.name));
     return paths;
   }
 

@@ -27,6 +27,7 @@ class AssetReader {
     read_object(json["object"], asset);
     read_shape_space(json, asset);
     read_examples(member_or(json, "examples", Json::array()), asset);
+    read_regions(member_or(json, "regions", Json::array()), asset);
     read_alignment(member_or(json, "alignment", Json::object()), asset);
     read_basis(member_or(json, "basis", Json::object()), asset);
     read_cubature(member_or(json, "cubature", Json::object()), asset);
@@ -116,6 +117,38 @@ class AssetReader {
     }
   }
 
+  void read_regions(const Json& json, AssetConfig& asset) const {
+    for (std::size_t i = 0; i < json.size(); ++i) {
+      const std::string place = fmt::format("/regions/{}", i);
+      const Json& region = json[i];
+      RegionConfig config{region["name"], read_selection(region["vertices"], place + "/vertices"), std::nullopt, {}};
+      if (region.contains("example_vertices"))
+        config.example_vertices = read_selection(region["example_vertices"], place + "/example_vertices");
+      for (std::size_t k = 0; k < region["examples"].size(); ++k)
+        config.examples.push_back(pose_name(region["examples"][k], asset, fmt::format("{}/examples/{}", place, k)));
+      check_region(config, asset.regions, place);
+      asset.regions.push_back(std::move(config));
+    }
+  }
+
+  void check_region(const RegionConfig& region, const std::vector<RegionConfig>& earlier,
+                    const std::string& place) const {
+    if (region.name == "." || region.name == ".." || region.name.find('/') != std::string::npos)
+      refuse(place + "/name", "a name without '/' that is neither \".\" nor \"..\"", "\"" + region.name + "\"");
+    const auto same = std::ranges::find(earlier, region.name, &RegionConfig::name);
+    if (same != earlier.end())
+      refuse(place + "/name", "another name for each region",
+             fmt::format("\"{}\", that of /regions/{} too", region.name, same - earlier.begin()));
+  }
+
+  std::string pose_name(const std::string& name, const AssetConfig& asset, const std::string& place) const {
+    const auto found = std::ranges::find(asset.examples, name, &ExampleConfig::name);
+    if (found == asset.examples.end()) refuse(place, "the name of an example", fmt::format("\"{}\"", name));
+    if (found->rest)
+      refuse(place, "the name of a posed example", fmt::format("\"{}\", the rest pose, which every region has", name));
+    return name;
+  }
+
   void read_alignment(const Json& json, AssetConfig& asset) const {
     AlignmentConfig& alignment = asset.alignment;
     alignment.method = json.value("method", alignment.method);
@@ -131,12 +164,12 @@ class AssetReader {
     }
     const Json regions = member_or(json, "regions", Json::array());
     for (std::size_t i = 0; i < regions.size(); ++i)
-      alignment.regions.push_back(read_region(regions[i], asset, fmt::format("/alignment/regions/{}", i)));
+      alignment.regions.push_back(read_part(regions[i], asset, fmt::format("/alignment/regions/{}", i)));
     alignment.accept = json.value("accept", alignment.accept);
     check_alignment(alignment);
   }
 
-  CorrespondingRegionConfig read_region(const Json& json, const AssetConfig& asset, const std::string& place) const {
+  CorrespondingRegionConfig read_part(const Json& json, const AssetConfig& asset, const std::string& place) const {
     CorrespondingRegionConfig region{read_selection(json["object"], place + "/object"), {}};
     for (std::size_t i = 0; i < json["examples"].size(); ++i) {
       const Json& example = json["examples"][i];

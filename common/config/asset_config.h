@@ -82,6 +82,14 @@ struct AlignmentConfig {
   bool accept = false;  ///< takes what is refused otherwise, with a warning
 };
 
+/// A part of the object with examples of its own.
+struct RegionConfig {
+  std::string name;
+  VertexSelection vertices;
+  std::optional<VertexSelection> example_vertices;  ///< of the rest example; absent: all
+  std::vector<std::string> examples;                ///< names, not the rest pose's
+};
+
 /// ASSET.json after validation, paths resolved against its folder. interfaces.md, "ASSET.json".
 struct AssetConfig {
   std::filesystem::path file;
@@ -92,6 +100,7 @@ struct AssetConfig {
   std::optional<VertexSelection> fixed;                ///< absent: a free body
   DropConfig object_drop;
   std::vector<ExampleConfig> examples;
+  std::vector<RegionConfig> regions;
 
   int eigenfunctions = 20;               ///< m
   std::string weighting = "eigenvalue";  ///< or "none"
@@ -113,8 +122,8 @@ struct AssetConfig {
   std::optional<VertexSelection> contact_vertices;  ///< absent: all of the surface
   std::optional<int> contact_count;                 ///< sampled from these; absent: all of them
 
-  std::optional<std::vector<std::string>>
-      needs;  ///< optional parts to write ("examples", "targets", "rigid", "contact"); absent: all that apply
+  std::optional<std::vector<std::string>> needs;  ///< optional parts to write ("examples", "targets", "rigid",
+                                                  ///< "contact", "regions"); absent: all that apply
   std::uint64_t seed = 1;
 };
 

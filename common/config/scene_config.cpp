@@ -1,5 +1,6 @@
 #include "common/config/scene_config.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
@@ -23,6 +24,18 @@ ExampleForceConfig read_example_force(const Json& json) {
   config.force = json.value("force", config.force);
   config.energy_reference = json.value("energy_reference", config.energy_reference);
   return config;
+}
+
+std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::filesystem::path& file) {
+  std::vector<RegionForceConfig> regions;
+  for (std::size_t i = 0; i < json.size(); ++i) {
+    RegionForceConfig region{json[i]["name"], read_example_force(json[i])};
+    if (std::ranges::find(regions, region.name, &RegionForceConfig::name) != regions.end())
+      throw InputError({file.string(), fmt::format("/regions/{}/name", i), "each region once",
+                        fmt::format("\"{}\" again", region.name), ""});
+    regions.push_back(std::move(region));
+  }
+  return regions;
 }
 
 VertexForceConfig read_vertex_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
@@ -82,6 +95,7 @@ SceneConfig load_scene(const std::filesystem::path& file) {
   scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
   scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
   if (json.contains("examples")) scene.examples = read_example_force(json["examples"]);
+  scene.regions = read_region_forces(member_or(json, "regions", Json::array()), file);
   const Json forces = member_or(json, "forces", Json::array());
   for (std::size_t i = 0; i < forces.size(); ++i)
     scene.forces.push_back(read_vertex_force(forces[i], file, fmt::format("/forces/{}", i)));
@@ -103,6 +117,9 @@ Needs needs_of(const SceneConfig& scene) {
               .contact = !scene.obstacles.empty(),
               .internal_force = scene.internal_force};
   if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
+  std::vector<RegionNeeds>& regions = needs.regions.emplace();
+  for (const auto& [name, force] : scene.regions)
+    regions.push_back({name, force.target != "solve", force.energy_reference});
   return needs;
 }
 

@@ -30,6 +30,12 @@ struct ExampleForceConfig {
   std::string energy_reference = "example";  ///< or "rest"
 };
 
+/// The example force of one region of the bundle.
+struct RegionForceConfig {
+  std::string name;
+  ExampleForceConfig force;
+};
+
 struct NewtonConfig {
   int max_iterations = 20;
   double tolerance = 1e-6;  ///< relative to |f_ext| + |f_int| + |inertia|
@@ -97,7 +103,8 @@ struct SceneConfig {
   double mass_damping = 0;                            ///< alpha [1/s]
   double stiffness_damping = 0;                       ///< beta [s]
   NewtonConfig newton;
-  std::optional<ExampleForceConfig> examples;
+  std::optional<ExampleForceConfig> examples;  ///< of the whole body
+  std::vector<RegionForceConfig> regions;
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact

@@ -20,26 +20,37 @@ LedgerEntry plan_polynomial(const Needs& needs) {
   return {"polynomial", true, 0, "the internal force may be a polynomial"};
 }
 
+LedgerEntry plan_regions(const Needs& needs, std::int64_t region_count) {
+  if (region_count == 0) return {"regions", false, 0, "the asset has no regions"};
+  if (needs.regions && needs.regions->empty()) return {"regions", false, 0, "no local example force is asked for"};
+  return {"regions", true, 0, "local example forces are asked for"};
+}
+
 }  // namespace
 
-std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count) {
-  const std::string example_reason = example_count == 0 ? "the asset has no examples"
-                                     : !needs.examples  ? "no example force is asked for"
-                                                        : "an example force is asked for";
+std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
+                                     std::int64_t region_count) {
+  const std::string example_reason = example_count == 0 && region_count > 0 ? "every example is of a region"
+                                     : example_count == 0                   ? "the asset has no examples"
+                                     : !needs.examples                      ? "no example force is asked for"
+                                                                            : "an example force is asked for";
   const LedgerEntry examples = {"examples", needs.examples && example_count > 0, 0, example_reason};
+  const LedgerEntry regions = plan_regions(needs, region_count);
   const bool rigid = constrained ? needs.carried : needs.rigid;
   const std::string rigid_reason = constrained ? (rigid ? "a motion carries the body" : "the body is constrained")
                                                : (rigid ? "the body is free" : "no rigid motion is asked for");
-  return {{"object", true, 0, "always"},
-          {"shape_space", examples.included, 0, example_reason},
-          examples,
-          {"modal", true, 0, "always"},
-          {"cubature", true, 0, "always"},
-          plan_polynomial(needs),
-          {"projection", examples.included, 0, example_reason},
-          plan_targets(needs, examples, example_count),
-          {"rigid", rigid, 0, rigid_reason},
-          {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"}};
+  return {
+      {"object", true, 0, "always"},
+      {"shape_space", examples.included || regions.included, 0, examples.included ? example_reason : regions.reason},
+      examples,
+      {"modal", true, 0, "always"},
+      {"cubature", true, 0, "always"},
+      plan_polynomial(needs),
+      {"projection", examples.included, 0, example_reason},
+      plan_targets(needs, examples, example_count),
+      regions,
+      {"rigid", rigid, 0, rigid_reason},
+      {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"}};
 }
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group) {

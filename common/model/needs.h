@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,15 +11,23 @@ namespace exmat {
 /// Most examples, the rest pose among them, that a table of targets is made for; it takes two.
 inline constexpr std::int64_t kMostTableExamples = 4;
 
+/// What a scene asks of one region.
+struct RegionNeeds {
+  std::string name;
+  bool targets = true;                       ///< its table of targets
+  std::string energy_reference = "example";  ///< or "rest"
+};
+
 /// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
 struct Needs {
-  bool examples = true;                      ///< /shape_space, /examples, /projection
-  bool rigid = true;                         ///< /rigid, of a free body
-  bool carried = false;                      ///< /rigid, of a body with fixed vertices that a motion carries
-  bool targets = true;                       ///< /targets, of at most kMostTableExamples examples
-  bool contact = true;                       ///< /contact
-  std::string internal_force = "auto";       ///< "auto", "cubature" or "polynomial" (/polynomial)
-  std::string energy_reference = "example";  ///< or "rest": undeformed shape in the energy of the targets
+  bool examples = true;                               ///< /shape_space, /examples, /projection
+  bool rigid = true;                                  ///< /rigid, of a free body
+  bool carried = false;                               ///< /rigid, of a body with fixed vertices that a motion carries
+  bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
+  bool contact = true;                                ///< /contact
+  std::optional<std::vector<RegionNeeds>> regions{};  ///< /regions, those named; absent: all, with tables as `targets`
+  std::string internal_force = "auto";                ///< "auto", "cubature" or "polynomial" (/polynomial)
+  std::string energy_reference = "example";           ///< or "rest": undeformed shape in the energy of the targets
 };
 
 /// One line of the ledger: a bundle group, whether it is in, and why.
@@ -29,9 +38,10 @@ struct LedgerEntry {
   std::string reason;
 };
 
-/// One entry per group of the bundle, in bundle order, bytes 0, of an asset with so many examples, the rest pose among
-/// them. Both stages decide by this list alone. method.md, section 7.
-std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count);
+/// One entry per group of the bundle, in bundle order, bytes 0, of an asset with so many examples of the whole body,
+/// the rest pose among them, and so many regions. Both stages decide by this list alone. method.md, section 7.
+std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
+                                     std::int64_t region_count = 0);
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group);
 

@@ -114,6 +114,17 @@ struct ProjectionData {
   RowMatrix target_basis;        ///< r x d, orthonormal basis of the poses that descriptors stand for, d <= min(r, 3m)
 };
 
+/// One group /regions/NAME: examples that act on some of the vertices alone, with weights, projection and targets of
+/// their own, in the groups' form above. method.md, section 5.
+struct RegionData {
+  std::string name;
+  std::int64_t index = 0;  ///< place in the asset
+  IndexVector vertices;    ///< n_r, of the object, ascending
+  ExampleSet examples;     ///< K of its own; descriptors of the displacement inside the region, zero outside
+  ProjectionData projection;
+  std::optional<TargetTableData> targets;
+};
+
 /// Group /rigid: moments about the centre of mass, X centred there, of a free body or of one whose fixed part is
 /// carried. method.md, section 6.
 struct RigidData {
@@ -147,6 +158,7 @@ struct ReducedModel {
   std::optional<PolynomialData> polynomial;
   std::optional<ProjectionData> projection;
   std::optional<TargetTableData> targets;
+  std::vector<RegionData> regions;  ///< in index order; none: no such group
   std::optional<RigidData> rigid;
   std::optional<ContactData> contact;
 };

@@ -40,10 +40,9 @@ void print_ledger(const std::vector<LedgerEntry>& ledger) {
     fmt::print("{:<14}{:>12}  {:<5}{}\n", entry.group, entry.bytes, entry.included ? "yes" : "no", entry.reason);
 }
 
-void print_examples(const ReducedModel& model) {
-  if (!model.examples) return;
-  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", "example", "method", "confidence", "lost by m [%]", "by basis [%]");
-  for (const auto& example : model.examples->examples)
+void print_examples(const std::string& title, const ExampleSet& set) {
+  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", title, "method", "confidence", "lost by m [%]", "by basis [%]");
+  for (const auto& example : set.examples)
     fmt::print("{:<20}{:>14.13}{:>12.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.confidence,
                100 * example.shape_space_error, 100 * example.basis_error);
 }
@@ -70,7 +69,8 @@ void bundle(const Options& options) {
       "frequencies {:.4g} to {:.4g} Hz; held-out cubature error: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %\n",
       model.modal->frequencies.minCoeff(), model.modal->frequencies.maxCoeff(), 100 * model.cubature->heldout_error,
       100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error);
-  print_examples(model);
+  if (model.examples) print_examples("example", *model.examples);
+  for (const RegionData& region : model.regions) print_examples("region " + region.name, region.examples);
   print_ledger(report.ledger);
   print_stages(report);
 }

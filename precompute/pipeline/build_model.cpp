@@ -19,7 +19,7 @@
 #include "precompute/modes/basis.h"
 #include "precompute/modes/linear_modes.h"
 #include "precompute/pipeline/alignment_report.h"
-#include "precompute/pipeline/example_stage.h"
+#include "precompute/pipeline/example_finish.h"
 #include "precompute/pipeline/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
 #include "precompute/targets/target_table.h"
@@ -27,10 +27,78 @@
 namespace exmat::precompute {
 namespace {
 
-// The rest pose among them, which is the object where no example is marked rest.
+bool in_whole_body(const AssetConfig& asset, const ExampleConfig& example) {
+  return std::ranges::none_of(asset.regions, [&](const RegionConfig& region) {
+    return std::ranges::find(region.examples, example.name) != region.examples.end();
+  });
+}
+
+// Those of the whole body, the rest pose among them, which is the object where no example is marked rest. None where
+// every pose is of a region.
 std::int64_t example_count(const AssetConfig& asset) {
-  if (asset.examples.empty()) return 0;
-  return std::ssize(asset.examples) + (std::ranges::any_of(asset.examples, &ExampleConfig::rest) ? 0 : 1);
+  const auto poses = std::ranges::count_if(
+      asset.examples, [&](const ExampleConfig& example) { return !example.rest && in_whole_body(asset, example); });
+  if (asset.examples.empty() || (poses == 0 && !asset.regions.empty())) return 0;
+  return 1 + poses;
+}
+
+// What a scene asks of a region; nothing where it does not name it.
+std::optional<RegionNeeds> needs_of_region(const Needs& needs, const std::string& name) {
+  if (!needs.regions) return RegionNeeds{name, needs.targets, needs.energy_reference};
+  const auto found = std::ranges::find(*needs.regions, name, &RegionNeeds::name);
+  return found == needs.regions->end() ? std::nullopt : std::optional(*found);
+}
+
+// Every region that the needs name is one of the asset's.
+void require_regions(const AssetConfig& asset, const Needs& needs) {
+  for (const RegionNeeds& region : needs.regions.value_or(std::vector<RegionNeeds>{}))
+    if (std::ranges::find(asset.regions, region.name, &RegionConfig::name) == asset.regions.end())
+      throw InputError({asset.file.string(), "/regions", fmt::format("the region \"{}\" of the scene", region.name),
+                        asset.regions.empty() ? "no regions" : "others", "name it here or leave it out of the scene"});
+}
+
+// Leaves out the groups that are not needed, and the poses of no other.
+void keep_needed(const Needs& needs, bool whole_body, ExampleInput& input) {
+  input.whole_body = input.whole_body && whole_body;
+  std::erase_if(input.regions, [&](const RegionInput& region) { return !needs_of_region(needs, region.name); });
+  std::erase_if(input.poses, [&](const PoseInput& pose) {
+    const bool local = std::ranges::any_of(input.regions, [&](const RegionInput& region) {
+      return std::ranges::find(region.examples, pose.name) != region.examples.end();
+    });
+    return !local && !(input.whole_body && pose.in_whole_body);
+  });
+}
+
+// All example sets of a model, and where they are in the asset.
+std::vector<std::pair<std::string, const ExampleSet*>> example_sets(const ReducedModel& model) {
+  std::vector<std::pair<std::string, const ExampleSet*>> sets;
+  if (model.examples) sets.emplace_back("/examples, ", &*model.examples);
+  for (const RegionData& region : model.regions)
+    sets.emplace_back(fmt::format("/regions, {}, ", region.name), &region.examples);
+  return sets;
+}
+
+// [r x k] the poses of all sets but the rest.
+Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
+  Eigen::MatrixXd poses(modes, 0);
+  for (const auto& [place, set] : example_sets(model))
+    for (const ExampleData& example : set->examples) {
+      if (example.is_rest) continue;
+      poses.conservativeResize(Eigen::NoChange, poses.cols() + 1);
+      poses.rightCols(1) = example.pose;
+    }
+  return poses;
+}
+
+// Part of the hash of the inputs.
+std::string text_of(const Needs& needs) {
+  std::string text = fmt::format(
+      "examples {}\nrigid {} {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n", needs.examples,
+      needs.rigid, needs.carried, needs.targets, needs.contact, needs.internal_force, needs.energy_reference);
+  if (!needs.regions) return text;
+  for (const auto& [name, targets, reference] : *needs.regions)
+    text += fmt::format("region {} {} {}\n", name, targets, reference);
+  return text + "no other regions\n";
 }
 
 class Pipeline {
@@ -54,11 +122,12 @@ class Pipeline {
 
   ObjectData object_data() const;
   void require_modes(const ElasticSystem& system) const;
-  void require_upright(const ReducedModel& model) const;
+  void require_upright(const ReducedModel& model, const std::string& place, const ExampleSet& set) const;
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
   void leave_out(const std::string& group, const std::string& reason);
   void add_internal_force(ReducedModel& model);
   void add_targets(ReducedModel& model);
+  void add_region_targets(ReducedModel& model);
   void add_contact(ReducedModel& model);
 
   const AssetConfig& asset_;
@@ -82,13 +151,13 @@ void Pipeline::require_modes(const ElasticSystem& system) const {
                     std::to_string(asset_.linear_modes), "ask for fewer or refine the mesh"});
 }
 
-void Pipeline::require_upright(const ReducedModel& model) const {
-  for (const auto& example : model.examples->examples) {
+void Pipeline::require_upright(const ReducedModel& model, const std::string& place, const ExampleSet& set) const {
+  for (const auto& example : set.examples) {
     const Eigen::VectorXd H = model.cubature->gradient * example.pose;
     for (Eigen::Index j = 0; j < model.cubature->elements.size(); ++j) {
       const RowMatrix3 F = Eigen::Map<const RowMatrix3>(H.data() + 9 * j) + RowMatrix3::Identity();
       if (F.determinant() > 0) continue;
-      throw InputError({asset_.file.string(), "/examples, " + example.name,
+      throw InputError({asset_.file.string(), place + example.name,
                         "a pose that inverts no cubature element of the object",
                         fmt::format("determinant {:.3g} of the deformation gradient in tet {}", F.determinant(),
                                     model.cubature->elements[j]),
@@ -139,6 +208,20 @@ void Pipeline::add_targets(ReducedModel& model) {
   if (!model.targets) leave_out("targets", table.message);
 }
 
+void Pipeline::add_region_targets(ReducedModel& model) {
+  for (RegionData& region : model.regions) {
+    const RegionNeeds needs = *needs_of_region(needs_, region.name);
+    if (!needs.targets) continue;
+    TargetTableReport table;
+    region.targets = timed(fmt::format("targets of region {}", region.name), [&] {
+      return build_target_table(model, region.examples, region.projection,
+                                {.tolerance = asset_.target_tolerance, .energy_reference = needs.energy_reference},
+                                table);
+    });
+    log::info(table.message);
+  }
+}
+
 void Pipeline::add_contact(ReducedModel& model) {
   if (!includes(report_.ledger, "contact")) return;
   model.contact = timed("contact", [&] {
@@ -153,20 +236,19 @@ void Pipeline::add_contact(ReducedModel& model) {
 ReducedModel Pipeline::run() {
   if (needs_.internal_force == "polynomial") require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
-  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_));
-  const bool with_examples = includes(report_.ledger, "examples");
+  require_regions(asset_, needs_);
+  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions));
+  const bool with_examples = includes(report_.ledger, "shape_space");
   std::optional<ExampleInput> example_input;
-  if (with_examples)
+  if (with_examples) {
     example_input = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });
+    keep_needed(needs_, includes(report_.ledger, "examples"), *example_input);
+  }
 
   ReducedModel model;
   model.asset_name = asset_.name;
   model.generator = fmt::format("exmat-precompute {}", version());
-  model.input_sha256 = hash_inputs(
-      report_.inputs,
-      fmt::format("{}\nexamples {}\nrigid {} {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n",
-                  model.generator, needs_.examples, needs_.rigid, needs_.carried, needs_.targets, needs_.contact,
-                  needs_.internal_force, needs_.energy_reference));
+  model.input_sha256 = hash_inputs(report_.inputs, model.generator + "\n" + text_of(needs_));
   model.object = object_data();
 
   std::optional<ShapeStage> shape;
@@ -192,24 +274,18 @@ ReducedModel Pipeline::run() {
 
   const double size = bounding_box_diagonal(object_.mesh.vertices);
   // As fine as the linear modes resolve.
-  std::optional<FieldClamp> clamp;
-  if (shape) clamp.emplace(system, modes.eigenvalues.tail(1)[0], asset_.name);
+  std::optional<PoseFitter> fitter;
+  if (shape) fitter.emplace(asset_, object_, system, solver, modes.eigenvalues.tail(1)[0], *shape);
   const auto basis = timed("basis", [&] {
     Eigen::MatrixXd fields;
-    if (shape && asset_.example_fields) fields = clamp->apply(shape->displacements);
+    if (shape && asset_.example_fields) fields = fitter->fields();
     return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) finish_examples(asset_, system, *clamp, *shape, model, report_.warnings);
+  if (shape) fitter->finish(model, report_.warnings);
 
   model.cubature = timed("cubature", [&] {
-    Eigen::MatrixXd poses(basis.cols(), 0);
-    if (model.examples) {
-      poses.resize(basis.cols(), static_cast<Eigen::Index>(model.examples->examples.size()) - 1);
-      for (Eigen::Index k = 0; k < poses.cols(); ++k)
-        poses.col(k) = model.examples->examples[static_cast<std::size_t>(k + 1)].pose;
-    }
-    const auto source = pose_source(system, modes, derivatives, basis, size, poses);
+    const auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
     return build_cubature(object_.mesh, object_.materials, source,
                           {asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
                            asset_.training_poses, asset_.seed});
@@ -217,9 +293,10 @@ ReducedModel Pipeline::run() {
   log::info(fmt::format("cubature: {} elements, held-out errors: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %",
                         model.cubature->elements.size(), 100 * model.cubature->heldout_error,
                         100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error));
-  if (model.examples) require_upright(model);
+  for (const auto& [place, set] : example_sets(model)) require_upright(model, place, *set);
   add_internal_force(model);
   add_targets(model);
+  add_region_targets(model);
   if (includes(report_.ledger, "rigid"))
     model.rigid = timed("rigid moments",
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
@@ -252,6 +329,7 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   needs.targets = named("targets");
   needs.rigid = needs.carried = named("rigid");
   needs.contact = named("contact");
+  if (!named("regions")) needs.regions.emplace();
   return needs;
 }
 

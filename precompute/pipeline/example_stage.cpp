@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <optional>
 #include <utility>
 
 #include "common/core/error.h"
@@ -19,14 +18,8 @@ namespace {
 
 // Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
 constexpr Eigen::Index kExtraEigenfunctions = 4;
-// A share of an example's displacement lost to truncation that is worth a warning.
-constexpr double kTruncationWarning = 0.25;
-
 // A displacement, over the object's size, that is none.
 constexpr double kNoPose = 1e-6;
-
-// Functions of the object looked through for how many would carry a pose.
-constexpr Eigen::Index kMostFunctions = 100;
 
 class ShapeStageBuilder {
  public:
@@ -41,10 +34,16 @@ class ShapeStageBuilder {
   void set_shape_data(const Eigen::VectorXd& eigenvalues);
   void add_examples();
   SparseMatrix fit_weights() const;
-  void add_rest(const AlignedRest& rest);
+  void add_rest(const AlignedRest& rest, ExampleGroup& group) const;
   TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
-  void add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred);
-  ExampleData example_data(const AlignmentOutcome& outcome, double volume) const;
+  void add_pose(const PoseInput& input, const AlignmentOutcome& outcome, const TransferredPose& transferred,
+                ExampleGroup& group) const;
+  ExampleData example_data(const AlignmentOutcome& outcome, double volume, const ExampleGroup& group) const;
+  void add_groups(const AlignedRest& rest);
+  PoseFrame region_frame(const AlignedRest& rest, const RegionView& view) const;
+  Eigen::VectorXd share_of_region(const AlignedRest& rest, const RegionInput& input) const;
+  void cut(const RegionView& view, const Eigen::VectorXd& share, TransferredPose& pose) const;
+  VertexArray carried_displacement(const TransferredPose& pose) const;
 
   const AssetConfig& asset_;
   const ObjectInput& object_;
@@ -92,10 +91,11 @@ SparseMatrix ShapeStageBuilder::fit_weights() const {
   return SparseMatrix(Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal());
 }
 
-ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, double volume) const {
+ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, double volume,
+                                            const ExampleGroup& group) const {
   ExampleData example;
   example.name = outcome.name;
-  example.index = std::ssize(stage_.examples.examples);
+  example.index = std::ssize(group.examples.examples);
   example.scale = std::cbrt(stage_.object.volume / volume);
   example.method = outcome.method;
   example.alignment_residual = outcome.residual;
@@ -105,13 +105,12 @@ ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, dou
   return example;
 }
 
-void ShapeStageBuilder::add_rest(const AlignedRest& rest) {
-  ExampleData example = example_data(rest.outcome, rest.basis.volume);
+void ShapeStageBuilder::add_rest(const AlignedRest& rest, ExampleGroup& group) const {
+  ExampleData example = example_data(rest.outcome, rest.basis.volume, group);
   example.is_rest = true;
   example.rotation = rest.rotation;
   example.descriptor = stage_.data.rest_descriptor;
-  stage_.examples.examples.push_back(std::move(example));
-  stage_.alignments.push_back(rest.outcome);
+  group.examples.examples.push_back(std::move(example));
 }
 
 TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const AlignedPose& pose,
@@ -123,62 +122,83 @@ TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const Align
                                *pose.functional_map * coefficients(pose.basis, pose.basis.vertices), frame);
 }
 
-void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred) {
-  ExampleData example = example_data(pose.outcome, tet_volumes(input.mesh).sum());
+void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignmentOutcome& outcome,
+                                 const TransferredPose& transferred, ExampleGroup& group) const {
+  ExampleData example = example_data(outcome, tet_volumes(input.mesh).sum(), group);
   example.rotation = transferred.rotation;
   example.shape_space_error = transferred.shape_space_error;
   example.descriptor = stage_.weights.asDiagonal() * transferred.coefficients;
-  const Eigen::Index column = example.index - 1;
-  stage_.fields.col(column) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
   if (transferred.displacement.norm() <= kNoPose * stage_.object.vertices.norm())
-    throw InputError({"", "/examples, " + input.name, "a pose that differs from the rest pose", "the rest pose",
-                      "leave it out: the rest pose is always an example"});
-  stage_.displacements.col(column) =
-      reconstruct_displacement(stage_.object, stage_.weights, example.descriptor - stage_.data.rest_descriptor);
-  hold_fixed_mean(object_.fixed, stage_.displacements.col(column));
-  stage_.examples.examples.push_back(std::move(example));
-  stage_.alignments.push_back(pose.outcome);
-  stage_.alignments.back().shape_space_error = transferred.shape_space_error;
+    throw InputError({"", "/examples, " + input.name,
+                      group.region.empty()
+                          ? "a pose that differs from the rest pose"
+                          : fmt::format("a pose that differs from the rest pose in the region {}", group.region),
+                      "the rest pose", "leave it out: the rest pose is always an example"});
+  group.fields.conservativeResize(3 * object_.mesh.vertex_count(), group.fields.cols() + 1);
+  group.fields.rightCols(1) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
+  group.examples.examples.push_back(std::move(example));
+}
+
+// 0 to 1 at each vertex of the object: how much of what a pose does there belongs to the region.
+Eigen::VectorXd ShapeStageBuilder::share_of_region(const AlignedRest& rest, const RegionInput& input) const {
+  const Eigen::VectorXd inside = input.inside.cast<double>();
+  if (input.inside_example.size() == 0) return inside;
+  return inside.cwiseProduct(rest.map.pull_back * input.inside_example.cast<double>());
+}
+
+// A pose is placed by the vertices that its region is seen from.
+PoseFrame ShapeStageBuilder::region_frame(const AlignedRest& rest, const RegionView& view) const {
+  if (view.frame().isZero(0)) return {rest.free_poses, fit_weights(), true};
+  return {rest.free_poses, SparseMatrix(view.frame().asDiagonal()), true};
+}
+
+// Leaves what the view sees of a pose that region_frame() placed.
+void ShapeStageBuilder::cut(const RegionView& view, const Eigen::VectorXd& share, TransferredPose& pose) const {
+  const double weight = view.frame().sum();
+  if (weight > 0) pose.displacement.rowwise() -= view.frame().transpose() * pose.displacement / weight;
+  pose.displacement = share.asDiagonal() * pose.displacement;
+  const Eigen::MatrixXd change = coefficients(stage_.object, pose.displacement);
+  pose.coefficients = stage_.rest_coefficients + change;
+  pose.shape_space_error = lost_share(stage_.object.mass, pose.displacement, stage_.object.eigenfunctions * change);
+}
+
+void ShapeStageBuilder::add_groups(const AlignedRest& rest) {
+  if (input_.whole_body) stage_.groups.push_back({""});
+  for (const RegionInput& input : input_.regions)
+    stage_.groups.push_back({input.name, RegionView(object_.mesh, input.inside, object_.fixed)});
+  for (ExampleGroup& group : stage_.groups) add_rest(rest, group);
 }
 
 void ShapeStageBuilder::add_examples() {
   ExampleAligner aligner(asset_, stage_.object, object_, input_);
   const AlignedRest rest = aligner.align_rest();
-  add_rest(rest);
+  stage_.alignments.push_back(rest.outcome);
+  add_groups(rest);
   const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
-  stage_.fields.resize(3 * object_.mesh.vertex_count(), std::ssize(input_.poses));
-  stage_.displacements.resizeLike(stage_.fields);
   for (const PoseInput& input : input_.poses) {
     const AlignedPose pose = aligner.align_pose(rest, input);
-    add_pose(input, pose, transfer(rest, pose, frame));
+    const TransferredPose whole = transfer(rest, pose, frame);
+    stage_.poses.push_back({whole.rotation, carried_displacement(whole)});
+    stage_.alignments.push_back(pose.outcome);
+    stage_.alignments.back().shape_space_error = whole.shape_space_error;
+    if (input_.whole_body && input.in_whole_body) add_pose(input, pose.outcome, whole, stage_.groups.front());
+    for (std::size_t i = 0; i < input_.regions.size(); ++i) {
+      const RegionInput& region = input_.regions[i];
+      if (std::ranges::find(region.examples, input.name) == region.examples.end()) continue;
+      ExampleGroup& group = stage_.groups[i + (input_.whole_body ? 1 : 0)];
+      TransferredPose local = transfer(rest, pose, region_frame(rest, *group.view));
+      cut(*group.view, share_of_region(rest, region), local);
+      add_pose(input, pose.outcome, local, group);
+    }
   }
 }
 
-// The least number of the object's functions, no cluster cut, that loses at most the share worth a warning of a
-// displacement [3n]; 0 where kMostFunctions do not do.
-class FunctionCounter {
- public:
-  FunctionCounter(const TetMesh& mesh, const std::string& name) : mesh_(mesh), name_(name) {}
-
-  Eigen::Index needed(const Eigen::VectorXd& field) {
-    if (!basis_) basis_ = laplace_basis(mesh_, std::min(kMostFunctions, mesh_.vertex_count() - 2), name_);
-    const VertexArray displacement = field.reshaped<Eigen::RowMajor>(field.size() / 3, 3);
-    const double whole = (displacement.transpose() * (basis_->mass * displacement)).trace();
-    const Eigen::VectorXd shares = coefficients(*basis_, displacement).rowwise().squaredNorm() / whole;
-    double carried = 0;
-    for (Eigen::Index count = 1; count < shares.size(); ++count) {
-      carried += shares[count - 1];
-      if (1 - carried <= kTruncationWarning * kTruncationWarning && !splits_cluster(basis_->eigenvalues, count))
-        return count;
-    }
-    return 0;
-  }
-
- private:
-  const TetMesh& mesh_;
-  const std::string& name_;
-  std::optional<LaplaceBasis> basis_;
-};
+VertexArray ShapeStageBuilder::carried_displacement(const TransferredPose& pose) const {
+  const RowMatrix change = stage_.weights.asDiagonal() * (pose.coefficients - stage_.rest_coefficients);
+  const Eigen::MatrixXd field =
+      carried_fields(stage_.object, stage_.weights, object_.fixed, change.reshaped<Eigen::RowMajor>());
+  return field.reshaped<Eigen::RowMajor>(object_.mesh.vertex_count(), 3);
+}
 
 ShapeStage ShapeStageBuilder::build() {
   set_shape_data(object_basis());
@@ -191,36 +211,6 @@ ShapeStage ShapeStageBuilder::build() {
 ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
                              std::vector<std::string>& warnings) {
   return ShapeStageBuilder(asset, object, input, warnings).build();
-}
-
-void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const FieldClamp& clamp, ShapeStage& stage,
-                     ReducedModel& model, std::vector<std::string>& warnings) {
-  model.projection = direct_projection(stage.object, stage.weights, system.full_mass, model.modal->basis);
-  const RowMatrix map = pose_map(stage.object, stage.weights, model.object->fixed, system, clamp, model.modal->basis,
-                                 model.projection->reduced_from_shape);
-  model.projection->target_basis = range_basis(map);
-  fill_weights_problem(stage.data.rest_descriptor, *model.projection, map, stage.examples);
-  FunctionCounter counter(model.object->mesh, asset.name);
-  for (Eigen::Index k = 0; k < stage.displacements.cols(); ++k) {
-    auto& example = stage.examples.examples[static_cast<std::size_t>(k + 1)];
-    const Eigen::VectorXd field = stage.displacements.col(k);
-    const Eigen::VectorXd rest = field - model.modal->basis * example.pose;
-    const double norm = field.dot(system.full_mass * field);
-    example.basis_error = norm > 0 ? std::sqrt(std::max(0.0, rest.dot(system.full_mass * rest) / norm)) : 0;
-    log::info(fmt::format(
-        "example {}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
-        example.name, asset.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
-    if (example.shape_space_error <= kTruncationWarning) continue;
-    const Eigen::Index needed = counter.needed(stage.fields.col(k));
-    warn(warnings, fmt::format("example {}: {} eigenfunctions lose {:.0f} % of its displacement; {}", example.name,
-                               asset.eigenfunctions, 100 * example.shape_space_error,
-                               needed > asset.eigenfunctions
-                                   ? fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
-                                                 100 * kTruncationWarning)
-                                   : "more than the mesh resolves would be needed"));
-  }
-  model.shape_space = std::move(stage.data);
-  model.examples = std::move(stage.examples);
 }
 
 }  // namespace exmat::precompute

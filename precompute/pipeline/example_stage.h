@@ -1,17 +1,31 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/config/asset_config.h"
 #include "common/model/reduced_model.h"
-#include "precompute/fem/elastic_system.h"
-#include "precompute/modes/field_clamp.h"
 #include "precompute/pipeline/alignment_verdict.h"
 #include "precompute/pipeline/inputs.h"
 #include "precompute/shape_space/laplace_basis.h"
+#include "precompute/shape_space/region_view.h"
 
 namespace exmat::precompute {
+
+/// Examples that act together: on the whole body, or on a region alone.
+struct ExampleGroup {
+  std::string region;                ///< empty: the whole body
+  std::optional<RegionView> view{};  ///< of a region
+  ExampleSet examples{};             ///< the rest pose first; reduced coordinates and basis errors are not filled in
+  Eigen::MatrixXd fields{};          ///< 3n x (K-1) displacement of the object to each pose, as the view sees it [m]
+};
+
+/// A pose brought to the object as a whole, whatever it acts on.
+struct StagedPose {
+  RowMatrix3 rotation = RowMatrix3::Identity();  ///< from the example's frame to the object's
+  VertexArray displacement;                      ///< n x 3, what the m functions carry [m]
+};
 
 /// The object's shape space and its examples in it, before there is a basis.
 struct ShapeStage {
@@ -20,20 +34,14 @@ struct ShapeStage {
   Eigen::VectorXd weights;            ///< Lambda, m
   ShapeSpaceData data;
   std::vector<AlignmentOutcome> alignments;  ///< of the examples, in their order
-  ExampleSet examples;            ///< the rest pose first; reduced coordinates and basis errors are not filled in
-  Eigen::MatrixXd fields;         ///< 3n x (K-1) displacement of the object to each pose, whole [m]
-  Eigen::MatrixXd displacements;  ///< 3n x (K-1) what the m functions carry of it [m]
+  std::vector<StagedPose> poses;             ///< as ExampleInput::poses
+  std::vector<ExampleGroup> groups;          ///< the whole body's, if any, then those of the regions
 };
 
-/// Computes the object's shape space and brings every example into it. method.md, section 1; alignment.md. `warnings`
-/// receives what is also logged as such. Refused alignments are in the stage, for require_aligned. Throws InputError
-/// (no file named where it is the asset's) and WorkError.
+/// Computes the object's shape space and brings every example into it. method.md, sections 1 and 5; alignment.md.
+/// `warnings` receives what is also logged as such. Refused alignments are in the stage, for require_aligned. Throws
+/// InputError (no file named where it is the asset's) and WorkError.
 ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
                              std::vector<std::string>& warnings);
-
-/// Puts shape space, projection and examples into a model that has its modal basis, logs and records what of each
-/// example is lost. `stage` is used up.
-void finish_examples(const AssetConfig& asset, const ElasticSystem& system, const FieldClamp& clamp, ShapeStage& stage,
-                     ReducedModel& model, std::vector<std::string>& warnings);
 
 }  // namespace exmat::precompute

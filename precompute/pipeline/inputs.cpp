@@ -109,6 +109,8 @@ class ExampleReader {
   bool poses_rest(const MeshFile& file) const;
   void read_correspondences(PoseInput& example);
   void read_landmark_file();
+  void read_regions();
+  FlagVector flagged(const VertexArray& file_vertices, const FileNumbers& numbers, const VertexSelection& selection);
   IndexVector selected(const VertexArray& file_vertices, const FileNumbers& numbers, const VertexSelection& selection);
 
   const AssetConfig& asset_;
@@ -190,6 +192,32 @@ IndexVector ExampleReader::selected(const VertexArray& file_vertices, const File
   return Eigen::Map<const IndexVector>(kept.data(), std::ssize(kept));
 }
 
+FlagVector ExampleReader::flagged(const VertexArray& file_vertices, const FileNumbers& numbers,
+                                  const VertexSelection& selection) {
+  FlagVector flags = FlagVector::Zero(std::ssize(numbers.kept));
+  for (const auto vertex : selected(file_vertices, numbers, selection)) flags[vertex] = 1;
+  return flags;
+}
+
+void ExampleReader::read_regions() {
+  const Mesh object{object_numbers_, object_.file_positions};
+  const Mesh& rest = input_.object_is_rest ? object : meshes_.at(input_.rest.name);
+  for (std::size_t i = 0; i < asset_.regions.size(); ++i) {
+    const RegionConfig& config = asset_.regions[i];
+    RegionInput region{
+        config.name, flagged(object.file_vertices, object.numbers, config.vertices), {}, config.examples};
+    if (!(region.inside.array() != 0 && object_.fixed.array() == 0).any())
+      throw InputError({asset_.file.string(), fmt::format("/regions/{}/vertices", i),
+                        "vertices of the object, some of them not fixed", "none", "choose others"});
+    if (config.example_vertices)
+      region.inside_example = flagged(rest.file_vertices, rest.numbers, *config.example_vertices);
+    for (PoseInput& pose : input_.poses)
+      if (std::ranges::find(config.examples, pose.name) != config.examples.end()) pose.in_whole_body = false;
+    input_.regions.push_back(std::move(region));
+  }
+  input_.whole_body = input_.regions.empty() || std::ranges::any_of(input_.poses, &PoseInput::in_whole_body);
+}
+
 // The dense map and the corresponding parts of one example.
 void ExampleReader::read_correspondences(PoseInput& example) {
   const Mesh& mesh = meshes_.at(example.name);
@@ -238,6 +266,7 @@ ExampleInput ExampleReader::read() {
   read_rest();
   for (const auto& example : asset_.examples)
     if (!example.rest) read_pose(example);
+  read_regions();
   read_landmark_file();
   for (const CorrespondingRegionConfig& region : asset_.alignment.regions)
     input_.parts.push_back(selected(object_.file_positions, object_numbers_, region.object));

@@ -29,8 +29,17 @@ struct PoseInput {
   double inverted_fraction = 0;   ///< share of the volume in tets that the pose turns inside out
   IndexVector
       on_object{};  ///< dense map: for each vertex of the object one of `mesh`, or -1; empty where none is given
+  bool in_whole_body = true;         ///< no region has it
   Eigen::Index column = 0;           ///< in ExampleInput::landmarks
   std::vector<IndexVector> parts{};  ///< for each of ExampleInput::parts its vertices of `mesh`; none where not given
+};
+
+/// A region of the asset, and the poses that act there.
+struct RegionInput {
+  std::string name;
+  FlagVector inside;          ///< n, of the object
+  FlagVector inside_example;  ///< of the rest example's vertices; empty: all
+  std::vector<std::string> examples;
 };
 
 /// The asset's examples: one rest mesh, and poses.
@@ -38,6 +47,8 @@ struct ExampleInput {
   bool object_is_rest = true;  ///< no rest example was named: `rest` is the object's own mesh
   PoseInput rest;              ///< column -1 where the object is the rest example
   std::vector<PoseInput> poses;
+  std::vector<RegionInput> regions;
+  bool whole_body = true;          ///< there are poses for it, or no regions
   IndexMatrix landmarks;           ///< l x (1 + examples), vertices of the object and the examples as read, -1 for none
   std::vector<IndexVector> parts;  ///< corresponding regions: their vertices of the object
 };

@@ -1,6 +1,6 @@
 #include "precompute/shape_space/pose_map.h"
 
-#include <cmath>
+#include "precompute/shape_space/projection.h"
 
 namespace exmat::precompute {
 
@@ -15,21 +15,25 @@ void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displa
     }
 }
 
-RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
-                   const ElasticSystem& system, const FieldClamp& clamp, const RowMatrix& basis,
-                   const RowMatrix& reduced_from_shape) {
-  if (!system.constrained()) return reduced_from_shape;
-  const Eigen::Index n = object.vertices.rows();
+Eigen::MatrixXd carried_fields(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                               const Eigen::MatrixXd& changes) {
+  Eigen::MatrixXd fields(3 * fixed.size(), changes.cols());
+  for (Eigen::Index k = 0; k < changes.cols(); ++k)
+    fields.col(k) =
+        reconstruct_displacement(object, weights, changes.col(k).reshaped<Eigen::RowMajor>(weights.size(), 3));
+  hold_fixed_mean(fixed, fields);
+  return fields;
+}
+
+PoseFields whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                            const FieldClamp& clamp) {
+  return [&](const Eigen::MatrixXd& changes) { return clamp.apply(carried_fields(object, weights, fixed, changes)); };
+}
+
+RowMatrix pose_map(const PoseFields& poses, Eigen::Index functions, const ElasticSystem& system,
+                   const RowMatrix& basis) {
   const Eigen::MatrixXd projector = system.mass * system.restrict(basis);
-  RowMatrix map(basis.cols(), 3 * weights.size());
-  for (Eigen::Index i = 0; i < weights.size(); ++i) {
-    const Eigen::VectorXd function = std::cbrt(object.volume) / weights[i] * object.eigenfunctions.col(i);
-    Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(3 * n, 3);
-    for (int axis = 0; axis < 3; ++axis) fields(Eigen::seqN(axis, n, 3), axis) = function;
-    hold_fixed_mean(fixed, fields);
-    map.middleCols(3 * i, 3) = projector.transpose() * clamp.apply(fields);
-  }
-  return map;
+  return projector.transpose() * poses(Eigen::MatrixXd::Identity(3 * functions, 3 * functions));
 }
 
 }  // namespace exmat::precompute

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <functional>
+
 #include "precompute/fem/elastic_system.h"
 #include "precompute/modes/field_clamp.h"
 #include "precompute/shape_space/laplace_basis.h"
@@ -10,12 +12,22 @@ namespace exmat::precompute {
 /// shape space leaves out, put back. Those of a free body, whose mean is 0, stay.
 void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements);
 
-/// [r x 3m] reduced coordinates of the pose that a change of descriptor stands for, U^T M C V^(1/3) (Phi Lambda^-1 (x)
-/// I_3): C puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by a
-/// FieldClamp. T^+ without C, and so for a free body, where `reduced_from_shape` is returned.
-/// `basis` is U, 3n x r. method.md, sections 4 and 5.
-RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
-                   const ElasticSystem& system, const FieldClamp& clamp, const RowMatrix& basis,
-                   const RowMatrix& reduced_from_shape);
+/// [3n x k] displacements V^(1/3) Phi Lambda^-1 of changes of descriptor [3m x k], entry 3i + axis, about the mean of
+/// the fixed vertices as above.
+Eigen::MatrixXd carried_fields(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                               const Eigen::MatrixXd& changes);
+
+/// [f x k] free rows of the displacements that changes of descriptor [3m x k], entry 3i + axis, stand for.
+using PoseFields = std::function<Eigen::MatrixXd(const Eigen::MatrixXd& changes)>;
+
+/// Those of the whole body: carried_fields() with the fixed vertices of a clamped body put back, by a FieldClamp.
+/// method.md, sections 4 and 5. All are kept by reference.
+PoseFields whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                            const FieldClamp& clamp);
+
+/// [r x 3m] reduced coordinates U^T M w of the pose w that each unit change of descriptor stands for. `basis` is U,
+/// 3n x r. T^+ where w is that of a free body as a whole.
+RowMatrix pose_map(const PoseFields& poses, Eigen::Index functions, const ElasticSystem& system,
+                   const RowMatrix& basis);
 
 }  // namespace exmat::precompute

@@ -23,15 +23,6 @@ Eigen::Matrix3d fit_rotation(const VertexArray& posed, const VertexArray& rest, 
   return procrustes_rotation((rest.rowwise() - rest_mean).transpose() * (weights * centred));
 }
 
-// |d - d_m| / |d| in the object's mass, both [n x 3]; nothing is lost of no displacement.
-double lost_share(const SparseMatrix& mass, const VertexArray& displacement, const VertexArray& carried) {
-  const auto norm = [&mass](const VertexArray& field) {
-    return std::sqrt((field.transpose() * (mass * field)).trace());
-  };
-  const double full = norm(displacement);
-  return full <= kNoDisplacement ? 0 : norm(displacement - carried) / full;
-}
-
 // The change of coefficients [m x 3] of a pose that `to_rest` has turned, fitted to the object as the frame says;
 // `displacement` [n x 3] is what is fitted.
 TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
@@ -45,6 +36,14 @@ TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& re
 }
 
 }  // namespace
+
+double lost_share(const SparseMatrix& mass, const VertexArray& displacement, const VertexArray& carried) {
+  const auto norm = [&mass](const VertexArray& field) {
+    return std::sqrt((field.transpose() * (mass * field)).trace());
+  };
+  const double full = norm(displacement);
+  return full <= kNoDisplacement ? 0 : norm(displacement - carried) / full;
+}
 
 Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(moments, Eigen::ComputeFullU | Eigen::ComputeFullV);

@@ -66,6 +66,9 @@ TransferredPose transfer_coefficients(const LaplaceBasis& object, const Eigen::M
                                       const Eigen::MatrixXd& carried_rest, const Eigen::MatrixXd& carried_posed,
                                       const PoseFrame& frame);
 
+/// |d - d_m| / |d| in a mass [n x n], of displacements [n x 3]; nothing is lost of none.
+double lost_share(const SparseMatrix& mass, const VertexArray& displacement, const VertexArray& carried);
+
 /// Proper rotation R that minimises sum_i w_i |R a_i - b_i|^2 for [3 x 3] moments sum_i w_i b_i a_i^T. Where the
 /// moments leave the angle about an axis open (rank one), the smallest rotation is taken. Kabsch 1976; Umeyama 1991.
 Eigen::Matrix3d procrustes_rotation(const Eigen::Matrix3d& moments);

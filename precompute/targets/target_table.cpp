@@ -199,9 +199,15 @@ std::optional<TargetTableData> TableBuilder::run() {
 
 std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
                                                   TargetTableReport& report) {
+  return build_target_table(model, *model.examples, *model.projection, options, report);
+}
+
+std::optional<TargetTableData> build_target_table(const ReducedModel& model, const ExampleSet& set,
+                                                  const ProjectionData& projection, const TargetTableOptions& options,
+                                                  TargetTableReport& report) {
   const Timer timer;
   report = {};
-  const std::vector<ExampleData>& examples = model.examples->examples;
+  const std::vector<ExampleData>& examples = set.examples;
   const auto count = static_cast<std::int64_t>(examples.size());
   if (count < 2 || count > kMostTableExamples) {
     report.message =
@@ -213,7 +219,7 @@ std::optional<TargetTableData> build_target_table(const ReducedModel& model, con
   const auto reference = runtime::energy_reference_from_name(options.energy_reference);
   TargetSolver target;
   if (const auto complaint = target.build(*material_from_name(model.object->material), *model.cubature, examples,
-                                          model.projection->target_basis, reference)) {
+                                          projection.target_basis, reference)) {
     report.message = "no table of targets: " + to_string(*complaint);
     return std::nullopt;
   }

@@ -41,4 +41,9 @@ struct TargetTableReport {
 std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
                                                   TargetTableReport& report);
 
+/// The same of other examples of that model: those of a region, with its projection.
+std::optional<TargetTableData> build_target_table(const ReducedModel& model, const ExampleSet& set,
+                                                  const ProjectionData& projection, const TargetTableOptions& options,
+                                                  TargetTableReport& report);
+
 }  // namespace exmat::precompute

@@ -180,6 +180,20 @@ std::int64_t exmat_model_examples(const exmat_model* model) noexcept {
   return model != nullptr ? model->model().example_count() : -1;
 }
 
+std::int64_t exmat_model_regions(const exmat_model* model) noexcept {
+  return model != nullptr ? model->model().region_count() : -1;
+}
+
+std::int64_t exmat_model_region_examples(const exmat_model* model, std::int64_t region) noexcept {
+  const ExampleModel* examples = model != nullptr ? model->model().region(region) : nullptr;
+  return examples != nullptr ? examples->weights.examples() : -1;
+}
+
+const char* exmat_model_region_name(const exmat_model* model, std::int64_t region) noexcept {
+  const ExampleModel* examples = model != nullptr ? model->model().region(region) : nullptr;
+  return examples != nullptr ? examples->region.c_str() : nullptr;
+}
+
 double exmat_model_time_step(const exmat_model* model) noexcept {
   return model != nullptr ? model->source->loaded.scene.time_step : -1;
 }
@@ -451,10 +465,24 @@ exmat_status exmat_body_read_reduced(const exmat_body* body, double* q, double* 
 
 exmat_status exmat_body_weights(const exmat_body* body, double* weights, std::int64_t count) noexcept {
   EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE_LENGTH(count, body->state.weights.size());
+  EXMAT_REQUIRE_LENGTH(count, body->model().example_count());
   if (count == 0) return EXMAT_OK;
   EXMAT_REQUIRE(weights);
-  std::copy_n(body->state.weights.data(), count, weights);
+  std::copy_n(body->state.examples.front().weights.data(), count, weights);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_region_weights(const exmat_body* body, std::int64_t region, double* weights,
+                                       std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  const ExampleModel* examples = body->model().region(region);
+  if (examples == nullptr)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: region = %" PRId64 ": expected one of the model's %" PRId64, __func__,
+                region, static_cast<std::int64_t>(body->model().region_count()));
+  EXMAT_REQUIRE_LENGTH(count, examples->weights.examples());
+  EXMAT_REQUIRE(weights);
+  const auto force = static_cast<std::size_t>(examples - body->model().examples.data());
+  std::copy_n(body->state.examples[force].weights.data(), count, weights);
   return EXMAT_OK;
 }
 

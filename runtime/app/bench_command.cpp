@@ -40,7 +40,7 @@ void print_scene(const BenchResult& result) {
 void print_rates(const BenchResult& result) {
   print("Newton iterations",
         fmt::format("{:.2f} a step, {:.2f} factorisations", result.newton_iterations, result.factorisations));
-  if (result.target == "solve") print("target iterations", fmt::format("{:.2f} a step", result.target_iterations));
+  if (result.target_iterations > 0) print("target iterations", fmt::format("{:.2f} a step", result.target_iterations));
   print("steps per second",
         fmt::format("{:.0f}{}", result.steps_per_second(), result.instances > 1 ? " over all bodies" : ""));
   print("real-time factor", fmt::format("{:.1f}", result.real_time_factor()));

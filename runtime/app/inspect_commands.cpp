@@ -8,7 +8,7 @@ namespace exmat::runtime {
 namespace {
 
 void print_groups(const ReducedModel& model, const BundleSummary& summary) {
-  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples);
+  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples, std::ssize(summary.regions));
   fill_bytes(model, ledger);
   fmt::print("\n{:<14} {:>14}\n", "group", "bytes");
   for (const LedgerEntry& entry : ledger)
@@ -44,6 +44,11 @@ void info_command(const std::filesystem::path& bundle) {
   if (summary.eigenfunctions > 0) fmt::print("eigenfunctions {}\n", summary.eigenfunctions);
   print_groups(model, summary);
   if (model.examples) print_examples(*model.examples);
+  for (const RegionData& region : model.regions) {
+    fmt::print("\nregion {}: {} vertices, {}", region.name, region.vertices.size(),
+               region.targets ? "with a table of targets" : "no table of targets");
+    print_examples(region.examples);
+  }
 }
 
 void validate_command(const std::filesystem::path& bundle) {

@@ -27,7 +27,7 @@ void print_summary(const RunSummary& summary, const LoadedScene& loaded, const S
   print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)));
   print("real-time factor", fmt::format("{:.1f}", mean > 0 ? config.time_step / (mean * summary.bodies) : 0));
   print("Newton iterations", fmt::format("{:.2f} a step", summary.newton_iterations.mean()));
-  if (runs_examples(*loaded.model, loaded.scene))
+  if (runs_examples(loaded.scene))
     print("target iterations", fmt::format("{:.2f} a step", summary.target_iterations.mean()));
   print("projections", std::to_string(summary.projections));
   print("unconverged steps", std::to_string(summary.unconverged_steps));

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <numeric>
+#include <set>
 
 #include "common/core/error.h"
 #include "common/core/progress.h"
@@ -143,8 +144,11 @@ class Bench {
 };
 
 std::string target_name(const LoadedScene& loaded) {
-  if (!runs_examples(*loaded.model, loaded.scene)) return "none";
-  return loaded.model->examples->table ? "table" : "solve";
+  std::set<std::string> names;
+  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i)
+    if (acts(loaded.scene.examples[i])) names.insert(loaded.model->examples[i].table ? "table" : "solve");
+  if (names.empty()) return "none";
+  return names.size() == 1 ? *names.begin() : "table and solve";
 }
 
 double microseconds(double seconds) { return 1e6 * seconds; }
@@ -179,7 +183,7 @@ BenchResult bench(const LoadedScene& loaded, const SceneConfig& config, const Be
   result.elements = force.cubature().elements();
   result.vertices = loaded.summary.vertices;
   result.tets = loaded.summary.tets;
-  result.examples = loaded.model->example_count();
+  for (const ExampleModel& examples : loaded.model->examples) result.examples += examples.weights.examples();
   result.integrator = config.integrator;
   result.internal_force = force.polynomial() ? "polynomial" : "cubature";
   result.target = target_name(loaded);

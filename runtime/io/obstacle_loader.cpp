@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <vector>
 
 #include "common/core/error.h"
 
@@ -13,28 +14,33 @@ Shape make_shape(const SphereConfig& sphere) { return Sphere{sphere.center, sphe
 Shape make_shape(const BoxConfig& box) { return Box{box.center, box.half_extents, box.orientation.toRotationMatrix()}; }
 Shape make_shape(const CapsuleConfig& capsule) { return Capsule{capsule.start, capsule.end, capsule.radius}; }
 
-const ExampleData* find_example(const ReducedModel& data, const std::string& name) {
-  if (!data.examples) return nullptr;
-  const auto found = std::ranges::find(data.examples->examples, name, &ExampleData::name);
-  return found == data.examples->examples.end() ? nullptr : &*found;
+/// Of the whole body first, then of regions.
+std::vector<const ExampleData*> examples_of(const ReducedModel& data) {
+  std::vector<const ExampleData*> examples;
+  const auto add = [&](const ExampleSet& set) {
+    for (const ExampleData& example : set.examples) examples.push_back(&example);
+  };
+  if (data.examples) add(*data.examples);
+  for (const RegionData& region : data.regions) add(region.examples);
+  return examples;
 }
 
 std::string example_names(const ReducedModel& data) {
   std::string names;
-  if (data.examples)
-    for (const ExampleData& example : data.examples->examples)
-      names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", example.name);
+  for (const ExampleData* example : examples_of(data))
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", example->name);
   return names.empty() ? "it has none" : "it has " + names;
 }
 
 Eigen::VectorXd example_coordinates(const SceneConfig& config, const ReducedModel& data) {
   const PoseConfig& pose = *config.body.pose;
-  const ExampleData* example = find_example(data, pose.example);
-  if (example == nullptr)
+  const auto examples = examples_of(data);
+  const auto example = std::ranges::find(examples, pose.example, &ExampleData::name);
+  if (example == examples.end())
     throw InputError({config.file.string(), "/body/pose/example",
                       fmt::format("an example of {}; {}", config.bundle.string(), example_names(data)),
                       '"' + pose.example + '"', ""});
-  return pose.weight * example->pose;
+  return pose.weight * (*example)->pose;
 }
 
 }  // namespace

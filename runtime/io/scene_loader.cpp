@@ -1,5 +1,6 @@
 #include "runtime/io/scene_loader.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <string_view>
 #include <utility>
@@ -25,21 +26,47 @@ void check_examples(const SceneConfig& config, const BundleSummary& summary) {
                       "precompute the asset with its examples, or drop \"examples\" from " + config.file.string()});
 }
 
+void check_regions(const SceneConfig& config, const BundleSummary& summary) {
+  std::string names;
+  for (const RegionSummary& region : summary.regions)
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", region.name);
+  for (std::size_t i = 0; i < config.regions.size(); ++i) {
+    const std::string& name = config.regions[i].name;
+    if (std::ranges::find(summary.regions, name, &RegionSummary::name) != summary.regions.end()) continue;
+    throw InputError(
+        {config.file.string(), fmt::format("/regions/{}/name", i),
+         fmt::format("a region of {}; {}", config.bundle.string(), names.empty() ? "it has none" : "it has " + names),
+         '"' + name + '"', "name regions in the asset and precompute it again"});
+  }
+}
+
+/// A table of targets where the scene insists on one. `owner` is the member of the scene, `group` that of the bundle.
+void check_table(const SceneConfig& config, const ExampleForceConfig& force, const std::string& owner,
+                 const std::string& group, bool has_targets, const std::string& energy_reference) {
+  if (force.target != "table") return;
+  const std::string bundle = config.bundle.string();
+  const std::string advice =
+      fmt::format("precompute the asset with this scene (--scene), or let the scene's {}.target say \"auto\"", owner);
+  if (!has_targets)
+    throw InputError({bundle, group, "this group, since the scene asks for a table of targets", "none", advice});
+  if (energy_reference != force.energy_reference)
+    throw InputError({bundle, group, "targets of energy_reference \"" + force.energy_reference + '"',
+                      '"' + energy_reference + '"', advice});
+}
+
 void check_methods(const SceneConfig& config, const BundleSummary& summary) {
   const std::string bundle = config.bundle.string();
   if (config.internal_force == "polynomial" && !summary.has_polynomial)
     throw InputError({bundle, "/polynomial", "this group, since the scene asks for it by internal_force", "none",
                       "precompute the asset with internal_force \"polynomial\", or let the scene say \"auto\""});
-  if (!config.examples || config.examples->target != "table") return;
-  if (!summary.has_targets)
-    throw InputError(
-        {bundle, "/targets", "this group, since the scene asks for a table of targets", "none",
-         "precompute the asset with this scene (--scene), or let the scene's examples.target say \"auto\""});
-  if (summary.energy_reference != config.examples->energy_reference)
-    throw InputError(
-        {bundle, "/targets", "targets of energy_reference \"" + config.examples->energy_reference + '"',
-         '"' + summary.energy_reference + '"',
-         "precompute the asset with this scene (--scene), or let the scene's examples.target say \"auto\""});
+  if (config.examples)
+    check_table(config, *config.examples, "examples", "/targets", summary.has_targets, summary.energy_reference);
+  for (std::size_t i = 0; i < config.regions.size(); ++i) {
+    const auto& [name, force] = config.regions[i];
+    const RegionSummary& region = *std::ranges::find(summary.regions, name, &RegionSummary::name);
+    check_table(config, force, fmt::format("regions[{}]", i), fmt::format("/regions/{}/targets", name),
+                region.has_targets, region.energy_reference);
+  }
 }
 
 void check_force_vertices(const SceneConfig& config, const BundleSummary& summary) {
@@ -90,6 +117,10 @@ ScriptedForce scripted_force(const SceneConfig& config, const VertexForceConfig&
   return scripted;
 }
 
+ExampleSettings example_settings(const ExampleForceConfig& config) {
+  return {config.stiffness, config.damping, config.bias, config.target_iterations};
+}
+
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   StepScene scene;
   scene.time_step = config.time_step;
@@ -102,9 +133,8 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
   for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force(config, force, loaded));
-  if (config.examples)
-    scene.examples = ExampleSettings{config.examples->stiffness, config.examples->damping, config.examples->bias,
-                                     config.examples->target_iterations};
+  if (config.examples) scene.examples.push_back(example_settings(*config.examples));
+  for (const RegionForceConfig& region : config.regions) scene.examples.push_back(example_settings(region.force));
   return scene;
 }
 
@@ -130,16 +160,33 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   options.polynomial = data.polynomial.has_value();
   options.carried = !config.body.motion.empty();
   if (config.examples) options.energy_reference = energy_reference_from_name(config.examples->energy_reference);
+  for (const auto& [name, force] : config.regions)
+    options.regions.push_back({name, std::ranges::find(data.regions, name, &RegionData::name)->targets.has_value(),
+                               energy_reference_from_name(force.energy_reference)});
   ModelResult result = build_model(data, options);
   if (result.model) return std::move(result.model);
   result.complaint.file = config.bundle.string();
   throw InputError(std::move(result.complaint));
 }
 
-std::string describe_target(const ExampleModel& examples, const StepScene& scene) {
+std::string describe_target(const ExampleModel& examples, const ExampleSettings& settings) {
   if (examples.table) return fmt::format("target: table, one polynomial of degree {}", examples.table->degree());
   return fmt::format("target: Newton in d = {} coordinates, s = {} elements, at most {} iterations a step",
-                     examples.target->dimension(), examples.target->elements(), scene.examples->target_iterations);
+                     examples.target->dimension(), examples.target->elements(), settings.target_iterations);
+}
+
+void describe_examples(const ExampleModel& examples, const ExampleSettings& settings, std::vector<std::string>& plan) {
+  const std::string owner = examples.region.empty() ? "" : fmt::format("region {}: ", examples.region);
+  if (!acts(settings)) {
+    plan.push_back(owner + "weights, target, example_force: left out, stiffness and damping are 0");
+    return;
+  }
+  const Eigen::Index modes = examples.filter.matrix().rows();
+  plan.push_back(owner +
+                 fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias));
+  plan.push_back(owner + describe_target(examples, settings));
+  plan.push_back(owner + fmt::format("example_force: linear, {} filter of {} x {}",
+                                     examples.filter.is_symmetric() ? "symmetric" : "unsymmetric", modes, modes));
 }
 
 }  // namespace
@@ -149,14 +196,16 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.summary = summarise_bundle(config.bundle);
   check_body(config, loaded.summary.constrained);
   check_examples(config, loaded.summary);
+  check_regions(config, loaded.summary);
   check_methods(config, loaded.summary);
   check_force_vertices(config, loaded.summary);
+  const Needs needs = fit_needs(needs_of(config), loaded.summary);
   loaded.ledger =
-      plan_groups(fit_needs(needs_of(config), loaded.summary), loaded.summary.constrained, loaded.summary.examples);
+      plan_groups(needs, loaded.summary.constrained, loaded.summary.examples, std::ssize(loaded.summary.regions));
   // A force on a body that moves needs to know where it acts.
   const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
   const bool positions = config.trajectory || (moves && !config.forces.empty());
-  const BundleRequest request{loaded.ledger, /*step_only=*/true, positions};
+  const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   loaded.model = prepare(config, loaded.data);
   loaded.scene = step_scene(config, loaded);
@@ -169,6 +218,7 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.data.polynomial.reset();
   loaded.data.targets.reset();
   loaded.data.contact.reset();
+  loaded.data.regions.clear();
   return loaded;
 }
 
@@ -181,17 +231,8 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   const auto left_out = [&plan](std::string_view stage, std::string_view why) {
     plan.push_back(fmt::format("{}: left out, {}", stage, why));
   };
-  if (runs_examples(model, scene)) {
-    const Eigen::Index count = model.example_count();
-    plan.push_back(fmt::format("weights: K = {} examples, bias {:g}", count, scene.examples->bias));
-    plan.push_back(describe_target(*model.examples, scene));
-    plan.push_back(fmt::format("example_force: linear, {} filter of {} x {}",
-                               model.examples->filter.is_symmetric() ? "symmetric" : "unsymmetric", model.modes(),
-                               model.modes()));
-  } else {
-    left_out("weights, target, example_force",
-             scene.examples ? "stiffness and damping are 0" : "the scene names no examples");
-  }
+  for (std::size_t i = 0; i < scene.examples.size(); ++i) describe_examples(model.examples[i], scene.examples[i], plan);
+  if (scene.examples.empty()) left_out("weights, target, example_force", "the scene names no examples");
   plan.push_back(model.internal_force.polynomial() ? std::string("internal_force: exact polynomial")
                                                    : fmt::format("internal_force: cubature, s = {} elements",
                                                                  model.internal_force.cubature().elements()));

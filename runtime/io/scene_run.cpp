@@ -12,9 +12,11 @@ namespace {
 
 std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
   if (!config.trajectory) return nullptr;
-  const bool examples = runs_examples(*loaded.model, loaded.scene);
-  const TrajectoryInfo info{config.integrator, config.time_step, 1 + config.steps / config.every,
-                            examples ? loaded.model->example_count() : 0};
+  TrajectoryInfo info{config.integrator, config.time_step, 1 + config.steps / config.every};
+  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i) {
+    const ExampleModel& examples = loaded.model->examples[i];
+    if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
+  }
   return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, info);
 }
 

@@ -39,19 +39,29 @@ void add_solver(const TargetSolver& solver, int iterations, StepWork& work) {
   work.bytes += doubles((2 + iterations) * gradient);
 }
 
-void add_examples(const Model& model, const StepReport& report, StepWork& work) {
-  const ExampleModel& examples = *model.examples;
-  const Eigen::Index modes = model.modes(), count = model.example_count();
+/// Of one force.
+void add_examples(const ExampleModel& examples, int target_iterations, const StepReport& report, StepWork& work) {
+  const Eigen::Index modes = examples.filter.matrix().rows(), count = examples.weights.examples();
   const auto numbers = static_cast<double>(count * (modes + count));  // load, and the slopes of one turn
   work.weights_flops += 2 * numbers;
   work.bytes += doubles(numbers);
   if (examples.table)
     add_table(*examples.table, work);
   else
-    add_solver(*examples.target, report.target_iterations, work);
+    add_solver(*examples.target, target_iterations, work);
   const double passes = examples.filter.is_symmetric() ? 1 : 1 + evaluations(report);  // over the filter
   work.other_flops += passes * 2 * square(modes);
   work.bytes += doubles((1 + passes) * square(modes));
+}
+
+/// The report counts the iterations of all targets together: each that is solved for is taken to need as many.
+void add_examples(const Model& model, const StepScene& scene, const StepReport& report, StepWork& work) {
+  int solved = 0;
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (acts(scene.examples[i]) && model.examples[i].target) ++solved;
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (acts(scene.examples[i]))
+      add_examples(model.examples[i], report.target_iterations / std::max(1, solved), report, work);
 }
 
 }  // namespace
@@ -79,7 +89,7 @@ StepWork step_work(const Model& model, const StepScene& scene, const StepReport&
   work.other_flops = (evaluations(report) + damping) * 2 * matrix;
   work.bytes = internal_force_bytes(model.internal_force, report) +
                doubles((evaluations(report) + damping + 2 * report.factorisations + report.newton_iterations) * matrix);
-  if (runs_examples(model, scene)) add_examples(model, report, work);
+  add_examples(model, scene, report, work);
   return work;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
-#include <optional>
 #include <span>
 
 #include "common/mesh/geometry.h"
@@ -18,7 +17,6 @@ SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
   sizes.set("n", model.object->mesh.vertex_count(), "the bundle");
   sizes.set("n_t", model.object->mesh.tet_count(), "the bundle");
   sizes.set("r", model.modal->basis.cols(), "the bundle");
-  sizes.set("K", info.examples, "the bundle");
   return sizes;
 }
 
@@ -29,8 +27,17 @@ Hdf5File create_file(const AtomicFile& output, const ReducedModel& model, const 
   file.write_attribute("/", "input_sha256", model.input_sha256);
   file.write_attribute("/", "integrator", info.integrator);
   file.write_attribute("/", "time_step", info.time_step);
-  for (const GroupSchema& group : trajectory_schema().groups)
-    if (info.examples > 0 || group.group != "examples") write_group(file, group, group.path);
+  const auto regional = [](const WeightInfo& weights) { return !weights.region.empty(); };
+  for (const GroupSchema& group : trajectory_schema().groups) {
+    if (group.group == "examples" && std::ranges::all_of(info.weights, regional)) continue;
+    if (group.group == "regions" && std::ranges::none_of(info.weights, regional)) continue;
+    if (is_single(group.path)) {
+      write_group(file, group, group.path);
+      continue;
+    }
+    for (const WeightInfo& weights : info.weights)
+      if (regional(weights)) write_group(file, group, fill_name(group.path, kRegionPlaceholder, weights.region));
+  }
   return file;
 }
 
@@ -97,15 +104,23 @@ std::string xdmf_text(const std::filesystem::path& trajectory, const ReducedMode
 
 /// Open datasets, in the order of the format.
 struct TrajectoryWriter::Datasets {
-  Datasets(Hdf5File& file, const SymbolSizes& sizes, bool examples) : file_(file), sizes_(sizes) {
-    if (examples) weights.emplace(rows("/examples/weights"));
+  Datasets(Hdf5File& file, const SymbolSizes& sizes, const std::vector<WeightInfo>& forces)
+      : file_(file), sizes_(sizes) {
+    for (const WeightInfo& force : forces) {
+      DatasetSchema schema =
+          trajectory_schema().dataset(force.region.empty() ? "/examples/weights" : "/regions/{region}/weights");
+      schema.path = fill_name(schema.path, kRegionPlaceholder, force.region);
+      SymbolSizes own = sizes;
+      own.set("K", force.count, "the bundle");
+      weights.emplace_back(file, schema, own);
+    }
   }
 
   void finish() {
     for (RowWriter* dataset : {&time, &positions, &reduced, &reduced_velocity, &body_position, &body_orientation,
                                &linear_momentum, &angular_momentum, &kinetic, &elastic, &potential, &step_time})
       dataset->finish();
-    if (weights) weights->finish();
+    for (RowWriter& dataset : weights) dataset.finish();
   }
 
  private:
@@ -127,7 +142,7 @@ struct TrajectoryWriter::Datasets {
   RowWriter elastic = rows("/energy/elastic");
   RowWriter potential = rows("/energy/potential");
   RowWriter step_time = rows("/step_time");
-  std::optional<RowWriter> weights;
+  std::vector<RowWriter> weights;  // as TrajectoryInfo::weights
 };
 
 TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model,
@@ -143,7 +158,7 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const Redu
   const TetArray& tets = model.object->mesh.tets;
   const DatasetSchema& schema = trajectory_schema().dataset("/tets");
   write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), tets.data());
-  datasets_ = std::make_unique<Datasets>(file_, sizes, info.examples > 0);
+  datasets_ = std::make_unique<Datasets>(file_, sizes, info.weights);
 }
 
 TrajectoryWriter::~TrajectoryWriter() = default;
@@ -169,7 +184,8 @@ void TrajectoryWriter::append(const State& state, const Energies& energies, doub
   datasets_->elastic.append(energies.elastic);
   datasets_->potential.append(energies.potential);
   datasets_->step_time.append(step_seconds);
-  if (datasets_->weights) datasets_->weights->append(row_of(state.weights));
+  for (std::size_t i = 0; i < info_.weights.size(); ++i)
+    datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
 }
 
 void TrajectoryWriter::append_positions(const State& state) {

@@ -13,12 +13,19 @@
 
 namespace exmat::runtime {
 
+/// An example force whose weights a trajectory shows.
+struct WeightInfo {
+  std::size_t force = 0;   ///< in State::examples
+  std::string region;      ///< empty: the whole body
+  std::int64_t count = 0;  ///< K
+};
+
 /// What a trajectory says of its run.
 struct TrajectoryInfo {
   std::string integrator;
-  double time_step = 0;       ///< [s]
-  std::int64_t frames = 0;    ///< that will be appended
-  std::int64_t examples = 0;  ///< K; 0: no /examples/weights
+  double time_step = 0;     ///< [s]
+  std::int64_t frames = 0;  ///< that will be appended
+  std::vector<WeightInfo> weights{};
 };
 
 /// Writes the trajectory of a body and an .xdmf beside it. interfaces.md, "Trajectory". Both appear under

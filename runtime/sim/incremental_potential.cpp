@@ -9,6 +9,12 @@ namespace {
 constexpr double kSmallRatio = 0.1;  // of inertia: beyond it a factorisation costs less than the terms of a series
 constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
 
+bool has_skew_forces(const Model& model, const StepScene& scene) noexcept {
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (acts(scene.examples[i]) && !model.examples[i].filter.is_symmetric()) return true;
+  return false;
+}
+
 }  // namespace
 
 IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& scene, const State& state,
@@ -17,8 +23,7 @@ IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& 
       scene_(scene),
       state_(state),
       workspace_(workspace),
-      examples_(runs_examples(model, scene)),
-      skew_(examples_ && !model.examples->filter.is_symmetric()),
+      skew_(has_skew_forces(model, scene)),
       rotates_(state.body.has_value()),
       carried_(model.carried.has_value()) {}
 
@@ -64,16 +69,23 @@ void IncrementalPotential::prepare() noexcept {
   } else {
     used.setZero();
   }
-  if (examples_) {
-    const ExampleForce& example = workspace_.example_force;
-    const ShapeFilter& filter = model_.examples->filter;
+  add_example_forces();
+  A.diagonal().array() += diagonal;
+  workspace_.frozen_force.setZero();
+}
+
+void IncrementalPotential::add_example_forces() noexcept {
+  auto used = workspace_.quadratic.topRows(model_.modes());
+  Eigen::VectorXd& g = workspace_.linear;
+  for (std::size_t i = 0; i < scene_.examples.size(); ++i) {
+    if (!acts(scene_.examples[i])) continue;
+    const ExampleForce& example = workspace_.examples[i].force;
+    const ShapeFilter& filter = model_.examples[i].filter;
     used += example.stiffness * filter.symmetric_part();
     workspace_.offset = example.stiffness * (state_.q - example.centre);
     g.noalias() += filter.matrix() * workspace_.offset;
     g -= example.pull;
   }
-  A.diagonal().array() += diagonal;
-  workspace_.frozen_force.setZero();
 }
 
 PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient,
@@ -138,9 +150,10 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
 /// Of q, into next_frozen_force. False where the rotation has no solution.
 bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
   workspace_.next_frozen_force.setZero();
-  if (skew_)
-    workspace_.next_frozen_force.noalias() +=
-        workspace_.example_force.stiffness * (model_.examples->filter.skew_part() * workspace_.offset);
+  for (std::size_t i = 0; skew_ && i < scene_.examples.size(); ++i)
+    if (acts(scene_.examples[i]))
+      workspace_.next_frozen_force.noalias() +=
+          workspace_.examples[i].force.stiffness * (model_.examples[i].filter.skew_part() * workspace_.offset);
   if (carried_) {
     workspace_.carried->velocity = workspace_.form.velocity_factor * (q - workspace_.form.velocity_centre);
     carried_force(*model_.carried, q, *workspace_.carried);

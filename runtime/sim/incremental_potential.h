@@ -8,8 +8,8 @@
 namespace exmat::runtime {
 
 /// What one step minimises:
-///   c_a/2 |q - q_a|^2 + c_v/2 (q - q_v)^T D (q - q_v) + E(q) - f_ext . q + k/2 (q - q_c)^T P_s (q - q_c) - kappa P_s
-///   p* . q,
+///   c_a/2 |q - q_a|^2 + c_v/2 (q - q_v)^T D (q - q_v) + E(q) - f_ext . q
+///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa P_s p* . q,
 /// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
 /// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
 /// the skew part of P_s and those of a rotation (free_motion.h, carried_motion.h): in values they are those of the
@@ -24,7 +24,7 @@ class IncrementalPotential {
   double start(const Eigen::VectorXd& first_iterate) noexcept;
   double potential_at_start() const noexcept;
 
-  /// The quadratic form. After start(); with example forces, after example_force of the workspace is set.
+  /// The quadratic form. After start(); with example forces, after prepare_example_forces().
   void prepare() noexcept;
 
   // For newton_minimize; the first evaluation with a Hessian is of the first iterate.
@@ -46,6 +46,7 @@ class IncrementalPotential {
   PotentialEvaluation assemble(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept;
   bool update_frozen_force(const Eigen::VectorXd& q) noexcept;
   PotentialValue quadratic(double elastic_energy) noexcept;
+  void add_example_forces() noexcept;
   void add_quadratic(Eigen::MatrixXd& hessian) const noexcept;
   double gyroscopic_ratio() const noexcept;
   bool has_frozen_force() const noexcept { return skew_ || rotates_ || carried_; }
@@ -55,7 +56,6 @@ class IncrementalPotential {
   const StepScene& scene_;
   const State& state_;
   Workspace& workspace_;
-  bool examples_;
   bool skew_;
   bool rotates_;
   bool carried_;

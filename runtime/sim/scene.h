@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -24,7 +25,7 @@ struct ScriptedForce {
   Eigen::Matrix3Xd mean_basis{};                         ///< [3 x r] mean of their U; these three for a body that moves
 };
 
-/// The linear example force. method.md, section 5.
+/// A linear example force, of the whole body or of a region. method.md, section 5.
 struct ExampleSettings {
   double stiffness = 0;                                  ///< kappa >= 0 [1/s^2]
   double damping = 0;                                    ///< c_kappa >= 0 [1/s]
@@ -43,14 +44,15 @@ struct StepScene {
   Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
   std::vector<ScriptedForce> forces;
   std::vector<Obstacle> obstacles;
-  std::optional<RigidMotion> carrier;       ///< of a model with `carried`: what carries its fixed part
-  std::optional<ExampleSettings> examples;  ///< absent: no weights, no target, no example force
+  std::optional<RigidMotion> carrier;     ///< of a model with `carried`: what carries its fixed part
+  std::vector<ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, example forces
 };
 
-/// Whether steps compute weights and target: there are examples and a force that depends on them.
-inline bool runs_examples(const Model& model, const StepScene& scene) noexcept {
-  return model.examples && scene.examples && (scene.examples->stiffness > 0 || scene.examples->damping > 0);
-}
+/// Whether these examples exert a force; weights and targets of those that do not are left out.
+inline bool acts(const ExampleSettings& examples) noexcept { return examples.stiffness > 0 || examples.damping > 0; }
+
+/// Whether any examples do.
+inline bool runs_examples(const StepScene& scene) noexcept { return std::ranges::any_of(scene.examples, acts); }
 
 /// Whether steps look for contacts.
 inline bool touches(const Model& model, const StepScene& scene) noexcept {

@@ -19,9 +19,10 @@ State make_state(const Model& model, const Eigen::VectorXd& q, const Eigen::Vect
     state.body.emplace();
     set_motion(model, {}, state);
   }
-  if (model.examples) {
-    state.weights = Eigen::VectorXd::Unit(model.example_count(), 0);
-    if (model.examples->target) state.target = Eigen::VectorXd::Zero(model.examples->target->dimension());
+  for (const ExampleModel& examples : model.examples) {
+    ExampleState& start = state.examples.emplace_back();
+    start.weights = Eigen::VectorXd::Unit(examples.weights.examples(), 0);
+    if (examples.target) start.target = Eigen::VectorXd::Zero(examples.target->dimension());
   }
   return state;
 }

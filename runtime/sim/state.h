@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "runtime/sim/model.h"
 
@@ -23,7 +24,15 @@ struct FreeState {
   Eigen::VectorXd momentum, momentum_previous;                      ///< [r] pi = qdot - sum_c omega_c A_c q
 };
 
-/// All that a body carries from step to step. r modes, K examples, d target coordinates.
+/// What one example force carries from step to step. K examples, d target coordinates.
+struct ExampleState {
+  Eigen::VectorXd weights;  ///< [K] of the last step, after the bias; (1, 0, ...) before the first
+  Eigen::VectorXd target;   ///< [d] y of the last step, see TargetSolver; empty with a table
+  bool has_target = false;
+  bool target_converged = false;
+};
+
+/// All that a body carries from step to step. r modes.
 struct State {
   Eigen::VectorXd q, v;                    ///< [r] reduced displacement, velocity
   Eigen::VectorXd q_previous, v_previous;  ///< [r] one step earlier (BDF2)
@@ -32,14 +41,11 @@ struct State {
   std::int64_t step = 0;                   ///< steps taken
   double time = 0;                         ///< step * time_step [s]
   double elastic_energy = 0;               ///< E(q) [J]
-  Eigen::VectorXd weights;                 ///< [K] of the last step, after the bias; (1, 0, ...) before the first
-  Eigen::VectorXd target;                  ///< [d] y of the last step, see TargetSolver; empty with a table
-  bool has_target = false;
-  bool target_converged = false;
-  ContactState contacts;                ///< what touches; sized for its scene by prepare_contacts()
-  bool begins_anew = true;              ///< the last step was no smooth one: the first, or one near obstacles
-  std::optional<FreeState> body;        ///< of a free body
-  std::optional<CarriedState> carried;  ///< of a body whose fixed part a motion carries
+  std::vector<ExampleState> examples;      ///< one for each of the model's example forces
+  ContactState contacts;                   ///< what touches; sized for its scene by prepare_contacts()
+  bool begins_anew = true;                 ///< the last step was no smooth one: the first, or one near obstacles
+  std::optional<FreeState> body;           ///< of a free body
+  std::optional<CarriedState> carried;     ///< of a body whose fixed part a motion carries
 
   /// [r] momentum of q: that of a free body, else qdot.
   const Eigen::VectorXd& momentum() const { return body ? body->momentum : v; }

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "runtime/sim/contact_step.h"
+#include "runtime/sim/example_forces.h"
 #include "runtime/sim/incremental_potential.h"
 
 namespace exmat::runtime {
@@ -11,7 +12,7 @@ namespace {
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
 constexpr double kBesideKey = 1e-6;    // of a step
 
-bool acts(const ScriptedForce& force, double time) { return force.start <= time && time < force.end; }
+bool acts_at(const ScriptedForce& force, double time) { return force.start <= time && time < force.end; }
 
 /// Of a free body only what the caller applies; the rest acts on its momenta first.
 void gather_external_force(const Model& model, const StepScene& scene, const State& state, double midpoint,
@@ -23,7 +24,7 @@ void gather_external_force(const Model& model, const StepScene& scene, const Sta
     add_carried_load(*model.carried, model.gravity_load, scene.gravity, *workspace.carried, external_force);
   if (state.body) return;
   for (const ScriptedForce& force : scene.forces) {
-    if (!acts(force, midpoint)) continue;
+    if (!acts_at(force, midpoint)) continue;
     if (model.carried)
       external_force.noalias() +=
           force.mean_basis.transpose() * (workspace.carried->frame.rotation.transpose() * force.total);
@@ -59,7 +60,7 @@ void move_free_body(const Model& model, const StepScene& scene, Integrator integ
   const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
   Eigen::Vector3d force = model.rigid->mass() * scene.gravity + body.applied_force, torque = body.applied_torque;
   for (const ScriptedForce& scripted : scene.forces) {
-    if (!acts(scripted, midpoint)) continue;
+    if (!acts_at(scripted, midpoint)) continue;
     const Eigen::Vector3d local = rotation.transpose() * scripted.total;
     const Eigen::Vector3d arm = scripted.lever + scripted.mean_basis * state.q;
     force += scripted.total;
@@ -88,54 +89,8 @@ Integrator integrator_of_step(const StepScene& scene, const State& state, bool n
 bool begins_anew(const StepScene& scene, const State& state, double midpoint) {
   if (state.begins_anew) return true;
   for (const ScriptedForce& force : scene.forces)
-    if (acts(force, midpoint) != acts(force, midpoint - scene.time_step)) return true;
+    if (acts_at(force, midpoint) != acts_at(force, midpoint - scene.time_step)) return true;
   return scene.carrier && scene.carrier->has_key(midpoint - scene.time_step, midpoint);
-}
-
-/// w(q) after the bias, into the workspace. method.md, section 5.
-void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q, Workspace& workspace) {
-  const StageTimer timer(workspace.profile, Stage::kWeights);
-  model.examples->weights.solve(q, workspace.weights_solver, workspace.weights);
-  apply_example_bias(scene.examples->bias, workspace.weights);
-}
-
-/// P_s p*, p* by Newton's method from the last target, into the workspace.
-void solve_target(const ExampleModel& examples, const StepScene& scene, const State& state, Workspace& workspace,
-                  StepReport& report) {
-  const TargetSolver& solver = *examples.target;
-  Eigen::VectorXd& y = workspace.solved_target;
-  y = state.target;
-  if (!state.has_target) solver.start(workspace.weights, y);
-  workspace.target_converged = state.has_target && state.target_converged && workspace.weights == state.weights;
-  if (!workspace.target_converged) {
-    const NewtonReport solved =
-        solver.solve(workspace.weights, workspace.target_solver, y, scene.examples->target_iterations);
-    report.target_iterations += solved.iterations;
-    workspace.target_converged = solved.status != NewtonStatus::kIterationLimit;
-    if (!workspace.target_converged) report.status |= kTargetNotConverged;
-    if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
-  }
-  workspace.target.noalias() = examples.filtered_basis * y;
-}
-
-/// Weights and target at the pose q, into the workspace. method.md, section 5.
-void update_target(const Model& model, const StepScene& scene, const State& state, const Eigen::VectorXd& q,
-                   Workspace& workspace, StepReport& report) {
-  const ExampleModel& examples = *model.examples;
-  evaluate_weights(model, scene, q, workspace);
-  const StageTimer timer(workspace.profile, Stage::kTarget);
-  if (examples.table)
-    examples.table->evaluate(workspace.weights, workspace.target_table, workspace.target);
-  else
-    solve_target(examples, scene, state, workspace, report);
-}
-
-/// f_example = -kappa P_s (q - p*) - c_kappa P_s qdot added to `force`.
-void add_example_force(const Model& model, const StepScene& scene, const State& state, Workspace& workspace,
-                       Eigen::VectorXd& force) {
-  workspace.offset = scene.examples->stiffness * state.q + scene.examples->damping * state.v;
-  force.noalias() -= model.examples->filter.matrix() * workspace.offset;
-  force += scene.examples->stiffness * workspace.target;
 }
 
 /// a_n of Newmark's method from the equation of motion at the beginning of the step.
@@ -171,9 +126,9 @@ void start_acceleration(const Model& model, const StepScene& scene, const State&
     a += workspace.carried->force;
     take_frame(model, scene, state, end, midpoint, workspace);
   }
-  if (!runs_examples(model, scene)) return;
-  update_target(model, scene, state, state.q, workspace, report);
-  add_example_force(model, scene, state, workspace, a);
+  if (!runs_examples(scene)) return;
+  update_targets(model, scene, state, state.q, workspace, report);
+  add_example_forces(model, scene, state, workspace, a);
 }
 
 void prepare_integrator(const Model& model, const StepScene& scene, Integrator integrator, const State& state,
@@ -203,16 +158,6 @@ void choose_first_iterate(const StepScene& scene, const State& state, Incrementa
   potential.start(workspace.q);
 }
 
-/// The terms of the example force that stay the same during the step.
-void prepare_example_force(const StepScene& scene, Workspace& workspace) {
-  const ExampleSettings& settings = *scene.examples;
-  ExampleForce& force = workspace.example_force;
-  const double damping = settings.damping * workspace.form.velocity_factor;
-  force.stiffness = settings.stiffness + damping;
-  force.centre = damping / force.stiffness * workspace.form.velocity_centre;
-  force.pull = settings.stiffness * workspace.target;
-}
-
 /// Arithmetic on subnormal numbers takes a hundred times as long, and a body that comes to rest is full of them.
 bool flush_subnormals(Eigen::VectorXd& numbers) {
   bool found = false;
@@ -238,12 +183,8 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.elastic_energy = elastic_energy;
   ++state.step;
   state.time = static_cast<double>(state.step) * scene.time_step;
-  if (!runs_examples(model, scene)) return;
-  state.weights = workspace.weights;
-  if (model.examples->table) return;
-  state.target = workspace.solved_target;
-  state.has_target = true;
-  state.target_converged = workspace.target_converged;
+  commit_weights(scene, workspace, state);
+  commit_targets(model, scene, workspace, state);
 }
 
 void add_newton_report(const NewtonReport& newton, StepReport& report) {
@@ -277,9 +218,9 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   IncrementalPotential potential(model, scene, state, workspace);
   choose_first_iterate(scene, state, potential, workspace, report);
   if (!workspace.q.allFinite()) report.status |= kStepNonFinite;
-  if (runs_examples(model, scene) && !(report.status & kStepNonFinite)) {
-    update_target(model, scene, state, workspace.q, workspace, report);
-    prepare_example_force(scene, workspace);
+  if (runs_examples(scene) && !(report.status & kStepNonFinite)) {
+    update_targets(model, scene, state, workspace.q, workspace, report);
+    prepare_example_forces(scene, workspace);
   }
   if (report.status & kStepNonFinite) return report;
 
@@ -303,9 +244,8 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
 }
 
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
-  if (!runs_examples(model, scene)) return;
   evaluate_weights(model, scene, state.q, workspace);
-  state.weights = workspace.weights;
+  commit_weights(scene, workspace, state);
 }
 
 void place_on_carrier(const Model& model, const StepScene& scene, State& state) {

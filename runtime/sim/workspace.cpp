@@ -10,6 +10,17 @@ ContactProblemWorkspace::ContactProblemWorkspace(const Model& model, const StepS
       gradient_q(q),
       stiffness(Eigen::MatrixXd::Zero(x.size(), x.size())) {}
 
+ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(model.weights.make_workspace()) {
+  if (model.table) target_table = model.table->make_workspace();
+  if (model.target) {
+    target_solver = model.target->make_workspace();
+    solved_target.setZero(model.target->dimension());
+  }
+  weights.setZero(model.weights.examples());
+  target.setZero(model.filter.matrix().rows());
+  force.centre = force.pull = target;
+}
+
 Workspace::Workspace(const Model& model, const StepScene& scene)
     : newton(model.modes()), elasticity(model.internal_force.make_workspace()) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.modes());
@@ -29,15 +40,7 @@ Workspace::Workspace(const Model& model, const StepScene& scene)
   if (touches(model, scene)) near.emplace(model, scene);
   product.setZero(padded(model.modes()));
   quadratic.setZero(padded(model.modes()), model.modes());
-  if (!runs_examples(model, scene)) return;
-  weights_solver = model.examples->weights.make_workspace();
-  if (model.examples->table) target_table = model.examples->table->make_workspace();
-  if (model.examples->target) {
-    target_solver = model.examples->target->make_workspace();
-    solved_target.setZero(model.examples->target->dimension());
-  }
-  weights.setZero(model.example_count());
-  target = example_force.centre = example_force.pull = zero;
+  for (std::size_t i = 0; i < scene.examples.size(); ++i) examples.emplace_back(model.examples[i]);
 }
 
 }  // namespace exmat::runtime

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "runtime/sim/contact.h"
 #include "runtime/sim/free_motion.h"
@@ -23,6 +24,20 @@ struct ContactProblemWorkspace {
   Eigen::VectorXd x;              ///< 6 + r, or r of a constrained body
   Eigen::VectorXd q, gradient_q;  ///< r
   Eigen::MatrixXd stiffness;      ///< of the contacts, as the unknowns
+};
+
+/// Scratch of one example force. K examples, d target coordinates.
+struct ExampleWorkspace {
+  explicit ExampleWorkspace(const ExampleModel& model);
+
+  ExampleWeights::Workspace weights_solver;
+  TargetTable::Workspace target_table;
+  TargetSolver::Workspace target_solver;
+  Eigen::VectorXd weights;        ///< K
+  Eigen::VectorXd solved_target;  ///< d
+  bool target_converged = false;  ///< of solved_target
+  Eigen::VectorXd target;         ///< r, P_s p*
+  ExampleForce force;
 };
 
 /// Scratch of one step, sized once for a model and a scene; holds nothing from step to step. One per thread.
@@ -49,15 +64,7 @@ struct Workspace {
   std::optional<FreeMotionWorkspace> free;      ///< of a free body
   std::optional<CarriedWorkspace> carried;      ///< of one that a motion carries
   std::optional<FreeState> body;                ///< and where it will be
-
-  ExampleWeights::Workspace weights_solver;  // the rest only with examples
-  TargetTable::Workspace target_table;
-  TargetSolver::Workspace target_solver;
-  Eigen::VectorXd weights;        ///< K
-  Eigen::VectorXd solved_target;  ///< d
-  bool target_converged = false;  ///< of solved_target
-  Eigen::VectorXd target;         ///< r, P_s p*
-  ExampleForce example_force;
+  std::vector<ExampleWorkspace> examples;       ///< one for each of the scene's
 };
 
 }  // namespace exmat::runtime

@@ -104,7 +104,7 @@ void target_table(State& state, int modes) {
 /// From the target of weights nearby, as one step leaves it to the next.
 void target_solve(State& state, int modes, int elements) {
   const auto model = prepare(bar_model(modes, elements), Target::kSolve, false);
-  const runtime::TargetSolver& solver = *model->examples->target;
+  const runtime::TargetSolver& solver = *model->examples.front().target;
   auto workspace = solver.make_workspace();
   const Eigen::VectorXd weights[2]{kWeights, kNextWeights};
   Eigen::VectorXd y(solver.dimension());

@@ -67,7 +67,7 @@ runtime::StepScene swing(const runtime::Model& model, Target target) {
   scene.mass_damping = 0.02;
   scene.stiffness_damping = 0.003;
   scene.gravity_force = gravity_force(model, {0, -3, 0});
-  if (target != Target::kNone) scene.examples = runtime::ExampleSettings{400, 2, 0.6, 4};
+  if (target != Target::kNone) scene.examples = {runtime::ExampleSettings{400, 2, 0.6, 4}};
   return scene;
 }
 

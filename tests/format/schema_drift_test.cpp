@@ -71,19 +71,32 @@ std::set<std::string> datasets_of(const Hdf5File& file, const std::string& group
   return paths;
 }
 
+// A path of the schema with all names of a model filled in.
+std::vector<std::string> paths_of(const std::string& schema_path, const ReducedModel& model) {
+  std::vector<std::string> paths;
+  const auto add = [&](const std::string& path, const ExampleSet& set) {
+    for (const ExampleData& example : set.examples) paths.push_back(fill_name(path, kExamplePlaceholder, example.name));
+  };
+  if (!schema_path.starts_with("/regions/")) add(schema_path, *model.examples);
+  for (const RegionData& region : model.regions)
+    if (schema_path.starts_with("/regions/") && (region.targets || schema_path.find("/targets") == std::string::npos))
+      add(fill_name(schema_path, kRegionPlaceholder, region.name), region.examples);
+  return paths;
+}
+
 TEST(WrittenBundle, HoldsExactlyTheSchemasDatasets) {
   const test::TemporaryFolder folder;
   ReducedModel model = test::small_model(false);
   write_bundle(model, folder / "a.h5");
   std::set<std::string> expected;
   for (const DatasetSchema& dataset : bundle_schema().datasets)
-    for (const ExampleData& example : model.examples->examples)
-      expected.insert(fill_example(dataset.path, example.name));
+    for (const std::string& path : paths_of(dataset.path, model)) expected.insert(path);
   const auto file = Hdf5File::open(folder / "a.h5");
   EXPECT_EQ(datasets_of(file, "/"), expected);
   for (const GroupSchema& group : bundle_schema().groups)
     for (const AttributeSchema& attribute : group.attributes)
-      EXPECT_TRUE(file.has_attribute(fill_example(group.path, "bend"), attribute.name)) << group.path << attribute.name;
+      for (const std::string& path : paths_of(group.path, model))
+        EXPECT_TRUE(file.has_attribute(path, attribute.name)) << path << attribute.name;
   for (const AttributeSchema& attribute : bundle_schema().attributes)
     EXPECT_TRUE(file.has_attribute("/", attribute.name));
 }

@@ -185,7 +185,7 @@ TEST_F(Pipeline, ABentExampleMovesTheBarAsAWhole) {
 
   const runtime::ModelResult prepared = runtime::build_model(model, {});
   ASSERT_TRUE(prepared.model) << to_string(prepared.complaint);
-  const runtime::TargetSolver& solver = prepared.model->examples->target.value();
+  const runtime::TargetSolver& solver = prepared.model->examples.front().target.value();
   auto workspace = solver.make_workspace();
   Eigen::VectorXd y(solver.dimension());
   double before = 0;
@@ -205,7 +205,7 @@ TEST_F(Pipeline, TargetOfOneExampleIsThatExample) {
   const ReducedModel model = build_bar();
   const runtime::ModelResult prepared = runtime::build_model(model, {});
   ASSERT_TRUE(prepared.model) << to_string(prepared.complaint);
-  const runtime::TargetSolver& solver = prepared.model->examples->target.value();
+  const runtime::TargetSolver& solver = prepared.model->examples.front().target.value();
   auto workspace = solver.make_workspace();
   for (Eigen::Index k = 0; k < 2; ++k) {
     Eigen::VectorXd y(solver.dimension());

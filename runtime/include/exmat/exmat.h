@@ -97,7 +97,13 @@ EXMAT_API void exmat_model_destroy(exmat_model* model) EXMAT_NOEXCEPT;
 /* Negative where `model` is NULL. */
 EXMAT_API int64_t exmat_model_modes(const exmat_model* model) EXMAT_NOEXCEPT;    /* r */
 EXMAT_API int64_t exmat_model_vertices(const exmat_model* model) EXMAT_NOEXCEPT; /* n */
-EXMAT_API int64_t exmat_model_examples(const exmat_model* model) EXMAT_NOEXCEPT; /* K; 0 without an example force */
+EXMAT_API int64_t exmat_model_examples(const exmat_model* model)
+    EXMAT_NOEXCEPT; /* K of the whole body; 0 without its example force */
+/* The regions with a local example force that the scene names, in its order, and of region 0, 1, ... its K and its
+   name. Negative and NULL where `model` is NULL or has no such region. */
+EXMAT_API int64_t exmat_model_regions(const exmat_model* model) EXMAT_NOEXCEPT;
+EXMAT_API int64_t exmat_model_region_examples(const exmat_model* model, int64_t region) EXMAT_NOEXCEPT;
+EXMAT_API const char* exmat_model_region_name(const exmat_model* model, int64_t region) EXMAT_NOEXCEPT;
 EXMAT_API double exmat_model_time_step(const exmat_model* model) EXMAT_NOEXCEPT; /* [s] */
 
 /* ---- points ---------------------------------------------------------------------------------------------------- */
@@ -218,6 +224,10 @@ EXMAT_API exmat_status exmat_body_read_reduced(const exmat_body* body, double* q
 
 /* Example weights [count = K] of the last step, after the bias. */
 EXMAT_API exmat_status exmat_body_weights(const exmat_body* body, double* weights, int64_t count) EXMAT_NOEXCEPT;
+
+/* The same of a region, 0 <= region < exmat_model_regions(). */
+EXMAT_API exmat_status exmat_body_region_weights(const exmat_body* body, int64_t region, double* weights,
+                                                 int64_t count) EXMAT_NOEXCEPT;
 
 typedef struct exmat_energies {
   double kinetic;   /* [J] */

@@ -122,7 +122,7 @@ TEST_P(FreeFlights, KeepMomentaAndEnergy) {
   const auto [integrator, time_step, spin, examples] = GetParam();
   const FreeBody body;
   StepScene scene = body.scene(time_step, integrator);
-  if (examples) scene.examples = ExampleSettings{400, 2, 0.6, 4};
+  if (examples) scene.examples = {ExampleSettings{400, 2, 0.6, 4}};
   State state = body.moving(spin, 0.02);
   Workspace workspace(*body.model, scene);
   const auto first = body.totals(state);
@@ -350,7 +350,7 @@ TEST(FreeFlight, StrongExampleForcesKeepTheMomenta) {
   const FreeBody body;
   for (const double stiffness : {1e2, 1e4, 1e6, 1e8}) {
     StepScene scene = body.scene(1e-3, Integrator::kBdf2);
-    scene.examples = ExampleSettings{stiffness, 0, 0.3, 4};
+    scene.examples = {ExampleSettings{stiffness, 0, 0.3, 4}};
     State state = body.moving(10, 0.02);
     Workspace workspace(*body.model, scene);
     const Eigen::Vector3d linear = state.body->linear_momentum, angular = state.body->angular_momentum;

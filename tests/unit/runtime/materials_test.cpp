@@ -225,7 +225,7 @@ TEST_P(MaterialsTest, StepsWithTargetsDoNotAllocate) {
     const auto model = prepared(bar, {.energy_reference = reference});
     StepScene scene = free_scene(*model, Integrator::kBdf2, 0.02);
     scene.gravity_force = gravity_force(*model, {80, -400, 100});  // violent: tangents have to be projected
-    scene.examples = ExampleSettings{300, 4, 0.5};
+    scene.examples = {ExampleSettings{300, 4, 0.5}};
     State state = make_state(*model);
     Workspace workspace(*model, scene);
     const test::AllocationCounter counter;

@@ -75,17 +75,17 @@ TEST(StepperTest, SolvesTheEquationOfMotionAlsoWhereTheFilterIsNotSymmetric) {
     for (const Integrator integrator : kIntegrators) {
       const Bar bar = test::make_bar({.density_gradient = density_gradient, .examples = 3});
       const auto model = prepared(bar);
-      ASSERT_EQ(model->examples->filter.is_symmetric(), density_gradient == 0);
+      ASSERT_EQ(model->examples.front().filter.is_symmetric(), density_gradient == 0);
       StepScene scene = free_scene(*model, integrator, 0.01);
       scene.mass_damping = 0.3;
       scene.newton = {50, 1e-9};
       scene.gravity_force = gravity_force(*model, gravity_for(bar, 2, 0.3));
-      scene.examples = ExampleSettings{300, 4, 0.5};
+      scene.examples = {ExampleSettings{300, 4, 0.5}};
       State state = make_state(*model);
       Workspace workspace(*model, scene);
       for (int i = 0; i < 50; ++i) {
         ASSERT_EQ(step(*model, scene, state, workspace).status, 0U);
-        const Eigen::VectorXd target = model->examples->target->basis() * state.target;
+        const Eigen::VectorXd target = model->examples.front().target->basis() * state.examples.front().target;
         const Eigen::VectorXd elastic = bar.basis().transpose() * test::full_internal_force(bar, bar.basis() * state.q);
         const ProjectionData& project = *bar.model.projection;
         const auto filtered = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
@@ -103,12 +103,12 @@ TEST(StepperTest, AStrongExampleForceHoldsTheBarAtTheTarget) {
   const auto model = prepared(bar);
   StepScene scene = free_scene(*model, Integrator::kBdf2, 0.005);
   scene.mass_damping = 2;
-  scene.examples = ExampleSettings{1e7, 1e4, 0};  // bias 0: the bent example alone
+  scene.examples = {ExampleSettings{1e7, 1e4, 0}};  // bias 0: the bent example alone
   const State state = settle(*model, scene, 2000);
-  const Eigen::VectorXd target = model->examples->filter.matrix() * bar.model.examples->examples[1].pose;
-  const Eigen::VectorXd filtered = model->examples->filter.matrix() * state.q;
+  const Eigen::VectorXd target = model->examples.front().filter.matrix() * bar.model.examples->examples[1].pose;
+  const Eigen::VectorXd filtered = model->examples.front().filter.matrix() * state.q;
   EXPECT_LE((filtered - target).norm(), 1e-3 * target.norm());
-  EXPECT_EQ(state.weights, Eigen::VectorXd::Unit(2, 1));
+  EXPECT_EQ(state.examples.front().weights, Eigen::VectorXd::Unit(2, 1));
 }
 
 // BDF2 has no monotone energy of its own: what falls in every step of a linear body is its G-norm, |x_n|^2 +
@@ -143,7 +143,7 @@ TEST(StepperTest, RestsWithoutLoadAtNoCost) {
   const auto model = prepared(bar);
   for (const Integrator integrator : kIntegrators) {
     StepScene scene = free_scene(*model, integrator, 0.01);
-    scene.examples = ExampleSettings{100, 1, 1};
+    scene.examples = {ExampleSettings{100, 1, 1}};
     State state = make_state(*model);
     Workspace workspace(*model, scene);
     for (int i = 0; i < 10; ++i) {
@@ -173,9 +173,9 @@ TEST(StepperTest, StagesThatAreNotNeededAreNotRun) {
   EXPECT_EQ(seconds_after_a_step(Stage::kWeights), 0);
   EXPECT_GT(seconds_after_a_step(Stage::kInternalForce), 0);
   EXPECT_GT(seconds_after_a_step(Stage::kSolve), 0);
-  scene.examples = ExampleSettings{0, 0, 1};
+  scene.examples = {ExampleSettings{0, 0, 1}};
   EXPECT_EQ(seconds_after_a_step(Stage::kTarget), 0);
-  scene.examples = ExampleSettings{100, 0, 0.5};
+  scene.examples = {ExampleSettings{100, 0, 0.5}};
   EXPECT_GT(seconds_after_a_step(Stage::kTarget), 0);
   EXPECT_GT(seconds_after_a_step(Stage::kWeights), 0);
 }
@@ -204,7 +204,7 @@ TEST(StepperTest, TwoRunsAgreeToTheLastBit) {
   StepScene scene = free_scene(*model, Integrator::kBdf2, 0.01);
   scene.gravity_force = gravity_force(*model, {0, -9.81, 0});
   scene.stiffness_damping = 0.001;
-  scene.examples = ExampleSettings{300, 4, 0.5};
+  scene.examples = {ExampleSettings{300, 4, 0.5}};
   EXPECT_EQ(settle(*model, scene, 100).q, settle(*model, scene, 100).q);
 }
 
@@ -215,7 +215,7 @@ TEST(StepperTest, NonFiniteInputSetsTheBitAndKeepsTheState) {
   for (const Integrator integrator : kIntegrators)
     for (const double poison : {kNan, std::numeric_limits<double>::infinity(), 1e300}) {
       StepScene scene = free_scene(*model, integrator, 0.01);
-      scene.examples = ExampleSettings{300, 4, 0.5};
+      scene.examples = {ExampleSettings{300, 4, 0.5}};
       scene.gravity_force = gravity_force(*model, {0, -9.81, 0});
       State state = make_state(*model);
       Workspace workspace(*model, scene);
@@ -227,7 +227,7 @@ TEST(StepperTest, NonFiniteInputSetsTheBitAndKeepsTheState) {
       EXPECT_EQ(state.q, sound.q);
       EXPECT_EQ(state.v, sound.v);
       EXPECT_EQ(state.step, sound.step);
-      EXPECT_EQ(state.weights, sound.weights);
+      EXPECT_EQ(state.examples.front().weights, sound.examples.front().weights);
 
       scene.gravity_force.setZero();
       state.v[0] = poison;
@@ -257,24 +257,24 @@ TEST(Stepper, ABoundedTargetCarriesOnInTheNextStep) {
   const Bar bar = test::make_bar({.examples = 4});
   const auto model = prepared(bar);
   StepScene scene = free_scene(*model, Integrator::kBdf2, 1e-3);
-  scene.examples = ExampleSettings{1e-12, 0, 0.1, 1};  // the body stays where it is, and with it the weights
-  const TargetSolver& solver = *model->examples->target;
+  scene.examples = {ExampleSettings{1e-12, 0, 0.1, 1}};  // the body stays where it is, and with it the weights
+  const TargetSolver& solver = *model->examples.front().target;
   State state = make_state(*model);
   Workspace workspace(*model, scene);
   int steps = 0;
-  while (!state.target_converged && steps < 50) {
+  while (!state.examples.front().target_converged && steps < 50) {
     const StepReport report = step(*model, scene, state, workspace);
     EXPECT_LE(report.target_iterations, 1);
-    EXPECT_EQ((report.status & kTargetNotConverged) != 0, !state.target_converged) << steps;
+    EXPECT_EQ((report.status & kTargetNotConverged) != 0, !state.examples.front().target_converged) << steps;
     ++steps;
   }
   EXPECT_GT(steps, 1);
-  ASSERT_TRUE(state.target_converged);
+  ASSERT_TRUE(state.examples.front().target_converged);
   auto scratch = solver.make_workspace();
   Eigen::VectorXd expected(solver.dimension());
-  solver.start(state.weights, expected);
-  solver.solve(state.weights, scratch, expected);
-  EXPECT_LE((state.target - expected).norm(), 1e-8 * expected.norm());
+  solver.start(state.examples.front().weights, expected);
+  solver.solve(state.examples.front().weights, scratch, expected);
+  EXPECT_LE((state.examples.front().target - expected).norm(), 1e-8 * expected.norm());
 }
 
 class ExtremeRuns : public ::testing::TestWithParam<std::tuple<double, double, double, int>> {};
@@ -330,7 +330,7 @@ void expect_no_allocation(const Model& model, Target target) {
           StepScene scene = free_scene(model, integrator, 0.01);
           scene.gravity_force = gravity_force(model, {0, -20, -5});
           if (damped) scene.mass_damping = scene.stiffness_damping = 0.01;
-          if (target != Target::kNone) scene.examples = ExampleSettings{300, 4, 0.5};
+          if (target != Target::kNone) scene.examples = {ExampleSettings{300, 4, 0.5}};
           if (scripted) scene.forces.push_back({scene.gravity_force, 0, 0.025});
           EXPECT_EQ(allocations_of_steps(model, scene, profiled), 0U)
               << static_cast<int>(integrator) << damped << scripted << profiled;

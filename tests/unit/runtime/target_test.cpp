@@ -17,7 +17,7 @@ using test::BarOptions;
 TargetSolver target_of(const ReducedModel& model, EnergyReference reference = EnergyReference::kExample) {
   auto result = build_model(model, {.examples = true, .energy_reference = reference});
   EXPECT_TRUE(result.model) << to_string(result.complaint);
-  return *result.model->examples->target;
+  return *result.model->examples.front().target;
 }
 
 Eigen::VectorXd solve(const TargetSolver& target, const Eigen::VectorXd& weights, const Eigen::VectorXd& from) {

@@ -132,8 +132,8 @@ const BadBundle kBadBundles[] = {
     {"OtherFormat", [](Spoiler& s) { s.set_text("/", "format", "other"); },
      "/@format: expected \"exmat-bundle\", found \"other\""},
     {"NoFormat", [](Spoiler& s) { s.remove_attribute("/", "format"); }, "/@format: expected an attribute, found none"},
-    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 4); },
-     "/@format_version: expected at most 3, found 4; a newer version of exmat"},
+    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 5); },
+     "/@format_version: expected at most 4, found 5; a newer version of exmat"},
     {"NoVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 0); },
      "/@format_version: expected a number > 0, found 0"},
     {"TextVersion", [](Spoiler& s) { s.set_text("/", "format_version", "1"); },
@@ -337,6 +337,7 @@ void write_version_1(const std::filesystem::path& path) {
   model.polynomial.reset();
   model.targets.reset();
   model.contact.reset();
+  model.regions.clear();
   write_bundle(model, path);
   Spoiler spoiler(path);
   spoiler.set_integer("/", "format_version", 1);

@@ -24,7 +24,7 @@ class FieldText {
  public:
   explicit FieldText(const ReducedModel& model) { visit_fields(model, *this); }
 
-  void group(std::string_view schema_path, std::string_view example) { group_ = fill_example(schema_path, example); }
+  void group(std::string_view, std::string_view path) { group_ = path; }
   template <typename T>
   void attribute(std::string_view name, const T& member) {
     fields[group_ + "@" + std::string(name)] = ::testing::PrintToString(to_attribute(member));
@@ -52,8 +52,11 @@ std::vector<std::string> datasets_of(const std::vector<ReadRecord>& record) {
 }
 
 BundleRequest request_for(const Needs& needs, bool constrained, bool step_only, bool positions) {
-  return {plan_groups(needs, constrained, 3), step_only, positions};
+  return {plan_groups(needs, constrained, 3, 2), needs.regions, step_only, positions};
 }
+
+const Needs kLeastNeeds{
+    .examples = false, .contact = false, .regions = std::vector<RegionNeeds>{}, .internal_force = "cubature"};
 
 class BundleOfEachKind : public ::testing::TestWithParam<std::pair<bool, bool>> {};
 
@@ -93,8 +96,7 @@ TEST(Bundle, ForSteppingReadsOnlyWhatStepsNeed) {
   const TemporaryFolder folder;
   write_bundle(small_model(true), folder / "a.h5");
   std::vector<ReadRecord> record;
-  const Needs needs{.examples = false, .contact = false, .internal_force = "cubature"};
-  const auto model = read_bundle(folder / "a.h5", request_for(needs, true, true, false), &record);
+  const auto model = read_bundle(folder / "a.h5", request_for(kLeastNeeds, true, true, false), &record);
   EXPECT_THAT(datasets_of(record),
               ElementsAre("/modal/gravity_load", "/cubature/weights", "/cubature/volumes", "/cubature/gradient",
                           "/cubature/youngs_modulus", "/cubature/poisson_ratio"));
@@ -110,9 +112,7 @@ TEST(Bundle, ForPositionsReadsMeshAndBasisToo) {
   const TemporaryFolder folder;
   write_bundle(small_model(true), folder / "a.h5");
   std::vector<ReadRecord> record;
-  read_bundle(folder / "a.h5",
-              request_for({.examples = false, .contact = false, .internal_force = "cubature"}, true, true, true),
-              &record);
+  read_bundle(folder / "a.h5", request_for(kLeastNeeds, true, true, true), &record);
   EXPECT_THAT(datasets_of(record),
               ElementsAre("/object/vertices", "/object/tets", "/object/density", "/modal/basis", "/modal/gravity_load",
                           "/cubature/weights", "/cubature/volumes", "/cubature/gradient", "/cubature/youngs_modulus",
@@ -133,6 +133,29 @@ TEST(Bundle, ForExampleForcesReadsTheirProblem) {
               ::testing::IsSupersetOf({"/examples/bend/reduced", "/polynomial/quartic", "/targets/exponents",
                                        "/targets/control_points", "/targets/knots"}));
   EXPECT_EQ(record.back().dataset, "/contact/basis");
+}
+
+TEST(Bundle, ForRegionsReadsThoseThatAreNamed) {
+  const TemporaryFolder folder;
+  write_bundle(small_model(false), folder / "a.h5");
+  Needs needs = kLeastNeeds;
+  needs.regions = {{"left", false}};
+  std::vector<ReadRecord> record;
+  const auto model = read_bundle(folder / "a.h5", request_for(needs, false, true, false), &record);
+  ASSERT_EQ(model.regions.size(), 1U);
+  EXPECT_FALSE(model.regions[0].targets);
+  EXPECT_EQ(model.regions[0].examples.gram, small_model().examples->gram);
+  EXPECT_THAT(datasets_of(record), ::testing::Contains("/regions/left/examples/bend/pose"));
+  EXPECT_THAT(datasets_of(record), ::testing::Not(::testing::Contains(HasSubstr("far right"))));
+  EXPECT_THAT(datasets_of(record), ::testing::Not(::testing::Contains(HasSubstr("/examples/z rest/descriptor"))));
+  needs.regions = {{"middle", true}};
+  try {
+    read_bundle(folder / "a.h5", request_for(needs, false, true, false));
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("a.h5: /regions/middle: expected the group"));
+    EXPECT_THAT(error.what(), HasSubstr("found the regions far right, left"));
+  }
 }
 
 TEST(Bundle, NamesAGroupThatIsMissing) {
@@ -156,10 +179,15 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.asset_name, "small");
   EXPECT_EQ(summary.generator, "exmat test");
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
-  EXPECT_EQ(summary.format_version, 3);
+  EXPECT_EQ(summary.format_version, 4);
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
-                                          "projection", "targets", "rigid", "contact"));
+                                          "projection", "targets", "regions", "rigid", "contact"));
+  ASSERT_EQ(summary.regions.size(), 2U);
+  EXPECT_EQ(summary.regions[0].name, "far right");
+  EXPECT_EQ(summary.regions[0].examples, 2);
+  EXPECT_FALSE(summary.regions[0].has_targets);
+  EXPECT_EQ(summary.regions[1].energy_reference, "rest");
   EXPECT_EQ(summary.vertices, 5);
   EXPECT_EQ(summary.tets, 2);
   EXPECT_EQ(summary.modes, 2);

@@ -140,6 +140,19 @@ ContactData small_contact(const ReducedModel& model) {
   return contact;
 }
 
+// The second with an example less and no targets.
+std::vector<RegionData> small_regions(const ReducedModel& model) {
+  std::vector<RegionData> regions(2);
+  regions[0] = {"left", 0, IndexVector{{0, 2}}, *model.examples, *model.projection, model.targets};
+  regions[1] = {"far right", 1, IndexVector{{1}}, *model.examples, *model.projection, std::nullopt};
+  ExampleSet& fewer = regions[1].examples;
+  fewer.examples.pop_back();
+  fewer.gram = RowMatrix(fewer.gram.topLeftCorner(2, 2));
+  fewer.h0 = Eigen::VectorXd(fewer.h0.head(2));
+  fewer.hq = RowMatrix(fewer.hq.topRows(2));
+  return regions;
+}
+
 }  // namespace
 
 ReducedModel small_model(bool constrained, bool with_examples) {
@@ -157,6 +170,7 @@ ReducedModel small_model(bool constrained, bool with_examples) {
     model.projection = ProjectionData{numbers(3 * kEigenfunctions, kModes, 6), numbers(kModes, 3 * kEigenfunctions, 7),
                                       numbers(kModes, 1, 8)};
     model.targets = small_targets();
+    model.regions = small_regions(model);
   }
   if (!constrained) model.rigid = small_rigid();
   model.contact = small_contact(model);

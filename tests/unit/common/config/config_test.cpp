@@ -259,6 +259,19 @@ TEST(NeedsOfAScene, AreExamplesWhereItStartsFromOne) {
   EXPECT_FALSE(needs_of(scene).targets);
 }
 
+TEST(NeedsOfAScene, AreTheRegionsThatItNames) {
+  SceneConfig scene;
+  EXPECT_TRUE(needs_of(scene).regions.value().empty());
+  scene.regions = {{"left", {}}, {"right", {.target = "solve", .energy_reference = "rest"}}};
+  const Needs needs = needs_of(scene);
+  EXPECT_FALSE(needs.examples);
+  ASSERT_EQ(needs.regions->size(), 2U);
+  EXPECT_EQ(needs.regions->at(0).name, "left");
+  EXPECT_TRUE(needs.regions->at(0).targets);
+  EXPECT_FALSE(needs.regions->at(1).targets);
+  EXPECT_EQ(needs.regions->at(1).energy_reference, "rest");
+}
+
 TEST(NeedsOfAScene, AreNoTargetsWhereItSolvesForThem) {
   SceneConfig scene;
   scene.examples.emplace();

@@ -1,0 +1,36 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "common/core/arrays.h"
+#include "common/mesh/tet_mesh.h"
+
+namespace exmat::precompute {
+
+/// What an example force sees of a region, linear in displacements: D'' u = D (u - R u_b), D the region's indicator and
+/// R u_b the rigid motion that its border makes. So it acts inside alone, and without net force or torque: all that the
+/// rest of the body feels is that the region bends. The border is the region's vertices beside others; a region that
+/// holds fixed vertices, or all there are, is seen as it moves, D u.
+class RegionView {
+ public:
+  /// `inside`, `fixed` [n] flag vertices of `mesh`.
+  RegionView(const TetMesh& mesh, const FlagVector& inside, const FlagVector& fixed);
+
+  const FlagVector& inside() const { return inside_; }  ///< n
+  /// [n] lumped volumes of the vertices whose motion the region is seen from: its border, or its fixed ones; zeros
+  /// where there are neither.
+  const Eigen::VectorXd& frame() const { return frame_; }
+
+  /// D'' applied to displacements [3n x k].
+  Eigen::MatrixXd see(const Eigen::MatrixXd& displacements) const;
+  /// Its transpose applied to forces [3n x k].
+  Eigen::MatrixXd transposed(const Eigen::MatrixXd& forces) const;
+
+ private:
+  FlagVector inside_;
+  Eigen::VectorXd frame_;
+  Eigen::MatrixXd rigid_;   // 3n x 6, motions of the region's vertices, or no columns
+  Eigen::MatrixXd border_;  // 3n x 6: border^T u are their amounts
+};
+
+}  // namespace exmat::precompute
