@@ -10,10 +10,14 @@ namespace exmat::precompute {
 /// shape space leaves out, put back. Those of a free body, whose mean is 0, stay.
 void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements);
 
-/// [r x 3m] reduced coordinates of the pose that a change of descriptor stands for, U^T M C V^(1/3) (Phi Lambda^-1 (x)
-/// I_3): C puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by a
-/// FieldClamp. T^+ without C, and so for a free body, where `reduced_from_shape` is returned.
-/// `basis` is U, 3n x r. method.md, sections 4 and 5.
+/// [f x 3m] free rows of the displacements that changes of descriptor stand for, C V^(1/3) (Phi Lambda^-1 (x) I_3): C
+/// puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by a FieldClamp; of a
+/// free body it takes the rigid motions out. method.md, sections 4 and 5.
+Eigen::MatrixXd pose_fields(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                            const ElasticSystem& system, const FieldClamp& clamp);
+
+/// [r x 3m] reduced coordinates of pose_fields(), U^T M times them: T^+ without C, and so for a free body, where
+/// `reduced_from_shape` is returned. `basis` is U, 3n x r.
 RowMatrix pose_map(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
                    const ElasticSystem& system, const FieldClamp& clamp, const RowMatrix& basis,
                    const RowMatrix& reduced_from_shape);
