@@ -32,9 +32,9 @@ class Stepper {
   Eigen::VectorXd start_acceleration();
   void update_target(const Eigen::VectorXd& q);
   Eigen::VectorXd choose_first_iterate(StepPotential& potential);
-  NewtonReport minimise(StepPotential& potential, Eigen::VectorXd& q);
+  NewtonReport minimise(StepPotential& potential, Eigen::VectorXd& d);
   void add(const NewtonReport& newton);
-  void commit(const StepPotential& potential, const Eigen::VectorXd& q);
+  void commit(const StepPotential& potential, const Eigen::VectorXd& d);
 
   const FullSpaceModel& model_;
   const FullSpaceScene& scene_;
@@ -142,14 +142,14 @@ void Stepper::update_target(const Eigen::VectorXd& q) {
   report_.target_seconds += timer.seconds();
 }
 
-// The predictor q_n + dt v_n or q_n itself, whichever has the lower potential.
+// The step to the predictor q_n + dt v_n or none, whichever has the lower potential.
 Eigen::VectorXd Stepper::choose_first_iterate(StepPotential& potential) {
-  Eigen::VectorXd q = state_.q + scene_.time_step * state_.v;
-  if (potential.start(q) <= potential.potential_at_start() || q == state_.q) return q;
+  Eigen::VectorXd d = scene_.time_step * state_.v;
+  if (potential.start(d) <= potential.potential_at_start() || d.isZero(0)) return d;
   ++report_.line_search_evaluations;
-  q = state_.q;
-  potential.start(q);
-  return q;
+  d.setZero();
+  potential.start(d);
+  return d;
 }
 
 void Stepper::add(const NewtonReport& newton) {
@@ -160,34 +160,34 @@ void Stepper::add(const NewtonReport& newton) {
   report_.residual = newton.residual;
 }
 
-NewtonReport Stepper::minimise(StepPotential& potential, Eigen::VectorXd& q) {
-  NewtonReport newton = minimise_step(potential, scene_.newton, workspace_.direction, q);
+NewtonReport Stepper::minimise(StepPotential& potential, Eigen::VectorXd& d) {
+  NewtonReport newton = minimise_step(potential, scene_.newton, workspace_.direction, d);
   add(newton);
   for (int round = 1; terms_.contacts != nullptr && round < runtime::kFrictionRounds; ++round) {
     const double change =
         runtime::refresh_friction(contacts_.obstacles, contacts_.candidates, contacts_.candidates.size());
     if (newton.status == NewtonStatus::kNonFinite || change <= runtime::kSameFriction) return newton;
-    potential.start(q);
-    newton = minimise_step(potential, scene_.newton, workspace_.direction, q);
+    potential.start(d);
+    newton = minimise_step(potential, scene_.newton, workspace_.direction, d);
     add(newton);
   }
   return newton;
 }
 
-void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& q) {
+void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
   const runtime::StepForm& form = terms_.form;
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
-  state_.q = q;
-  state_.v = form.velocity_factor * (q - form.velocity_centre);
-  state_.a = form.acceleration_factor * (q - form.acceleration_centre);
+  state_.v = form.velocity_factor * (d + (state_.q - form.velocity_centre));
+  state_.a = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
+  state_.q += d;
   state_.elastic_energy = potential.elastic_energy();
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
   state_.begins_anew = terms_.contacts != nullptr;
   state_.contacts.count = 0;
   if (terms_.contacts != nullptr) {
-    model_.contacts->commit(q, contacts_, state_.contacts);
+    model_.contacts->commit(state_.q, contacts_, state_.contacts);
     report_.contacts = contacts_.touching;
     report_.contact_force = contacts_.total_force;
   }
@@ -206,16 +206,16 @@ FullSpaceReport Stepper::run() {
   set_form(integrator);
   set_rate_centre(integrator);
   StepPotential potential(model_, scene_, state_, terms_);
-  Eigen::VectorXd q = choose_first_iterate(potential);
-  if (!q.allFinite()) report_.status |= runtime::kStepNonFinite;
-  if (terms_.examples && !(report_.status & runtime::kStepNonFinite)) update_target(q);
+  Eigen::VectorXd d = choose_first_iterate(potential);
+  if (!d.allFinite()) report_.status |= runtime::kStepNonFinite;
+  if (terms_.examples && !(report_.status & runtime::kStepNonFinite)) update_target(state_.q + d);
   if (report_.status & runtime::kStepNonFinite) return report_;
   potential.prepare();
-  const NewtonStatus status = minimise(potential, q).status;
-  if (status == NewtonStatus::kNonFinite || !q.allFinite()) report_.status |= runtime::kStepNonFinite;
+  const NewtonStatus status = minimise(potential, d).status;
+  if (status == NewtonStatus::kNonFinite || !d.allFinite()) report_.status |= runtime::kStepNonFinite;
   if (status == NewtonStatus::kIterationLimit) report_.status |= runtime::kStepIterationLimit;
   if (status == NewtonStatus::kStagnated) report_.status |= runtime::kStepStagnated;
-  if (!(report_.status & runtime::kStepNonFinite)) commit(potential, q);
+  if (!(report_.status & runtime::kStepNonFinite)) commit(potential, d);
   return report_;
 }
 

@@ -20,8 +20,8 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 class Minimisation {
  public:
   Minimisation(StepPotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
-               Eigen::VectorXd& q)
-      : potential_(potential), settings_(settings), solver_(solver), q_(q) {}
+               Eigen::VectorXd& d)
+      : potential_(potential), settings_(settings), solver_(solver), d_(d) {}
 
   NewtonReport run();
 
@@ -34,7 +34,7 @@ class Minimisation {
   StepPotential& potential_;
   const runtime::NewtonSettings& settings_;
   SparseDirection& solver_;
-  Eigen::VectorXd& q_;
+  Eigen::VectorXd& d_;
   NewtonReport report_;
   PotentialEvaluation here_;
   Eigen::VectorXd gradient_, direction_;
@@ -57,11 +57,11 @@ bool Minimisation::finished() {
 
 bool Minimisation::find_direction() {
   const auto product = [this](const Eigen::VectorXd& x) { return potential_.product(x); };
-  potential_.assemble(q_, Tangent::kExact);
+  potential_.assemble(d_, Tangent::kExact);
   if (solver_.solve(potential_.hessian(), product, -gradient_, direction_)) return true;
   ++report_.projections;
-  potential_.assemble(q_, Tangent::kPositiveSemidefinite);
-  here_ = potential_.evaluate(q_, gradient_);
+  potential_.assemble(d_, Tangent::kPositiveSemidefinite);
+  here_ = potential_.evaluate(d_, gradient_);
   potential_.accept(here_);
   report_.residual = gradient_.norm();
   return solver_.solve_shifted(potential_.hessian(), product, -gradient_, direction_);
@@ -72,12 +72,12 @@ bool Minimisation::line_search(double slope, Eigen::VectorXd& trial, Eigen::Vect
   const auto low_enough = [&](double length, const PotentialValue& value) {
     return value.value <= here_.potential.value + kArmijo * length * slope + kRounding * here_.potential.magnitude;
   };
-  trial = q_ + direction_;
+  trial = d_ + direction_;
   there = potential_.evaluate(trial, trial_gradient);
   if (low_enough(1, there.potential)) return true;
   double length = 0.5;
   for (int halving = 0; halving < kHalvings; ++halving, length *= 0.5) {
-    trial = q_ + length * direction_;
+    trial = d_ + length * direction_;
     ++report_.line_search_evaluations;
     if (!low_enough(length, potential_.value(trial))) continue;
     there = potential_.evaluate(trial, trial_gradient);
@@ -95,14 +95,14 @@ bool Minimisation::move() {
   PotentialEvaluation there;
   if (below_rounding) {
     // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
-    trial = q_ + direction_;
+    trial = d_ + direction_;
     there = potential_.evaluate(trial, trial_gradient);
   } else if (!line_search(slope, trial, trial_gradient, there)) {
-    here_ = potential_.evaluate(q_, gradient_);
+    here_ = potential_.evaluate(d_, gradient_);
     return false;
   }
   potential_.accept(there);
-  q_.swap(trial);
+  d_.swap(trial);
   gradient_.swap(trial_gradient);
   here_ = there;
   ++report_.iterations;
@@ -111,7 +111,7 @@ bool Minimisation::move() {
 }
 
 NewtonReport Minimisation::run() {
-  here_ = potential_.evaluate_first(q_, gradient_);
+  here_ = potential_.evaluate_first(d_, gradient_);
   report_.residual = gradient_.norm();
   const int before = solver_.factorisations();
   while (!finished()) {
@@ -130,8 +130,8 @@ NewtonReport Minimisation::run() {
 }  // namespace
 
 NewtonReport minimise_step(StepPotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
-                           Eigen::VectorXd& q) {
-  return Minimisation(potential, settings, solver, q).run();
+                           Eigen::VectorXd& d) {
+  return Minimisation(potential, settings, solver, d).run();
 }
 
 }  // namespace exmat::precompute

@@ -21,29 +21,27 @@ StepPotential::StepPotential(const FullSpaceModel& model, const FullSpaceScene& 
       state_(state),
       terms_(terms),
       damped_(scene.mass_damping > 0 || scene.stiffness_damping > 0),
-      skew_(terms.examples && !model.examples->symmetric()) {
+      skew_(terms.examples && !model.examples->symmetric()),
+      reach_(model.rest.cwiseAbs().maxCoeff() + state.q.lpNorm<Eigen::Infinity>()) {
   if (terms.examples)
     filter_stiffness_ = scene.examples->stiffness + scene.examples->damping * terms.form.velocity_factor;
 }
 
-double StepPotential::inertia_and_load(const Eigen::VectorXd& q) const {
-  const Eigen::VectorXd offset = q - terms_.form.acceleration_centre;
-  return 0.5 * terms_.form.acceleration_factor * offset.dot(model_.system.mass * offset) -
-         terms_.external_force.dot(q - state_.q);
+double StepPotential::inertia_and_load(const Eigen::VectorXd& d) const {
+  const Eigen::VectorXd offset = d + (state_.q - terms_.form.acceleration_centre);
+  return 0.5 * terms_.form.acceleration_factor * offset.dot(model_.system.mass * offset) - terms_.external_force.dot(d);
 }
 
-double StepPotential::start(const Eigen::VectorXd& first_iterate) {
-  elastic_energy_ =
-      model_.elasticity.force_and_stiffness(first_iterate, runtime::Tangent::kExact, internal_force_, stiffness_);
+double StepPotential::start(const Eigen::VectorXd& d) {
+  const Eigen::VectorXd q = state_.q + d;
+  elastic_energy_ = model_.elasticity.force_and_stiffness(q, runtime::Tangent::kExact, internal_force_, stiffness_);
   stiffness_is_current_ = true;
-  if (deforms()) first_.emplace(model_, first_iterate);
-  return elastic_energy_ + inertia_and_load(first_iterate);
+  if (deforms()) first_.emplace(model_, q);
+  return elastic_energy_ + inertia_and_load(d);
 }
 
-double StepPotential::potential_at_start() const { return state_.elastic_energy + inertia_and_load(state_.q); }
-
-Eigen::VectorXd StepPotential::stiffness_product(const Eigen::VectorXd& x) const {
-  return stiffness_.selfadjointView<Eigen::Lower>() * x;
+double StepPotential::potential_at_start() const {
+  return state_.elastic_energy + inertia_and_load(Eigen::VectorXd::Zero(state_.q.size()));
 }
 
 void StepPotential::prepare() {
@@ -80,38 +78,39 @@ Eigen::VectorXd StepPotential::deformation_product(const Eigen::VectorXd& u) con
   return product;
 }
 
-PotentialValue StepPotential::sum(double elastic, double contact, const Eigen::VectorXd& q,
-                                  const Eigen::VectorXd& offset_product, const Eigen::VectorXd& change) const {
-  const Eigen::VectorXd offset = q - state_.q;
-  PotentialValue total;
-  for (const double term : {elastic, contact, 0.5 * offset.dot(offset_product), linear_.dot(offset)}) {
-    total.value += term;
-    total.magnitude += std::abs(term);
-  }
+PotentialValue StepPotential::sum(double elastic, double contact, const Eigen::VectorXd& d,
+                                  const Eigen::VectorXd& inertia, const Eigen::VectorXd& change) const {
+  PotentialValue total{elastic + contact + 0.5 * d.dot(inertia) + linear_.dot(d), elastic + contact};
+  total.magnitude += (0.5 * inertia.cwiseAbs() + linear_.cwiseAbs()).dot(d.cwiseAbs());
+  // Positions are rounded, and forces do work on that.
+  total.magnitude += reach_ * internal_force_.lpNorm<1>();
+  if (terms_.contacts != nullptr) total.magnitude += reach_ * terms_.contacts->force.lpNorm<1>();
   if (!deforms()) return total;
-  const double quadratic = 0.5 * change.dot(deformation_product(change));
-  total.value += quadratic + (deformation_linear_ + frozen_).dot(change);
-  total.magnitude += std::abs(quadratic) + std::abs(deformation_linear_.dot(change));
+  const Eigen::VectorXd product = deformation_product(change), linear = deformation_linear_ + frozen_;
+  total.value += 0.5 * change.dot(product) + linear.dot(change);
+  const double reach = model_.frame ? reach_ : 0;
+  total.magnitude += (0.5 * product.cwiseAbs() + linear.cwiseAbs()).dot((change.array().abs() + reach).matrix());
   return total;
 }
 
-PotentialValue StepPotential::value(const Eigen::VectorXd& q) const {
-  const Eigen::VectorXd product = terms_.form.acceleration_factor * (model_.system.mass * (q - state_.q));
+PotentialValue StepPotential::value(const Eigen::VectorXd& d) const {
+  const Eigen::VectorXd q = state_.q + d;
+  const Eigen::VectorXd inertia = terms_.form.acceleration_factor * (model_.system.mass * d);
   const Eigen::VectorXd change = deforms() ? Deformation(model_, q).u() - start_deformation_ : Eigen::VectorXd();
   const double contact = terms_.contacts != nullptr ? model_.contacts->potential(q, *terms_.contacts) : 0;
-  return sum(model_.elasticity.energy(q), contact, q, product, change);
+  return sum(model_.elasticity.energy(q), contact, d, inertia, change);
 }
 
-PotentialEvaluation StepPotential::evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) {
-  elastic_energy_ = model_.elasticity.force(q, internal_force_);
+PotentialEvaluation StepPotential::evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) {
+  elastic_energy_ = model_.elasticity.force(state_.q + d, internal_force_);
   stiffness_is_current_ = false;
-  return evaluate_first(q, gradient);
+  return evaluate_first(d, gradient);
 }
 
-PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) {
-  const auto& form = terms_.form;
-  const Eigen::VectorXd product = form.acceleration_factor * (model_.system.mass * (q - state_.q));
-  gradient = internal_force_ + linear_ + product;
+PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) {
+  const Eigen::VectorXd q = state_.q + d;
+  const Eigen::VectorXd inertia = terms_.form.acceleration_factor * (model_.system.mass * d);
+  gradient = internal_force_ + linear_ + inertia;
   double contact = 0;
   Eigen::VectorXd change;
   if (deforms()) {
@@ -123,15 +122,15 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& q, Eige
           0.5 * filter_stiffness_ * (model_.examples->filter(change) - model_.examples->transposed_filter(change));
   }
   PotentialEvaluation evaluation;
-  const Eigen::VectorXd inertia = linear_ + product + terms_.external_force;
-  evaluation.force_scale = terms_.external_force.norm() + internal_force_.norm() + inertia.norm();
+  evaluation.force_scale =
+      terms_.external_force.norm() + internal_force_.norm() + (linear_ + inertia + terms_.external_force).norm();
   if (terms_.contacts != nullptr) {
     model_.contacts->evaluate(q, *terms_.contacts);
     gradient -= terms_.contacts->force;
     contact = terms_.contacts->potential;
     evaluation.force_scale += terms_.contacts->force.norm();
   }
-  evaluation.potential = sum(elastic_energy_, contact, q, product, change);
+  evaluation.potential = sum(elastic_energy_, contact, d, inertia, change);
   return evaluation;
 }
 
@@ -143,9 +142,9 @@ void StepPotential::accept(PotentialEvaluation& evaluation) {
   frozen_ = next_frozen_;
 }
 
-void StepPotential::assemble(const Eigen::VectorXd& q, runtime::Tangent tangent) {
+void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent) {
   if (!stiffness_is_current_ || tangent != runtime::Tangent::kExact)
-    elastic_energy_ = model_.elasticity.force_and_stiffness(q, tangent, internal_force_, stiffness_);
+    elastic_energy_ = model_.elasticity.force_and_stiffness(state_.q + d, tangent, internal_force_, stiffness_);
   stiffness_is_current_ = true;
   // Damping by a stiffness that had to be projected would feed energy in.
   if (tangent != runtime::Tangent::kExact && at_first_iterate_ && scene_.stiffness_damping > 0) prepare();

@@ -41,7 +41,7 @@ struct StepTerms {
   VertexContacts::Step* contacts = nullptr;  ///< near obstacles
 };
 
-/// What one step minimises, with d = q - q_n:
+/// What one step minimises, in d = q - q_n, which keeps the digits that c_a and a body far from its rest would take:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
 ///     + k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
 /// the terms of runtime::IncrementalPotential in full space. The skew part of P has no potential: in values its force
@@ -53,36 +53,33 @@ class StepPotential {
 
   /// Elasticity at the first iterate. Returns inertia, elasticity and external force alone, comparable with
   /// potential_at_start().
-  double start(const Eigen::VectorXd& first_iterate);
+  double start(const Eigen::VectorXd& d);
   double potential_at_start() const;
 
   /// Damping of the first iterate and all that is linear; after start() and when the target is known.
   void prepare();
 
-  /// At the q of start(), whose elasticity serves; anywhere.
-  runtime::PotentialEvaluation evaluate_first(const Eigen::VectorXd& q, Eigen::VectorXd& gradient);
-  runtime::PotentialEvaluation evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient);
-  runtime::PotentialValue value(const Eigen::VectorXd& q) const;
-  /// The q of the last evaluate() is the next iterate.
+  /// At the d of start(), whose elasticity serves; anywhere.
+  runtime::PotentialEvaluation evaluate_first(const Eigen::VectorXd& d, Eigen::VectorXd& gradient);
+  runtime::PotentialEvaluation evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient);
+  runtime::PotentialValue value(const Eigen::VectorXd& d) const;
+  /// The d of the last evaluate() is the next iterate.
   void accept(runtime::PotentialEvaluation& evaluation);
 
-  /// The sparse part of the Hessian at the q of the last evaluate(), and the product with all of it. With projected
+  /// The sparse part of the Hessian at the d of the last evaluate(), and the product with all of it. With projected
   /// tangents at the first iterate, damping is frozen anew: evaluate again.
-  void assemble(const Eigen::VectorXd& q, runtime::Tangent tangent);
+  void assemble(const Eigen::VectorXd& d, runtime::Tangent tangent);
   LowerTriangle& hessian() { return hessian_; }
   Eigen::VectorXd product(const Eigen::VectorXd& x) const;
 
   double elastic_energy() const { return elastic_energy_; }
-  const Eigen::VectorXd& internal_force() const { return internal_force_; }
-  /// K of the last start() or assemble() times x.
-  Eigen::VectorXd stiffness_product(const Eigen::VectorXd& x) const;
 
  private:
   bool deforms() const { return damped_ || terms_.examples; }
   Eigen::VectorXd damping_product(const Eigen::VectorXd& u) const;
   Eigen::VectorXd deformation_product(const Eigen::VectorXd& u) const;
-  double inertia_and_load(const Eigen::VectorXd& q) const;
-  runtime::PotentialValue sum(double elastic, double contact, const Eigen::VectorXd& q,
+  double inertia_and_load(const Eigen::VectorXd& d) const;
+  runtime::PotentialValue sum(double elastic, double contact, const Eigen::VectorXd& d,
                               const Eigen::VectorXd& offset_product, const Eigen::VectorXd& change) const;
 
   const FullSpaceModel& model_;
@@ -90,6 +87,7 @@ class StepPotential {
   const FullSpaceState& state_;
   const StepTerms& terms_;
   bool damped_, skew_;
+  double reach_;                 // of the largest coordinates [m]
   double filter_stiffness_ = 0;  // k = kappa + c_kappa c_v
   bool at_first_iterate_ = true, stiffness_is_current_ = false;
 

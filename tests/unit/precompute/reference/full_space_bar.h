@@ -8,13 +8,14 @@
 
 namespace exmat::precompute {
 
-/// The number of modes of a clamped bar of a few cells that leave nothing out.
+/// The number of modes of a bar of a few cells that leave nothing out.
 inline int all_modes(const test::BarOptions& options) {
   const auto [nx, ny, nz] = options.cells;
-  return 3 * nx * (ny + 1) * (nz + 1);
+  const int section = 3 * (ny + 1) * (nz + 1);
+  return options.free ? (nx + 1) * section - 6 : nx * section;
 }
 
-/// A clamped bar with all modes in its basis and the example poses that descriptors stand for on all vertices.
+/// A bar with all modes in its basis and the example poses that descriptors stand for on all vertices.
 inline test::Bar complete_bar(test::BarOptions options) {
   options.linear_modes = all_modes(options) - std::max(0, std::min(options.examples, 4) - 1);
   test::Bar bar = test::make_bar(options);
@@ -31,7 +32,7 @@ inline test::Bar complete_bar(test::BarOptions options) {
   return bar;
 }
 
-/// Steps and expects each of them to be sound.
+/// Steps, and expects each one to be sound.
 inline void run(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state, int steps) {
   FullSpaceWorkspace workspace(model);
   for (int i = 0; i < steps; ++i) ASSERT_EQ(step(model, scene, state, workspace).status, 0U) << i;
