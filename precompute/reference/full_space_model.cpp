@@ -11,7 +11,7 @@ VertexArray as_rows(const Eigen::VectorXd& field) { return field.reshaped<Eigen:
 
 }  // namespace
 
-FullSpaceModel build_full_space_model(const ReducedModel& model, bool examples, runtime::EnergyReference reference) {
+FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options) {
   if (!model.object) throw InputError({"", "/object", "this group", "none", "precompute the bundle again"});
   const ObjectData& object = *model.object;
   FullSpaceModel full;
@@ -24,7 +24,9 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, bool examples, 
   full.gravity_load = full.system.restrict(full.system.full_mass * axes);
   if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
   if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
-  if (examples) full.examples.emplace(model, full.system, example_fields(model, full.system), reference);
+  if (options.targets == ExampleTargets::kNone) return full;
+  full.examples.emplace(model, full.system, example_fields(model, full.system), options.energy_reference);
+  if (options.targets == ExampleTargets::kSurface) full.surface_targets.emplace(object, full.system, *full.examples);
   return full;
 }
 

@@ -8,6 +8,7 @@
 #include "precompute/reference/fitted_frame.h"
 #include "precompute/reference/full_space_examples.h"
 #include "precompute/reference/mesh_elasticity.h"
+#include "precompute/reference/surface_targets.h"
 #include "precompute/reference/vertex_contacts.h"
 #include "runtime/sim/scene.h"
 #include "runtime/sim/state.h"
@@ -17,22 +18,33 @@ namespace exmat::precompute {
 /// A body with all degrees of freedom of its mesh: what the reduced model of the same bundle is measured against.
 /// Immutable. n vertices, f free degrees of freedom (all 3n of a free body, which moves in the world by itself).
 struct FullSpaceModel {
-  VertexArray rest;                           ///< n x 3 [m]
-  ElasticSystem system;                       ///< consistent mass, f x f and 3n x 3n
-  MeshElasticity elasticity;                  ///< all tets
-  Eigen::VectorXd mass_values;                ///< of the mass on the pattern of the stiffness [kg]
-  Eigen::MatrixXd gravity_load;               ///< f x 3, force per unit acceleration along each axis [kg]
-  std::optional<FittedFrame> frame;           ///< of a free body
-  std::optional<VertexContacts> contacts;     ///< of a bundle with /contact
-  std::optional<FullSpaceExamples> examples;  ///< absent: built without
+  VertexArray rest;                               ///< n x 3 [m]
+  ElasticSystem system;                           ///< consistent mass, f x f and 3n x 3n
+  MeshElasticity elasticity;                      ///< all tets
+  Eigen::VectorXd mass_values;                    ///< of the mass on the pattern of the stiffness [kg]
+  Eigen::MatrixXd gravity_load;                   ///< f x 3, force per unit acceleration along each axis [kg]
+  std::optional<FittedFrame> frame;               ///< of a free body
+  std::optional<VertexContacts> contacts;         ///< of a bundle with /contact
+  std::optional<FullSpaceExamples> examples;      ///< absent: built without
+  std::optional<SurfaceTargets> surface_targets;  ///< that take the place of the targets of `examples`
 
   Eigen::Index size() const { return elasticity.size(); }
 };
 
-/// From /object; /contact if it is there; with `examples` also /examples, /shape_space and /modal. Throws InputError
-/// where a group is missing.
-FullSpaceModel build_full_space_model(const ReducedModel& model, bool examples,
-                                      runtime::EnergyReference reference = runtime::EnergyReference::kExample);
+enum class ExampleTargets {
+  kNone,     ///< no examples
+  kTets,     ///< the example materials of method.md, by the elastic energy of all tets
+  kSurface,  ///< the method that the paper compares with, see SurfaceTargets
+};
+
+struct FullSpaceOptions {
+  ExampleTargets targets = ExampleTargets::kNone;
+  runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;  ///< of kTets
+};
+
+/// From /object; /contact if it is there; with targets also /examples, /shape_space and /modal. Throws InputError where
+/// a group is missing.
+FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options = {});
 
 /// A State of the run time, of a body without a frame of its own: q, v and a [f] are displacement from rest [m],
 /// velocity and acceleration of the free degrees of freedom, target [d] the coordinates of the last target.

@@ -31,6 +31,10 @@ class Stepper {
   void set_rate_centre(Integrator integrator);
   Eigen::VectorXd start_acceleration();
   void update_target(const Eigen::VectorXd& q);
+  void start_target();
+  void solve_target();
+  void solve_surface_target();
+  void set_undeformed();
   Eigen::VectorXd choose_first_iterate(StepPotential& potential);
   NewtonReport minimise(StepPotential& potential, Eigen::VectorXd& d);
   void add(const NewtonReport& newton);
@@ -44,7 +48,7 @@ class Stepper {
   StepTerms terms_;
   VertexContacts::Step contacts_;
   Eigen::VectorXd weights_, target_;  // K, d
-  bool target_converged_ = false;
+  bool examples_ = false, target_converged_ = false;
 };
 
 void Stepper::gather_external_force() {
@@ -109,8 +113,13 @@ Eigen::VectorXd Stepper::start_acceleration() {
   const Eigen::VectorXd bending = start.to_frame(stiffness.selfadjointView<Eigen::Lower>() * start.to_world(rate));
   Eigen::VectorXd deforming = scene_.stiffness_damping * bending;
   deforming += scene_.mass_damping * (model_.system.mass * rate);
+  if (examples_) update_target(state_.q);
+  if (terms_.example_elasticity != nullptr) {
+    Eigen::VectorXd pull;
+    terms_.example_elasticity->force(state_.q - terms_.target, pull);
+    internal += scene_.example_elasticity * pull;
+  }
   if (terms_.examples) {
-    update_target(state_.q);
     deforming += model_.examples->filter(scene_.examples->stiffness * (start.u() - terms_.target) +
                                          scene_.examples->damping * rate);
   }
@@ -128,18 +137,47 @@ void Stepper::update_target(const Eigen::VectorXd& q) {
   weights_ = examples.weights(Deformation(model_, q).u());
   runtime::apply_example_bias(scene_.examples->bias, weights_);
   target_ = state_.target;
-  if (!state_.has_target) examples.target().start(weights_, target_);
+  if (!state_.has_target) start_target();
   target_converged_ = state_.has_target && state_.target_converged && weights_ == state_.weights;
-  if (!target_converged_) {
-    if (!workspace_.target) workspace_.target.emplace(examples.target().make_workspace());
-    const NewtonReport solved = examples.target().solve(weights_, *workspace_.target, target_);
-    report_.target_iterations += solved.iterations;
-    target_converged_ = solved.status != NewtonStatus::kIterationLimit;
-    if (!target_converged_) report_.status |= runtime::kTargetNotConverged;
-    if (solved.status == NewtonStatus::kNonFinite) report_.status |= runtime::kStepNonFinite;
-  }
-  terms_.target = examples.target_fields() * target_;
+  if (!target_converged_) model_.surface_targets ? solve_surface_target() : solve_target();
+  if (!target_converged_) report_.status |= runtime::kTargetNotConverged;
+  terms_.target = (model_.surface_targets ? examples.pose_basis() : examples.target_fields()) * target_;
+  if (scene_.example_elasticity > 0) set_undeformed();
   report_.target_seconds += timer.seconds();
+}
+
+// The blend of the examples.
+void Stepper::start_target() {
+  const FullSpaceExamples& examples = *model_.examples;
+  if (!model_.surface_targets) return examples.target().start(weights_, target_);
+  target_.setZero();
+  for (Eigen::Index k = 0; k < examples.count(); ++k) target_ += weights_[k] * examples.pose(k);
+}
+
+void Stepper::solve_target() {
+  const runtime::TargetSolver& solver = model_.examples->target();
+  if (!workspace_.target) workspace_.target.emplace(solver.make_workspace());
+  const NewtonReport solved = solver.solve(weights_, *workspace_.target, target_);
+  report_.target_iterations += solved.iterations;
+  target_converged_ = solved.status != NewtonStatus::kIterationLimit;
+  if (solved.status == NewtonStatus::kNonFinite) report_.status |= runtime::kStepNonFinite;
+}
+
+void Stepper::solve_surface_target() {
+  const MinimiserReport solved = model_.surface_targets->solve(weights_, target_);
+  report_.target_iterations += solved.iterations;
+  report_.target_evaluations += solved.evaluations;
+  target_converged_ = solved.converged;
+  if (!target_.allFinite()) report_.status |= runtime::kStepNonFinite;
+}
+
+// The target as the undeformed shape.
+void Stepper::set_undeformed() {
+  if (!workspace_.example_elasticity) workspace_.example_elasticity = model_.elasticity;
+  const Eigen::VectorXd displacement = model_.system.extend(terms_.target);
+  const VertexArray shape = model_.rest + displacement.reshaped<Eigen::RowMajor>(model_.rest.rows(), 3);
+  report_.inverted_tets = workspace_.example_elasticity->set_undeformed(shape);
+  terms_.example_elasticity = &*workspace_.example_elasticity;
 }
 
 // The step to the predictor q_n + dt v_n or none, whichever has the lower potential.
@@ -191,7 +229,7 @@ void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
     report_.contacts = contacts_.touching;
     report_.contact_force = contacts_.total_force;
   }
-  if (!terms_.examples) return;
+  if (!examples_) return;
   state_.weights = weights_;
   state_.target = target_;
   state_.has_target = true;
@@ -200,7 +238,9 @@ void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
 
 FullSpaceReport Stepper::run() {
   const auto& settings = scene_.examples;
-  terms_.examples = model_.examples && settings && (settings->stiffness > 0 || settings->damping > 0);
+  const bool linear = settings && (settings->stiffness > 0 || settings->damping > 0);
+  examples_ = model_.examples && settings && (linear || scene_.example_elasticity > 0);
+  terms_.examples = examples_ && scene_.example_elasticity == 0;
   gather_external_force();
   const Integrator integrator = find_contacts() ? Integrator::kBackwardEuler : scene_.integrator;
   set_form(integrator);
@@ -208,7 +248,7 @@ FullSpaceReport Stepper::run() {
   StepPotential potential(model_, scene_, state_, terms_);
   Eigen::VectorXd d = choose_first_iterate(potential);
   if (!d.allFinite()) report_.status |= runtime::kStepNonFinite;
-  if (terms_.examples && !(report_.status & runtime::kStepNonFinite)) update_target(state_.q + d);
+  if (examples_ && !(report_.status & runtime::kStepNonFinite)) update_target(state_.q + d);
   if (report_.status & runtime::kStepNonFinite) return report_;
   potential.prepare();
   const NewtonStatus status = minimise(potential, d).status;

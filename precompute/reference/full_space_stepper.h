@@ -25,6 +25,9 @@ struct FullSpaceScene {
   std::vector<VertexForceConfig> forces;              ///< vertices of the object
   std::vector<runtime::Obstacle> obstacles;
   std::optional<runtime::ExampleSettings> examples;  ///< absent: no weights, no target, no example force
+  /// If above 0, the example force is not the linear one but that of the elastic energy with the target as the
+  /// undeformed shape, of this share of the material's own stiffness.
+  double example_elasticity = 0;
 };
 
 /// Scratch of the steps of one body: factors that the next step may use again, nothing else.
@@ -34,12 +37,15 @@ struct FullSpaceWorkspace {
   SparseDirection direction;                                                ///< of Newton's method
   std::unique_ptr<Eigen::SimplicialLLT<LowerTriangle, Eigen::Lower>> mass;  ///< once it is needed
   std::optional<runtime::TargetSolver::Workspace> target;
+  std::optional<MeshElasticity> example_elasticity;
 };
 
 /// What one step did, and how long it took.
 struct FullSpaceReport : runtime::StepReport {
-  double target_seconds = 0;  ///< weights and target: t_interp of the paper's Table 2
-  double seconds = 0;         ///< all of it: t_total
+  int target_evaluations = 0;      ///< of the surface energy, each with a reconstruction
+  Eigen::Index inverted_tets = 0;  ///< that an elastic example force leaves out, since the target inverts them
+  double target_seconds = 0;       ///< weights and target: t_interp of the paper's Table 2
+  double seconds = 0;              ///< all of it: t_total
 };
 
 /// Advances a body by one time step: M u'' + D u' + f_int(u) = f_ext + f_example, D = alpha M + beta K; what

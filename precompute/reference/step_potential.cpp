@@ -98,7 +98,12 @@ PotentialValue StepPotential::value(const Eigen::VectorXd& d) const {
   const Eigen::VectorXd inertia = terms_.form.acceleration_factor * (model_.system.mass * d);
   const Eigen::VectorXd change = deforms() ? Deformation(model_, q).u() - start_deformation_ : Eigen::VectorXd();
   const double contact = terms_.contacts != nullptr ? model_.contacts->potential(q, *terms_.contacts) : 0;
-  return sum(model_.elasticity.energy(q), contact, d, inertia, change);
+  return sum(model_.elasticity.energy(q) + elastic_example_energy(q), contact, d, inertia, change);
+}
+
+double StepPotential::elastic_example_energy(const Eigen::VectorXd& q) const {
+  if (terms_.example_elasticity == nullptr) return 0;
+  return scene_.example_elasticity * terms_.example_elasticity->energy(q - terms_.target);
 }
 
 PotentialEvaluation StepPotential::evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) {
@@ -121,6 +126,12 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
       next_frozen_ =
           0.5 * filter_stiffness_ * (model_.examples->filter(change) - model_.examples->transposed_filter(change));
   }
+  double example_energy = 0;
+  if (terms_.example_elasticity != nullptr) {
+    const double share = scene_.example_elasticity;
+    example_energy = share * terms_.example_elasticity->force(q - terms_.target, example_force_);
+    gradient += share * example_force_;
+  }
   PotentialEvaluation evaluation;
   evaluation.force_scale =
       terms_.external_force.norm() + internal_force_.norm() + (linear_ + inertia + terms_.external_force).norm();
@@ -130,7 +141,7 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
     contact = terms_.contacts->potential;
     evaluation.force_scale += terms_.contacts->force.norm();
   }
-  evaluation.potential = sum(elastic_energy_, contact, d, inertia, change);
+  evaluation.potential = sum(elastic_energy_ + example_energy, contact, d, inertia, change);
   return evaluation;
 }
 
@@ -151,6 +162,11 @@ void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent)
   hessian_ = stiffness_;
   hessian_.coeffs() += terms_.form.acceleration_factor * model_.mass_values.array();
   if (damped_) hessian_.coeffs() += terms_.form.velocity_factor * damping_.coeffs();
+  if (terms_.example_elasticity != nullptr) {
+    LowerTriangle stiffness;
+    terms_.example_elasticity->force_and_stiffness(state_.q + d - terms_.target, tangent, example_force_, stiffness);
+    hessian_.coeffs() += scene_.example_elasticity * stiffness.coeffs();
+  }
   if (terms_.contacts != nullptr) model_.contacts->add_stiffness(*terms_.contacts, hessian_);
 }
 

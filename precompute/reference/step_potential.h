@@ -33,18 +33,20 @@ class Deformation {
 
 /// What one step knows before its Newton iterations.
 struct StepTerms {
-  runtime::StepForm form;                    ///< of q
-  Eigen::VectorXd rate_centre;               ///< u_v [f]: u' = c_v (u - u_v)
-  Eigen::VectorXd external_force;            ///< [f]
-  Eigen::VectorXd target;                    ///< u* [f], with an example force
-  bool examples = false;                     ///< there is one
-  VertexContacts::Step* contacts = nullptr;  ///< near obstacles
+  runtime::StepForm form;                              ///< of q
+  Eigen::VectorXd rate_centre;                         ///< u_v [f]: u' = c_v (u - u_v)
+  Eigen::VectorXd external_force;                      ///< [f]
+  Eigen::VectorXd target;                              ///< u* [f], with an example force
+  bool examples = false;                               ///< there is one
+  const MeshElasticity* example_elasticity = nullptr;  ///< of displacements from u*, instead of the linear force
+  VertexContacts::Step* contacts = nullptr;            ///< near obstacles
 };
 
 /// What one step minimises, in d = q - q_n, which keeps the digits that c_a and a body far from its rest would take:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
 ///     + k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
-/// the terms of runtime::IncrementalPotential in full space. The skew part of P has no potential: in values its force
+/// the terms of runtime::IncrementalPotential in full space; with an elastic example force, s E*(q - u*) instead of the
+/// last two, of the share s. The skew part of P has no potential: in values its force
 /// is that of the iterate last accepted. Hessians leave out how the frame of a free body turns.
 class StepPotential {
  public:
@@ -76,6 +78,7 @@ class StepPotential {
 
  private:
   bool deforms() const { return damped_ || terms_.examples; }
+  double elastic_example_energy(const Eigen::VectorXd& q) const;
   Eigen::VectorXd damping_product(const Eigen::VectorXd& u) const;
   Eigen::VectorXd deformation_product(const Eigen::VectorXd& u) const;
   double inertia_and_load(const Eigen::VectorXd& d) const;
@@ -93,6 +96,7 @@ class StepPotential {
 
   double elastic_energy_ = 0;
   Eigen::VectorXd internal_force_;
+  Eigen::VectorXd example_force_;                // of an elastic example force, minus its derivative
   LowerTriangle stiffness_, hessian_, damping_;  // damping: D, components of the world at the first iterate
   std::optional<Deformation> first_, here_;      // at the first iterate, at the last evaluate()
   Eigen::VectorXd start_deformation_;            // u_n

@@ -21,7 +21,7 @@ constexpr std::array kIntegrators{Integrator::kBdf2, Integrator::kBackwardEuler,
 /// A free bar of a few tets that spins, flies and vibrates.
 struct FreeBar {
   explicit FreeBar(const test::BarOptions& options = {.cells = {3, 1, 1}, .free = true, .linear_modes = 8})
-      : bar(test::make_bar(options)), model(build_full_space_model(bar.model, options.examples > 0)) {}
+      : bar(test::make_bar(options)), model(build_full_space_model(bar.model, targets_of(options))) {}
 
   FullSpaceState moving(double spin) const {
     const Eigen::VectorXd first = bar.basis().col(0) + 0.3 * bar.basis().col(3);
@@ -110,7 +110,7 @@ TEST(FullSpace, KeepsLinearMomentumAndAngularMomentumToItsOrder) {
 /// Energies in ten periods of a bar that is let go, over the first one.
 std::vector<double> energies_of_vibration(Integrator integrator, int steps_per_period) {
   const test::Bar bar = test::make_bar({.cells = {4, 1, 1}});
-  const FullSpaceModel model = build_full_space_model(bar.model, false);
+  const FullSpaceModel model = build_full_space_model(bar.model);
   const Eigen::VectorXd bent = 0.03 * bar.length / bar.basis().col(0).lpNorm<Eigen::Infinity>() * bar.basis().col(0);
   const FullSpaceScene scene = scene_of(integrator, 1 / (steps_per_period * bar.model.modal->frequencies[0]));
   FullSpaceState state = make_full_space_state(model, bent, Eigen::VectorXd::Zero(bent.size()));
@@ -162,7 +162,7 @@ double deflection(int along, double length, double width, double youngs_modulus,
   object.materials = {Eigen::VectorXd::Constant(tets, 1000), Eigen::VectorXd::Constant(tets, youngs_modulus),
                       Eigen::VectorXd::Zero(tets)};
   object.fixed = (object.mesh.vertices.col(0).array() < 1e-9).cast<std::uint8_t>();
-  const FullSpaceModel full = build_full_space_model(model, false);
+  const FullSpaceModel full = build_full_space_model(model);
   FullSpaceScene scene = scene_of(Integrator::kBackwardEuler, 1e6);  // statics
   std::vector<std::int64_t> end;
   std::vector<double> shares;
@@ -202,7 +202,7 @@ TEST(FullSpace, ConvergesInTheElementSizeToTimoshenkosBeam) {
 
 TEST(FullSpace, ReportsWhatIsNotFiniteAndKeepsTheState) {
   const test::Bar bar = test::make_bar({.cells = {2, 1, 1}});
-  const FullSpaceModel model = build_full_space_model(bar.model, false);
+  const FullSpaceModel model = build_full_space_model(bar.model);
   FullSpaceState state = at_rest(model);
   state.applied_force[3] = std::numeric_limits<double>::quiet_NaN();
   FullSpaceWorkspace workspace(model);
@@ -213,9 +213,9 @@ TEST(FullSpace, ReportsWhatIsNotFiniteAndKeepsTheState) {
 
 TEST(FullSpace, NamesAMissingGroup) {
   test::Bar bar = test::make_bar({.cells = {2, 1, 1}});
-  EXPECT_THROW(build_full_space_model(bar.model, true), InputError);
+  EXPECT_THROW(build_full_space_model(bar.model, {.targets = ExampleTargets::kTets}), InputError);
   bar.model.object.reset();
-  EXPECT_THROW(build_full_space_model(bar.model, false), InputError);
+  EXPECT_THROW(build_full_space_model(bar.model), InputError);
 }
 
 // A free body in a frame of its own (the run time) and in the world: of second order in the time step they are the
@@ -224,7 +224,7 @@ TEST(FullSpace, FreeBodiesWithDampingAndExamplesAreThoseOfTheRunTime) {
   test::Bar bar =
       complete_bar({.cells = {2, 1, 1}, .density_gradient = 0.5, .free = true, .eigenfunctions = 3, .examples = 2});
   const auto reduced = runtime::build_model(bar.model, {}).model;
-  const FullSpaceModel full = build_full_space_model(bar.model, true);
+  const FullSpaceModel full = build_full_space_model(bar.model, {.targets = ExampleTargets::kTets});
   runtime::FreeMotion motion;
   motion.linear_velocity = Eigen::Vector3d(1, 0, -1);
   motion.angular_velocity = Eigen::Vector3d(1, 6, -3);
@@ -275,7 +275,7 @@ struct Dropped {
   explicit Dropped(double friction, double slope)
       : bar(test::make_bar({.cells = {2, 1, 1}, .lengths = {0.4, 0.2, 0.2}, .youngs_modulus = 1e6, .free = true})) {
     bar.model.contact = test::surface_contact(bar.model);
-    model = build_full_space_model(bar.model, false);
+    model = build_full_space_model(bar.model);
     scene.time_step = 2e-3;
     // The floor stays level; gravity leans.
     scene.gravity = kGravity * Eigen::Vector3d(std::sin(slope), 0, -std::cos(slope));

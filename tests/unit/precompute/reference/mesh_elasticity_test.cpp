@@ -13,7 +13,7 @@ namespace {
 class MeshElasticityTest : public testing::TestWithParam<MaterialModel> {
  protected:
   test::Bar bar_ = test::make_bar({.cells = {2, 2, 1}, .material = GetParam(), .density_gradient = 1});
-  FullSpaceModel model_ = build_full_space_model(bar_.model, false);
+  FullSpaceModel model_ = build_full_space_model(bar_.model);
   const MeshElasticity& elasticity_ = model_.elasticity;
   /// Strains of about 0.3.
   Eigen::VectorXd u_ = 0.03 * test::random_vector(elasticity_.size(), 1);

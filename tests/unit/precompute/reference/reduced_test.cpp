@@ -29,7 +29,7 @@ class ReducedTwin {
                            .examples = options.examples})) {
     if (options.floor) bar_.model.contact = movable_contact();
     reduced_ = runtime::build_model(bar_.model, {}).model;
-    full_ = build_full_space_model(bar_.model, options.examples > 0);
+    full_ = build_full_space_model(bar_.model, targets_of({.examples = options.examples}));
     reduced_scene_.integrator = full_scene_.integrator = options.integrator;
     reduced_scene_.time_step = full_scene_.time_step = 0.01;
     reduced_scene_.newton = full_scene_.newton = {60, 1e-11};
