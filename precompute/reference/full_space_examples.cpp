@@ -57,8 +57,11 @@ Eigen::MatrixXd example_fields(const ReducedModel& model, const ElasticSystem& s
   require_examples(model);
   const LaplaceBasis object = laplace_basis_of(model);
   const FieldClamp clamp(system, clamp_decay(model), model.asset_name);
-  return pose_fields(object, descriptor_weights(object, model.shape_space->weighting), model.object->fixed, system,
-                     clamp);
+  Eigen::MatrixXd fields =
+      pose_fields(object, descriptor_weights(object, model.shape_space->weighting), model.object->fixed, system, clamp);
+  // The modal basis of a free body holds no rigid motions.
+  fields -= system.null_space * (system.null_space.transpose() * (system.mass * fields)).eval();
+  return fields;
 }
 
 FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system,

@@ -1,8 +1,10 @@
 #include "precompute/reference/full_space_model.h"
 
 #include <Eigen/Geometry>
+#include <string>
 
 #include "common/core/error.h"
+#include "common/core/log.h"
 
 namespace exmat::precompute {
 namespace {
@@ -26,6 +28,9 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpace
   if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
   if (options.targets == ExampleTargets::kNone) return full;
   full.examples.emplace(model, full.system, example_fields(model, full.system), options.energy_reference);
+  if (const Eigen::Index left_out = full.examples->left_out_tets(); left_out > 0)
+    log::warning(model.asset_name + ": the energies of the target leave out " + std::to_string(left_out) + " of " +
+                 std::to_string(object.mesh.tet_count()) + " tets, which an example turns inside out");
   if (options.targets == ExampleTargets::kSurface) full.surface_targets.emplace(object, full.system, *full.examples);
   return full;
 }

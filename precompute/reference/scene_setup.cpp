@@ -20,6 +20,13 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
   if (config.examples && config.examples->force != "linear")
     throw InputError({file, "/examples/force", "\"linear\"", '"' + config.examples->force + '"', ""});
+  const auto require_part = [&](bool needed, bool there, const char* group) {
+    if (needed && !there)
+      throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
+                        "precompute the bundle again with this scene (--scene)"});
+  };
+  require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
+  require_part(config.examples.has_value(), model.examples.has_value(), "/examples");
   for (std::size_t i = 0; i < config.forces.size(); ++i)
     for (const std::int64_t vertex : config.forces[i].vertices)
       if (vertex < 0 || vertex >= model.rest.rows())

@@ -36,7 +36,7 @@ double StepPotential::start(const Eigen::VectorXd& d) {
   const Eigen::VectorXd q = state_.q + d;
   elastic_energy_ = model_.elasticity.force_and_stiffness(q, runtime::Tangent::kExact, internal_force_, stiffness_);
   stiffness_is_current_ = true;
-  if (deforms()) first_.emplace(model_, q);
+  if (deforms() && at_first_iterate_) first_.emplace(model_, q);
   return elastic_energy_ + inertia_and_load(d);
 }
 
@@ -85,6 +85,8 @@ PotentialValue StepPotential::sum(double elastic, double contact, const Eigen::V
   // Positions are rounded, and forces do work on that.
   total.magnitude += reach_ * internal_force_.lpNorm<1>();
   if (terms_.contacts != nullptr) total.magnitude += reach_ * terms_.contacts->force.lpNorm<1>();
+  if (terms_.example_elasticity != nullptr)
+    total.magnitude += reach_ * scene_.example_elasticity * example_force_.lpNorm<1>();
   if (!deforms()) return total;
   const Eigen::VectorXd product = deformation_product(change), linear = deformation_linear_ + frozen_;
   total.value += 0.5 * change.dot(product) + linear.dot(change);

@@ -46,8 +46,8 @@ struct StepTerms {
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
 ///     + k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
 /// the terms of runtime::IncrementalPotential in full space; with an elastic example force, s E*(q - u*) instead of the
-/// last two, of the share s. The skew part of P has no potential: in values its force
-/// is that of the iterate last accepted. Hessians leave out how the frame of a free body turns.
+/// last two, of the share s. The skew part of P has no potential: in values its force is that of the iterate last
+/// accepted. Hessians leave out how the frame of a free body turns.
 class StepPotential {
  public:
   StepPotential(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
@@ -96,7 +96,7 @@ class StepPotential {
 
   double elastic_energy_ = 0;
   Eigen::VectorXd internal_force_;
-  Eigen::VectorXd example_force_;                // of an elastic example force, minus its derivative
+  Eigen::VectorXd example_force_;                // derivative of an elastic example energy
   LowerTriangle stiffness_, hessian_, damping_;  // damping: D, components of the world at the first iterate
   std::optional<Deformation> first_, here_;      // at the first iterate, at the last evaluate()
   Eigen::VectorXd start_deformation_;            // u_n

@@ -26,8 +26,6 @@ Eigen::MatrixXd pose_fields(const LaplaceBasis& object, const Eigen::VectorXd& w
     hold_fixed_mean(fixed, fields);
     result.middleCols(3 * i, 3) = clamp.apply(fields);
   }
-  if (!system.constrained())
-    result -= system.null_space * (system.null_space.transpose() * (system.mass * result)).eval();
   return result;
 }
 

@@ -11,8 +11,8 @@ namespace exmat::precompute {
 void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements);
 
 /// [f x 3m] free rows of the displacements that changes of descriptor stand for, C V^(1/3) (Phi Lambda^-1 (x) I_3): C
-/// puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by a FieldClamp; of a
-/// free body it takes the rigid motions out. method.md, sections 4 and 5.
+/// puts the fixed vertices of a clamped body back, on the mean by hold_fixed_mean(), the rest by a FieldClamp.
+/// method.md, sections 4 and 5.
 Eigen::MatrixXd pose_fields(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
                             const ElasticSystem& system, const FieldClamp& clamp);
 

@@ -80,10 +80,12 @@ TEST_F(ReferenceFiles, AReducedSceneComesNearerToTheFullOneWithMoreModes) {
 }
 
 TEST_F(ReferenceFiles, RefusesWhatItCannotDo) {
-  const ReducedModel data = built(8);
+  ReducedModel data = built(8);
+  data.contact.reset();
   const auto model = precompute::build_full_space_model(data);
   for (const Json& members :
        {R"({"body": {"motion": [{"time": 0, "position": [0, 0, 0]}, {"time": 1, "position": [1, 0, 0]}]}})"_json,
+        R"({"examples": {"stiffness": 1}})"_json, R"({"obstacles": [{"plane": {"normal": [0, 1, 0]}}]})"_json,
         R"({"forces": [{"vertices": {"ids": [100000]}, "force": [1, 0, 0]}]})"_json}) {
     const SceneConfig config = load_scene(write_scene(folder_, members));
     EXPECT_THROW(precompute::full_space_scene(config, {}, model), InputError) << members;

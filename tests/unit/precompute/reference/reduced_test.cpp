@@ -35,7 +35,8 @@ class ReducedTwin {
     reduced_scene_.newton = full_scene_.newton = {60, 1e-11};
     reduced_scene_.mass_damping = full_scene_.mass_damping = options.damping;
     reduced_scene_.stiffness_damping = full_scene_.stiffness_damping = 0.01 * options.damping;
-    if (options.examples > 0) reduced_scene_.examples = full_scene_.examples = runtime::ExampleSettings{400, 2, 0.5};
+    if (options.examples > 0) reduced_scene_.examples = {runtime::ExampleSettings{400, 2, 0.5}};
+    if (options.examples > 0) full_scene_.examples = {runtime::ExampleSettings{400, 2, 0.5}};
     if (options.floor) reduced_scene_.obstacles = {{runtime::Plane{{0, -0.05, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     full_scene_.obstacles = reduced_scene_.obstacles;
     set_loads();
