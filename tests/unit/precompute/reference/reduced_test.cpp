@@ -12,6 +12,9 @@ namespace {
 
 using runtime::Integrator;
 
+// Both methods solve to residuals of 1e-11 of the forces, and targets to 1e-10 of the examples' gradients.
+constexpr double kSame = 1e-10;
+
 struct Case {
   MaterialModel material = MaterialModel::kStVenantKirchhoff;
   Integrator integrator = Integrator::kBdf2;
@@ -106,17 +109,16 @@ class ReducedOfAllModes : public testing::TestWithParam<std::tuple<MaterialModel
 
 TEST_P(ReducedOfAllModes, IsTheFullSpace) {
   ReducedTwin twin({.material = std::get<0>(GetParam()), .integrator = std::get<1>(GetParam())});
-  // Residuals of 1e-11 of the forces, added up over 40 steps.
-  EXPECT_LE(twin.difference(40), 1e-8);
+  EXPECT_LE(twin.difference(40), kSame);
   EXPECT_GE(twin.size(), 0.1) << "the motion is too small to tell";
 }
 
 TEST_P(ReducedOfAllModes, IsTheFullSpaceWithDampingAndExamples) {
   ReducedTwin twin(
       {.material = std::get<0>(GetParam()), .integrator = std::get<1>(GetParam()), .examples = 3, .damping = 0.5});
-  // Targets are solved to 1e-10 of the largest example's gradient.
-  EXPECT_LE(twin.difference(40), 1e-7);
-  EXPECT_LE(twin.weights_off(), 1e-6);
+  EXPECT_LE(twin.difference(40), kSame);
+  EXPECT_LE(twin.weights_off(), kSame);
+  EXPECT_GE(twin.size(), 0.1) << "the motion is too small to tell";
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -128,13 +130,13 @@ INSTANTIATE_TEST_SUITE_P(
 // P_s is not symmetric then.
 TEST(ReducedOfAllModesAndMixedDensity, IsTheFullSpace) {
   ReducedTwin twin({.examples = 3, .density_gradient = 3});
-  EXPECT_LE(twin.difference(40), 1e-7);
+  EXPECT_LE(twin.difference(40), kSame);
 }
 
 // Backward Euler throughout: with another integrator the two may come near, and change to it, in different steps.
 TEST(ReducedOfAllModesInContact, IsTheFullSpace) {
   ReducedTwin twin({.integrator = Integrator::kBackwardEuler, .floor = true});
-  EXPECT_LE(twin.difference(60), 1e-7);
+  EXPECT_LE(twin.difference(60), 10 * kSame);  // penalties are stiff
   EXPECT_GT(twin.contacts(), 20) << "nothing touches";
 }
 
