@@ -11,6 +11,9 @@
 
 namespace exmat::precompute {
 
+/// Starts PETSc, once per program.
+void start_solvers();
+
 /// What PETSc said of its last error.
 std::string& last_petsc_message();
 

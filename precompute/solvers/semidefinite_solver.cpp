@@ -17,7 +17,9 @@ PetscErrorCode remember_error(MPI_Comm, int, const char*, const char*, PetscErro
   return code;
 }
 
-// Once per program; PETSc and MPI cannot be started a second time, so they end with it.
+}  // namespace
+
+// PETSc and MPI cannot be started a second time, so they end with the program.
 void start_solvers() {
   static const bool started = [] {
     // A single process needs no daemon, no binding and no network. mpirun sets its own.
@@ -32,8 +34,6 @@ void start_solvers() {
   }();
   static_cast<void>(started);
 }
-
-}  // namespace
 
 std::string& last_petsc_message() {
   static std::string message;

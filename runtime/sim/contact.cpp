@@ -25,76 +25,6 @@ double largest_norm(const RowMatrix& basis, const std::vector<int>& order, int f
   return std::sqrt(largest);
 }
 
-/// Friction of size `limit` as a function of the slip l: f1(l) / l, its derivative f1' and its integral f0, all times
-/// the limit.
-struct SlipLaw {
-  double secant = 0, tangent = 0, energy = 0;
-
-  SlipLaw(double limit, double stiffness, double slip) {
-    const double full = 2 * limit / stiffness;  // where the force reaches its limit
-    if (slip < full) {
-      secant = stiffness * (1 - 0.5 * slip / full);
-      tangent = stiffness * (1 - slip / full);
-      energy = stiffness * slip * slip * (0.5 - slip / full / 6);
-    } else {
-      secant = limit / slip;
-      energy = limit * (slip - full / 3);
-    }
-  }
-};
-
-Eigen::Vector3d tangential(const Eigen::Vector3d& vector, const Eigen::Vector3d& normal) {
-  return vector - normal.dot(vector) * normal;
-}
-
-/// y, see ContactSet.
-Eigen::Vector3d slip_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) {
-  return tangential(point - candidate.anchor + candidate.damping * (point - candidate.carried), candidate.normal);
-}
-
-/// d - tau v_n.
-double damped_depth(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) {
-  return -gap - candidate.damping * candidate.normal.dot(point - candidate.carried);
-}
-
-void evaluate_normal(ContactCandidate& candidate, const SurfacePoint& surface, const Eigen::Vector3d& point) {
-  candidate.gap = surface.distance;
-  const double depth = damped_depth(candidate, surface.distance, point);
-  if (depth <= 0) return;
-  const double factor = 1 + candidate.damping;
-  const Eigen::Vector3d direction = (surface.normal + candidate.damping * candidate.normal) / factor;
-  candidate.force = candidate.stiffness * depth * direction;
-  candidate.normal_force = candidate.force.norm();
-  candidate.directions.col(0) = direction;
-  candidate.weights[0] = candidate.stiffness * factor;
-}
-
-void evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& point) {
-  candidate.slip = slip_of(candidate, point);
-  if (candidate.friction_force <= 0) return;
-  const double length = candidate.slip.norm();
-  const SlipLaw law(candidate.friction_force, candidate.stiffness, length);
-  const Eigen::Vector3d along =
-      length > 0 ? Eigen::Vector3d(candidate.slip / length) : candidate.normal.unitOrthogonal();
-  candidate.force -= law.secant * candidate.slip;
-  candidate.directions.col(1) = along;
-  candidate.directions.col(2) = candidate.normal.cross(along);
-  candidate.weights[1] = (1 + candidate.damping) * law.tangent;
-  candidate.weights[2] = (1 + candidate.damping) * law.secant;
-}
-
-double potential_of(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) {
-  const double depth = std::max(0.0, damped_depth(candidate, gap, point));
-  double energy = 0.5 * candidate.stiffness * depth * depth;
-  if (candidate.friction_force > 0)
-    energy += SlipLaw(candidate.friction_force, candidate.stiffness, slip_of(candidate, point).norm()).energy;
-  return energy / (1 + candidate.damping);
-}
-
-bool precedes(const HeldContact& held, const ContactCandidate& candidate) {
-  return held.vertex != candidate.vertex ? held.vertex < candidate.vertex : held.obstacle < candidate.obstacle;
-}
-
 /// Lower triangle of A += F F^T, F the first `used` columns of `factors`. Eigen keeps its panels on the stack up to r =
 /// 500.
 void add_factors(const Eigen::MatrixXd& factors, Eigen::Index used, Eigen::MatrixXd& A) {
@@ -243,24 +173,11 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, doub
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     ContactCandidate& candidate = workspace.candidates[i];
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    const Obstacle& obstacle = *placed.obstacle;
     const Eigen::Vector3d arm = world_arm(candidate.vertex, pose);
     const Eigen::Vector3d point = pose.position + arm;
-    candidate.carried = candidate.anchor = placed.carried(point);
-    const SurfacePoint surface = placed.nearest_surface_point(candidate.carried);
     const Eigen::Vector3d predicted = point + time_step * world_velocity(candidate.vertex, arm, pose, velocity);
-    const double predicted_gap = surface.distance + surface.normal.dot(predicted - candidate.carried);
-    const bool touches = std::min(surface.distance, predicted_gap) < 0;
-    candidate.normal = surface.normal;
-    candidate.stiffness = obstacle.stiffness * areas_[candidate.vertex];
-    candidate.damping = touches ? obstacle.damping / (obstacle.stiffness * time_step) : 0;
-    candidate.friction_force = 0;
-    while (next < state.count && precedes(state.held[next], candidate)) ++next;
-    if (next == state.count) continue;
-    const HeldContact& held = state.held[next];
-    if (held.vertex != candidate.vertex || held.obstacle != candidate.obstacle) continue;
-    candidate.anchor = placed.pose.to_world(held.anchor);
-    candidate.friction_force = obstacle.friction * held.normal_force;
+    freeze_contact(placed, point, predicted, areas_[candidate.vertex], time_step, candidate);
+    take_friction(placed, state, next, candidate);
   }
 }
 
@@ -272,21 +189,16 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
   workspace.touching = 0;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     ContactCandidate& candidate = workspace.candidates[i];
-    candidate.force.setZero();
-    candidate.weights.setZero();
-    candidate.normal_force = 0;
     candidate.arm = world_arm(candidate.vertex, pose);
     const Eigen::Vector3d point = pose.position + candidate.arm;
-    const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    evaluate_normal(candidate, placed.nearest_surface_point(point), point);
-    evaluate_friction(candidate, point);
+    evaluate_contact(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)], point, candidate);
     if (candidate.normal_force > 0) ++workspace.touching;
     if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
     workspace.force += candidate.force;
     workspace.torque += candidate.arm.cross(candidate.force);
     const Eigen::Vector3d body_force = pose.rotation.transpose() * candidate.force;
     workspace.generalised += basis_.middleRows<3>(3 * candidate.vertex).transpose().lazyProduct(body_force);
-    workspace.potential += potential_of(candidate, candidate.gap, point);
+    workspace.potential += contact_potential(candidate, candidate.gap, point);
   }
 }
 
@@ -296,22 +208,13 @@ double ContactSet::potential(const BodyPose& pose, const ContactWorkspace& works
     const ContactCandidate& candidate = workspace.candidates[i];
     const Eigen::Vector3d point = pose.position + world_arm(candidate.vertex, pose);
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    sum += potential_of(candidate, placed.signed_distance(point), point);
+    sum += contact_potential(candidate, placed.signed_distance(point), point);
   }
   return sum;
 }
 
 double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept {
-  double largest = 0, change = 0;
-  for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
-    ContactCandidate& candidate = workspace.candidates[i];
-    const double friction = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction;
-    const double force = friction * candidate.normal_force;
-    change = std::max(change, std::abs(force - candidate.friction_force));
-    largest = std::max({largest, force, candidate.friction_force});
-    candidate.friction_force = force;
-  }
-  return largest > 0 ? change / largest : 0;
+  return runtime::refresh_friction(workspace.obstacles, workspace.candidates, workspace.candidate_count);
 }
 
 template <int kRigid>
@@ -352,18 +255,8 @@ void ContactSet::commit(const BodyPose& pose, const ContactWorkspace& workspace,
   state.count = 0;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     const ContactCandidate& candidate = workspace.candidates[i];
-    if (candidate.normal_force <= 0) continue;
-    const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
     const Eigen::Vector3d point = pose.position + candidate.arm;
-    const double full = 2 * placed.obstacle->friction * candidate.normal_force / candidate.stiffness;
-    const double length = candidate.slip.norm();
-    const Eigen::Vector3d stretch = length > full ? Eigen::Vector3d(candidate.slip * (full / length))
-                                                  : tangential(point - candidate.anchor, candidate.normal);
-    HeldContact& held = state.held[state.count++];
-    held.vertex = candidate.vertex;
-    held.obstacle = candidate.obstacle;
-    held.normal_force = candidate.normal_force;
-    held.anchor = placed.pose.to_frame(point - stretch);
+    hold_contact(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)], point, candidate, state);
   }
 }
 

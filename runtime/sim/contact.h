@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
-#include "runtime/sim/obstacle.h"
+#include "runtime/sim/contact_law.h"
 
 namespace exmat::runtime {
 
@@ -22,41 +22,6 @@ struct BodyVelocity {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< world [m/s]
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< world [rad/s]
   const Eigen::VectorXd& v;                           ///< [r]
-};
-
-/// What a touching vertex remembers from step to step.
-struct HeldContact {
-  int vertex = 0, obstacle = 0;
-  double normal_force = 0;                           ///< at the end of the last step [N]
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the obstacle [m]
-};
-
-/// The contacts of a State: the first `count` of `held`, in order of vertex and obstacle.
-struct ContactState {
-  std::vector<HeldContact> held;
-  std::size_t count = 0;
-};
-
-/// A vertex that may touch an obstacle in this step.
-struct ContactCandidate {
-  int vertex = 0, obstacle = 0;
-
-  // Frozen for the step.
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< n_0, where the step begins
-  Eigen::Vector3d carried = Eigen::Vector3d::Zero();  ///< x_0, where the obstacle would carry the vertex [m]
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();   ///< of the tangential spring, world [m]
-  double stiffness = 0;                               ///< kappa = area * stiffness [N/m]
-  double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
-  double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
-
-  // Of the last evaluation.
-  double gap = 0;                                            ///< [m]
-  double normal_force = 0;                                   ///< [N]
-  Eigen::Vector3d arm = Eigen::Vector3d::Zero();             ///< x - position [m]
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();           ///< on the vertex [N]
-  Eigen::Vector3d slip = Eigen::Vector3d::Zero();            ///< y, tangential [m]
-  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  ///< columns d_i: -df/dx = sum_i w_i d_i d_i^T
-  Eigen::Vector3d weights = Eigen::Vector3d::Zero();         ///< w_i >= 0 [N/m]
 };
 
 class ContactSet;
@@ -84,19 +49,7 @@ struct ContactWorkspace {
   Eigen::MatrixXd factors;  ///< (6 + r) x some columns
 };
 
-/// Contact of a body's surface with obstacles. method.md, section 6.
-///
-/// With depth d, area A, kappa = A stiffness and the mean velocity v of the step relative to the obstacle, v h = x -
-/// x_0, tau = damping / stiffness, a vertex feels
-///   normal    kappa max(0, d - tau n_0 . v) n: a spring and a damper that never pull. The damper acts in steps in
-///   which
-///             the vertex touches at the beginning or would by its velocity.
-///   friction  -mu lambda f1(|y|) y / |y|, y = (I - n_0 n_0^T) (x - anchor + tau v): a spring and a damper of initial
-///             stiffness kappa, capped by Coulomb's law: f1(l) = 2 l / e - (l / e)^2 up to e = 2 mu lambda / kappa,
-///             then 1 (the mollifier of Li et al. 2020 on a displacement). The anchor sticks to the obstacle and is
-///             dragged along where it slides (Cundall and Strack 1979), so that nothing creeps below the cone.
-/// lambda is the normal force at the end of the last step, or at the last refresh_friction(). Both forces are minus the
-/// gradient of a potential of the positions x at the end of the step, whatever the integrator.
+/// Contact of a body's surface with obstacles, by the law of contact_law.h. method.md, section 6.
 ///
 /// One step: gather, freeze, then evaluate, potential and add_stiffness as often as needed, then evaluate at the
 /// accepted pose and commit. An obstacle that is thinner than a vertex moves in one step may be passed through.

@@ -6,10 +6,6 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kMarginSteps = 2;      // way of a vertex that candidates are looked for in
-constexpr int kFrictionRounds = 3;      // solutions of one step for the normal forces of friction
-constexpr double kSameFriction = 0.05;  // relative change of friction that needs no further one
-
 BodyPose pose_of(const Model& model, const State& state) {
   BodyPose pose{.q = state.q};
   if (state.carried) {
@@ -69,7 +65,7 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
     const MotionSample& end = workspace.carried->frame;
     travel = std::max(travel, set.travel_bound(pose, {end.linear_velocity, end.angular_velocity, state.v}, dt));
   }
-  const double margin = kMarginSteps * travel + dt * dt * scene.gravity.norm();
+  const double margin = kContactMarginSteps * travel + dt * dt * scene.gravity.norm();
   ContactWorkspace& contact = workspace.near->contact;
   set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
   if (contact.candidate_count == 0) return false;

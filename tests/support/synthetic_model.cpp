@@ -1,5 +1,6 @@
 #include "tests/support/synthetic_model.h"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <Eigen/QR>
@@ -383,6 +384,24 @@ Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displ
     }
   }
   return force;
+}
+
+Eigen::VectorXd runge_kutta_positions(const Bar& bar, Eigen::VectorXd x, Eigen::VectorXd v, double time, int steps) {
+  const Eigen::LLT<Eigen::MatrixXd> mass(bar.mass);
+  const Eigen::VectorXd rest = bar.model.object->mesh.vertices.reshaped<Eigen::RowMajor>();
+  const auto acceleration = [&](const Eigen::VectorXd& at) {
+    return Eigen::VectorXd(-mass.solve(full_internal_force(bar, at - rest)));
+  };
+  const double h = time / steps;
+  for (int i = 0; i < steps; ++i) {
+    const Eigen::VectorXd a1 = acceleration(x), v2 = v + h / 2 * a1;
+    const Eigen::VectorXd a2 = acceleration(x + h / 2 * v), v3 = v + h / 2 * a2;
+    const Eigen::VectorXd a3 = acceleration(x + h / 2 * v2), v4 = v + h * a3;
+    const Eigen::VectorXd a4 = acceleration(x + h * v3);
+    x += h / 6 * (v + 2 * v2 + 2 * v3 + v4);
+    v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
+  }
+  return x;
 }
 
 ContactData surface_contact(const ReducedModel& model) {

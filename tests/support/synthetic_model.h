@@ -46,6 +46,10 @@ Eigen::Matrix3d first_piola_kirchhoff(MaterialModel model, const Eigen::Matrix3d
 /// 3n internal force at the displacement u [3n], by nodes: f_i = V P grad N_i.
 Eigen::VectorXd full_internal_force(const Bar& bar, const Eigen::VectorXd& displacement);
 
+/// [3n] positions of all vertices of a free bar after `time` by the classical Runge-Kutta method, M x'' = -f_int, from
+/// positions x and velocities v [3n].
+Eigen::VectorXd runge_kutta_positions(const Bar& bar, Eigen::VectorXd x, Eigen::VectorXd v, double time, int steps);
+
 /// Contact at all surface vertices, a third of the area of their triangles each.
 ContactData surface_contact(const ReducedModel& model);
 

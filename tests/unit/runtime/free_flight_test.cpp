@@ -170,25 +170,6 @@ TEST(FreeFlight, NewmarkKeepsTheEnergy) {
   }
 }
 
-/// Positions of all vertices after `time` by the classical Runge-Kutta method in full space: M x'' = -f_int.
-Eigen::VectorXd full_space_positions(const Bar& bar, Eigen::VectorXd x, Eigen::VectorXd v, double time, int steps) {
-  const Eigen::LLT<Eigen::MatrixXd> mass(bar.mass);
-  const Eigen::VectorXd rest = bar.model.object->mesh.vertices.reshaped<Eigen::RowMajor>();
-  const auto acceleration = [&](const Eigen::VectorXd& at) {
-    return Eigen::VectorXd(-mass.solve(test::full_internal_force(bar, at - rest)));
-  };
-  const double h = time / steps;
-  for (int i = 0; i < steps; ++i) {
-    const Eigen::VectorXd a1 = acceleration(x), v2 = v + h / 2 * a1;
-    const Eigen::VectorXd a2 = acceleration(x + h / 2 * v), v3 = v + h / 2 * a2;
-    const Eigen::VectorXd a3 = acceleration(x + h / 2 * v2), v4 = v + h * a3;
-    const Eigen::VectorXd a4 = acceleration(x + h * v3);
-    x += h / 6 * (v + 2 * v2 + 2 * v3 + v4);
-    v += h / 6 * (a1 + 2 * a2 + 2 * a3 + a4);
-  }
-  return x;
-}
-
 // With all modes in the basis the moving frame is only another description of the full space: what differs is the
 // integrator's own error, of second order.
 TEST(FreeFlight, OfAllModesIsTheFullSpace) {
@@ -199,8 +180,8 @@ TEST(FreeFlight, OfAllModesIsTheFullSpace) {
   const State start = body.moving(20, 0.02);
   VertexArray x, velocity;
   body.vertices(start, x, velocity);
-  const Eigen::VectorXd expected =
-      full_space_positions(body.bar, x.reshaped<Eigen::RowMajor>(), velocity.reshaped<Eigen::RowMajor>(), kTime, 4000);
+  const Eigen::VectorXd expected = test::runge_kutta_positions(body.bar, x.reshaped<Eigen::RowMajor>(),
+                                                               velocity.reshaped<Eigen::RowMajor>(), kTime, 4000);
   for (const Integrator integrator : {Integrator::kNewmark, Integrator::kBdf2}) {
     std::vector<double> errors;
     for (const int steps : {400, 800}) {
@@ -254,8 +235,8 @@ TEST(FreeFlight, ComesNearerToTheFullSpaceWithMoreModes) {
     VertexArray x, velocity;
     if (turns.empty()) {
       body.vertices(state, x, velocity);
-      const Eigen::VectorXd end = full_space_positions(body.bar, x.reshaped<Eigen::RowMajor>(),
-                                                       velocity.reshaped<Eigen::RowMajor>(), kTime, kSteps);
+      const Eigen::VectorXd end = test::runge_kutta_positions(body.bar, x.reshaped<Eigen::RowMajor>(),
+                                                              velocity.reshaped<Eigen::RowMajor>(), kTime, kSteps);
       expected = placement(body, end.reshaped<Eigen::RowMajor>(x.rows(), 3));
     }
     const StepScene scene = body.scene(kTime / kSteps, Integrator::kNewmark);

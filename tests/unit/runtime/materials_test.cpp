@@ -64,60 +64,6 @@ TEST_P(MaterialsTest, ProjectedStiffnessIsPositiveSemidefiniteAndEqualWhereTheEx
   EXPECT_LE((exact - projected).norm(), 1e-12 * exact.norm());
 }
 
-/// Backward Euler in the free vertices of the full space: Newton's method, Jacobian by differences of the force.
-Eigen::VectorXd dense_step(const Bar& bar, const std::vector<int>& free, const Eigen::VectorXd& load, double time_step,
-                           Eigen::VectorXd& u, Eigen::VectorXd& velocity) {
-  const auto force = [&](const Eigen::VectorXd& x) -> Eigen::VectorXd {
-    Eigen::VectorXd whole = Eigen::VectorXd::Zero(bar.mass.rows());
-    whole(free) = x;
-    return test::full_internal_force(bar, whole)(free);
-  };
-  const Eigen::MatrixXd mass = bar.mass(free, free) / (time_step * time_step);
-  const Eigen::VectorXd start = u, free_flight = u + time_step * velocity;
-  for (int iteration = 0; iteration < 20; ++iteration) {
-    const Eigen::VectorXd residual = mass * (u - free_flight) + force(u) - load;
-    if (residual.norm() <= 1e-11 * load.norm()) break;
-    Eigen::MatrixXd jacobian = mass;
-    const double h = 1e-6 * bar.length;
-    for (Eigen::Index i = 0; i < u.size(); ++i) {
-      const Eigen::VectorXd step = h * Eigen::VectorXd::Unit(u.size(), i);
-      jacobian.col(i) += (force(u + step) - force(u - step)) / (2 * h);
-    }
-    u -= Eigen::VectorXd(jacobian.partialPivLu().solve(residual));
-  }
-  velocity = (u - start) / time_step;
-  return u;
-}
-
-// All modes and all elements: the same discrete equations in other coordinates.
-TEST_P(MaterialsTest, TrajectoryIsThatOfTheDenseFullSpace) {
-  const Bar bar = test::make_bar({.cells = {2, 1, 1}, .material = GetParam(), .linear_modes = 24});
-  const auto model = prepared(bar);
-  StepScene scene = free_scene(*model, Integrator::kBackwardEuler, 0.02);
-  scene.newton = {50, 1e-12};
-  scene.gravity_force = gravity_force(*model, {0, -60, 10});
-  State state = make_state(*model);
-  Workspace workspace(*model, scene);
-  std::vector<int> free;
-  Eigen::VectorXd gravity = Eigen::VectorXd::Zero(bar.mass.rows());
-  for (int dof = 0; dof < static_cast<int>(bar.mass.rows()); ++dof) {
-    gravity[dof] = dof % 3 == 1 ? -60 : dof % 3 == 2 ? 10 : 0;
-    if (bar.model.object->fixed[dof / 3] == 0) free.push_back(dof);
-  }
-  ASSERT_EQ(std::ssize(free), 24);
-  const Eigen::VectorXd load = (bar.mass * gravity)(free);
-  Eigen::VectorXd u = Eigen::VectorXd::Zero(24), velocity = u;
-  double largest = 0;
-  for (int i = 0; i < 40; ++i) {
-    ASSERT_EQ(step(*model, scene, state, workspace).status & kStepNonFinite, 0U);
-    dense_step(bar, free, load, scene.time_step, u, velocity);
-    const Eigen::VectorXd reduced = (bar.basis() * state.q)(free);
-    ASSERT_LE((reduced - u).norm(), 1e-7 * u.norm()) << i;
-    largest = std::max(largest, largest_displacement(bar, state.q));
-  }
-  EXPECT_GE(largest, 0.15 * bar.length);
-}
-
 /// The displacement at which the bar comes to rest under gravity.
 Eigen::VectorXd hanging(MaterialModel material, double gravity) {
   const Bar bar = test::make_bar({.material = material});
