@@ -1,10 +1,9 @@
 #pragma once
 
-#include <Eigen/SparseCholesky>
-#include <memory>
 #include <vector>
 
 #include "precompute/alignment/arap_energy.h"
+#include "precompute/alignment/cholesky_factor.h"
 #include "precompute/alignment/surface_tree.h"
 
 namespace exmat::precompute {
@@ -50,19 +49,18 @@ class Registration {
   const TriangleArray& moving_triangles() const { return triangles_; }
 
  private:
-  using Factor = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>;
   struct SurfacePair;
 
   void round(double weight, VertexArray& positions) const;
   std::vector<SurfacePair> surface_pairs(const VertexArray& positions) const;
-  const Factor& preconditioner(double weight) const;
+  const CholeskyFactor& preconditioner(double weight) const;
 
   ArapEnergy arap_;
   TriangleArray triangles_;
   Eigen::VectorXd areas_;  // of the moving triangles at rest, of sum 1
   SurfaceTree fixed_;
   PointPairs pairs_;
-  std::vector<std::unique_ptr<Factor>> factors_;
+  std::vector<CholeskyFactor> factors_;
 };
 
 }  // namespace exmat::precompute

@@ -44,17 +44,29 @@ struct Body {
   std::array<int, 3> object_cells, rest_cells, posed_cells;
 };
 
+TetMesh bar(const std::array<int, 3>& cells, double height, std::uint32_t seed) {
+  return test::centred(test::shaken_box(cells, {kLength, 1, height}, seed));
+}
+
 const std::vector<Body>& bodies() {
   const std::array<int, 3> a{16, 5, 4}, b{14, 4, 4}, c{15, 5, 3}, d{16, 6, 6}, e{13, 5, 5};
-  const auto bar = [](const std::array<int, 3>& cells, double height, std::uint32_t seed) {
-    return test::centred(test::shaken_box(cells, {kLength, 1, height}, seed));
-  };
   const double radius = 1 / std::sqrt(M_PI);
   static const std::vector<Body> all{
       {"rectangular bar", bar(a, 0.6, 1), bar(b, 0.6, 2), bar(c, 0.6, 3), a, b, c},
       {"square bar", bar(a, 1, 1), bar(b, 1, 2), bar(c, 1, 3), a, b, c},
       {"cylinder for a square bar", bar(a, 1, 1), test::cylinder_mesh(16, 6, kLength, radius, 2),
        test::cylinder_mesh(13, 5, kLength, radius, 3), a, d, e}};
+  return all;
+}
+
+// Rectangular bars of other sizes: two large meshes, and meshes of which one is much finer than the other.
+const std::vector<Body>& sizes() {
+  const auto pair = [](const std::string& name, const std::array<int, 3>& rest, const std::array<int, 3>& posed) {
+    return Body{name, bar(rest, 0.6, 1), bar(rest, 0.6, 1), bar(posed, 0.6, 3), rest, rest, posed};
+  };
+  static const std::vector<Body> all{pair("both large", {42, 12, 8}, {40, 13, 8}),
+                                     pair("pose much finer", {20, 6, 3}, {54, 16, 11}),
+                                     pair("pose much coarser", {54, 16, 11}, {20, 6, 3})};
   return all;
 }
 
@@ -230,8 +242,24 @@ std::string table() {
   return text;
 }
 
+std::string sizes_table() {
+  std::string text =
+      "\n| pair of meshes | vertices: rest example / pose | seconds a pose | m = 20: bend / twist / S | ideal |\n"
+      "| --- | --- | --- | --- | --- |\n";
+  Counts counts;
+  for (const Body& body : sizes()) {
+    Case alignment(body, {.name = "auto, same frame"});
+    const Timer timer;
+    const Row row = alignment.row(20, counts);
+    text += fmt::format("| {} | {} / {} | {:.1f} | {} | {} |\n", body.name, body.rest.vertex_count(),
+                        body.posed.vertex_count(), timer.seconds() / static_cast<double>(poses().size()), row.ours,
+                        row.ideal);
+  }
+  return text;
+}
+
 int run(int argc, char** argv) {
-  const std::string results = table();
+  const std::string results = table() + sizes_table();
   std::cout << results;
   if (argc < 2) return 0;
   const std::string page = test::read_file(argv[1]);
