@@ -12,7 +12,8 @@ namespace {
 constexpr int kRounds = 25, kRefiningRounds = 8;
 constexpr int kStepsPerRound = 2;  // local and global
 constexpr double kFirstWeight = 20, kLastWeight = 400;
-constexpr double kPairWeight = 20;       // of pairs given, whatever the round
+constexpr double kPairWeight = 20;  // of pairs given, whatever the round
+constexpr Eigen::Index kCornersOfATet = 4;
 constexpr double kPointToPoint = 0.1;    // beside point-to-plane
 constexpr int kFactors = 4;              // weights between the first and the last that are factored
 constexpr double kIsotropicShare = 0.4;  // of the preconditioner, between kPointToPoint and 1 + kPointToPoint
@@ -60,7 +61,8 @@ Registration::Registration(const TetMesh& moving, const TetMesh& fixed, PointPai
   Eigen::SparseMatrix<double> surface(n, n);
   surface.setFromTriplets(entries.begin(), entries.end());
   Eigen::SparseMatrix<double> base = arap_.stiffness();
-  if (pairs_.count() > 0)
+  // Points between many vertices would fill the matrix; they are few, which conjugate gradients manage.
+  if (pairs_.count() > 0 && pairs_.points.nonZeros() <= kCornersOfATet * pairs_.count())
     base += Eigen::SparseMatrix<double>(pairs_.points.transpose() * pairs_.points) *
             (kPairWeight / static_cast<double>(pairs_.count()));
   for (int factor = 0; factor < kFactors; ++factor)
