@@ -83,7 +83,7 @@ class PoseAligner {
   const Fit& choose(const std::vector<Fit>& poses) const;
   Registered turn_to_landmarks(VertexArray positions) const;
   Registered settle(const VertexArray& positions) const;
-  bool mirror_fits_better(double objective) const;
+  bool mirror_fits_better(double misfit) const;
   PoseAlignment result(const Fit& taken, const std::vector<Fit>& poses) const;
 
   const AlignedShape& rest_;
@@ -262,15 +262,15 @@ std::vector<Fit> PoseAligner::symmetric_copies(const Fit& taken) const {
   return copies;
 }
 
-bool PoseAligner::mirror_fits_better(double objective) const {
-  if (objective < kMirrorWorthwhile) return false;
+bool PoseAligner::mirror_fits_better(double misfit) const {
+  if (misfit < kMirrorWorthwhile) return false;
   TetMesh mirrored = rest_.mesh;
   mirrored.vertices.col(0) *= -1;
   mirrored.tets.col(0).swap(mirrored.tets.col(1));
   const Registration registration(mirrored, pose_.mesh);
   double least = std::numeric_limits<double>::infinity();
-  if (reflected_start_.rows() > 0) least = registration.run(reflected_start_).objective();
-  return least < kMirrorMargin * objective;
+  if (reflected_start_.rows() > 0) least = registration.run(reflected_start_).misfit();
+  return least < kMirrorMargin * misfit;
 }
 
 PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& poses) const {
@@ -281,9 +281,11 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   alignment.positions = registered.positions;
   alignment.start = taken.start;
   alignment.residual = std::sqrt(registered.chamfer) / size_;
+  alignment.missed_landmarks = registered.landmark_rms / size_;
   alignment.confidence = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)),
                                   registered.distortion, registered.inverted}
-                             .total();
+                             .total() +
+                         2 * alignment.missed_landmarks;
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const Eigen::Matrix3d turn =
@@ -298,7 +300,7 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
     if (!has_landmarks() && (hints_.free_frame || pose.size < farther * taken.size)) alignment.ambiguous = true;
   }
   alignment.hides_twist = symmetry_.of_revolution && !has_landmarks();
-  alignment.mirrored = mirror_fits_better(registered.objective());
+  alignment.mirrored = mirror_fits_better(registered.misfit());
   return alignment;
 }
 
@@ -320,7 +322,8 @@ Registered PoseAligner::turn_to_landmarks(VertexArray positions) const {
 // Landmarks and maps name vertices, near which a point belongs: they decide which pose it is, the surface where it
 // lies. A body of revolution slips, so there they stay.
 Registered PoseAligner::settle(const VertexArray& positions) const {
-  if (has_landmarks() && !symmetry_.of_revolution) return Registration(rest_.mesh, pose_.mesh).run(positions);
+  if (has_landmarks() && !symmetry_.of_revolution)
+    return registration_.assess(Registration(rest_.mesh, pose_.mesh).run(positions).positions);
   if (has_landmarks() && !has_dense_map()) return turn_to_landmarks(positions);
   return registration_.refine(positions);
 }

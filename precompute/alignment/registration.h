@@ -24,8 +24,10 @@ struct Registered {
   double inverted = 0;      ///< share of the volume with det F < 0
   double landmark_rms = 0;  ///< distance of the pairs
 
-  /// F of alignment.md: E_ARAP + 20 Chamfer^2 + 2 inverted + 2 landmark RMS.
-  double objective() const { return distortion + 20 * chamfer + 2 * inverted + 2 * landmark_rms; }
+  /// How well the shapes fit: E_ARAP + 20 Chamfer^2 + 2 inverted.
+  double misfit() const { return distortion + 20 * chamfer + 2 * inverted; }
+  /// F of alignment.md: that and 2 landmark RMS.
+  double objective() const { return misfit() + 2 * landmark_rms; }
 };
 
 /// As-rigid-as-possible registration of one body's surface to another's, both of volume 1 at centroid 0. Each round

@@ -116,11 +116,9 @@ void ShapeStageBuilder::add_rest(const AlignedRest& rest) {
 
 TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const AlignedPose& pose,
                                             const PoseFrame& frame) const {
-  if (!pose.functional_map)
-    return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
-  return transfer_coefficients(stage_.object, stage_.rest_coefficients,
-                               rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
-                               *pose.functional_map * coefficients(pose.basis, pose.basis.vertices), frame);
+  if (pose.carried)
+    return transfer_carried(stage_.object, stage_.rest_coefficients, rest.carried, *pose.carried, frame);
+  return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
 }
 
 void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred) {
@@ -180,6 +178,16 @@ class FunctionCounter {
   std::optional<LaplaceBasis> basis_;
 };
 
+// `needed` functions of the object would carry the pose; 0 where the mesh has too few.
+std::string advice_on_loss(const ExampleData& example, Eigen::Index functions, Eigen::Index needed) {
+  if (needed > functions)
+    return fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
+                       100 * kTruncationWarning);
+  if (needed > 0 && example.method == "coupled")
+    return "coupled bases do, not the functions: give more landmarks or regions, or take alignment.method \"auto\"";
+  return "more than the mesh resolves would be needed";
+}
+
 ShapeStage ShapeStageBuilder::build() {
   set_shape_data(object_basis());
   add_examples();
@@ -211,13 +219,9 @@ void finish_examples(const AssetConfig& asset, const ElasticSystem& system, cons
         "example {}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
         example.name, asset.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
     if (example.shape_space_error <= kTruncationWarning) continue;
-    const Eigen::Index needed = counter.needed(stage.fields.col(k));
     warn(warnings, fmt::format("example {}: {} eigenfunctions lose {:.0f} % of its displacement; {}", example.name,
                                asset.eigenfunctions, 100 * example.shape_space_error,
-                               needed > asset.eigenfunctions
-                                   ? fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
-                                                 100 * kTruncationWarning)
-                                   : "more than the mesh resolves would be needed"));
+                               advice_on_loss(example, asset.eigenfunctions, counter.needed(stage.fields.col(k)))));
   }
   model.shape_space = std::move(stage.data);
   model.examples = std::move(stage.examples);

@@ -1,6 +1,7 @@
 // Errors of transferred poses against analytic ones, by method of alignment. Prints the table of docs/alignment.md, and
 // renews it where the page is named: alignment_benchmark [PAGE.md]
 
+#include <ctime>
 #include <fmt/format.h>
 #include <fstream>
 #include <iostream>
@@ -90,15 +91,6 @@ const std::vector<Method>& methods() {
   return all;
 }
 
-// The vertex of a box_mesh at each of its corners.
-std::vector<std::int32_t> corners(const std::array<int, 3>& cells) {
-  std::vector<std::int32_t> ids;
-  for (int k = 0; k < 8; ++k)
-    ids.push_back(((k >> 2 & 1) * cells[2] * (cells[1] + 1) + (k >> 1 & 1) * cells[1]) * (cells[0] + 1) +
-                  (k & 1) * cells[0]);
-  return ids;
-}
-
 TetMesh moved(TetMesh mesh) {
   const Eigen::AngleAxisd turn(2.0, Eigen::Vector3d(1, 2, 3).normalized());
   mesh.vertices = 37 * mesh.vertices * turn.toRotationMatrix().transpose();
@@ -124,7 +116,8 @@ ExampleInput example_input(const Body& body, const Method& method) {
     input.poses.push_back(std::move(pose));
   }
   if (!method.landmarks) return input;
-  const auto object = corners(body.object_cells), rest = corners(body.rest_cells), posed = corners(body.posed_cells);
+  const auto object = test::box_corners(body.object_cells), rest = test::box_corners(body.rest_cells),
+             posed = test::box_corners(body.posed_cells);
   input.landmarks.resize(8, 5);
   for (Eigen::Index k = 0; k < 8; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -189,11 +182,8 @@ class Case {
     const precompute::PoseFrame frame{rest.free_poses, basis.mass};
     const Eigen::MatrixXd at_rest = coefficients(basis, basis.vertices);
     const auto transferred =
-        pose.functional_map
-            ? precompute::transfer_coefficients(
-                  basis, at_rest, rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
-                  *pose.functional_map * coefficients(pose.basis, pose.basis.vertices), frame)
-            : precompute::transfer_pose(basis, at_rest, rest.map, rest.basis, pose.positions, frame);
+        pose.carried ? precompute::transfer_carried(basis, at_rest, rest.carried, *pose.carried, frame)
+                     : precompute::transfer_pose(basis, at_rest, rest.map, rest.basis, pose.positions, frame);
     const auto [ideal, ours] = errors(basis, transferred.coefficients - at_rest, body_.object, poses()[k].pose);
     const bool wrong = ours > ideal + kWrong, refused = pose.outcome.verdict == AlignmentVerdict::kRefused,
                doubtful = pose.outcome.verdict == AlignmentVerdict::kDoubtful;
@@ -244,16 +234,16 @@ std::string table() {
 
 std::string sizes_table() {
   std::string text =
-      "\n| pair of meshes | vertices: rest example / pose | seconds a pose | m = 20: bend / twist / S | ideal |\n"
+      "\n| pair of meshes | vertices: rest example / pose | CPU seconds a pose | m = 20: bend / twist / S | ideal |\n"
       "| --- | --- | --- | --- | --- |\n";
   Counts counts;
   for (const Body& body : sizes()) {
     Case alignment(body, {.name = "auto, same frame"});
-    const Timer timer;
+    const std::clock_t begin = std::clock();
     const Row row = alignment.row(20, counts);
+    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
     text += fmt::format("| {} | {} / {} | {:.1f} | {} | {} |\n", body.name, body.rest.vertex_count(),
-                        body.posed.vertex_count(), timer.seconds() / static_cast<double>(poses().size()), row.ours,
-                        row.ideal);
+                        body.posed.vertex_count(), seconds / static_cast<double>(poses().size()), row.ours, row.ideal);
   }
   return text;
 }
