@@ -23,6 +23,7 @@ constexpr double kSameStart = 0.1;           // difference of starts, relative t
 constexpr double kNoPose = 0.03;             // a displacement from rest, relative to the body's size, that is none
 constexpr double kClearlyFarther = 1.2;      // times the displacement of the pose that is taken
 constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
+constexpr int kTurningRounds = 4;            // of landmarks on a body of revolution
 constexpr double kMirrorMargin = 0.5;        // of the best F, from which on a mirror image is believed
 constexpr double kMirrorWorthwhile = 0.05;   // F above which it is looked for
 
@@ -80,8 +81,9 @@ class PoseAligner {
   std::vector<Fit> symmetric_copies(const Fit& taken) const;
   double limit(const std::vector<Fit>& fits) const;
   const Fit& choose(const std::vector<Fit>& poses) const;
+  Registered turn_to_landmarks(VertexArray positions) const;
   Registered settle(const VertexArray& positions) const;
-  bool mirror_fits_better(double objective) const;
+  bool mirror_fits_better(double misfit) const;
   PoseAlignment result(const Fit& taken, const std::vector<Fit>& poses) const;
 
   const AlignedShape& rest_;
@@ -260,15 +262,15 @@ std::vector<Fit> PoseAligner::symmetric_copies(const Fit& taken) const {
   return copies;
 }
 
-bool PoseAligner::mirror_fits_better(double objective) const {
-  if (objective < kMirrorWorthwhile) return false;
+bool PoseAligner::mirror_fits_better(double misfit) const {
+  if (misfit < kMirrorWorthwhile) return false;
   TetMesh mirrored = rest_.mesh;
   mirrored.vertices.col(0) *= -1;
   mirrored.tets.col(0).swap(mirrored.tets.col(1));
   const Registration registration(mirrored, pose_.mesh);
   double least = std::numeric_limits<double>::infinity();
-  if (reflected_start_.rows() > 0) least = registration.run(reflected_start_).objective();
-  return least < kMirrorMargin * objective;
+  if (reflected_start_.rows() > 0) least = registration.run(reflected_start_).misfit();
+  return least < kMirrorMargin * misfit;
 }
 
 PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& poses) const {
@@ -279,9 +281,11 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   alignment.positions = registered.positions;
   alignment.start = taken.start;
   alignment.residual = std::sqrt(registered.chamfer) / size_;
+  alignment.missed_landmarks = registered.landmark_rms / size_;
   alignment.confidence = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)),
                                   registered.distortion, registered.inverted}
-                             .total();
+                             .total() +
+                         2 * alignment.missed_landmarks;
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const Eigen::Matrix3d turn =
@@ -296,15 +300,32 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
     if (!has_landmarks() && (hints_.free_frame || pose.size < farther * taken.size)) alignment.ambiguous = true;
   }
   alignment.hides_twist = symmetry_.of_revolution && !has_landmarks();
-  alignment.mirrored = mirror_fits_better(registered.objective());
+  alignment.mirrored = mirror_fits_better(registered.misfit());
   return alignment;
+}
+
+// A landmark pulls at one point, which gives way by itself: the body's turn lags behind. What the landmarks are off by
+// is therefore asked of the body's first functions, round after round.
+Registered PoseAligner::turn_to_landmarks(VertexArray positions) const {
+  const PointPairs exact = pairs();
+  const auto smooth = rest_.basis.eigenfunctions.leftCols(std::min(kTreeFunctions, functions(rest_)));
+  Eigen::MatrixXd low_pass = (exact.points * smooth) * (smooth.transpose() * rest_.basis.mass);
+  low_pass.rowwise() += Eigen::RowVectorXd(Eigen::RowVectorXd::Ones(low_pass.cols()) * rest_.basis.mass);
+  for (int round = 0; round < kTurningRounds; ++round) {
+    const VertexArray misses = exact.targets - exact.points * positions;
+    const Registration registration(rest_.mesh, pose_.mesh, {low_pass.sparseView(), low_pass * positions + misses});
+    positions = registration.refine(positions).positions;
+  }
+  return registration_.assess(positions);
 }
 
 // Landmarks and maps name vertices, near which a point belongs: they decide which pose it is, the surface where it
 // lies. A body of revolution slips, so there they stay.
 Registered PoseAligner::settle(const VertexArray& positions) const {
-  if (!has_landmarks() || symmetry_.of_revolution) return registration_.refine(positions);
-  return Registration(rest_.mesh, pose_.mesh).run(positions);
+  if (has_landmarks() && !symmetry_.of_revolution)
+    return registration_.assess(Registration(rest_.mesh, pose_.mesh).run(positions).positions);
+  if (has_landmarks() && !has_dense_map()) return turn_to_landmarks(positions);
+  return registration_.refine(positions);
 }
 
 PoseAlignment PoseAligner::align() {

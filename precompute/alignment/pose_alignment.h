@@ -29,7 +29,8 @@ struct PoseAlignment {
   VertexArray positions;            ///< n_0 x 3, normalised, in the frame of the pose
   std::string start;                ///< what the registration began with
   double residual = 0;              ///< RMS distance of the two surfaces, over the RMS radius of the rest example
-  double confidence = 0;            ///< J of alignment.md; 0 is certain
+  double missed_landmarks = 0;      ///< RMS distance of the landmarks from where they belong, over the RMS radius
+  double confidence = 0;            ///< J of alignment.md + 2 missed_landmarks; 0 is certain
   double inverted_fraction = 0;     ///< of the rest example's volume
   std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
   bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is

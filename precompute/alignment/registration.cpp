@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include "common/core/error.h"
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {
@@ -13,7 +12,8 @@ namespace {
 constexpr int kRounds = 25, kRefiningRounds = 8;
 constexpr int kStepsPerRound = 2;  // local and global
 constexpr double kFirstWeight = 20, kLastWeight = 400;
-constexpr double kPairWeight = 20;       // of pairs given, whatever the round
+constexpr double kPairWeight = 20;  // of pairs given, whatever the round
+constexpr Eigen::Index kCornersOfATet = 4;
 constexpr double kPointToPoint = 0.1;    // beside point-to-plane
 constexpr int kFactors = 4;              // weights between the first and the last that are factored
 constexpr double kIsotropicShare = 0.4;  // of the preconditioner, between kPointToPoint and 1 + kPointToPoint
@@ -61,19 +61,18 @@ Registration::Registration(const TetMesh& moving, const TetMesh& fixed, PointPai
   Eigen::SparseMatrix<double> surface(n, n);
   surface.setFromTriplets(entries.begin(), entries.end());
   Eigen::SparseMatrix<double> base = arap_.stiffness();
-  if (pairs_.count() > 0)
+  // Points between many vertices would fill the matrix; they are few, which conjugate gradients manage.
+  if (pairs_.count() > 0 && pairs_.points.nonZeros() <= kCornersOfATet * pairs_.count())
     base += Eigen::SparseMatrix<double>(pairs_.points.transpose() * pairs_.points) *
             (kPairWeight / static_cast<double>(pairs_.count()));
-  for (int factor = 0; factor < kFactors; ++factor) {
-    factors_.push_back(std::make_unique<Factor>(base + kIsotropicShare * factored_weight(factor) * surface));
-    if (factors_.back()->info() != Eigen::Success) throw WorkError("registration: the global step is singular");
-  }
+  for (int factor = 0; factor < kFactors; ++factor)
+    factors_.emplace_back(base + kIsotropicShare * factored_weight(factor) * surface, "registration: global step");
 }
 
-const Registration::Factor& Registration::preconditioner(double weight) const {
+const CholeskyFactor& Registration::preconditioner(double weight) const {
   const double step = std::log(kLastWeight / kFirstWeight) / (kFactors - 1);
   const auto index = std::lround(std::log(weight / kFirstWeight) / step);
-  return *factors_[static_cast<std::size_t>(index)];
+  return factors_[static_cast<std::size_t>(index)];
 }
 
 std::vector<Registration::SurfacePair> Registration::surface_pairs(const VertexArray& positions) const {
@@ -121,11 +120,11 @@ void Registration::round(double weight, VertexArray& positions) const {
   VertexArray targets = VertexArray::Zero(positions.rows(), 3);
   for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.target), targets);
   if (pair_weight > 0) targets += pairs_.points.transpose() * (pair_weight * pairs_.targets);
-  const Factor& factor = preconditioner(weight);
+  const CholeskyFactor& factor = preconditioner(weight);
   for (int step = 0; step < kStepsPerRound; ++step) {
     const VertexArray load = arap_.load(arap_.rotations(positions)) + targets;
     VertexArray residual = load - apply(positions);
-    VertexArray preconditioned = factor.solve(Eigen::MatrixXd(residual));
+    VertexArray preconditioned = factor.solve(residual);
     VertexArray direction = preconditioned;
     double product = residual.cwiseProduct(preconditioned).sum();
     for (int k = 0; k < kMostIterations && residual.norm() > kTolerance * load.norm(); ++k) {
@@ -133,7 +132,7 @@ void Registration::round(double weight, VertexArray& positions) const {
       const double length = product / direction.cwiseProduct(applied).sum();
       positions += length * direction;
       residual -= length * applied;
-      preconditioned = factor.solve(Eigen::MatrixXd(residual));
+      preconditioned = factor.solve(residual);
       const double next = residual.cwiseProduct(preconditioned).sum();
       direction = preconditioned + next / product * direction;
       product = next;

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <Eigen/SparseCholesky>
-#include <memory>
 #include <vector>
 
 #include "precompute/alignment/arap_energy.h"
+#include "precompute/alignment/cholesky_factor.h"
 #include "precompute/alignment/surface_tree.h"
 
 namespace exmat::precompute {
@@ -25,8 +24,10 @@ struct Registered {
   double inverted = 0;      ///< share of the volume with det F < 0
   double landmark_rms = 0;  ///< distance of the pairs
 
-  /// F of alignment.md: E_ARAP + 20 Chamfer^2 + 2 inverted + 2 landmark RMS.
-  double objective() const { return distortion + 20 * chamfer + 2 * inverted + 2 * landmark_rms; }
+  /// How well the shapes fit: E_ARAP + 20 Chamfer^2 + 2 inverted.
+  double misfit() const { return distortion + 20 * chamfer + 2 * inverted; }
+  /// F of alignment.md: that and 2 landmark RMS.
+  double objective() const { return misfit() + 2 * landmark_rms; }
 };
 
 /// As-rigid-as-possible registration of one body's surface to another's, both of volume 1 at centroid 0. Each round
@@ -50,19 +51,18 @@ class Registration {
   const TriangleArray& moving_triangles() const { return triangles_; }
 
  private:
-  using Factor = Eigen::SimplicialLLT<Eigen::SparseMatrix<double>>;
   struct SurfacePair;
 
   void round(double weight, VertexArray& positions) const;
   std::vector<SurfacePair> surface_pairs(const VertexArray& positions) const;
-  const Factor& preconditioner(double weight) const;
+  const CholeskyFactor& preconditioner(double weight) const;
 
   ArapEnergy arap_;
   TriangleArray triangles_;
   Eigen::VectorXd areas_;  // of the moving triangles at rest, of sum 1
   SurfaceTree fixed_;
   PointPairs pairs_;
-  std::vector<std::unique_ptr<Factor>> factors_;
+  std::vector<CholeskyFactor> factors_;
 };
 
 }  // namespace exmat::precompute

@@ -1,9 +1,12 @@
 #include "precompute/mesh_io/mesh_file.h"
 
 #include "common/core/error.h"
+#include "precompute/mesh_io/medit_reader.h"
 #include "precompute/mesh_io/msh_reader.h"
+#include "precompute/mesh_io/tetgen_reader.h"
 #include "precompute/mesh_io/text_input.h"
 #include "precompute/mesh_io/veg_reader.h"
+#include "precompute/mesh_io/vtk_reader.h"
 
 namespace exmat::precompute {
 
@@ -11,7 +14,10 @@ MeshFile read_mesh(const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
   if (extension == ".veg") return read_veg(file);
   if (extension == ".msh") return read_msh(file);
-  throw InputError({file.string(), "", "a mesh file with the extension .veg or .msh",
+  if (extension == ".node" || extension == ".ele") return read_tetgen(file);
+  if (extension == ".mesh") return read_medit(file);
+  if (extension == ".vtk") return read_vtk(file);
+  throw InputError({file.string(), "", "a mesh file with the extension .veg, .msh, .node, .ele, .mesh or .vtk",
                     extension.empty() ? "no extension" : quote(extension), ""});
 }
 

@@ -19,6 +19,7 @@ struct MeshFile {
 };
 
 /// Reads by extension: .veg (Vega, with *INCLUDE, *MATERIAL ENU, *SET, *REGION), .msh (Gmsh 2.2 and 4.1, ASCII and
+/// binary), .node or .ele (TetGen, both of the pair), .mesh (MEDIT, ASCII), .vtk (legacy unstructured grids, ASCII and
 /// binary). Throws InputError with file, line (or byte offset in binary parts), expected and found.
 MeshFile read_mesh(const std::filesystem::path& file);
 

@@ -5,6 +5,8 @@
 #include <fmt/format.h>
 #include <limits>
 
+#include "precompute/mesh_io/mesh_arrays.h"
+
 namespace exmat::precompute {
 namespace {
 
@@ -54,13 +56,7 @@ std::int32_t MshNodes::find(const MshCursor& cursor, std::uint64_t tag) const {
   return entry->index;
 }
 
-VertexArray MshNodes::positions() const {
-  VertexArray vertices(static_cast<Eigen::Index>(positions_.size()), 3);
-  for (std::size_t v = 0; v < positions_.size(); ++v)
-    for (int axis = 0; axis < 3; ++axis)
-      vertices(static_cast<Eigen::Index>(v), axis) = positions_[v][static_cast<std::size_t>(axis)];
-  return vertices;
-}
+VertexArray MshNodes::positions() const { return vertex_array(positions_); }
 
 std::int32_t read_physical_tag(MshCursor& cursor) {
   const std::int32_t tag = cursor.read_int("a physical tag");

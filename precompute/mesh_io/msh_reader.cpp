@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/core/log.h"
+#include "precompute/mesh_io/mesh_arrays.h"
 #include "precompute/mesh_io/msh_contents.h"
 #include "precompute/mesh_io/text_input.h"
 
@@ -110,11 +111,7 @@ void warn_of_skipped(const std::filesystem::path& file, const MshContents& conte
 
 MeshFile to_mesh_file(const std::filesystem::path& file, MshContents contents) {
   MeshFile result;
-  result.mesh.vertices = contents.nodes.positions();
-  result.mesh.tets.resize(static_cast<Eigen::Index>(contents.tets.size()), 4);
-  for (std::size_t t = 0; t < contents.tets.size(); ++t)
-    for (int corner = 0; corner < 4; ++corner)
-      result.mesh.tets(static_cast<Eigen::Index>(t), corner) = contents.tets[t][static_cast<std::size_t>(corner)];
+  result.mesh = {contents.nodes.positions(), tet_array(contents.tets)};
   for (const auto& [tag, tets] : contents.volume_groups) {
     const auto name = contents.volume_names.find(tag);
     auto& set = result.tet_sets[name != contents.volume_names.end() ? name->second : std::to_string(tag)];

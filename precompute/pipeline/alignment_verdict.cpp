@@ -14,6 +14,8 @@ constexpr double kInvertedLimit = 0.05;
 constexpr double kResidualWarning = 0.05, kResidualRefusal = 0.15;
 // Rotations of a whole pose that its frame, taken to be the object's, makes unlikely and incredible [rad].
 constexpr double kTurnWarning = 50 * std::numbers::pi / 180, kTurnRefusal = 80 * std::numbers::pi / 180;
+// A distance of landmarks, over the body's size, that is to blame for a doubt.
+constexpr double kMissedLandmarks = 0.1;
 // A displacement, over the body's size, that says nothing was found.
 constexpr double kNoPose = 0.03;
 
@@ -95,7 +97,11 @@ void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool f
     object_to(outcome, AlignmentVerdict::kRefused,
               fmt::format("the mirror image of the rest example fits much better; mirror the example back, or give {}",
                           kSameMesh));
-  const auto advice = fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
+  const std::string advice =
+      alignment.missed_landmarks > kMissedLandmarks
+          ? fmt::format("the landmarks are {:.0f} % of the body's size from where they belong: do they correspond?",
+                        100 * alignment.missed_landmarks)
+          : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
   judge_confidence(outcome, advice);
   judge_residual(outcome, advice);
   judge_competitors(alignment, free_frame, outcome);

@@ -9,6 +9,7 @@
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/coupled_bases.h"
+#include "precompute/shape_space/nearest_point.h"
 
 namespace exmat::precompute {
 namespace {
@@ -16,6 +17,8 @@ namespace {
 constexpr double kGoodConfidence = 0.5;     // of a rest example that stands as the object does
 constexpr double kBetterRotation = 0.5;     // of the confidence as it stands, for a rotation to be believed
 constexpr double kCompetingRotation = 1.4;  // of the best one's confidence
+constexpr double kCompetingFloor = 0.05;    // added to it: below, rotations differ by the tessellation alone
+constexpr double kSameMesh = 1e-6;          // a confidence that only the object's own mesh has
 constexpr double kSameRotation = 0.5;       // [rad]
 constexpr Eigen::Index kFewestLandmarks = 4;
 constexpr double kMissedLandmarks = 0.25;  // share of their displacement, RMS, that coupled bases may miss unremarked
@@ -80,10 +83,12 @@ AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
   std::ranges::stable_sort(turned, {}, [](const AlignedRest& rest) { return rest.map.confidence; });
   AlignedRest& best = turned.front();
   if (best.map.confidence > kBetterRotation * as_it_stands.map.confidence) return as_it_stands;
+  const double most = best.map.confidence < kSameMesh
+                          ? kSameMesh
+                          : std::max(kCompetingRotation * best.map.confidence, best.map.confidence + kCompetingFloor);
   for (const AlignedRest& other : turned) {
     const double apart = Eigen::AngleAxisd(Eigen::Matrix3d(best.rotation.transpose() * other.rotation)).angle();
-    if (apart > kSameRotation && other.map.confidence < kCompetingRotation * best.map.confidence)
-      ++best.outcome.competing_maps;
+    if (apart > kSameRotation && other.map.confidence < most) ++best.outcome.competing_maps;
   }
   if (best.outcome.competing_maps > 0)
     object_to(
@@ -138,6 +143,8 @@ AlignedRest ExampleAligner::align_rest() {
     log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)",
                           examples_.rest.name, 100 * rest.map.residual, rest.map.confidence));
   }
+  rest.carried = {rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
+                  rest.map.pull_back * rest.basis.vertices};
   rest.outcome.name = examples_.rest.name;
   rest.outcome.residual = rest.map.residual;
   rest.outcome.confidence = rest.map.confidence;
@@ -264,22 +271,34 @@ double ExampleAligner::missed_landmarks(const AlignedRest& rest, const PoseInput
   return size > 0 ? std::sqrt(missed / size) : 0;
 }
 
-AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& pose) const {
+// [n x 3] positions of the pose at the object's vertices, in its own frame: registered from the displacement [n x 3] of
+// the object that the coupled bases give, after which they are judged.
+VertexArray ExampleAligner::registered_points(const AlignedRest& rest, const AlignedShape& pose,
+                                              const VertexArray& displacement, const Eigen::Matrix3d& to_rest) {
+  const TetMesh object{object_.vertices, object_input_.mesh.tets};
+  const TetMesh& moving = rest_shape(rest).mesh;
+  const SparseMatrix on_object = nearest_points(object, moving.vertices).interpolation(object);
+  const VertexArray start = (moving.vertices + on_object * displacement) * to_rest;
+  return rest.map.pull_back * Registration(moving, pose.mesh).run(start).positions;
+}
+
+AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& pose) {
   AlignedPose aligned;
-  aligned.basis = laplace_basis(pose.mesh, example_function_count(functions(), pose.mesh.vertex_count()), pose.name);
-  const Eigen::MatrixXd map = coupled_map(pose, aligned.basis);
-  const Eigen::MatrixXd carried_rest = rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices);
-  const Eigen::MatrixXd carried = map * coefficients(aligned.basis, aligned.basis.vertices);
+  const Eigen::Index size = example_function_count(functions(), pose.mesh.vertex_count());
+  const AlignedShape shape = aligned_shape(pose.mesh, size, pose.name);
+  const LaplaceBasis basis = first_functions(shape.basis, size);
+  const Eigen::MatrixXd map = coupled_map(pose, basis);
+  const Eigen::MatrixXd &carried_rest = rest.carried.coefficients, carried = map * coefficients(basis, basis.vertices);
   Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
   if (rest.free_poses) to_rest = procrustes_rotation(carried_rest.transpose() * carried);
   const VertexArray displacement = object_.eigenfunctions * (carried * to_rest.transpose() - carried_rest);
+  aligned.carried = CarriedShape{carried, registered_points(rest, shape, displacement, to_rest)};
   const MapScore score =
       score_map(ArapEnergy({object_.vertices, object_input_.mesh.tets}), map, object_.vertices + displacement);
-  const VertexArray posed = aligned.basis.vertices * to_rest.transpose();
+  const VertexArray posed = shape.mesh.vertices * to_rest.transpose();
   const SurfaceTree found(object_.vertices + displacement, surface_triangles(object_input_.mesh.tets)),
       given(posed, surface_triangles(pose.mesh.tets));
   aligned.outcome.residual = std::sqrt(two_way_chamfer(found, given)) / rms_radius(object_);
-  aligned.functional_map = map;
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
   const double missed = missed_landmarks(rest, pose, posed, displacement);

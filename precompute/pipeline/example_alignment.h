@@ -16,16 +16,16 @@ namespace exmat::precompute {
 struct AlignedRest {
   LaplaceBasis basis;  ///< of the rest example; its vertices turned into the object's frame
   RestMap map;
+  CarriedShape carried;                                    ///< the rest example by the map
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< from the rest example's frame to the object's
   bool free_poses = false;                                 ///< poses are rotated to the rest example first
   AlignmentOutcome outcome;
 };
 
-/// A pose as the rest example's vertices show it, or, of coupled bases, as a functional map.
+/// A pose as the rest example's vertices show it, or, of coupled bases, as it comes over to the object.
 struct AlignedPose {
-  VertexArray positions;                          ///< n_0 x 3, normalised, in the frame of the pose
-  std::optional<Eigen::MatrixXd> functional_map;  ///< m x K_k, of the pose's own functions
-  LaplaceBasis basis;                             ///< of the pose, with a functional map
+  VertexArray positions;                ///< n_0 x 3, normalised, in the frame of the pose
+  std::optional<CarriedShape> carried;  ///< of coupled bases, normalised, in the frame of the pose
   AlignmentOutcome outcome;
 };
 
@@ -50,7 +50,9 @@ class ExampleAligner {
   AlignedPose registered(const AlignedRest& rest, const PoseInput& pose);
   double missed_landmarks(const AlignedRest& rest, const PoseInput& pose, const VertexArray& posed,
                           const VertexArray& displacement) const;
-  AlignedPose coupled(const AlignedRest& rest, const PoseInput& pose) const;
+  AlignedPose coupled(const AlignedRest& rest, const PoseInput& pose);
+  VertexArray registered_points(const AlignedRest& rest, const AlignedShape& pose, const VertexArray& displacement,
+                                const Eigen::Matrix3d& to_rest);
   Eigen::MatrixXd coupled_map(const PoseInput& example, const LaplaceBasis& basis) const;
 
   const AssetConfig& asset_;

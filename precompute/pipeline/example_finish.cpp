@@ -58,6 +58,16 @@ Eigen::MatrixXd descriptor_changes(const ExampleSet& set) {
   return changes;
 }
 
+// `needed` functions of the object would carry the pose; 0 where too many would be needed.
+std::string advice_on_loss(const ExampleData& example, Eigen::Index functions, Eigen::Index needed) {
+  if (needed > functions)
+    return fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
+                       100 * kTruncationWarning);
+  if (needed > 0 && example.method == "coupled")
+    return "coupled bases do, not the functions: give more landmarks or regions, or take alignment.method \"auto\"";
+  return fmt::format("the first {} do not carry it", kMostFunctions);
+}
+
 void log_losses(const ExampleGroup& group, const AssetConfig& asset, FunctionCounter& counter, const ExampleSet& set,
                 std::vector<std::string>& warnings) {
   const std::string where = group.region.empty() ? "" : fmt::format(" in region {}", group.region);
@@ -67,13 +77,9 @@ void log_losses(const ExampleGroup& group, const AssetConfig& asset, FunctionCou
         "example {}{}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
         example.name, where, asset.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
     if (example.shape_space_error <= kTruncationWarning) continue;
-    const Eigen::Index needed = counter.needed(group.fields.col(k));
     warn(warnings, fmt::format("example {}{}: {} eigenfunctions lose {:.0f} % of its displacement; {}", example.name,
                                where, asset.eigenfunctions, 100 * example.shape_space_error,
-                               needed > asset.eigenfunctions
-                                   ? fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
-                                                 100 * kTruncationWarning)
-                                   : fmt::format("the first {} do not carry it", kMostFunctions)));
+                               advice_on_loss(example, asset.eigenfunctions, counter.needed(group.fields.col(k)))));
   }
 }
 

@@ -115,11 +115,9 @@ void ShapeStageBuilder::add_rest(const AlignedRest& rest, ExampleGroup& group) c
 
 TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const AlignedPose& pose,
                                             const PoseFrame& frame) const {
-  if (!pose.functional_map)
-    return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
-  return transfer_coefficients(stage_.object, stage_.rest_coefficients,
-                               rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
-                               *pose.functional_map * coefficients(pose.basis, pose.basis.vertices), frame);
+  if (pose.carried)
+    return transfer_carried(stage_.object, stage_.rest_coefficients, rest.carried, *pose.carried, frame);
+  return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
 }
 
 void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignmentOutcome& outcome,

@@ -57,8 +57,9 @@ Eigen::MatrixXd example_fields(const ReducedModel& model, const ElasticSystem& s
   require_examples(model);
   const LaplaceBasis object = laplace_basis_of(model);
   const FieldClamp clamp(system, clamp_decay(model), model.asset_name);
-  Eigen::MatrixXd fields =
-      pose_fields(object, descriptor_weights(object, model.shape_space->weighting), model.object->fixed, system, clamp);
+  const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting);
+  const PoseFields poses = whole_body_poses(object, weights, model.object->fixed, clamp);
+  Eigen::MatrixXd fields = poses(Eigen::MatrixXd::Identity(3 * weights.size(), 3 * weights.size()));
   // The modal basis of a free body holds no rigid motions.
   fields -= system.null_space * (system.null_space.transpose() * (system.mass * fields)).eval();
   return fields;

@@ -10,7 +10,7 @@
 
 namespace exmat::precompute {
 
-/// [f x 3m] displacements that changes of descriptor stand for, by pose_fields() from what a bundle holds; of a free
+/// [f x 3m] displacements that changes of descriptor stand for, by whole_body_poses() from what a bundle holds; of a free
 /// body without their rigid part.
 Eigen::MatrixXd example_fields(const ReducedModel& model, const ElasticSystem& system);
 

@@ -23,6 +23,11 @@ Eigen::Matrix3d fit_rotation(const VertexArray& posed, const VertexArray& rest, 
   return procrustes_rotation((rest.rowwise() - rest_mean).transpose() * (weights * centred));
 }
 
+// Without its mean in the mass, of sum 1.
+VertexArray centred(const VertexArray& field, const SparseMatrix& mass) {
+  return field.rowwise() - (mass * field).colwise().sum();
+}
+
 // The change of coefficients [m x 3] of a pose that `to_rest` has turned, fitted to the object as the frame says;
 // `displacement` [n x 3] is what is fitted.
 TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
@@ -102,20 +107,23 @@ TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd&
                  frame.fit_whole ? VertexArray(map.pull_back * whole) : VertexArray(object.eigenfunctions * change),
                  to_rest, frame);
   const VertexArray displacement = posed * pose.rotation.transpose() - rest_basis.vertices;
-  pose.displacement = map.pull_back * displacement;
-  pose.displacement.rowwise() -= (object.mass * pose.displacement).colwise().sum();
+  pose.displacement = centred(map.pull_back * displacement, object.mass);
   pose.shape_space_error = lost_share(object.mass, pose.displacement, object.eigenfunctions * carry(displacement));
   return pose;
 }
 
-TransferredPose transfer_coefficients(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
-                                      const Eigen::MatrixXd& carried_rest, const Eigen::MatrixXd& carried_posed,
-                                      const PoseFrame& frame) {
+TransferredPose transfer_carried(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                                 const CarriedShape& rest, const CarriedShape& posed, const PoseFrame& frame) {
   Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();
-  if (frame.free_example) to_rest = procrustes_rotation(carried_rest.transpose() * carried_posed);
-  const Eigen::MatrixXd change = carried_posed * to_rest.transpose() - carried_rest;
-  TransferredPose pose = place_pose(object, rest_coefficients, change, object.eigenfunctions * change, to_rest, frame);
-  pose.displacement = object.eigenfunctions * (pose.coefficients - rest_coefficients);
+  if (frame.free_example) to_rest = procrustes_rotation(rest.coefficients.transpose() * posed.coefficients);
+  const Eigen::MatrixXd change = posed.coefficients * to_rest.transpose() - rest.coefficients;
+  const VertexArray whole = posed.points * to_rest.transpose() - rest.points;
+  TransferredPose pose =
+      place_pose(object, rest_coefficients, change,
+                 frame.fit_whole ? whole : VertexArray(object.eigenfunctions * change), to_rest, frame);
+  pose.displacement = centred(posed.points * pose.rotation.transpose() - rest.points, object.mass);
+  pose.shape_space_error =
+      lost_share(object.mass, pose.displacement, object.eigenfunctions * (pose.coefficients - rest_coefficients));
   return pose;
 }
 

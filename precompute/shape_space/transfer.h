@@ -60,11 +60,16 @@ struct PoseFrame {
 TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients, const RestMap& map,
                               const LaplaceBasis& rest_basis, const VertexArray& posed, const PoseFrame& frame);
 
-/// The same from coefficients alone: those of the rest and the posed example, carried to the object's functions by a
-/// functional map [m x 3 each]. What these lose of the pose is not known: shape_space_error is 0.
-TransferredPose transfer_coefficients(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
-                                      const Eigen::MatrixXd& carried_rest, const Eigen::MatrixXd& carried_posed,
-                                      const PoseFrame& frame);
+/// An example as a functional map carries it to the object.
+struct CarriedShape {
+  Eigen::MatrixXd coefficients;  ///< m x 3
+  VertexArray points;            ///< n x 3, positions on the example at the object's vertices, found in another way
+};
+
+/// The same from what is carried of the rest and the posed example. The coefficients alone make the pose; the points
+/// give `displacement` and tell what is lost of it, shape_space_error.
+TransferredPose transfer_carried(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                                 const CarriedShape& rest, const CarriedShape& posed, const PoseFrame& frame);
 
 /// |d - d_m| / |d| in a mass [n x n], of displacements [n x 3]; nothing is lost of none.
 double lost_share(const SparseMatrix& mass, const VertexArray& displacement, const VertexArray& carried);

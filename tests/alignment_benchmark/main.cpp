@@ -1,6 +1,7 @@
 // Errors of transferred poses against analytic ones, by method of alignment. Prints the table of docs/alignment.md, and
 // renews it where the page is named: alignment_benchmark [PAGE.md]
 
+#include <ctime>
 #include <fmt/format.h>
 #include <fstream>
 #include <iostream>
@@ -44,17 +45,29 @@ struct Body {
   std::array<int, 3> object_cells, rest_cells, posed_cells;
 };
 
+TetMesh bar(const std::array<int, 3>& cells, double height, std::uint32_t seed) {
+  return test::centred(test::shaken_box(cells, {kLength, 1, height}, seed));
+}
+
 const std::vector<Body>& bodies() {
   const std::array<int, 3> a{16, 5, 4}, b{14, 4, 4}, c{15, 5, 3}, d{16, 6, 6}, e{13, 5, 5};
-  const auto bar = [](const std::array<int, 3>& cells, double height, std::uint32_t seed) {
-    return test::centred(test::shaken_box(cells, {kLength, 1, height}, seed));
-  };
   const double radius = 1 / std::sqrt(M_PI);
   static const std::vector<Body> all{
       {"rectangular bar", bar(a, 0.6, 1), bar(b, 0.6, 2), bar(c, 0.6, 3), a, b, c},
       {"square bar", bar(a, 1, 1), bar(b, 1, 2), bar(c, 1, 3), a, b, c},
       {"cylinder for a square bar", bar(a, 1, 1), test::cylinder_mesh(16, 6, kLength, radius, 2),
        test::cylinder_mesh(13, 5, kLength, radius, 3), a, d, e}};
+  return all;
+}
+
+// Rectangular bars of other sizes: two large meshes, and meshes of which one is much finer than the other.
+const std::vector<Body>& sizes() {
+  const auto pair = [](const std::string& name, const std::array<int, 3>& rest, const std::array<int, 3>& posed) {
+    return Body{name, bar(rest, 0.6, 1), bar(rest, 0.6, 1), bar(posed, 0.6, 3), rest, rest, posed};
+  };
+  static const std::vector<Body> all{pair("both large", {42, 12, 8}, {40, 13, 8}),
+                                     pair("pose much finer", {20, 6, 3}, {54, 16, 11}),
+                                     pair("pose much coarser", {54, 16, 11}, {20, 6, 3})};
   return all;
 }
 
@@ -76,15 +89,6 @@ const std::vector<Method>& methods() {
       {.name = "dense map, same frame", .method = "map", .map = true},
       {.name = "coupled bases, 8 landmarks, same frame", .method = "coupled", .landmarks = true}};
   return all;
-}
-
-// The vertex of a box_mesh at each of its corners.
-std::vector<std::int32_t> corners(const std::array<int, 3>& cells) {
-  std::vector<std::int32_t> ids;
-  for (int k = 0; k < 8; ++k)
-    ids.push_back(((k >> 2 & 1) * cells[2] * (cells[1] + 1) + (k >> 1 & 1) * cells[1]) * (cells[0] + 1) +
-                  (k & 1) * cells[0]);
-  return ids;
 }
 
 TetMesh moved(TetMesh mesh) {
@@ -112,7 +116,8 @@ ExampleInput example_input(const Body& body, const Method& method) {
     input.poses.push_back(std::move(pose));
   }
   if (!method.landmarks) return input;
-  const auto object = corners(body.object_cells), rest = corners(body.rest_cells), posed = corners(body.posed_cells);
+  const auto object = test::box_corners(body.object_cells), rest = test::box_corners(body.rest_cells),
+             posed = test::box_corners(body.posed_cells);
   input.landmarks.resize(8, 5);
   for (Eigen::Index k = 0; k < 8; ++k) {
     const auto at = static_cast<std::size_t>(k);
@@ -177,11 +182,8 @@ class Case {
     const precompute::PoseFrame frame{rest.free_poses, basis.mass};
     const Eigen::MatrixXd at_rest = coefficients(basis, basis.vertices);
     const auto transferred =
-        pose.functional_map
-            ? precompute::transfer_coefficients(
-                  basis, at_rest, rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
-                  *pose.functional_map * coefficients(pose.basis, pose.basis.vertices), frame)
-            : precompute::transfer_pose(basis, at_rest, rest.map, rest.basis, pose.positions, frame);
+        pose.carried ? precompute::transfer_carried(basis, at_rest, rest.carried, *pose.carried, frame)
+                     : precompute::transfer_pose(basis, at_rest, rest.map, rest.basis, pose.positions, frame);
     const auto [ideal, ours] = errors(basis, transferred.coefficients - at_rest, body_.object, poses()[k].pose);
     const bool wrong = ours > ideal + kWrong, refused = pose.outcome.verdict == AlignmentVerdict::kRefused,
                doubtful = pose.outcome.verdict == AlignmentVerdict::kDoubtful;
@@ -230,8 +232,24 @@ std::string table() {
   return text;
 }
 
+std::string sizes_table() {
+  std::string text =
+      "\n| pair of meshes | vertices: rest example / pose | CPU seconds a pose | m = 20: bend / twist / S | ideal |\n"
+      "| --- | --- | --- | --- | --- |\n";
+  Counts counts;
+  for (const Body& body : sizes()) {
+    Case alignment(body, {.name = "auto, same frame"});
+    const std::clock_t begin = std::clock();
+    const Row row = alignment.row(20, counts);
+    const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
+    text += fmt::format("| {} | {} / {} | {:.1f} | {} | {} |\n", body.name, body.rest.vertex_count(),
+                        body.posed.vertex_count(), seconds / static_cast<double>(poses().size()), row.ours, row.ideal);
+  }
+  return text;
+}
+
 int run(int argc, char** argv) {
-  const std::string results = table();
+  const std::string results = table() + sizes_table();
   std::cout << results;
   if (argc < 2) return 0;
   const std::string page = test::read_file(argv[1]);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <vector>
 
 #include "tests/support/box_mesh.h"
 
@@ -24,6 +25,15 @@ inline TetMesh shaken_box(const std::array<int, 3>& cells, const std::array<doub
       if (x > 0.5 * cell && x < lengths[at] - 0.5 * cell) mesh.vertices(v, axis) += shift;
     }
   return mesh;
+}
+
+/// The vertices of a box_mesh at its corners, the first axis fastest.
+inline std::vector<std::int32_t> box_corners(const std::array<int, 3>& cells) {
+  std::vector<std::int32_t> ids;
+  for (int k = 0; k < 8; ++k)
+    ids.push_back(((k >> 2 & 1) * cells[2] * (cells[1] + 1) + (k >> 1 & 1) * cells[1]) * (cells[0] + 1) +
+                  (k & 1) * cells[0]);
+  return ids;
 }
 
 /// Centred at the origin.

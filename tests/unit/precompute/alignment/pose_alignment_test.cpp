@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <vector>
 
+#include "precompute/shape_space/nearest_point.h"
 #include "precompute/shape_space/transfer.h"
 #include "tests/support/posed_bodies.h"
 
@@ -71,15 +72,15 @@ Result align(const TetMesh& rest, const TetMesh& posed, const test::Pose& pose, 
   return result;
 }
 
+// Interpolation that takes the values at vertices.
+SparseMatrix at_vertices(const std::vector<std::int32_t>& vertices, const std::array<int, 3>& cells) {
+  SparseMatrix points(std::ssize(vertices), (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1));
+  for (std::size_t k = 0; k < vertices.size(); ++k) points.insert(static_cast<Eigen::Index>(k), vertices[k]) = 1;
+  return points;
+}
+
 Correspondences corners(const std::array<int, 3>& on_rest, const std::array<int, 3>& on_pose) {
-  const auto at = [](const std::array<int, 3>& cells) {
-    SparseMatrix points(8, (cells[0] + 1) * (cells[1] + 1) * (cells[2] + 1));
-    for (int k = 0; k < 8; ++k)
-      points.insert(k, ((k >> 2 & 1) * cells[2] * (cells[1] + 1) + (k >> 1 & 1) * cells[1]) * (cells[0] + 1) +
-                           (k & 1) * cells[0]) = 1;
-    return points;
-  };
-  return {at(on_rest), at(on_pose)};
+  return {at_vertices(test::box_corners(on_rest), on_rest), at_vertices(test::box_corners(on_pose), on_pose)};
 }
 
 // The limits are 1.5 times what these cases measure; a wrong map has errors above 0.5.
@@ -164,15 +165,76 @@ TEST(AlignPose, MotionAndScaleOfTheFileDoNotMatter) {
   }
 }
 
-TEST(AlignPose, AMirrorImageAndAnotherBodyAreTold) {
-  const TetMesh rest = corner_piece({12, 8, 2}, true);
-  const test::Pose mirror = [](const Eigen::Vector3d& x) { return Eigen::Vector3d(x[0], x[1], -x[2]); };
-  TetMesh mirrored = test::posed(corner_piece({16, 8, 3}, true), mirror);
-  mirrored.tets.col(0).swap(mirrored.tets.col(1));
-  const Result reflected = align(rest, mirrored, mirror, {true, {}, false});
-  EXPECT_TRUE(reflected.alignment.mirrored || reflected.alignment.confidence > 0.5);
+const test::Pose kMirror = [](const Eigen::Vector3d& x) { return Eigen::Vector3d(x[0], x[1], -x[2]); };
+
+TetMesh mirrored(TetMesh mesh) {
+  mesh = test::posed(mesh, kMirror);
+  mesh.tets.col(0).swap(mesh.tets.col(1));
+  return mesh;
+}
+
+// A body that is no mirror image of itself: nothing but its mirror image fits, and that is told.
+TEST(AlignPose, AMirrorImageIsTold) {
+  const TetMesh rest = corner_piece({12, 8, 2}, true), other = corner_piece({16, 8, 3}, true);
+  for (const bool free_frame : {false, true}) {
+    const Result same = align(rest, other, [](const Eigen::Vector3d& x) { return x; }, {free_frame, {}, false});
+    EXPECT_FALSE(same.alignment.mirrored) << free_frame;
+    const Result reflected = align(rest, mirrored(other), kMirror, {free_frame, {}, false});
+    EXPECT_TRUE(reflected.alignment.mirrored) << free_frame;
+  }
+}
+
+// The mirror image of a bend is a bend the other way of a bar that is its own mirror image.
+TEST(AlignPose, AMirrorImageOfABodyWithMirrorSymmetryIsAnotherPose) {
+  const auto pose = test::bend(kLength, 1.2), other_way = test::bend(kLength, -1.2);
+  const Result result = align(bar({12, 4, 3}, 0.6, 1), mirrored(test::posed(bar({11, 3, 3}, 0.6, 2), pose)), other_way);
+  EXPECT_FALSE(result.alignment.mirrored);
+  EXPECT_LE(result.error, 0.05);
+}
+
+TEST(AlignPose, AnotherBodyIsRefused) {
   const TetMesh cube = test::centred(test::shaken_box({6, 6, 6}, {1, 1, 1}, 3));
-  EXPECT_GT(align(bar({12, 4, 3}, 0.6, 1), cube, mirror).alignment.confidence, 1.2);
+  EXPECT_GT(align(bar({12, 4, 3}, 0.6, 1), cube, kMirror).alignment.confidence, 1.2);
+}
+
+// Landmarks moved along the body's surface by a share of its RMS radius, each in a direction of its own.
+TEST(AlignPose, InexactLandmarksCostLittleAndWrongOnesAreTold) {
+  const std::array<int, 3> ours{12, 4, 3}, theirs{11, 3, 3};
+  const TetMesh rest = bar(ours, 0.6, 1), at_rest = bar(theirs, 0.6, 2);
+  const Eigen::Matrix3d R = Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  const auto bend = test::bend(kLength, 1.57);
+  const test::Pose pose = [&](const Eigen::Vector3d& x) { return Eigen::Vector3d(R * bend(x)); };
+  const TetMesh posed = test::posed(at_rest, pose);
+  const double size = rms_radius(aligned_shape(at_rest, 0, "posed").basis) * std::cbrt(kLength * 0.6);
+  const auto with_landmarks = [&](double offset) {
+    AlignmentHints hints{true, corners(ours, theirs), true};
+    VertexArray places = at_rest.vertices(test::box_corners(theirs), Eigen::all);
+    std::mt19937 generator(5);
+    for (auto place : places.rowwise())
+      for (double& x : place) x += offset * size * (generator() % 2 == 0 ? 1 : -1) / std::sqrt(3.0);
+    hints.correspondences.on_pose = nearest_points(at_rest, places).interpolation(at_rest);
+    return align(rest, posed, pose, hints);
+  };
+  const Result exact = with_landmarks(0), nearly = with_landmarks(0.01), far = with_landmarks(0.2);
+  EXPECT_LE(exact.alignment.missed_landmarks, 0.01);
+  EXPECT_LE(exact.alignment.confidence, 0.35);
+  EXPECT_LE(nearly.error, 1.1 * exact.error);
+  EXPECT_LE(nearly.alignment.confidence, exact.alignment.confidence + 0.02);  // twice the 1 % that they are off
+  // The surface puts right what the landmarks miss, so the confidence is what tells: 2 x 0.2, less what is projected
+  // back onto the body.
+  EXPECT_LE(far.error, 0.01);
+  EXPECT_NEAR(far.alignment.missed_landmarks, 0.15, 0.03);
+  EXPECT_GT(far.alignment.confidence, nearly.alignment.confidence + 0.2);
+}
+
+TEST(AlignPose, LandmarksThatAreInterchangedAreTold) {
+  const std::array<int, 3> ours{12, 4, 3}, theirs{11, 3, 3};
+  const auto pose = test::bend(kLength, 1.57);
+  std::vector<std::int32_t> ids = test::box_corners(theirs);
+  std::swap(ids[0], ids[1]);  // at opposite ends
+  const Correspondences wrong{at_vertices(test::box_corners(ours), ours), at_vertices(ids, theirs)};
+  const Result result = align(bar(ours, 0.6, 1), test::posed(bar(theirs, 0.6, 2), pose), pose, {true, wrong, true});
+  EXPECT_GT(result.alignment.confidence, 1.2);
 }
 
 TEST(RestSymmetry, OfBodiesWithKnownSymmetries) {

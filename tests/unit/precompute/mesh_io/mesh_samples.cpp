@@ -1,6 +1,7 @@
 #include "tests/unit/precompute/mesh_io/mesh_samples.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <fmt/format.h>
 #include <fstream>
@@ -233,8 +234,82 @@ std::string to_msh_41_binary(const MeshFile& mesh_file, bool swap) {
   return out.text("\n$EndElements\n").bytes();
 }
 
+std::string to_medit(const MeshFile& mesh_file) {
+  const TetMesh& mesh = mesh_file.mesh;
+  std::string text =
+      fmt::format("MeshVersionFormatted 2\n# sample\nDimension\n3\n\nVertices\n{}\n", mesh.vertex_count());
+  for (const auto& x : mesh.vertices.rowwise()) text += fmt::format("{} {} {} 0\n", x[0], x[1], x[2]);
+  text += "Corners 1\n1\nEdges\n1\n1 2 5\nTriangles\n1\n1 2 3 5\n";
+  text += fmt::format("Tetrahedra\n{}\n", mesh.tet_count());
+  const auto soft_count = static_cast<Eigen::Index>(mesh_file.tet_sets.at("soft part").size());
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    text += fmt::format("{} {} {} {} {}\n", mesh.tets(t, 0) + 1, mesh.tets(t, 1) + 1, mesh.tets(t, 2) + 1,
+                        mesh.tets(t, 3) + 1, t < soft_count ? kSoft : kAll);
+  return text + "End\n";
+}
+
+// As text or as big-endian values, whatever their order in memory.
+std::string to_vtk(const MeshFile& mesh_file, bool binary, bool offsets) {
+  const TetMesh& mesh = mesh_file.mesh;
+  ByteWriter out(std::endian::native == std::endian::little);
+  const auto real = [&](double value) { binary ? out.real(value) : out.text(fmt::format("{} ", value)); };
+  const auto integer = [&](Eigen::Index value) {
+    binary ? out.integer(static_cast<std::int32_t>(value)) : out.text(fmt::format("{} ", value));
+  };
+  const auto size = [&](Eigen::Index value) {
+    binary ? out.size(static_cast<std::uint64_t>(value)) : out.text(fmt::format("{} ", value));
+  };
+  out.text(fmt::format("# vtk DataFile Version {}\nsample\n{}\nDATASET UNSTRUCTURED_GRID\n", offsets ? "5.1" : "3.0",
+                       binary ? "BINARY" : "ASCII"));
+  out.text("FIELD FieldData 1\nTIME 1 1 double\n");
+  real(0.25);
+  out.text(fmt::format("\nPOINTS {} double\n", mesh.vertex_count()));
+  for (const double x : mesh.vertices.reshaped<Eigen::RowMajor>()) real(x);
+  // A triangle, then the tets.
+  const Eigen::Index cells = mesh.tet_count() + 1;
+  if (offsets) {
+    out.text(fmt::format("\nMETADATA\nINFORMATION 0\n\nCELLS {} {}\nOFFSETS vtktypeint64\n", cells + 1, 4 * cells - 1));
+    size(0);
+    for (Eigen::Index cell = 0; cell < cells; ++cell) size(3 + 4 * cell);
+    out.text("\nCONNECTIVITY vtktypeint64\n");
+    for (int corner = 0; corner < 3; ++corner) size(corner);
+    for (const auto corner : mesh.tets.reshaped<Eigen::RowMajor>()) size(corner);
+  } else {
+    out.text(fmt::format("\nCELLS {} {}\n", cells, 5 * cells - 1));
+    for (const int value : {3, 0, 1, 2}) integer(value);
+    for (const auto& tet : mesh.tets.rowwise()) {
+      integer(4);
+      for (const auto corner : tet) integer(corner);
+    }
+  }
+  out.text(fmt::format("\nCELL_TYPES {}\n", cells));
+  for (Eigen::Index cell = 0; cell < cells; ++cell) integer(cell == 0 ? 5 : 10);
+  out.text(fmt::format("\nCELL_DATA {}\nSCALARS part int 1\nLOOKUP_TABLE default\n", cells));
+  const auto soft_count = static_cast<Eigen::Index>(mesh_file.tet_sets.at("soft part").size());
+  for (Eigen::Index cell = 0; cell < cells; ++cell) integer(cell <= soft_count ? kSoft : kAll);
+  out.text(fmt::format("\nPOINT_DATA {}\nVECTORS displacement double\n", mesh.vertex_count()));
+  for (const double x : mesh.vertices.reshaped<Eigen::RowMajor>()) real(x);
+  return out.text("\n").bytes();
+}
+
+Sets named_sets(const MeshFile& mesh_file) { return mesh_file.tet_sets; }
+
+Sets numbered_sets(const MeshFile& mesh_file, const std::string& prefix) {
+  const auto& soft = mesh_file.tet_sets.at("soft part");
+  const auto& all = mesh_file.tet_sets.at("all");
+  return {{prefix + std::to_string(kSoft), soft},
+          {prefix + std::to_string(kAll), {all.begin() + std::ssize(soft), all.end()}}};
+}
+
 const std::vector<Flavour>& flavours() {
+  static const auto numbered = [](const MeshFile& mesh_file) { return numbered_sets(mesh_file, ""); };
+  static const auto of_part = [](const MeshFile& mesh_file) { return numbered_sets(mesh_file, "part "); };
   static const std::vector<Flavour> kFlavours{
+      {"Medit", ".mesh", to_medit, numbered},
+      {"VtkText", ".vtk", [](const MeshFile& mesh_file) { return to_vtk(mesh_file, false, false); }, of_part},
+      {"VtkBinary", ".vtk", [](const MeshFile& mesh_file) { return to_vtk(mesh_file, true, false); }, of_part},
+      {"VtkOffsetsText", ".vtk", [](const MeshFile& mesh_file) { return to_vtk(mesh_file, false, true); }, of_part},
+      {"VtkOffsetsBinary", ".vtk", [](const MeshFile& mesh_file) { return to_vtk(mesh_file, true, true); }, of_part},
       {"Veg", ".veg", to_veg},
       {"Msh22Text", ".msh", to_msh_22_text},
       {"Msh22Binary", ".msh", [](const MeshFile& mesh_file) { return to_msh_22_binary(mesh_file); }},

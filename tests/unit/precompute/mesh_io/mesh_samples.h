@@ -43,9 +43,17 @@ std::string to_msh_22_binary(const MeshFile& mesh_file, bool swap = false);
 std::string to_msh_41_text(const MeshFile& mesh_file);
 std::string to_msh_41_binary(const MeshFile& mesh_file, bool swap = false);
 
+std::string to_medit(const MeshFile& mesh_file);
+std::string to_vtk(const MeshFile& mesh_file, bool binary, bool offsets);
+
+using Sets = std::map<std::string, std::vector<std::int32_t>>;
+/// The sets as formats with names keep them.
+Sets named_sets(const MeshFile& mesh_file);
+
 struct Flavour {
   std::string name, extension;
   std::string (*write)(const MeshFile&);
+  Sets (*sets)(const MeshFile&) = named_sets;  ///< what the format keeps of them
 };
 /// Every format and encoding.
 const std::vector<Flavour>& flavours();

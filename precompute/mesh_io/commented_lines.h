@@ -9,25 +9,26 @@
 
 namespace exmat::precompute {
 
-/// A line of a .veg file without its comment and the blanks around it. Views stay valid as long as the VegLines.
-struct VegLine {
+/// A line without its comment and the blanks around it. Views stay valid as long as the CommentedLines.
+struct FileLine {
   std::string_view text;
   const std::filesystem::path* file = nullptr;
   std::size_t number = 0;  ///< 1-based
 };
 
 /// Throws the InputError of one line.
-[[noreturn]] void fail_at(const VegLine& line, const std::string& expected, const std::string& found,
+[[noreturn]] void fail_at(const FileLine& line, const std::string& expected, const std::string& found,
                           const std::string& advice = "");
 
-/// The lines of a .veg file that are not empty, with the lines of included files in place of each *INCLUDE. Included
-/// paths are relative to the file that names them.
-class VegLines {
+/// The lines of a text file that hold more than a comment, which '#' begins. With an `include` keyword, the lines of
+/// the files that such lines name stand in their place; paths are relative to the file that names them.
+class CommentedLines {
  public:
-  explicit VegLines(const std::filesystem::path& file);
+  /// `kind` is for messages: "a .veg file".
+  CommentedLines(const std::filesystem::path& file, std::string kind, std::string_view include = {});
 
   /// The line to read next; empty at the end of the file.
-  const std::optional<VegLine>& current() const { return current_; }
+  const std::optional<FileLine>& current() const { return current_; }
   void advance();
 
   /// As fail_at(current line), or at the end of the named file.
@@ -43,13 +44,15 @@ class VegLines {
     std::size_t offset = 0;
     std::size_t line = 0;
   };
-  std::optional<VegLine> next_plain_line();
+  std::optional<FileLine> next_plain_line();
   void open(const std::filesystem::path& file);
-  void open_include(const VegLine& line);
+  void open_include(const FileLine& line);
 
+  std::string kind_;
+  std::string_view include_;
   std::deque<File> files_;
   std::vector<File*> open_;  // the innermost last
-  std::optional<VegLine> current_;
+  std::optional<FileLine> current_;
 };
 
 }  // namespace exmat::precompute
