@@ -53,7 +53,8 @@ struct FullSpaceReport : runtime::StepReport {
 /// iterate, damping and target frozen there, backward Euler near obstacles. Newton's method with an energy line search.
 ///
 /// A free body moves in the world. Damping and example force are those of its deformation in the frame that fits it
-/// best (FittedFrame) and take neither momentum nor, but for the integrator, angular momentum.
+/// best (FittedFrame) and take neither momentum nor, but for the integrator, angular momentum. It may turn by any
+/// angle in a step: there is no backward Euler for fast turns, as there is in a moving frame.
 FullSpaceReport step(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
                      FullSpaceWorkspace& workspace);
 
