@@ -43,8 +43,8 @@ FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::V
   state.a = state.applied_force = Eigen::VectorXd::Zero(model.size());
   state.elastic_energy = model.elasticity.energy(state.q);
   if (!model.examples) return state;
-  state.weights = Eigen::VectorXd::Unit(model.examples->count(), 0);
-  state.target = Eigen::VectorXd::Zero(model.examples->pose_basis().cols());
+  state.examples.push_back(
+      {Eigen::VectorXd::Unit(model.examples->count(), 0), Eigen::VectorXd::Zero(model.examples->pose_basis().cols())});
   return state;
 }
 

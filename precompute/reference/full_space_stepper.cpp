@@ -136,9 +136,10 @@ void Stepper::update_target(const Eigen::VectorXd& q) {
   const FullSpaceExamples& examples = *model_.examples;
   weights_ = examples.weights(Deformation(model_, q).u());
   runtime::apply_example_bias(scene_.examples->bias, weights_);
-  target_ = state_.target;
-  if (!state_.has_target) start_target();
-  target_converged_ = state_.has_target && state_.target_converged && weights_ == state_.weights;
+  const runtime::ExampleState& former = state_.examples.front();
+  target_ = former.target;
+  if (!former.has_target) start_target();
+  target_converged_ = former.has_target && former.target_converged && weights_ == former.weights;
   if (!target_converged_) model_.surface_targets ? solve_surface_target() : solve_target();
   if (!target_converged_) report_.status |= runtime::kTargetNotConverged;
   terms_.target = (model_.surface_targets ? examples.pose_basis() : examples.target_fields()) * target_;
@@ -230,10 +231,7 @@ void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
     report_.contact_force = contacts_.total_force;
   }
   if (!examples_) return;
-  state_.weights = weights_;
-  state_.target = target_;
-  state_.has_target = true;
-  state_.target_converged = target_converged_;
+  state_.examples.front() = {weights_, target_, true, target_converged_};
 }
 
 FullSpaceReport Stepper::run() {

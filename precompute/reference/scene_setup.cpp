@@ -20,6 +20,9 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
   if (config.examples && config.examples->force != "linear")
     throw InputError({file, "/examples/force", "\"linear\"", '"' + config.examples->force + '"', ""});
+  if (!config.regions.empty())
+    throw InputError({file, "/regions", "no regions: the full-space reference has examples of the whole body alone",
+                      std::to_string(config.regions.size()), ""});
   const auto require_part = [&](bool needed, bool there, const char* group) {
     if (needed && !there)
       throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",

@@ -174,7 +174,7 @@ TEST(Baseline, ABodyTakesTheShapeOfTheTarget) {
       report = step(baseline.model, scene, state, workspace);
       ASSERT_FALSE(report.status & runtime::kStepNonFinite) << i;
     }
-    const Eigen::VectorXd target = baseline.model.examples->pose_basis() * state.target;
+    const Eigen::VectorXd target = baseline.model.examples->pose_basis() * state.examples.front().target;
     const Eigen::VectorXd u = Deformation(baseline.model, state.q).u();
     EXPECT_LE((u - target).norm(), 0.1 * target.norm()) << free;
     EXPECT_GE(target.lpNorm<Eigen::Infinity>(), 0.02 * baseline.bar.length) << "the target is no pose";
@@ -194,7 +194,7 @@ TEST(Baseline, StartsWithTheForceOfTheElasticEnergy) {
   FullSpaceState state = at_rest(baseline.model);
   run(baseline.model, scene, state, 1);
   MeshElasticity elasticity = baseline.model.elasticity;
-  const Eigen::VectorXd target = baseline.model.examples->pose_basis() * state.target;
+  const Eigen::VectorXd target = baseline.model.examples->pose_basis() * state.examples.front().target;
   const VertexArray shape = baseline.model.rest + baseline.model.system.extend(target).reshaped<Eigen::RowMajor>(
                                                       baseline.model.rest.rows(), 3);
   ASSERT_EQ(elasticity.set_undeformed(shape), 0);

@@ -61,7 +61,9 @@ class ReducedTwin {
       const Eigen::VectorXd u = bar_.basis() * state.q;
       largest = std::max(largest, (u - full_.system.extend(full_state.q)).lpNorm<Eigen::Infinity>());
       size = std::max(size, u.lpNorm<Eigen::Infinity>());
-      if (full_.examples) weights_off_ = std::max(weights_off_, (state.weights - full_state.weights).norm());
+      if (full_.examples)
+        weights_off_ =
+            std::max(weights_off_, (state.examples.front().weights - full_state.examples.front().weights).norm());
     }
     size_ = size / bar_.length;
     return largest / size;
