@@ -18,6 +18,10 @@ VertexArray vertex_array(const std::vector<std::array<double, 3>>& rows) { retur
 
 TetArray tet_array(const std::vector<std::array<std::int32_t, 4>>& rows) { return to_array<TetArray>(rows); }
 
+TriangleArray triangle_array(const std::vector<std::array<std::int32_t, 3>>& rows) {
+  return to_array<TriangleArray>(rows);
+}
+
 std::map<std::string, std::vector<std::int32_t>> region_sets(const std::vector<std::int64_t>& regions) {
   std::map<std::string, std::vector<std::int32_t>> sets;
   for (std::size_t t = 0; t < regions.size(); ++t)

@@ -154,6 +154,59 @@ template std::uint64_t ValueCursor::read_binary(std::string_view);
 template float ValueCursor::read_binary(std::string_view);
 template double ValueCursor::read_binary(std::string_view);
 
+void ValueCursor::check_values(std::uint64_t count, const NumberType& type, std::string_view what) const {
+  // The last number of a text needs no blank after it.
+  if (is_binary() && type.kind == NumberType::Kind::kBits)
+    check_count(count / 8, what, 1);
+  else
+    check_count(count, what, is_binary() ? type.bytes : 1);
+}
+
+double ValueCursor::read_real_of(const NumberType& type, std::string_view what) {
+  if (type.kind != NumberType::Kind::kReal) return static_cast<double>(read_integer_of(type, what));
+  if (!is_binary()) {
+    const double value = read_real(what);
+    refuse_cut();
+    return value;
+  }
+  if (type.bytes == 8) return read_real(what);
+  const double value = static_cast<double>(read_binary<float>(what));
+  if (!std::isfinite(value)) fail(fmt::format("{}, a finite number", what), fmt::format("{}", value));
+  return value;
+}
+
+std::int64_t ValueCursor::read_integer_of(const NumberType& type, std::string_view what) {
+  if (!is_binary()) {
+    const std::string_view word = read_word();
+    const auto value = parse_integer(word);
+    if (!value) fail(std::string(what), describe(word));
+    refuse_cut();
+    return *value;
+  }
+  const bool is_signed = type.kind == NumberType::Kind::kSigned;
+  if (type.bytes == 1) return is_signed ? read_binary<std::int8_t>(what) : read_binary<std::uint8_t>(what);
+  if (type.bytes == 2) return is_signed ? read_binary<std::int16_t>(what) : read_binary<std::uint16_t>(what);
+  if (type.bytes == 4)
+    return is_signed ? std::int64_t{read_binary<std::int32_t>(what)} : std::int64_t{read_binary<std::uint32_t>(what)};
+  return read_binary<std::int64_t>(what);
+}
+
+void ValueCursor::skip_values(std::uint64_t count, const NumberType& type, std::string_view what) {
+  check_values(count, type, what);
+  if (is_binary()) {
+    read_bytes(type.kind == NumberType::Kind::kBits ? (count + 7) / 8 : count * type.bytes, what);
+    return;
+  }
+  for (std::uint64_t k = 0; k < count; ++k)
+    if (const auto word = read_word(); word.empty()) fail(std::string(what), describe(word));
+  if (count > 0) refuse_cut();
+}
+
+// A number that ends with the file may have had more digits.
+void ValueCursor::refuse_cut() const {
+  if (offset_ >= bytes_.size()) fail("a line end after the last number", "the end of the file", "is the file cut off?");
+}
+
 void ValueCursor::check_count(std::uint64_t count, std::string_view what, std::size_t min_bytes) const {
   constexpr std::uint64_t kMaxCount = std::numeric_limits<std::int32_t>::max();
   const std::uint64_t limit = std::min<std::uint64_t>(rest().size() / min_bytes, kMaxCount);

@@ -6,6 +6,13 @@
 
 namespace exmat::precompute {
 
+/// A type of number of a file that names them.
+struct NumberType {
+  enum class Kind { kSigned, kUnsigned, kReal, kBits };
+  Kind kind;
+  std::size_t bytes;  ///< of a binary value; of bits, eight share one
+};
+
 /// Reads the values of a mesh file, held in memory, in either encoding: text until set_binary, which words and lines
 /// stay in. Every fault is an InputError whose place is a line of a text file or a byte of a binary one.
 class ValueCursor {
@@ -26,6 +33,12 @@ class ValueCursor {
   std::int32_t read_int(std::string_view what);
   std::uint64_t read_size(std::string_view what);
   double read_real(std::string_view what);
+  /// A value of a type that the file names.
+  double read_real_of(const NumberType& type, std::string_view what);
+  std::int64_t read_integer_of(const NumberType& type, std::string_view what);
+  void skip_values(std::uint64_t count, const NumberType& type, std::string_view what);
+  /// Refuses a number of values that the rest of the file cannot hold.
+  void check_values(std::uint64_t count, const NumberType& type, std::string_view what) const;
   /// A binary value of another type.
   template <typename Number>
   Number read_binary(std::string_view what);
@@ -44,8 +57,6 @@ class ValueCursor {
 
   /// Whether nothing but blanks is left.
   bool at_end() const;
-  /// Whether the last value ends with the file: in text, it may be cut off.
-  bool exhausted() const { return offset_ >= bytes_.size(); }
   /// To the next line that is not blank.
   void skip_blank_lines();
   /// Offset of the value or name read last, for fail.
@@ -65,6 +76,7 @@ class ValueCursor {
 
  private:
   void skip_blanks();
+  void refuse_cut() const;
 
   std::string file_;
   std::string_view bytes_;

@@ -14,7 +14,7 @@
 namespace exmat::precompute {
 namespace {
 
-using Kind = VtkType::Kind;
+using Kind = NumberType::Kind;
 
 constexpr std::int64_t kTetCell = 10, kFirstVolumeCell = 10;
 constexpr std::array<std::int64_t, 3> kCurvedTetCells{24, 71, 78};  // quadratic, Lagrange, Bezier
@@ -42,8 +42,8 @@ class VtkReader {
   void read_cell_types(const Words& words);
   bool read_attribute(const Words& words);
   void read_field(const Words& words);
-  void read_array(std::string_view name, std::uint64_t components, std::uint64_t tuples, const VtkType& type);
-  std::int32_t read_point_index(const VtkType& type);
+  void read_array(std::string_view name, std::uint64_t components, std::uint64_t tuples, const NumberType& type);
+  std::int32_t read_point_index(const NumberType& type);
   void check_tets() const;
   MeshFile result() const;
 
@@ -107,7 +107,7 @@ void VtkReader::read_section(const Words& words) {
 void VtkReader::read_points(const Words& words) {
   if (!points_.empty()) cursor_.fail("POINTS once", "a second time");
   const std::uint64_t count = cursor_.number(words[1], "points");
-  const VtkType type = cursor_.type(words[2]);
+  const NumberType type = cursor_.type(words[2]);
   cursor_.check_values(count, type, "points");
   cursor_.check_values(3 * count, type, "coordinates");
   for (std::uint64_t k = 0; k < count; ++k) {
@@ -125,7 +125,7 @@ void VtkReader::read_cells(const Words& words) {
   has_offsets_ ? read_offsets(count, size) : read_rows(count, size);
 }
 
-std::int32_t VtkReader::read_point_index(const VtkType& type) {
+std::int32_t VtkReader::read_point_index(const NumberType& type) {
   const auto count = static_cast<std::int64_t>(points_.size());
   const std::string expected = fmt::format("a point from 0 to {}", count - 1);
   const std::int64_t index = cursor_.read_integer_of(type, expected);
@@ -135,7 +135,7 @@ std::int32_t VtkReader::read_point_index(const VtkType& type) {
 
 // Rows of a number of corners and these, as before version 5.
 void VtkReader::read_rows(std::uint64_t cells, std::uint64_t size) {
-  const VtkType type = cursor_.type("int");
+  const NumberType type = cursor_.type("int");
   cursor_.check_values(cells, type, "cells");
   cursor_.check_values(size, type, "values of cells");
   for (std::uint64_t cell = 0; cell < cells; ++cell) {
@@ -155,7 +155,7 @@ void VtkReader::read_rows(std::uint64_t cells, std::uint64_t size) {
 void VtkReader::read_offsets(std::uint64_t offsets, std::uint64_t size) {
   Words words = cursor_.read_keywords();
   if (words[0] != "OFFSETS") cursor_.fail("OFFSETS after CELLS", quote(words[0]));
-  const VtkType offset_type = cursor_.type(words[1]);
+  const NumberType offset_type = cursor_.type(words[1]);
   cursor_.check_values(offsets, offset_type, "offsets of cells");
   std::int64_t last = 0;
   for (std::uint64_t k = 0; k < offsets; ++k) {
@@ -171,7 +171,7 @@ void VtkReader::read_offsets(std::uint64_t offsets, std::uint64_t size) {
     cursor_.fail(fmt::format("{}, the last offset", size), fmt::format("{}", last));
   words = cursor_.read_keywords();
   if (words[0] != "CONNECTIVITY") cursor_.fail("CONNECTIVITY after OFFSETS", quote(words[0]));
-  const VtkType type = cursor_.type(words[1]);
+  const NumberType type = cursor_.type(words[1]);
   cursor_.check_values(size, type, "points of cells");
   for (std::uint64_t k = 0; k < size; ++k) corners_.push_back(read_point_index(type));
 }
@@ -206,7 +206,7 @@ bool VtkReader::read_attribute(const Words& words) {
     read_array(words[1], components, attribute_count_, cursor_.type(words[2]));
     return true;
   }
-  const VtkType colours = cursor_.type(cursor_.is_binary() ? "unsigned_char" : "float");
+  const NumberType colours = cursor_.type(cursor_.is_binary() ? "unsigned_char" : "float");
   if (keyword == "LOOKUP_TABLE") {
     read_array(words[1], 4, cursor_.number(words[2], "colours"), colours);
   } else if (keyword == "COLOR_SCALARS") {
@@ -230,7 +230,8 @@ void VtkReader::read_field(const Words& words) {
 }
 
 // Keeps integers of cells, one each.
-void VtkReader::read_array(std::string_view name, std::uint64_t components, std::uint64_t tuples, const VtkType& type) {
+void VtkReader::read_array(std::string_view name, std::uint64_t components, std::uint64_t tuples,
+                           const NumberType& type) {
   if (components > kMostComponents)
     cursor_.fail(fmt::format("at most {} components", kMostComponents), fmt::format("{}", components));
   cursor_.check_values(tuples, type, "values");

@@ -102,8 +102,8 @@ TEST_P(EachFlavour, IsRefusedAtEveryTruncation) {
       EXPECT_FALSE(error.complaint().expected.empty());
     }
   }
-  // A .msh or a .mesh without its last line end is whole; a .veg may end after any section that follows the tets, a .vtk
-  // before and after each of its data, with and without a line end, and after the lines that begin them.
+  // A .msh or a .mesh without its last line end is whole; a .veg may end after any section that follows the tets, a
+  // .vtk before and after each of its data, with and without a line end, and after the lines that begin them.
   const std::map<std::string, std::size_t> optional{
       {".msh", 1}, {".mesh", 1}, {".veg", whole.size() - whole.find("*SET") + 2}, {".vtk", 7}};
   const std::size_t optional_bytes = optional.at(GetParam().extension);

@@ -1,0 +1,12 @@
+#pragma once
+
+#include "precompute/mesh_io/surface_file.h"
+
+namespace exmat::precompute {
+
+/// Reads the vertices and faces of a Wavefront .obj file (paulbourke.net/dataformats/obj). Indices count from 1, or
+/// backwards from the last vertex before them where they are negative; those of textures and normals, and all other
+/// statements are left out. Throws InputError with file, line, expected and found.
+SurfaceMesh read_obj(const std::filesystem::path& file);
+
+}  // namespace exmat::precompute

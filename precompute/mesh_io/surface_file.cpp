@@ -1,0 +1,23 @@
+#include "precompute/mesh_io/surface_file.h"
+
+#include "common/core/error.h"
+#include "precompute/mesh_io/obj_reader.h"
+#include "precompute/mesh_io/ply_reader.h"
+#include "precompute/mesh_io/text_input.h"
+
+namespace exmat::precompute {
+
+SurfaceMesh read_surface(const std::filesystem::path& file) {
+  const std::string extension = file.extension().string();
+  if (extension == ".obj") return read_obj(file);
+  if (extension == ".ply") return read_ply(file);
+  throw InputError({file.string(), "", "a surface with the extension .obj or .ply",
+                    extension.empty() ? "no extension" : quote(extension), ""});
+}
+
+void add_fan(const std::vector<std::int32_t>& polygon, std::vector<std::array<std::int32_t, 3>>& triangles) {
+  for (std::size_t corner = 2; corner < polygon.size(); ++corner)
+    triangles.push_back({polygon[0], polygon[corner - 1], polygon[corner]});
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,34 @@
+#include "precompute/render/embedding.h"
+
+#include <fmt/format.h>
+
+#include "common/core/log.h"
+#include "common/mesh/geometry.h"
+
+namespace exmat::precompute {
+namespace {
+
+// Affine coordinates of a point, 1 at each of its tet's corners in turn: 1/4 at the middle, linear from there.
+Eigen::RowVector4d affine_coordinates(const TetMesh& mesh, Eigen::Index tet, const Eigen::Vector3d& point) {
+  const Eigen::Matrix<double, 4, 3> corners = tet_positions(mesh, tet);
+  const Eigen::Vector3d middle = corners.colwise().mean();
+  return (shape_gradients(corners) * (point - middle)).transpose().array() + 0.25;
+}
+
+}  // namespace
+
+Embedding embed_points(const TetMesh& mesh, const VertexArray& points, const std::string& name) {
+  Embedding embedding{nearest_points(mesh, points)};
+  auto& [tets, weights, distances] = embedding.points;
+  for (Eigen::Index k = 0; k < points.rows(); ++k)
+    weights.row(k) = affine_coordinates(mesh, tets[k], points.row(k).transpose());
+  if (points.rows() == 0) return embedding;
+  embedding.outside = (distances.array() > kOnSurface * bounding_box_diagonal(mesh.vertices)).count();
+  embedding.farthest = distances.maxCoeff();
+  if (embedding.outside > 0)
+    log::info(fmt::format("{}: {} of {} points are outside the body, by up to {:.3g} m; they move with the nearest tet",
+                          name, embedding.outside, points.rows(), embedding.farthest));
+  return embedding;
+}
+
+}  // namespace exmat::precompute
