@@ -20,7 +20,7 @@ constexpr std::size_t kWholeBasisAbove = 8;
 ReducedModel read_rest(const Source& source, bool basis) {
   const std::string reason = "points are asked for";
   const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
-  ReducedModel data = read_bundle(source.bundle, {groups, /*step_only=*/true, /*positions=*/true});
+  ReducedModel data = read_bundle(source.bundle, {.groups = groups, .step_only = true, .positions = true});
   const BundleSummary& summary = source.loaded.summary;
   if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
     throw InputError({source.bundle.string(), "/", "the bundle that the model was created from", "another one",
