@@ -236,7 +236,7 @@ void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
 
 FullSpaceReport Stepper::run() {
   const auto& settings = scene_.examples;
-  const bool linear = settings && (settings->stiffness > 0 || settings->damping > 0);
+  const bool linear = settings && runtime::acts(*settings);
   examples_ = model_.examples && settings && (linear || scene_.example_elasticity > 0);
   terms_.examples = examples_ && scene_.example_elasticity == 0;
   gather_external_force();

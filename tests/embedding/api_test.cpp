@@ -114,6 +114,35 @@ TEST_F(ApiTest, StepsAreThoseOfTheLibraryBitForBit) {
   }
 }
 
+TEST_F(ApiTest, RegionsHaveWeightsOfTheirOwn) {
+  test::Bar bar = test::make_bar({.examples = 3});
+  RegionData& region = bar.model.regions.emplace_back();
+  region.name = "outer";
+  region.vertices = IndexVector::Constant(1, 5);
+  region.examples = *bar.model.examples;
+  region.projection = *bar.model.projection;
+  write_bundle(bar.model, files_.bundle());
+  const std::string scene = files_.scene(R"("regions": [{"name": "outer", "stiffness": 100, "bias": 0.5}])");
+  Reference reference(scene);
+  const Model model = Model::from_scene(scene);
+  EXPECT_EQ(model.examples(), 0u);
+  ASSERT_EQ(model.regions(), 1u);
+  EXPECT_EQ(model.region_examples(0), 3u);
+  EXPECT_EQ(model.region_name(0), "outer");
+  EXPECT_EQ(exmat_model_region_examples(model.get(), 1), -1);
+  EXPECT_EQ(exmat_model_region_name(model.get(), -1), nullptr);
+  Body body(model);
+  body.step(5);
+  reference.step(5);
+  Eigen::VectorXd weights(3);
+  body.read_region_weights(0, span_of(weights));
+  EXPECT_EQ(weights, reference.state.examples.front().weights);
+  EXPECT_LE(weights[0], 0.5);
+  EXPECT_EQ(exmat_body_region_weights(body.get(), 1, weights.data(), 3), EXMAT_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(exmat_last_error()).find("region = 1: expected one of the model's 1"), std::string::npos);
+  EXPECT_EQ(exmat_body_region_weights(body.get(), 0, weights.data(), 2), EXMAT_INVALID_ARGUMENT);
+}
+
 TEST_F(ApiTest, FreeBodiesArePlacedPushedAndRead) {
   const test::Bar bar = test::make_bar({.free = true, .examples = 3});
   write_bundle(bar.model, files_.bundle());

@@ -74,6 +74,14 @@ class Model {
   std::size_t modes() const noexcept { return static_cast<std::size_t>(exmat_model_modes(get())); }
   std::size_t vertices() const noexcept { return static_cast<std::size_t>(exmat_model_vertices(get())); }
   std::size_t examples() const noexcept { return static_cast<std::size_t>(exmat_model_examples(get())); }
+  std::size_t regions() const noexcept { return static_cast<std::size_t>(exmat_model_regions(get())); }
+  /// Of region < regions().
+  std::size_t region_examples(std::size_t region) const noexcept {
+    return static_cast<std::size_t>(exmat_model_region_examples(get(), static_cast<std::int64_t>(region)));
+  }
+  std::string region_name(std::size_t region) const {
+    return exmat_model_region_name(get(), static_cast<std::int64_t>(region));
+  }
   double time_step() const noexcept { return exmat_model_time_step(get()); }
 
   const exmat_model* get() const noexcept { return handle_.get(); }
@@ -176,6 +184,11 @@ class Body {
   /// `weights` [K].
   void read_weights(std::span<double> weights) const {
     detail::check(exmat_body_weights(get(), weights.data(), detail::length(weights)));
+  }
+  /// `weights` [K of the region].
+  void read_region_weights(std::size_t region, std::span<double> weights) const {
+    const auto index = static_cast<std::int64_t>(region);
+    detail::check(exmat_body_region_weights(get(), index, weights.data(), detail::length(weights)));
   }
   exmat_energies energies() const {
     exmat_energies energies;

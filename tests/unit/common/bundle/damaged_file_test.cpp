@@ -32,9 +32,16 @@ std::string fault_of(const std::filesystem::path& file) {
   return "";
 }
 
+// One region, without targets: each dataset more is a few thousand bytes that are damaged one by one.
+ReducedModel least_model(bool constrained) {
+  ReducedModel model = small_model(constrained);
+  model.regions.erase(model.regions.begin());
+  return model;
+}
+
 TEST(CutShort, IsRefusedAtEachLength) {
   const TemporaryFolder folder;
-  write_bundle(small_model(true), folder / "a.h5");
+  write_bundle(least_model(true), folder / "a.h5");
   const std::string content = read_file(folder / "a.h5");
   const auto file = folder / "short.h5";
   write_file(file, content);
@@ -76,11 +83,11 @@ std::vector<ByteRange> data_ranges(const std::filesystem::path& path) {
 
 TEST(FlippedBit, InDataIsFoundAndTheDatasetNamed) {
   const TemporaryFolder folder;
-  write_bundle(small_model(false), folder / "a.h5");
+  write_bundle(least_model(false), folder / "a.h5");
   std::string content = read_file(folder / "a.h5");
   const auto ranges = data_ranges(folder / "a.h5");
-  // All of the schema's; the three of an example three times, in a second region twice; that region has no targets.
-  ASSERT_EQ(ranges.size(), bundle_schema().datasets.size() + 2 * 3 + 2 * 3 + (1 + 2 * 3 + 3 + 3));
+  // All of the schema's; the three of an example three times, in the region twice; that has no targets.
+  ASSERT_EQ(ranges.size(), bundle_schema().datasets.size() + 2 * 3 + 3 - 3);
   for (const auto& [dataset, begin, end] : ranges)
     for (std::size_t at = begin; at < end; ++at) {
       const auto flip = [&] { content[at] = static_cast<char>(content[at] ^ (1 << (at % 8))); };
@@ -95,9 +102,9 @@ TEST(FlippedBit, InDataIsFoundAndTheDatasetNamed) {
 
 // A stride without common factors with the format's alignment visits all kinds of places.
 TEST(FlippedByte, AnywhereIsRefusedOrHarmless) {
-  constexpr std::size_t kStride = 13;
+  constexpr std::size_t kStride = 29;
   const TemporaryFolder folder;
-  write_bundle(small_model(false), folder / "a.h5");
+  write_bundle(least_model(false), folder / "a.h5");
   std::string content = read_file(folder / "a.h5");
   std::size_t refused = 0;
   for (std::size_t at = 0; at < content.size(); at += kStride) {
