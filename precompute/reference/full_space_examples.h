@@ -10,8 +10,8 @@
 
 namespace exmat::precompute {
 
-/// [f x 3m] displacements that changes of descriptor stand for, by whole_body_poses() from what a bundle holds; of a free
-/// body without their rigid part.
+/// [f x 3m] displacements that changes of descriptor stand for, by whole_body_poses() from what a bundle holds; of a
+/// free body without their rigid part.
 Eigen::MatrixXd example_fields(const ReducedModel& model, const ElasticSystem& system);
 
 /// Example forces without a modal basis, of which those of method.md, section 5, are the Galerkin projection: with the
