@@ -11,6 +11,8 @@
 #include "common/core/version.h"
 #include "precompute/pipeline/build_model.h"
 #include "precompute/solvers/semidefinite_solver.h"
+#include "precompute/study/report.h"
+#include "precompute/study/study.h"
 
 namespace {
 
@@ -22,6 +24,9 @@ struct Options {
   std::string bundle;
   std::string scene;
   std::string alignment_report;
+  std::string study, folder;
+  std::optional<double> budget_us, max_error;
+  int jobs = 1;
 };
 
 void print_stages(const precompute::BuildReport& report) {
@@ -93,6 +98,31 @@ void check(const Options& options) {
   fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
 }
 
+void print_front(const precompute::StudyResult& result) {
+  fmt::print("\n{:>5}{:>12}{:>12}{:>12}  {}\n", "point", "error [%]", "step [us]", "p95 [us]", "front");
+  for (const std::size_t i : result.front) {
+    const precompute::PointResult& point = result.points[i];
+    fmt::print("{:>5}{:>12.3f}{:>12.2f}{:>12.2f}  {}\n", i + 1, 100 * point.errors.position.mean,
+               1e6 * point.times->median, 1e6 * point.times->p95, precompute::describe(point.settings));
+  }
+}
+
+void study(const Options& options) {
+  precompute::StudyOptions how{.folder = options.folder, .jobs = options.jobs, .budget = {}};
+  if (options.budget_us) how.budget.seconds = 1e-6 * *options.budget_us;
+  if (options.max_error) how.budget.error = 1e-2 * *options.max_error;
+  const precompute::StudyResult result = precompute::run_study(precompute::load_study(options.study), how);
+  fmt::print("{}: {} points; {}\n", result.config.name, result.points.size(),
+             (std::filesystem::path(options.folder) / "report.html").string());
+  print_front(result);
+  const std::string recommendation = precompute::recommendation_text(result);
+  if (result.recommended) fmt::print("\n{}\n", recommendation);
+  if (const std::size_t failed = result.failures(); failed > 0)
+    throw WorkError(fmt::format("{}: {} of {} points or their baseline failed; see the report", options.study, failed,
+                                result.points.size()));
+  if (!recommendation.empty() && !result.recommended) throw WorkError(recommendation);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -115,9 +145,27 @@ int main(int argc, char** argv) {
     command->add_option("--alignment-report", options.alignment_report,
                         "folder to write each transferred pose beside its example into (.vtk and .svg)");
 
+  auto* study_command = app.add_subcommand(
+      "study", "measure a scene's error against run time over sweeps of settings, by the full space");
+  study_command->add_option("STUDY", options.study, "study file (JSON)")->required();
+  study_command
+      ->add_option("-o,--output", options.folder,
+                   "folder for report.html, results.csv, results.json and what a resumed study needs")
+      ->required();
+  study_command
+      ->add_option("--budget-us", options.budget_us, "recommend the most accurate point of at most so many us a step")
+      ->check(CLI::PositiveNumber);
+  study_command
+      ->add_option("--max-error", options.max_error, "recommend the fastest point of at most so many percent of error")
+      ->check(CLI::PositiveNumber);
+  study_command->add_option("--jobs", options.jobs, "processes that run points; times are measured by one")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+
   return run_program(app, argc, argv, [&] {
     apply(options.common);
     if (bundle_command->parsed()) bundle(options);
     if (check_command->parsed()) check(options);
+    if (study_command->parsed()) study(options);
   });
 }
