@@ -67,25 +67,32 @@ PointResult point_from(const Ordered& json) {
 
 std::string checksum(const Ordered& content) { return hash_inputs({}, content.dump()); }
 
+// Clocks count nanoseconds: written as such, times are read as they were.
+double microseconds(double seconds) { return static_cast<double>(std::llround(1e9 * seconds)) / 1e3; }
+double seconds(const Ordered& microseconds) {
+  return static_cast<double>(std::llround(1e3 * microseconds.get<double>())) / 1e9;
+}
+
 }  // namespace
 
 Ordered to_json(const StepTimes& times) {
   Ordered stages = Ordered::object();
-  for (std::size_t i = 0; i < kTimedStages.size(); ++i) stages[std::string(kTimedStages[i])] = 1e6 * times.stages[i];
-  return {{"median_us", 1e6 * times.median},
-          {"p95_us", 1e6 * times.p95},
-          {"interp_us", 1e6 * times.interpolation},
+  for (std::size_t i = 0; i < kTimedStages.size(); ++i)
+    stages[std::string(kTimedStages[i])] = microseconds(times.stages[i]);
+  return {{"median_us", microseconds(times.median)},
+          {"p95_us", microseconds(times.p95)},
+          {"interp_us", microseconds(times.interpolation)},
           {"stages_median_us", stages},
           {"steps", times.steps}};
 }
 
 StepTimes times_from_json(const Ordered& json) {
   StepTimes times;
-  times.median = 1e-6 * json.at("median_us").get<double>();
-  times.p95 = 1e-6 * json.at("p95_us").get<double>();
-  times.interpolation = 1e-6 * json.at("interp_us").get<double>();
+  times.median = seconds(json.at("median_us"));
+  times.p95 = seconds(json.at("p95_us"));
+  times.interpolation = seconds(json.at("interp_us"));
   for (std::size_t i = 0; i < kTimedStages.size(); ++i)
-    times.stages[i] = 1e-6 * json.at("stages_median_us").at(std::string(kTimedStages[i])).get<double>();
+    times.stages[i] = seconds(json.at("stages_median_us").at(std::string(kTimedStages[i])));
   times.steps = json.at("steps").get<std::int64_t>();
   return times;
 }

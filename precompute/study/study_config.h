@@ -10,14 +10,14 @@ namespace exmat::precompute {
 
 /// Lists of settings; an empty one stands for the asset's or the scene's own.
 struct SweepConfig {
-  std::vector<int> eigenfunctions;          ///< m
-  std::vector<int> basis_size;              ///< r
-  std::vector<int> cubature_elements;       ///< s
-  std::vector<std::string> material;        ///< names of MaterialModel
-  std::vector<double> time_step;            ///< [s]
-  std::vector<std::string> integrator;      ///< "bdf2", "backward_euler", "newmark"
-  std::vector<std::string> internal_force;  ///< "cubature", "polynomial", "all_elements"
-  std::vector<std::string> target;          ///< "table", "solve"
+  std::vector<int> eigenfunctions{};          ///< m
+  std::vector<int> basis_size{};              ///< r
+  std::vector<int> cubature_elements{};       ///< s
+  std::vector<std::string> material{};        ///< names of MaterialModel
+  std::vector<double> time_step{};            ///< [s]
+  std::vector<std::string> integrator{};      ///< "bdf2", "backward_euler", "newmark"
+  std::vector<std::string> internal_force{};  ///< "cubature", "polynomial", "all_elements"
+  std::vector<std::string> target{};          ///< "table", "solve"
 };
 
 /// How the full space is integrated; absent: as the point.

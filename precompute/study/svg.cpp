@@ -5,9 +5,8 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
-#include <limits>
+#include <initializer_list>
 #include <map>
-#include <numeric>
 #include <utility>
 
 namespace exmat::precompute {
@@ -153,7 +152,7 @@ std::string legend(const Plot& plot) {
 
 // Of a picture of bodies [px].
 constexpr double kPanel = 300, kMargin = 10;
-constexpr std::size_t kShades = 8, kSlices = 48;
+constexpr int kShades = 8, kSlices = 24;
 
 // Rows right, up, towards the viewer, who looks down at a corner.
 Eigen::Matrix3d view(const Eigen::Vector3d& up) {
@@ -166,25 +165,49 @@ Eigen::Matrix3d view(const Eigen::Vector3d& up) {
   return rows;
 }
 
+// Numbers of path data, with a blank only where it is needed.
+std::string path_numbers(std::initializer_list<int> numbers) {
+  std::string text;
+  for (const int number : numbers) {
+    if (!text.empty() && number >= 0) text += ' ';
+    text += std::to_string(number);
+  }
+  return text;
+}
+
+// Triangles of one look, each from the first corner of the one before.
+struct Triangles {
+  std::string path = "M0 0";
+  Eigen::Vector2i last = Eigen::Vector2i::Zero();
+
+  void add(const Eigen::Vector2i& p, const Eigen::Vector2i& q, const Eigen::Vector2i& r) {
+    const Eigen::Vector2i move = p - last, first = q - p, second = r - q;
+    path +=
+        "m" + path_numbers({move[0], move[1]}) + "l" + path_numbers({first[0], first[1], second[0], second[1]}) + "z";
+    last = p;
+  }
+};
+
 // The faces turned to the viewer, in slices from the farthest on, those of a shade together: many fewer bytes than one
 // by one, and hidden by their neighbours alike.
 std::string panel(const TriangleArray& surface, const VertexArray& points, double depth_low, double depth_high) {
-  std::map<std::pair<std::size_t, std::size_t>, std::string> paths;
+  std::map<std::pair<int, int>, Triangles> looks;
   for (const auto& triangle : surface.rowwise()) {
     const Eigen::Vector3d a = points.row(triangle[0]), b = points.row(triangle[1]), c = points.row(triangle[2]);
     const Eigen::Vector3d normal = (b - a).cross(c - a);
     if (normal[2] <= 0) continue;
     const double slope = normal[2] / normal.norm(), depth = (a + b + c)[2] / 3;
     const double share = (depth - depth_low) / std::max(depth_high - depth_low, 1e-300);
-    const auto slice = static_cast<std::size_t>(std::clamp(share, 0.0, 0.999) * kSlices);
-    const auto shade = static_cast<std::size_t>(std::min(slope, 0.999) * kShades);
     const auto pixel = [](const Eigen::Vector3d& x) { return Eigen::Vector2i(std::lround(x[0]), std::lround(-x[1])); };
-    const Eigen::Vector2i p = pixel(a), q = pixel(b) - p, r = pixel(c) - pixel(b);
-    if (q[0] * r[1] == q[1] * r[0]) continue;  // nothing to be seen
-    paths[{slice, shade}] += fmt::format("M{} {}l{} {} {} {}z", p[0], p[1], q[0], q[1], r[0], r[1]);
+    const Eigen::Vector2i p = pixel(a), q = pixel(b), r = pixel(c);
+    if ((q - p)[0] * (r - q)[1] == (q - p)[1] * (r - q)[0]) continue;  // nothing to be seen
+    looks[{static_cast<int>(std::clamp(share, 0.0, 0.999) * kSlices),
+           static_cast<int>(std::min(slope, 0.999) * kShades)}]
+        .add(p, q, r);
   }
   std::string svg;
-  for (const auto& [place, path] : paths) svg += fmt::format("<path class=\"s{}\" d=\"{}\"/>\n", place.second, path);
+  for (const auto& [look, triangles] : looks)
+    svg += fmt::format("<path class=\"s{}\" d=\"{}\"/>\n", look.second, triangles.path);
   return svg;
 }
 

@@ -64,10 +64,14 @@ TEST(Choose, IsTheBestThatMeetsTheBudgetByBruteForce) {
     const auto fast = choose(outcomes, {.seconds = {}, .error = limit});
     ASSERT_EQ(accurate.has_value(), least_error < 100);
     ASSERT_EQ(fast.has_value(), least_seconds < 100);
-    if (accurate) EXPECT_EQ(outcomes[*accurate].error, least_error);
-    if (accurate) EXPECT_LE(outcomes[*accurate].seconds, limit);
-    if (fast) EXPECT_EQ(outcomes[*fast].seconds, least_seconds);
-    if (fast) EXPECT_LE(outcomes[*fast].error, limit);
+    if (accurate) {
+      EXPECT_EQ(outcomes[*accurate].error, least_error);
+      EXPECT_LE(outcomes[*accurate].seconds, limit);
+    }
+    if (fast) {
+      EXPECT_EQ(outcomes[*fast].seconds, least_seconds);
+      EXPECT_LE(outcomes[*fast].error, limit);
+    }
   }
 }
 
