@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "precompute/pipeline/markup.h"
 #include "precompute/study/svg.h"
 
 namespace exmat::precompute {
@@ -136,7 +137,7 @@ struct Varying {
             s.material,
             fmt::format("{:g} ms", 1e3 * s.time_step),
             s.integrator,
-            s.internal_force,
+            s.internal_force == kAllElements ? "cubature" : s.internal_force,
             s.target};
   }
   std::vector<std::set<std::string>> values_;
@@ -263,10 +264,11 @@ std::string points_table(const StudyResult& result) {
 
 std::string references_table(const StudyResult& result) {
   std::string html = "<h2>Full space</h2>\n<div class=\"wide\"><table>\n" +
-                     header({"material", "dt [ms]", "integrator", "steps", "step, median [ms]", "Newton",
+                     header({"m", "material", "dt [ms]", "integrator", "steps", "step, median [ms]", "Newton",
                              "factorisations", "above tolerance"});
   for (const ReferenceResult& r : result.references) {
-    html += "<tr>" + cell(r.material, " class=\"l\"") + cell(fmt::format("{:g}", 1e3 * r.time_step)) +
+    html += "<tr>" + cell(r.eigenfunctions > 0 ? std::to_string(r.eigenfunctions) : "-") +
+            cell(r.material, " class=\"l\"") + cell(fmt::format("{:g}", 1e3 * r.time_step)) +
             cell(r.integrator, " class=\"l\"");
     if (!r.failure.empty()) {
       html += fmt::format("<td class=\"l bad\" colspan=\"5\">{}</td></tr>\n", escaped(r.failure));

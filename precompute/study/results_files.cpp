@@ -87,6 +87,7 @@ std::vector<Column> columns() {
 
 Ordered to_json(const ReferenceResult& reference) {
   return {{"key", reference.key},
+          {"eigenfunctions", reference.eigenfunctions},
           {"material", reference.material},
           {"time_step", reference.time_step},
           {"integrator", reference.integrator},

@@ -41,6 +41,7 @@ struct BundlePlan {
 struct ReferencePlan {
   std::string key, bundle;
   SceneConfig scene;
+  int eigenfunctions = 0;
   std::string material, failure;
 };
 
@@ -195,7 +196,8 @@ std::size_t Study::plan_reference(const PointSettings& settings, std::size_t bun
   const std::string key = key_of(identity);
   const auto found = std::ranges::find(references_, key, &ReferencePlan::key);
   if (found != references_.end()) return static_cast<std::size_t>(found - references_.begin());
-  references_.push_back({key, bundles_[bundle].key, with_settings(scene_, own), own.material, ""});
+  references_.push_back({key, bundles_[bundle].key, with_settings(scene_, own),
+                         result_.has_examples ? own.eigenfunctions : 0, own.material, ""});
   return references_.size() - 1;
 }
 
@@ -390,6 +392,7 @@ PointResult Study::result_of(const PointPlan& plan) const {
 ReferenceResult Study::result_of(const ReferencePlan& plan) const {
   ReferenceResult result;
   result.key = plan.key;
+  result.eigenfunctions = plan.eigenfunctions;
   result.time_step = plan.scene.time_step;
   result.integrator = plan.scene.integrator;
   result.material = plan.material;

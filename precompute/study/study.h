@@ -20,7 +20,8 @@ struct StudyOptions {
 /// One full-space run that points are measured against.
 struct ReferenceResult {
   std::string key;
-  double time_step = 0;  ///< [s]
+  int eigenfunctions = 0;  ///< of its examples; 0: none
+  double time_step = 0;    ///< [s]
   std::string integrator, material, failure;
   std::int64_t steps = 0, unconverged_steps = 0;
   double newton_iterations = 0, factorisations = 0, step_seconds = 0;  ///< means; median, of one run

@@ -9,6 +9,8 @@
 #include <map>
 #include <utility>
 
+#include "precompute/pipeline/markup.h"
+
 namespace exmat::precompute {
 namespace {
 
@@ -17,7 +19,7 @@ constexpr std::array<const char*, 8> kPalette{"#4477aa", "#ee6677", "#228833", "
                                               "#33aacc", "#aa3377", "#888888", "#ee8833"};
 
 // Of a plot [px].
-constexpr double kWidth = 720, kHeight = 360, kLeft = 66, kRight = 190, kTop = 30, kBottom = 46;
+constexpr double kWidth = 860, kHeight = 380, kLeft = 66, kRight = 300, kTop = 30, kBottom = 46;
 
 const char* colour_of(int colour) {
   return colour < 0 ? "currentColor" : kPalette[static_cast<std::size_t>(colour) % kPalette.size()];
@@ -212,23 +214,6 @@ std::string panel(const TriangleArray& surface, const VertexArray& points, doubl
 }
 
 }  // namespace
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    if (c == '<')
-      result += "&lt;";
-    else if (c == '>')
-      result += "&gt;";
-    else if (c == '&')
-      result += "&amp;";
-    else if (c == '"')
-      result += "&quot;";
-    else
-      result += c;
-  }
-  return result;
-}
 
 std::string plot_svg(const Plot& plot) {
   std::vector<double> xs, ys;

@@ -8,9 +8,6 @@
 
 namespace exmat::precompute {
 
-/// Text as it may stand in HTML and SVG.
-std::string escaped(const std::string& text);
-
 struct PlotPoint {
   double x = 0, y = 0;
   std::string label;  ///< shown where the pointer is

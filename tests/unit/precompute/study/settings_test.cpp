@@ -1,10 +1,12 @@
 #include "precompute/study/settings.h"
 
+#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/config/config.h"
 #include "common/core/error.h"
 
 namespace exmat::precompute {
@@ -136,6 +138,24 @@ TEST_F(Settings, RefusesTooManyPoints) {
     study_.sweeps[0].eigenfunctions[static_cast<std::size_t>(i)] =
         study_.sweeps[0].basis_size[static_cast<std::size_t>(i)] = i + 1;
   EXPECT_THROW(expanded(), InputError);
+}
+
+// The studies of the examples, with the files' own settings among their points.
+TEST(ExampleStudies, AreSound) {
+  const std::filesystem::path examples = EXMAT_SOURCE_DIR "/examples";
+  for (const char* file : {"03_car_wall/study.json", "04_bar_cuboid/study.json", "05_bar_cylinder/study.json",
+                           "06_cross/study.json", "07_teddy_global/study.json", "08_teddy_local/study.json",
+                           "reduction/bar_study.json", "reduction/cross_study.json"}) {
+    const StudyConfig study = load_study(examples / file);
+    const AssetConfig asset = load_asset(study.asset);
+    const SceneConfig scene = load_scene(study.scene);
+    const auto points = expand(study, asset, scene);
+    EXPECT_GE(points.size(), 6U) << file;
+    EXPECT_TRUE(std::ranges::any_of(points, [](const PointSettings& p) { return p.internal_force == kAllElements; }));
+    PointSettings own = own_settings(asset, scene);
+    if (own.target == "auto") own.target = "table";
+    EXPECT_NE(std::ranges::find(points, own), points.end()) << file;
+  }
 }
 
 }  // namespace
