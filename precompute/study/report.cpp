@@ -123,15 +123,16 @@ struct Varying {
       for (std::size_t i = 0; i < names.size(); ++i) values_[i].insert(names[i]);
     }
   }
-  std::string name(const PointSettings& settings) const {
+  std::string name(const PointSettings& settings, bool time_step = true) const {
     std::string text;
     const std::vector<std::string> names = texts(settings);
     for (std::size_t i = 0; i < names.size(); ++i)
-      if (values_[i].size() > 1) text += (text.empty() ? "" : ", ") + names[i];
+      if (values_[i].size() > 1 && (time_step || i != kTimeStep)) text += (text.empty() ? "" : ", ") + names[i];
     return text;
   }
 
  private:
+  static constexpr std::size_t kTimeStep = 2;
   static std::vector<std::string> texts(const PointSettings& s) {
     return {fmt::format("m {}", s.eigenfunctions),
             s.material,
@@ -198,9 +199,7 @@ std::string plots(const StudyResult& result) {
       result, "Error against the time step", "time step [ms]",
       [](const PointResult& p) { return 1e3 * p.settings.time_step; },
       [&](const PointResult& p) {
-        PointSettings other = p.settings;
-        other.time_step = 0;
-        return fmt::format("r {}, {}, {}", p.modes, name_of_elements(p), other.integrator);
+        return joined(fmt::format("r {}, {}", p.modes, name_of_elements(p)), varying.name(p.settings, false));
       },
       false);
   return html;

@@ -25,6 +25,8 @@ const char* colour_of(int colour) {
   return colour < 0 ? "currentColor" : kPalette[static_cast<std::size_t>(colour) % kPalette.size()];
 }
 
+constexpr double kFewDecades = 0.7;  // on an axis: evenly spaced numbers say more than 1, 2, 5
+
 // From values to pixels along one axis.
 class Axis {
  public:
@@ -42,7 +44,10 @@ class Axis {
   bool shows(double value) const { return std::isfinite(value) && (!logarithmic_ || value > 0); }
   double pixel(double value) const { return first_ + (mapped(value) - low_) / (high_ - low_) * (last_ - first_); }
 
-  std::vector<double> ticks() const { return logarithmic_ ? log_ticks() : linear_ticks(); }
+  std::vector<double> ticks() const {
+    if (!logarithmic_) return linear_ticks(low_, high_);
+    return high_ - low_ < kFewDecades ? linear_ticks(std::pow(10, low_), std::pow(10, high_)) : log_ticks();
+  }
 
  private:
   double mapped(double value) const { return logarithmic_ ? std::log10(value) : value; }
@@ -57,13 +62,13 @@ class Axis {
     return ticks;
   }
 
-  std::vector<double> linear_ticks() const {
-    const double rough = (high_ - low_) / 5, decade = std::pow(10, std::floor(std::log10(rough)));
+  static std::vector<double> linear_ticks(double low, double high) {
+    const double rough = (high - low) / 5, decade = std::pow(10, std::floor(std::log10(rough)));
     double step = decade;
     for (const double factor : {1.0, 2.0, 5.0, 10.0})
       if (factor * decade <= rough * 1.5) step = factor * decade;
     std::vector<double> ticks;
-    for (double at = std::ceil(low_ / step) * step; at <= high_; at += step)
+    for (double at = std::ceil(low / step) * step; at <= high; at += step)
       ticks.push_back(std::abs(at) < 1e-9 * step ? 0 : at);
     return ticks;
   }
