@@ -110,16 +110,17 @@ void compare(const SceneConfig& config, const ReducedModel& data, long steps) {
 }
 
 void baseline(const SceneConfig& config, const ReducedModel& data, long steps) {
-  const FullSpaceModel model =
-      precompute::build_full_space_model(data, {.targets = precompute::ExampleTargets::kSurface});
+  precompute::FullSpaceOptions options = precompute::full_space_options(config);
+  options.targets = precompute::ExampleTargets::kSurface;
+  const FullSpaceModel model = precompute::build_full_space_model(data, options);
   auto scene = precompute::full_space_scene(config, runtime::make_obstacles(config), model);
   scene.example_elasticity = 1;
   FullSpaceState state = precompute::full_space_start(config, model, Eigen::VectorXd::Zero(model.rest.size()));
   FullSpaceWorkspace workspace(model);
   Times times;
   for (long i = 0; i < steps; ++i) times.add(sound_step(model, scene, state, workspace));
-  fmt::print("{} vertices of the surface, d = {}\n", model.surface_targets->surface_vertices(),
-             model.examples->pose_basis().cols());
+  fmt::print("{} vertices of the surface, d = {}\n", model.surface_targets.front().surface_vertices(),
+             model.examples.front().pose_basis().cols());
   times.print("baseline");
 }
 
@@ -132,7 +133,7 @@ int run(int argc, char** argv) {
   const long steps = argc > 2 ? std::stol(argv[2]) : static_cast<long>(config.steps);
   const ReducedModel data = read_bundle(config.bundle);
   compare(config, data, steps);
-  if (config.examples) baseline(config, data, steps);
+  if (config.examples || !config.regions.empty()) baseline(config, data, steps);
   return 0;
 }
 
