@@ -18,7 +18,7 @@ from pathlib import Path
 
 FOLDERS = ("common", "precompute", "runtime")
 CHECKS = "-*,readability-identifier-naming"
-LARGEST_UNIT = 16
+LARGEST_UNIT = 32
 LOCAL_SCOPE = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.S | re.M)
 LOCAL_NAME = re.compile(r"^(?!\s|//).*?\b(\w+)\s*(?:\(|=|\{|;|\[)", re.M)
 
@@ -60,7 +60,7 @@ def check(root, flags, sources):
         (Path(folder) / ".clang-tidy").write_text((root / ".clang-tidy").read_text())
         unit = Path(folder) / "unit.cpp"
         unit.write_text("".join(f'#include "{source}"\n' for source in sources))
-        result = subprocess.run(["clang-tidy", "-quiet", f"--checks={CHECKS}", f"--header-filter=^{root}/({'|'.join(FOLDERS)})/", str(unit),
+        result = subprocess.run(["clang-tidy", "-quiet", f"--checks={CHECKS}", f"--header-filter=^{root}/({'|'.join(FOLDERS)})/.*[.](h|hpp|cpp)$", str(unit),
                                  "--", *flags], capture_output=True, text=True)
     if "[clang-diagnostic-error]" in result.stdout and len(sources) > 1:
         middle = len(sources) // 2
