@@ -19,9 +19,6 @@ namespace {
 constexpr double kTruncationWarning = 0.25;
 // Functions of the object looked through for how many would carry a pose.
 constexpr Eigen::Index kMostFunctions = 100;
-// Of the example force that a region's poses balance with, relative to the squared frequency of the highest linear
-// mode.
-constexpr double kRegionStiffness = 100;
 
 // The least number of the object's functions, no cluster cut, that loses at most the share worth a warning of a
 // displacement [3n]; 0 where kMostFunctions do not do.

@@ -11,6 +11,21 @@ namespace {
 
 VertexArray as_rows(const Eigen::VectorXd& field) { return field.reshaped<Eigen::RowMajor>(field.size() / 3, 3); }
 
+void add_examples(const ReducedModel& model, const FullSpaceOptions& options, FullSpaceModel& full) {
+  const auto add = [&](const ExamplePoses& poses, runtime::EnergyReference reference, const std::string& owner) {
+    const auto& added = full.examples.emplace_back(model, full.system, poses, reference);
+    if (const Eigen::Index left_out = added.left_out_tets(); left_out > 0)
+      log::warning(owner + ": the energies of the target leave out " + std::to_string(left_out) + " of " +
+                   std::to_string(model.object->mesh.tet_count()) + " tets, which an example turns inside out");
+  };
+  if (options.whole_body) add(whole_body_example_poses(model, full.system), options.energy_reference, model.asset_name);
+  std::vector<std::string> names;
+  for (const auto& region : options.regions) names.push_back(region.name);
+  const std::vector<ExamplePoses> poses = region_example_poses(model, full.system, names);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    add(poses[i], options.regions[i].energy_reference, model.asset_name + ", region " + names[i]);
+}
+
 }  // namespace
 
 FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options) {
@@ -27,11 +42,10 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpace
   if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
   if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
   if (options.targets == ExampleTargets::kNone) return full;
-  full.examples.emplace(model, full.system, example_fields(model, full.system), options.energy_reference);
-  if (const Eigen::Index left_out = full.examples->left_out_tets(); left_out > 0)
-    log::warning(model.asset_name + ": the energies of the target leave out " + std::to_string(left_out) + " of " +
-                 std::to_string(object.mesh.tet_count()) + " tets, which an example turns inside out");
-  if (options.targets == ExampleTargets::kSurface) full.surface_targets.emplace(object, full.system, *full.examples);
+  add_examples(model, options, full);
+  if (options.targets != ExampleTargets::kSurface) return full;
+  for (const FullSpaceExamples& examples : full.examples)
+    full.surface_targets.emplace_back(object, full.system, examples);
   return full;
 }
 
@@ -42,9 +56,9 @@ FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::V
   state.v = state.v_previous = model.system.restrict(velocity);
   state.a = state.applied_force = Eigen::VectorXd::Zero(model.size());
   state.elastic_energy = model.elasticity.energy(state.q);
-  if (!model.examples) return state;
-  state.examples.push_back(
-      {Eigen::VectorXd::Unit(model.examples->count(), 0), Eigen::VectorXd::Zero(model.examples->pose_basis().cols())});
+  for (const FullSpaceExamples& examples : model.examples)
+    state.examples.push_back(
+        {Eigen::VectorXd::Unit(examples.count(), 0), Eigen::VectorXd::Zero(examples.pose_basis().cols())});
   return state;
 }
 

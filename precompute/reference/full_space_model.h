@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "common/model/reduced_model.h"
 #include "precompute/fem/elastic_system.h"
@@ -18,15 +20,15 @@ namespace exmat::precompute {
 /// A body with all degrees of freedom of its mesh: what the reduced model of the same bundle is measured against.
 /// Immutable. n vertices, f free degrees of freedom (all 3n of a free body, which moves in the world by itself).
 struct FullSpaceModel {
-  VertexArray rest;                               ///< n x 3 [m]
-  ElasticSystem system;                           ///< consistent mass, f x f and 3n x 3n
-  MeshElasticity elasticity;                      ///< all tets
-  Eigen::VectorXd mass_values;                    ///< of the mass on the pattern of the stiffness [kg]
-  Eigen::MatrixXd gravity_load;                   ///< f x 3, force per unit acceleration along each axis [kg]
-  std::optional<FittedFrame> frame;               ///< of a free body
-  std::optional<VertexContacts> contacts;         ///< of a bundle with /contact
-  std::optional<FullSpaceExamples> examples;      ///< absent: built without
-  std::optional<SurfaceTargets> surface_targets;  ///< that take the place of the targets of `examples`
+  VertexArray rest;                             ///< n x 3 [m]
+  ElasticSystem system;                         ///< consistent mass, f x f and 3n x 3n
+  MeshElasticity elasticity;                    ///< all tets
+  Eigen::VectorXd mass_values;                  ///< of the mass on the pattern of the stiffness [kg]
+  Eigen::MatrixXd gravity_load;                 ///< f x 3, force per unit acceleration along each axis [kg]
+  std::optional<FittedFrame> frame;             ///< of a free body
+  std::optional<VertexContacts> contacts;       ///< of a bundle with /contact
+  std::vector<FullSpaceExamples> examples;      ///< of the whole body, if they are asked for, then of regions
+  std::vector<SurfaceTargets> surface_targets;  ///< that take the place of the targets of `examples`, or none
 
   Eigen::Index size() const { return elasticity.size(); }
 };
@@ -39,11 +41,17 @@ enum class ExampleTargets {
 
 struct FullSpaceOptions {
   ExampleTargets targets = ExampleTargets::kNone;
+  bool whole_body = true;                                                          ///< with targets: its examples
   runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;  ///< of kTets
+  struct Region {
+    std::string name{};
+    runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;
+  };
+  std::vector<Region> regions{};  ///< with targets: whose examples to have
 };
 
-/// From /object; /contact if it is there; with targets also /examples, /shape_space and /modal. Throws InputError where
-/// a group is missing.
+/// From /object; /contact if it is there; with targets also /examples or /regions, /shape_space and /modal. Throws
+/// InputError where a group is missing.
 FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options = {});
 
 /// A State of the run time, of a body without a frame of its own: q, v and a [f] are displacement from rest [m],

@@ -1,6 +1,7 @@
 #include "precompute/reference/full_space_stepper.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/core/timer.h"
 #include "precompute/reference/sparse_newton.h"
@@ -8,11 +9,12 @@
 namespace exmat::precompute {
 namespace {
 
+using runtime::ExampleState;
 using runtime::Integrator;
 using runtime::NewtonReport;
 using runtime::NewtonStatus;
 
-bool acts(const VertexForceConfig& force, double time) { return force.start <= time && time < force.end; }
+bool pushes(const VertexForceConfig& force, double time) { return force.start <= time && time < force.end; }
 
 // One step from its beginning to its end.
 class Stepper {
@@ -30,11 +32,13 @@ class Stepper {
   void set_form(Integrator integrator);
   void set_rate_centre(Integrator integrator);
   Eigen::VectorXd start_acceleration();
-  void update_target(const Eigen::VectorXd& q);
-  void start_target();
-  void solve_target();
-  void solve_surface_target();
-  void set_undeformed();
+  bool acts(std::size_t group) const;
+  void update_targets(const Eigen::VectorXd& q);
+  ExampleState next_target(std::size_t group, const Eigen::VectorXd& u);
+  Eigen::VectorXd start_target(std::size_t group, const Eigen::VectorXd& weights) const;
+  void solve_target(std::size_t group, ExampleState& examples);
+  void solve_surface_target(std::size_t group, ExampleState& examples);
+  const MeshElasticity* undeformed(std::size_t group, const Eigen::VectorXd& target);
   Eigen::VectorXd choose_first_iterate(StepPotential& potential);
   NewtonReport minimise(StepPotential& potential, Eigen::VectorXd& d);
   void add(const NewtonReport& newton);
@@ -47,15 +51,14 @@ class Stepper {
   FullSpaceReport report_;
   StepTerms terms_;
   VertexContacts::Step contacts_;
-  Eigen::VectorXd weights_, target_;  // K, d
-  bool examples_ = false, target_converged_ = false;
+  std::vector<ExampleState> examples_;  // at the end of the step, of those that act
 };
 
 void Stepper::gather_external_force() {
   const double midpoint = state_.time + 0.5 * scene_.time_step;
   Eigen::VectorXd forces = Eigen::VectorXd::Zero(3 * model_.rest.rows());
   for (const VertexForceConfig& force : scene_.forces)
-    if (acts(force, midpoint))
+    if (pushes(force, midpoint))
       for (const std::int64_t vertex : force.vertices) forces.segment<3>(3 * vertex) += force.force;
   terms_.external_force = model_.system.restrict(forces) + model_.gravity_load * scene_.gravity + state_.applied_force;
 }
@@ -64,7 +67,7 @@ void Stepper::gather_external_force() {
 bool Stepper::begins_anew() const {
   const double midpoint = state_.time + 0.5 * scene_.time_step;
   return state_.begins_anew || std::ranges::any_of(scene_.forces, [&](const VertexForceConfig& force) {
-           return acts(force, midpoint) != acts(force, midpoint - scene_.time_step);
+           return pushes(force, midpoint) != pushes(force, midpoint - scene_.time_step);
          });
 }
 
@@ -113,15 +116,16 @@ Eigen::VectorXd Stepper::start_acceleration() {
   const Eigen::VectorXd bending = start.to_frame(stiffness.selfadjointView<Eigen::Lower>() * start.to_world(rate));
   Eigen::VectorXd deforming = scene_.stiffness_damping * bending;
   deforming += scene_.mass_damping * (model_.system.mass * rate);
-  if (examples_) update_target(state_.q);
-  if (terms_.example_elasticity != nullptr) {
-    Eigen::VectorXd pull;
-    terms_.example_elasticity->force(state_.q - terms_.target, pull);
-    internal += scene_.example_elasticity * pull;
-  }
-  if (terms_.examples) {
-    deforming += model_.examples->filter(scene_.examples->stiffness * (start.u() - terms_.target) +
-                                         scene_.examples->damping * rate);
+  update_targets(state_.q);
+  for (const ExampleTerm& term : terms_.examples) {
+    if (term.elasticity != nullptr) {
+      Eigen::VectorXd pull;
+      term.elasticity->force(state_.q - term.target, pull);
+      internal += scene_.example_elasticity * pull;
+    } else {
+      deforming +=
+          term.examples->filter(term.settings->stiffness * (start.u() - term.target) + term.settings->damping * rate);
+    }
   }
   if (!workspace_.mass) {
     LowerTriangle mass = model_.elasticity.pattern();
@@ -131,54 +135,86 @@ Eigen::VectorXd Stepper::start_acceleration() {
   return workspace_.mass->solve(terms_.external_force - internal - start.force(deforming));
 }
 
-void Stepper::update_target(const Eigen::VectorXd& q) {
+bool Stepper::acts(std::size_t group) const {
+  return group < scene_.examples.size() && (runtime::acts(scene_.examples[group]) || scene_.example_elasticity > 0);
+}
+
+void Stepper::update_targets(const Eigen::VectorXd& q) {
   const Timer timer;
-  const FullSpaceExamples& examples = *model_.examples;
-  weights_ = examples.weights(Deformation(model_, q).u());
-  runtime::apply_example_bias(scene_.examples->bias, weights_);
-  const runtime::ExampleState& former = state_.examples.front();
-  target_ = former.target;
-  if (!former.has_target) start_target();
-  target_converged_ = former.has_target && former.target_converged && weights_ == former.weights;
-  if (!target_converged_) model_.surface_targets ? solve_surface_target() : solve_target();
-  if (!target_converged_) report_.status |= runtime::kTargetNotConverged;
-  terms_.target = (model_.surface_targets ? examples.pose_basis() : examples.target_fields()) * target_;
-  if (scene_.example_elasticity > 0) set_undeformed();
+  terms_.examples.clear();
+  report_.inverted_tets = 0;
+  examples_ = state_.examples;
+  std::optional<Deformation> deformation;
+  for (std::size_t group = 0; group < model_.examples.size(); ++group) {
+    if (!acts(group)) continue;
+    if (!deformation) deformation.emplace(model_, q);
+    const FullSpaceExamples& examples = model_.examples[group];
+    examples_[group] = next_target(group, deformation->u());
+    ExampleTerm& term = terms_.examples.emplace_back();
+    term.examples = &examples;
+    term.settings = &scene_.examples[group];
+    const bool surface = !model_.surface_targets.empty();
+    term.target = (surface ? examples.pose_basis() : examples.target_fields()) * examples_[group].target;
+    if (scene_.example_elasticity > 0) term.elasticity = undeformed(group, term.target);
+  }
   report_.target_seconds += timer.seconds();
 }
 
-// The blend of the examples.
-void Stepper::start_target() {
-  const FullSpaceExamples& examples = *model_.examples;
-  if (!model_.surface_targets) return examples.target().start(weights_, target_);
-  target_.setZero();
-  for (Eigen::Index k = 0; k < examples.count(); ++k) target_ += weights_[k] * examples.pose(k);
+ExampleState Stepper::next_target(std::size_t group, const Eigen::VectorXd& u) {
+  const ExampleState& former = state_.examples[group];
+  ExampleState next = former;
+  next.weights = model_.examples[group].weights(u);
+  runtime::apply_example_bias(scene_.examples[group].bias, next.weights);
+  if (!former.has_target) next.target = start_target(group, next.weights);
+  next.has_target = true;
+  next.target_converged = former.has_target && former.target_converged && next.weights == former.weights;
+  if (!next.target_converged)
+    model_.surface_targets.empty() ? solve_target(group, next) : solve_surface_target(group, next);
+  if (!next.target_converged) report_.status |= runtime::kTargetNotConverged;
+  return next;
 }
 
-void Stepper::solve_target() {
-  const runtime::TargetSolver& solver = model_.examples->target();
-  if (!workspace_.target) workspace_.target.emplace(solver.make_workspace());
-  const NewtonReport solved = solver.solve(weights_, *workspace_.target, target_);
+// The blend of the examples.
+Eigen::VectorXd Stepper::start_target(std::size_t group, const Eigen::VectorXd& weights) const {
+  const FullSpaceExamples& examples = model_.examples[group];
+  Eigen::VectorXd target = Eigen::VectorXd::Zero(examples.pose_basis().cols());
+  if (model_.surface_targets.empty()) {
+    examples.target().start(weights, target);
+    return target;
+  }
+  for (Eigen::Index k = 0; k < examples.count(); ++k) target += weights[k] * examples.pose(k);
+  return target;
+}
+
+void Stepper::solve_target(std::size_t group, ExampleState& examples) {
+  const runtime::TargetSolver& solver = model_.examples[group].target();
+  auto& scratch = workspace_.examples[group].target;
+  if (!scratch) scratch.emplace(solver.make_workspace());
+  const NewtonReport solved = solver.solve(examples.weights, *scratch, examples.target);
   report_.target_iterations += solved.iterations;
-  target_converged_ = solved.status != NewtonStatus::kIterationLimit;
+  examples.target_converged = solved.status != NewtonStatus::kIterationLimit;
   if (solved.status == NewtonStatus::kNonFinite) report_.status |= runtime::kStepNonFinite;
 }
 
-void Stepper::solve_surface_target() {
-  const MinimiserReport solved = model_.surface_targets->solve(weights_, target_);
+void Stepper::solve_surface_target(std::size_t group, ExampleState& examples) {
+  const MinimiserReport solved = model_.surface_targets[group].solve(examples.weights, examples.target);
   report_.target_iterations += solved.iterations;
   report_.target_evaluations += solved.evaluations;
-  target_converged_ = solved.converged;
-  if (!target_.allFinite()) report_.status |= runtime::kStepNonFinite;
+  examples.target_converged = solved.converged;
+  if (!examples.target.allFinite()) report_.status |= runtime::kStepNonFinite;
 }
 
-// The target as the undeformed shape.
-void Stepper::set_undeformed() {
-  if (!workspace_.example_elasticity) workspace_.example_elasticity = model_.elasticity;
-  const Eigen::VectorXd displacement = model_.system.extend(terms_.target);
+// The elasticity of which the target [f] is the undeformed shape.
+const MeshElasticity* Stepper::undeformed(std::size_t group, const Eigen::VectorXd& target) {
+  auto& elasticity = workspace_.examples[group].elasticity;
+  if (!elasticity) {
+    elasticity = model_.elasticity;
+    if (const auto inside = model_.examples[group].inside()) elasticity->restrict_to(*inside);
+  }
+  const Eigen::VectorXd displacement = model_.system.extend(target);
   const VertexArray shape = model_.rest + displacement.reshaped<Eigen::RowMajor>(model_.rest.rows(), 3);
-  report_.inverted_tets = workspace_.example_elasticity->set_undeformed(shape);
-  terms_.example_elasticity = &*workspace_.example_elasticity;
+  report_.inverted_tets += elasticity->set_undeformed(shape);
+  return &*elasticity;
 }
 
 // The step to the predictor q_n + dt v_n or none, whichever has the lower potential.
@@ -230,15 +266,10 @@ void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
     report_.contacts = contacts_.touching;
     report_.contact_force = contacts_.total_force;
   }
-  if (!examples_) return;
-  state_.examples.front() = {weights_, target_, true, target_converged_};
+  state_.examples = std::move(examples_);
 }
 
 FullSpaceReport Stepper::run() {
-  const auto& settings = scene_.examples;
-  const bool linear = settings && runtime::acts(*settings);
-  examples_ = model_.examples && settings && (linear || scene_.example_elasticity > 0);
-  terms_.examples = examples_ && scene_.example_elasticity == 0;
   gather_external_force();
   const Integrator integrator = find_contacts() ? Integrator::kBackwardEuler : scene_.integrator;
   set_form(integrator);
@@ -246,7 +277,7 @@ FullSpaceReport Stepper::run() {
   StepPotential potential(model_, scene_, state_, terms_);
   Eigen::VectorXd d = choose_first_iterate(potential);
   if (!d.allFinite()) report_.status |= runtime::kStepNonFinite;
-  if (examples_ && !(report_.status & runtime::kStepNonFinite)) update_target(state_.q + d);
+  if (!(report_.status & runtime::kStepNonFinite)) update_targets(state_.q + d);
   if (report_.status & runtime::kStepNonFinite) return report_;
   potential.prepare();
   const NewtonStatus status = minimise(potential, d).status;
@@ -259,7 +290,8 @@ FullSpaceReport Stepper::run() {
 
 }  // namespace
 
-FullSpaceWorkspace::FullSpaceWorkspace(const FullSpaceModel& model) : direction(model.elasticity.pattern()) {}
+FullSpaceWorkspace::FullSpaceWorkspace(const FullSpaceModel& model)
+    : direction(model.elasticity.pattern()), examples(model.examples.size()) {}
 
 FullSpaceReport step(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
                      FullSpaceWorkspace& workspace) {

@@ -24,9 +24,9 @@ struct FullSpaceScene {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]
   std::vector<VertexForceConfig> forces;              ///< vertices of the object
   std::vector<runtime::Obstacle> obstacles;
-  std::optional<runtime::ExampleSettings> examples;  ///< absent: no weights, no target, no example force
-  /// If above 0, the example force is not the linear one but that of the elastic energy with the target as the
-  /// undeformed shape, of this share of the material's own stiffness.
+  std::vector<runtime::ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, forces
+  /// If above 0, example forces are not the linear ones but those of the elastic energy with the target as the
+  /// undeformed shape, of this share of the material's own stiffness; of a region that of its own tets.
   double example_elasticity = 0;
 };
 
@@ -36,8 +36,11 @@ struct FullSpaceWorkspace {
 
   SparseDirection direction;                                                ///< of Newton's method
   std::unique_ptr<Eigen::SimplicialLLT<LowerTriangle, Eigen::Lower>> mass;  ///< once it is needed
-  std::optional<runtime::TargetSolver::Workspace> target;
-  std::optional<MeshElasticity> example_elasticity;
+  struct Examples {
+    std::optional<runtime::TargetSolver::Workspace> target;
+    std::optional<MeshElasticity> elasticity;  ///< from the target
+  };
+  std::vector<Examples> examples;  ///< as the model's
 };
 
 /// What one step did, and how long it took.

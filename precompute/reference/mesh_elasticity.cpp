@@ -55,7 +55,14 @@ Eigen::Index MeshElasticity::set_undeformed(const VertexArray& positions) {
     else
       ++left_out;
   }
+  volumes_(excluded_).setZero();
   return left_out;
+}
+
+void MeshElasticity::restrict_to(const FlagVector& vertices) {
+  for (Eigen::Index t = 0; t < tets_.rows(); ++t)
+    if (!vertices(tets_.row(t).transpose()).all()) excluded_.push_back(t);
+  volumes_(excluded_).setZero();
 }
 
 Eigen::Matrix3d MeshElasticity::displacement_gradient(Eigen::Index tet, const Eigen::VectorXd& u) const {

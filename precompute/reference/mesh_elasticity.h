@@ -32,6 +32,9 @@ class MeshElasticity {
   /// inside out are left out of all sums; returns their number.
   Eigen::Index set_undeformed(const VertexArray& positions);
 
+  /// Leaves tets that have a vertex outside of the flagged ones [n] out of all sums, for good.
+  void restrict_to(const FlagVector& vertices);
+
   /// [J].
   double energy(const Eigen::VectorXd& u) const;
 
@@ -60,6 +63,7 @@ class MeshElasticity {
   Eigen::Index size_ = 0;
   MaterialModel material_ = MaterialModel::kStVenantKirchhoff;
   TetArray tets_;
+  std::vector<Eigen::Index> excluded_;  // tets
   std::vector<LameParameters> lame_;
   std::vector<Gradients> gradients_;  // of the shape functions
   Eigen::VectorXd volumes_;           // 0 where a tet is left out

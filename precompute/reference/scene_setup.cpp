@@ -20,16 +20,14 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
   if (config.examples && config.examples->force != "linear")
     throw InputError({file, "/examples/force", "\"linear\"", '"' + config.examples->force + '"', ""});
-  if (!config.regions.empty())
-    throw InputError({file, "/regions", "no regions: the full-space reference has examples of the whole body alone",
-                      std::to_string(config.regions.size()), ""});
   const auto require_part = [&](bool needed, bool there, const char* group) {
     if (needed && !there)
       throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
                         "precompute the bundle again with this scene (--scene)"});
   };
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
-  require_part(config.examples.has_value(), model.examples.has_value(), "/examples");
+  const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
+  require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
   for (std::size_t i = 0; i < config.forces.size(); ++i)
     for (const std::int64_t vertex : config.forces[i].vertices)
       if (vertex < 0 || vertex >= model.rest.rows())
@@ -51,17 +49,23 @@ FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::
   scene.gravity = config.gravity;
   scene.forces = config.forces;
   scene.obstacles = std::move(obstacles);
-  if (config.examples)
-    scene.examples =
-        runtime::ExampleSettings{config.examples->stiffness, config.examples->damping, config.examples->bias};
+  const auto add = [&](const ExampleForceConfig& force) {
+    scene.examples.push_back({force.stiffness, force.damping, force.bias});
+  };
+  if (config.examples) add(*config.examples);
+  for (const RegionForceConfig& region : config.regions) add(region.force);
   return scene;
 }
 
 FullSpaceOptions full_space_options(const SceneConfig& config) {
   FullSpaceOptions options;
-  if (!config.examples) return options;
+  if (!config.examples && config.regions.empty()) return options;
   options.targets = ExampleTargets::kTets;
-  options.energy_reference = runtime::energy_reference_from_name(config.examples->energy_reference);
+  options.whole_body = config.examples.has_value();
+  if (config.examples)
+    options.energy_reference = runtime::energy_reference_from_name(config.examples->energy_reference);
+  for (const auto& [name, force] : config.regions)
+    options.regions.push_back({name, runtime::energy_reference_from_name(force.energy_reference)});
   return options;
 }
 

@@ -1,5 +1,6 @@
 #include "precompute/reference/step_potential.h"
 
+#include <algorithm>
 #include <cmath>
 
 namespace exmat::precompute {
@@ -21,10 +22,20 @@ StepPotential::StepPotential(const FullSpaceModel& model, const FullSpaceScene& 
       state_(state),
       terms_(terms),
       damped_(scene.mass_damping > 0 || scene.stiffness_damping > 0),
-      skew_(terms.examples && !model.examples->symmetric()),
-      reach_(model.rest.cwiseAbs().maxCoeff() + state.q.lpNorm<Eigen::Infinity>()) {
-  if (terms.examples)
-    filter_stiffness_ = scene.examples->stiffness + scene.examples->damping * terms.form.velocity_factor;
+      reach_(model.rest.cwiseAbs().maxCoeff() + state.q.lpNorm<Eigen::Infinity>()) {}
+
+bool StepPotential::linear_examples() const {
+  return std::ranges::any_of(scene_.examples, runtime::acts) && scene_.example_elasticity == 0;
+}
+
+bool StepPotential::skew() const {
+  return linear_examples() &&
+         std::ranges::any_of(terms_.examples, [](const ExampleTerm& term) { return !term.examples->symmetric(); });
+}
+
+// k = kappa + c_kappa c_v.
+double StepPotential::filter_stiffness(const ExampleTerm& term) const {
+  return term.settings->stiffness + term.settings->damping * terms_.form.velocity_factor;
 }
 
 double StepPotential::inertia_and_load(const Eigen::VectorXd& d) const {
@@ -59,22 +70,37 @@ void StepPotential::prepare() {
     damping_.coeffs() += scene_.mass_damping * model_.mass_values.array();
     deformation_linear_ += damping_product(rate);
   }
-  if (!terms_.examples) return;
+  if (!linear_examples()) return;
   // k (u_n - u_c) = kappa u_n + c_kappa u'.
-  const auto& settings = *scene_.examples;
-  deformation_linear_ +=
-      model_.examples->filter(settings.stiffness * (start_deformation_ - terms_.target) + settings.damping * rate);
+  for (const ExampleTerm& term : terms_.examples)
+    deformation_linear_ += term.examples->filter(term.settings->stiffness * (start_deformation_ - term.target) +
+                                                 term.settings->damping * rate);
 }
 
 Eigen::VectorXd StepPotential::damping_product(const Eigen::VectorXd& u) const {
   return first_->to_frame(damping_.selfadjointView<Eigen::Lower>() * first_->to_world(u));
 }
 
-// c_v D u + k P u.
+// sum k P u.
+Eigen::VectorXd StepPotential::filtered(const Eigen::VectorXd& u) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(u.size());
+  for (const ExampleTerm& term : terms_.examples) sum += filter_stiffness(term) * term.examples->filter(u);
+  return sum;
+}
+
+// sum k (P - P^T)/2 u.
+Eigen::VectorXd StepPotential::skew_filtered(const Eigen::VectorXd& u) const {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(u.size());
+  for (const ExampleTerm& term : terms_.examples)
+    sum += 0.5 * filter_stiffness(term) * (term.examples->filter(u) - term.examples->transposed_filter(u));
+  return sum;
+}
+
+// c_v D u + sum k P u.
 Eigen::VectorXd StepPotential::deformation_product(const Eigen::VectorXd& u) const {
   Eigen::VectorXd product = Eigen::VectorXd::Zero(u.size());
   if (damped_) product += terms_.form.velocity_factor * damping_product(u);
-  if (terms_.examples) product += filter_stiffness_ * model_.examples->filter(u);
+  if (linear_examples()) product += filtered(u);
   return product;
 }
 
@@ -85,8 +111,7 @@ PotentialValue StepPotential::sum(double elastic, double contact, const Eigen::V
   // Positions are rounded, and forces do work on that.
   total.magnitude += reach_ * internal_force_.lpNorm<1>();
   if (terms_.contacts != nullptr) total.magnitude += reach_ * terms_.contacts->force.lpNorm<1>();
-  if (terms_.example_elasticity != nullptr)
-    total.magnitude += reach_ * scene_.example_elasticity * example_force_.lpNorm<1>();
+  if (scene_.example_elasticity > 0) total.magnitude += reach_ * scene_.example_elasticity * example_force_.lpNorm<1>();
   if (!deforms()) return total;
   const Eigen::VectorXd product = deformation_product(change), linear = deformation_linear_ + frozen_;
   total.value += 0.5 * change.dot(product) + linear.dot(change);
@@ -104,8 +129,23 @@ PotentialValue StepPotential::value(const Eigen::VectorXd& d) const {
 }
 
 double StepPotential::elastic_example_energy(const Eigen::VectorXd& q) const {
-  if (terms_.example_elasticity == nullptr) return 0;
-  return scene_.example_elasticity * terms_.example_elasticity->energy(q - terms_.target);
+  double energy = 0;
+  for (const ExampleTerm& term : terms_.examples)
+    if (term.elasticity != nullptr) energy += term.elasticity->energy(q - term.target);
+  return scene_.example_elasticity * energy;
+}
+
+// Into example_force_, before the share; returns the energy.
+double StepPotential::elastic_example_force(const Eigen::VectorXd& q) {
+  double energy = 0;
+  example_force_.setZero(q.size());
+  for (const ExampleTerm& term : terms_.examples) {
+    if (term.elasticity == nullptr) continue;
+    Eigen::VectorXd force;
+    energy += term.elasticity->force(q - term.target, force);
+    example_force_ += force;
+  }
+  return scene_.example_elasticity * energy;
 }
 
 PotentialEvaluation StepPotential::evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) {
@@ -124,16 +164,10 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
     here_.emplace(model_, q);
     change = here_->u() - start_deformation_;
     gradient += here_->force(deformation_linear_ + deformation_product(change));
-    if (skew_)
-      next_frozen_ =
-          0.5 * filter_stiffness_ * (model_.examples->filter(change) - model_.examples->transposed_filter(change));
+    if (skew()) next_frozen_ = skew_filtered(change);
   }
-  double example_energy = 0;
-  if (terms_.example_elasticity != nullptr) {
-    const double share = scene_.example_elasticity;
-    example_energy = share * terms_.example_elasticity->force(q - terms_.target, example_force_);
-    gradient += share * example_force_;
-  }
+  const double example_energy = elastic_example_force(q);
+  if (scene_.example_elasticity > 0) gradient += scene_.example_elasticity * example_force_;
   PotentialEvaluation evaluation;
   evaluation.force_scale =
       terms_.external_force.norm() + internal_force_.norm() + (linear_ + inertia + terms_.external_force).norm();
@@ -149,7 +183,7 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
 
 void StepPotential::accept(PotentialEvaluation& evaluation) {
   at_first_iterate_ = false;
-  if (!skew_) return;
+  if (!skew()) return;
   const Eigen::VectorXd change = here_->u() - start_deformation_;
   evaluation.potential.value += (next_frozen_ - frozen_).dot(change);
   frozen_ = next_frozen_;
@@ -164,9 +198,11 @@ void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent)
   hessian_ = stiffness_;
   hessian_.coeffs() += terms_.form.acceleration_factor * model_.mass_values.array();
   if (damped_) hessian_.coeffs() += terms_.form.velocity_factor * damping_.coeffs();
-  if (terms_.example_elasticity != nullptr) {
+  for (const ExampleTerm& term : terms_.examples) {
+    if (term.elasticity == nullptr) continue;
     LowerTriangle stiffness;
-    terms_.example_elasticity->force_and_stiffness(state_.q + d - terms_.target, tangent, example_force_, stiffness);
+    Eigen::VectorXd unused;
+    term.elasticity->force_and_stiffness(state_.q + d - term.target, tangent, unused, stiffness);
     hessian_.coeffs() += scene_.example_elasticity * stiffness.coeffs();
   }
   if (terms_.contacts != nullptr) model_.contacts->add_stiffness(*terms_.contacts, hessian_);
@@ -174,11 +210,11 @@ void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent)
 
 Eigen::VectorXd StepPotential::product(const Eigen::VectorXd& x) const {
   Eigen::VectorXd result = hessian_.selfadjointView<Eigen::Lower>() * x;
-  if (!terms_.examples) return result;
+  if (!linear_examples()) return result;
   const Eigen::VectorXd change = here_->rate(x);
-  Eigen::VectorXd filtered = model_.examples->filter(change);
-  if (skew_) filtered = 0.5 * (filtered + model_.examples->transposed_filter(change));
-  return result + filter_stiffness_ * here_->force(filtered);
+  Eigen::VectorXd force = filtered(change);
+  if (skew()) force -= skew_filtered(change);
+  return result + here_->force(force);
 }
 
 }  // namespace exmat::precompute

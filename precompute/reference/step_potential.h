@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <optional>
+#include <vector>
 
 #include "precompute/reference/full_space_stepper.h"
 #include "runtime/sim/integrator.h"
@@ -31,23 +32,29 @@ class Deformation {
   Eigen::VectorXd u_;
 };
 
+/// One example force of a step.
+struct ExampleTerm {
+  const FullSpaceExamples* examples = nullptr;
+  const runtime::ExampleSettings* settings = nullptr;
+  Eigen::VectorXd target;                      ///< u* [f]
+  const MeshElasticity* elasticity = nullptr;  ///< of displacements from u*, instead of the linear force
+};
+
 /// What one step knows before its Newton iterations.
 struct StepTerms {
-  runtime::StepForm form;                              ///< of q
-  Eigen::VectorXd rate_centre;                         ///< u_v [f]: u' = c_v (u - u_v)
-  Eigen::VectorXd external_force;                      ///< [f]
-  Eigen::VectorXd target;                              ///< u* [f], with an example force
-  bool examples = false;                               ///< there is one
-  const MeshElasticity* example_elasticity = nullptr;  ///< of displacements from u*, instead of the linear force
-  VertexContacts::Step* contacts = nullptr;            ///< near obstacles
+  runtime::StepForm form;                    ///< of q
+  Eigen::VectorXd rate_centre;               ///< u_v [f]: u' = c_v (u - u_v)
+  Eigen::VectorXd external_force;            ///< [f]
+  std::vector<ExampleTerm> examples;         ///< those that act; known when prepare() is called
+  VertexContacts::Step* contacts = nullptr;  ///< near obstacles
 };
 
 /// What one step minimises, in d = q - q_n, which keeps the digits that c_a and a body far from its rest would take:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
-///     + k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
-/// the terms of runtime::IncrementalPotential in full space; with an elastic example force, s E*(q - u*) instead of the
-/// last two, of the share s. The skew part of P has no potential: in values its force is that of the iterate last
-/// accepted. Hessians leave out how the frame of a free body turns.
+///     + sum k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
+/// the terms of runtime::IncrementalPotential in full space, summed over the example forces; with elastic ones,
+/// s E*(q - u*) instead of these two, of the share s. The skew part of P has no potential: in values its force is that
+/// of the iterate last accepted. Hessians leave out how the frame of a free body turns.
 class StepPotential {
  public:
   StepPotential(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
@@ -77,9 +84,15 @@ class StepPotential {
   double elastic_energy() const { return elastic_energy_; }
 
  private:
-  bool deforms() const { return damped_ || terms_.examples; }
+  bool deforms() const { return damped_ || linear_examples(); }
+  bool linear_examples() const;
+  bool skew() const;
+  double filter_stiffness(const ExampleTerm& term) const;
   double elastic_example_energy(const Eigen::VectorXd& q) const;
+  double elastic_example_force(const Eigen::VectorXd& q);
   Eigen::VectorXd damping_product(const Eigen::VectorXd& u) const;
+  Eigen::VectorXd filtered(const Eigen::VectorXd& u) const;
+  Eigen::VectorXd skew_filtered(const Eigen::VectorXd& u) const;
   Eigen::VectorXd deformation_product(const Eigen::VectorXd& u) const;
   double inertia_and_load(const Eigen::VectorXd& d) const;
   runtime::PotentialValue sum(double elastic, double contact, const Eigen::VectorXd& d,
@@ -89,9 +102,8 @@ class StepPotential {
   const FullSpaceScene& scene_;
   const FullSpaceState& state_;
   const StepTerms& terms_;
-  bool damped_, skew_;
-  double reach_;                 // of the largest coordinates [m]
-  double filter_stiffness_ = 0;  // k = kappa + c_kappa c_v
+  bool damped_;
+  double reach_;  // of the largest coordinates [m]
   bool at_first_iterate_ = true, stiffness_is_current_ = false;
 
   double elastic_energy_ = 0;

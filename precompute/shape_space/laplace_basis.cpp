@@ -26,6 +26,13 @@ LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::s
   return basis;
 }
 
+LaplaceBasis laplace_basis_of(const ReducedModel& model) {
+  const ShapeSpaceData& space = *model.shape_space;
+  const TetMesh& mesh = model.object->mesh;
+  return {space.eigenvalues,          space.eigenfunctions, scalar_mass(mesh) / space.volume,
+          normalised_positions(mesh), space.volume,         space.centroid};
+}
+
 LaplaceBasis first_functions(LaplaceBasis basis, Eigen::Index count) {
   basis.eigenvalues.conservativeResize(count);
   basis.eigenfunctions.conservativeResize(Eigen::NoChange, count);

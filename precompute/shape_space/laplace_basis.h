@@ -3,6 +3,7 @@
 #include <string>
 
 #include "common/mesh/tet_mesh.h"
+#include "common/model/reduced_model.h"
 #include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
@@ -20,6 +21,9 @@ struct LaplaceBasis {
 
 /// The first `count` eigenpairs; `name` is for messages.
 LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::string& name);
+
+/// That of a bundle with /object and /shape_space.
+LaplaceBasis laplace_basis_of(const ReducedModel& model);
 
 /// The first `count` of its functions.
 LaplaceBasis first_functions(LaplaceBasis basis, Eigen::Index count);

@@ -9,6 +9,10 @@
 
 namespace exmat::precompute {
 
+/// kappa of a region's poses relative to the squared frequency of the highest linear mode: forces of scenes rarely
+/// exceed it.
+inline constexpr double kRegionStiffness = 100;
+
 /// Poses of the whole body that a region's changes of descriptor stand for: the displacement w that minimises
 /// kappa M_b |b w - c|^2 + w^T K w, where b w are the coefficients of what the view sees of it, c those of the change
 /// and M_b the mass of the body. That is where the body comes to rest, at small displacements, under an example force

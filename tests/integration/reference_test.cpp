@@ -32,9 +32,9 @@ TEST_F(ReferenceFiles, ExamplePosesAreThoseOfTheBundleBeforeTheirReduction) {
     const ReducedModel model = built(12, {{"object", object}});
     const auto system =
         precompute::build_elastic_system(model.object->mesh, model.object->materials, model.object->fixed);
-    const Eigen::MatrixXd fields = precompute::example_fields(model, system);
+    const auto poses = precompute::whole_body_example_poses(model, system);
     const Eigen::MatrixXd reduce = (system.mass * system.restrict(model.modal->basis)).transpose();
-    const precompute::FullSpaceExamples examples(model, system, fields, runtime::EnergyReference::kExample);
+    const precompute::FullSpaceExamples examples(model, system, poses, runtime::EnergyReference::kExample);
     const ExampleData& twist = model.examples->examples[1];
     const Eigen::VectorXd pose = examples.pose_basis() * examples.pose(1);
     EXPECT_LE((reduce * pose - twist.pose).norm(), 1e-9 * twist.pose.norm()) << object;

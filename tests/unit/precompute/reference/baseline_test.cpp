@@ -126,7 +126,7 @@ struct Baseline {
 
 TEST(SurfaceTargets, GradientIsTheDerivative) {
   const Baseline baseline;
-  const SurfaceTargets& targets = *baseline.model.surface_targets;
+  const SurfaceTargets& targets = baseline.model.surface_targets.front();
   const Eigen::Vector3d weights(0.3, 0.5, 0.2);
   const Eigen::VectorXd z = 0.5 * (targets.pose(1) + targets.pose(2)), direction = test::random_vector(z.size(), 1);
   Eigen::VectorXd gradient, unused;
@@ -141,7 +141,7 @@ TEST(SurfaceTargets, GradientIsTheDerivative) {
 // And between two examples the minimum is below what blending their descriptors gives.
 TEST(SurfaceTargets, OfOneExampleAloneIsThatExample) {
   const Baseline baseline;
-  const SurfaceTargets& targets = *baseline.model.surface_targets;
+  const SurfaceTargets& targets = baseline.model.surface_targets.front();
   for (Eigen::Index k = 0; k < 3; ++k) {
     Eigen::VectorXd z = 0.5 * targets.pose(1) + 0.3 * targets.pose(2);
     const MinimiserReport report = targets.solve(Eigen::Vector3d::Unit(k), z);
@@ -165,7 +165,7 @@ TEST(Baseline, ABodyTakesTheShapeOfTheTarget) {
     scene.time_step = 0.01;
     scene.integrator = runtime::Integrator::kBackwardEuler;
     scene.mass_damping = 5;
-    scene.examples = runtime::ExampleSettings{.bias = 0};
+    scene.examples = {{.bias = 0}};
     scene.example_elasticity = 50;
     FullSpaceState state = at_rest(baseline.model);
     FullSpaceWorkspace workspace(baseline.model);
@@ -174,7 +174,7 @@ TEST(Baseline, ABodyTakesTheShapeOfTheTarget) {
       report = step(baseline.model, scene, state, workspace);
       ASSERT_FALSE(report.status & runtime::kStepNonFinite) << i;
     }
-    const Eigen::VectorXd target = baseline.model.examples->pose_basis() * state.examples.front().target;
+    const Eigen::VectorXd target = baseline.model.examples.front().pose_basis() * state.examples.front().target;
     const Eigen::VectorXd u = Deformation(baseline.model, state.q).u();
     EXPECT_LE((u - target).norm(), 0.1 * target.norm()) << free;
     EXPECT_GE(target.lpNorm<Eigen::Infinity>(), 0.02 * baseline.bar.length) << "the target is no pose";
@@ -189,12 +189,12 @@ TEST(Baseline, StartsWithTheForceOfTheElasticEnergy) {
   FullSpaceScene scene;
   scene.time_step = 1e-5;
   scene.integrator = runtime::Integrator::kNewmark;
-  scene.examples = runtime::ExampleSettings{.bias = 0.5};
+  scene.examples = {{.bias = 0.5}};
   scene.example_elasticity = 0.3;
   FullSpaceState state = at_rest(baseline.model);
   run(baseline.model, scene, state, 1);
   MeshElasticity elasticity = baseline.model.elasticity;
-  const Eigen::VectorXd target = baseline.model.examples->pose_basis() * state.examples.front().target;
+  const Eigen::VectorXd target = baseline.model.examples.front().pose_basis() * state.examples.front().target;
   const VertexArray shape = baseline.model.rest + baseline.model.system.extend(target).reshaped<Eigen::RowMajor>(
                                                       baseline.model.rest.rows(), 3);
   ASSERT_EQ(elasticity.set_undeformed(shape), 0);

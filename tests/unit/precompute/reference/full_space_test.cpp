@@ -238,8 +238,7 @@ TEST(FullSpace, FreeBodiesWithDampingAndExamplesAreThoseOfTheRunTime) {
     scene.mass_damping = full_scene.mass_damping = 2;
     scene.stiffness_damping = full_scene.stiffness_damping = 1e-3;
     scene.gravity_force = Eigen::VectorXd::Zero(reduced->modes());
-    full_scene.examples = runtime::ExampleSettings{2000, 10, 0.3};
-    scene.examples = {*full_scene.examples};
+    scene.examples = full_scene.examples = {{2000, 10, 0.3}};
     runtime::State state = runtime::make_state(*reduced);
     runtime::set_motion(*reduced, motion, state);
     runtime::Workspace workspace(*reduced, scene);
@@ -261,7 +260,7 @@ TEST(FullSpace, ExamplesAndDampingTakeNoMomentum) {
   FullSpaceScene scene = scene_of(Integrator::kNewmark, 5e-4);
   scene.mass_damping = 5;
   scene.stiffness_damping = 1e-3;
-  scene.examples = runtime::ExampleSettings{3000, 10, 0.3};
+  scene.examples = {{3000, 10, 0.3}};
   const FullSpaceState start = body.moving(2), end = body.after(scene, 2, 200);
   const Eigen::Vector3d p = body.linear_momentum(start), L = body.angular_momentum(start);
   EXPECT_LE((body.linear_momentum(end) - p).norm(), 1e-8 * p.norm());

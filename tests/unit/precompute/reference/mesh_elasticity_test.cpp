@@ -56,6 +56,31 @@ TEST_P(MeshElasticityTest, ProjectedStiffnessIsPositiveSemidefinite) {
   EXPECT_GE(lowest(projected), -1e-10 * projected.norm());
 }
 
+TEST_P(MeshElasticityTest, OfAPartIsThatOfTheMeshOfThatPart) {
+  const ObjectData& object = *bar_.model.object;
+  FlagVector inside = FlagVector::Zero(object.mesh.vertex_count());
+  inside.tail(2 * inside.size() / 3).setOnes();
+  std::vector<Eigen::Index> tets;
+  for (Eigen::Index t = 0; t < object.mesh.tet_count(); ++t)
+    if (inside(object.mesh.tets.row(t).transpose()).all()) tets.push_back(t);
+  ASSERT_GT(tets.size(), 0U);
+  ASSERT_LT(std::ssize(tets), object.mesh.tet_count());
+  TetMesh mesh = object.mesh;
+  mesh.tets = TetArray(object.mesh.tets(tets, Eigen::all));
+  TetMaterials materials = object.materials;
+  materials.youngs_modulus = Eigen::VectorXd(object.materials.youngs_modulus(tets));
+  materials.poisson_ratio = Eigen::VectorXd(object.materials.poisson_ratio(tets));
+  materials.density = Eigen::VectorXd(object.materials.density(tets));
+  const MeshElasticity alone(mesh, materials, model_.system.free_dofs);
+  MeshElasticity part = elasticity_;
+  part.restrict_to(inside);
+  Eigen::VectorXd expected, force;
+  EXPECT_EQ(part.force(u_, force), alone.force(u_, expected));
+  EXPECT_EQ(force, expected);
+  EXPECT_EQ(part.set_undeformed(mesh.vertices), 0);
+  EXPECT_EQ(part.energy(u_), alone.energy(u_));
+}
+
 // Nothing is stored in a new undeformed shape, and what it is a rotation of has no energy either.
 TEST_P(MeshElasticityTest, StartsFromAnyUndeformedShape) {
   const TetMesh& mesh = bar_.model.object->mesh;

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <tuple>
 
+#include "common/core/error.h"
 #include "tests/unit/precompute/reference/full_space_bar.h"
 
 // With all modes in its basis the reduced model is the full space in other coordinates: a clamped body's trajectories
@@ -20,7 +21,7 @@ struct Case {
   Integrator integrator = Integrator::kBdf2;
   int examples = 0;
   double density_gradient = 0, damping = 0;
-  bool floor = false;
+  bool floor = false, region = false;
 };
 
 class ReducedTwin {
@@ -31,15 +32,27 @@ class ReducedTwin {
                            .density_gradient = options.density_gradient,
                            .examples = options.examples})) {
     if (options.floor) bar_.model.contact = movable_contact();
-    reduced_ = runtime::build_model(bar_.model, {}).model;
-    full_ = build_full_space_model(bar_.model, targets_of({.examples = options.examples}));
+    runtime::ModelOptions reduced_options;
+    FullSpaceOptions full_options = targets_of({.examples = options.examples});
+    if (options.region) {
+      FlagVector outer = FlagVector::Zero(bar_.model.object->mesh.vertex_count());
+      outer.tail(2 * outer.size() / 3).setOnes();
+      add_region(bar_.model, "outer", outer);
+      reduced_options.regions = {{"outer"}};
+      full_options.regions = {{"outer"}};
+    }
+    auto built = runtime::build_model(bar_.model, reduced_options);
+    if (!built.model) throw InputError(built.complaint);
+    reduced_ = std::move(built.model);
+    full_ = build_full_space_model(bar_.model, full_options);
     reduced_scene_.integrator = full_scene_.integrator = options.integrator;
     reduced_scene_.time_step = full_scene_.time_step = 0.01;
     reduced_scene_.newton = full_scene_.newton = {60, 1e-11};
     reduced_scene_.mass_damping = full_scene_.mass_damping = options.damping;
     reduced_scene_.stiffness_damping = full_scene_.stiffness_damping = 0.01 * options.damping;
-    if (options.examples > 0) reduced_scene_.examples = {runtime::ExampleSettings{400, 2, 0.5}};
-    if (options.examples > 0) full_scene_.examples = {runtime::ExampleSettings{400, 2, 0.5}};
+    if (options.examples > 0) reduced_scene_.examples = {{400, 2, 0.5}};
+    if (options.region) reduced_scene_.examples.push_back({2000, 1, 0.2});
+    full_scene_.examples = reduced_scene_.examples;
     if (options.floor) reduced_scene_.obstacles = {{runtime::Plane{{0, -0.05, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     full_scene_.obstacles = reduced_scene_.obstacles;
     set_loads();
@@ -61,9 +74,8 @@ class ReducedTwin {
       const Eigen::VectorXd u = bar_.basis() * state.q;
       largest = std::max(largest, (u - full_.system.extend(full_state.q)).lpNorm<Eigen::Infinity>());
       size = std::max(size, u.lpNorm<Eigen::Infinity>());
-      if (full_.examples)
-        weights_off_ =
-            std::max(weights_off_, (state.examples.front().weights - full_state.examples.front().weights).norm());
+      for (std::size_t k = 0; k < full_.examples.size(); ++k)
+        weights_off_ = std::max(weights_off_, (state.examples[k].weights - full_state.examples[k].weights).norm());
     }
     size_ = size / bar_.length;
     return largest / size;
@@ -128,6 +140,15 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Combine(testing::Values(MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
                                      MaterialModel::kCorotational),
                      testing::Values(Integrator::kBdf2, Integrator::kBackwardEuler, Integrator::kNewmark)));
+
+TEST(ReducedOfAllModesAndARegion, IsTheFullSpace) {
+  for (const double density_gradient : {0, 3}) {
+    ReducedTwin twin({.examples = 3, .density_gradient = density_gradient, .damping = 0.5, .region = true});
+    EXPECT_LE(twin.difference(40), kSame) << density_gradient;
+    EXPECT_LE(twin.weights_off(), kSame) << density_gradient;
+    EXPECT_GE(twin.size(), 0.1) << "the motion is too small to tell";
+  }
+}
 
 // P_s is not symmetric then.
 TEST(ReducedOfAllModesAndMixedDensity, IsTheFullSpace) {

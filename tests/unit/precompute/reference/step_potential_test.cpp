@@ -20,20 +20,25 @@ class StepPotentialTest : public testing::TestWithParam<bool> {
                            .examples = 2});
     bar_.model.contact = test::surface_contact(bar_.model);
     if (!GetParam()) drop_fixed(*bar_.model.contact);
-    model_ = build_full_space_model(bar_.model, {.targets = ExampleTargets::kTets});
+    FlagVector half = FlagVector::Zero(bar_.model.object->mesh.vertex_count());
+    half.tail(2 * half.size() / 3).setOnes();
+    add_region(bar_.model, "half", half);
+    model_ = build_full_space_model(bar_.model, {.targets = ExampleTargets::kTets, .regions = {{"half"}}});
     scene_.time_step = 0.01;
     scene_.mass_damping = 3;
     scene_.stiffness_damping = 0.01;
-    scene_.examples = runtime::ExampleSettings{300, 20, 0.5};
+    scene_.examples = {{300, 20, 0.5}, {200, 0, 1}};
     scene_.obstacles = {{runtime::Plane{{0, 0.02, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     state_ = at_rest(model_);
     state_.v = 0.3 * test::random_vector(model_.size(), 1);
     if (GetParam()) turn();
     runtime::backward_euler_form(state_, scene_.time_step, terms_.form);
-    terms_.examples = true;
     terms_.rate_centre = Deformation(model_, state_.q).u();
     terms_.external_force = 10 * test::random_vector(model_.size(), 2);
-    terms_.target = model_.examples->pose_basis() * model_.examples->pose(1);
+    for (std::size_t i = 0; i < 2; ++i) {
+      const FullSpaceExamples& examples = model_.examples[i];
+      terms_.examples.push_back({&examples, &scene_.examples[i], examples.pose_basis() * examples.pose(1)});
+    }
     contacts_ =
         model_.contacts->begin(scene_.obstacles, scene_.time_step, scene_.time_step, state_.q, state_.v, 0.1, {});
     for (auto& candidate : contacts_.candidates) candidate.friction_force = 5;

@@ -1,0 +1,84 @@
+#!/usr/bin/python3
+"""clang-tidy's identifier naming over every source that is compiled.
+
+Usage: naming.py ROOT BUILD_FOLDER    prints each violation; exit status 1 if there are any.
+
+Most of the time of clang-tidy goes into the headers of Eigen and the library, once for each source. So sources of the same flags
+are read together, as many in one unit as have no local names in common; a unit that does not compile is split in two.
+"""
+import json
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+FOLDERS = ("common", "precompute", "runtime")
+CHECKS = "-*,readability-identifier-naming"
+LARGEST_UNIT = 32
+LOCAL_SCOPE = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.S | re.M)
+LOCAL_NAME = re.compile(r"^(?!\s|//).*?\b(\w+)\s*(?:\(|=|\{|;|\[)", re.M)
+
+
+def local_names(path):
+    """Names that a source keeps to itself, roughly."""
+    return {name for scope in LOCAL_SCOPE.findall(path.read_text()) for name in LOCAL_NAME.findall(scope)}
+
+
+def flags_of(entry):
+    """Without the file and where it is compiled to."""
+    words = shlex.split(entry["command"])
+    return tuple(word for i, word in enumerate(words[1:], 1)
+                 if not (word in ("-o", "-c", entry["file"]) or words[i - 1] == "-o"))
+
+
+def units(root, build):
+    """(flags, sources) of the units that sources are read in."""
+    result = []
+    for entry in json.loads((build / "compile_commands.json").read_text()):
+        path = Path(entry["file"])
+        if not any(path.is_relative_to(root / folder) for folder in FOLDERS):
+            continue
+        flags, names = flags_of(entry), local_names(path)
+        for unit in result:
+            if unit["flags"] == flags and len(unit["sources"]) < LARGEST_UNIT and not unit["names"] & names:
+                break
+        else:
+            unit = {"flags": flags, "sources": [], "names": set()}
+            result.append(unit)
+        unit["sources"].append(path)
+        unit["names"] |= names
+    return [(unit["flags"], unit["sources"]) for unit in result]
+
+
+def check(root, flags, sources):
+    """Violations in some sources and their headers."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / ".clang-tidy").write_text((root / ".clang-tidy").read_text())
+        unit = Path(folder) / "unit.cpp"
+        unit.write_text("".join(f'#include "{source}"\n' for source in sources))
+        result = subprocess.run(["clang-tidy", "-quiet", f"--checks={CHECKS}", f"--header-filter=^{root}/({'|'.join(FOLDERS)})/.*[.](h|hpp|cpp)$", str(unit),
+                                 "--", *flags], capture_output=True, text=True)
+    if "[clang-diagnostic-error]" in result.stdout and len(sources) > 1:
+        middle = len(sources) // 2
+        return check(root, flags, sources[:middle]) | check(root, flags, sources[middle:])
+    found = {line for line in result.stdout.splitlines() if re.search(r"\b(error|warning):", line)}
+    return found if found or result.returncode == 0 else {f"{sources[0]}: clang-tidy: {result.stderr[-1000:]}"}
+
+
+def violations(root, build):
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return sorted(set().union(*pool.map(lambda unit: check(root, *unit), units(root, build))))
+
+
+def main():
+    found = violations(Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve())
+    print("\n".join(found) if found else "all names hold")
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
