@@ -102,9 +102,9 @@ class Study {
   std::string key_of(const Ordered& settings) const {
     return hash_inputs({}, inputs_ + settings.dump()).substr(0, kKeyLength);
   }
-  SceneConfig scene_of(const PointPlan& point) const {
+  SceneConfig scene_of(const PointPlan& point, const std::string& bundle) const {
     SceneConfig scene = with_settings(scene_, point.settings);
-    scene.bundle = bundle_file(bundles_[point.bundle].key);
+    scene.bundle = bundle_file(bundle);
     return scene;
   }
   std::filesystem::path bundle_file(const std::string& key) const {
@@ -246,7 +246,7 @@ void Study::plan() {
 
 bool Study::is_finished(const PointPlan& point) const {
   const auto result = read_point(point_file(point.key));
-  if (!result || result->bundle != bundles_[point.bundle].key) return false;
+  if (!result || !std::filesystem::exists(bundle_file(result->bundle))) return false;
   return point.settings.internal_force != kAllElements || read_frames(frames_file(point.key)).has_value();
 }
 
@@ -291,7 +291,7 @@ BodyFrames only(const BodyFrames& frames, std::size_t i) {
 }
 
 void Study::run_point(const PointPlan& plan) const {
-  const SceneConfig scene = scene_of(plan);
+  const SceneConfig scene = scene_of(plan, bundles_[plan.bundle].key);
   const ReducedModel data = read_bundle(scene.bundle);
   const SparseMatrix mass = scalar_mass(data.object->mesh, data.object->materials.density);
   const auto& rest = data.object->mesh.vertices;
@@ -327,16 +327,20 @@ void Study::run_point(const PointPlan& plan) const {
 }
 
 void Study::build_bundles(int jobs) {
+  std::set<std::size_t> needed;
+  for (const PointPlan& point : points_)
+    if (!is_finished(point)) needed.insert(point.bundle);
   std::vector<Job> work;
   std::vector<std::size_t> which;
-  for (std::size_t i = 0; i < bundles_.size(); ++i) {
+  for (const std::size_t i : needed) {
     if (std::filesystem::exists(bundle_file(bundles_[i].key)) && read_sealed(stages_file(bundles_[i].key))) continue;
     work.push_back({"bundle " + bundles_[i].key, [this, i] { build_bundle(bundles_[i]); }});
     which.push_back(i);
   }
   const auto failures = run_in_processes("bundles", work, jobs);
   for (std::size_t k = 0; k < which.size(); ++k) bundles_[which[k]].failure = failures[k].value_or("");
-  for (std::size_t i = 0; i < points_.size(); ++i) failures_[i] = bundles_[points_[i].bundle].failure;
+  for (std::size_t i = 0; i < points_.size(); ++i)
+    if (!is_finished(points_[i])) failures_[i] = bundles_[points_[i].bundle].failure;
 }
 
 void Study::run_references(int jobs) {
@@ -424,7 +428,7 @@ std::unique_ptr<FullSpaceRun> Study::baseline() {
   const PointPlan& own = points_[result_.own];
   if (!config_.baseline || !result_.points[result_.own].failure.empty()) return nullptr;
   try {
-    const SceneConfig scene = scene_of(own);
+    const SceneConfig scene = scene_of(own, result_.points[result_.own].bundle);
     return std::make_unique<FullSpaceRun>(scene, read_bundle(scene.bundle), true);
   } catch (const std::exception& error) {
     result_.baseline_failure = error.what();
@@ -435,7 +439,7 @@ std::unique_ptr<FullSpaceRun> Study::baseline() {
 
 void Study::measure_times(const std::vector<std::size_t>& sound, const std::filesystem::path& file) {
   std::vector<SceneConfig> scenes;
-  for (const std::size_t i : sound) scenes.push_back(scene_of(points_[i]));
+  for (const std::size_t i : sound) scenes.push_back(scene_of(points_[i], result_.points[i].bundle));
   const auto body = baseline();
   const Timings timings = time_steps(scenes, config_.timing, body.get());
   Ordered json = Ordered::object();
