@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "common/bundle/bundle.h"
+#include "common/bundle/library_versions.h"
 #include "common/config/config.h"
 #include "common/console/console.h"
 #include "common/core/atomic_file.h"
@@ -97,8 +98,9 @@ void check(const Options& options) {
 
 int main(int argc, char** argv) {
   CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
-  app.set_version_flag("--version",
-                       [] { return fmt::format("exmat-precompute {}, {}", version(), precompute::solver_versions()); });
+  app.set_version_flag("--version", [] {
+    return fmt::format("exmat-precompute {}, {}, {}", version(), precompute::solver_versions(), library_versions());
+  });
   app.require_subcommand(1);
   Options options;
   add_common_options(app, options.common);

@@ -1,13 +1,15 @@
 #include <CLI/CLI.hpp>
+#include <fmt/format.h>
 
-#include "common/bundle/hdf5_file.h"
+#include "common/bundle/library_versions.h"
 #include "common/console/console.h"
+#include "common/core/version.h"
 #include "runtime/app/commands.h"
 
 int main(int argc, char** argv) {
   using namespace exmat;
   CLI::App app{"Steps example-based elastic bodies in real time.", "exmat-runtime"};
-  app.set_version_flag("--version", generator_name());
+  app.set_version_flag("--version", [] { return fmt::format("exmat-runtime {}, {}", version(), library_versions()); });
   app.require_subcommand(1);
   CommonOptions common;
   add_common_options(app, common);
