@@ -7,8 +7,10 @@
 #include "common/config/config.h"
 #include "common/console/console.h"
 #include "common/core/atomic_file.h"
+#include "common/core/error.h"
 #include "common/core/timer.h"
 #include "common/core/version.h"
+#include "common/mesh/geometry.h"
 #include "precompute/pipeline/build_model.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
@@ -47,14 +49,32 @@ void print_examples(const std::string& title, const ExampleSet& set) {
                100 * example.shape_space_error, 100 * example.basis_error);
 }
 
+void print_render_mesh(const ReducedModel& model) {
+  const RenderData& render = *model.render;
+  fmt::print("render mesh: {} vertices, {} triangles; {} vertices outside the object", render.vertices.rows(),
+             render.triangles.rows(), render.outside);
+  if (render.outside > 0)
+    fmt::print(", by up to {:.3g} m ({:.3g} % of the diagonal of its bounding box)", render.farthest,
+               100 * render.farthest / bounding_box_diagonal(model.object->mesh.vertices));
+  fmt::print("\n");
+}
+
+// What the scene asks of the bundle; nothing without a scene.
+std::optional<Needs> scene_needs(const Options& options, const AssetConfig& asset) {
+  if (options.scene.empty()) return std::nullopt;
+  const Needs needs = needs_of(load_scene(options.scene));
+  if (needs.render && !asset.render_mesh)
+    throw InputError({options.asset, "/object/render_mesh", "a surface, for output.render of the scene", "none",
+                      "name one here or leave output.render out of the scene"});
+  return needs;
+}
+
 void bundle(const Options& options) {
   const AssetConfig asset = load_asset(options.asset);
-  std::optional<Needs> scene_needs;
-  if (!options.scene.empty()) scene_needs = needs_of(load_scene(options.scene));
+  const Needs needs = precompute::resolve_needs(asset, scene_needs(options, asset));
   { const AtomicFile writable(options.bundle); }  // better refused now than after the work
   precompute::BuildReport report;
-  const ReducedModel model =
-      precompute::build_model(asset, precompute::resolve_needs(asset, scene_needs), report, options.alignment_report);
+  const ReducedModel model = precompute::build_model(asset, needs, report, options.alignment_report);
   const Timer timer;
   write_bundle(model, options.bundle);
   report.stages.push_back({"writing the bundle", timer.seconds()});
@@ -69,6 +89,7 @@ void bundle(const Options& options) {
       "frequencies {:.4g} to {:.4g} Hz; held-out cubature error: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %\n",
       model.modal->frequencies.minCoeff(), model.modal->frequencies.maxCoeff(), 100 * model.cubature->heldout_error,
       100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error);
+  if (model.render) print_render_mesh(model);
   if (model.examples) print_examples("example", *model.examples);
   for (const RegionData& region : model.regions) print_examples("region " + region.name, region.examples);
   print_ledger(report.ledger);

@@ -93,8 +93,9 @@ Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
 // Part of the hash of the inputs.
 std::string text_of(const Needs& needs) {
   std::string text = fmt::format(
-      "examples {}\nrigid {} {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n", needs.examples,
-      needs.rigid, needs.carried, needs.targets, needs.contact, needs.internal_force, needs.energy_reference);
+      "examples {}\nrigid {} {}\ntargets {}\ncontact {}\nrender {}\ninternal_force {}\nenergy_reference {}\n",
+      needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render, needs.internal_force,
+      needs.energy_reference);
   if (!needs.regions) return text;
   for (const auto& [name, targets, reference] : *needs.regions)
     text += fmt::format("region {} {} {}\n", name, targets, reference);
@@ -237,7 +238,8 @@ ReducedModel Pipeline::run() {
   if (needs_.internal_force == "polynomial") require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
   require_regions(asset_, needs_);
-  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions));
+  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions),
+                               asset_.render_mesh.has_value());
   const bool with_examples = includes(report_.ledger, "shape_space");
   std::optional<ExampleInput> example_input;
   if (with_examples) {
@@ -246,6 +248,9 @@ ReducedModel Pipeline::run() {
   }
 
   ReducedModel model;
+  if (includes(report_.ledger, "render"))
+    model.render =
+        timed("render mesh", [&] { return read_render_mesh(asset_, object_, report_.inputs, report_.warnings); });
   model.asset_name = asset_.name;
   model.generator = fmt::format("exmat-precompute {}", version());
   model.input_sha256 = hash_inputs(report_.inputs, model.generator + "\n" + text_of(needs_));
@@ -329,6 +334,7 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   needs.targets = named("targets");
   needs.rigid = needs.carried = named("rigid");
   needs.contact = named("contact");
+  needs.render = named("render");
   if (!named("regions")) needs.regions.emplace();
   return needs;
 }
@@ -343,6 +349,7 @@ std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::
                                            BuildReport& report) {
   report.inputs.push_back(asset.file);
   const auto object = read_object(asset, report.inputs);
+  if (asset.render_mesh) read_render_mesh(asset, object, report.inputs, report.warnings);
   if (asset.examples.empty()) return {};
   const auto input = read_examples(asset, object, report.inputs);
   const ShapeStage stage =

@@ -13,9 +13,11 @@
 #include "common/mesh/checks.h"
 #include "common/mesh/geometry.h"
 #include "precompute/mesh_io/mesh_file.h"
+#include "precompute/mesh_io/surface_file.h"
 #include "precompute/mesh_io/vertex_selection.h"
 #include "precompute/pipeline/correspondence_files.h"
 #include "precompute/pipeline/object_materials.h"
+#include "precompute/render/embedding.h"
 
 namespace exmat::precompute {
 namespace {
@@ -281,7 +283,8 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
   object.mesh = checked.file.mesh;
   const TetMesh file_mesh{checked.file_vertices,
                           Eigen::Map<const TetArray>(checked.file_tets.data(), std::ssize(checked.file_tets) / 4, 4)};
-  object.materials = object_materials(asset, file_mesh, checked.file.materials, checked.report.kept_tets, files);
+  object.materials = object_materials(asset, file_mesh, checked.file.tet_sets, checked.file.materials,
+                                      checked.report.kept_tets, files);
   object.fixed = flag(asset.fixed, 0, asset, checked, files);
   object.contact = flag(asset.contact_vertices, 1, asset, checked, files);
   object.file_tets = checked.file_tets;
@@ -293,6 +296,26 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
 
 ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, InputFiles& files) {
   return ExampleReader(asset, object, files).read();
+}
+
+RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object, InputFiles& files,
+                            std::vector<std::string>& warnings) {
+  const std::string name = asset.render_mesh->string();
+  SurfaceMesh surface = read_surface(*asset.render_mesh);
+  files.push_back(*asset.render_mesh);
+  const Embedding embedding = embed_points(object.mesh, surface.vertices, name);
+  const double share = embedding.farthest / bounding_box_diagonal(object.mesh.vertices);
+  if (share > kFarOutside) {
+    warnings.push_back(
+        fmt::format("{}: a vertex is {:.3g} m outside the object, {:.0f} % of the diagonal of its bounding box; does "
+                    "the render mesh "
+                    "stand where the object does, in metres?",
+                    name, embedding.farthest, 100 * share));
+    log::warning(warnings.back());
+  }
+  const auto& [tets, weights, distances] = embedding.points;
+  return {std::move(surface.vertices), tets, weights, std::move(surface.triangles), embedding.outside,
+          embedding.farthest};
 }
 
 std::string hash_inputs(const InputFiles& files, const std::string& salt) {
