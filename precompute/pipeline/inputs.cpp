@@ -1,12 +1,8 @@
 #include "precompute/pipeline/inputs.h"
 
 #include <algorithm>
-#include <array>
 #include <fmt/format.h>
-#include <fstream>
 #include <map>
-#include <memory>
-#include <openssl/evp.h>
 
 #include "common/core/error.h"
 #include "common/core/log.h"
@@ -17,6 +13,7 @@
 #include "precompute/mesh_io/vertex_selection.h"
 #include "precompute/pipeline/correspondence_files.h"
 #include "precompute/pipeline/object_materials.h"
+#include "precompute/pipeline/sha256.h"
 #include "precompute/render/embedding.h"
 
 namespace exmat::precompute {
@@ -319,22 +316,11 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
 }
 
 std::string hash_inputs(const InputFiles& files, const std::string& salt) {
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::vector<char> buffer(1 << 20);
-  for (const auto& path : files) {
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) throw InputError({path.string(), "", "a readable file", "none", "check the path"});
-    while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), stream.gcount() > 0)
-      EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(stream.gcount()));
-  }
-  EVP_DigestUpdate(context.get(), salt.data(), salt.size());
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned size = 0;
-  EVP_DigestFinal_ex(context.get(), digest.data(), &size);
-  std::string text;
-  for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", digest[i]);
-  return text;
+  Sha256 hash;
+  // With their lengths, so that no byte can change sides.
+  for (const auto& path : files) hash.add(fmt::format("\n{} bytes\n", hash.add_file(path)));
+  hash.add(salt);
+  return hash.digest();
 }
 
 }  // namespace exmat::precompute

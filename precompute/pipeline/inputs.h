@@ -69,7 +69,7 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
 /// Share of the object's bounding box's diagonal.
 constexpr double kFarOutside = 0.1;
 
-/// SHA-256 over the contents of the files, in order, and `salt`, as 64 hexadecimal digits.
+/// SHA-256 over the contents and lengths of the files, in order, and `salt`, as 64 hexadecimal digits.
 std::string hash_inputs(const InputFiles& files, const std::string& salt);
 
 }  // namespace exmat::precompute
