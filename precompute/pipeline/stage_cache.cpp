@@ -11,6 +11,7 @@
 #include "common/core/version.h"
 #include "precompute/pipeline/sha256.h"
 #include "precompute/solvers/semidefinite_solver.h"
+#include "runtime/kernels/kernels.h"
 
 namespace exmat::precompute {
 namespace {
@@ -24,12 +25,12 @@ std::string digest_of(std::string_view bytes) {
   return hash.digest();
 }
 
-// Another build may compute otherwise, whatever its version says.
+// Another build may compute otherwise, whatever its version says, and so may another instruction set.
 std::string this_program() {
   const std::filesystem::path file = "/proc/self/exe";
   std::error_code ignored;
   const std::string build = std::filesystem::exists(file, ignored) ? sha256_of_file(file) : "";
-  return fmt::format("{}\n{}\n{}\n", version(), build, solver_versions());
+  return fmt::format("{}\n{}\n{}\n{}\n", version(), build, solver_versions(), runtime::kernels().name);
 }
 
 }  // namespace

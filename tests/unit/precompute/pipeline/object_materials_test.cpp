@@ -1,5 +1,6 @@
 #include "precompute/pipeline/object_materials.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -78,6 +79,33 @@ TEST_F(ObjectMaterials, SetsOfTheMeshFileAreParts) {
   kept_ = {1, 9};
   EXPECT_EQ(materials().youngs_modulus, Eigen::Vector2d(2e5, 1e5))
       << "the file's numbers, also where tets were dropped";
+}
+
+// From the files of each format, as the pipeline reads them.
+TEST_F(ObjectMaterials, SetsOfEveryFormatReachTheMaterials) {
+  const exmat::test::TemporaryFolder folder;
+  const MeshFile sample = test::sample_mesh(2);
+  const auto& soft = sample.tet_sets.at("soft part");
+  const auto expect_soft = [&](const std::filesystem::path& file, const std::string& set) {
+    asset_.object_mesh = file;
+    asset_.material_regions = {{SetSelection{set}, 2e4, std::nullopt, std::nullopt}};
+    const Eigen::VectorXd found = read_object(asset_, files_).materials.youngs_modulus;
+    Eigen::VectorXd expected = Eigen::VectorXd::Constant(sample.mesh.tet_count(), 1e5);
+    expected(soft).setConstant(2e4);
+    EXPECT_EQ(found, expected) << file;
+  };
+  for (const test::Flavour& flavour : test::flavours())
+    for (const auto& [name, tets] : flavour.sets(sample))
+      if (tets == soft) expect_soft(folder.write(flavour.name + flavour.extension, flavour.write(sample)), name);
+  std::string nodes = fmt::format("{} 3 0 0\n", sample.mesh.vertex_count());
+  std::string elements = fmt::format("{} 4 1\n", sample.mesh.tet_count());
+  for (Eigen::Index v = 0; v < sample.mesh.vertex_count(); ++v)
+    nodes += fmt::format("{} {} {} {}\n", v, sample.mesh.vertices(v, 0), sample.mesh.vertices(v, 1),
+                         sample.mesh.vertices(v, 2));
+  for (Eigen::Index t = 0; t < sample.mesh.tet_count(); ++t)
+    elements += fmt::format("{} {} {}\n", t, fmt::join(sample.mesh.tets.row(t), " "), t < std::ssize(soft) ? 5 : 6);
+  folder.write("body.node", nodes);
+  expect_soft(folder.write("body.ele", elements), "5");
 }
 
 TEST_F(ObjectMaterials, ASetThatTheMeshFileDoesNotHaveIsNamedWithThoseThatItHas) {
