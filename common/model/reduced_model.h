@@ -78,7 +78,7 @@ struct CubatureData {
   RowMatrix heldout_poses;                  ///< N x r reduced poses that the held-out errors are measured on
   std::string internal_force = "cubature";  ///< what `auto` takes: "cubature" or "polynomial"
   std::string internal_force_reason;        ///< why
-  std::string method;                       ///< "greedy_swap", "greedy" or "nn_htp"
+  std::string method;                       ///< "greedy_swap", "greedy", "nn_htp" or "all_elements"
   double training_error = 0;                ///< relative, force, as heldout_error
   double heldout_error = 0;                 ///< relative, force in the norm of the inverse rest stiffness
   double heldout_energy_error = 0;          ///< relative

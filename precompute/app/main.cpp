@@ -6,6 +6,7 @@
 #include "common/console/console.h"
 #include "common/core/version.h"
 #include "precompute/app/bundle_command.h"
+#include "precompute/app/study_command.h"
 #include "precompute/pipeline/build_model.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
@@ -72,9 +73,30 @@ int main(int argc, char** argv) {
   add_alignment_report(bundle_command_line, options.alignment_report);
   add_alignment_report(check_command, check_options.alignment_report);
 
+  StudyCommandOptions study_options;
+  auto* study_command_line = app.add_subcommand(
+      "study", "measure a scene's error against run time over sweeps of settings, by the full space");
+  study_command_line->add_option("STUDY", study_options.study, "study file (JSON)")->required();
+  study_command_line
+      ->add_option("-o,--output", study_options.folder,
+                   "folder for report.html, results.csv, results.json and what a resumed study needs")
+      ->required();
+  study_command_line
+      ->add_option("--budget-us", study_options.budget_us,
+                   "recommend the most accurate point of at most so many us a step")
+      ->check(CLI::PositiveNumber);
+  study_command_line
+      ->add_option("--max-error", study_options.max_error,
+                   "recommend the fastest point of at most so many percent of error")
+      ->check(CLI::PositiveNumber);
+  study_command_line->add_option("--jobs", study_options.jobs, "processes that run points; times are measured by one")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+
   return run_program(app, argc, argv, [&] {
     apply(common);
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
+    if (study_command_line->parsed()) study_command(study_options);
   });
 }

@@ -204,8 +204,15 @@ struct Choice {
   Eigen::VectorXd weights;
 };
 
+Choice all_elements(Eigen::Index tets) {
+  Choice choice{std::vector<Eigen::Index>(static_cast<std::size_t>(tets)), Eigen::VectorXd::Ones(tets)};
+  std::iota(choice.elements.begin(), choice.elements.end(), 0);
+  return choice;
+}
+
 Choice choose(const ElementSamples& samples, const PoseSource& source, const CubatureOptions& options,
               const ErrorMeter& training, const ErrorMeter& heldout) {
+  if (options.method == kAllElementsMethod) return all_elements(samples.count());
   const RowMatrix& poses = training.poses();
   const Totals& totals = training.totals();
   const TrainingRows rows(source, totals.response);
@@ -242,6 +249,9 @@ void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
   if (options.tolerance && options.method == "nn_htp")
     throw InputError({"", "/cubature/tolerance", "cubature.elements with method nn_htp, which needs a fixed number",
                       "a tolerance", ""});
+  if (options.method == kAllElementsMethod && (options.elements || options.tolerance))
+    throw InputError({"", options.elements ? "/cubature/elements" : "/cubature/tolerance",
+                      "neither elements nor tolerance with method all_elements", "one of them", ""});
 }
 
 }  // namespace

@@ -8,10 +8,13 @@
 
 namespace exmat::precompute {
 
+/// The method that takes every tet with the weight 1: exact, and as slow as there are tets.
+inline constexpr const char* kAllElementsMethod = "all_elements";
+
 struct CubatureOptions {
   std::optional<int> elements;         ///< s
   std::optional<double> tolerance;     ///< held-out force error; both absent: 2 r elements
-  std::string method = "greedy_swap";  ///< "greedy_swap", "greedy" or "nn_htp"
+  std::string method = "greedy_swap";  ///< "greedy_swap", "greedy", "nn_htp" or "all_elements", which has neither
   int training_poses = 200;
   std::uint64_t seed = 1;
 };

@@ -12,6 +12,7 @@
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
+#include "precompute/pipeline/markup.h"
 
 namespace exmat::precompute {
 namespace {
@@ -24,12 +25,6 @@ std::string file_name(std::string name) {
   for (char& c : name)
     if (std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '-' && c != '.') c = '_';
   return name;
-}
-
-std::string escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) result += c == '<' ? "&lt;" : c == '>' ? "&gt;" : c == '&' ? "&amp;" : std::string(1, c);
-  return result;
 }
 
 // The triangles that face the viewer, the farthest first, shaded by their slope.

@@ -2,6 +2,7 @@
 """The pose tool against closed forms, and the meshes of the paper's scenes against the sizes of its Table 2."""
 import importlib.machinery
 import importlib.util
+import json
 import pathlib
 import sys
 import tempfile
@@ -105,11 +106,17 @@ class Surfaces(unittest.TestCase):
         np.testing.assert_allclose([points.min(0), points.max(0)], [body.min(0), body.max(0)], atol=0.06)  # the nose sticks out
 
 
+def tool(name):
+    """A tool of the examples as a module."""
+    loader = importlib.machinery.SourceFileLoader(name, str(EXAMPLES / name))
+    module = importlib.util.module_from_spec(importlib.util.spec_from_loader(name, loader))
+    loader.exec_module(module)
+    return module
+
+
 class Meshes(unittest.TestCase):
     def setUp(self):
-        loader = importlib.machinery.SourceFileLoader("paper_table", str(EXAMPLES / "paper_table"))
-        self.table = importlib.util.module_from_spec(importlib.util.spec_from_loader("paper_table", loader))
-        loader.exec_module(self.table)
+        self.table = tool("paper_table")
 
     def test_sizes_are_near_the_papers(self):
         for name, variant, (dofs, tets, example_vertices, m, r, s), *_ in self.table.PAPER.values():
@@ -124,6 +131,45 @@ class Meshes(unittest.TestCase):
                     np.testing.assert_array_equal(posed[1], examples[0][1])
                 asked = asset["shape_space"]["eigenfunctions"], asset["basis"]["size"], asset["cubature"]["elements"]
                 self.assertEqual(asked, (m, r, s))
+
+
+class Studies(unittest.TestCase):
+    """What examples/studies makes of results of round numbers."""
+
+    @staticmethod
+    def point(s, internal_force, target, mean, from_all, interp, total):
+        settings = {"eigenfunctions": 5, "basis_size": 20, "cubature_elements": s, "material": "stvk", "time_step": 0.001,
+                    "integrator": "bdf2", "internal_force": internal_force, "target": target}
+        errors = {"position": {"mean": mean}, "position_from_all_elements": from_all and {"mean": from_all}}
+        return {"settings": settings, "elements": s or 99, "target": target, "failure": "", "errors": errors,
+                "times": {"interp_us": interp, "median_us": total}}
+
+    def setUp(self):
+        self.studies = tool("studies")
+        points = [self.point(30, "cubature", "table", 0.05, 0.03, 0.5, 10), self.point(30, "cubature", "solve", 0.05, 0.03, 20, 40),
+                  self.point(60, "cubature", "table", 0.045, 0.01, 0.5, 15), self.point(None, "all_elements", "table", 0.04, None, 0.5, 100)]
+        self.result = {"points": points, "own": 0, "baseline": {"interp_us": 10000, "median_us": 40000}, "baseline_failure": "",
+                       "processor": "X", "paper": {"interp_ms": 4, "total_ms": 10, "zhu_interp_ms": 8, "zhu_total_ms": 50}}
+
+    def test_times_stand_beside_the_baselines_and_the_papers(self):
+        self.assertEqual(self.studies.time_row("bar", self.result),
+                         "| bar | 8 / 50 | 4 / 10 | 2 / 5 | 10 / 40 | 20 / 40 | 500 / 1000 | 0.5 / 10 | 20000 / 4000 |\n")
+
+    def test_errors_stand_by_elements(self):
+        self.assertIn("| bar | 5 | 20 | 4 % | 5 % (3 %) | 4.5 % (1 %) |\n", self.studies.error_table({"bar": self.result}))
+
+    def test_failures_are_told(self):
+        self.assertEqual(self.studies.failures({"bar": self.result}), "")
+        self.result["points"][1]["failure"] = "broke"
+        self.assertIn("- bar: 1 failed, the first: broke", self.studies.failures({"bar": self.result}))
+        self.assertIn("| - | - | 0.5 / 10 |", self.studies.time_row("bar", self.result))
+
+    def test_the_papers_numbers_are_those_of_its_table(self):
+        for name, (folder, _, _, zhu, paper) in tool("paper_table").PAPER.items():
+            study = json.loads((EXAMPLES / self.studies.STUDIES[name]).read_text())
+            self.assertEqual(self.studies.STUDIES[name], f"{folder}/study.json")
+            self.assertEqual(study["name"], name)
+            self.assertEqual([study["paper"][k] for k in ("zhu_interp_ms", "zhu_total_ms", "interp_ms", "total_ms")], [*zhu, *paper])
 
 
 if __name__ == "__main__":

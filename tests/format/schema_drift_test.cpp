@@ -163,7 +163,7 @@ void check_closed(const Json& schema, const std::string& place) {
 }
 
 class ConfigSchema : public ::testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(Each, ConfigSchema, ::testing::Values("asset", "scene"));
+INSTANTIATE_TEST_SUITE_P(Each, ConfigSchema, ::testing::Values("asset", "scene", "study"));
 
 TEST_P(ConfigSchema, IsClosedAndDescribed) {
   const Json schema = Json::parse(embedded_schema(GetParam()));

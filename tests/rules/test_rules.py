@@ -23,7 +23,8 @@ BUILD = Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build/release"
 PLANTED = [
     ("direction", "runtime/io/x.cpp", '#include "precompute/fem/assembly.h"\n'),
     ("direction", "common/mesh/x.h", '#include "runtime/sim/model.h"\n'),
-    ("direction", "precompute/study/x.cpp", '#include "runtime/io/trajectory.h"\n'),
+    ("direction", "precompute/pipeline/x.cpp", '#include "runtime/io/trajectory.h"\n'),
+    ("direction", "precompute/study/x.cpp", '#include "runtime/api/settings.h"\n'),
     ("lean", "common/elastic/x.h", "#include <nlohmann/json.hpp>\n"),
     ("lean", "common/model/x.h", '#include "common/bundle/bundle.h"\n'),
     ("lean", "runtime/sim/x.cpp", "#include <hdf5.h>\n"),
@@ -42,6 +43,7 @@ PLANTED = [
 ]
 
 HARMLESS = [
+    ("precompute/study/x.cpp", '#include "runtime/io/trajectory.h"\n'),
     ("runtime/sim/x.cpp", "// throw nothing, try nothing\n#include <Eigen/Core>\n#include <cmath>\n"),
     ("runtime/io/x.cpp", "#include <hdf5.h>\n"),
     ("precompute/solvers/x.cpp", "#include <petscmat.h>\n"),

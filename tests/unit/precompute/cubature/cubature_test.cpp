@@ -63,6 +63,23 @@ INSTANTIATE_TEST_SUITE_P(Materials, Cubature,
                                          MaterialModel::kCorotational),
                          [](const auto& model) { return std::string(name_of(model.param)); });
 
+TEST_P(Cubature, OfAllElementsIsExact) {
+  const auto data = build_cubature(mesh_, materials_, source_, {std::nullopt, std::nullopt, kAllElementsMethod, 20, 3});
+  ASSERT_EQ(data.elements, IndexVector::LinSpaced(mesh_.tet_count(), 0, static_cast<int>(mesh_.tet_count()) - 1));
+  EXPECT_EQ(data.weights, Eigen::VectorXd::Ones(mesh_.tet_count()));
+  EXPECT_LE(data.heldout_error, 1e-12);
+  const Eigen::VectorXd q = data.heldout_poses.row(0), H = data.gradient * q;
+  double energy = 0;
+  with_material(GetParam(), [&](auto material) {
+    for (Eigen::Index j = 0; j < data.elements.size(); ++j)
+      energy += data.volumes[j] * material.energy(Eigen::Map<const RowMatrix3>(H.data() + 9 * j),
+                                                  lame_parameters(data.youngs_modulus[j], data.poisson_ratio[j]));
+  });
+  EXPECT_NEAR(energy, independent(q, data.weights).second, 1e-12 * energy);
+  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {20, std::nullopt, kAllElementsMethod, 20, 3}), InputError);
+  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {std::nullopt, 0.1, kAllElementsMethod, 20, 3}), InputError);
+}
+
 TEST_P(Cubature, HeldoutErrorsAreWhatAnIndependentEvaluationGets) {
   const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, "greedy_swap", 60, 3});
   ASSERT_EQ(data.elements.size(), 20);

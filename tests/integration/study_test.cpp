@@ -1,0 +1,149 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <map>
+
+#include "tests/integration/support.h"
+
+namespace exmat::test {
+namespace {
+
+using namespace nlohmann::literals;
+using ::testing::HasSubstr;
+
+/// The small bar, a scene of it, and a study of a few points.
+class StudyProgram : public testing::Test {
+ protected:
+  StudyProgram() {
+    write_small_bar(folder_);
+    write_scene(folder_, R"({
+      "time_step": 0.01, "steps": 40, "gravity": [0, -2, 1], "damping": { "mass": 0.5, "stiffness": 0.001 },
+      "examples": { "stiffness": 300, "damping": 5, "bias": 0.7 } })"_json);
+  }
+  void write_study(const Json& members = Json::object()) {
+    Json study = R"({
+      "name": "small", "asset": "asset.json", "scene": "scene.json", "frames": 10, "timing": {"rounds": 1, "steps": 20},
+      "sweeps": [ { "basis_size": [8, 12], "internal_force": ["cubature", "all_elements"], "target": ["solve"] } ] })"_json;
+    study.merge_patch(members);
+    folder_.write("study.json", study.dump());
+  }
+  Outcome study(const std::string& output, std::vector<std::string> options = {}) {
+    options.insert(options.begin(),
+                   {"study", folder_.path("study.json"), "-o", folder_.path(output), "--log-level", "error"});
+    return exmat_precompute(options);
+  }
+  Json results(const std::string& output) const {
+    return Json::parse(read_file(folder_.path(output + "/results.json")));
+  }
+
+  /// Errors of the points by their settings.
+  static std::map<std::string, Json> errors(const Json& results) {
+    std::map<std::string, Json> errors;
+    for (const Json& point : results["points"]) errors[point["settings"].dump()] = point["errors"];
+    return errors;
+  }
+  std::map<std::string, std::filesystem::file_time_type> written(const std::string& output) const {
+    std::map<std::string, std::filesystem::file_time_type> times;
+    for (const char* part : {"bundles", "references", "points", "timing"})
+      for (const auto& entry : std::filesystem::directory_iterator(folder_.path(output + "/" + part)))
+        times[entry.path()] = entry.last_write_time();
+    return times;
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_F(StudyProgram, MeasuresAndAnswersABudget) {
+  write_study({{"baseline", true}, {"timing", {{"baseline_steps", 1}}}});
+  const Outcome outcome = study("out", {"--max-error", "1000"});
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  EXPECT_THAT(outcome.output, HasSubstr("at most 1000 %: point"));
+  const Json json = results("out");
+  ASSERT_EQ(json["points"].size(), 4U);
+  std::map<std::pair<int, bool>, double> mean;
+  for (const Json& point : json["points"]) {
+    const bool all = point["settings"]["internal_force"] == "all_elements";
+    mean[{point["modes"], all}] = point["errors"]["position"]["mean"];
+    EXPECT_EQ(point["steps"], 40);
+    EXPECT_EQ(point["elements"], all ? 96 : 12);
+    EXPECT_GT(point["times"]["median_us"], 0);
+    EXPECT_EQ(point["errors"]["position_from_all_elements"].is_null(), all);
+  }
+  EXPECT_LT((mean[{12, true}]), (mean[{8, true}])) << "more modes";
+  EXPECT_EQ(json["references"].size(), 1U);
+  EXPECT_GT(json["baseline"]["median_us"], json["points"][0]["times"]["median_us"]);
+  const Json asset = Json::parse(read_file(folder_.path("out/recommended_asset.json")));
+  EXPECT_EQ(asset["basis"]["size"], json["points"][json["recommended"].get<int>()]["settings"]["basis_size"]);
+  EXPECT_EQ(Json::parse(read_file(folder_.path("out/recommended_scene.json")))["examples"]["target"], "solve");
+  const std::string report = read_file(folder_.path("out/report.html"));
+  EXPECT_THAT(report, HasSubstr("the baseline here"));
+  EXPECT_LT(report.size(), 400000U);
+}
+
+TEST_F(StudyProgram, ResumesWithoutDoingAgainWhatIsFinished) {
+  write_study();
+  ASSERT_EQ(study("out").status, 0);
+  const auto first = written("out");
+  const Json before = results("out");
+  const Outcome again = study("out", {"--budget-us", "1e-3"});
+  EXPECT_EQ(again.status, 1) << "nothing is that fast";
+  EXPECT_THAT(again.errors, HasSubstr("no point; the nearest is point"));
+  EXPECT_EQ(written("out"), first);
+  EXPECT_EQ(errors(results("out")), errors(before));
+  EXPECT_EQ(results("out")["points"][0]["times"], before["points"][0]["times"]);
+
+  // A damaged point and a damaged reference are done again, with what is new; the others are left alone.
+  const std::string damaged = folder_.path("out/points/" + before["points"][0]["key"].get<std::string>() + ".json");
+  const std::string reference =
+      folder_.path("out/references/" + before["references"][0]["key"].get<std::string>() + ".frames");
+  write_file(damaged, read_file(damaged).substr(0, 100));
+  write_file(reference, "no frames");
+  write_study(
+      R"({"sweeps": [ { "basis_size": [8, 12], "internal_force": ["cubature", "all_elements"], "target": ["solve"] },
+                              { "basis_size": [10], "target": ["solve"] } ]})"_json);
+  ASSERT_EQ(study("out").status, 0);
+  const auto after = written("out");
+  const Json now = results("out");
+  ASSERT_EQ(now["points"].size(), 5U);
+  for (const auto& [settings, error] : errors(before)) EXPECT_EQ(errors(now)[settings], error) << settings;
+  for (const auto& [file, time] : first) {
+    const bool renewed =
+        file == damaged || file == reference || file.starts_with(damaged.substr(0, damaged.size() - 5));
+    EXPECT_EQ(after.at(file) == time, !renewed) << file;
+  }
+}
+
+TEST_F(StudyProgram, GivesTheSameErrorsWithMoreJobs) {
+  write_study();
+  ASSERT_EQ(study("one", {"--jobs", "1"}).status, 0);
+  ASSERT_EQ(study("two", {"--jobs", "2"}).status, 0);
+  EXPECT_EQ(errors(results("one")), errors(results("two")));
+}
+
+TEST_F(StudyProgram, TellsWhatFailedAndGoesOn) {
+  write_study(R"({"sweeps": [ { "basis_size": [8, 5000], "target": ["solve"] } ]})"_json);
+  const Outcome outcome = study("out");
+  EXPECT_EQ(outcome.status, 1);
+  EXPECT_THAT(outcome.errors, HasSubstr("1 of 2 points"));
+  const Json json = results("out");
+  EXPECT_EQ(json["points"][0]["failure"], "");
+  EXPECT_GT(json["points"][0]["times"]["median_us"], 0);
+  EXPECT_THAT(json["points"][1]["failure"].get<std::string>(), HasSubstr("/basis/size"));
+  EXPECT_THAT(read_file(folder_.path("out/report.html")), HasSubstr("/basis/size"));
+}
+
+TEST_F(StudyProgram, RefusesBadStudies) {
+  write_study({{"sweeps", Json::array({{{"time_step", {0.01, 0.0137}}}})}});
+  Outcome outcome = study("out");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.errors, HasSubstr("study.json: /sweeps: expected time steps with a common multiple"));
+  write_study({{"asset", "none.json"}});
+  outcome = study("out");
+  EXPECT_EQ(outcome.status, 2);
+  EXPECT_THAT(outcome.errors, HasSubstr("none.json"));
+  write_study();
+  EXPECT_EQ(study("out", {"--jobs", "0"}).status, 2);
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("out")));
+}
+
+}  // namespace
+}  // namespace exmat::test
