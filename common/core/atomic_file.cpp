@@ -1,10 +1,14 @@
 #include "common/core/atomic_file.h"
 
+#include <array>
 #include <cerrno>
+#include <charconv>
+#include <csignal>
 #include <cstdint>
 #include <fcntl.h>
 #include <random>
 #include <string>
+#include <string_view>
 #include <sys/stat.h>
 #include <system_error>
 #include <unistd.h>
@@ -26,17 +30,59 @@ constexpr mode_t kMode = 0666;  // less the umask, as for any new file
   fail(target, std::generic_category().message(error_number));
 }
 
-std::string random_suffix() {
-  constexpr char kDigits[] = "0123456789abcdef";
-  constexpr int kLength = 16;
+constexpr std::string_view kExtension = ".tmp";
+
+std::string hexadecimal(std::uint64_t value) {
+  std::array<char, 16> digits{};
+  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), value, 16).ptr;
+  return {digits.data(), end};
+}
+
+// Names the processes that a process id speaks of here: of this machine, and of this container on it.
+std::string process_world() {
+  std::array<char, 256> host{};
+  ::gethostname(host.data(), host.size() - 1);
+  std::error_code ignored;
+  const auto container = std::filesystem::read_symlink("/proc/self/ns/pid", ignored);
+  std::uint64_t hash = 14695981039346656037U;  // Fowler, Noll and Vo's, 1a
+  for (const char c : std::string(host.data()) + '\n' + container.string())
+    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  return hexadecimal(hash);
+}
+
+// ".MACHINE-"
+const std::string& own_prefix() {
+  static const std::string prefix = '.' + process_world() + '-';
+  return prefix;
+}
+
+std::string own_suffix() {
   std::random_device device;
-  std::string suffix = ".";
-  for (int i = 0; i < kLength; ++i) suffix += kDigits[device() % 16];
-  return suffix + ".tmp";
+  const auto random = (std::uint64_t{device()} << 32) | device();
+  return own_prefix() + std::to_string(::getpid()) + '-' + hexadecimal(random) + std::string(kExtension);
+}
+
+// Whether a name is that of a temporary file, beginning with `prefix`, of a process that is no more.
+bool is_left_behind(std::string_view name, std::string_view prefix) {
+  if (!name.starts_with(prefix) || !name.ends_with(kExtension)) return false;
+  name.remove_prefix(prefix.size());
+  pid_t process = 0;
+  const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), process);
+  if (error != std::errc() || end == name.data() + name.size() || *end != '-' || process <= 0) return false;
+  return ::kill(process, 0) != 0 && errno == ESRCH;
 }
 
 std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
+}
+
+// What cannot be listed or removed stays: it is in nobody's way.
+void remove_left_behind(const std::filesystem::path& target) {
+  const std::string prefix = target.filename().string() + own_prefix();
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder_of(target), error), end; !error && entry != end;
+       entry.increment(error))
+    if (is_left_behind(entry->path().filename().string(), prefix)) ::unlink(entry->path().c_str());
 }
 
 void check_target(const std::filesystem::path& target) {
@@ -73,9 +119,10 @@ void flush_folder(const std::filesystem::path& folder) {
 
 AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
   check_target(target_);
+  remove_left_behind(target_);
   for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
     temporary_ = target_;
-    temporary_ += random_suffix();
+    temporary_ += own_suffix();
     const Descriptor descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL);
     if (descriptor.get() >= 0) {
       pending_ = true;

@@ -11,10 +11,11 @@ namespace exmat {
 ///     write_somehow(output.temporary());
 ///     output.commit();                 // fsync, rename
 ///
-/// Without commit() the destructor removes the temporary file and leaves the target as it was.
+/// Without commit() the destructor removes the temporary file and leaves the target as it was. What a killed process
+/// left behind beside the same target is removed by the next one on this machine.
 class AtomicFile {
  public:
-  /// Creates TARGET.XXXXXX.tmp, X random. Throws WorkError: no such folder, not writable, target is a folder, disk
+  /// Creates TARGET.MACHINE-PID-RANDOM.tmp. Throws WorkError: no such folder, not writable, target is a folder, disk
   /// full.
   explicit AtomicFile(std::filesystem::path target);
   ~AtomicFile();

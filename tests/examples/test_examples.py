@@ -88,6 +88,24 @@ class Pose(unittest.TestCase):
         np.testing.assert_array_equal(same, tets)
 
 
+class Surfaces(unittest.TestCase):
+    def test_the_teddys_surface_is_closed_and_encloses_about_its_tets(self):
+        folder = EXAMPLES / "07_teddy_global"
+        rows = [line.split() for line in (folder / "surface.obj").read_text().splitlines()]
+        points = np.array([row[1:] for row in rows if row[0] == "v"], float)
+        triangles = np.array([row[1:] for row in rows if row[0] == "f"], int) - 1
+        edges = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+        directed = {tuple(edge) for edge in edges.tolist()}
+        self.assertEqual(len(directed), len(edges))
+        self.assertEqual({(b, a) for a, b in directed}, directed)
+        volume = np.linalg.det(points[triangles]).sum() / 6
+        body, tets = pose.read(folder / "object.msh")
+        corners = body[tets]
+        # The tets are inscribed in the ellipsoids, whose seams the surface rounds.
+        np.testing.assert_allclose(volume, abs(np.linalg.det(corners[:, 1:] - corners[:, :1])).sum() / 6, rtol=0.1)
+        np.testing.assert_allclose([points.min(0), points.max(0)], [body.min(0), body.max(0)], atol=0.06)  # the nose sticks out
+
+
 def tool(name):
     """A tool of the examples as a module."""
     loader = importlib.machinery.SourceFileLoader(name, str(EXAMPLES / name))

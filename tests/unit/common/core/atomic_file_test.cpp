@@ -2,6 +2,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include "common/core/error.h"
 #include "tests/unit/common/bundle/small_model.h"
@@ -84,6 +86,35 @@ TEST(WriteFileAtomically, LeavesTheOldFileWhenTheDiskIsFull) {
   }
   EXPECT_EQ(read_file(folder / "a.txt"), "old");
   EXPECT_EQ(folder.size(), 1u);
+}
+
+// A process that is killed while it writes.
+pid_t killed_writer(const std::filesystem::path& target) {
+  const pid_t child = fork();
+  if (child == 0) {
+    const AtomicFile output(target);
+    std::raise(SIGKILL);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  return child;
+}
+
+TEST(AtomicFile, RemovesWhatAKilledProcessLeftBehind) {
+  const TemporaryFolder folder;
+  const auto target = folder / "out.txt", other = folder / "out.txt.old";
+  write_file_atomically(target, "old");
+  killed_writer(target);
+  killed_writer(other);
+  EXPECT_EQ(folder.names().size(), 3U) << "nothing was left behind";
+  const AtomicFile alive(target);
+  EXPECT_EQ(folder.names().size(), 3U);  // its own in the place of the killed one's
+  write_file_atomically(target, "new");
+  EXPECT_TRUE(std::filesystem::exists(alive.temporary())) << "a living process lost its file";
+  EXPECT_EQ(read_file(target), "new");
+  write_file_atomically(other, "other");
+  EXPECT_EQ(folder.names().size(), 3U);
 }
 
 }  // namespace

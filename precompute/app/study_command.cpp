@@ -1,0 +1,40 @@
+#include "precompute/app/study_command.h"
+
+#include <filesystem>
+#include <fmt/format.h>
+
+#include "common/core/error.h"
+#include "precompute/study/report.h"
+#include "precompute/study/study.h"
+
+namespace exmat {
+namespace {
+
+void print_front(const precompute::StudyResult& result) {
+  fmt::print("\n{:>5}{:>12}{:>12}{:>12}  {}\n", "point", "error [%]", "step [us]", "p95 [us]", "front");
+  for (const std::size_t i : result.front) {
+    const precompute::PointResult& point = result.points[i];
+    fmt::print("{:>5}{:>12.3f}{:>12.2f}{:>12.2f}  {}\n", i + 1, 100 * point.errors.position.mean,
+               1e6 * point.times->median, 1e6 * point.times->p95, precompute::describe(point.settings));
+  }
+}
+
+}  // namespace
+
+void study_command(const StudyCommandOptions& options) {
+  precompute::StudyOptions how{.folder = options.folder, .jobs = options.jobs, .budget = {}};
+  if (options.budget_us) how.budget.seconds = 1e-6 * *options.budget_us;
+  if (options.max_error) how.budget.error = 1e-2 * *options.max_error;
+  const precompute::StudyResult result = precompute::run_study(precompute::load_study(options.study), how);
+  fmt::print("{}: {} points; {}\n", result.config.name, result.points.size(),
+             (std::filesystem::path(options.folder) / "report.html").string());
+  print_front(result);
+  const std::string recommendation = precompute::recommendation_text(result);
+  if (result.recommended) fmt::print("\n{}\n", recommendation);
+  if (const std::size_t failed = result.failures(); failed > 0)
+    throw WorkError(fmt::format("{}: {} of {} points or their baseline failed; see the report", options.study, failed,
+                                result.points.size()));
+  if (!recommendation.empty() && !result.recommended) throw WorkError(recommendation);
+}
+
+}  // namespace exmat

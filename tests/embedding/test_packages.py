@@ -1,0 +1,68 @@
+#!/usr/bin/python3
+"""The Debian packages: what they depend on, what they hold, and that their programs run.
+
+Usage: test_packages.py BUILD_FOLDER
+"""
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+BUILD = Path(sys.argv.pop(1)).resolve()
+OFFLINE = (BUILD / "bin/exmat-precompute").exists()
+
+
+def output_of(*command):
+    return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+class Packages(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(cls.folder.cleanup)
+        made = Path(cls.folder.name) / "made"
+        output_of("cpack", "--config", str(BUILD / "CPackConfig.cmake"), "-B", str(made))
+        cls.packages = {path.name.split("_")[0]: path for path in made.glob("*.deb")}
+
+    def depends(self, name):
+        return output_of("dpkg-deb", "--field", str(self.packages[name]), "Depends")
+
+    def unpacked(self, name):
+        target = Path(self.folder.name) / name
+        output_of("dpkg-deb", "--extract", str(self.packages[name]), str(target))
+        return target
+
+    def files(self, root):
+        return {str(path.relative_to(root)) for path in root.rglob("*") if not path.is_dir()}
+
+    def test_one_for_each_stage(self):
+        self.assertEqual(set(self.packages), {"exmat-runtime"} | ({"exmat-precompute"} if OFFLINE else set()))
+
+    def test_the_run_time_needs_neither_mpi_nor_petsc(self):
+        depends = self.depends("exmat-runtime")
+        self.assertIn("libhdf5", depends)
+        for foreign in ("mpi", "petsc", "slepc", "mumps", "exmat-precompute"):
+            self.assertNotIn(foreign, depends)
+
+    def test_the_run_time_holds_program_library_and_headers(self):
+        root = self.unpacked("exmat-runtime")
+        files = self.files(root)
+        self.assertIn("usr/bin/exmat-runtime", files)
+        self.assertIn("usr/include/exmat/exmat.h", files)
+        self.assertIn("usr/share/doc/exmat-runtime/copyright", files)
+        self.assertTrue(any(name.endswith("exmat-config.cmake") for name in files))
+        self.assertFalse(any("precompute" in name for name in files))
+        self.assertIn("HDF5", output_of(str(root / "usr/bin/exmat-runtime"), "--version"))
+
+    @unittest.skipUnless(OFFLINE, "built without the offline stage")
+    def test_the_offline_stage_is_its_program(self):
+        self.assertIn("petsc", self.depends("exmat-precompute"))
+        root = self.unpacked("exmat-precompute")
+        self.assertEqual(self.files(root), {"usr/bin/exmat-precompute", "usr/share/doc/exmat-precompute/copyright"})
+        self.assertIn("SLEPc", output_of(str(root / "usr/bin/exmat-precompute"), "--version"))
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
