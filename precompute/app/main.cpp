@@ -7,10 +7,12 @@
 #include "common/config/config.h"
 #include "common/console/console.h"
 #include "common/core/atomic_file.h"
+#include "common/core/error.h"
 #include "common/core/timer.h"
 #include "common/core/version.h"
 #include "precompute/pipeline/build_model.h"
 #include "precompute/solvers/semidefinite_solver.h"
+#include "precompute/study/stability_report.h"
 
 namespace {
 
@@ -22,6 +24,9 @@ struct Options {
   std::string bundle;
   std::string scene;
   std::string alignment_report;
+  std::string study_folder;
+  bool stability = false, quick = false;
+  int jobs = 0;
 };
 
 void print_stages(const precompute::BuildReport& report) {
@@ -93,6 +98,23 @@ void check(const Options& options) {
   fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
 }
 
+void stability(const Options& options) {
+  CommonOptions quiet = options.common;  // hundreds of small bodies go through the stages
+  if (quiet.log_level != "debug") quiet.log_level = "error";
+  apply(quiet);
+  precompute::write_stability_report({}, options.study_folder);  // better refused now than after the work
+  const auto runs =
+      options.quick
+          ? precompute::run_stability(precompute::short_stability_suite(), {precompute::kShortSteps, options.jobs})
+          : precompute::run_stability(precompute::long_stability_suite(), {precompute::kLongSteps, options.jobs});
+  precompute::write_stability_report(runs, options.study_folder);
+  fmt::print("{}", precompute::stability_markdown(runs));
+  const auto failed = precompute::runs_with(runs, precompute::Verdict::kFail).size();
+  if (failed > 0)
+    throw WorkError(fmt::format("{} of {} runs of the stability suite failed; see {}/stability.html", failed,
+                                runs.size(), options.study_folder));
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -115,9 +137,25 @@ int main(int argc, char** argv) {
     command->add_option("--alignment-report", options.alignment_report,
                         "folder to write each transferred pose beside its example into (.vtk and .svg)");
 
+  auto* study_command = app.add_subcommand("study", "run a study of the step and write its report");
+  study_command
+      ->add_flag("--stability", options.stability,
+                 "thousands of runs at the ends of every range: stiffness, loads, starts, spin, contact, examples; "
+                 "status 1 if one fails that is no known limit")
+      ->required();
+  study_command->add_flag("--quick", options.quick, "with --stability: the part of the suite that the tests run");
+  study_command->add_option("--jobs", options.jobs, "runs at a time; 0: as many as --threads")
+      ->check(CLI::Range(0, 4096))
+      ->capture_default_str();
+  study_command
+      ->add_option("-o,--output", options.study_folder,
+                   "folder for stability.html, .md, .csv and .json; made if missing")
+      ->required();
+
   return run_program(app, argc, argv, [&] {
     apply(options.common);
     if (bundle_command->parsed()) bundle(options);
     if (check_command->parsed()) check(options);
+    if (study_command->parsed()) stability(options);
   });
 }
