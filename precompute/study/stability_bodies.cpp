@@ -23,7 +23,7 @@ namespace {
 
 constexpr double kLengths[3] = {1.0, 0.25, 0.2};  // [m]
 constexpr std::array<int, 3> kCells{8, 2, 2};
-constexpr double kFlatLayer = 1.54e-3;                        // thickness of the cells of slivers [m]
+constexpr double kFlatLayer = 1.54e-3;                       // thickness of the cells of slivers [m]
 constexpr double kBend = 1.2, kTwist = 1.0, kNearly = 1e-7;  // [rad]
 constexpr int kModes = 12, kLinearModes = 8, kElements = 24, kEigenfunctions = 8, kTrainingPoses = 60;
 

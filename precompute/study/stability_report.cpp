@@ -56,7 +56,7 @@ Row row_of(const std::string& group, const std::string& integrator, const Sum& s
           fmt::format("{}", sum.passed),
           fmt::format("{}", sum.limited),
           fmt::format("{}", sum.failed),
-          fmt::format("{:.2f}", sum.displacement),
+          fmt::format("{:.3g}", sum.displacement),
           fmt::format("{}", sum.steps),
           fmt::format("{:.2f}, {}", static_cast<double>(sum.newton) / steps, sum.most_iterations),
           fmt::format("{:.3f}", static_cast<double>(sum.search) / steps),

@@ -33,7 +33,12 @@ std::string all(const std::vector<const StabilityRun*>& runs) {
 class StabilityGroups : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(All, StabilityGroups,
                          testing::Values("stiffness", "loads", "starts", "spin", "contact", "examples", "slivers",
-                                         "no damping"));
+                                         "no damping"),
+                         [](const auto& info) {
+                           std::string name = info.param;
+                           std::erase(name, ' ');
+                           return name;
+                         });
 
 TEST_P(StabilityGroups, MeetEveryBoundOrEndAtAKnownLimit) {
   const auto runs = run_stability(cases_of({GetParam()}));
@@ -142,15 +147,17 @@ TEST(Stability, ResultsDoNotDependOnTheNumberOfJobs) {
   EXPECT_EQ(stability_json(one), stability_json(two));
 }
 
-// What the suite is for: without a safeguard of the step it has to fail.
+// What the suite is for: without a safeguard of the step it has to fail. Of 132 runs each, 24 and 49 did.
+std::vector<StabilityRun> runs_with_fault(const PlantedFault& fault) {
+  auto cases = cases_of({"loads", "starts"});
+  std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != runtime::Integrator::kBdf2; });
+  return run_stability(cases, {.most_steps = 200, .fault = fault});
+}
+
 TEST(Stability, SeesThatTheLineSearchIsMissing) {
-  const auto runs = run_stability(cases_of({"loads", "starts"}), {.most_steps = 200, .fault = {.line_search = false}});
+  const auto runs = runs_with_fault({.line_search = false});
   const auto failed = runs_with(runs, Verdict::kFail);
-  int clamped_bdf2 = 0;
-  for (const StabilityRun* run : failed)
-    clamped_bdf2 += !run->test.body.free && run->test.integrator == runtime::Integrator::kBdf2 ? 1 : 0;
-  EXPECT_GE(clamped_bdf2, 1);
-  EXPECT_GE(failed.size(), 10U);
+  ASSERT_GE(failed.size(), 10U);
   EXPECT_TRUE(std::ranges::any_of(runs, [](const auto& run) { return run.result.non_finite_steps > 0; }));
   // Failures are shown.
   for (const std::string& text : {stability_markdown(runs), stability_html(runs), stability_csv(runs)})
@@ -159,11 +166,7 @@ TEST(Stability, SeesThatTheLineSearchIsMissing) {
 }
 
 TEST(Stability, SeesThatTheProjectionIsMissing) {
-  const auto runs = run_stability(cases_of({"loads", "starts"}), {.most_steps = 200, .fault = {.projection = false}});
-  int clamped_bdf2 = 0;
-  for (const StabilityRun* run : runs_with(runs, Verdict::kFail))
-    clamped_bdf2 += !run->test.body.free && run->test.integrator == runtime::Integrator::kBdf2 ? 1 : 0;
-  EXPECT_GE(clamped_bdf2, 5);
+  EXPECT_GE(runs_with(runs_with_fault({.projection = false}), Verdict::kFail).size(), 20U);
 }
 
 TEST(Stability, ProgramWritesItsReport) {
