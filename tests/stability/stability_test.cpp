@@ -34,8 +34,8 @@ class StabilityGroups : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(All, StabilityGroups,
                          testing::Values("stiffness", "loads", "starts", "spin", "contact", "examples", "slivers",
                                          "no damping"),
-                         [](const auto& info) {
-                           std::string name = info.param;
+                         [](const auto& group) {
+                           std::string name = group.param;
                            std::erase(name, ' ');
                            return name;
                          });
