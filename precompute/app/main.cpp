@@ -76,10 +76,19 @@ int main(int argc, char** argv) {
   StudyCommandOptions study_options;
   auto* study_command_line = app.add_subcommand(
       "study", "measure a scene's error against run time over sweeps of settings, by the full space");
-  study_command_line->add_option("STUDY", study_options.study, "study file (JSON)")->required();
+  auto* subject = study_command_line->add_option_group("subject", "what to measure");
+  subject->require_option(1);
+  subject->add_option("STUDY", study_options.study, "study file (JSON)");
+  subject->add_flag(
+      "--stability", study_options.stability,
+      "instead of a study: thousands of runs at the ends of every range, of stiffness, loads, starts, spin, "
+      "contact, examples; status 1 if one fails that is no known limit");
+  study_command_line->add_flag("--quick", study_options.quick, "with --stability: the part that the tests run");
   study_command_line
-      ->add_option("-o,--output", study_options.folder,
-                   "folder for report.html, results.csv, results.json and what a resumed study needs")
+      ->add_option(
+          "-o,--output", study_options.folder,
+          "folder for report.html, results.csv, results.json and what a resumed study needs; of --stability for "
+          "stability.html, .md, .csv and .json")
       ->required();
   study_command_line
       ->add_option("--budget-us", study_options.budget_us,
@@ -89,14 +98,19 @@ int main(int argc, char** argv) {
       ->add_option("--max-error", study_options.max_error,
                    "recommend the fastest point of at most so many percent of error")
       ->check(CLI::PositiveNumber);
-  study_command_line->add_option("--jobs", study_options.jobs, "processes that run points; times are measured by one")
+  study_command_line
+      ->add_option("--jobs", study_options.jobs,
+                   "processes that run points; times are measured by one. Of --stability runs at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
 
   return run_program(app, argc, argv, [&] {
+    if (study_options.stability && common.log_level == "info")
+      common.log_level = "error";  // of hundreds of small bodies
     apply(common);
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
-    if (study_command_line->parsed()) study_command(study_options);
+    if (study_command_line->parsed())
+      study_options.stability ? stability_command(study_options) : study_command(study_options);
   });
 }

@@ -5,6 +5,7 @@
 
 #include "common/core/error.h"
 #include "precompute/study/report.h"
+#include "precompute/study/stability_report.h"
 #include "precompute/study/study.h"
 
 namespace exmat {
@@ -35,6 +36,20 @@ void study_command(const StudyCommandOptions& options) {
     throw WorkError(fmt::format("{}: {} of {} points or their baseline failed; see the report", options.study, failed,
                                 result.points.size()));
   if (!recommendation.empty() && !result.recommended) throw WorkError(recommendation);
+}
+
+void stability_command(const StudyCommandOptions& options) {
+  precompute::write_stability_report({}, options.folder);  // better refused now than after the work
+  const auto runs =
+      options.quick
+          ? precompute::run_stability(precompute::short_stability_suite(), {precompute::kShortSteps, options.jobs})
+          : precompute::run_stability(precompute::long_stability_suite(), {precompute::kLongSteps, options.jobs});
+  precompute::write_stability_report(runs, options.folder);
+  fmt::print("{}", precompute::stability_markdown(runs));
+  const auto failed = precompute::runs_with(runs, precompute::Verdict::kFail).size();
+  if (failed > 0)
+    throw WorkError(fmt::format("{} of {} runs of the stability suite failed; see {}/stability.html", failed,
+                                runs.size(), options.folder));
 }
 
 }  // namespace exmat

@@ -131,6 +131,7 @@ Eigen::Index SemidefiniteSolver::size() const { return implementation_->size; }
 
 Eigen::MatrixXd SemidefiniteSolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
   const auto& self = *implementation_;
+  if (right_hand_sides.cols() == 0) return right_hand_sides;
   const Eigen::Index full = self.size + self.border;
   Eigen::MatrixXd extended = Eigen::MatrixXd::Zero(full, right_hand_sides.cols());
   extended.topRows(self.size) = right_hand_sides;

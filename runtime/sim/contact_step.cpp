@@ -18,20 +18,26 @@ BodyPose pose_of(const Model& model, const State& state) {
   return pose;
 }
 
-/// Pose and momenta of the solution x of a ContactProblem, into the workspace.
-void take_contact_solution(const StepScene& scene, const State& state, Workspace& workspace) {
+/// Pose and momenta of the solution x of a ContactProblem, into the workspace. Momenta come from the forces of the
+/// contacts, or, where these are not balanced for want of convergence, from the way that the body went.
+void take_contact_solution(const StepScene& scene, const State& state, bool converged, Workspace& workspace) {
   ContactProblemWorkspace& near = *workspace.near;
   workspace.q = state.q + near.x.tail(state.q.size());
   if (!state.body) return;
   FreeState& body = *workspace.body;
   FreeMotionWorkspace& free = *workspace.free;
   body.position += near.x.head<3>();
-  body.linear_momentum += scene.time_step * near.contact.force;
-  body.angular_momentum += scene.time_step * near.contact.torque;
   const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
-  const Eigen::Vector3d momentum = rotation.transpose() * body.angular_momentum;
-  free.solution.spin =
-      free.moments.inertia.inverse() * (momentum - free.moments.deformation.transpose() * free.velocity);
+  const Eigen::Vector3d deformation = free.moments.deformation.transpose() * free.velocity;
+  if (converged) {
+    body.angular_momentum += scene.time_step * near.contact.torque;
+    free.solution.spin = free.moments.inertia.inverse() * (rotation.transpose() * body.angular_momentum - deformation);
+  } else {
+    near.contact.force = body.mass / (scene.time_step * scene.time_step) * near.x.head<3>();
+    free.solution.spin = free.solution.rotation / scene.time_step;
+    body.angular_momentum = rotation * (free.moments.inertia * free.solution.spin + deformation);
+  }
+  body.linear_momentum += scene.time_step * near.contact.force;
 }
 
 void add(const NewtonReport& more, NewtonReport& total) {
@@ -95,7 +101,7 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
   }
-  take_contact_solution(scene, state, workspace);
+  take_contact_solution(scene, state, total.status == NewtonStatus::kConverged, workspace);
   return total;
 }
 

@@ -1,10 +1,15 @@
 #include "runtime/sim/free_motion.h"
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
 #include <tuple>
 
 namespace exmat::runtime {
 namespace {
+
+constexpr double kSubTurn = 0.3;  // [rad] of turn_rigidly()
+constexpr int kMostSubSteps = 1000;
 
 /// D + V, see free_motion.h, and what J^-1 makes of it and of H.
 void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace) {
@@ -37,13 +42,41 @@ void begin_rotation(const FreeState& body, double time_step, bool dissipative,
   workspace.problem.offset = (time_step - workspace.problem.factor) * body.spin;
   workspace.solution.spin = body.spin;
   workspace.solution.rotation = time_step * body.spin;
-  workspace.spin_is_given = false;
+  workspace.spin_is_given = workspace.turn_is_given = false;
+}
+
+void turn_rigidly(const RigidFrame& frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step,
+                  FreeMotionWorkspace& workspace) noexcept {
+  frame.moments(q, workspace.moments);
+  const Eigen::Matrix3d& inertia = workspace.moments.inertia;
+  const Eigen::Matrix3d inverse = inertia.inverse();
+  const Eigen::Vector3d deformation = workspace.moments.deformation.transpose() * v;
+  Eigen::Vector3d momentum = workspace.problem.momentum, spin = inverse * (momentum - deformation);
+  const double sub_turns = std::ceil(time_step * spin.norm() / kSubTurn);
+  const int steps = sub_turns < kMostSubSteps ? std::max(1, static_cast<int>(sub_turns)) : kMostSubSteps;
+  const double sub_step = time_step / steps;
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  for (int k = 0; k < steps; ++k) {
+    SpinSolution solution = solve_spin({momentum, Eigen::Vector3d::Zero(), sub_step}, inertia, deformation, spin);
+    if (!solution.converged) solution.rotation = sub_step * spin;
+    turn = turn * quaternion_of(solution.rotation);
+    momentum = rotation_of(solution.rotation).transpose() * momentum;
+    spin = inverse * (momentum - deformation);
+  }
+  const Eigen::AngleAxisd angle(turn.normalized());
+  workspace.solution = {spin, angle.angle() * angle.axis(), true};
+  workspace.turned_momentum = momentum;
+  workspace.turn_is_given = true;
 }
 
 bool update_spin(const RigidFrame& frame, const Eigen::VectorXd& q, FreeMotionWorkspace& workspace) noexcept {
   frame.moments(q, workspace.moments);
   if (workspace.spin_is_given) return true;
   const Eigen::Vector3d deformation = workspace.moments.deformation.transpose() * workspace.velocity;
+  if (workspace.turn_is_given) {
+    workspace.solution.spin = workspace.moments.inertia.inverse() * (workspace.turned_momentum - deformation);
+    return true;
+  }
   workspace.solution = solve_spin(workspace.problem, workspace.moments.inertia, deformation, workspace.solution.spin);
   return workspace.solution.converged;
 }

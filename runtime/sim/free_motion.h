@@ -17,8 +17,10 @@ struct FreeMotionWorkspace {
   FreeMotionWorkspace() = default;
   explicit FreeMotionWorkspace(const Model& model);
 
-  SpinProblem problem;         ///< of this step
-  bool spin_is_given = false;  ///< near obstacles the spin is an unknown of its own
+  SpinProblem problem;                                        ///< of this step
+  bool spin_is_given = false;                                 ///< near obstacles the spin is an unknown of its own
+  bool turn_is_given = false;                                 ///< see turn_rigidly()
+  Eigen::Vector3d turned_momentum = Eigen::Vector3d::Zero();  ///< L in the body frame at the end of a given turn
   SpinSolution solution;
   RigidFrame::Moments moments;
   AlignedArray scratch;
@@ -31,6 +33,12 @@ struct FreeMotionWorkspace {
 /// The problem of the spin in this step, after external forces have changed the momenta of `body`. `dissipative`:
 /// implicit Euler instead of implicit midpoint.
 void begin_rotation(const FreeState& body, double time_step, bool dissipative, FreeMotionWorkspace& workspace) noexcept;
+
+/// Where the body turns too far in the step for begin_rotation()'s problem: gives it the turn that a rigid body of its
+/// shape and motion at the beginning makes, by implicit Euler in sub-steps of at most 0.3 rad or a thousandth of the
+/// step. Keeps L exactly, and the energy of a rigid body from growing. The spin then follows from L in that frame.
+void turn_rigidly(const RigidFrame& frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step,
+                  FreeMotionWorkspace& workspace) noexcept;
 
 /// Moments at q and the spin at the end of the step for q and its velocity in workspace.velocity. False where there is
 /// no such spin.

@@ -8,6 +8,7 @@ namespace {
 
 constexpr double kSmallRatio = 0.1;  // of inertia: beyond it a factorisation costs less than the terms of a series
 constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
+constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();  // of trace(K) |q|
 
 bool has_skew_forces(const Model& model, const StepScene& scene) noexcept {
   for (std::size_t i = 0; i < scene.examples.size(); ++i)
@@ -41,6 +42,7 @@ double IncrementalPotential::start(const Eigen::VectorXd& first_iterate) noexcep
   const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(true));
   elastic_energy_ = model_.internal_force.force_and_stiffness(first_iterate, workspace_.elasticity,
                                                               workspace_.internal_force, workspace_.newton.hessian);
+  force_rounding_ = kForceRounding * workspace_.newton.hessian.diagonal().cwiseAbs().sum();
   return elastic_energy_ + inertia_and_load(first_iterate);
 }
 
@@ -138,8 +140,10 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
   set_offset(q);
   gradient = workspace_.internal_force + workspace_.linear + workspace_.product.head(q.size());
   const double inertia = form.acceleration_factor * (q - form.acceleration_centre).norm();
-  PotentialEvaluation evaluation{quadratic(elastic_energy_),
-                                 workspace_.external_force.norm() + workspace_.internal_force.norm() + inertia};
+  // Elements deformed without stress, as those that StVK reflects, cancel to rounding: no residual comes below it.
+  const double rounding = force_rounding_ * q.norm() / scene_.newton.tolerance;
+  PotentialEvaluation evaluation{quadratic(elastic_energy_), workspace_.external_force.norm() +
+                                                                 workspace_.internal_force.norm() + inertia + rounding};
   if (has_frozen_force()) {
     if (!update_frozen_force(q)) evaluation.potential.value = std::numeric_limits<double>::infinity();
     gradient += workspace_.next_frozen_force;
@@ -191,6 +195,7 @@ double IncrementalPotential::gyroscopic_ratio() const noexcept {
 
 int IncrementalPotential::gyroscopic_terms() const noexcept {
   const double ratio = gyroscopic_ratio();
+  if (!(ratio <= kSmallRatio)) return 0;  // since the factorisation it has grown beyond what the series is for
   double error = ratio;
   int terms = 0;
   for (; error > kGyroscopicError; error *= ratio) ++terms;

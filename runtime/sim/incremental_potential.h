@@ -61,6 +61,7 @@ class IncrementalPotential {
   bool carried_;
   bool at_first_iterate_ = true;
   double elastic_energy_ = 0;
+  double force_rounding_ = 0;  // of internal forces over |q|
 };
 
 }  // namespace exmat::runtime

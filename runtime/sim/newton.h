@@ -16,6 +16,10 @@ namespace exmat::runtime {
 struct NewtonSettings {
   int max_iterations = 20;
   double tolerance = 1e-6;  ///< |gradient| <= tolerance * scale of the evaluation
+
+  // Faults that the stability suite is to find; newton_minimize() alone looks at them, no file sets them.
+  bool line_search = true;  ///< false: every full step is taken
+  bool projection = true;   ///< false: stagnates where the exact Hessian is not positive definite
 };
 
 enum class NewtonStatus {
@@ -120,13 +124,19 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
     direction.noalias() = workspace.lu->solve(-workspace.gradient);
     return workspace.gradient.dot(direction);
   }
+  const auto solve = [&] { kernels().cholesky_solve(workspace.factor.data(), size, direction.data()); };
   direction = -workspace.gradient;
-  kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+  solve();
   if constexpr (requires { problem.gyroscopic_terms(); }) {
     for (int term = problem.gyroscopic_terms(); term > 0; --term) {
       workspace.trial = direction;
       direction = -workspace.gradient - problem.gyroscopic_product(workspace.trial);
-      kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+      solve();
+    }
+    // A series cut short may ascend.
+    if (workspace.gradient.dot(direction) >= 0) {
+      direction = -workspace.gradient;
+      solve();
     }
   }
   return workspace.gradient.dot(direction);
@@ -196,6 +206,12 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
   report.residual = gradient.norm();
   for (;;) {
     const double limit = settings.tolerance * here.force_scale;
+    if (std::isfinite(unchecked_from) && !(report.residual <= unchecked_from)) {
+      x.swap(trial);
+      here = problem.evaluate(x, gradient);
+      report.residual = gradient.norm();
+      return finish(NewtonStatus::kStagnated);
+    }
     if (!std::isfinite(report.residual) || !std::isfinite(here.potential.value))
       return finish(NewtonStatus::kNonFinite);
     if (report.residual <= limit) return finish(NewtonStatus::kConverged);
@@ -205,6 +221,7 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
     const bool fresh = state != Hessian::kFactorised;
     if (state == Hessian::kStale) problem.hessian(x, Tangent::kExact, hessian);
     if (fresh && !detail::factorize(workspace, report)) {
+      if (!settings.projection) return finish(NewtonStatus::kStagnated);
       ++report.projections;
       problem.hessian(x, Tangent::kPositiveSemidefinite, hessian);
       here = problem.evaluate(x, gradient);
@@ -219,10 +236,10 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
     }
     const double slope = detail::solve_direction(problem, workspace, gyroscopic);
     if (!std::isfinite(slope)) return finish(NewtonStatus::kNonFinite);
-    const bool below_rounding = -slope <= detail::kRounding * here.potential.magnitude;
+    const bool below_rounding = std::abs(slope) <= detail::kRounding * here.potential.magnitude;
     unchecked_from = below_rounding ? report.residual : std::numeric_limits<double>::infinity();
     PotentialEvaluation there;
-    if (below_rounding) {
+    if (below_rounding || !settings.line_search) {
       // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
       trial = x + Eigen::Map<const Eigen::VectorXd>(direction.data(), x.size());
       there = problem.evaluate(trial, trial_gradient);

@@ -198,6 +198,27 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) {
   if (newton.status == NewtonStatus::kStagnated) report.status |= kStepStagnated;
 }
 
+/// Stages 3 to 6 of the step, its form and external forces given: q at its end into the workspace, and the elastic
+/// energy there.
+NewtonReport solve(const Model& model, const StepScene& scene, const State& state, bool near, Workspace& workspace,
+                   StepReport& report, double& elastic_energy) {
+  NewtonReport failed;
+  failed.status = NewtonStatus::kNonFinite;
+  IncrementalPotential potential(model, scene, state, workspace);
+  choose_first_iterate(scene, state, potential, workspace, report);
+  if (!workspace.q.allFinite()) return failed;
+  if (runs_examples(scene)) {
+    update_targets(model, scene, state, workspace.q, workspace, report);
+    if (report.status & kStepNonFinite) return failed;
+    prepare_example_forces(scene, workspace);
+  }
+  potential.prepare();
+  const NewtonReport newton = near ? solve_with_contacts(model, scene, state, potential, workspace)
+                                   : newton_minimize(potential, scene.newton, workspace.q, workspace.newton);
+  elastic_energy = potential.elastic_energy();
+  return newton;
+}
+
 }  // namespace
 
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
@@ -215,19 +236,14 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   prepare_integrator(model, scene, integrator, state, begins_anew(scene, state, midpoint), workspace, report);
 
   workspace.newton.profile = workspace.profile;
-  IncrementalPotential potential(model, scene, state, workspace);
-  choose_first_iterate(scene, state, potential, workspace, report);
-  if (!workspace.q.allFinite()) report.status |= kStepNonFinite;
-  if (runs_examples(scene) && !(report.status & kStepNonFinite)) {
-    update_targets(model, scene, state, workspace.q, workspace, report);
-    prepare_example_forces(scene, workspace);
+  double elastic_energy = 0;
+  NewtonReport newton = solve(model, scene, state, near, workspace, report, elastic_energy);
+  if (newton.status == NewtonStatus::kNonFinite && state.body && !near) {
+    backward_euler_form(state, scene.time_step, workspace.form);
+    turn_rigidly(*model.rigid, state.q, state.v, scene.time_step, *workspace.free);
+    newton = solve(model, scene, state, near, workspace, report, elastic_energy);
   }
-  if (report.status & kStepNonFinite) return report;
-
-  potential.prepare();
-  add_newton_report(near ? solve_with_contacts(model, scene, state, potential, workspace)
-                         : newton_minimize(potential, scene.newton, workspace.q, workspace.newton),
-                    report);
+  add_newton_report(newton, report);
   workspace.offset = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
   if (!workspace.q.allFinite() || !workspace.offset.allFinite()) report.status |= kStepNonFinite;
   if (report.status & kStepNonFinite) return report;
@@ -237,7 +253,7 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   }
   const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.offset);
   if (small_q || small_v) report.status |= kStepSubnormal;
-  commit(model, scene, potential.elastic_energy(), workspace, state);
+  commit(model, scene, elastic_energy, workspace, state);
   state.begins_anew = near;
   commit_contacts(model, near, workspace, state);
   return report;

@@ -116,6 +116,36 @@ TEST(ContactStep, ImpactTakesNoEnergyAndMomentumIsTheIntegralOfTheForces) {
     }
 }
 
+// One iteration leaves forces of the contacts that nothing balances. The momenta do not get them: they are those of the
+// way that the body went, and of the force that is reported.
+TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
+  for (const double stiffness : {1e6, 1e8}) {
+    Dropped dropped(1.0 / 30, stiffness, 0.5);
+    dropped.scene.newton.max_iterations = 1;
+    FreeMotion motion;
+    motion.position = Eigen::Vector3d(0, 0, 0.05);
+    motion.linear_velocity = Eigen::Vector3d(1, 0, -3);
+    motion.angular_velocity = Eigen::Vector3d(0, 4, 1);
+    set_motion(*dropped.model, motion, dropped.state);
+    Workspace workspace(*dropped.model, dropped.scene);
+    const double dt = dropped.scene.time_step;
+    int unconverged = 0;
+    for (int i = 0; i < 10; ++i) {
+      const FreeState before = *dropped.state.body;
+      const StepReport report = step(*dropped.model, dropped.scene, dropped.state, workspace);
+      ASSERT_FALSE(report.status & kStepNonFinite);
+      if ((report.status & kStepUnconverged) == 0) continue;
+      ++unconverged;
+      const FreeState& after = *dropped.state.body;
+      const Eigen::Vector3d of_way = dropped.mass() / dt * (after.position - before.position);
+      EXPECT_LE((after.linear_momentum - of_way).norm(), 1e-9 * of_way.norm()) << stiffness << " step " << i;
+      const Eigen::Vector3d force = report.contact_force + dropped.mass() * dropped.scene.gravity;
+      EXPECT_LE((after.linear_momentum - before.linear_momentum - dt * force).norm(), 1e-9 * of_way.norm());
+    }
+    EXPECT_GT(unconverged, 0);
+  }
+}
+
 TEST(ContactStep, AwayFromObstaclesNothingIsLookedAt) {
   Dropped dropped(1e-3, 1e6);
   dropped.state.body->position = Eigen::Vector3d(0, 0, 50);

@@ -326,6 +326,67 @@ TEST(FreeFlight, AllocatesNothing) {
     }
 }
 
+TEST(FreeFlight, ATurnOfManyRoundsInAStepIsThatOfARigidBody) {
+  const FreeBody body;
+  const Eigen::Vector3d J = body.bar.model.rigid->inertia.diagonal();
+  const double dt = 1.0 / 30;
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double spin : {0.0, 1.0, 1e3, 1e5}) {
+      State state = make_state(*body.model);
+      FreeMotion motion;
+      motion.angular_velocity = spin * Eigen::Vector3d::Unit(axis);
+      set_motion(*body.model, motion, state);
+      FreeMotionWorkspace workspace(*body.model);
+      begin_rotation(*state.body, dt, true, workspace);
+      turn_rigidly(*body.model->rigid, state.q, state.v, dt, workspace);
+      const Eigen::Matrix3d turn(Eigen::AngleAxisd(spin * dt, Eigen::Vector3d::Unit(axis)));
+      // Rounding of the angle, that of 1e-16 L about the other axes a thousand times.
+      EXPECT_LE((rotation_of(workspace.solution.rotation) - turn).norm(), 1e-12 * (1 + spin * dt)) << axis << spin;
+      EXPECT_LE((workspace.turned_momentum - spin * J[axis] * Eigen::Vector3d::Unit(axis)).norm(),
+                1e-12 * spin * J[axis]);
+    }
+}
+
+// Time steps of 30 to 3000 rad.
+TEST(FreeFlight, NoSpinIsTooFast) {
+  const FreeBody body;
+  for (const double spin : {1e3, 1e5})
+    for (const Integrator integrator : {Integrator::kBdf2, Integrator::kBackwardEuler, Integrator::kNewmark}) {
+      const StepScene scene = body.scene(1.0 / 30, integrator);
+      State state = body.moving(spin, 0.02);
+      const Eigen::Vector3d momentum = state.body->angular_momentum;
+      double energy = energies(scene, state).kinetic + state.elastic_energy;
+      Workspace workspace(*body.model, scene);
+      const test::AllocationCounter counter;
+      for (int i = 0; i < 30; ++i) {
+        const StepReport report = step(*body.model, scene, state, workspace);
+        ASSERT_FALSE(report.status & kStepNonFinite) << spin << " step " << i;
+      }
+      EXPECT_EQ(counter.count(), 0U);
+      EXPECT_LE(energies(scene, state).kinetic + state.elastic_energy, energy) << spin;
+      EXPECT_LE((state.body->angular_momentum - momentum).norm(), 1e-14 * momentum.norm());
+    }
+}
+
+// Once the factor of an iteration was of a slow spin and the next one's was fast, the series for it never ended; and a
+// step along an ascending direction was taken unchecked.
+TEST(FreeFlight, ABodyOfRandomShapeKeepsItsEnergyByBackwardEuler) {
+  for (const MaterialModel material : {MaterialModel::kStableNeoHookean, MaterialModel::kCorotational}) {
+    const FreeBody body({.material = material, .free = true});
+    for (const double time_step : {1e-3, 1.0 / 30})
+      for (std::uint32_t seed = 1; seed <= 5; ++seed) {
+        const StepScene scene = body.scene(time_step, Integrator::kBackwardEuler);
+        State state = body.moving(1, 5, seed);
+        const double energy = energies(scene, state).kinetic + state.elastic_energy;
+        Workspace workspace(*body.model, scene);
+        for (int i = 0; i < 100; ++i) {
+          ASSERT_FALSE(step(*body.model, scene, state, workspace).status & kStepNonFinite) << seed << " step " << i;
+          ASSERT_LE(energies(scene, state).kinetic + state.elastic_energy, energy * (1 + 1e-9)) << seed << " " << i;
+        }
+      }
+  }
+}
+
 // Example forces are internal, however strong.
 TEST(FreeFlight, StrongExampleForcesKeepTheMomenta) {
   const FreeBody body;
