@@ -89,7 +89,7 @@ bool Minimisation::line_search(double slope, Eigen::VectorXd& trial, Eigen::Vect
 // Along the direction; false where nothing lowers the potential.
 bool Minimisation::move() {
   const double slope = gradient_.dot(direction_);
-  const bool below_rounding = -slope <= kRounding * here_.potential.magnitude;
+  const bool below_rounding = std::abs(slope) <= kRounding * here_.potential.magnitude;
   unchecked_from_ = below_rounding ? report_.residual : kInfinity;
   Eigen::VectorXd trial, trial_gradient;
   PotentialEvaluation there;
@@ -97,6 +97,10 @@ bool Minimisation::move() {
     // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
     trial = d_ + direction_;
     there = potential_.evaluate(trial, trial_gradient);
+    if (!(trial_gradient.norm() <= report_.residual)) {
+      here_ = potential_.evaluate(d_, gradient_);
+      return false;
+    }
   } else if (!line_search(slope, trial, trial_gradient, there)) {
     here_ = potential_.evaluate(d_, gradient_);
     return false;
