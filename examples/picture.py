@@ -59,6 +59,7 @@ class Run:
         self.label = path.stem.removeprefix("scene").removeprefix("_").replace("_", " ")
         with h5py.File(path.parent / self.scene["bundle"]) as f:
             self.rest, self.surface = f["/object/vertices"][:], f["/object/surface"][:]
+            drawn_rest = f["/render/vertices"][:] if "render" in f else self.rest
             self.fixed = np.flatnonzero(f["/object/fixed"][:]) if "/object/fixed" in f else []
             centre = f["/rigid/centre_of_mass"][:] if "rigid" in f else None
         with h5py.File(path.parent / self.scene["output"]["trajectory"]) as f:
@@ -66,13 +67,18 @@ class Run:
             pick = lambda name: np.array([f[name][k] for k in frames])
             self.times, self.positions = pick("/time"), pick("/vertices").astype(float)
             bodies = list(zip(pick("/body/position"), pick("/body/orientation")))
-        self.displacement = np.array([self.without_rigid_motion(x, centre, *b) for x, b in zip(self.positions, bodies)])
+            # The render mesh, where there is one, in place of the tets' surface.
+            self.drawn, self.drawn_rest, self.edges = self.positions, self.rest, True
+            if "render" in f:
+                self.drawn, self.surface = pick("/render/vertices").astype(float), f["/render/triangles"][:]
+                self.drawn_rest, self.edges = drawn_rest, False
+        self.displacement = np.array([self.without_rigid_motion(x, centre, *b) for x, b in zip(self.drawn, bodies)])
 
     def without_rigid_motion(self, positions, centre, position, orientation):
         """Length of the displacement of each vertex; of a free body in its own frame."""
         if centre is not None:
             positions = (positions - centre - position) @ sheet.rotation(orientation) + centre
-        return np.linalg.norm(positions - self.rest, axis=1)
+        return np.linalg.norm(positions - self.drawn_rest, axis=1)
 
     def obstacles(self):
         return [x for x in self.scene.get("obstacles", []) if not x.get("motion")]
@@ -85,9 +91,9 @@ class Run:
 
     def panel(self, k, table, low, high, ghost):
         size = np.linalg.norm(np.ptp(self.rest, axis=0))
-        actors = [sheet.body(self.positions[k], self.surface, self.displacement[k], table)]
+        actors = [sheet.body(self.drawn[k], self.surface, self.displacement[k], table, edges=self.edges)]
         if ghost:
-            actors.append(sheet.body(self.rest, self.surface, colour=(0.5, 0.5, 0.5), opacity=0.12, edges=False))
+            actors.append(sheet.body(self.drawn_rest, self.surface, colour=(0.5, 0.5, 0.5), opacity=0.12, edges=False))
         if len(self.fixed):
             actors.append(sheet.marks(self.positions[k][self.fixed], vtk.vtkSphereSource(), 0.018 * size, (0.1, 0.3, 0.7)))
         ids, directions = self.forces(self.times[k])
@@ -100,7 +106,7 @@ class Run:
 
 def draw_motion(a):
     runs = [Run(path, a.times, a.frames) for path in a.scenes]
-    shown = np.concatenate([r.positions.reshape(-1, 3) for r in runs])
+    shown = np.concatenate([r.drawn.reshape(-1, 3) for r in runs])
     low, high = shown.min(0), shown.max(0)
     for obstacle in itertools.chain(*(r.obstacles() for r in runs)):
         bounds = np.reshape(sheet.obstacle_data(obstacle, low, high).GetBounds(), (3, 2))

@@ -61,6 +61,7 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   if (includes(groups, "cubature"))
     reader.read_text("/cubature", "/cubature", "internal_force", summary.internal_force);
   if (summary.has_targets) reader.read_text("/targets", "/targets", "energy_reference", summary.energy_reference);
+  summary.render_vertices = value_of(sizes, "v");
   if (includes(groups, "regions"))
     for (const std::string& name : reader.region_names()) summary.regions.push_back(summarise_region(reader, name));
   return summary;

@@ -39,6 +39,7 @@ struct BundleSummary {
   bool has_polynomial = false;   ///< /polynomial is there
   bool has_targets = false;      ///< /targets is there
   std::vector<RegionSummary> regions;
+  std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
 };
 BundleSummary summarise_bundle(const std::filesystem::path& path);
 

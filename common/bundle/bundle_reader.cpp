@@ -1,6 +1,7 @@
 #include "common/bundle/bundle_reader.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <span>
 
@@ -19,6 +20,7 @@ const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attrib
 // What of an asset brings a group.
 std::string asset_member(std::string_view group) {
   if (group == "polynomial") return "\"polynomial\" as internal_force";
+  if (group == "render") return "object.render_mesh";
   const bool is_need = group == "targets" || group == "rigid" || group == "contact" || group == "regions";
   return fmt::format("\"{}\" among the needs", is_need ? group : "examples");
 }
@@ -230,6 +232,7 @@ void BundleReader::check_model(const ReducedModel& model) {
   if (model.examples) attempt([&] { check_example_indices("/examples", *model.examples); });
   attempt([&] { check_fixed_vertices(model); });
   if (model.targets) check_targets("/targets", *model.targets);
+  if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
   for (const RegionData& region : model.regions) {
     const std::string path = "/regions/" + region.name;
     attempt([&] { check_example_indices(path + "/examples", region.examples); });
@@ -285,6 +288,16 @@ void BundleReader::check_target_knots(const std::string& folder, const TargetTab
   if (!is_sound(path) || !is_sound(folder + "/exponents")) return;
   if (const auto fault = check_knots(targets.knots, targets.exponents.cols()))
     refuse(path, fault->expected, fault->found);
+}
+
+void BundleReader::check_barycentric(const RowMatrix& rows) const {
+  const std::string path = "/render/barycentric";
+  if (!is_sound(path)) return;
+  // Rounding grows with the entries of a row, which are large where a vertex is far outside its tet.
+  constexpr double kRounding = 1e-9;
+  for (Eigen::Index k = 0; k < rows.rows(); ++k)
+    if (std::abs(rows.row(k).sum() - 1) > kRounding * rows.row(k).cwiseAbs().sum())
+      refuse(path, fmt::format("numbers that add up to 1 in row {}", k), fmt::format("{}", rows.row(k).sum()));
 }
 
 void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,

@@ -78,6 +78,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.rigid.emplace();
   else if (group == "contact")
     model.contact.emplace();
+  else if (group == "render")
+    model.render.emplace();
   else
     throw std::logic_error("no member of the model is bound to the group " + std::string(group));
 }

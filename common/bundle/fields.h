@@ -176,6 +176,17 @@ void visit_contact(Contact& contact, Visitor& visit) {
   visit.dataset("basis", contact.basis);
 }
 
+template <typename Render, typename Visitor>
+void visit_render(Render& render, Visitor& visit) {
+  enter(kTopPlace, "/render", visit);
+  visit.attribute("outside", render.outside);
+  visit.attribute("farthest", render.farthest);
+  visit.dataset("vertices", render.vertices);
+  visit.dataset("tets", render.tets);
+  visit.dataset("barycentric", render.barycentric);
+  visit.dataset("triangles", render.triangles);
+}
+
 /// Visits the groups that the model holds, in bundle order. Model is ReducedModel or const ReducedModel.
 template <typename Model, typename Visitor>
 void visit_fields(Model& model, Visitor& visit) {
@@ -194,6 +205,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);
   if (model.contact) visit_contact(*model.contact, visit);
+  if (model.render) visit_render(*model.render, visit);
 }
 
 /// Root attributes that are no members of the model; write_bundle and read_bundle know them by name.

@@ -53,13 +53,19 @@ class AssetReader {
     const Json parts = member_or(json, "materials", Json::array());
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const Json& part = parts[i];
-      asset.material_regions.push_back({read_selection(part["tets"], fmt::format("/object/materials/{}/tets", i)),
+      asset.material_regions.push_back({read_tets(part["tets"], fmt::format("/object/materials/{}/tets", i)),
                                         optional_member<double>(part, "youngs_modulus"),
                                         optional_member<double>(part, "poisson_ratio"),
                                         optional_member<double>(part, "density")});
     }
     if (json.contains("fixed")) asset.fixed = read_selection(json["fixed"], "/object/fixed");
     asset.object_drop = read_drop(json);
+    if (json.contains("render_mesh")) asset.render_mesh = resolve_path(file_, json["render_mesh"]);
+  }
+
+  TetSelection read_tets(const Json& json, const std::string& place) const {
+    if (json.contains("set")) return SetSelection{json["set"]};
+    return std::visit([](const auto& selection) { return TetSelection(selection); }, read_selection(json, place));
   }
 
   VertexSelection read_selection(const Json& json, const std::string& place) const {

@@ -29,8 +29,13 @@ struct IdSelection {
 };
 using VertexSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection>;
 
-/// Tets by their centroids, or by their ids in the mesh file.
-using TetSelection = VertexSelection;
+/// A set of tets that the mesh file names.
+struct SetSelection {
+  std::string name;
+};
+
+/// Tets by their centroids, by their ids in the mesh file, or by a set of it.
+using TetSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, SetSelection>;
 
 struct MaterialConfig {
   std::string model = "stvk";
@@ -99,6 +104,7 @@ struct AssetConfig {
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
   std::optional<VertexSelection> fixed;                ///< absent: a free body
   DropConfig object_drop;
+  std::optional<std::filesystem::path> render_mesh;  ///< surface that is drawn in the object's place
   std::vector<ExampleConfig> examples;
   std::vector<RegionConfig> regions;
 
@@ -123,7 +129,7 @@ struct AssetConfig {
   std::optional<int> contact_count;                 ///< sampled from these; absent: all of them
 
   std::optional<std::vector<std::string>> needs;  ///< optional parts to write ("examples", "targets", "rigid",
-                                                  ///< "contact", "regions"); absent: all that apply
+                                                  ///< "contact", "regions", "render"); absent: all that apply
   std::uint64_t seed = 1;
 };
 

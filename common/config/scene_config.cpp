@@ -107,6 +107,7 @@ SceneConfig load_scene(const std::filesystem::path& file) {
   const Json output = member_or(json, "output", Json::object());
   if (output.contains("trajectory")) scene.trajectory = resolve_path(file, output["trajectory"]);
   scene.every = output.value("every", scene.every);
+  scene.render = output.value("render", scene.render);
   return scene;
 }
 
@@ -115,6 +116,7 @@ Needs needs_of(const SceneConfig& scene) {
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != "solve",
               .contact = !scene.obstacles.empty(),
+              .render = scene.render,
               .internal_force = scene.internal_force};
   if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
   std::vector<RegionNeeds>& regions = needs.regions.emplace();

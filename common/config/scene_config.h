@@ -111,6 +111,7 @@ struct SceneConfig {
   int instances = 1;                      ///< bodies that are stepped; the trajectory shows the first
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;
+  bool render = false;  ///< the trajectory holds the render mesh
 };
 
 }  // namespace exmat

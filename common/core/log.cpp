@@ -16,7 +16,7 @@ void send(Level level, std::string_view message) {
 
 }  // namespace
 
-void set_sink(Sink new_sink) { sink() = std::move(new_sink); }
+Sink set_sink(Sink new_sink) { return std::exchange(sink(), std::move(new_sink)); }
 
 void debug(std::string_view message) { send(Level::kDebug, message); }
 void info(std::string_view message) { send(Level::kInfo, message); }

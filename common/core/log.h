@@ -7,10 +7,10 @@ namespace exmat::log {
 
 enum class Level { kDebug, kInfo, kWarning, kError };
 
-/// Receives every message; replaces the former sink. Without one, messages are dropped. Not thread-safe: set it in
-/// main.
+/// Receives every message. Without one, messages are dropped.
 using Sink = std::function<void(Level, std::string_view)>;
-void set_sink(Sink sink);
+/// Returns the former sink. Not thread-safe: set it in main.
+Sink set_sink(Sink sink);
 
 void debug(std::string_view message);
 void info(std::string_view message);

@@ -17,7 +17,9 @@ ProgressSink& sink() {
 void set_progress_sink(ProgressSink new_sink) { sink() = std::move(new_sink); }
 
 Progress::Progress(std::string stage, std::int64_t total)
-    : stage_(std::move(stage)), total_(total), start_(Clock::now()), last_report_(start_) {}
+    : stage_(std::move(stage)), total_(total), start_(Clock::now()), last_report_(start_) {
+  report(false);
+}
 
 Progress::~Progress() { report(true); }
 

@@ -17,7 +17,8 @@ struct ProgressReport {
   bool finished = false;
 };
 
-/// Receives reports, at most a few a second; set it in main. Without one, reports are dropped.
+/// Receives reports, where a stage begins and ends and at most a few a second between; set it in main. Without one,
+/// reports are dropped.
 using ProgressSink = std::function<void(const ProgressReport&)>;
 void set_progress_sink(ProgressSink sink);
 

@@ -26,10 +26,16 @@ LedgerEntry plan_regions(const Needs& needs, std::int64_t region_count) {
   return {"regions", true, 0, "local example forces are asked for"};
 }
 
+LedgerEntry plan_render(const Needs& needs, bool render_mesh) {
+  if (!render_mesh) return {"render", false, 0, "the asset has no render mesh"};
+  if (!needs.render) return {"render", false, 0, "the render mesh is not asked for"};
+  return {"render", true, 0, "the render mesh is asked for"};
+}
+
 }  // namespace
 
 std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
-                                     std::int64_t region_count) {
+                                     std::int64_t region_count, bool render_mesh) {
   const std::string example_reason = example_count == 0 && region_count > 0 ? "every example is of a region"
                                      : example_count == 0                   ? "the asset has no examples"
                                      : !needs.examples                      ? "no example force is asked for"
@@ -50,7 +56,8 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
       plan_targets(needs, examples, example_count),
       regions,
       {"rigid", rigid, 0, rigid_reason},
-      {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"}};
+      {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"},
+      plan_render(needs, render_mesh)};
 }
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group) {

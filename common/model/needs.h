@@ -25,6 +25,7 @@ struct Needs {
   bool carried = false;                               ///< /rigid, of a body with fixed vertices that a motion carries
   bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
   bool contact = true;                                ///< /contact
+  bool render = true;                                 ///< /render, of an asset that names a render mesh
   std::optional<std::vector<RegionNeeds>> regions{};  ///< /regions, those named; absent: all, with tables as `targets`
   std::string internal_force = "auto";                ///< "auto", "cubature" or "polynomial" (/polynomial)
   std::string energy_reference = "example";           ///< or "rest": undeformed shape in the energy of the targets
@@ -39,9 +40,10 @@ struct LedgerEntry {
 };
 
 /// One entry per group of the bundle, in bundle order, bytes 0, of an asset with so many examples of the whole body,
-/// the rest pose among them, and so many regions. Both stages decide by this list alone. method.md, section 7.
+/// the rest pose among them, so many regions and perhaps a render mesh. Both stages decide by this list alone.
+/// method.md, section 7.
 std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
-                                     std::int64_t region_count = 0);
+                                     std::int64_t region_count = 0, bool render_mesh = false);
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group);
 

@@ -145,6 +145,17 @@ struct ContactData {
   RowMatrix basis;        ///< 3k x r (dataset k 3 r), their rows of the modal basis
 };
 
+/// Group /render: a surface that moves with the body, to be drawn. Vertex k is at the sum of barycentric(k, c) times
+/// the place of corner c of tets[k], wherever these are; the rows add up to 1.
+struct RenderData {
+  VertexArray vertices;      ///< v x 3, at rest, as in the file [m]
+  IndexVector tets;          ///< v
+  RowMatrix barycentric;     ///< v x 4, negative where the vertex is outside its tet
+  TriangleArray triangles;   ///< f x 3, of the vertices
+  std::int64_t outside = 0;  ///< vertices that are not on the body
+  double farthest = 0;       ///< distance of the farthest vertex from the body [m]
+};
+
 /// Everything a scene may need of one asset. Absent groups were left out (method.md, section 7).
 struct ReducedModel {
   std::string asset_name;
@@ -161,6 +172,7 @@ struct ReducedModel {
   std::vector<RegionData> regions;  ///< in index order; none: no such group
   std::optional<RigidData> rigid;
   std::optional<ContactData> contact;
+  std::optional<RenderData> render;
 };
 
 }  // namespace exmat

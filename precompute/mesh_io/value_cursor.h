@@ -76,7 +76,6 @@ class ValueCursor {
 
  private:
   void skip_blanks();
-  void refuse_cut() const;
 
   std::string file_;
   std::string_view bytes_;

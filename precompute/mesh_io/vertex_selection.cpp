@@ -21,6 +21,12 @@ std::string bounding_box(const VertexArray& points) {
                      to_text(points.colwise().maxCoeff()));
 }
 
+std::string names_of(const TetSets& sets) {
+  std::string names;
+  for (const auto& [name, tets] : sets) names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", name);
+  return names.empty() ? "none" : names;
+}
+
 template <typename Predicate>
 std::vector<std::int32_t> points_where(const VertexArray& points, Predicate is_inside) {
   std::vector<std::int32_t> ids;
@@ -32,8 +38,9 @@ std::vector<std::int32_t> points_where(const VertexArray& points, Predicate is_i
 // Of points, which are the vertices or stand for the tets; `noun` says which.
 class Selector {
  public:
-  Selector(const VertexArray& points, std::string_view noun, const std::string& asset_file)
-      : points_(points), noun_(noun), asset_file_(asset_file) {}
+  Selector(const VertexArray& points, std::string_view noun, const std::string& asset_file,
+           const TetSets* sets = nullptr)
+      : points_(points), noun_(noun), asset_file_(asset_file), sets_(sets) {}
 
   std::vector<std::int32_t> operator()(const BoxSelection& box) const {
     const Eigen::RowVector3d min(box.min.data()), max(box.max.data());
@@ -68,6 +75,14 @@ class Selector {
     return require_some(std::move(ids), selection.file.string(), "");
   }
 
+  std::vector<std::int32_t> operator()(const SetSelection& selection) const {
+    const auto found = sets_->find(selection.name);
+    if (found == sets_->end())
+      throw InputError({asset_file_, "set", "a set of the mesh file", fmt::format("\"{}\"", selection.name),
+                        "the file has " + names_of(*sets_)});
+    return require_some(found->second, asset_file_, "set");
+  }
+
  private:
   std::vector<std::int32_t> require_some(std::vector<std::int32_t> ids, const std::string& file,
                                          const std::string& place) const {
@@ -81,6 +96,7 @@ class Selector {
   const VertexArray& points_;
   std::string_view noun_;
   const std::string& asset_file_;
+  const TetSets* sets_;
 };
 
 }  // namespace
@@ -90,11 +106,11 @@ std::vector<std::int32_t> select_vertices(const VertexArray& vertices, const Ver
   return std::visit(Selector(vertices, "vertex", asset_file), selection);
 }
 
-std::vector<std::int32_t> select_tets(const TetMesh& mesh, const TetSelection& selection,
+std::vector<std::int32_t> select_tets(const TetMesh& mesh, const TetSets& sets, const TetSelection& selection,
                                       const std::string& asset_file) {
   VertexArray centroids(mesh.tet_count(), 3);
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) centroids.row(t) = tet_positions(mesh, t).colwise().mean();
-  return std::visit(Selector(centroids, "tet", asset_file), selection);
+  return std::visit(Selector(centroids, "tet", asset_file, &sets), selection);
 }
 
 }  // namespace exmat::precompute

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -15,8 +16,12 @@ namespace exmat::precompute {
 std::vector<std::int32_t> select_vertices(const VertexArray& vertices, const VertexSelection& selection,
                                           const std::string& asset_file);
 
-/// The same of tets: those whose centroid the box or the sphere holds, or by id. `mesh` is that of the file.
-std::vector<std::int32_t> select_tets(const TetMesh& mesh, const TetSelection& selection,
+/// Tets of a mesh file by the names that it gives them.
+using TetSets = std::map<std::string, std::vector<std::int32_t>>;
+
+/// The same of tets: those whose centroid the box or the sphere holds, by id, or one of the `sets` (a name that is none
+/// is an InputError that lists them). `mesh` and `sets` are those of the file.
+std::vector<std::int32_t> select_tets(const TetMesh& mesh, const TetSets& sets, const TetSelection& selection,
                                       const std::string& asset_file);
 
 }  // namespace exmat::precompute

@@ -16,7 +16,7 @@ namespace {
 
 using Kind = NumberType::Kind;
 
-constexpr std::int64_t kTetCell = 10, kFirstVolumeCell = 10;
+constexpr std::int64_t kVertexCell = 1, kTetCell = 10, kFirstVolumeCell = 10;
 constexpr std::array<std::int64_t, 3> kCurvedTetCells{24, 71, 78};  // quadratic, Lagrange, Bezier
 constexpr std::size_t kMostRegions = 1000;
 constexpr std::uint64_t kMostComponents = 1000;
@@ -186,6 +186,10 @@ void VtkReader::read_cell_types(const Words& words) {
     const std::size_t corners = ends_[cell] - (cell == 0 ? 0 : ends_[cell - 1]);
     if (type == kTetCell && corners != 4)
       cursor_.fail("4 points of a tet (cell type 10)", fmt::format("{} of cell {}", corners, cell));
+    // Also what is left of a tet's 10 where the file is cut off.
+    if (type == kVertexCell && corners != 1)
+      cursor_.fail("1 point of a vertex (cell type 1)", fmt::format("{} of cell {}", corners, cell),
+                   "is the file cut off?");
     if (std::ranges::find(kCurvedTetCells, type) != kCurvedTetCells.end())
       cursor_.fail("tets of first order (cell type 10)", fmt::format("tets of higher order (cell type {})", type));
   }

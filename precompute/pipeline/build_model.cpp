@@ -9,7 +9,6 @@
 
 #include "common/core/error.h"
 #include "common/core/log.h"
-#include "common/core/timer.h"
 #include "common/core/version.h"
 #include "common/mesh/geometry.h"
 #include "precompute/contact/contact_vertices.h"
@@ -21,6 +20,7 @@
 #include "precompute/pipeline/alignment_report.h"
 #include "precompute/pipeline/example_finish.h"
 #include "precompute/pipeline/internal_force.h"
+#include "precompute/pipeline/stage_cache.h"
 #include "precompute/polynomial/reduced_polynomial.h"
 #include "precompute/targets/target_table.h"
 
@@ -93,8 +93,9 @@ Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
 // Part of the hash of the inputs.
 std::string text_of(const Needs& needs) {
   std::string text = fmt::format(
-      "examples {}\nrigid {} {}\ntargets {}\ncontact {}\ninternal_force {}\nenergy_reference {}\n", needs.examples,
-      needs.rigid, needs.carried, needs.targets, needs.contact, needs.internal_force, needs.energy_reference);
+      "examples {}\nrigid {} {}\ntargets {}\ncontact {}\nrender {}\ninternal_force {}\nenergy_reference {}\n",
+      needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render, needs.internal_force,
+      needs.energy_reference);
   if (!needs.regions) return text;
   for (const auto& [name, targets, reference] : *needs.regions)
     text += fmt::format("region {} {} {}\n", name, targets, reference);
@@ -103,21 +104,19 @@ std::string text_of(const Needs& needs) {
 
 class Pipeline {
  public:
-  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report,
-           const std::filesystem::path& alignment_folder)
-      : asset_(asset), needs_(needs), report_(report), alignment_folder_(alignment_folder) {}
+  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildFolders& folders)
+      : asset_(asset), needs_(needs), report_(report), alignment_folder_(folders.alignment_report) {
+    if (!folders.cache.empty()) cache_ = StageCache(folders.cache);
+  }
 
+  void read();
   ReducedModel run();
+  const StageCache& cache() const { return cache_; }
 
  private:
   template <typename Work>
   auto timed(const std::string& stage, Work work) {
-    log::info(stage);
-    const Timer timer;
-    auto result = work();
-    report_.stages.push_back({stage, timer.seconds()});
-    log::info(fmt::format("{}: {:.3f} s", stage, timer.seconds()));
-    return result;
+    return timed_stage(stage, report_, work);
   }
 
   ObjectData object_data() const;
@@ -125,6 +124,9 @@ class Pipeline {
   void require_upright(const ReducedModel& model, const std::string& place, const ExampleSet& set) const;
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
   void leave_out(const std::string& group, const std::string& reason);
+  std::optional<TargetTableData> target_table(const ReducedModel& model, const ExampleSet& set,
+                                              const ProjectionData& projection, const std::string& energy_reference,
+                                              std::string& message);
   void add_internal_force(ReducedModel& model);
   void add_targets(ReducedModel& model);
   void add_region_targets(ReducedModel& model);
@@ -133,8 +135,11 @@ class Pipeline {
   const AssetConfig& asset_;
   const Needs& needs_;
   BuildReport& report_;
-  const std::filesystem::path& alignment_folder_;
+  const std::filesystem::path alignment_folder_;
+  StageCache cache_;
   ObjectInput object_;
+  std::optional<ExampleInput> examples_;
+  std::optional<RenderData> render_;
 };
 
 ObjectData Pipeline::object_data() const {
@@ -186,39 +191,53 @@ void Pipeline::add_internal_force(ReducedModel& model) {
   if (!includes(report_.ledger, "polynomial")) return choose_internal_force("cubature", std::nullopt, model);
   const std::string& asked = needs_.internal_force;
   if (asked == "polynomial" || reason_against_polynomial(model, asset_.cubature_tolerance).empty())
-    model.polynomial =
-        timed("polynomial", [&] { return reduced_polynomial(object_.mesh, object_.materials, model.modal->basis); });
-  timed("internal force", [&] {
-    choose_internal_force(asked, asset_.cubature_tolerance, model);
-    return 0;
-  });
+    model.polynomial = timed("polynomial", [&] {
+      return cache_.get(
+          "polynomial", [&] { return reduced_polynomial(object_.mesh, object_.materials, model.modal->basis); },
+          object_.mesh, object_.materials, model.modal->basis);
+    });
+  timed("internal force", [&] { choose_internal_force(asked, asset_.cubature_tolerance, model); });
   log::info(
       fmt::format("internal force: {}, {}", model.cubature->internal_force, model.cubature->internal_force_reason));
   if (!model.polynomial) leave_out("polynomial", model.cubature->internal_force_reason);
 }
 
+// `message`: what was made, or why nothing was.
+std::optional<TargetTableData> Pipeline::target_table(const ReducedModel& model, const ExampleSet& set,
+                                                      const ProjectionData& projection,
+                                                      const std::string& energy_reference, std::string& message) {
+  auto [table, text] = cache_.get(
+      "targets",
+      [&] {
+        TargetTableReport report;
+        auto made =
+            build_target_table(model, set, projection,
+                               {.tolerance = asset_.target_tolerance, .energy_reference = energy_reference}, report);
+        return std::pair(std::move(made), report.message);
+      },
+      model.object->material, *model.cubature, set, projection.target_basis, asset_.target_tolerance, energy_reference);
+  message = text;
+  log::info(message);
+  return std::move(table);
+}
+
 void Pipeline::add_targets(ReducedModel& model) {
   if (!includes(report_.ledger, "targets")) return;
-  TargetTableReport table;
+  std::string message;
   model.targets = timed("targets", [&] {
-    return build_target_table(
-        model, {.tolerance = asset_.target_tolerance, .energy_reference = needs_.energy_reference}, table);
+    return target_table(model, *model.examples, *model.projection, needs_.energy_reference, message);
   });
-  log::info(table.message);
-  if (!model.targets) leave_out("targets", table.message);
+  if (!model.targets) leave_out("targets", message);
 }
 
 void Pipeline::add_region_targets(ReducedModel& model) {
   for (RegionData& region : model.regions) {
     const RegionNeeds needs = *needs_of_region(needs_, region.name);
     if (!needs.targets) continue;
-    TargetTableReport table;
+    std::string message;
     region.targets = timed(fmt::format("targets of region {}", region.name), [&] {
-      return build_target_table(model, region.examples, region.projection,
-                                {.tolerance = asset_.target_tolerance, .energy_reference = needs.energy_reference},
-                                table);
+      return target_table(model, region.examples, region.projection, needs.energy_reference, message);
     });
-    log::info(table.message);
   }
 }
 
@@ -233,30 +252,38 @@ void Pipeline::add_contact(ReducedModel& model) {
   log::info(fmt::format("contact: {} vertices", model.contact->areas.size()));
 }
 
-ReducedModel Pipeline::run() {
+std::string generator() { return fmt::format("exmat-precompute {}", version()); }
+
+void Pipeline::read() {
   if (needs_.internal_force == "polynomial") require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
   require_regions(asset_, needs_);
-  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions));
-  const bool with_examples = includes(report_.ledger, "shape_space");
-  std::optional<ExampleInput> example_input;
-  if (with_examples) {
-    example_input = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });
-    keep_needed(needs_, includes(report_.ledger, "examples"), *example_input);
+  report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions),
+                               asset_.render_mesh.has_value());
+  if (includes(report_.ledger, "shape_space")) {
+    examples_ = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });
+    keep_needed(needs_, includes(report_.ledger, "examples"), *examples_);
   }
 
+  if (includes(report_.ledger, "render"))
+    render_ = timed("render mesh", [&] { return read_render_mesh(asset_, object_, report_.inputs, report_.warnings); });
+  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_));
+}
+
+ReducedModel Pipeline::run() {
+  read();
   ReducedModel model;
+  model.render = std::move(render_);
   model.asset_name = asset_.name;
-  model.generator = fmt::format("exmat-precompute {}", version());
-  model.input_sha256 = hash_inputs(report_.inputs, model.generator + "\n" + text_of(needs_));
+  model.generator = generator();
+  model.input_sha256 = report_.input_sha256;
   model.object = object_data();
 
   std::optional<ShapeStage> shape;
-  if (with_examples)
+  if (examples_)
     shape = timed("shape space and examples",
-                  [&] { return build_shape_stage(asset_, object_, *example_input, report_.warnings); });
-  if (shape && !alignment_folder_.empty())
-    write_alignment_report(object_.mesh, *example_input, *shape, alignment_folder_);
+                  [&] { return build_shape_stage(asset_, object_, *examples_, cache_, report_.warnings); });
+  if (shape && !alignment_folder_.empty()) write_alignment_report(object_.mesh, *examples_, *shape, alignment_folder_);
   if (shape) require_aligned(asset_, shape->alignments, report_.warnings);
 
   const auto system =
@@ -267,9 +294,16 @@ ReducedModel Pipeline::run() {
   });
   log::info(system.constrained() ? fmt::format("constrained body: {} fixed vertices", object_.fixed.cast<int>().sum())
                                  : "free body: six rigid modes found and excluded");
-  const auto modes = timed("linear modes", [&] { return linear_modes(system, solver, asset_.linear_modes); });
+  const auto modes = timed("linear modes", [&] {
+    return cache_.get(
+        "linear modes", [&] { return linear_modes(system, solver, asset_.linear_modes); }, system.mass,
+        system.stiffness, system.null_space, asset_.linear_modes);
+  });
   const auto derivatives = timed("modal derivatives", [&] {
-    return modal_derivatives(object_.mesh, object_.materials, system, solver, modes.modes);
+    return cache_.get(
+        "modal derivatives",
+        [&] { return modal_derivatives(object_.mesh, object_.materials, system, solver, modes.modes); }, object_.mesh,
+        object_.materials, system.free_dofs, modes.modes);
   });
 
   const double size = bounding_box_diagonal(object_.mesh.vertices);
@@ -286,9 +320,11 @@ ReducedModel Pipeline::run() {
 
   model.cubature = timed("cubature", [&] {
     const auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
-    return build_cubature(object_.mesh, object_.materials, source,
-                          {asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
-                           asset_.training_poses, asset_.seed});
+    const CubatureOptions options{asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
+                                  asset_.training_poses, asset_.seed};
+    return cache_.get(
+        "cubature", [&] { return build_cubature(object_.mesh, object_.materials, source, options); }, object_.mesh,
+        object_.materials, source, options);
   });
   log::info(fmt::format("cubature: {} elements, held-out errors: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %",
                         model.cubature->elements.size(), 100 * model.cubature->heldout_error,
@@ -329,24 +365,37 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   needs.targets = named("targets");
   needs.rigid = needs.carried = named("rigid");
   needs.contact = named("contact");
+  needs.render = named("render");
   if (!named("regions")) needs.regions.emplace();
   return needs;
 }
 
 ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
-                         const std::filesystem::path& alignment_folder) {
+                         const BuildFolders& folders) {
   report.inputs.push_back(asset.file);
-  return with_file_named(asset, [&] { return Pipeline(asset, needs, report, alignment_folder).run(); });
+  return with_file_named(asset, [&] {
+    Pipeline pipeline(asset, needs, report, folders);
+    ReducedModel model = pipeline.run();
+    report.cache = pipeline.cache().uses();
+    return model;
+  });
+}
+
+void read_inputs(const AssetConfig& asset, const Needs& needs, BuildReport& report) {
+  report.inputs.push_back(asset.file);
+  with_file_named(asset, [&] { Pipeline(asset, needs, report, {}).read(); });
 }
 
 std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::filesystem::path& alignment_folder,
                                            BuildReport& report) {
   report.inputs.push_back(asset.file);
   const auto object = read_object(asset, report.inputs);
+  if (asset.render_mesh) read_render_mesh(asset, object, report.inputs, report.warnings);
   if (asset.examples.empty()) return {};
   const auto input = read_examples(asset, object, report.inputs);
+  StageCache no_cache;
   const ShapeStage stage =
-      with_file_named(asset, [&] { return build_shape_stage(asset, object, input, report.warnings); });
+      with_file_named(asset, [&] { return build_shape_stage(asset, object, input, no_cache, report.warnings); });
   if (!alignment_folder.empty()) write_alignment_report(object.mesh, input, stage, alignment_folder);
   return stage.alignments;
 }

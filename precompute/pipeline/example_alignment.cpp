@@ -9,6 +9,7 @@
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/coupled_bases.h"
+#include "precompute/pipeline/stage_cache.h"
 #include "precompute/shape_space/nearest_point.h"
 
 namespace exmat::precompute {
@@ -46,8 +47,8 @@ Eigen::MatrixXd part_coefficients(const LaplaceBasis& basis, const std::vector<c
 }  // namespace
 
 ExampleAligner::ExampleAligner(const AssetConfig& asset, const LaplaceBasis& object, const ObjectInput& object_input,
-                               const ExampleInput& examples)
-    : asset_(asset), object_(object), object_input_(object_input), examples_(examples) {}
+                               const ExampleInput& examples, StageCache& cache)
+    : asset_(asset), object_(object), object_input_(object_input), examples_(examples), cache_(cache) {}
 
 AlignedRest ExampleAligner::map_rest(const LaplaceBasis& basis, const Eigen::Matrix3d& rotation) const {
   AlignedRest rest;
@@ -132,7 +133,10 @@ AlignedRest ExampleAligner::align_rest() {
     rest.outcome.method = "object";
   } else {
     const auto& mesh = examples_.rest.mesh;
-    const auto basis = laplace_basis(mesh, example_function_count(m, mesh.vertex_count()), examples_.rest.name);
+    const Eigen::Index count = example_function_count(m, mesh.vertex_count());
+    const auto basis = cache_.get(
+        "eigenfunctions of the rest example", [&] { return laplace_basis(mesh, count, examples_.rest.name); }, mesh,
+        count);
     rest = best_rotation(basis);
     use_vertex_map(rest);
     if (asset_.alignment.method == "coupled") {
@@ -324,7 +328,23 @@ AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput&
                        pose.inverted_fraction};
     return aligned;
   }
-  return asset_.alignment.method == "coupled" ? coupled(rest, pose) : registered(rest, pose);
+  const AlignmentConfig& config = asset_.alignment;
+  return cache_.get(
+      "alignment of " + pose.name,
+      [&] { return config.method == "coupled" ? coupled(rest, pose) : registered(rest, pose); }, object_,
+      object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
+      landmarks_of(pose), config.landmarks.has_value(), examples_.parts, pose.parts, config.method, config.frame);
+}
+
+// [l x 3] of the object, the rest example and the pose: what its alignment sees of them.
+IndexMatrix ExampleAligner::landmarks_of(const PoseInput& pose) const {
+  const Eigen::Index rows = examples_.landmarks.rows();
+  IndexMatrix landmarks = IndexMatrix::Constant(rows, 3, -1);
+  if (rows == 0) return landmarks;
+  landmarks.col(0) = examples_.landmarks.col(0);
+  if (examples_.rest.column >= 0) landmarks.col(1) = examples_.landmarks.col(examples_.rest.column);
+  landmarks.col(2) = examples_.landmarks.col(pose.column);
+  return landmarks;
 }
 
 }  // namespace exmat::precompute

@@ -12,6 +12,8 @@
 
 namespace exmat::precompute {
 
+class StageCache;
+
 /// The rest example in the object's frame.
 struct AlignedRest {
   LaplaceBasis basis;  ///< of the rest example; its vertices turned into the object's frame
@@ -34,7 +36,7 @@ class ExampleAligner {
  public:
   /// All of these are kept by reference. `object` holds m functions.
   ExampleAligner(const AssetConfig& asset, const LaplaceBasis& object, const ObjectInput& object_input,
-                 const ExampleInput& examples);
+                 const ExampleInput& examples, StageCache& cache);
 
   /// Throws InputError and WorkError where the input cannot be worked with at all; doubts are in the outcome.
   AlignedRest align_rest();
@@ -54,11 +56,13 @@ class ExampleAligner {
   VertexArray registered_points(const AlignedRest& rest, const AlignedShape& pose, const VertexArray& displacement,
                                 const Eigen::Matrix3d& to_rest);
   Eigen::MatrixXd coupled_map(const PoseInput& example, const LaplaceBasis& basis) const;
+  IndexMatrix landmarks_of(const PoseInput& pose) const;
 
   const AssetConfig& asset_;
   const LaplaceBasis& object_;
   const ObjectInput& object_input_;
   const ExampleInput& examples_;
+  StageCache& cache_;
   std::optional<AlignedShape> rest_shape_;
   Symmetry symmetry_;
 };

@@ -23,9 +23,9 @@ constexpr double kNoPose = 1e-6;
 
 class ShapeStageBuilder {
  public:
-  ShapeStageBuilder(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
+  ShapeStageBuilder(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input, StageCache& cache,
                     std::vector<std::string>& warnings)
-      : asset_(asset), object_(object), input_(input), warnings_(warnings) {}
+      : asset_(asset), object_(object), input_(input), cache_(cache), warnings_(warnings) {}
 
   ShapeStage build();
 
@@ -48,6 +48,7 @@ class ShapeStageBuilder {
   const AssetConfig& asset_;
   const ObjectInput& object_;
   const ExampleInput& input_;
+  StageCache& cache_;
   std::vector<std::string>& warnings_;
   ShapeStage stage_;
 };
@@ -60,7 +61,9 @@ Eigen::VectorXd ShapeStageBuilder::object_basis() {
     throw InputError({"", "/shape_space/eigenfunctions",
                       fmt::format("at most {} for a mesh of {} vertices", available - 1, object_.mesh.vertex_count()),
                       std::to_string(m), "ask for fewer or refine the mesh"});
-  stage_.object = laplace_basis(object_.mesh, std::min(m + kExtraEigenfunctions, available), asset_.name);
+  const Eigen::Index count = std::min(m + kExtraEigenfunctions, available);
+  stage_.object = cache_.get(
+      "eigenfunctions", [&] { return laplace_basis(object_.mesh, count, asset_.name); }, object_.mesh, count);
   Eigen::VectorXd eigenvalues = stage_.object.eigenvalues;
   stage_.object.eigenvalues.conservativeResize(m);
   stage_.object.eigenfunctions.conservativeResize(Eigen::NoChange, m);
@@ -168,7 +171,7 @@ void ShapeStageBuilder::add_groups(const AlignedRest& rest) {
 }
 
 void ShapeStageBuilder::add_examples() {
-  ExampleAligner aligner(asset_, stage_.object, object_, input_);
+  ExampleAligner aligner(asset_, stage_.object, object_, input_, cache_);
   const AlignedRest rest = aligner.align_rest();
   stage_.alignments.push_back(rest.outcome);
   add_groups(rest);
@@ -207,8 +210,8 @@ ShapeStage ShapeStageBuilder::build() {
 }  // namespace
 
 ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
-                             std::vector<std::string>& warnings) {
-  return ShapeStageBuilder(asset, object, input, warnings).build();
+                             StageCache& cache, std::vector<std::string>& warnings) {
+  return ShapeStageBuilder(asset, object, input, cache, warnings).build();
 }
 
 }  // namespace exmat::precompute

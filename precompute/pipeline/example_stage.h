@@ -8,6 +8,7 @@
 #include "common/model/reduced_model.h"
 #include "precompute/pipeline/alignment_verdict.h"
 #include "precompute/pipeline/inputs.h"
+#include "precompute/pipeline/stage_cache.h"
 #include "precompute/shape_space/laplace_basis.h"
 #include "precompute/shape_space/region_view.h"
 
@@ -39,9 +40,10 @@ struct ShapeStage {
 };
 
 /// Computes the object's shape space and brings every example into it. method.md, sections 1 and 5; alignment.md.
-/// `warnings` receives what is also logged as such. Refused alignments are in the stage, for require_aligned. Throws
-/// InputError (no file named where it is the asset's) and WorkError.
+/// Eigenfunctions and registered poses come from the cache where it has them. `warnings` receives what is also logged
+/// as such. Refused alignments are in the stage, for require_aligned. Throws InputError (no file named where it is the
+/// asset's) and WorkError.
 ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
-                             std::vector<std::string>& warnings);
+                             StageCache& cache, std::vector<std::string>& warnings);
 
 }  // namespace exmat::precompute

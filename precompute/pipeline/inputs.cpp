@@ -1,21 +1,20 @@
 #include "precompute/pipeline/inputs.h"
 
 #include <algorithm>
-#include <array>
 #include <fmt/format.h>
-#include <fstream>
 #include <map>
-#include <memory>
-#include <openssl/evp.h>
 
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/checks.h"
 #include "common/mesh/geometry.h"
 #include "precompute/mesh_io/mesh_file.h"
+#include "precompute/mesh_io/surface_file.h"
 #include "precompute/mesh_io/vertex_selection.h"
 #include "precompute/pipeline/correspondence_files.h"
 #include "precompute/pipeline/object_materials.h"
+#include "precompute/pipeline/sha256.h"
+#include "precompute/render/embedding.h"
 
 namespace exmat::precompute {
 namespace {
@@ -281,7 +280,8 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
   object.mesh = checked.file.mesh;
   const TetMesh file_mesh{checked.file_vertices,
                           Eigen::Map<const TetArray>(checked.file_tets.data(), std::ssize(checked.file_tets) / 4, 4)};
-  object.materials = object_materials(asset, file_mesh, checked.file.materials, checked.report.kept_tets, files);
+  object.materials = object_materials(asset, file_mesh, checked.file.tet_sets, checked.file.materials,
+                                      checked.report.kept_tets, files);
   object.fixed = flag(asset.fixed, 0, asset, checked, files);
   object.contact = flag(asset.contact_vertices, 1, asset, checked, files);
   object.file_tets = checked.file_tets;
@@ -295,23 +295,32 @@ ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, 
   return ExampleReader(asset, object, files).read();
 }
 
-std::string hash_inputs(const InputFiles& files, const std::string& salt) {
-  const std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context(EVP_MD_CTX_new(), EVP_MD_CTX_free);
-  EVP_DigestInit_ex(context.get(), EVP_sha256(), nullptr);
-  std::vector<char> buffer(1 << 20);
-  for (const auto& path : files) {
-    std::ifstream stream(path, std::ios::binary);
-    if (!stream) throw InputError({path.string(), "", "a readable file", "none", "check the path"});
-    while (stream.read(buffer.data(), static_cast<std::streamsize>(buffer.size())), stream.gcount() > 0)
-      EVP_DigestUpdate(context.get(), buffer.data(), static_cast<std::size_t>(stream.gcount()));
+RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object, InputFiles& files,
+                            std::vector<std::string>& warnings) {
+  const std::string name = asset.render_mesh->string();
+  SurfaceMesh surface = read_surface(*asset.render_mesh);
+  files.push_back(*asset.render_mesh);
+  const Embedding embedding = embed_points(object.mesh, surface.vertices, name);
+  const double share = embedding.farthest / bounding_box_diagonal(object.mesh.vertices);
+  if (share > kFarOutside) {
+    warnings.push_back(
+        fmt::format("{}: a vertex is {:.3g} m outside the object, {:.0f} % of the diagonal of its bounding box; does "
+                    "the render mesh "
+                    "stand where the object does, in metres?",
+                    name, embedding.farthest, 100 * share));
+    log::warning(warnings.back());
   }
-  EVP_DigestUpdate(context.get(), salt.data(), salt.size());
-  std::array<unsigned char, EVP_MAX_MD_SIZE> digest{};
-  unsigned size = 0;
-  EVP_DigestFinal_ex(context.get(), digest.data(), &size);
-  std::string text;
-  for (unsigned i = 0; i < size; ++i) text += fmt::format("{:02x}", digest[i]);
-  return text;
+  const auto& [tets, weights, distances] = embedding.points;
+  return {std::move(surface.vertices), tets, weights, std::move(surface.triangles), embedding.outside,
+          embedding.farthest};
+}
+
+std::string hash_inputs(const InputFiles& files, const std::string& salt) {
+  Sha256 hash;
+  // With their lengths, so that no byte can change sides.
+  for (const auto& path : files) hash.add(fmt::format("\n{} bytes\n", hash.add_file(path)));
+  hash.add(salt);
+  return hash.digest();
 }
 
 }  // namespace exmat::precompute

@@ -5,6 +5,7 @@
 
 #include "common/config/asset_config.h"
 #include "common/mesh/tet_mesh.h"
+#include "common/model/reduced_model.h"
 
 namespace exmat::precompute {
 
@@ -60,7 +61,15 @@ using InputFiles = std::vector<std::filesystem::path>;
 ObjectInput read_object(const AssetConfig& asset, InputFiles& files);
 ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, InputFiles& files);
 
-/// SHA-256 over the contents of the files, in order, and `salt`, as 64 hexadecimal digits.
+/// The asset's render mesh, embedded in the object. Warns (in the log and in `warnings`) where a vertex is farther
+/// outside than kFarOutside. The asset must name one.
+RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object, InputFiles& files,
+                            std::vector<std::string>& warnings);
+
+/// Share of the object's bounding box's diagonal.
+constexpr double kFarOutside = 0.1;
+
+/// SHA-256 over the contents and lengths of the files, in order, and `salt`, as 64 hexadecimal digits.
 std::string hash_inputs(const InputFiles& files, const std::string& salt);
 
 }  // namespace exmat::precompute

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
-#include "precompute/mesh_io/vertex_selection.h"
 
 namespace exmat::precompute {
 namespace {
@@ -37,7 +36,7 @@ void require_poisson_ratios(const TetMaterials& materials, const AssetConfig& as
 
 }  // namespace
 
-TetMaterials object_materials(const AssetConfig& asset, const TetMesh& file_mesh,
+TetMaterials object_materials(const AssetConfig& asset, const TetMesh& file_mesh, const TetSets& sets,
                               const std::optional<TetMaterials>& file_materials,
                               const std::vector<std::int32_t>& kept_tets, InputFiles& files) {
   const auto base = [&](const std::optional<double>& value, const char* name, Eigen::VectorXd TetMaterials::*member) {
@@ -48,7 +47,7 @@ TetMaterials object_materials(const AssetConfig& asset, const TetMesh& file_mesh
                          base(asset.material.poisson_ratio, "poisson_ratio", &TetMaterials::poisson_ratio),
                          material_from_name(asset.material.model).value()};
   for (const MaterialRegionConfig& region : asset.material_regions) {
-    const auto tets = select_tets(file_mesh, region.tets, asset.file.string());
+    const auto tets = select_tets(file_mesh, sets, region.tets, asset.file.string());
     if (const auto* file = std::get_if<FileSelection>(&region.tets)) files.push_back(file->file);
     set(region.density, tets, materials.density);
     set(region.youngs_modulus, tets, materials.youngs_modulus);

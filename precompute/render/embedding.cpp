@@ -23,11 +23,14 @@ Embedding embed_points(const TetMesh& mesh, const VertexArray& points, const std
   for (Eigen::Index k = 0; k < points.rows(); ++k)
     weights.row(k) = affine_coordinates(mesh, tets[k], points.row(k).transpose());
   if (points.rows() == 0) return embedding;
-  embedding.outside = (distances.array() > kOnSurface * bounding_box_diagonal(mesh.vertices)).count();
+  const double diagonal = bounding_box_diagonal(mesh.vertices);
+  embedding.outside = (distances.array() > kOnSurface * diagonal).count();
   embedding.farthest = distances.maxCoeff();
   if (embedding.outside > 0)
-    log::info(fmt::format("{}: {} of {} points are outside the body, by up to {:.3g} m; they move with the nearest tet",
-                          name, embedding.outside, points.rows(), embedding.farthest));
+    log::info(fmt::format(
+        "{}: {} of {} points are outside the body, by up to {:.3g} m ({:.3g} % of the diagonal of its bounding box); "
+        "they move with the nearest tet",
+        name, embedding.outside, points.rows(), embedding.farthest, 100 * embedding.farthest / diagonal));
   return embedding;
 }
 

@@ -19,9 +19,16 @@ struct BenchCommandOptions {
   bool json = false;
 };
 
+struct ExportOptions {
+  std::filesystem::path trajectory, output;
+  bool mesh = false;                 ///< the tet mesh, not the render mesh
+  std::optional<double> frame_rate;  ///< [1/s]
+};
+
 // The commands of exmat-runtime: results on stdout, logs and progress on stderr; failures are InputError or WorkError.
 void run_command(const RunOptions& options);
 void bench_command(const BenchCommandOptions& options);
+void export_command(const ExportOptions& options);
 void info_command(const std::filesystem::path& bundle);
 void validate_command(const std::filesystem::path& bundle);
 

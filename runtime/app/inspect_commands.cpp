@@ -8,7 +8,8 @@ namespace exmat::runtime {
 namespace {
 
 void print_groups(const ReducedModel& model, const BundleSummary& summary) {
-  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples, std::ssize(summary.regions));
+  std::vector<LedgerEntry> ledger =
+      plan_groups({}, summary.constrained, summary.examples, std::ssize(summary.regions), summary.render_vertices > 0);
   fill_bytes(model, ledger);
   fmt::print("\n{:<14} {:>14}\n", "group", "bytes");
   for (const LedgerEntry& entry : ledger)
@@ -41,6 +42,10 @@ void info_command(const std::filesystem::path& bundle) {
   if (model.cubature)
     fmt::print("held-out error force {:.3g}, energy {:.3g}, stiffness {:.3g}\n", model.cubature->heldout_error,
                model.cubature->heldout_energy_error, model.cubature->heldout_stiffness_error);
+  if (model.render)
+    fmt::print("render mesh    {} vertices, {} triangles; {} outside the body, by up to {:.3g} m\n",
+               model.render->vertices.rows(), model.render->triangles.rows(), model.render->outside,
+               model.render->farthest);
   if (summary.eigenfunctions > 0) fmt::print("eigenfunctions {}\n", summary.eigenfunctions);
   print_groups(model, summary);
   if (model.examples) print_examples(*model.examples);

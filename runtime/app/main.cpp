@@ -30,6 +30,18 @@ int main(int argc, char** argv) {
       ->check(step_range);
   bench.add_flag("--json", bench_options.json, "Print JSON instead of a table");
 
+  runtime::ExportOptions export_options;
+  CLI::App& export_command = *app.add_subcommand(
+      "export", "Write a trajectory as a point cache (.pc2), for Blender's and 3ds Max's mesh caches");
+  export_command.add_option("trajectory", export_options.trajectory, "TRAJECTORY.h5")->required();
+  export_command.add_option("-o,--output", export_options.output, "Point cache to write (.pc2)")->required();
+  export_command.add_flag("--mesh", export_options.mesh,
+                          "The tet mesh's vertices, also where the trajectory holds a render mesh");
+  export_command
+      .add_option("--frame-rate", export_options.frame_rate,
+                  "Frames a second of the animation, which then plays in real time; default: a sample is a frame")
+      ->check(CLI::Range(1e-3, 1e6));
+
   std::filesystem::path bundle;
   CLI::App& info = *app.add_subcommand("info", "Say what a bundle holds");
   CLI::App& validate = *app.add_subcommand("validate", "Say whether every dataset of a bundle is sound");
@@ -39,6 +51,7 @@ int main(int argc, char** argv) {
     apply(common);
     if (run.parsed()) runtime::run_command(options);
     if (bench.parsed()) runtime::bench_command(bench_options);
+    if (export_command.parsed()) runtime::export_command(export_options);
     if (info.parsed()) runtime::info_command(bundle);
     if (validate.parsed()) runtime::validate_command(bundle);
   });

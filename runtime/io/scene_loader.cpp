@@ -69,6 +69,13 @@ void check_methods(const SceneConfig& config, const BundleSummary& summary) {
   }
 }
 
+void check_render(const SceneConfig& config, const BundleSummary& summary) {
+  if (!config.render || !config.trajectory || summary.render_vertices > 0) return;
+  throw InputError({config.bundle.string(), "/render", "this group, since the scene asks for output.render", "none",
+                    "name object.render_mesh in the asset and precompute it again, or drop \"render\" from " +
+                        config.file.string()});
+}
+
 void check_force_vertices(const SceneConfig& config, const BundleSummary& summary) {
   for (std::size_t i = 0; i < config.forces.size(); ++i)
     for (const std::int64_t vertex : config.forces[i].vertices)
@@ -199,9 +206,11 @@ LoadedScene load_run(const SceneConfig& config) {
   check_regions(config, loaded.summary);
   check_methods(config, loaded.summary);
   check_force_vertices(config, loaded.summary);
-  const Needs needs = fit_needs(needs_of(config), loaded.summary);
-  loaded.ledger =
-      plan_groups(needs, loaded.summary.constrained, loaded.summary.examples, std::ssize(loaded.summary.regions));
+  check_render(config, loaded.summary);
+  Needs needs = fit_needs(needs_of(config), loaded.summary);
+  needs.render = needs.render && config.trajectory;
+  loaded.ledger = plan_groups(needs, loaded.summary.constrained, loaded.summary.examples,
+                              std::ssize(loaded.summary.regions), loaded.summary.render_vertices > 0);
   // A force on a body that moves needs to know where it acts.
   const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
   const bool positions = config.trajectory || (moves && !config.forces.empty());
@@ -262,7 +271,10 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   else
     left_out("contact", "the scene names no obstacles");
   if (config.trajectory) {
-    plan.push_back(fmt::format("output: n = {} positions every {} steps", loaded.summary.vertices, config.every));
+    const RenderData* const render = loaded.data.render ? &*loaded.data.render : nullptr;
+    plan.push_back(fmt::format("output: n = {} positions{} every {} steps", loaded.summary.vertices,
+                               render ? fmt::format(" and {} of the render mesh", render->tets.size()) : "",
+                               config.every));
   } else {
     left_out("output", "no trajectory is asked for; positions are not loaded");
   }

@@ -19,7 +19,7 @@ struct LoadedScene {
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;  ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;  ///< datasets that were read, in order
-  ReducedModel data;                ///< /object and /modal, complete only if the scene writes positions
+  ReducedModel data;                ///< /object and /modal, complete only if the scene writes positions, and /render
 };
 
 /// Reads of the bundle what the scene needs, no more: positions only if it writes a trajectory. Throws InputError: a

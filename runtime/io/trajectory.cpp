@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <optional>
 #include <span>
 
 #include "common/mesh/geometry.h"
@@ -17,6 +18,9 @@ SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
   sizes.set("n", model.object->mesh.vertex_count(), "the bundle");
   sizes.set("n_t", model.object->mesh.tet_count(), "the bundle");
   sizes.set("r", model.modal->basis.cols(), "the bundle");
+  if (!model.render) return sizes;
+  sizes.set("v", model.render->tets.size(), "the bundle");
+  sizes.set("f", model.render->triangles.rows(), "the bundle");
   return sizes;
 }
 
@@ -31,6 +35,7 @@ Hdf5File create_file(const AtomicFile& output, const ReducedModel& model, const 
   for (const GroupSchema& group : trajectory_schema().groups) {
     if (group.group == "examples" && std::ranges::all_of(info.weights, regional)) continue;
     if (group.group == "regions" && std::ranges::none_of(info.weights, regional)) continue;
+    if (group.group == "render" && !model.render) continue;
     if (is_single(group.path)) {
       write_group(file, group, group.path);
       continue;
@@ -47,26 +52,37 @@ std::span<const double> row_of(const Eigen::VectorXd& vector) {
 
 std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.data(), 3}; }
 
-/// One grid of the temporal collection: a hyperslab of /vertices on the shared /tets.
-std::string xdmf_frame(const std::string& h5, const ReducedModel& model, const TrajectoryInfo& info, std::size_t frame,
-                       double time) {
-  const auto n = model.object->mesh.vertex_count(), tets = model.object->mesh.tet_count();
+/// Positions as a row of single precision.
+void append_drawn(const VertexArray& positions, RowWriter& dataset) {
+  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
+  dataset.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
+}
+
+/// The cells that an .xdmf shows, and the datasets that hold them and the frames of their vertices.
+struct Drawn {
+  std::string_view cell, cells_path, vertices_path;
+  Eigen::Index corners = 0, cells = 0, vertices = 0;
+};
+
+/// One grid of the temporal collection: a hyperslab of the vertices on the shared cells.
+std::string xdmf_frame(const std::string& h5, const Drawn& drawn, std::int64_t frames, std::size_t frame, double time) {
   return fmt::format(
       "      <Grid Name=\"frame {0}\">\n"
       "        <Time Value=\"{1}\"/>\n"
-      "        <Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"{2}\">\n"
-      "          <DataItem Dimensions=\"{2} 4\" NumberType=\"Int\" Precision=\"4\" "
-      "Format=\"HDF\">{3}:/tets</DataItem>\n"
+      "        <Topology TopologyType=\"{6}\" NumberOfElements=\"{2}\">\n"
+      "          <DataItem Dimensions=\"{2} {7}\" NumberType=\"Int\" Precision=\"4\" "
+      "Format=\"HDF\">{3}:{8}</DataItem>\n"
       "        </Topology>\n"
       "        <Geometry GeometryType=\"XYZ\">\n"
       "          <DataItem ItemType=\"HyperSlab\" Dimensions=\"1 {4} 3\">\n"
       "            <DataItem Dimensions=\"3 3\" NumberType=\"Int\" Format=\"XML\">{0} 0 0 1 1 1 1 {4} 3</DataItem>\n"
-      "            <DataItem Dimensions=\"{5} {4} 3\" NumberType=\"Float\" Precision=\"4\" Format=\"HDF\">{3}:/vertices"
+      "            <DataItem Dimensions=\"{5} {4} 3\" NumberType=\"Float\" Precision=\"4\" Format=\"HDF\">{3}:{9}"
       "</DataItem>\n"
       "          </DataItem>\n"
       "        </Geometry>\n"
       "      </Grid>\n",
-      frame, time, tets, h5, n, info.frames);
+      frame, time, drawn.cells, h5, drawn.vertices, frames, drawn.cell, drawn.corners, drawn.cells_path,
+      drawn.vertices_path);
 }
 
 std::string escape_xml(const std::string& text) {
@@ -89,14 +105,14 @@ std::string escape_xml(const std::string& text) {
   return escaped;
 }
 
-std::string xdmf_text(const std::filesystem::path& trajectory, const ReducedModel& model, const TrajectoryInfo& info,
-                      const std::vector<double>& times) {
+std::string xdmf_text(const std::filesystem::path& trajectory, const std::string& name, const Drawn& drawn,
+                      std::int64_t frames, const std::vector<double>& times) {
   const std::string h5 = escape_xml(trajectory.filename().string());
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
       "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
-      escape_xml(model.asset_name));
-  for (std::size_t frame = 0; frame < times.size(); ++frame) text += xdmf_frame(h5, model, info, frame, times[frame]);
+      escape_xml(name));
+  for (std::size_t frame = 0; frame < times.size(); ++frame) text += xdmf_frame(h5, drawn, frames, frame, times[frame]);
   return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
 }
 
@@ -114,6 +130,7 @@ struct TrajectoryWriter::Datasets {
       own.set("K", force.count, "the bundle");
       weights.emplace_back(file, schema, own);
     }
+    if (sizes.find("v") != nullptr) render.emplace(rows("/render/vertices"));
   }
 
   void finish() {
@@ -121,6 +138,7 @@ struct TrajectoryWriter::Datasets {
                                &linear_momentum, &angular_momentum, &kinetic, &elastic, &potential, &step_time})
       dataset->finish();
     for (RowWriter& dataset : weights) dataset.finish();
+    if (render) render->finish();
   }
 
  private:
@@ -142,7 +160,8 @@ struct TrajectoryWriter::Datasets {
   RowWriter elastic = rows("/energy/elastic");
   RowWriter potential = rows("/energy/potential");
   RowWriter step_time = rows("/step_time");
-  std::vector<RowWriter> weights;  // as TrajectoryInfo::weights
+  std::vector<RowWriter> weights;   // as TrajectoryInfo::weights
+  std::optional<RowWriter> render;  // vertices of the render mesh
 };
 
 TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model,
@@ -155,9 +174,12 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const Redu
       displacements_(model.object->mesh.vertex_count(), 3),
       velocities_(model.object->mesh.vertex_count(), 3) {
   const SymbolSizes sizes = sizes_of(model, info);
-  const TetArray& tets = model.object->mesh.tets;
-  const DatasetSchema& schema = trajectory_schema().dataset("/tets");
-  write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), tets.data());
+  const auto write = [&](const char* path, const auto& array) {
+    const DatasetSchema& schema = trajectory_schema().dataset(path);
+    write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), array.data());
+  };
+  write("/tets", model.object->mesh.tets);
+  if (model.render) write("/render/triangles", model.render->triangles);
   datasets_ = std::make_unique<Datasets>(file_, sizes, info.weights);
 }
 
@@ -195,13 +217,26 @@ void TrajectoryWriter::append_positions(const State& state) {
   VertexArray positions = model_.object->mesh.vertices + displacements_;
   if (state.body) place(*state.body, positions);
   if (state.carried) carry(state.carried->frame, positions);
-  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
-  datasets_->positions.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
+  append_drawn(positions, datasets_->positions);
+  if (model_.render) append_render_mesh(positions);
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
   const Momenta now = state.body ? Momenta{state.body->linear_momentum, state.body->angular_momentum}
                                  : momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
   datasets_->linear_momentum.append(row_of(now.linear));
   datasets_->angular_momentum.append(row_of(now.angular));
+}
+
+/// From the positions of the tets' vertices, which the trajectory holds in any case: 12 products a vertex, where rows
+/// of the basis of its own would take 3 r and as much memory. Weights add up to 1, so that the world frame serves.
+void TrajectoryWriter::append_render_mesh(const VertexArray& positions) {
+  const RenderData& render = *model_.render;
+  VertexArray drawn(render.tets.size(), 3);
+  for (Eigen::Index k = 0; k < drawn.rows(); ++k) {
+    const auto corners = model_.object->mesh.tets.row(render.tets[k]);
+    drawn.row(k) = render.barycentric(k, 0) * positions.row(corners[0]);
+    for (int c = 1; c < 4; ++c) drawn.row(k) += render.barycentric(k, c) * positions.row(corners[c]);
+  }
+  append_drawn(drawn, *datasets_->render);
 }
 
 /// From the body's frame at rest to the world.
@@ -226,8 +261,20 @@ void TrajectoryWriter::finish() {
   datasets_.reset();
   file_.close();
   output_.commit();
-  write_file_atomically(std::filesystem::path(output_.target()).replace_extension(".xdmf"),
-                        xdmf_text(output_.target(), model_, info_, times_));
+  const std::filesystem::path& target = output_.target();
+  const TetMesh& mesh = model_.object->mesh;
+  const Drawn body{"Tetrahedron", "/tets", "/vertices", 4, mesh.tet_count(), mesh.vertex_count()};
+  write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
+                        xdmf_text(target, model_.asset_name, body, info_.frames, times_));
+  if (!model_.render) return;
+  const Drawn surface{"Triangle",
+                      "/render/triangles",
+                      "/render/vertices",
+                      3,
+                      model_.render->triangles.rows(),
+                      model_.render->tets.size()};
+  write_file_atomically(target.parent_path() / (target.stem().string() + "_render.xdmf"),
+                        xdmf_text(target, model_.asset_name, surface, info_.frames, times_));
 }
 
 }  // namespace exmat::runtime

@@ -28,12 +28,12 @@ struct TrajectoryInfo {
   std::vector<WeightInfo> weights{};
 };
 
-/// Writes the trajectory of a body and an .xdmf beside it. interfaces.md, "Trajectory". Both appear under
-/// their names in finish() and not before; without it nothing is left. Two equal runs give the same bytes except
-/// /step_time.
+/// Writes the trajectory of a body and an .xdmf beside it, and NAME_render.xdmf where the model holds /render.
+/// interfaces.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is left.
+/// Two equal runs give the same bytes except /step_time.
 class TrajectoryWriter {
  public:
-  /// `model` holds /object and the basis, and outlives the writer. Throws WorkError.
+  /// `model` holds /object and the basis, perhaps /render, and outlives the writer. Throws WorkError.
   TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const TrajectoryInfo& info);
   ~TrajectoryWriter();
 
@@ -49,6 +49,7 @@ class TrajectoryWriter {
  private:
   struct Datasets;
   void append_positions(const State& state);
+  void append_render_mesh(const VertexArray& positions);
   void place(const FreeState& body, VertexArray& positions) const;
   void carry(const MotionSample& frame, VertexArray& positions);
 

@@ -12,6 +12,7 @@
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/kd_tree.h"
 #include "precompute/pipeline/example_alignment.h"
+#include "precompute/pipeline/stage_cache.h"
 #include "precompute/shape_space/transfer.h"
 #include "tests/support/posed_bodies.h"
 #include "tests/support/temporary_folder.h"
@@ -163,7 +164,8 @@ class Case {
 
   Row row(int m, Counts& counts) {
     const auto basis = precompute::laplace_basis(body_.object, m, "object");
-    precompute::ExampleAligner aligner(asset_, basis, object_, input_);
+    precompute::StageCache no_cache;
+    precompute::ExampleAligner aligner(asset_, basis, object_, input_, no_cache);
     const auto rest = aligner.align_rest();
     if (aligned_.empty() || method_.method == "coupled") {
       aligned_.clear();

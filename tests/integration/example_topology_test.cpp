@@ -31,7 +31,8 @@ class ExampleTopology : public testing::Test {
     std::vector<std::string> warnings;
     const auto object = precompute::read_object(asset, files);
     const auto examples = precompute::read_examples(asset, object, files);
-    return precompute::build_shape_stage(asset, object, examples, warnings);
+    precompute::StageCache no_cache;
+    return precompute::build_shape_stage(asset, object, examples, no_cache, warnings);
   }
 
   // The pose on a mesh of these cells, neither the object's nor, by default, the rest example's.

@@ -75,7 +75,7 @@ class LeavingOut : public testing::Test {
       if (entry.included) included.push_back(entry.group);
     }
     EXPECT_EQ(included, groups);
-    EXPECT_EQ(built.report.ledger.size(), kAll.size() + 1);  // and regions, which the asset has none of
+    EXPECT_EQ(built.report.ledger.size(), kAll.size() + 2);  // and regions and render, which the asset has none of
   }
 
   /// What the run time reads of bundle.h5 for a scene.

@@ -77,6 +77,22 @@ class SceneRunTest : public ::testing::Test {
   Bar bar_;
 };
 
+/// Three points: in a tet, on a vertex, and outside.
+RenderData drawn_on(const ObjectData& object) {
+  RenderData render;
+  render.tets = IndexVector{{0, 5, 7}};
+  render.barycentric.resize(3, 4);
+  render.barycentric << 0.4, 0.3, 0.2, 0.1, 0, 0, 1, 0, 1.5, -1, 0.25, 0.25;
+  render.vertices.setZero(3, 3);
+  for (Eigen::Index k = 0; k < 3; ++k)
+    for (int c = 0; c < 4; ++c)
+      render.vertices.row(k) +=
+          render.barycentric(k, c) * object.mesh.vertices.row(object.mesh.tets(render.tets[k], c));
+  render.triangles = TriangleArray{{0, 1, 2}};
+  render.outside = 1;
+  return render;
+}
+
 std::set<std::string> datasets(const LoadedScene& loaded) {
   std::set<std::string> names;
   for (const ReadRecord& record : loaded.records) names.insert(record.dataset);
@@ -198,6 +214,69 @@ TEST_F(SceneRunTest, TrajectoryHoldsTheRun) {
   EXPECT_LT(doubles(file, "/energy/potential").back(), 0);
 }
 
+// A turn and a shift of the start carry the render mesh exactly, also what is outside the body: 1e-6 is single
+// precision.
+TEST_F(SceneRunTest, TheRenderMeshMovesWithTheBody) {
+  bar_ = test::make_bar({.free = true});
+  const RenderData& render = bar_.model.render.emplace(drawn_on(*bar_.model.object));
+  write_bundle(bar_.model, folder_ / "bar.h5");
+  const SceneConfig config = scene(R"(, "body": {"orientation": [0.6, 0, 0.8, 0], "position": [1, 2, 3],
+      "angular_velocity": [0, 0, 5]}, "output": {"trajectory": "t.h5", "every": 5, "render": true})");
+  const LoadedScene loaded = load_run(config);
+  EXPECT_THAT(describe_plan(loaded, config), ::testing::Contains(HasSubstr("and 3 of the render mesh every 5 steps")));
+  run(loaded, config, false);
+  EXPECT_EQ(files(), (std::set<std::string>{"bar.h5", "scene.json", "t.h5", "t.xdmf", "t_render.xdmf"}));
+
+  const Hdf5File file = Hdf5File::open(folder_ / "t.h5");
+  EXPECT_EQ(shape(file, "/render/vertices"), (std::vector<std::int64_t>{5, 3, 3}));
+  EXPECT_EQ(doubles(file, "/render/triangles"), (std::vector<double>{0, 1, 2}));
+  const auto drawn = doubles(file, "/render/vertices");
+  const Eigen::RowVector3d centre = bar_.model.rigid->centre_of_mass.transpose();
+  const Eigen::Matrix3d turn = Eigen::Quaterniond(0.6, 0, 0.8, 0).toRotationMatrix();
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    const Eigen::RowVector3d expected =
+        (render.vertices.row(k) - centre) * turn.transpose() + centre + Eigen::RowVector3d(1, 2, 3);
+    EXPECT_LE((Eigen::RowVector3d(&drawn[static_cast<std::size_t>(3 * k)]) - expected).norm(), 1e-6) << k;
+  }
+  // Later by the frame's vertices, which are in single precision: weights of up to 3 in all.
+  const auto vertices = doubles(file, "/vertices");
+  const Eigen::Index n = bar_.model.object->mesh.vertex_count(), last = 4;
+  for (Eigen::Index k = 0; k < 3; ++k) {
+    Eigen::RowVector3d expected = Eigen::RowVector3d::Zero();
+    for (int c = 0; c < 4; ++c) {
+      const Eigen::Index corner = last * n + bar_.model.object->mesh.tets(render.tets[k], c);
+      expected += render.barycentric(k, c) * Eigen::RowVector3d(&vertices[static_cast<std::size_t>(3 * corner)]);
+    }
+    EXPECT_LE((Eigen::RowVector3d(&drawn[static_cast<std::size_t>(3 * (last * 3 + k))]) - expected).norm(), 3e-6) << k;
+  }
+  const std::string xdmf = slurp(folder_ / "t_render.xdmf");
+  for (const char* text : {"t.h5:/render/vertices", "t.h5:/render/triangles", "TopologyType=\"Triangle\"",
+                           "NumberOfElements=\"1\"", "4 0 0 1 1 1 1 3 3", "Dimensions=\"5 3 3\""})
+    EXPECT_THAT(xdmf, HasSubstr(text));
+}
+
+TEST_F(SceneRunTest, ARenderMeshIsReadForItsTrajectoryAlone) {
+  bar_.model.render = drawn_on(*bar_.model.object);
+  write_bundle(bar_.model, folder_ / "bar.h5");
+  const std::set<std::string> render{"/render/tets", "/render/barycentric", "/render/triangles"};
+  const auto read = [&](const std::string& output) {
+    std::set<std::string> found;
+    for (const std::string& path : datasets(load_run(scene(", \"output\": {" + output + "}"))))
+      if (path.starts_with("/render")) found.insert(path);
+    return found;
+  };
+  EXPECT_EQ(read(R"("trajectory": "t.h5", "render": true)"), render);
+  EXPECT_TRUE(read(R"("trajectory": "t.h5")").empty());
+  EXPECT_TRUE(read(R"("render": true)").empty());
+}
+
+TEST_F(SceneRunTest, ABundleWithoutARenderMeshIsNamedWithWhatToDo) {
+  EXPECT_THAT(failure_of([&] { load_run(scene(R"(, "output": {"trajectory": "t.h5", "render": true})")); }),
+              ::testing::AllOf(HasSubstr("bar.h5: /render: expected this group"),
+                               HasSubstr("name object.render_mesh in the asset")));
+  EXPECT_NO_THROW(load_run(scene(R"(, "output": {"render": true})"))) << "nothing is written";
+}
+
 TEST_F(SceneRunTest, MomentaAreThoseOfTheMassMatrix) {
   const SceneConfig config = scene(", \"output\": {\"trajectory\": \"t.h5\", \"every\": 20}");
   run(load_run(config), config, false);
@@ -285,7 +364,7 @@ TEST_F(SceneRunTest, TwoRunsDifferInTheStepTimeAlone) {
     run(load_run(config), config, false);
     const Hdf5File file = Hdf5File::open(folder_ / name);
     for (const DatasetSchema& dataset : trajectory_schema().datasets) {
-      if (dataset.path == "/step_time" || !is_single(dataset.path)) continue;
+      if (dataset.path == "/step_time" || dataset.group == "render" || !is_single(dataset.path)) continue;
       const std::vector<double> values = doubles(file, dataset.path);
       EXPECT_EQ(values, first.try_emplace(dataset.path, values).first->second) << dataset.path;
     }

@@ -132,8 +132,8 @@ const BadBundle kBadBundles[] = {
     {"OtherFormat", [](Spoiler& s) { s.set_text("/", "format", "other"); },
      "/@format: expected \"exmat-bundle\", found \"other\""},
     {"NoFormat", [](Spoiler& s) { s.remove_attribute("/", "format"); }, "/@format: expected an attribute, found none"},
-    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 5); },
-     "/@format_version: expected at most 4, found 5; a newer version of exmat"},
+    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 6); },
+     "/@format_version: expected at most 5, found 6; a newer version of exmat"},
     {"NoVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 0); },
      "/@format_version: expected a number > 0, found 0"},
     {"TextVersion", [](Spoiler& s) { s.set_text("/", "format_version", "1"); },
@@ -213,6 +213,12 @@ const BadBundle kBadBundles[] = {
      "/polynomial/quartic: expected Q (Q = 6 from /examples/hq), found 9"},
     {"ContactOfOtherVertices", [](Spoiler& s) { s.replace("/contact/areas", H5T_NATIVE_DOUBLE, {3}); },
      "/contact/areas: expected k (k = 2 from /contact/vertices), found 3"},
+    {"RenderTetBeyond", [](Spoiler& s) { s.set("/render/tets", 2, std::int32_t{2}); },
+     "/render/tets: expected an index from 0 to 1 (n_t = 2 from /object/tets), found 2 at [2]"},
+    {"RenderTriangleBeyond", [](Spoiler& s) { s.set("/render/triangles", 1, std::int32_t{3}); },
+     "/render/triangles: expected an index from 0 to 2 (v = 3 from /render/vertices), found 3 at [0][1]"},
+    {"RenderWeights", [](Spoiler& s) { s.set("/render/barycentric", 6, 0.5); },
+     "/render/barycentric: expected numbers that add up to 1 in row 1, found 1.5"},
     {"ContactWithoutArea", [](Spoiler& s) { s.set("/contact/areas", 1, 0.0); },
      "/contact/areas: expected a number > 0, found 0 at [1]"},
     {"ExponentsOfOtherExamples",
@@ -338,6 +344,7 @@ void write_version_1(const std::filesystem::path& path) {
   model.targets.reset();
   model.contact.reset();
   model.regions.clear();
+  model.render.reset();
   write_bundle(model, path);
   Spoiler spoiler(path);
   spoiler.set_integer("/", "format_version", 1);

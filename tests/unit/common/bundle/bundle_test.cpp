@@ -52,11 +52,14 @@ std::vector<std::string> datasets_of(const std::vector<ReadRecord>& record) {
 }
 
 BundleRequest request_for(const Needs& needs, bool constrained, bool step_only, bool positions) {
-  return {plan_groups(needs, constrained, 3, 2), needs.regions, step_only, positions};
+  return {plan_groups(needs, constrained, 3, 2, true), needs.regions, step_only, positions};
 }
 
-const Needs kLeastNeeds{
-    .examples = false, .contact = false, .regions = std::vector<RegionNeeds>{}, .internal_force = "cubature"};
+const Needs kLeastNeeds{.examples = false,
+                        .contact = false,
+                        .render = false,
+                        .regions = std::vector<RegionNeeds>{},
+                        .internal_force = "cubature"};
 
 class BundleOfEachKind : public ::testing::TestWithParam<std::pair<bool, bool>> {};
 
@@ -102,7 +105,7 @@ TEST(Bundle, ForSteppingReadsOnlyWhatStepsNeed) {
                           "/cubature/youngs_modulus", "/cubature/poisson_ratio"));
   EXPECT_EQ(record[0].bytes, 3u * 2u * 8u);
   EXPECT_FALSE(model.examples || model.shape_space || model.polynomial || model.projection || model.targets ||
-               model.rigid || model.contact);
+               model.rigid || model.contact || model.render);
   EXPECT_EQ(model.object->mesh.vertices.rows(), 0);
   EXPECT_EQ(model.modal->basis.rows(), 0);
   EXPECT_EQ(model.object->material, "stvk");
@@ -117,6 +120,20 @@ TEST(Bundle, ForPositionsReadsMeshAndBasisToo) {
               ElementsAre("/object/vertices", "/object/tets", "/object/density", "/modal/basis", "/modal/gravity_load",
                           "/cubature/weights", "/cubature/volumes", "/cubature/gradient", "/cubature/youngs_modulus",
                           "/cubature/poisson_ratio"));
+}
+
+TEST(Bundle, ForARenderMeshReadsWhatItMovesWith) {
+  const TemporaryFolder folder;
+  write_bundle(small_model(true), folder / "a.h5");
+  Needs needs = kLeastNeeds;
+  needs.render = true;
+  std::vector<ReadRecord> record;
+  const auto model = read_bundle(folder / "a.h5", request_for(needs, true, true, true), &record);
+  const auto datasets = datasets_of(record);
+  EXPECT_THAT(std::vector(datasets.end() - 3, datasets.end()),
+              ElementsAre("/render/tets", "/render/barycentric", "/render/triangles"));
+  EXPECT_EQ(model.render->barycentric, small_model().render->barycentric);
+  EXPECT_EQ(model.render->outside, 1);
 }
 
 TEST(Bundle, ForExampleForcesReadsTheirProblem) {
@@ -179,10 +196,11 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.asset_name, "small");
   EXPECT_EQ(summary.generator, "exmat test");
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
-  EXPECT_EQ(summary.format_version, 4);
+  EXPECT_EQ(summary.format_version, 5);
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
-                                          "projection", "targets", "regions", "rigid", "contact"));
+                                          "projection", "targets", "regions", "rigid", "contact", "render"));
+  EXPECT_EQ(summary.render_vertices, 3);
   ASSERT_EQ(summary.regions.size(), 2U);
   EXPECT_EQ(summary.regions[0].name, "far right");
   EXPECT_EQ(summary.regions[0].examples, 2);

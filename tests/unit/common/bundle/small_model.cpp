@@ -140,6 +140,21 @@ ContactData small_contact(const ReducedModel& model) {
   return contact;
 }
 
+// The middle of a tet, and a vertex outside.
+RenderData small_render() {
+  RenderData render;
+  render.vertices.resize(3, 3);
+  render.vertices << 0.25, 0.25, 0.25, 1, 1, 1, -1, 0, 0;
+  render.tets = IndexVector{{0, 1, 0}};
+  render.barycentric.resize(3, 4);
+  render.barycentric << 0.25, 0.25, 0.25, 0.25, 0, 1, 0, 0, 2, -1, 0, 0;
+  render.triangles.resize(1, 3);
+  render.triangles << 0, 2, 1;
+  render.outside = 1;
+  render.farthest = 1;
+  return render;
+}
+
 // The second with an example less and no targets.
 std::vector<RegionData> small_regions(const ReducedModel& model) {
   std::vector<RegionData> regions(2);
@@ -174,6 +189,7 @@ ReducedModel small_model(bool constrained, bool with_examples) {
   }
   if (!constrained) model.rigid = small_rigid();
   model.contact = small_contact(model);
+  model.render = small_render();
   return model;
 }
 

@@ -27,7 +27,7 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.object_mesh, folder / "bar.veg");
   EXPECT_EQ(asset.material.model, "stvk");
   EXPECT_FALSE(asset.material.density || asset.fixed || asset.cubature_elements || asset.cubature_tolerance ||
-               asset.needs || asset.contact_vertices || asset.contact_count);
+               asset.needs || asset.render_mesh || asset.contact_vertices || asset.contact_count);
   EXPECT_TRUE(asset.examples.empty());
   EXPECT_EQ(asset.eigenfunctions, 20);
   EXPECT_EQ(asset.basis_size, 30);
@@ -43,7 +43,8 @@ TEST(LoadAsset, ReadsEveryMember) {
     "name": "car",
     "object": {"mesh": "/data/car.veg", "drop": ["degenerate_tets", "smaller_components"],
                "material": {"model": "stvk", "youngs_modulus": 6.0e6, "poisson_ratio": 0.4, "density": 1000},
-               "fixed": {"box": {"min": [0, -1, 0], "max": [1, 1, 0.01]}}},
+               "fixed": {"box": {"min": [0, -1, 0], "max": [1, 1, 0.01]}},
+               "materials": [{"tets": {"set": "wheel 1"}, "density": 7}], "render_mesh": "draw/car.obj"},
     "shape_space": {"eigenfunctions": 6, "weighting": "none"},
     "examples": [{"name": "rest", "mesh": "../ex0.veg", "rest": true},
                  {"name": "bend", "mesh": "sub/./ex1.veg", "drop": ["unreferenced_vertices"]}],
@@ -67,6 +68,8 @@ TEST(LoadAsset, ReadsEveryMember) {
   const auto& box = std::get<BoxSelection>(*asset.fixed);
   EXPECT_THAT(box.min, ElementsAre(0, -1, 0));
   EXPECT_THAT(box.max, ElementsAre(1, 1, 0.01));
+  EXPECT_EQ(std::get<SetSelection>(asset.material_regions.at(0).tets).name, "wheel 1");
+  EXPECT_EQ(asset.render_mesh, folder / "draw/car.obj");
   EXPECT_EQ(asset.eigenfunctions, 6);
   EXPECT_EQ(asset.weighting, "none");
   ASSERT_EQ(asset.examples.size(), 2u);
@@ -119,7 +122,7 @@ TEST(LoadScene, FillsInDefaults) {
   EXPECT_EQ(scene.steps, 1000);
   EXPECT_EQ(scene.integrator, "bdf2");
   EXPECT_EQ(scene.gravity, Eigen::Vector3d::Zero());
-  EXPECT_FALSE(scene.examples || scene.trajectory);
+  EXPECT_FALSE(scene.examples || scene.trajectory || scene.render || needs_of(scene).render);
   EXPECT_EQ(scene.newton.max_iterations, 20);
   EXPECT_EQ(scene.internal_force, "auto");
   EXPECT_EQ(scene.instances, 1);
@@ -137,7 +140,7 @@ TEST(LoadScene, ReadsEveryMember) {
                  "force": "linear", "energy_reference": "rest"},
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
                {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]}],
-    "output": {"trajectory": "run.h5", "every": 2}})");
+    "output": {"trajectory": "run.h5", "every": 2, "render": true}})");
   EXPECT_EQ(scene.time_step, 0.01);
   EXPECT_EQ(scene.steps, 20);
   EXPECT_EQ(scene.gravity, Eigen::Vector3d(0, -0.98, 0));
@@ -162,6 +165,7 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_THAT(scene.forces[1].vertices, ElementsAre(2, 0));
   EXPECT_EQ(scene.forces[1].end, std::numeric_limits<double>::infinity());
   EXPECT_EQ(*scene.trajectory, folder / "run.h5");
+  EXPECT_TRUE(scene.render && needs_of(scene).render);
   EXPECT_EQ(scene.every, 2);
 }
 

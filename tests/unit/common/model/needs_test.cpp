@@ -44,5 +44,13 @@ TEST(PlanGroups, HasContactWhereItIsAskedFor) {
       EXPECT_EQ(includes(plan_groups({.contact = contact}, constrained, 0), "contact"), contact);
 }
 
+TEST(PlanGroups, HasARenderMeshWhereTheAssetNamesOneAndItIsAskedFor) {
+  EXPECT_TRUE(includes(plan_groups({}, true, 0, 0, true), "render"));
+  EXPECT_EQ(entry_of(plan_groups({}, true, 0, 0, false), "render").reason, "the asset has no render mesh");
+  const LedgerEntry entry = entry_of(plan_groups({.render = false}, true, 0, 0, true), "render");
+  EXPECT_FALSE(entry.included);
+  EXPECT_EQ(entry.reason, "the render mesh is not asked for");
+}
+
 }  // namespace
 }  // namespace exmat

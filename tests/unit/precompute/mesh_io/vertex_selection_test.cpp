@@ -91,18 +91,22 @@ TEST(SelectVertices, RefusesAnEmptySelectionAndGivesTheBoundingBox) {
   EXPECT_EQ(complaint_of_selecting(selections[2]).place, "the sphere about (0.5, 0.5, 0.5) of radius 0.5");
 }
 
-TEST(SelectTets, ByCentroidOrId) {
+TEST(SelectTets, ByCentroidIdOrSet) {
   const TetMesh mesh = exmat::test::box_mesh({2, 1, 1}, {2, 1, 1});
-  const auto select = [&mesh](const TetSelection& selection) { return select_tets(mesh, selection, "asset.json"); };
+  const TetSets sets{{"part", {3, 1}}, {"nothing", {}}};
+  const auto select = [&](const TetSelection& selection) { return select_tets(mesh, sets, selection, "asset.json"); };
   EXPECT_THAT(select(BoxSelection{{1, 0, 0}, {2, 1, 1}}), ElementsAre(6, 7, 8, 9, 10, 11));
   EXPECT_THAT(select(SphereSelection{{0.5, 0.5, 0.5}, 0.6}), ElementsAre(0, 1, 2, 3, 4, 5));
   EXPECT_THAT(select(IdSelection{{7, 1}}), ElementsAre(1, 7));
+  EXPECT_THAT(select(SetSelection{"part"}), ElementsAre(1, 3));
   const TemporaryFolder folder;
   EXPECT_THAT(select(FileSelection{folder.write("a.txt", "1, 12\n")}), ElementsAre(0, 11));
   const auto found = [&](const TetSelection& selection) { return complaint_of([&] { select(selection); }); };
   EXPECT_THAT(found(IdSelection{{12}}).expected, HasSubstr("0-based tet ids below 12"));
   EXPECT_THAT(found(FileSelection{folder.write("b.txt", "13\n")}).expected, HasSubstr("tet ids from 1 to 12"));
   EXPECT_THAT(found(BoxSelection{{5, 0, 0}, {6, 1, 1}}).expected, HasSubstr("at least one tet of the mesh"));
+  EXPECT_THAT(found(SetSelection{"nothing"}).expected, HasSubstr("at least one tet of the mesh"));
+  EXPECT_THAT(found(SetSelection{"parts"}).advice, HasSubstr("\"nothing\", \"part\""));
 }
 
 }  // namespace

@@ -108,6 +108,13 @@ TEST_F(ReadVtk, IntegersOfTheCellsAreRegionsAndOtherDataAreLeftOut) {
                 ElementsAre(Pair("part 3", ElementsAre(0)), Pair("region 7", ElementsAre(0))));
 }
 
+TEST_F(ReadVtk, NeedsNoLineEndAfterTheLastLine) {
+  const std::string whole = kRows;
+  EXPECT_TRUE(test::same_mesh(read(whole.substr(0, whole.size() - 1)).mesh, read(whole).mesh));
+  const std::string with_data = whole + "CELL_DATA 2\nSCALARS part int\nLOOKUP_TABLE default\n3 12";
+  EXPECT_THAT(read(with_data).tet_sets, testing::ElementsAre(testing::Pair("part 12", testing::ElementsAre(0))));
+}
+
 TEST_F(ReadVtk, WarnsOfVolumeCellsLeftOut) {
   std::vector<std::string> warnings;
   log::set_sink([&](log::Level, std::string_view message) { warnings.emplace_back(message); });
@@ -213,8 +220,7 @@ constexpr std::array kMalformed{
     Malformed{"OtherCountOfTypes", kRows, "CELL_TYPES 2", "CELL_TYPES 3", "line 12", "CELL_TYPES 2, as of CELLS",
               "'3'"},
     Malformed{"MissingType", kRows, "5\n10\n", "5\n", "line 14", "the type of a cell", "the end of the file"},
-    Malformed{"TypeAtTheVeryEnd", kRows, "10\n", "10", "line 14", "a line end after the last number",
-              "the end of the file"},
+    Malformed{"CutType", kRows, "10\n", "1", "line 14", "1 point of a vertex (cell type 1)", "4 of cell 1"},
     Malformed{"NoTypes", kRows, "CELL_TYPES 2\n5\n10\n", "", "line 11", "CELL_TYPES", "the end of the file"},
     Malformed{"TriangleAsTet", kRows, "5\n10\n", "10\n10\n", "line 13", "4 points of a tet (cell type 10)",
               "3 of cell 0"},

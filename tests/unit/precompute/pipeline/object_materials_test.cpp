@@ -21,13 +21,14 @@ class ObjectMaterials : public testing::Test {
     for (std::int32_t t = 0; t < mesh_.tet_count(); ++t) kept_.push_back(t);
   }
   TetMaterials materials(const std::optional<TetMaterials>& in_file = std::nullopt) {
-    return object_materials(asset_, mesh_, in_file, kept_, files_);
+    return object_materials(asset_, mesh_, sets_, in_file, kept_, files_);
   }
   Complaint complaint() {
     return complaint_of([this] { materials(); });
   }
 
   TetMesh mesh_ = exmat::test::box_mesh({2, 1, 1}, {2, 1, 1});  // tets 0 to 5, then 6 to 11 beyond x = 1
+  TetSets sets_{{"left", {0, 1, 2}}, {"right", {9, 10}}};
   AssetConfig asset_;
   std::vector<std::int32_t> kept_;
   InputFiles files_;
@@ -63,6 +64,28 @@ TEST_F(ObjectMaterials, DroppedTetsKeepTheIdsOfTheOthers) {
   kept_ = {2, 7, 11};
   asset_.material_regions = {{IdSelection{{7}}, 2e5, std::nullopt, std::nullopt}};
   EXPECT_EQ(materials().youngs_modulus, Eigen::Vector3d(1e5, 2e5, 1e5));
+}
+
+TEST_F(ObjectMaterials, SetsOfTheMeshFileAreParts) {
+  asset_.material_regions = {{SetSelection{"left"}, 2e5, std::nullopt, 500},
+                             {SetSelection{"right"}, std::nullopt, 0.1, std::nullopt}};
+  const TetMaterials found = materials();
+  for (Eigen::Index t = 0; t < 12; ++t) {
+    EXPECT_EQ(found.youngs_modulus[t], t < 3 ? 2e5 : 1e5) << t;
+    EXPECT_EQ(found.density[t], t < 3 ? 500 : 1000) << t;
+    EXPECT_EQ(found.poisson_ratio[t], t == 9 || t == 10 ? 0.1 : 0.3) << t;
+  }
+  kept_ = {1, 9};
+  EXPECT_EQ(materials().youngs_modulus, Eigen::Vector2d(2e5, 1e5))
+      << "the file's numbers, also where tets were dropped";
+}
+
+TEST_F(ObjectMaterials, ASetThatTheMeshFileDoesNotHaveIsNamedWithThoseThatItHas) {
+  asset_.material_regions = {{SetSelection{"rigth"}, 2e5, std::nullopt, std::nullopt}};
+  EXPECT_EQ(complaint().found, "\"rigth\"");
+  EXPECT_EQ(complaint().advice, "the file has \"left\", \"right\"");
+  sets_.clear();
+  EXPECT_EQ(complaint().advice, "the file has none");
 }
 
 TEST_F(ObjectMaterials, FilesOfTetsAreInputs) {

@@ -1,0 +1,186 @@
+#include "precompute/app/bundle_command.h"
+
+#include <filesystem>
+#include <fmt/format.h>
+#include <optional>
+#include <utility>
+
+#include "common/bundle/bundle.h"
+#include "common/bundle/schema.h"
+#include "common/config/config.h"
+#include "common/core/atomic_file.h"
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/mesh/geometry.h"
+#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/depfile.h"
+#include "precompute/pipeline/run_report.h"
+
+namespace exmat {
+namespace {
+
+using precompute::BuildReport;
+using precompute::RunReport;
+
+void print_stages(const BuildReport& report) {
+  double total = 0;
+  fmt::print("\n{:<28}{:>10}\n", "stage", "seconds");
+  for (const auto& stage : report.stages) {
+    fmt::print("{:<28}{:>10.3f}\n", stage.stage, stage.seconds);
+    total += stage.seconds;
+  }
+  fmt::print("{:<28}{:>10.3f}\n", "total", total);
+}
+
+void print_ledger(const std::vector<LedgerEntry>& ledger) {
+  fmt::print("\n{:<14}{:>12}  {:<5}{}\n", "group", "bytes", "in", "why");
+  for (const auto& entry : ledger)
+    fmt::print("{:<14}{:>12}  {:<5}{}\n", entry.group, entry.bytes, entry.included ? "yes" : "no", entry.reason);
+}
+
+void print_examples(const std::string& title, const ExampleSet& set) {
+  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", title, "method", "confidence", "lost by m [%]", "by basis [%]");
+  for (const auto& example : set.examples)
+    fmt::print("{:<20}{:>14.13}{:>12.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.confidence,
+               100 * example.shape_space_error, 100 * example.basis_error);
+}
+
+void print_render_mesh(const ReducedModel& model) {
+  const RenderData& render = *model.render;
+  fmt::print("render mesh: {} vertices, {} triangles; {} vertices outside the object", render.vertices.rows(),
+             render.triangles.rows(), render.outside);
+  if (render.outside > 0)
+    fmt::print(", by up to {:.3g} m ({:.3g} % of the diagonal of its bounding box)", render.farthest,
+               100 * render.farthest / bounding_box_diagonal(model.object->mesh.vertices));
+  fmt::print("\n");
+}
+
+void print_model(const std::string& bundle, const ReducedModel& model) {
+  fmt::print("{}: {} vertices, {} tets, {} body, r = {}, s = {}", bundle, model.object->mesh.vertex_count(),
+             model.object->mesh.tet_count(), model.object->fixed.any() ? "constrained" : "free",
+             model.modal->basis.cols(), model.cubature->elements.size());
+  if (model.shape_space) fmt::print(", m = {}", model.shape_space->eigenvalues.size());
+  fmt::print(", {} bytes\n", std::filesystem::file_size(bundle));
+  fmt::print(
+      "frequencies {:.4g} to {:.4g} Hz; held-out cubature error: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %\n",
+      model.modal->frequencies.minCoeff(), model.modal->frequencies.maxCoeff(), 100 * model.cubature->heldout_error,
+      100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error);
+  if (model.render) print_render_mesh(model);
+  if (model.examples) print_examples("example", *model.examples);
+  for (const RegionData& region : model.regions) print_examples("region " + region.name, region.examples);
+}
+
+// What the scene asks of the bundle; nothing without a scene.
+std::optional<Needs> scene_needs(const BundleOptions& options, const AssetConfig& asset) {
+  if (options.scene.empty()) return std::nullopt;
+  const Needs needs = needs_of(load_scene(options.scene));
+  if (needs.render && !asset.render_mesh)
+    throw InputError({options.asset, "/object/render_mesh", "a surface, for output.render of the scene", "none",
+                      "name one here or leave output.render out of the scene"});
+  return needs;
+}
+
+// Whether the bundle is there and was computed from these inputs, by this version.
+bool is_up_to_date(const BundleOptions& options, const AssetConfig& asset, const Needs& needs, BuildReport& report) {
+  if (!std::filesystem::exists(options.bundle)) return false;
+  precompute::read_inputs(asset, needs, report);
+  try {
+    const BundleSummary summary = summarise_bundle(options.bundle);
+    return summary.input_sha256 == report.input_sha256 && summary.format_version == bundle_schema().format_version;
+  } catch (const InputError& error) {
+    log::warning(fmt::format("computing the bundle again: {}", error.what()));
+    return false;
+  }
+}
+
+void write_depfile(const BundleOptions& options, const BuildReport& report) {
+  if (options.depfile.empty()) return;
+  precompute::InputFiles files = report.inputs;
+  if (!options.scene.empty()) files.emplace_back(options.scene);
+  write_file_atomically(options.depfile, precompute::depfile_text(options.bundle, files));
+}
+
+// Better refused now than after the work.
+void require_writable(const BundleOptions& options) {
+  for (const std::string& file : {options.bundle, options.depfile})
+    if (!file.empty()) const AtomicFile writable(file);
+}
+
+/// Sets `model` where it makes one.
+void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
+  const AssetConfig asset = load_asset(options.asset);
+  const Needs needs = precompute::resolve_needs(asset, scene_needs(options, asset));
+  require_writable(options);
+  if (options.if_changed && is_up_to_date(options, asset, needs, report.build)) {
+    log::info(fmt::format("{}: its inputs have not changed, nothing to do", options.bundle));
+    write_depfile(options, report.build);
+    report.status = "unchanged";
+    return;
+  }
+  report.build = {};
+  model = precompute::build_model(asset, needs, report.build, {options.alignment_report, options.cache});
+  precompute::timed_stage("writing the bundle", report.build, [&] { write_bundle(*model, options.bundle); });
+  fill_bytes(*model, report.build.ledger);
+  write_depfile(options, report.build);
+  report.status = "done";
+  print_model(options.bundle, *model);
+  print_ledger(report.build.ledger);
+  print_stages(report.build);
+}
+
+/// Notes the warnings of the log while it lives.
+class WarningRecorder {
+ public:
+  explicit WarningRecorder(std::vector<std::string>& warnings) {
+    log::set_sink([former = former_ = log::set_sink({}), &warnings](log::Level level, std::string_view message) {
+      if (level == log::Level::kWarning) warnings.emplace_back(message);
+      if (former) former(level, message);
+    });
+  }
+  ~WarningRecorder() { log::set_sink(std::move(former_)); }
+  WarningRecorder(const WarningRecorder&) = delete;
+  WarningRecorder& operator=(const WarningRecorder&) = delete;
+
+ private:
+  log::Sink former_;
+};
+
+void save(const BundleOptions& options, const RunReport& report, const std::optional<ReducedModel>& model) {
+  write_file_atomically(
+      options.report,
+      to_json(report, model ? &*model : nullptr).dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) +
+          "\n");
+}
+
+// The failure itself is what the program ends with, even where its report cannot be written.
+void save_failure(const BundleOptions& options, RunReport& report, const std::exception& failure,
+                  const std::optional<ReducedModel>& model) {
+  report.status = "failed";
+  report.message = failure.what();
+  report.exit_status = static_cast<int>(dynamic_cast<const InputError*>(&failure) != nullptr ? ExitStatus::kBadInput
+                                                                                             : ExitStatus::kFailure);
+  try {
+    save(options, report, model);
+  } catch (const std::exception& error) {
+    log::error(error.what());
+  }
+}
+
+}  // namespace
+
+void bundle_command(const BundleOptions& options) {
+  RunReport report{.asset = options.asset, .bundle = options.bundle};
+  std::optional<ReducedModel> model;
+  if (options.report.empty()) return make_bundle(options, report, model);
+  { const AtomicFile writable(options.report); }
+  const WarningRecorder recorder(report.warnings);
+  try {
+    make_bundle(options, report, model);
+  } catch (const std::exception& error) {
+    save_failure(options, report, error, model);
+    throw;
+  }
+  save(options, report, model);
+}
+
+}  // namespace exmat

@@ -1,0 +1,19 @@
+#pragma once
+
+#include <string>
+
+namespace exmat {
+
+struct BundleOptions {
+  std::string asset, bundle;
+  std::string scene;             ///< empty: what the asset needs
+  std::string alignment_report;  ///< folder; empty: none
+  std::string depfile, report;   ///< files; empty: none
+  std::string cache;             ///< folder of stages; empty: none
+  bool if_changed = false;       ///< nothing is done where the bundle is of these inputs
+};
+
+/// Computes and writes a bundle, prints what came out, then writes the depfile and, also of a failure, the report.
+void bundle_command(const BundleOptions& options);
+
+}  // namespace exmat
