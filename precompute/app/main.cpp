@@ -5,7 +5,9 @@
 #include "common/console/console.h"
 #include "common/core/version.h"
 #include "precompute/app/bundle_command.h"
+#include "precompute/app/solver_options.h"
 #include "precompute/pipeline/build_model.h"
+#include "precompute/solvers/ranks.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
 namespace {
@@ -35,15 +37,15 @@ void check(const CheckOptions& options) {
   fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(std::vector<char*> words) {
   CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
   app.set_version_flag("--version",
                        [] { return fmt::format("exmat-precompute {}, {}", version(), precompute::solver_versions()); });
   app.require_subcommand(1);
   CommonOptions common;
   add_common_options(app, common);
+  precompute::SolverSettings solvers{.options = take_solver_options(words)};
+  add_solver_options(app, solvers);
 
   BundleOptions options;
   auto* bundle_command_line = app.add_subcommand("bundle", "compute the offline stage and write a bundle");
@@ -70,9 +72,16 @@ int main(int argc, char** argv) {
   add_alignment_report(bundle_command_line, options.alignment_report);
   add_alignment_report(check_command, check_options.alignment_report);
 
-  return run_program(app, argc, argv, [&] {
+  return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     apply(common);
+    precompute::configure_solvers(solvers);
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
   });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return precompute::run_on_ranks([&] { return run({argv, argv + argc}); });
 }
