@@ -16,7 +16,7 @@ namespace exmat::precompute {
 namespace {
 
 constexpr double kConvergence = 1e-12;       // of Krylov-Schur, relative to the eigenvalue
-constexpr double kLobpcgConvergence = 1e-7;  // |K x - lambda M x| / |lambda M x|, about; one inverse iteration follows
+constexpr double kLobpcgConvergence = 1e-9;  // |K x - lambda M x| / |lambda M x|, about
 constexpr double kResidualLimit = 1e-9;      // of the returned pairs
 constexpr int kMostPolishes = 4;             // one does after Krylov-Schur
 constexpr double kMissedMargin = 1e-7;       // a find below (1 - this) times the largest kept value was missed

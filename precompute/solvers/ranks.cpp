@@ -217,7 +217,7 @@ const SolverSettings& solver_settings() { return settings(); }
 void require_options_taken() {
   for (const auto& [name, value] : settings().options) {
     PetscBool taken = PETSC_FALSE;
-    check_petsc(PetscOptionsUsed(nullptr, ("-" + name).c_str(), &taken), "options");
+    check_petsc(PetscOptionsUsed(nullptr, name.c_str(), &taken), "options");
     if (taken == PETSC_TRUE) continue;
     std::string option = "--" + name;
     std::replace(option.begin(), option.end(), '_', '-');
