@@ -3,6 +3,7 @@
 
 #include "common/config/config.h"
 #include "common/console/console.h"
+#include "common/core/log.h"
 #include "common/core/version.h"
 #include "precompute/app/bundle_command.h"
 #include "precompute/app/solver_options.h"
@@ -75,6 +76,7 @@ int run(std::vector<char*> words) {
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     apply(common);
     precompute::configure_solvers(solvers);
+    if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
   });

@@ -69,6 +69,15 @@ NullSpaceHandle null_space_of(const Eigen::MatrixXd& own, Eigen::Index block) {
   return space;
 }
 
+// MUMPS's failures are no errors to PETSc.
+void require_factors(Mat factor) {
+  MatFactorError error = MAT_FACTOR_NOERROR;
+  check_petsc(MatFactorGetError(factor, &error), "state of the factorisation");
+  if (error == MAT_FACTOR_OUTMEMORY)
+    throw WorkError("not enough memory for the factors; use more ranks, or --eigensolver gamg");
+  if (error != MAT_FACTOR_NOERROR) throw WorkError("MUMPS cannot factorise the matrix");
+}
+
 }  // namespace
 
 std::string solver_versions() {
@@ -111,6 +120,7 @@ void SolverShare::factorise_directly(const SparseMatrix& whole, const Eigen::Mat
   check_petsc(MatFactorInfoInitialize(&info), "factor options");
   check_petsc(MatCholeskyFactorSymbolic(made, matrix.get(), nullptr, &info), "symbolic factorisation");
   check_petsc(MatCholeskyFactorNumeric(made, matrix.get(), &info), "factorisation");
+  require_factors(made);
 }
 
 void SolverShare::set_up_multigrid(const SparseMatrix& whole, const Eigen::MatrixXd& mass_times_null_space,

@@ -2,11 +2,12 @@
 
 #include <chrono>
 #include <cstdio>
+#include <cstdlib>
 #include <exception>
-#include <limits>
 #include <new>
-#include <numeric>
+#include <string>
 #include <thread>
+#include <vector>
 
 namespace exmat::precompute {
 namespace {
