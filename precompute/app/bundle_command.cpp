@@ -24,9 +24,10 @@ using precompute::RunReport;
 
 void print_stages(const BuildReport& report) {
   double total = 0;
-  fmt::print("\n{:<28}{:>10}\n", "stage", "seconds");
+  fmt::print("\n{:<28}{:>10}{:>18}\n", "stage", "seconds", "peak memory [MB]");
   for (const auto& stage : report.stages) {
-    fmt::print("{:<28}{:>10.3f}\n", stage.stage, stage.seconds);
+    fmt::print("{:<28}{:>10.3f}{:>18.1f}\n", stage.stage, stage.seconds,
+               1e-6 * static_cast<double>(stage.peak_memory_bytes));
     total += stage.seconds;
   }
   fmt::print("{:<28}{:>10.3f}\n", "total", total);

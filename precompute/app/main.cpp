@@ -4,10 +4,13 @@
 #include "common/bundle/library_versions.h"
 #include "common/config/config.h"
 #include "common/console/console.h"
+#include "common/core/log.h"
 #include "common/core/version.h"
 #include "precompute/app/bundle_command.h"
+#include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
 #include "precompute/pipeline/build_model.h"
+#include "precompute/solvers/ranks.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
 namespace {
@@ -37,9 +40,7 @@ void check(const CheckOptions& options) {
   fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(std::vector<char*> words) {
   CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
   app.set_version_flag("--version", [] {
     return fmt::format("exmat-precompute {}, {}, {}", version(), precompute::solver_versions(), library_versions());
@@ -47,6 +48,8 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   CommonOptions common;
   add_common_options(app, common);
+  precompute::SolverSettings solvers{.options = take_solver_options(words)};
+  add_solver_options(app, solvers);
 
   BundleOptions options;
   auto* bundle_command_line = app.add_subcommand("bundle", "compute the offline stage and write a bundle");
@@ -104,13 +107,21 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
 
-  return run_program(app, argc, argv, [&] {
+  return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     if (study_options.stability && common.log_level == "info")
       common.log_level = "error";  // of hundreds of small bodies
     apply(common);
+    precompute::configure_solvers(solvers);
+    if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
     if (study_command_line->parsed())
       study_options.stability ? stability_command(study_options) : study_command(study_options);
   });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return precompute::run_on_ranks([&] { return run({argv, argv + argc}); });
 }

@@ -82,7 +82,7 @@ ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& mate
   if (size == system.full_mass.rows()) {
     system.mass = system.full_mass;
     system.stiffness = system.full_stiffness;
-    system.null_space = rigid_motions(mesh, system.full_mass);
+    system.null_space = system.rigid = rigid_motions(mesh, system.full_mass);
     return system;
   }
   if (size == 0)
@@ -91,6 +91,7 @@ ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& mate
   system.mass = submatrix(system.full_mass, system.free_dofs);
   system.stiffness = submatrix(system.full_stiffness, system.free_dofs);
   system.null_space.resize(size, 0);
+  system.rigid = system.restrict(rigid_motions(mesh, system.full_mass));
   return system;
 }
 

@@ -17,6 +17,7 @@ struct ElasticSystem {
   std::vector<std::int32_t> free_dofs;  ///< f, ascending; all 3n of a free body
   SparseMatrix mass, stiffness;         ///< f x f
   Eigen::MatrixXd null_space;           ///< f x 6, M-orthonormal rigid motions of a free body; f x 0 of a clamped one
+  Eigen::MatrixXd rigid;                ///< f x 6, the free rows of the rigid motions of the body
 
   bool constrained() const { return null_space.cols() == 0; }
   /// [f x k] free rows of [3n x k] fields.

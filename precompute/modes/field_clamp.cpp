@@ -5,7 +5,8 @@ namespace exmat::precompute {
 FieldClamp::FieldClamp(const ElasticSystem& system, double decay, const std::string& name) : system_(system) {
   if (!system.constrained()) return;
   full_ = system.full_stiffness + decay * system.full_mass;
-  solver_.emplace(system.stiffness + decay * system.mass, system.null_space, name + ": clamp of the examples");
+  solver_.emplace(system.stiffness + decay * system.mass, system.null_space, name + ": clamp of the examples",
+                  system.rigid);
 }
 
 Eigen::MatrixXd FieldClamp::apply(const Eigen::MatrixXd& fields) const {

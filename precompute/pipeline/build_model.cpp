@@ -290,7 +290,8 @@ ReducedModel Pipeline::run() {
       timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
   require_modes(system);
   const auto solver = timed("factorisation", [&] {
-    return SemidefiniteSolver(system.stiffness, system.mass * system.null_space, asset_.name + ": elastic stiffness");
+    return SemidefiniteSolver(system.stiffness, system.mass * system.null_space, asset_.name + ": elastic stiffness",
+                              system.rigid);
   });
   log::info(system.constrained() ? fmt::format("constrained body: {} fixed vertices", object_.fixed.cast<int>().sum())
                                  : "free body: six rigid modes found and excluded");

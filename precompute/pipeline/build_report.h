@@ -17,7 +17,7 @@ namespace exmat::precompute {
 struct StageTime {
   std::string stage;
   double seconds = 0;
-  std::int64_t peak_memory_bytes = 0;  ///< most that the process had until the stage's end
+  std::int64_t peak_memory_bytes = 0;  ///< most that any rank had until the stage's end
 };
 
 /// A result that was asked of the cache of stages.
@@ -36,7 +36,7 @@ struct BuildReport {
   std::vector<std::string> warnings;  ///< also in the log
 };
 
-/// Most memory that the process has had so far.
+/// Most memory that any rank has had so far.
 std::int64_t peak_memory_bytes();
 
 /// Runs a stage and returns its result; it is logged, reported as progress and entered in `report` when it ends.
@@ -47,7 +47,8 @@ auto timed_stage(const std::string& stage, BuildReport& report, Work work) {
   const Timer timer;
   const auto enter = [&] {
     report.stages.push_back({stage, timer.seconds(), peak_memory_bytes()});
-    log::info(fmt::format("{}: {:.3f} s", stage, timer.seconds()));
+    log::info(fmt::format("{}: {:.3f} s, peak memory {:.1f} MB", stage, timer.seconds(),
+                          1e-6 * static_cast<double>(report.stages.back().peak_memory_bytes)));
   };
   if constexpr (std::is_void_v<std::invoke_result_t<Work>>) {
     work();

@@ -78,7 +78,7 @@ std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const 
   const LaplaceBasis object = laplace_basis_of(model);
   const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting);
   const SemidefiniteSolver solver(system.stiffness, system.mass * system.null_space,
-                                  model.asset_name + ": elastic stiffness");
+                                  model.asset_name + ": elastic stiffness", system.rigid);
   for (const std::string& name : regions) {
     const auto region = std::ranges::find(model.regions, name, &RegionData::name);
     require_examples(model, region != model.regions.end(), "/regions/" + name);

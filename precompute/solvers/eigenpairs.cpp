@@ -2,34 +2,58 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <cmath>
+#include <exception>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "common/core/error.h"
 #include "common/core/progress.h"
-#include "precompute/solvers/petsc_handles.h"
+#include "precompute/solvers/solver_access.h"
 
 namespace exmat::precompute {
 namespace {
 
-constexpr double kConvergence = 1e-12;   // of Krylov-Schur, relative to the eigenvalue
-constexpr double kResidualLimit = 1e-9;  // of the returned pairs
-constexpr double kMissedMargin = 1e-7;   // a find below (1 - this) times the largest kept value was missed
+constexpr double kConvergence = 1e-12;       // of Krylov-Schur, relative to the eigenvalue
+constexpr double kLobpcgConvergence = 1e-9;  // |K x - lambda M x| / |lambda M x|, about
+constexpr double kResidualLimit = 1e-9;      // of the returned pairs
+constexpr int kMostPolishes = 4;             // one does after Krylov-Schur
+constexpr double kMissedMargin = 1e-7;       // a find below (1 - this) times the largest kept value was missed
 
-using Columns = Eigen::Map<const Eigen::VectorXd>;
-
-// y = K^+ x.
-PetscErrorCode apply_inverse(PC preconditioner, Vec x, Vec y) {
-  const SemidefiniteSolver* solver = nullptr;
-  check_petsc(PCShellGetContext(preconditioner, &solver), "context");
+// y = K^+ x, of each rank's rows; `solve` does it.
+template <typename Solve>
+PetscErrorCode transform(Vec x, Vec y, Solve solve) {
   const PetscScalar* input = nullptr;
   PetscScalar* output = nullptr;
-  check_petsc(VecGetArrayRead(x, &input), "vector");
-  check_petsc(VecGetArrayWrite(y, &output), "vector");
-  Eigen::Map<Eigen::VectorXd>(output, solver->size()) = solver->solve(Columns(input, solver->size()));
-  check_petsc(VecRestoreArrayRead(x, &input), "vector");
-  check_petsc(VecRestoreArrayWrite(y, &output), "vector");
-  return 0;
+  PetscInt rows = 0;
+  try {
+    check_petsc(VecGetLocalSize(x, &rows), "vector");
+    check_petsc(VecGetArrayRead(x, &input), "vector");
+    check_petsc(VecGetArrayWrite(y, &output), "vector");
+    Eigen::Map<Eigen::VectorXd>(output, rows) = solve(Eigen::Map<const Eigen::VectorXd>(input, rows));
+    check_petsc(VecRestoreArrayRead(x, &input), "vector");
+    check_petsc(VecRestoreArrayWrite(y, &output), "vector");
+    return 0;
+  } catch (const std::exception& error) {  // PETSc has to return before this is thrown on
+    last_petsc_message() = error.what();
+    return PETSC_ERR_USER;
+  }
+}
+
+PetscErrorCode apply_inverse(PC preconditioner, Vec x, Vec y) {
+  const SolverShare* solver = nullptr;
+  const PetscErrorCode code = PCShellGetContext(preconditioner, &solver);
+  if (code != 0) return code;
+  return transform(x, y, [&](const auto& own) { return solver->solve_rows(own); });
+}
+
+PetscErrorCode apply_multigrid(PC preconditioner, Vec x, Vec y) {
+  const SolverShare* solver = nullptr;
+  PC multigrid = nullptr;
+  PetscErrorCode code = PCShellGetContext(preconditioner, &solver);
+  if (code == 0) code = KSPGetPC(solver->iteration.get(), &multigrid);
+  return code != 0 ? code : PCApply(multigrid, x, y);
 }
 
 PetscErrorCode report_progress(EPS, PetscInt, PetscInt converged, PetscScalar*, PetscScalar*, PetscReal*, PetscInt,
@@ -38,31 +62,65 @@ PetscErrorCode report_progress(EPS, PetscInt, PetscInt converged, PetscScalar*, 
   return 0;
 }
 
-// Shift and invert at zero, the inverse being that of the solver.
-void set_transformation(EPS eps, const SemidefiniteSolver& solver) {
-  check_petsc(EPSSetTarget(eps, 0.0), "target");
-  check_petsc(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE), "order");
-  ST transform = nullptr;
+// The linear solver of the transformation: one application of `apply`. Options of its kind are not for it.
+void set_inverse(EPS eps, STType type, const SolverShare& solver, PetscErrorCode (*apply)(PC, Vec, Vec)) {
+  ST transformation = nullptr;
   KSP linear = nullptr;
   PC inverse = nullptr;
-  check_petsc(EPSGetST(eps, &transform), "spectral transformation");
-  check_petsc(STSetType(transform, STSINVERT), "spectral transformation");
-  check_petsc(STGetKSP(transform, &linear), "linear solver");
+  check_petsc(EPSGetST(eps, &transformation), "spectral transformation");
+  check_petsc(STSetType(transformation, type), "spectral transformation");
+  check_petsc(STGetKSP(transformation, &linear), "linear solver");
+  check_petsc(KSPSetOptionsPrefix(linear, "inverse_"), "linear solver");
   check_petsc(KSPSetType(linear, KSPPREONLY), "linear solver");
   check_petsc(KSPGetPC(linear, &inverse), "inverse");
   check_petsc(PCSetType(inverse, PCSHELL), "inverse");
-  check_petsc(PCShellSetContext(inverse, const_cast<SemidefiniteSolver*>(&solver)), "inverse");
-  check_petsc(PCShellSetApply(inverse, apply_inverse), "inverse");
+  check_petsc(PCShellSetContext(inverse, const_cast<SolverShare*>(&solver)), "inverse");
+  check_petsc(PCShellSetApply(inverse, apply), "inverse");
 }
 
-VecHandle to_vec(const Eigen::VectorXd& values) {
+// Shift and invert at zero, the inverse being that of the solver.
+void set_krylov_schur(EPS eps, const SolverShare& solver) {
+  check_petsc(EPSSetType(eps, EPSKRYLOVSCHUR), "eigensolver type");
+  check_petsc(EPSSetTolerances(eps, kConvergence, 1000), "tolerance");
+  check_petsc(EPSSetTarget(eps, 0.0), "target");
+  check_petsc(EPSSetWhichEigenpairs(eps, EPS_TARGET_MAGNITUDE), "order");
+  set_inverse(eps, STSINVERT, solver, apply_inverse);
+}
+
+void set_lobpcg(EPS eps, Mat mass, const SolverShare& solver) {
+  // SLEPc compares |K x - lambda M x| with lambda, x^T M x = 1: then |M x| is about the root of a diagonal entry of M.
+  PetscScalar trace = 0;
+  check_petsc(MatGetTrace(mass, &trace), "trace of the mass");
+  const double scale = std::sqrt(trace / static_cast<double>(solver.layout.size));
+  check_petsc(EPSSetType(eps, EPSLOBPCG), "eigensolver type");
+  check_petsc(EPSSetTolerances(eps, kLobpcgConvergence * scale, 5000), "tolerance");
+  check_petsc(EPSSetConvergenceTest(eps, EPS_CONV_REL), "convergence test");
+  check_petsc(EPSSetWhichEigenpairs(eps, EPS_SMALLEST_REAL), "order");
+  set_inverse(eps, STPRECOND, solver, apply_multigrid);
+}
+
+VecHandle to_vec(const Eigen::Ref<const Eigen::VectorXd>& own) {
   VecHandle vector;
-  check_petsc(VecCreateSeq(PETSC_COMM_SELF, static_cast<PetscInt>(values.size()), vector.out()), "vector");
+  check_petsc(VecCreate(team(), vector.out()), "vector");
+  check_petsc(VecSetSizes(vector.get(), static_cast<PetscInt>(own.size()), PETSC_DETERMINE), "vector");
+  check_petsc(VecSetType(vector.get(), VECSTANDARD), "vector");
   PetscScalar* data = nullptr;
   check_petsc(VecGetArrayWrite(vector.get(), &data), "vector");
-  std::copy(values.data(), values.data() + values.size(), data);
+  std::copy(own.data(), own.data() + own.size(), data);
   check_petsc(VecRestoreArrayWrite(vector.get(), &data), "vector");
   return vector;
+}
+
+std::vector<VecHandle> to_vecs(const Eigen::MatrixXd& own) {
+  std::vector<VecHandle> vectors;
+  for (Eigen::Index k = 0; k < own.cols(); ++k) vectors.push_back(to_vec(own.col(k)));
+  return vectors;
+}
+
+std::vector<Vec> raw(const std::vector<VecHandle>& handles) {
+  std::vector<Vec> vectors;
+  for (const VecHandle& handle : handles) vectors.push_back(handle.get());
+  return vectors;
 }
 
 // Every start has components along all eigenvectors, and is the same in every run.
@@ -73,49 +131,84 @@ Eigen::VectorXd start_vector(Eigen::Index size, unsigned seed) {
   return start;
 }
 
-// One Krylov-Schur run in the M-complement of the columns of `found`.
-Eigen::MatrixXd krylov_schur(Mat stiffness, Mat mass, const SemidefiniteSolver& solver, const Eigen::MatrixXd& found,
-                             Eigen::Index count) {
-  EpsHandle eps;
-  check_petsc(EPSCreate(PETSC_COMM_SELF, eps.out()), "eigensolver");
-  check_petsc(EPSSetOperators(eps.get(), stiffness, mass), "operators");
-  check_petsc(EPSSetProblemType(eps.get(), EPS_GHEP), "problem type");
-  check_petsc(EPSSetType(eps.get(), EPSKRYLOVSCHUR), "eigensolver type");
-  check_petsc(EPSSetDimensions(eps.get(), static_cast<PetscInt>(count), PETSC_DEFAULT, PETSC_DEFAULT), "dimensions");
-  check_petsc(EPSSetTolerances(eps.get(), kConvergence, 1000), "tolerance");
-  set_transformation(eps.get(), solver);
-
-  std::vector<VecHandle> deflation;
-  std::vector<Vec> raw;
-  for (Eigen::Index k = 0; k < found.cols(); ++k) raw.push_back(deflation.emplace_back(to_vec(found.col(k))).get());
-  check_petsc(EPSSetDeflationSpace(eps.get(), static_cast<PetscInt>(raw.size()), raw.data()), "deflation");
-  const auto start = to_vec(solver.solve(start_vector(solver.size(), 1 + static_cast<unsigned>(found.cols()))));
-  Vec raw_start = start.get();
-  check_petsc(EPSSetInitialSpace(eps.get(), 1, &raw_start), "start vector");
-  Progress progress("eigenpairs", count);
-  check_petsc(EPSMonitorSet(eps.get(), report_progress, &progress, nullptr), "monitor");
-  check_petsc(EPSSolve(eps.get()), "eigensolution");
-
+// [own rows x count] of the eigenvectors of a solved problem.
+Eigen::MatrixXd eigenvectors(EPS eps, Eigen::Index own, Eigen::Index count) {
   PetscInt converged = 0;
-  check_petsc(EPSGetConverged(eps.get(), &converged), "convergence");
+  check_petsc(EPSGetConverged(eps, &converged), "convergence");
   if (converged < count)
     throw WorkError("eigensolver: expected " + std::to_string(count) + " eigenpairs, found " +
                     std::to_string(converged) + "; ask for fewer, or refine the mesh");
-  const auto vector = to_vec(start_vector(solver.size(), 1));
-  Eigen::MatrixXd vectors(solver.size(), count);
+  const auto vector = to_vec(Eigen::VectorXd::Zero(own));
+  Eigen::MatrixXd vectors(own, count);
   for (Eigen::Index k = 0; k < count; ++k) {
-    check_petsc(EPSGetEigenvector(eps.get(), static_cast<PetscInt>(k), vector.get(), nullptr), "eigenvector");
+    check_petsc(EPSGetEigenvector(eps, static_cast<PetscInt>(k), vector.get(), nullptr), "eigenvector");
     const PetscScalar* data = nullptr;
     check_petsc(VecGetArrayRead(vector.get(), &data), "vector");
-    vectors.col(k) = Columns(data, vectors.rows());
+    vectors.col(k) = Eigen::Map<const Eigen::VectorXd>(data, own);
     check_petsc(VecRestoreArrayRead(vector.get(), &data), "vector");
   }
   return vectors;
 }
 
-// One step of inverse iteration and Rayleigh-Ritz: orthonormal to rounding, residuals far below Krylov-Schur's.
-Eigenpairs polish(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
-                  const Eigen::MatrixXd& vectors) {
+// One run in the M-complement of the columns of `found`; each rank has its rows of all.
+Eigen::MatrixXd solve_eigenproblem(const EigenShare& problem, const Eigen::MatrixXd& found,
+                                   const Eigen::VectorXd& start, Eigen::Index count) {
+  EpsHandle eps;
+  check_petsc(EPSCreate(team(), eps.out()), "eigensolver");
+  check_petsc(EPSSetOperators(eps.get(), problem.stiffness.get(), problem.mass.get()), "operators");
+  check_petsc(EPSSetProblemType(eps.get(), EPS_GHEP), "problem type");
+  check_petsc(EPSSetDimensions(eps.get(), static_cast<PetscInt>(count), PETSC_DEFAULT, PETSC_DEFAULT), "dimensions");
+  const bool lobpcg = solver_settings().eigensolver == Eigensolver::kLobpcg;
+  lobpcg ? set_lobpcg(eps.get(), problem.mass.get(), problem.solver) : set_krylov_schur(eps.get(), problem.solver);
+
+  std::vector<VecHandle> deflation = to_vecs(found);
+  if (lobpcg)  // the inverse of the other leaves the null space out
+    for (auto& field : to_vecs(problem.solver.null_space)) deflation.push_back(std::move(field));
+  check_petsc(EPSSetDeflationSpace(eps.get(), static_cast<PetscInt>(deflation.size()), raw(deflation).data()),
+              "deflation");
+  const auto first = to_vec(start);
+  Vec raw_first = first.get();
+  check_petsc(EPSSetInitialSpace(eps.get(), 1, &raw_first), "start vector");
+  if (!solver_settings().options.empty()) check_petsc(EPSSetFromOptions(eps.get()), "options of the eigensolver");
+  Progress progress("eigenpairs", count);
+  check_petsc(EPSMonitorSet(eps.get(), report_progress, &progress, nullptr), "monitor");
+  check_petsc(EPSSolve(eps.get()), "eigensolution");
+  return eigenvectors(eps.get(), start.size(), count);
+}
+
+// The eigenproblem on all ranks, while it lives.
+class TeamProblem {
+ public:
+  TeamProblem(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver)
+      : solver_(solver), share_(announced(solver), solver.share()) {
+    share_.pose(stiffness, mass);
+  }
+
+  // `count` eigenvectors in the M-complement of the columns of `found`.
+  Eigen::MatrixXd search(const Eigen::MatrixXd& found, Eigen::Index count) const {
+    Eigen::MatrixXd fields(solver_.size(), found.cols() + 1);
+    fields.leftCols(found.cols()) = found;
+    fields.rightCols(1) = solver_.solve(start_vector(solver_.size(), 1 + static_cast<unsigned>(found.cols())));
+    announce({Task::kSearch, share_.id, {found.cols(), count}});
+    Eigen::MatrixXd vectors = share_.search(fields, found.cols(), count);
+    require_options_taken();
+    return vectors;
+  }
+
+ private:
+  static Call announced(const SemidefiniteSolver& solver) {
+    const Call call{Task::kPoseEigenproblem, new_share_id(), {solver.share().id}};
+    announce(call);
+    return call;
+  }
+
+  const SemidefiniteSolver& solver_;
+  EigenShare share_;
+};
+
+// A step of inverse iteration and Rayleigh-Ritz: orthonormal to rounding, residuals far below Krylov-Schur's.
+Eigenpairs polish_once(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                       const Eigen::MatrixXd& vectors) {
   const Eigen::MatrixXd improved = solver.solve(mass * vectors);
   const Eigen::MatrixXd K = improved.transpose() * (stiffness * improved);
   const Eigen::MatrixXd M = improved.transpose() * (mass * improved);
@@ -131,15 +224,44 @@ Eigenpairs polish(const SparseMatrix& stiffness, const SparseMatrix& mass, const
   return pairs;
 }
 
+// Until the residuals are small, for those found by LOBPCG.
+Eigenpairs polish(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                  const Eigen::MatrixXd& vectors) {
+  Eigenpairs pairs = polish_once(stiffness, mass, solver, vectors);
+  for (int pass = 1; pass < kMostPolishes && pairs.residuals.maxCoeff() > kResidualLimit; ++pass)
+    pairs = polish_once(stiffness, mass, solver, pairs.vectors);
+  return pairs;
+}
+
 }  // namespace
+
+EigenShare::EigenShare(const Call& call, SolverShare& used) : solver(used) { id = call.object; }
+
+EigenShare::~EigenShare() { forget(id); }
+
+void EigenShare::pose(const SparseMatrix& whole_stiffness, const SparseMatrix& whole_mass) {
+  agree([&] {
+    stiffness = to_petsc(solver.layout, whole_stiffness, {}, 0);
+    mass = to_petsc(solver.layout, whole_mass, {}, 0);
+  });
+}
+
+Eigen::MatrixXd EigenShare::search(const Eigen::MatrixXd& fields, Eigen::Index found, Eigen::Index count) const {
+  Eigen::MatrixXd vectors;
+  agree([&] {
+    const Eigen::MatrixXd own = scatter_rows(solver.layout, fields, found + 1);
+    vectors = gather_rows(solver.layout, solve_eigenproblem(*this, own.leftCols(found), own.col(found), count));
+  });
+  return vectors;
+}
 
 Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass,
                                const SemidefiniteSolver& solver, Eigen::Index count) {
-  const MatHandle petsc_stiffness = to_petsc(stiffness, {}), petsc_mass = to_petsc(mass, {});
-  Eigen::MatrixXd found = krylov_schur(petsc_stiffness.get(), petsc_mass.get(), solver, {}, count);
+  const TeamProblem problem(stiffness, mass, solver);
+  Eigen::MatrixXd found = problem.search(Eigen::MatrixXd(solver.size(), 0), count);
   Eigenpairs pairs = polish(stiffness, mass, solver, found);
   for (;;) {
-    const Eigen::MatrixXd extra = krylov_schur(petsc_stiffness.get(), petsc_mass.get(), solver, pairs.vectors, 1);
+    const Eigen::MatrixXd extra = problem.search(pairs.vectors, 1);
     const Eigen::VectorXd x = extra.col(0);
     if (x.dot(stiffness * x) / x.dot(mass * x) >= (1 - kMissedMargin) * pairs.values[count - 1]) break;
     found.resize(found.rows(), count + 1);
@@ -148,8 +270,8 @@ Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix
     pairs = {pairs.values.head(count), pairs.vectors.leftCols(count), pairs.residuals.head(count)};
   }
   if (pairs.residuals.maxCoeff() > kResidualLimit)
-    throw WorkError("eigensolver: residual " + std::to_string(pairs.residuals.maxCoeff()) +
-                    " is above 1e-9; the mesh has very bad elements");
+    throw WorkError("eigensolver: residual " + std::to_string(1e9 * pairs.residuals.maxCoeff()) +
+                    "e-9 is above 1e-9; the mesh has very bad elements, or parts that can move without deforming it");
   fix_signs(pairs.vectors);
   return pairs;
 }

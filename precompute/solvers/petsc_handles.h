@@ -48,8 +48,7 @@ class Handle {
 using MatHandle = Handle<Mat, MatDestroy>;
 using VecHandle = Handle<Vec, VecDestroy>;
 using EpsHandle = Handle<EPS, EPSDestroy>;
-
-/// Copies a matrix of Eigen's; `border` [n x c] is appended as c more columns and, transposed, as c more rows.
-MatHandle to_petsc(const SparseMatrix& matrix, const Eigen::MatrixXd& border);
+using KspHandle = Handle<KSP, KSPDestroy>;
+using NullSpaceHandle = Handle<MatNullSpace, MatNullSpaceDestroy>;
 
 }  // namespace exmat::precompute

@@ -1,44 +1,84 @@
 #include "precompute/solvers/semidefinite_solver.h"
 
-#include <cstdlib>
+#include <Eigen/QR>
 #include <slepcsys.h>
 #include <vector>
 
-#include "precompute/solvers/petsc_handles.h"
 #include "precompute/solvers/solver_access.h"
 
 namespace exmat::precompute {
 namespace {
 
-// Keeps the text of the first error for check_petsc, which throws it once the call has returned.
-PetscErrorCode remember_error(MPI_Comm, int, const char*, const char*, PetscErrorCode code, PetscErrorType type,
-                              const char* message, void*) {
-  if (type == PETSC_ERROR_INITIAL) last_petsc_message() = message;
-  return code;
+// Of conjugate gradients: |b - K x| / |b|.
+constexpr double kIterationTolerance = 1e-12;
+// Of the right-hand side as given: what is left of one along the null space is rounding.
+constexpr double kRounding = 1e-14;
+constexpr PetscInt kMostIterations = 2000;
+// Share of the mean of the diagonal that the matrix which multigrid is made for is shifted by, where K has null
+// vectors.
+constexpr double kShift = 1e-6;
+constexpr Eigen::Index kRigidMotions = 6;
+
+// Vertices stay whole where the matrix is that of displacements.
+Eigen::Index block_of(Eigen::Index soft) { return soft == kRigidMotions ? 3 : 1; }
+
+// columns -= along onto^T columns, of all ranks' rows.
+void remove(const Eigen::MatrixXd& along, const Eigen::MatrixXd& onto, Eigen::MatrixXd& columns) {
+  if (along.cols() == 0) return;
+  Eigen::MatrixXd products = onto.transpose() * columns;
+  add_up(products);
+  columns -= along * products;
+}
+
+// Of all ranks' rows.
+Eigen::VectorXd norms(const Eigen::MatrixXd& columns) {
+  Eigen::MatrixXd squares = columns.colwise().squaredNorm();
+  add_up(squares);
+  return squares.cwiseSqrt().transpose();
+}
+
+Eigen::MatrixXd orthonormal(const Eigen::MatrixXd& fields) {
+  if (fields.size() == 0) return fields;
+  const Eigen::HouseholderQR<Eigen::MatrixXd> factors(fields);
+  return factors.householderQ() * Eigen::MatrixXd::Identity(fields.rows(), fields.cols());
+}
+
+// A vector on the ranks' own values, which must outlive it.
+VecHandle view(const Eigen::Ref<const Eigen::VectorXd>& own) {
+  VecHandle vector;
+  check_petsc(
+      VecCreateMPIWithArray(team(), 1, static_cast<PetscInt>(own.size()), PETSC_DETERMINE, own.data(), vector.out()),
+      "vector");
+  return vector;
+}
+
+NullSpaceHandle null_space_of(const Eigen::MatrixXd& own, Eigen::Index block) {
+  std::vector<VecHandle> handles;
+  std::vector<Vec> raw;
+  for (Eigen::Index k = 0; k < own.cols(); ++k) {
+    VecHandle copy;
+    const VecHandle original = view(own.col(k));
+    check_petsc(VecDuplicate(original.get(), copy.out()), "vector");
+    check_petsc(VecCopy(original.get(), copy.get()), "vector");
+    check_petsc(VecSetBlockSize(copy.get(), static_cast<PetscInt>(block)), "vector");
+    raw.push_back(handles.emplace_back(std::move(copy)).get());
+  }
+  NullSpaceHandle space;
+  check_petsc(MatNullSpaceCreate(team(), PETSC_FALSE, static_cast<PetscInt>(raw.size()), raw.data(), space.out()),
+              "null space");
+  return space;
+}
+
+// MUMPS's failures are no errors to PETSc.
+void require_factors(Mat factor) {
+  MatFactorError error = MAT_FACTOR_NOERROR;
+  check_petsc(MatFactorGetError(factor, &error), "state of the factorisation");
+  if (error == MAT_FACTOR_OUTMEMORY)
+    throw WorkError("not enough memory for the factors; use more ranks, or --eigensolver gamg");
+  if (error != MAT_FACTOR_NOERROR) throw WorkError("MUMPS cannot factorise the matrix");
 }
 
 }  // namespace
-
-// PETSc and MPI cannot be started a second time, so they end with the program.
-void start_solvers() {
-  static const bool started = [] {
-    // A single process needs no daemon, no binding and no network. mpirun sets its own.
-    setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
-    setenv("HWLOC_HIDE_ERRORS", "2", 0);  // stderr is for the log, also in containers without /sys
-    setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
-    setenv("OMPI_MCA_btl", "self,vader", 0);
-    check_petsc(SlepcInitializeNoArguments(), "initialisation");
-    check_petsc(PetscPushErrorHandler(remember_error, nullptr), "error handler");
-    std::atexit([] { SlepcFinalize(); });
-    return true;
-  }();
-  static_cast<void>(started);
-}
-
-std::string& last_petsc_message() {
-  static std::string message;
-  return message;
-}
 
 std::string solver_versions() {
   const auto text = [](int major, int minor, int sub) {
@@ -48,78 +88,135 @@ std::string solver_versions() {
          text(SLEPC_VERSION_MAJOR, SLEPC_VERSION_MINOR, SLEPC_VERSION_SUBMINOR);
 }
 
-MatHandle to_petsc(const SparseMatrix& matrix, const Eigen::MatrixXd& border) {
-  const auto n = static_cast<PetscInt>(matrix.rows());
-  const auto c = static_cast<PetscInt>(border.cols());
-  std::vector<PetscInt> row_sizes(static_cast<std::size_t>(n + c));
-  for (PetscInt i = 0; i < n; ++i)
-    row_sizes[static_cast<std::size_t>(i)] = matrix.outerIndexPtr()[i + 1] - matrix.outerIndexPtr()[i] + c;
-  // The zero diagonal of the border is stored: PETSc's factorisations ask for it.
-  for (PetscInt k = 0; k < c; ++k) row_sizes[static_cast<std::size_t>(n + k)] = n + 1;
+SolverShare::SolverShare(const Call& call)
+    : layout{call.numbers[0], block_of(call.numbers[2])},
+      border(call.numbers[1]),
+      soft(call.numbers[2]),
+      direct(solver_settings().eigensolver == Eigensolver::kDirect) {
+  id = call.object;
+}
 
-  MatHandle result;
-  check_petsc(MatCreateSeqAIJ(PETSC_COMM_SELF, n + c, n + c, 0, row_sizes.data(), result.out()), "matrix");
-  std::vector<PetscInt> columns;
-  std::vector<PetscScalar> values;
-  const auto set_row = [&](PetscInt row) {
-    check_petsc(MatSetValues(result.get(), 1, &row, static_cast<PetscInt>(columns.size()), columns.data(),
-                             values.data(), INSERT_VALUES),
-                "matrix row");
-    columns.clear();
-    values.clear();
-  };
-  for (PetscInt i = 0; i < n; ++i) {
-    for (SparseMatrix::InnerIterator entry(matrix, i); entry; ++entry) {
-      columns.push_back(static_cast<PetscInt>(entry.col()));
-      values.push_back(entry.value());
-    }
-    for (PetscInt k = 0; k < c; ++k) {
-      columns.push_back(n + k);
-      values.push_back(border(i, k));
-    }
-    set_row(i);
+SolverShare::~SolverShare() { forget(id); }
+
+void SolverShare::factorise(const SparseMatrix& whole, const Eigen::MatrixXd& mass_times_null_space,
+                            const Eigen::MatrixXd& soft_fields) {
+  agree([&] {
+    if (direct) return factorise_directly(whole, mass_times_null_space);
+    set_up_multigrid(whole, mass_times_null_space, soft_fields);
+  });
+}
+
+void SolverShare::factorise_directly(const SparseMatrix& whole, const Eigen::MatrixXd& mass_times_null_space) {
+  // Both blocks of the bordered matrix get one scale, whatever the units.
+  const double scale = leads() ? whole.diagonal().cwiseAbs().mean() : 0;
+  const double border_norm = leads() && border > 0 ? mass_times_null_space.cwiseAbs().maxCoeff() : 1.0;
+  matrix = to_petsc(layout, whole, mass_times_null_space * (scale / border_norm), border);
+
+  Mat& made = *factor.out();
+  check_petsc(MatGetFactor(matrix.get(), MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &made), "choice of MUMPS");
+  check_petsc(MatMumpsSetIcntl(made, 13, 1), "MUMPS option");  // inertia needs the root factored in one piece
+  check_petsc(MatMumpsSetIcntl(made, 24, 1), "MUMPS option");  // detect null pivots
+  MatFactorInfo info;
+  check_petsc(MatFactorInfoInitialize(&info), "factor options");
+  check_petsc(MatCholeskyFactorSymbolic(made, matrix.get(), nullptr, &info), "symbolic factorisation");
+  check_petsc(MatCholeskyFactorNumeric(made, matrix.get(), &info), "factorisation");
+  require_factors(made);
+}
+
+void SolverShare::set_up_multigrid(const SparseMatrix& whole, const Eigen::MatrixXd& mass_times_null_space,
+                                   const Eigen::MatrixXd& soft_fields) {
+  matrix = to_petsc(layout, whole, {}, 0);
+  mass_null_space = scatter_rows(layout, mass_times_null_space, border);
+  if (border > 0) null_space = scatter_rows(layout, soft_fields, border);
+  if (soft > 0) {
+    soft_space = null_space_of(scatter_rows(layout, orthonormal(soft_fields), soft), layout.block);
+    check_petsc(MatSetNearNullSpace(matrix.get(), soft_space.get()), "soft fields");
   }
-  for (PetscInt k = 0; k < c; ++k) {
-    for (PetscInt i = 0; i < n; ++i) {
-      columns.push_back(i);
-      values.push_back(border(i, k));
-    }
-    columns.push_back(n + k);
-    values.push_back(0);
-    set_row(n + k);
+  Mat made_for = matrix.get();
+  if (border > 0) {
+    check_petsc(MatSetNullSpace(matrix.get(), soft_space.get()), "null space");
+    double shift = leads() ? kShift * whole.diagonal().mean() : 0;
+    MPI_Bcast(&shift, 1, MPI_DOUBLE, 0, team());
+    check_petsc(MatDuplicate(matrix.get(), MAT_COPY_VALUES, shifted.out()), "matrix");
+    check_petsc(MatSetNearNullSpace(shifted.get(), soft_space.get()), "soft fields");
+    check_petsc(MatShift(shifted.get(), shift), "shift");
+    made_for = shifted.get();
   }
-  check_petsc(MatAssemblyBegin(result.get(), MAT_FINAL_ASSEMBLY), "matrix assembly");
-  check_petsc(MatAssemblyEnd(result.get(), MAT_FINAL_ASSEMBLY), "matrix assembly");
-  check_petsc(MatSetOption(result.get(), MAT_SYMMETRIC, PETSC_TRUE), "matrix symmetry");
-  return result;
+  PC multigrid = nullptr;
+  check_petsc(KSPCreate(team(), iteration.out()), "linear solver");
+  check_petsc(KSPSetOperators(iteration.get(), matrix.get(), made_for), "linear solver");
+  check_petsc(KSPSetType(iteration.get(), KSPCG), "linear solver");
+  check_petsc(KSPSetNormType(iteration.get(), KSP_NORM_UNPRECONDITIONED), "linear solver");
+  check_petsc(KSPSetTolerances(iteration.get(), kIterationTolerance, PETSC_DEFAULT, PETSC_DEFAULT, kMostIterations),
+              "linear solver");
+  check_petsc(KSPGetPC(iteration.get(), &multigrid), "multigrid");
+  check_petsc(PCSetType(multigrid, PCGAMG), "multigrid");
+  check_petsc(KSPSetOptionsPrefix(iteration.get(), "st_"), "linear solver");
+  check_petsc(KSPSetFromOptions(iteration.get()), "options of the linear solver");
+  check_petsc(KSPSetUp(iteration.get()), "multigrid");
+}
+
+Eigen::MatrixXd SolverShare::solve(const Eigen::MatrixXd& right_hand_sides, Eigen::Index columns) const {
+  Eigen::MatrixXd solutions;
+  agree([&] { solutions = gather_rows(layout, solve_rows(scatter_rows(layout, right_hand_sides, columns))); });
+  return solutions;
+}
+
+Eigen::MatrixXd SolverShare::solve_rows(const Eigen::MatrixXd& right_hand_sides) const {
+  return direct ? solve_directly(right_hand_sides) : iterate(right_hand_sides);
+}
+
+Eigen::MatrixXd SolverShare::solve_directly(const Eigen::MatrixXd& right_hand_sides) const {
+  const Eigen::Index own = right_hand_sides.rows(), extended_rows = own + (is_last() ? border : 0);
+  Eigen::MatrixXd extended = Eigen::MatrixXd::Zero(extended_rows, right_hand_sides.cols());
+  extended.topRows(own) = right_hand_sides;
+  Eigen::MatrixXd solution(extended_rows, right_hand_sides.cols());
+  const auto rows = static_cast<PetscInt>(extended_rows), columns = static_cast<PetscInt>(right_hand_sides.cols()),
+             all = static_cast<PetscInt>(layout.size + border);
+  MatHandle b, x;
+  check_petsc(MatCreateDense(team(), rows, PETSC_DECIDE, all, columns, extended.data(), b.out()), "right-hand sides");
+  check_petsc(MatCreateDense(team(), rows, PETSC_DECIDE, all, columns, solution.data(), x.out()), "solutions");
+  check_petsc(MatMatSolve(factor.get(), b.get(), x.get()), "solve");
+  return solution.topRows(own);
+}
+
+Eigen::MatrixXd SolverShare::iterate(Eigen::MatrixXd right_hand_sides) const {
+  const Eigen::VectorXd sizes = norms(right_hand_sides);
+  remove(mass_null_space, null_space, right_hand_sides);
+  Eigen::MatrixXd solutions = Eigen::MatrixXd::Zero(right_hand_sides.rows(), right_hand_sides.cols());
+  for (Eigen::Index k = 0; k < solutions.cols(); ++k) {
+    const VecHandle b = view(right_hand_sides.col(k)), x = view(solutions.col(k));
+    check_petsc(KSPSetTolerances(iteration.get(), PETSC_DEFAULT, kRounding * sizes[k], PETSC_DEFAULT, PETSC_DEFAULT),
+                "linear solver");
+    check_petsc(KSPSolve(iteration.get(), b.get(), x.get()), "conjugate gradients");
+    KSPConvergedReason reason = KSP_CONVERGED_ITERATING;
+    PetscReal left = 0;
+    PetscInt steps = 0;
+    check_petsc(KSPGetConvergedReason(iteration.get(), &reason), "convergence");
+    check_petsc(KSPGetResidualNorm(iteration.get(), &left), "convergence");
+    check_petsc(KSPGetIterationNumber(iteration.get(), &steps), "convergence");
+    if (reason < 0)
+      throw WorkError("conjugate gradients: relative residual " + std::to_string(1e12 * left / sizes[k]) +
+                      "e-12 after " + std::to_string(steps) +
+                      " iterations; the mesh has bad elements, or parts that can move without deforming it");
+  }
+  remove(null_space, mass_null_space, solutions);
+  return solutions;
 }
 
 SemidefiniteSolver::SemidefiniteSolver(const SparseMatrix& matrix, const Eigen::MatrixXd& mass_times_null_space,
-                                       const std::string& name)
-    : implementation_(std::make_unique<Implementation>()) {
+                                       const std::string& name, const Eigen::MatrixXd& soft_fields) {
   start_solvers();
-  auto& self = *implementation_;
-  self.size = matrix.rows();
-  self.border = mass_times_null_space.cols();
-  // Both blocks of the bordered matrix get one scale, whatever the units.
-  const double scale = matrix.diagonal().cwiseAbs().mean();
-  const double border_norm = self.border > 0 ? mass_times_null_space.cwiseAbs().maxCoeff() : 1.0;
-  self.matrix = to_petsc(matrix, mass_times_null_space * (scale / border_norm));
-
-  Mat& factor = *self.factor.out();
-  check_petsc(MatGetFactor(self.matrix.get(), MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &factor), "choice of MUMPS");
-  check_petsc(MatMumpsSetIcntl(factor, 13, 1), "MUMPS option");  // inertia needs the root factored in one piece
-  check_petsc(MatMumpsSetIcntl(factor, 24, 1), "MUMPS option");  // detect null pivots
-  MatFactorInfo info;
-  check_petsc(MatFactorInfoInitialize(&info), "factor options");
-  check_petsc(MatCholeskyFactorSymbolic(factor, self.matrix.get(), nullptr, &info), "symbolic factorisation");
-  check_petsc(MatCholeskyFactorNumeric(factor, self.matrix.get(), &info), "factorisation");
-
+  const Call call{Task::kFactorise, new_share_id(), {matrix.rows(), mass_times_null_space.cols(), soft_fields.cols()}};
+  announce(call);
+  share_ = std::make_unique<SolverShare>(call);
+  share_->factorise(matrix, mass_times_null_space, soft_fields);
+  if (!share_->direct) return;
   PetscInt negative = 0, zero = 0, positive = 0;
-  check_petsc(MatGetInertia(factor, &negative, &zero, &positive), "inertia");
-  if (negative != self.border || zero != 0)
+  check_petsc(MatGetInertia(share_->factor.get(), &negative, &zero, &positive), "inertia");
+  if (negative != share_->border || zero != 0)
     throw WorkError(
-        name + ": expected " + std::to_string(self.border) + " negative and no zero pivots, found " +
+        name + ": expected " + std::to_string(share_->border) + " negative and no zero pivots, found " +
         std::to_string(negative) + " and " + std::to_string(zero) +
         ": parts of the body can move without deforming it (hinges, or tets joined only in an edge or a vertex)");
 }
@@ -127,21 +224,12 @@ SemidefiniteSolver::SemidefiniteSolver(const SparseMatrix& matrix, const Eigen::
 SemidefiniteSolver::~SemidefiniteSolver() = default;
 SemidefiniteSolver::SemidefiniteSolver(SemidefiniteSolver&&) noexcept = default;
 
-Eigen::Index SemidefiniteSolver::size() const { return implementation_->size; }
+Eigen::Index SemidefiniteSolver::size() const { return share_->layout.size; }
 
 Eigen::MatrixXd SemidefiniteSolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
-  const auto& self = *implementation_;
   if (right_hand_sides.cols() == 0) return right_hand_sides;
-  const Eigen::Index full = self.size + self.border;
-  Eigen::MatrixXd extended = Eigen::MatrixXd::Zero(full, right_hand_sides.cols());
-  extended.topRows(self.size) = right_hand_sides;
-  Eigen::MatrixXd solution(full, right_hand_sides.cols());
-  const auto rows = static_cast<PetscInt>(full), columns = static_cast<PetscInt>(right_hand_sides.cols());
-  MatHandle b, x;
-  check_petsc(MatCreateSeqDense(PETSC_COMM_SELF, rows, columns, extended.data(), b.out()), "right-hand sides");
-  check_petsc(MatCreateSeqDense(PETSC_COMM_SELF, rows, columns, solution.data(), x.out()), "solutions");
-  check_petsc(MatMatSolve(self.factor.get(), b.get(), x.get()), "solve");
-  return solution.topRows(self.size);
+  announce({Task::kSolve, share_->id, {right_hand_sides.cols()}});
+  return share_->solve(right_hand_sides, right_hand_sides.cols());
 }
 
 }  // namespace exmat::precompute

@@ -174,8 +174,8 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const Redu
       displacements_(model.object->mesh.vertex_count(), 3),
       velocities_(model.object->mesh.vertex_count(), 3) {
   const SymbolSizes sizes = sizes_of(model, info);
-  const auto write = [&](const char* path, const auto& array) {
-    const DatasetSchema& schema = trajectory_schema().dataset(path);
+  const auto write = [&](const char* name, const auto& array) {
+    const DatasetSchema& schema = trajectory_schema().dataset(name);
     write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), array.data());
   };
   write("/tets", model.object->mesh.tets);

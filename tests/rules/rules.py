@@ -14,7 +14,7 @@ LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime
 LEAN_INCLUDES = LEAN + ("exmat",)
 POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of core/atomic_file alone
 STREAMS = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "cstdio"}
-PRIVATE_HEADERS = {"precompute/solvers/petsc_handles.h": "precompute/solvers", "precompute/solvers/solver_access.h": "precompute/solvers"}
+PRIVATE_HEADERS = {f"precompute/solvers/{name}.h": "precompute/solvers" for name in ("petsc_handles", "solver_access", "team")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 OWN = re.compile(r"^(common|precompute|runtime|tests)/")
 

@@ -1,0 +1,52 @@
+#include "precompute/app/solver_options.h"
+
+#include <algorithm>
+#include <cctype>
+#include <map>
+
+namespace exmat {
+namespace {
+
+using precompute::Eigensolver;
+
+bool is_solver_option(const std::string& word) { return word.starts_with("--eps-") || word.starts_with("--st-"); }
+
+bool is_value(const std::string& word) {
+  return !word.starts_with("-") || (word.size() > 1 && std::isdigit(static_cast<unsigned char>(word[1])) != 0);
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> take_solver_options(std::vector<char*>& words) {
+  std::vector<std::pair<std::string, std::string>> options;
+  std::vector<char*> rest;
+  for (std::size_t i = 0; i < words.size(); ++i) {
+    const std::string word = words[i];
+    if (i == 0 || !is_solver_option(word)) {
+      rest.push_back(words[i]);
+      continue;
+    }
+    const std::size_t equals = word.find('=');
+    std::string name = word.substr(2, equals == std::string::npos ? equals : equals - 2), value;
+    std::replace(name.begin(), name.end(), '-', '_');
+    if (equals != std::string::npos)
+      value = word.substr(equals + 1);
+    else if (i + 1 < words.size() && is_value(words[i + 1]))
+      value = words[++i];
+    options.emplace_back(name, value);
+  }
+  words = rest;
+  return options;
+}
+
+void add_solver_options(CLI::App& app, precompute::SolverSettings& settings) {
+  const std::map<std::string, Eigensolver> names{
+      {"direct", Eigensolver::kDirect}, {"gamg", Eigensolver::kGamg}, {"lobpcg", Eigensolver::kLobpcg}};
+  app.add_option("--eigensolver", settings.eigensolver,
+                 "direct (MUMPS), or with less memory gamg (multigrid) or lobpcg; --eps-NAME VALUE and --st-NAME VALUE "
+                 "are passed on to SLEPc and PETSc")
+      ->transform(CLI::CheckedTransformer(names, CLI::ignore_case))
+      ->option_text("{direct,gamg,lobpcg} [direct]");
+}
+
+}  // namespace exmat
