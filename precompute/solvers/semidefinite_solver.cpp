@@ -19,7 +19,7 @@ constexpr PetscInt kMostIterations = 2000;
 constexpr double kShift = 1e-6;
 constexpr Eigen::Index kRigidMotions = 6;
 
-// Vertices stay whole where the matrix is that of displacements.
+// Vertices stay whole in multigrid where the matrix is that of displacements.
 Eigen::Index block_of(Eigen::Index soft) { return soft == kRigidMotions ? 3 : 1; }
 
 // columns -= along onto^T columns, of all ranks' rows.
@@ -89,11 +89,12 @@ std::string solver_versions() {
 }
 
 SolverShare::SolverShare(const Call& call)
-    : layout{call.numbers[0], block_of(call.numbers[2])},
+    : layout{call.numbers[0], 1},
       border(call.numbers[1]),
       soft(call.numbers[2]),
       direct(solver_settings().eigensolver == Eigensolver::kDirect) {
   id = call.object;
+  if (!direct) layout.block = block_of(soft);
 }
 
 SolverShare::~SolverShare() { forget(id); }
