@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "common/core/error.h"
+#include "common/core/fnv_hash.h"
 
 namespace exmat {
 namespace {
@@ -44,10 +45,7 @@ std::string process_world() {
   ::gethostname(host.data(), host.size() - 1);
   std::error_code ignored;
   const auto container = std::filesystem::read_symlink("/proc/self/ns/pid", ignored);
-  std::uint64_t hash = 14695981039346656037U;  // Fowler, Noll and Vo's, 1a
-  for (const char c : std::string(host.data()) + '\n' + container.string())
-    hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
-  return hexadecimal(hash);
+  return hexadecimal(fnv_hash(std::string(host.data()) + '\n' + container.string()));
 }
 
 // ".MACHINE-"

@@ -12,6 +12,7 @@
 
 #include "common/core/atomic_file.h"
 #include "common/core/error.h"
+#include "common/core/fnv_hash.h"
 
 namespace exmat::precompute {
 namespace {
@@ -32,12 +33,6 @@ std::optional<double> common_multiple(const std::vector<double>& time_steps, dou
 }
 
 constexpr std::string_view kMagic = "exmat frames 1\n";
-
-std::uint64_t fnv1a(std::string_view bytes) {
-  std::uint64_t hash = 0xcbf29ce484222325;
-  for (const char byte : bytes) hash = (hash ^ static_cast<unsigned char>(byte)) * 0x100000001b3;
-  return hash;
-}
 
 template <typename T>
 void put(std::string& bytes, const T* values, std::size_t count) {
@@ -116,7 +111,7 @@ void write_frames(const std::filesystem::path& file, const BodyFrames& frames) {
   for (const auto member : kSeries) put(bytes, (frames.*member).data(), (frames.*member).size());
   for (const auto member : kFields)
     for (const VertexArray& field : frames.*member) put(bytes, field.data(), static_cast<std::size_t>(field.size()));
-  const std::uint64_t hash = fnv1a(bytes);
+  const std::uint64_t hash = fnv_hash(bytes);
   put(bytes, &hash, 1);
   write_file_atomically(file, std::string(kMagic) + bytes);
 }
@@ -131,7 +126,7 @@ std::optional<BodyFrames> read_frames(const std::filesystem::path& file) {
   std::string_view tail = bytes.substr(bytes.size() - sizeof hash);
   bytes.remove_suffix(sizeof hash);
   take(tail, &hash, 1);
-  return hash == fnv1a(bytes) ? parse(bytes) : std::nullopt;
+  return hash == fnv_hash(bytes) ? parse(bytes) : std::nullopt;
 }
 
 }  // namespace exmat::precompute

@@ -19,6 +19,29 @@ double of_stage(const runtime::Profile& profile, runtime::Stage stage) {
   return profile.seconds[static_cast<std::size_t>(stage)];
 }
 
+// Of whole steps, and of weights and targets within.
+class StepSamples {
+ public:
+  void add_step(double seconds) {
+    whole_.add(seconds);
+    ++count_;
+  }
+  void add_interpolation(double seconds) { interpolation_.add(seconds); }
+  /// Without stages.
+  StepTimes times() const {
+    StepTimes times;
+    times.median = whole_.quantile(0.5);
+    times.p95 = whole_.quantile(0.95);
+    times.interpolation = interpolation_.quantile(0.5);
+    times.steps = count_;
+    return times;
+  }
+
+ private:
+  Samples whole_, interpolation_;
+  std::int64_t count_ = 0;
+};
+
 class TimedScene {
  public:
   TimedScene(SceneConfig config, std::int64_t steps)
@@ -29,27 +52,21 @@ class TimedScene {
   }
 
   void measure() {
-    round(steps_, [this](double seconds) {
-      whole_.add(seconds);
-      ++count_;
-    });
+    round(steps_, [this](double seconds) { samples_.add_step(seconds); });
     runtime::Profile profile;
     workspace_.profile = &profile;
     round(steps_, [&](double) {
       for (std::size_t i = 0; i < kTimedStages.size(); ++i) stages_[i].add(profile.seconds[i]);
-      interpolation_.add(of_stage(profile, runtime::Stage::kWeights) + of_stage(profile, runtime::Stage::kTarget));
+      samples_.add_interpolation(of_stage(profile, runtime::Stage::kWeights) +
+                                 of_stage(profile, runtime::Stage::kTarget));
       profile = {};
     });
     workspace_.profile = nullptr;
   }
 
   StepTimes times() const {
-    StepTimes times;
-    times.median = whole_.quantile(0.5);
-    times.p95 = whole_.quantile(0.95);
-    times.interpolation = interpolation_.quantile(0.5);
+    StepTimes times = samples_.times();
     for (std::size_t i = 0; i < kTimedStages.size(); ++i) times.stages[i] = stages_[i].quantile(0.5);
-    times.steps = count_;
     return times;
   }
 
@@ -74,9 +91,8 @@ class TimedScene {
   runtime::LoadedScene loaded_;
   std::int64_t steps_;
   runtime::Workspace workspace_;
-  Samples whole_, interpolation_;
+  StepSamples samples_;
   std::array<Samples, kTimedStages.size()> stages_;
-  std::int64_t count_ = 0;
 };
 
 class TimedBaseline {
@@ -86,24 +102,15 @@ class TimedBaseline {
   void measure(int steps) {
     for (int i = 0; body_ != nullptr && i < steps; ++i) {
       const FullSpaceReport report = body_->sound_step();
-      whole_.add(report.seconds);
-      if (report.target_iterations > 0) interpolation_.add(report.target_seconds);
-      ++count_;
+      samples_.add_step(report.seconds);
+      if (report.target_iterations > 0) samples_.add_interpolation(report.target_seconds);
     }
   }
-  StepTimes times() const {
-    StepTimes times;
-    times.median = whole_.quantile(0.5);
-    times.p95 = whole_.quantile(0.95);
-    times.interpolation = interpolation_.quantile(0.5);
-    times.steps = count_;
-    return times;
-  }
+  StepTimes times() const { return samples_.times(); }
 
  private:
   FullSpaceRun* body_;
-  Samples whole_, interpolation_;
-  std::int64_t count_ = 0;
+  StepSamples samples_;
 };
 
 }  // namespace

@@ -1,32 +1,13 @@
 #include "runtime/io/bodies.h"
 
 #include <algorithm>
-#include <bit>
 #include <omp.h>
 #include <utility>
 
+#include "common/core/fnv_hash.h"
 #include "common/core/timer.h"
 
 namespace exmat::runtime {
-namespace {
-
-/// FNV-1a of numbers, byte by byte.
-class Hash {
- public:
-  void add(const auto& values) {
-    for (const double value : values)
-      for (int shift = 0; shift < 64; shift += 8) {
-        hash_ ^= std::bit_cast<std::uint64_t>(value) >> shift & 0xff;
-        hash_ *= 0x100000001b3;
-      }
-  }
-  std::uint64_t value() const { return hash_; }
-
- private:
-  std::uint64_t hash_ = 0xcbf29ce484222325;
-};
-
-}  // namespace
 
 Bodies::Bodies(const Model& model, const StepScene& scene, State start, int count)
     : model_(model),
@@ -77,15 +58,15 @@ std::optional<int> Bodies::first_non_finite() const {
 }
 
 std::uint64_t Bodies::hash() const {
-  Hash hash;
+  FnvHash hash;
   for (const State& state : states_) {
-    hash.add(state.q);
-    hash.add(state.v);
+    hash.add_all(state.q);
+    hash.add_all(state.v);
     if (!state.body) continue;
-    hash.add(state.body->position);
-    hash.add(state.body->orientation.coeffs());
-    hash.add(state.body->linear_momentum);
-    hash.add(state.body->angular_momentum);
+    hash.add_all(state.body->position);
+    hash.add_all(state.body->orientation.coeffs());
+    hash.add_all(state.body->linear_momentum);
+    hash.add_all(state.body->angular_momentum);
   }
   return hash.value();
 }
