@@ -1,5 +1,7 @@
 #include "precompute/fem/assembly.h"
 
+#include <algorithm>
+#include <numeric>
 #include <vector>
 
 #include "common/elastic/material.h"
@@ -8,21 +10,75 @@
 namespace exmat::precompute {
 namespace {
 
-using Triplet = Eigen::Triplet<double>;
+// The tets around each vertex, one vertex after another.
+struct VertexTets {
+  std::vector<std::int32_t> starts, tets;
+};
+
+VertexTets tets_around(const TetMesh& mesh) {
+  VertexTets around{std::vector<std::int32_t>(static_cast<std::size_t>(mesh.vertex_count()) + 1), {}};
+  for (const auto vertex : mesh.tets.reshaped()) ++around.starts[static_cast<std::size_t>(vertex) + 1];
+  std::partial_sum(around.starts.begin(), around.starts.end(), around.starts.begin());
+  around.tets.resize(static_cast<std::size_t>(mesh.tets.size()));
+  std::vector<std::int32_t> next(around.starts);
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    for (const auto vertex : mesh.tets.row(t))
+      around.tets[static_cast<std::size_t>(next[static_cast<std::size_t>(vertex)]++)] = static_cast<std::int32_t>(t);
+  return around;
+}
+
+// [n x n] zeros where vertices share a tet.
+SparseMatrix vertex_pattern(const TetMesh& mesh) {
+  const VertexTets around = tets_around(mesh);
+  std::vector<int> starts{0}, columns, row;
+  for (std::size_t v = 0; v + 1 < around.starts.size(); ++v) {
+    row.clear();
+    for (auto k = around.starts[v]; k < around.starts[v + 1]; ++k)
+      for (const auto vertex : mesh.tets.row(around.tets[static_cast<std::size_t>(k)])) row.push_back(vertex);
+    std::ranges::sort(row);
+    columns.insert(columns.end(), row.begin(), std::ranges::unique(row).begin());
+    starts.push_back(static_cast<int>(columns.size()));
+  }
+  const std::vector<double> zeros(columns.size());
+  return Eigen::Map<const SparseMatrix>(mesh.vertex_count(), mesh.vertex_count(), std::ssize(columns), starts.data(),
+                                        columns.data(), zeros.data());
+}
+
+// Where (row, column) is among the stored entries.
+Eigen::Index position(const SparseMatrix& matrix, Eigen::Index row, int column) {
+  const int* columns = matrix.innerIndexPtr();
+  return std::lower_bound(columns + matrix.outerIndexPtr()[row], columns + matrix.outerIndexPtr()[row + 1], column) -
+         columns;
+}
 
 // Sums element(t), a [4 x 4] matrix of each tet, into an n x n matrix.
 template <typename ElementMatrix>
 SparseMatrix assemble_scalar(const TetMesh& mesh, const ElementMatrix& element) {
-  std::vector<Triplet> entries;
-  entries.reserve(static_cast<std::size_t>(16 * mesh.tet_count()));
+  SparseMatrix matrix = vertex_pattern(mesh);
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
     const Eigen::Matrix4d local = element(t);
     for (int i = 0; i < 4; ++i)
-      for (int j = 0; j < 4; ++j) entries.emplace_back(mesh.tets(t, i), mesh.tets(t, j), local(i, j));
+      for (int j = 0; j < 4; ++j) matrix.valuePtr()[position(matrix, mesh.tets(t, i), mesh.tets(t, j))] += local(i, j);
   }
-  SparseMatrix matrix(mesh.vertex_count(), mesh.vertex_count());
-  matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
+}
+
+// [3n x 3n] zeros where `scalar` has entries, in blocks of 3 x 3: that of its k-th entry, in row i with d entries from
+// the s-th on, starts at entry 9 s + 3 (k - s) and has its rows 3 d entries apart.
+SparseMatrix block_pattern(const SparseMatrix& scalar) {
+  SparseMatrix blocks(3 * scalar.rows(), 3 * scalar.cols());
+  blocks.resizeNonZeros(9 * scalar.nonZeros());
+  int at = 0;
+  for (Eigen::Index row = 0; row < scalar.rows(); ++row)
+    for (int axis = 0; axis < 3; ++axis) {
+      blocks.outerIndexPtr()[3 * row + axis] = at;
+      for (SparseMatrix::InnerIterator entry(scalar, row); entry; ++entry)
+        for (int other = 0; other < 3; ++other)
+          blocks.innerIndexPtr()[at++] = 3 * static_cast<int>(entry.col()) + other;
+    }
+  blocks.outerIndexPtr()[blocks.rows()] = at;
+  std::fill_n(blocks.valuePtr(), at, 0.0);
+  return blocks;
 }
 
 // 12 x 12: lambda g_i g_j^T + mu g_j g_i^T + mu (g_i . g_j) I for each pair of corners, times the volume.
@@ -58,17 +114,22 @@ SparseMatrix laplacian_stiffness(const TetMesh& mesh) {
 
 SparseMatrix elastic_stiffness(const TetMesh& mesh, const TetMaterials& materials) {
   const Eigen::VectorXd volumes = tet_volumes(mesh);
-  std::vector<Triplet> entries;
-  entries.reserve(static_cast<std::size_t>(144 * mesh.tet_count()));
+  const SparseMatrix scalar = vertex_pattern(mesh);
+  SparseMatrix matrix = block_pattern(scalar);
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
     const auto lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
     const auto local = element_stiffness(shape_gradients(tet_positions(mesh, t)), volumes[t], lame);
-    for (int i = 0; i < 12; ++i)
-      for (int j = 0; j < 12; ++j)
-        entries.emplace_back(3 * mesh.tets(t, i / 3) + i % 3, 3 * mesh.tets(t, j / 3) + j % 3, local(i, j));
+    for (int i = 0; i < 4; ++i) {
+      const Eigen::Index row = mesh.tets(t, i), start = scalar.outerIndexPtr()[row],
+                         stride = 3 * (scalar.outerIndexPtr()[row + 1] - start);
+      for (int j = 0; j < 4; ++j) {
+        const Eigen::Index entry = position(scalar, row, mesh.tets(t, j));
+        for (int a = 0; a < 3; ++a)
+          Eigen::Map<Eigen::RowVector3d>(matrix.valuePtr() + 9 * start + 3 * (entry - start) + a * stride) +=
+              local.block<1, 3>(3 * i + a, 3 * j);
+      }
+    }
   }
-  SparseMatrix matrix(3 * mesh.vertex_count(), 3 * mesh.vertex_count());
-  matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
 }
 
@@ -91,14 +152,15 @@ SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<std::int32_
   for (std::size_t i = 0; i < kept.size(); ++i)
     new_index[static_cast<std::size_t>(kept[i])] = static_cast<std::int32_t>(i);
   const auto size = static_cast<Eigen::Index>(kept.size());
-  std::vector<Triplet> entries;
-  entries.reserve(static_cast<std::size_t>(matrix.nonZeros()));
-  for (Eigen::Index i = 0; i < size; ++i)
+  SparseMatrix sub(size, size);
+  sub.reserve(matrix.nonZeros());
+  for (Eigen::Index i = 0; i < size; ++i) {
+    sub.startVec(i);
     for (SparseMatrix::InnerIterator entry(matrix, kept[static_cast<std::size_t>(i)]); entry; ++entry)
       if (const auto column = new_index[static_cast<std::size_t>(entry.col())]; column >= 0)
-        entries.emplace_back(static_cast<int>(i), column, entry.value());
-  SparseMatrix sub(size, size);
-  sub.setFromTriplets(entries.begin(), entries.end());
+        sub.insertBack(i, column) = entry.value();
+  }
+  sub.finalize();
   return sub;
 }
 

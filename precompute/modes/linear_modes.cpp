@@ -58,18 +58,18 @@ Eigen::MatrixXd modal_derivatives(const TetMesh& mesh, const TetMaterials& mater
   std::vector<std::pair<Eigen::Index, Eigen::Index>> pairs;
   for (Eigen::Index j = 0; j < modes.cols(); ++j)
     for (Eigen::Index i = 0; i <= j; ++i) pairs.emplace_back(i, j);
-  Eigen::MatrixXd loads(fields.rows(), static_cast<Eigen::Index>(pairs.size()));
+  Eigen::MatrixXd loads(modes.rows(), static_cast<Eigen::Index>(pairs.size()));
   Progress progress("modal derivatives", static_cast<std::int64_t>(pairs.size()));
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t p = 0; p < pairs.size(); ++p) {
-    loads.col(static_cast<Eigen::Index>(p)) = -with_material(materials.model, [&](auto material) {
+    loads.col(static_cast<Eigen::Index>(p)) = -system.restrict(with_material(materials.model, [&](auto material) {
       return second_derivative(material, mesh, materials, gradients, volumes, fields.col(pairs[p].first),
                                fields.col(pairs[p].second));
-    });
+    }));
 #pragma omp critical(modal_derivatives_progress)
     progress.advance();
   }
-  return solver.solve(system.restrict(loads));
+  return solver.solve(loads);
 }
 
 }  // namespace exmat::precompute

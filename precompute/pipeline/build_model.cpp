@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <memory>
 #include <numbers>
 #include <utility>
 
@@ -289,35 +290,42 @@ ReducedModel Pipeline::run() {
   const auto system =
       timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
   require_modes(system);
-  const auto solver = timed("factorisation", [&] {
-    return SemidefiniteSolver(system.stiffness, system.mass * system.null_space, asset_.name + ": elastic stiffness",
-                              system.rigid);
+  auto solver = timed("factorisation", [&] {
+    return std::make_unique<SemidefiniteSolver>(system.stiffness, system.mass * system.null_space,
+                                                asset_.name + ": elastic stiffness", system.rigid);
   });
   log::info(system.constrained() ? fmt::format("constrained body: {} fixed vertices", object_.fixed.cast<int>().sum())
                                  : "free body: six rigid modes found and excluded");
   const auto modes = timed("linear modes", [&] {
     return cache_.get(
-        "linear modes", [&] { return linear_modes(system, solver, asset_.linear_modes); }, system.mass,
+        "linear modes", [&] { return linear_modes(system, *solver, asset_.linear_modes); }, system.mass,
         system.stiffness, system.null_space, asset_.linear_modes);
   });
   const auto derivatives = timed("modal derivatives", [&] {
     return cache_.get(
         "modal derivatives",
-        [&] { return modal_derivatives(object_.mesh, object_.materials, system, solver, modes.modes); }, object_.mesh,
+        [&] { return modal_derivatives(object_.mesh, object_.materials, system, *solver, modes.modes); }, object_.mesh,
         object_.materials, system.free_dofs, modes.modes);
   });
 
   const double size = bounding_box_diagonal(object_.mesh.vertices);
-  // As fine as the linear modes resolve.
+  // Factors are the most of the memory: none longer than needed.
+  if (!shape || !shape->has_regions()) solver.reset();
   std::optional<PoseFitter> fitter;
-  if (shape) fitter.emplace(asset_, object_, system, solver, modes.eigenvalues.tail(1)[0], *shape);
+  if (shape)
+    timed("poses of the examples", [&] {
+      // As fine as the linear modes resolve.
+      fitter.emplace(asset_, object_, system, solver.get(), modes.eigenvalues.tail(1)[0], *shape);
+    });
+  solver.reset();
   const auto basis = timed("basis", [&] {
     Eigen::MatrixXd fields;
     if (shape && asset_.example_fields) fields = fitter->fields();
     return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) fitter->finish(model, report_.warnings);
+  if (shape) timed("weights of the examples", [&] { fitter->finish(model, report_.warnings); });
+  fitter.reset();
 
   model.cubature = timed("cubature", [&] {
     const auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));

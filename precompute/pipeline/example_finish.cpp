@@ -90,13 +90,13 @@ IndexVector flagged(const FlagVector& flags) {
 }  // namespace
 
 PoseFitter::PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
-                       const SemidefiniteSolver& solver, double highest, ShapeStage& stage)
+                       const SemidefiniteSolver* solver, double highest, ShapeStage& stage)
     : asset_(asset), object_(object), system_(system), stage_(stage), clamp_(system, highest, asset.name) {
   for (const ExampleGroup& group : stage.groups) {
     if (group.region.empty()) {
       poses_.push_back(whole_body_poses(stage.object, stage.weights, object.fixed, clamp_));
     } else {
-      const auto poses = std::make_shared<RegionPoses>(stage.object, stage.weights, *group.view, system, solver,
+      const auto poses = std::make_shared<RegionPoses>(stage.object, stage.weights, *group.view, system, *solver,
                                                        kRegionStiffness * highest);
       poses_.emplace_back([poses](const Eigen::MatrixXd& changes) { return poses->displacements(changes); });
     }

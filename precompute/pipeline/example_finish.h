@@ -13,10 +13,10 @@ namespace exmat::precompute {
 /// Makes the poses of a shape stage fit for the body, and brings them into its modal basis.
 class PoseFitter {
  public:
-  /// `solver` is that of the system's stiffness; `highest` [1/s^2] the squared frequency of the highest linear mode:
-  /// the basis resolves nothing finer. All of these are kept by reference.
+  /// `solver` is that of the system's stiffness, asked only for regions and here alone; `highest` [1/s^2] the squared
+  /// frequency of the highest linear mode: the basis resolves nothing finer. The others are kept by reference.
   PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
-             const SemidefiniteSolver& solver, double highest, ShapeStage& stage);
+             const SemidefiniteSolver* solver, double highest, ShapeStage& stage);
 
   /// [f x k] displacements of all poses, groups in order: what the basis is to hold.
   Eigen::MatrixXd fields() const;

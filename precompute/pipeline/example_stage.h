@@ -37,6 +37,8 @@ struct ShapeStage {
   std::vector<AlignmentOutcome> alignments;  ///< of the examples, in their order
   std::vector<StagedPose> poses;             ///< as ExampleInput::poses
   std::vector<ExampleGroup> groups;          ///< the whole body's, if any, then those of the regions
+
+  bool has_regions() const { return !groups.empty() && !groups.back().region.empty(); }
 };
 
 /// Computes the object's shape space and brings every example into it. method.md, sections 1 and 5; alignment.md.

@@ -1,6 +1,7 @@
 #include "precompute/solvers/semidefinite_solver.h"
 
 #include <Eigen/QR>
+#include <algorithm>
 #include <slepcsys.h>
 #include <vector>
 
@@ -18,6 +19,8 @@ constexpr PetscInt kMostIterations = 2000;
 // vectors.
 constexpr double kShift = 1e-6;
 constexpr Eigen::Index kRigidMotions = 6;
+// Right-hand sides that are copied and solved for together: more are no faster.
+constexpr Eigen::Index kSolvedTogether = 32;
 
 // Vertices stay whole in multigrid where the matrix is that of displacements.
 Eigen::Index block_of(Eigen::Index soft) { return soft == kRigidMotions ? 3 : 1; }
@@ -122,6 +125,7 @@ void SolverShare::factorise_directly(const SparseMatrix& whole, const Eigen::Mat
   check_petsc(MatCholeskyFactorSymbolic(made, matrix.get(), nullptr, &info), "symbolic factorisation");
   check_petsc(MatCholeskyFactorNumeric(made, matrix.get(), &info), "factorisation");
   require_factors(made);
+  matrix = {};
 }
 
 void SolverShare::set_up_multigrid(const SparseMatrix& whole, const Eigen::MatrixXd& mass_times_null_space,
@@ -228,9 +232,13 @@ SemidefiniteSolver::SemidefiniteSolver(SemidefiniteSolver&&) noexcept = default;
 Eigen::Index SemidefiniteSolver::size() const { return share_->layout.size; }
 
 Eigen::MatrixXd SemidefiniteSolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
-  if (right_hand_sides.cols() == 0) return right_hand_sides;
-  announce({Task::kSolve, share_->id, {right_hand_sides.cols()}});
-  return share_->solve(right_hand_sides, right_hand_sides.cols());
+  Eigen::MatrixXd solutions(right_hand_sides.rows(), right_hand_sides.cols());
+  for (Eigen::Index begin = 0; begin < solutions.cols(); begin += kSolvedTogether) {
+    const Eigen::Index count = std::min(kSolvedTogether, solutions.cols() - begin);
+    announce({Task::kSolve, share_->id, {count}});
+    solutions.middleCols(begin, count) = share_->solve(right_hand_sides.middleCols(begin, count), count);
+  }
+  return solutions;
 }
 
 }  // namespace exmat::precompute

@@ -22,7 +22,8 @@ struct SolverShare : Share {
   Layout layout;
   Eigen::Index border = 0, soft = 0;  ///< columns of R, of the soft fields
   bool direct = true;
-  MatHandle matrix, factor;  ///< bordered where direct
+  MatHandle matrix;          ///< none where direct
+  MatHandle factor;          ///< of the bordered matrix, where direct
   KspHandle iteration;       ///< conjugate gradients
   MatHandle shifted;         ///< without null vectors, for multigrid
   NullSpaceHandle soft_space;
