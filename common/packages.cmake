@@ -17,6 +17,7 @@ set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)  # what the binaries link is what their p
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME exmat-runtime)
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Steps example-based elastic bodies in real time: program, library, headers.")
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_NAME exmat-precompute)
+set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS libopenblas0-serial)  # any BLAS does; the reference one is slow
 set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Turns objects and example poses into bundles for exmat-runtime.")
 foreach(component IN LISTS CPACK_COMPONENTS_ALL)
   install(FILES LICENSE DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/exmat-${component} RENAME copyright COMPONENT ${component})

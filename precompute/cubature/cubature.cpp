@@ -18,10 +18,7 @@ namespace {
 constexpr double kEnergyWeight = 3;
 constexpr Eigen::Index kHeldoutPoses = 50;
 constexpr Eigen::Index kStiffnessPoses = 10;
-// The training matrix stays below this many entries (8 bytes each): larger meshes offer a part of their tets in each
-// pass.
-constexpr Eigen::Index kTrainingEntries = 50'000'000;
-constexpr int kPasses = 4;
+constexpr int kPasses = 4;  // over meshes that offer a part of their tets in each
 // Partial sums over the tets have this fixed size, so that they do not depend on the number of threads.
 constexpr Eigen::Index kSumBlock = 256;
 
@@ -216,7 +213,8 @@ Choice choose(const ElementSamples& samples, const PoseSource& source, const Cub
   const RowMatrix& poses = training.poses();
   const Totals& totals = training.totals();
   const TrainingRows rows(source, totals.response);
-  const Eigen::Index limit = std::max<Eigen::Index>(1, kTrainingEntries / ((samples.modes() + 1) * poses.rows()));
+  const Eigen::Index limit =
+      std::max<Eigen::Index>(1, options.training_entries / ((samples.modes() + 1) * poses.rows()));
   const int passes = samples.count() > limit ? kPasses : 1;
   const auto r = static_cast<std::size_t>(samples.modes());
   const bool open_ended = options.tolerance.has_value();

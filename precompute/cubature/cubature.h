@@ -17,6 +17,10 @@ struct CubatureOptions {
   std::string method = "greedy_swap";  ///< "greedy_swap", "greedy", "nn_htp" or "all_elements", which has neither
   int training_poses = 200;
   std::uint64_t seed = 1;
+  /// Most entries of the training matrix [(r + 1) poses x candidates], 8 bytes each: where all tets would be more, each
+  /// of four passes chooses from as many as fit, a systematic sample over the order of their energies, beside those
+  /// that it has.
+  std::int64_t training_entries = 50'000'000;
 };
 
 /// Relative errors of a weighted element subset against all elements, root mean square over poses: forces in the norm

@@ -204,7 +204,8 @@ void pass_members(Archive& archive, PoseSource& value) {
 
 template <typename Archive>
 void pass_members(Archive& archive, CubatureOptions& value) {
-  pass_all(archive, value.elements, value.tolerance, value.method, value.training_poses, value.seed);
+  pass_all(archive, value.elements, value.tolerance, value.method, value.training_poses, value.seed,
+           value.training_entries);
 }
 
 template <typename Archive, typename First, typename Second>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdlib>
+#include <dlfcn.h>
 #include <map>
 #include <memory>
 #include <sys/resource.h>
@@ -154,12 +155,21 @@ PetscErrorCode remember_error(MPI_Comm, int, const char*, const char*, PetscErro
   return code;
 }
 
+// OpenBLAS, where it is the BLAS in use and has threads, keeps to one: the many small products of a factorisation leave
+// threads waiting for each other, and results would depend on their number.
+void keep_blas_to_one_thread() {
+  using SetThreads = void (*)(int);
+  if (const auto set_threads = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
+    set_threads(1);
+}
+
 }  // namespace
 
 // PETSc and MPI cannot be started a second time, so they end with the program.
 void start_solvers() {
   static const bool started = [] {
     set_environment();
+    keep_blas_to_one_thread();
     check_petsc(SlepcInitializeNoArguments(), "initialisation");
     check_petsc(PetscPushErrorHandler(remember_error, nullptr), "error handler");
     std::atexit([] { SlepcFinalize(); });

@@ -111,8 +111,16 @@ class Parallel : public testing::Test {
     close("basis", outside(reference.modal->basis, model.modal->basis, mass));
     EXPECT_EQ(model.cubature->elements, reference.cubature->elements);
     close("cubature", difference(model.cubature->weights, reference.cubature->weights));
-    close("pose", difference(model.modal->basis * model.examples->examples[1].pose,
-                             reference.modal->basis * reference.examples->examples[1].pose));
+    const auto close_poses = [&](const std::vector<ExampleData>& found, const std::vector<ExampleData>& expected) {
+      ASSERT_EQ(found.size(), expected.size());
+      for (std::size_t k = 1; k < found.size(); ++k)  // the first is at rest
+        close("pose", difference(model.modal->basis * found[k].pose, reference.modal->basis * expected[k].pose));
+    };
+    ASSERT_EQ(model.examples.has_value(), reference.examples.has_value());
+    if (reference.examples) close_poses(model.examples->examples, reference.examples->examples);
+    ASSERT_EQ(model.regions.size(), reference.regions.size());
+    for (std::size_t k = 0; k < reference.regions.size(); ++k)
+      close_poses(model.regions[k].examples.examples, reference.regions[k].examples.examples);
     EXPECT_EQ(model.input_sha256, reference.input_sha256);
   }
 
@@ -138,6 +146,21 @@ TEST_F(Parallel, RanksMakeTheSameBundle) {
     if (ranks == 1) {
       EXPECT_TRUE(read_file(folder_ / "bundle.h5") == bytes);
     }
+  }
+}
+
+// A border of six rigid motions, on the last rank; a region's poses take solves of their own.
+TEST_F(Parallel, RanksMakeTheSameFreeBodyWithARegion) {
+  asset_ = write_small_bar(folder_, Json::parse(R"({
+    "internal_force": "cubature", "object": { "fixed": null },
+    "regions": [ { "name": "outer", "vertices": { "box": { "min": [1.99, -1, -1], "max": [9, 2, 2] } },
+                   "examples": ["twist"] } ] })"));
+  const ReducedModel reference = bundle(0);
+  ASSERT_EQ(reference.regions.size(), 1U);
+  ASSERT_TRUE(reference.rigid.has_value());
+  for (const int ranks : {2, 3}) {
+    SCOPED_TRACE(ranks);
+    expect_same(bundle(ranks), reference);
   }
 }
 
