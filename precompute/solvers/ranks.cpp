@@ -4,13 +4,18 @@
 #include <chrono>
 #include <cstdlib>
 #include <dlfcn.h>
+#include <malloc.h>
 #include <map>
 #include <memory>
+#include <new>
 #include <sys/resource.h>
 #include <thread>
 
 #include "precompute/solvers/solver_access.h"
 #include "precompute/solvers/team.h"
+
+// Needs what PETSc's other headers declare.
+#include <petscblaslapack.h>
 
 namespace exmat::precompute {
 namespace {
@@ -155,12 +160,27 @@ PetscErrorCode remember_error(MPI_Comm, int, const char*, const char*, PetscErro
   return code;
 }
 
-// OpenBLAS, where it is the BLAS in use and has threads, keeps to one: the many small products of a factorisation leave
-// threads waiting for each other, and results would depend on their number.
-void keep_blas_to_one_thread() {
+// OpenBLAS, where it is the BLAS in use: it keeps to one thread, as the many small products of a factorisation leave
+// threads waiting for each other and results would depend on their number; and it gets its work space while there is
+// memory, as it would wait for it for ever.
+void prepare_blas() {
   using SetThreads = void (*)(int);
   if (const auto set_threads = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
     set_threads(1);
+  constexpr std::size_t kWorkSpace = 160'000'000;
+  if (std::unique_ptr<char[]>(new (std::nothrow) char[kWorkSpace]) == nullptr) throw WorkError("not enough memory");
+  const PetscBLASInt one = 1;
+  PetscScalar value = 1;
+  BLASgemm_("N", "N", &one, &one, &one, &value, &value, &one, &value, &one, &value, &value, &one);
+}
+
+// Factors go back to the system when they are freed; Open MPI would have them kept, in pieces that the next ones do not
+// fit in.
+void return_freed_memory() {
+  constexpr int kOwnPages = 32 << 20;  // glibc's largest
+  mallopt(M_MMAP_MAX, 1 << 16);
+  mallopt(M_MMAP_THRESHOLD, kOwnPages);
+  mallopt(M_TRIM_THRESHOLD, 2 * kOwnPages);
 }
 
 }  // namespace
@@ -169,8 +189,9 @@ void keep_blas_to_one_thread() {
 void start_solvers() {
   static const bool started = [] {
     set_environment();
-    keep_blas_to_one_thread();
+    prepare_blas();
     check_petsc(SlepcInitializeNoArguments(), "initialisation");
+    return_freed_memory();
     check_petsc(PetscPushErrorHandler(remember_error, nullptr), "error handler");
     std::atexit([] { SlepcFinalize(); });
     return true;
