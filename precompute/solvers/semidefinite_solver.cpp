@@ -72,13 +72,23 @@ NullSpaceHandle null_space_of(const Eigen::MatrixXd& own, Eigen::Index block) {
   return space;
 }
 
+[[noreturn]] void refuse_for_memory(const char* what) {
+  throw WorkError(std::string("not enough memory for the ") + what + "; use more ranks, or --eigensolver gamg");
+}
+
 // MUMPS's failures are no errors to PETSc.
 void require_factors(Mat factor) {
   MatFactorError error = MAT_FACTOR_NOERROR;
   check_petsc(MatFactorGetError(factor, &error), "state of the factorisation");
-  if (error == MAT_FACTOR_OUTMEMORY)
-    throw WorkError("not enough memory for the factors; use more ranks, or --eigensolver gamg");
+  if (error == MAT_FACTOR_OUTMEMORY) refuse_for_memory("factors");
   if (error != MAT_FACTOR_NOERROR) throw WorkError("MUMPS cannot factorise the matrix");
+}
+
+void require_solved(PetscErrorCode code, Mat factor) {
+  constexpr PetscInt kNoMemory = -13;  // INFOG(1) of MUMPS
+  PetscInt state = 0;
+  if (code != 0 && MatMumpsGetInfog(factor, 1, &state) == 0 && state == kNoMemory) refuse_for_memory("solutions");
+  check_petsc(code, "solve");
 }
 
 }  // namespace
@@ -181,7 +191,7 @@ Eigen::MatrixXd SolverShare::solve_directly(const Eigen::MatrixXd& right_hand_si
   MatHandle b, x;
   check_petsc(MatCreateDense(team(), rows, PETSC_DECIDE, all, columns, extended.data(), b.out()), "right-hand sides");
   check_petsc(MatCreateDense(team(), rows, PETSC_DECIDE, all, columns, solution.data(), x.out()), "solutions");
-  check_petsc(MatMatSolve(factor.get(), b.get(), x.get()), "solve");
+  require_solved(MatMatSolve(factor.get(), b.get(), x.get()), factor.get());
   return solution.topRows(own);
 }
 
