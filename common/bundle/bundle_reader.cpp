@@ -148,12 +148,17 @@ void BundleReader::require_group(const LedgerEntry& entry) const {
 Hdf5Dataset BundleReader::open_checked(const DatasetSchema& schema, const std::string& path) {
   Hdf5Dataset dataset = file_.open_dataset(path);
   if (dataset.type() != schema.type) refuse(path, std::string(name_of(schema.type)), dataset.type_name());
+  dataset.check_storage();
   if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), path))
     refuse(path, *expected, size_text(dataset.sizes()));
   const bool may_be_empty = std::ranges::find(schema.constraints, Constraint::Kind::kMayBeEmpty, &Constraint::kind) !=
                             schema.constraints.end();
   if (dataset.element_count() == 0 && !may_be_empty) refuse(path, "some elements", size_text(dataset.sizes()));
-  dataset.check_storage();
+  // Links of several names to the same data take no place in the file.
+  bytes_opened_ += dataset.element_count() * size_of(schema.type);
+  if (bytes_opened_ > file_.capacity())
+    refuse(path, fmt::format("{} bytes in all datasets at most, for the size of the file", file_.capacity()),
+           fmt::format("{}", bytes_opened_));
   return dataset;
 }
 

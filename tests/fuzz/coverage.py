@@ -1,0 +1,90 @@
+"""Lines and regions of the readers that inputs of the fuzz targets reach, as a table on stdout.
+
+    cmake --preset fuzz-coverage && cmake --build --preset fuzz-coverage
+    python3 tests/fuzz/coverage.py build/fuzz-coverage [TARGET [CORPUS...]] [--missed]
+
+Without corpora those of tests/fuzz/corpus; --missed lists the lines that no input reaches.
+"""
+import argparse
+import json
+import pathlib
+import subprocess
+import sys
+import tempfile
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+MESH_IO = "precompute/mesh_io/"
+TABLES = [MESH_IO + "commented_lines.cpp", MESH_IO + "mesh_tables.cpp", MESH_IO + "text_input.cpp"]
+CURSOR = [MESH_IO + "value_cursor.cpp", MESH_IO + "text_input.cpp"]
+BUNDLE = ["common/bundle/bundle.cpp", "common/bundle/bundle_reader.cpp", "common/bundle/hdf5_file.cpp",
+          "common/bundle/validate.cpp", "common/bundle/value_checks.cpp"]
+SOURCES = {
+    "veg": [MESH_IO + "veg_reader.cpp", *TABLES],
+    "msh": [MESH_IO + "msh_", *CURSOR],
+    "mesh": [MESH_IO + "medit_reader.cpp", *CURSOR],
+    "vtk": [MESH_IO + "vtk_", *CURSOR],
+    "node": [MESH_IO + "tetgen_reader.cpp", *TABLES],
+    "obj": [MESH_IO + "obj_reader.cpp", *TABLES],
+    "ply": [MESH_IO + "ply_reader.cpp", *CURSOR],
+    "json": ["common/config/"],
+    "bundle": BUNDLE,
+    "bundle_edits": BUNDLE,
+}
+
+
+def replay(program, corpora, folder):
+    """The merged profile of a target's run on files."""
+    raw, merged = folder / "raw", folder / "merged"
+    environment = {"LLVM_PROFILE_FILE": str(raw)}
+    run = subprocess.run([program, "-runs=0", *corpora], env=environment, capture_output=True, text=True)
+    if run.returncode != 0:
+        sys.exit(f"coverage: {program} failed:\n{run.stderr[-2000:]}")
+    subprocess.run(["llvm-profdata", "merge", "-sparse", raw, "-o", merged], check=True)
+    return merged
+
+
+def files_of(program, profile, target):
+    """What llvm-cov says of the target's sources, by their paths in the repository."""
+    command = ["llvm-cov", "export", program, f"-instr-profile={profile}"]
+    found = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)["data"][0]["files"]
+    files = {pathlib.Path(file["filename"]).resolve().relative_to(ROOT).as_posix(): file for file in found
+             if pathlib.Path(file["filename"]).resolve().is_relative_to(ROOT)}
+    return {name: file for name, file in files.items()
+            if name.endswith(".cpp") and any(name.startswith(source) for source in SOURCES[target])}
+
+
+def missed_lines(file):
+    """Numbers of the lines where code begins that was never run."""
+    return sorted({line for line, _, count, has_count, is_entry, is_gap in file["segments"]
+                   if has_count and is_entry and count == 0 and not is_gap})
+
+
+def percent(files, kind):
+    counts = [file["summary"][kind] for file in files]
+    return 100 * sum(count["covered"] for count in counts) / sum(count["count"] for count in counts)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("build", type=pathlib.Path)
+    parser.add_argument("target", nargs="?", choices=SOURCES)
+    parser.add_argument("corpora", nargs="*")
+    parser.add_argument("--missed", action="store_true")
+    arguments = parser.parse_intermixed_args()
+    print("| target | file | lines | regions |\n| --- | --- | ---: | ---: |")
+    for target in [arguments.target] if arguments.target else SOURCES:
+        program = arguments.build / "bin" / f"exmat_fuzz_{target}"
+        corpora = arguments.corpora or [ROOT / "tests" / "fuzz" / "corpus" / target]
+        with tempfile.TemporaryDirectory() as folder:
+            files = files_of(program, replay(program, corpora, pathlib.Path(folder)), target)
+        for name, file in files.items():
+            print(f"| {target} | {name} | {percent([file], 'lines'):.1f} % | {percent([file], 'regions'):.1f} % |")
+            if arguments.missed:
+                text = (ROOT / name).read_text().splitlines()
+                for line in missed_lines(file):
+                    print(f"    {line}: {text[line - 1].strip()}")
+        print(f"| {target} | all | {percent(files.values(), 'lines'):.1f} % | {percent(files.values(), 'regions'):.1f} % |")
+
+
+if __name__ == "__main__":
+    main()
