@@ -123,7 +123,9 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
     });
   }
   if (model.examples) attempt([&] { add_examples("/examples", *model.examples); });
-  if (includes(request.groups, "regions") && file_.has_group("/regions")) attempt([&] { add_regions(model); });
+  attempt([&] {
+    if (includes(request.groups, "regions") && file_.has_group("/regions")) add_regions(model);
+  });
   visit_fields(model, *this);
   if (model.examples)  // before version 3
     for (ExampleData& example : model.examples->examples)
@@ -180,7 +182,8 @@ void BundleReader::group(std::string_view schema_path, std::string_view path) {
   path_ = path;
   if (schema_path_ == "/") return;
   sizes_.forget(bundle_schema().group(schema_path_).symbols);
-  if (schema_path_.ends_with("/examples")) sizes_.set("K", std::ssize(example_names(path_)), "the groups of " + path_);
+  if (schema_path_.ends_with("/examples"))
+    attempt([&] { sizes_.set("K", std::ssize(example_names(path_)), "the groups of " + path_); });
 }
 
 const AttributeSchema& BundleReader::attribute_schema(std::string_view name) const {

@@ -54,8 +54,9 @@ std::string hdf5_reason() {
   throw WorkError(fmt::format("cannot write {}{}{}: {}", file, place.empty() ? "" : ": ", place, hdf5_reason()));
 }
 
-[[noreturn]] void fail_damaged(const std::string& file, const std::string& place) {
-  throw InputError({file, place, "", "", fmt::format("the file is damaged ({})", hdf5_reason())});
+[[noreturn]] void fail_damaged(const std::string& file, const std::string& place,
+                               const std::string& reason = hdf5_reason()) {
+  throw InputError({file, place, "", "", fmt::format("the file is damaged ({})", reason)});
 }
 
 Hdf5Handle make_handle(hid_t id, herr_t (*closer)(hid_t)) { return {id, closer}; }
@@ -230,13 +231,26 @@ std::string name_by_index(hid_t group, hsize_t index) {
   return name;
 }
 
-// Whether every part of the path is there as a hard link: a bundle refers to no other file.
-bool has_link(hid_t file, const std::string& path) {
-  for (std::size_t end = path.find('/', 1); path != "/"; end = path.find('/', end + 1)) {
+Hdf5Handle open_object_of(hid_t file, const std::string& path) {
+  return make_handle(H5Oopen(file, path.c_str(), H5P_DEFAULT), H5Oclose);
+}
+
+// Whether every part of the path is there as a hard link: a bundle refers to no other file. What cannot be read is said
+// at once: HDF5 1.10 keeps an object header of which it could read the first part only, and whoever asks again finds
+// less in it, without an error.
+bool has_link(hid_t file, const std::string& name, const std::string& path) {
+  for (std::size_t begin = 0, end = path.find('/', 1); path != "/"; begin = end, end = path.find('/', end + 1)) {
     const std::string prefix = path.substr(0, end);
-    H5L_info_t info;
-    if (H5Lexists(file, prefix.c_str(), H5P_DEFAULT) <= 0) return false;
-    if (H5Lget_info(file, prefix.c_str(), &info, H5P_DEFAULT) < 0 || info.type != H5L_TYPE_HARD) return false;
+    H5L_info_t info{};
+    const htri_t exists = H5Lexists(file, prefix.c_str(), H5P_DEFAULT);
+    if (exists == 0) return false;
+    if (exists < 0 || H5Lget_info(file, prefix.c_str(), &info, H5P_DEFAULT) < 0) {
+      const std::string reason = hdf5_reason();
+      const auto parent = open_object_of(file, path.substr(0, std::max<std::size_t>(begin, 1)));
+      if (parent.get() >= 0 && H5Iget_type(parent.get()) != H5I_GROUP) return false;
+      fail_damaged(name, prefix, reason);
+    }
+    if (info.type != H5L_TYPE_HARD) return false;
     if (end == std::string::npos) break;
   }
   return true;
@@ -430,9 +444,7 @@ Hdf5Dataset Hdf5File::create_dataset(const std::string& path, ElementType type, 
   return {require(std::move(handle), name_, path), name_, path};
 }
 
-Hdf5Handle Hdf5File::open_object(const std::string& path) const {
-  return make_handle(H5Oopen(handle_.get(), path.c_str(), H5P_DEFAULT), H5Oclose);
-}
+Hdf5Handle Hdf5File::open_object(const std::string& path) const { return open_object_of(handle_.get(), path); }
 
 namespace {
 
@@ -513,18 +525,18 @@ void Hdf5File::write_checksum(const std::string& dataset, std::uint32_t crc32) {
 
 namespace {
 
-bool is_object(hid_t file, const std::string& path, H5I_type_t kind) {
-  if (!has_link(file, path)) return false;
-  const auto object = make_handle(H5Oopen(file, path.c_str(), H5P_DEFAULT), H5Oclose);
-  // A header that cannot be read counts as present: opening it again says so, which is more than "missing".
-  return object.get() < 0 || H5Iget_type(object.get()) == kind;
+bool is_object(hid_t file, const std::string& name, const std::string& path, H5I_type_t kind) {
+  if (!has_link(file, name, path)) return false;
+  const auto object = open_object_of(file, path);
+  if (object.get() < 0) fail_damaged(name, path);
+  return H5Iget_type(object.get()) == kind;
 }
 
 }  // namespace
 
-bool Hdf5File::has_group(const std::string& path) const { return is_object(handle_.get(), path, H5I_GROUP); }
+bool Hdf5File::has_group(const std::string& path) const { return is_object(handle_.get(), name_, path, H5I_GROUP); }
 
-bool Hdf5File::has_dataset(const std::string& path) const { return is_object(handle_.get(), path, H5I_DATASET); }
+bool Hdf5File::has_dataset(const std::string& path) const { return is_object(handle_.get(), name_, path, H5I_DATASET); }
 
 bool Hdf5File::has_attribute(const std::string& object, const std::string& name) const {
   return H5Aexists_by_name(handle_.get(), object.c_str(), name.c_str(), H5P_DEFAULT) > 0;
@@ -544,7 +556,7 @@ std::vector<std::string> Hdf5File::list(const std::string& group) const {
 }
 
 Hdf5Dataset Hdf5File::open_dataset(const std::string& path) const {
-  if (!has_link(handle_.get(), path)) throw InputError({name_, path, "a dataset", "nothing of that name", ""});
+  if (!has_link(handle_.get(), name_, path)) throw InputError({name_, path, "a dataset", "nothing of that name", ""});
   auto handle = open_object(path);
   if (handle.get() < 0) fail_damaged(name_, path);
   if (H5Iget_type(handle.get()) != H5I_DATASET)

@@ -115,6 +115,7 @@ class Hdf5File {
   void write_checksum(const std::string& dataset, std::uint32_t crc32);
 
   // Reading.
+  /// InputError where what would tell is damaged.
   bool has_group(const std::string& path) const;
   bool has_dataset(const std::string& path) const;
   bool has_attribute(const std::string& object, const std::string& name) const;

@@ -36,7 +36,7 @@ void check_bundle(const std::filesystem::path& file) {
   const bool is_summarised = is_taken([&] { summary = summarise_bundle(file); });
   if (is_read) require(is_summarised);
   if (!is_summarised) return;
-  const Needs needs = fit_needs({.internal_force = "auto", .regions = {{{"left"}}}}, summary);
+  const Needs needs = fit_needs({.regions = {{{"left"}}}}, summary);
   is_taken([&] {
     read_bundle(file, {.groups = plan_groups(needs, summary.constrained, 0),
                        .regions = needs.regions,

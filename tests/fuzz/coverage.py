@@ -1,13 +1,16 @@
 """Lines and regions of the readers that inputs of the fuzz targets reach, as a table on stdout.
 
     cmake --preset fuzz-coverage && cmake --build --preset fuzz-coverage
-    python3 tests/fuzz/coverage.py build/fuzz-coverage [TARGET [CORPUS...]] [--missed]
+    python3 tests/fuzz/coverage.py build/fuzz-coverage [TARGET [CORPUS...]] [--missed] [--least FOLDER]
 
-Without corpora those of tests/fuzz/corpus; --missed lists the lines that no input reaches.
+Without corpora those of tests/fuzz/corpus. --missed lists the lines that no input reaches; --least copies to FOLDER few
+inputs that together reach as much as all do.
 """
 import argparse
 import json
+import hashlib
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -59,6 +62,26 @@ def missed_lines(file):
                    if has_count and is_entry and count == 0 and not is_gap})
 
 
+def regions_of(program, target, corpora):
+    """Where the regions of code begin that inputs reach."""
+    with tempfile.TemporaryDirectory() as folder:
+        files = files_of(program, replay(program, corpora, pathlib.Path(folder)), target)
+    return {(name, line, column) for name, file in files.items()
+            for line, column, count, has_count, is_entry, _ in file["segments"] if has_count and is_entry and count > 0}
+
+
+def copy_least(program, target, corpora, folder):
+    """Takes, as long as there is one, the input that adds most; of two that add the same, the smaller."""
+    inputs = sorted({file for corpus in corpora for file in pathlib.Path(corpus).iterdir()})
+    reached = {file: regions_of(program, target, [file]) for file in inputs}
+    left = set().union(*reached.values())
+    folder.mkdir(parents=True, exist_ok=True)
+    while left:
+        best = max(inputs, key=lambda file: (len(reached[file] & left), -file.stat().st_size))
+        left -= reached[best]
+        shutil.copy(best, folder / hashlib.sha1(best.read_bytes()).hexdigest()[:12])
+
+
 def percent(files, kind):
     counts = [file["summary"][kind] for file in files]
     return 100 * sum(count["covered"] for count in counts) / sum(count["count"] for count in counts)
@@ -70,11 +93,15 @@ def main():
     parser.add_argument("target", nargs="?", choices=SOURCES)
     parser.add_argument("corpora", nargs="*")
     parser.add_argument("--missed", action="store_true")
+    parser.add_argument("--least", type=pathlib.Path, metavar="FOLDER")
     arguments = parser.parse_intermixed_args()
     print("| target | file | lines | regions |\n| --- | --- | ---: | ---: |")
     for target in [arguments.target] if arguments.target else SOURCES:
         program = arguments.build / "bin" / f"exmat_fuzz_{target}"
         corpora = arguments.corpora or [ROOT / "tests" / "fuzz" / "corpus" / target]
+        if arguments.least:
+            copy_least(program, target, corpora, arguments.least)
+            corpora = [arguments.least]
         with tempfile.TemporaryDirectory() as folder:
             files = files_of(program, replay(program, corpora, pathlib.Path(folder)), target)
         for name, file in files.items():
