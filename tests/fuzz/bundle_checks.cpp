@@ -38,7 +38,8 @@ void check_bundle(const std::filesystem::path& file) {
   if (!is_summarised) return;
   const Needs needs = fit_needs({.regions = {{{"left"}}}}, summary);
   is_taken([&] {
-    read_bundle(file, {.groups = plan_groups(needs, summary.constrained, 0),
+    read_bundle(file, {.groups = plan_groups(needs, summary.constrained, summary.examples, std::ssize(summary.regions),
+                                             summary.render_vertices > 0),
                        .regions = needs.regions,
                        .step_only = true,
                        .positions = true});

@@ -17,27 +17,27 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MESH_IO = "precompute/mesh_io/"
-TABLES = [MESH_IO + "commented_lines.cpp", MESH_IO + "mesh_tables.cpp", MESH_IO + "text_input.cpp"]
-CURSOR = [MESH_IO + "value_cursor.cpp", MESH_IO + "text_input.cpp"]
 BUNDLE = ["common/bundle/bundle.cpp", "common/bundle/bundle_reader.cpp", "common/bundle/hdf5_file.cpp",
           "common/bundle/validate.cpp", "common/bundle/value_checks.cpp"]
+# What is each target's own, by the beginning of the path, and what the mesh readers share.
 SOURCES = {
-    "veg": [MESH_IO + "veg_reader.cpp", *TABLES],
-    "msh": [MESH_IO + "msh_", *CURSOR],
-    "mesh": [MESH_IO + "medit_reader.cpp", *CURSOR],
-    "vtk": [MESH_IO + "vtk_", *CURSOR],
-    "node": [MESH_IO + "tetgen_reader.cpp", *TABLES],
-    "obj": [MESH_IO + "obj_reader.cpp", *TABLES],
-    "ply": [MESH_IO + "ply_reader.cpp", *CURSOR],
+    "veg": [MESH_IO + "veg_reader.cpp"],
+    "msh": [MESH_IO + "msh_"],
+    "mesh": [MESH_IO + "medit_reader.cpp"],
+    "vtk": [MESH_IO + "vtk_"],
+    "node": [MESH_IO + "tetgen_reader.cpp"],
+    "obj": [MESH_IO + "obj_reader.cpp"],
+    "ply": [MESH_IO + "ply_reader.cpp"],
     "json": ["common/config/"],
     "bundle": BUNDLE,
     "bundle_edits": BUNDLE,
 }
+SHARED = [MESH_IO + name for name in ("commented_lines.cpp", "mesh_tables.cpp", "text_input.cpp", "value_cursor.cpp")]
 
 
 def replay(program, corpora, folder):
-    """The merged profile of a target's run on files."""
-    raw, merged = folder / "raw", folder / "merged"
+    """The profile of a target's run on files."""
+    raw, merged = folder / "raw", folder / program.name
     environment = {"LLVM_PROFILE_FILE": str(raw)}
     run = subprocess.run([program, "-runs=0", *corpora], env=environment, capture_output=True, text=True)
     if run.returncode != 0:
@@ -46,14 +46,17 @@ def replay(program, corpora, folder):
     return merged
 
 
-def files_of(program, profile, target):
-    """What llvm-cov says of the target's sources, by their paths in the repository."""
-    command = ["llvm-cov", "export", program, f"-instr-profile={profile}"]
+def files_of(programs, profiles, sources):
+    """What llvm-cov says of sources after runs of programs, by paths in the repository."""
+    merged = profiles[0].with_suffix(".all")
+    subprocess.run(["llvm-profdata", "merge", "-sparse", *profiles, "-o", merged], check=True)
+    objects = [f"-object={program}" for program in programs[1:]]
+    command = ["llvm-cov", "export", programs[0], *objects, f"-instr-profile={merged}"]
     found = json.loads(subprocess.run(command, check=True, capture_output=True).stdout)["data"][0]["files"]
     files = {pathlib.Path(file["filename"]).resolve().relative_to(ROOT).as_posix(): file for file in found
              if pathlib.Path(file["filename"]).resolve().is_relative_to(ROOT)}
     return {name: file for name, file in files.items()
-            if name.endswith(".cpp") and any(name.startswith(source) for source in SOURCES[target])}
+            if name.endswith(".cpp") and any(name.startswith(source) for source in sources)}
 
 
 def missed_lines(file):
@@ -65,7 +68,7 @@ def missed_lines(file):
 def regions_of(program, target, corpora):
     """Where the regions of code begin that inputs reach."""
     with tempfile.TemporaryDirectory() as folder:
-        files = files_of(program, replay(program, corpora, pathlib.Path(folder)), target)
+        files = files_of([program], [replay(program, corpora, pathlib.Path(folder))], SOURCES[target] + SHARED)
     return {(name, line, column) for name, file in files.items()
             for line, column, count, has_count, is_entry, _ in file["segments"] if has_count and is_entry and count > 0}
 
@@ -87,6 +90,16 @@ def percent(files, kind):
     return 100 * sum(count["covered"] for count in counts) / sum(count["count"] for count in counts)
 
 
+def print_files(target, files, with_missed):
+    for name, file in files.items():
+        print(f"| {target} | {name} | {percent([file], 'lines'):.1f} % | {percent([file], 'regions'):.1f} % |")
+        if with_missed:
+            text = (ROOT / name).read_text().splitlines()
+            for line in missed_lines(file):
+                print(f"    {line}: {text[line - 1].strip()}")
+    print(f"| {target} | all | {percent(files.values(), 'lines'):.1f} % | {percent(files.values(), 'regions'):.1f} % |")
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
     parser.add_argument("build", type=pathlib.Path)
@@ -95,22 +108,19 @@ def main():
     parser.add_argument("--missed", action="store_true")
     parser.add_argument("--least", type=pathlib.Path, metavar="FOLDER")
     arguments = parser.parse_intermixed_args()
+    targets = [arguments.target] if arguments.target else list(SOURCES)
+    programs, profiles = [arguments.build / "bin" / f"exmat_fuzz_{target}" for target in targets], []
     print("| target | file | lines | regions |\n| --- | --- | ---: | ---: |")
-    for target in [arguments.target] if arguments.target else SOURCES:
-        program = arguments.build / "bin" / f"exmat_fuzz_{target}"
-        corpora = arguments.corpora or [ROOT / "tests" / "fuzz" / "corpus" / target]
-        if arguments.least:
-            copy_least(program, target, corpora, arguments.least)
-            corpora = [arguments.least]
-        with tempfile.TemporaryDirectory() as folder:
-            files = files_of(program, replay(program, corpora, pathlib.Path(folder)), target)
-        for name, file in files.items():
-            print(f"| {target} | {name} | {percent([file], 'lines'):.1f} % | {percent([file], 'regions'):.1f} % |")
-            if arguments.missed:
-                text = (ROOT / name).read_text().splitlines()
-                for line in missed_lines(file):
-                    print(f"    {line}: {text[line - 1].strip()}")
-        print(f"| {target} | all | {percent(files.values(), 'lines'):.1f} % | {percent(files.values(), 'regions'):.1f} % |")
+    with tempfile.TemporaryDirectory() as folder:
+        for target, program in zip(targets, programs):
+            corpora = arguments.corpora or [ROOT / "tests" / "fuzz" / "corpus" / target]
+            if arguments.least:
+                copy_least(program, target, corpora, arguments.least)
+                corpora = [arguments.least]
+            profiles.append(replay(program, corpora, pathlib.Path(folder)))
+            print_files(target, files_of([program], profiles[-1:], SOURCES[target]), arguments.missed)
+        if not arguments.target:
+            print_files("mesh readers", files_of(programs, profiles, SHARED), arguments.missed)
 
 
 if __name__ == "__main__":
