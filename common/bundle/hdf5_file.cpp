@@ -361,8 +361,8 @@ void Hdf5Dataset::check_storage() const {
   if (!is_plain && saturating_product(chunk, H5Tget_size(type.get())) > capacity)
     refuse(fmt::format("chunks that fit in a file of {} bytes", file_bytes),
            fmt::format("{}", fmt::join(chunk, " x ")));
-  if (bytes > 0 && H5Dget_storage_size(handle_.get()) == 0) refuse("data", "none: the dataset was never written");
   if (const auto filter = odd_filter(properties.get())) refuse("contiguous data or deflate", *filter);
+  if (bytes > 0 && H5Dget_storage_size(handle_.get()) == 0) refuse("data", "none: the dataset was never written");
 }
 
 void Hdf5Dataset::read(void* data, ElementType type) const {

@@ -168,13 +168,18 @@ class Editor {
     write_attribute(path, "crc32", H5T_STD_U32LE, &crc);
   }
 
-  // Nothing where there are none, or too many, or a filter that no bundle is read with: HDF5 1.10 reads beyond the end
-  // of what these have packed.
+  // Filters that no bundle is read with. HDF5 1.10 itself reads and writes beyond the ends of its buffers with them.
+  static bool packs_bits(hid_t properties) {
+    const auto has = [&](H5Z_filter_t filter) {
+      return H5Pget_filter_by_id2(properties, filter, nullptr, nullptr, nullptr, 0, nullptr, nullptr) >= 0;
+    };
+    return has(H5Z_FILTER_NBIT) || has(H5Z_FILTER_SCALEOFFSET);
+  }
+
+  // Nothing where there are none, or too many.
   static std::vector<std::byte> values_of(hid_t dataset, hid_t type) {
     const Hdf5Handle shape(H5Dget_space(dataset), H5Sclose), properties(H5Dget_create_plist(dataset), H5Pclose);
-    for (const H5Z_filter_t filter : {H5Z_FILTER_NBIT, H5Z_FILTER_SCALEOFFSET})
-      if (H5Pget_filter_by_id2(properties.get(), filter, nullptr, nullptr, nullptr, 0, nullptr, nullptr) >= 0)
-        return {};
+    if (packs_bits(properties.get())) return {};
     const auto count = static_cast<hsize_t>(std::max<hssize_t>(H5Sget_simple_extent_npoints(shape.get()), 0));
     if (count > kMostBytes || H5Dget_storage_size(dataset) == 0) return {};
     std::vector<std::byte> data(count * H5Tget_size(type));
@@ -255,7 +260,7 @@ class Editor {
         H5Dcreate2(file_.get(), path.c_str(), new_type, shape.get(), H5P_DEFAULT, properties.get(), H5P_DEFAULT),
         H5Dclose);
     copy_attributes(old.get(), dataset.get());
-    if (script_.below(8) == 1) return;
+    if (script_.below(8) == 1 || packs_bits(properties.get())) return;
     hsize_t bytes = H5Tget_size(new_type);
     for (const hsize_t extent : sizes)
       bytes = extent > 0 && bytes > kMostBytes / extent ? kMostBytes + 1 : bytes * extent;
