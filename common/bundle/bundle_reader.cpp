@@ -123,7 +123,9 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
     });
   }
   if (model.examples) attempt([&] { add_examples("/examples", *model.examples); });
-  if (includes(request.groups, "regions") && file_.has_group("/regions")) attempt([&] { add_regions(model); });
+  attempt([&] {
+    if (includes(request.groups, "regions") && file_.has_group("/regions")) add_regions(model);
+  });
   visit_fields(model, *this);
   if (model.examples)  // before version 3
     for (ExampleData& example : model.examples->examples)
@@ -148,12 +150,17 @@ void BundleReader::require_group(const LedgerEntry& entry) const {
 Hdf5Dataset BundleReader::open_checked(const DatasetSchema& schema, const std::string& path) {
   Hdf5Dataset dataset = file_.open_dataset(path);
   if (dataset.type() != schema.type) refuse(path, std::string(name_of(schema.type)), dataset.type_name());
+  dataset.check_storage();
   if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), path))
     refuse(path, *expected, size_text(dataset.sizes()));
   const bool may_be_empty = std::ranges::find(schema.constraints, Constraint::Kind::kMayBeEmpty, &Constraint::kind) !=
                             schema.constraints.end();
   if (dataset.element_count() == 0 && !may_be_empty) refuse(path, "some elements", size_text(dataset.sizes()));
-  dataset.check_storage();
+  // Links of several names to the same data take no place in the file.
+  bytes_opened_ += dataset.element_count() * size_of(schema.type);
+  if (bytes_opened_ > file_.capacity())
+    refuse(path, fmt::format("{} bytes in all datasets at most, for the size of the file", file_.capacity()),
+           fmt::format("{}", bytes_opened_));
   return dataset;
 }
 
@@ -175,7 +182,8 @@ void BundleReader::group(std::string_view schema_path, std::string_view path) {
   path_ = path;
   if (schema_path_ == "/") return;
   sizes_.forget(bundle_schema().group(schema_path_).symbols);
-  if (schema_path_.ends_with("/examples")) sizes_.set("K", std::ssize(example_names(path_)), "the groups of " + path_);
+  if (schema_path_.ends_with("/examples"))
+    attempt([&] { sizes_.set("K", std::ssize(example_names(path_)), "the groups of " + path_); });
 }
 
 const AttributeSchema& BundleReader::attribute_schema(std::string_view name) const {

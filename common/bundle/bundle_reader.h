@@ -100,7 +100,8 @@ class BundleReader {
 
   BundleRequest request_;
   SymbolSizes sizes_;
-  std::set<std::string> sound_;  // datasets and attributes that were read and passed
+  std::size_t bytes_opened_ = 0;  // of datasets, in memory
+  std::set<std::string> sound_;   // datasets and attributes that were read and passed
   std::string schema_path_;
   std::string path_;
 };

@@ -54,8 +54,9 @@ std::string hdf5_reason() {
   throw WorkError(fmt::format("cannot write {}{}{}: {}", file, place.empty() ? "" : ": ", place, hdf5_reason()));
 }
 
-[[noreturn]] void fail_damaged(const std::string& file, const std::string& place) {
-  throw InputError({file, place, "", "", fmt::format("the file is damaged ({})", hdf5_reason())});
+[[noreturn]] void fail_damaged(const std::string& file, const std::string& place,
+                               const std::string& reason = hdf5_reason()) {
+  throw InputError({file, place, "", "", fmt::format("the file is damaged ({})", reason)});
 }
 
 Hdf5Handle make_handle(hid_t id, herr_t (*closer)(hid_t)) { return {id, closer}; }
@@ -230,13 +231,26 @@ std::string name_by_index(hid_t group, hsize_t index) {
   return name;
 }
 
-// Whether every part of the path is there as a hard link: a bundle refers to no other file.
-bool has_link(hid_t file, const std::string& path) {
-  for (std::size_t end = path.find('/', 1); path != "/"; end = path.find('/', end + 1)) {
+Hdf5Handle open_object_of(hid_t file, const std::string& path) {
+  return make_handle(H5Oopen(file, path.c_str(), H5P_DEFAULT), H5Oclose);
+}
+
+// Whether every part of the path is there as a hard link: a bundle refers to no other file. What cannot be read is said
+// at once: HDF5 1.10 keeps an object header of which it could read the first part only, and whoever asks again finds
+// less in it, without an error.
+bool has_link(hid_t file, const std::string& name, const std::string& path) {
+  for (std::size_t begin = 0, end = path.find('/', 1); path != "/"; begin = end, end = path.find('/', end + 1)) {
     const std::string prefix = path.substr(0, end);
-    H5L_info_t info;
-    if (H5Lexists(file, prefix.c_str(), H5P_DEFAULT) <= 0) return false;
-    if (H5Lget_info(file, prefix.c_str(), &info, H5P_DEFAULT) < 0 || info.type != H5L_TYPE_HARD) return false;
+    H5L_info_t info{};
+    const htri_t exists = H5Lexists(file, prefix.c_str(), H5P_DEFAULT);
+    if (exists == 0) return false;
+    if (exists < 0 || H5Lget_info(file, prefix.c_str(), &info, H5P_DEFAULT) < 0) {
+      const std::string reason = hdf5_reason();
+      const auto parent = open_object_of(file, path.substr(0, std::max<std::size_t>(begin, 1)));
+      if (parent.get() >= 0 && H5Iget_type(parent.get()) != H5I_GROUP) return false;
+      fail_damaged(name, prefix, reason);
+    }
+    if (info.type != H5L_TYPE_HARD) return false;
     if (end == std::string::npos) break;
   }
   return true;
@@ -283,18 +297,50 @@ std::string Hdf5Dataset::type_name() const {
   return describe_type(type.get());
 }
 
-std::size_t Hdf5Dataset::element_count() const {
-  std::size_t count = 1;
-  for (const std::int64_t size : sizes_) count = saturating_product(count, static_cast<std::size_t>(size));
-  return count;
+namespace {
+
+std::size_t file_size(hid_t file) {
+  hsize_t bytes = 0;
+  H5Fget_filesize(file, &bytes);
+  return bytes;
 }
+
+std::size_t saturating_product(std::span<const std::int64_t> sizes, std::size_t bytes) {
+  for (const std::int64_t size : sizes) bytes = saturating_product(bytes, static_cast<std::size_t>(size));
+  return bytes;
+}
+
+std::vector<std::int64_t> chunk_sizes(hid_t properties) {
+  const int rank = std::max(H5Pget_chunk(properties, 0, nullptr), 0);
+  std::vector<hsize_t> sizes(static_cast<std::size_t>(rank));
+  H5Pget_chunk(properties, rank, sizes.data());
+  return {sizes.begin(), sizes.end()};
+}
+
+// The name or number of a filter that is not read, or comes a second time: deflated data may deflate again.
+std::optional<std::string> odd_filter(hid_t properties) {
+  std::array<bool, 3> seen{};
+  constexpr std::array<H5Z_filter_t, 3> kKnown = {H5Z_FILTER_DEFLATE, H5Z_FILTER_SHUFFLE, H5Z_FILTER_FLETCHER32};
+  for (int i = 0; i < H5Pget_nfilters(properties); ++i) {
+    std::size_t parameters = 0;
+    const H5Z_filter_t filter =
+        H5Pget_filter2(properties, static_cast<unsigned>(i), nullptr, &parameters, nullptr, 0, nullptr, nullptr);
+    const auto known = static_cast<std::size_t>(std::ranges::find(kKnown, filter) - kKnown.begin());
+    if (known == kKnown.size()) return fmt::format("HDF5 filter {}", filter);
+    if (std::exchange(seen[known], true)) return fmt::format("HDF5 filter {} twice", filter);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
+std::size_t Hdf5Dataset::element_count() const { return saturating_product(sizes_, 1); }
 
 void Hdf5Dataset::check_storage() const {
   const auto type = make_handle(H5Dget_type(handle_.get()), H5Tclose);
   const auto properties = make_handle(H5Dget_create_plist(handle_.get()), H5Pclose);
   const auto file = make_handle(H5Iget_file_id(handle_.get()), H5Fclose);
-  hsize_t file_bytes = 0;
-  H5Fget_filesize(file.get(), &file_bytes);
+  const std::size_t file_bytes = file_size(file.get());
   const auto refuse = [this](const std::string& expected, const std::string& found) {
     throw InputError({file_, path_, expected, found, ""});
   };
@@ -303,19 +349,20 @@ void Hdf5Dataset::check_storage() const {
   const bool is_plain =
       (layout == H5D_CONTIGUOUS && H5Pget_external_count(properties.get()) == 0) || layout == H5D_COMPACT;
   if (!is_plain && layout != H5D_CHUNKED) refuse("data within the file", "a reference to another file or dataset");
-  const std::size_t bytes = saturating_product(element_count(), H5Tget_size(type.get()));
+  const std::size_t bytes = saturating_product(sizes_, H5Tget_size(type.get()));
   const std::size_t capacity = is_plain ? file_bytes : saturating_product(file_bytes, kMaxExpansion);
-  if (bytes > capacity)
+  const auto chunk = chunk_sizes(properties.get());
+  // Each by itself too: beside a size of 0 any other would pass, and products with it overflow.
+  const bool is_large =
+      std::ranges::any_of(sizes_, [&](std::int64_t size) { return static_cast<std::size_t>(size) > capacity; });
+  if (bytes > capacity || is_large)
     refuse(fmt::format("sizes that fit in a file of {} bytes", file_bytes),
            fmt::format("{}", fmt::join(sizes_, " x ")));
+  if (!is_plain && saturating_product(chunk, H5Tget_size(type.get())) > capacity)
+    refuse(fmt::format("chunks that fit in a file of {} bytes", file_bytes),
+           fmt::format("{}", fmt::join(chunk, " x ")));
+  if (const auto filter = odd_filter(properties.get())) refuse("contiguous data or deflate", *filter);
   if (bytes > 0 && H5Dget_storage_size(handle_.get()) == 0) refuse("data", "none: the dataset was never written");
-  for (int i = 0; i < H5Pget_nfilters(properties.get()); ++i) {
-    std::size_t parameters = 0;
-    const H5Z_filter_t filter =
-        H5Pget_filter2(properties.get(), static_cast<unsigned>(i), nullptr, &parameters, nullptr, 0, nullptr, nullptr);
-    if (filter != H5Z_FILTER_DEFLATE && filter != H5Z_FILTER_SHUFFLE && filter != H5Z_FILTER_FLETCHER32)
-      refuse("contiguous data or deflate", fmt::format("HDF5 filter {}", filter));
-  }
 }
 
 void Hdf5Dataset::read(void* data, ElementType type) const {
@@ -373,6 +420,8 @@ Hdf5File Hdf5File::create(const std::filesystem::path& file, std::string shown_a
   return {require(std::move(handle), shown_as, ""), std::move(shown_as)};
 }
 
+std::size_t Hdf5File::capacity() const { return saturating_product(file_size(handle_.get()), kMaxExpansion); }
+
 void Hdf5File::close() {
   if (handle_.get() >= 0) require(H5Fflush(handle_.get(), H5F_SCOPE_GLOBAL), name_, "");
   if (!handle_.close()) fail_writing(name_, "");
@@ -395,9 +444,7 @@ Hdf5Dataset Hdf5File::create_dataset(const std::string& path, ElementType type, 
   return {require(std::move(handle), name_, path), name_, path};
 }
 
-Hdf5Handle Hdf5File::open_object(const std::string& path) const {
-  return make_handle(H5Oopen(handle_.get(), path.c_str(), H5P_DEFAULT), H5Oclose);
-}
+Hdf5Handle Hdf5File::open_object(const std::string& path) const { return open_object_of(handle_.get(), path); }
 
 namespace {
 
@@ -478,18 +525,18 @@ void Hdf5File::write_checksum(const std::string& dataset, std::uint32_t crc32) {
 
 namespace {
 
-bool is_object(hid_t file, const std::string& path, H5I_type_t kind) {
-  if (!has_link(file, path)) return false;
-  const auto object = make_handle(H5Oopen(file, path.c_str(), H5P_DEFAULT), H5Oclose);
-  // A header that cannot be read counts as present: opening it again says so, which is more than "missing".
-  return object.get() < 0 || H5Iget_type(object.get()) == kind;
+bool is_object(hid_t file, const std::string& name, const std::string& path, H5I_type_t kind) {
+  if (!has_link(file, name, path)) return false;
+  const auto object = open_object_of(file, path);
+  if (object.get() < 0) fail_damaged(name, path);
+  return H5Iget_type(object.get()) == kind;
 }
 
 }  // namespace
 
-bool Hdf5File::has_group(const std::string& path) const { return is_object(handle_.get(), path, H5I_GROUP); }
+bool Hdf5File::has_group(const std::string& path) const { return is_object(handle_.get(), name_, path, H5I_GROUP); }
 
-bool Hdf5File::has_dataset(const std::string& path) const { return is_object(handle_.get(), path, H5I_DATASET); }
+bool Hdf5File::has_dataset(const std::string& path) const { return is_object(handle_.get(), name_, path, H5I_DATASET); }
 
 bool Hdf5File::has_attribute(const std::string& object, const std::string& name) const {
   return H5Aexists_by_name(handle_.get(), object.c_str(), name.c_str(), H5P_DEFAULT) > 0;
@@ -509,7 +556,7 @@ std::vector<std::string> Hdf5File::list(const std::string& group) const {
 }
 
 Hdf5Dataset Hdf5File::open_dataset(const std::string& path) const {
-  if (!has_link(handle_.get(), path)) throw InputError({name_, path, "a dataset", "nothing of that name", ""});
+  if (!has_link(handle_.get(), name_, path)) throw InputError({name_, path, "a dataset", "nothing of that name", ""});
   auto handle = open_object(path);
   if (handle.get() < 0) fail_damaged(name_, path);
   if (H5Iget_type(handle.get()) != H5I_DATASET)
@@ -566,9 +613,7 @@ AttributeValue Hdf5File::read_attribute(const std::string& object, const std::st
   const auto kind = H5Tget_class(type.get());
   const bool is_known = kind == H5T_INTEGER || kind == H5T_FLOAT || kind == H5T_STRING;
   const H5S_class_t shape = H5Sget_simple_extent_type(space.get());
-  std::size_t count = 1;
-  for (const std::int64_t size : sizes_of(space.get()))
-    count = saturating_product(count, static_cast<std::size_t>(size));
+  const std::size_t count = saturating_product(sizes_of(space.get()), 1);
   if (!is_known || (shape != H5S_SCALAR && shape != H5S_SIMPLE))
     throw InputError({name_, place, "a number or text", describe_type(type.get()), ""});
   if (saturating_product(count, H5Tget_size(type.get())) > kMaxAttributeBytes)

@@ -71,8 +71,9 @@ class Hdf5Dataset {
   /// Saturates where the product of the sizes overflows; check_storage() refuses that.
   std::size_t element_count() const;
 
-  /// Throws InputError unless the file can hold as much as the sizes say and holds it in itself (contiguous, compact or
-  /// chunked with deflate). Call it before allocating.
+  /// Throws InputError unless the file can hold as much as the sizes (and those of chunks) say and holds it in itself
+  /// (contiguous, compact or chunked, with each of deflate, shuffle and fletcher32 once at most). Call it before
+  /// allocating.
   void check_storage() const;
 
   /// Reads or writes all of it; `data` holds element_count() elements of `memory_type`.
@@ -100,6 +101,8 @@ class Hdf5File {
 
   /// As messages name it.
   const std::string& name() const { return name_; }
+  /// The most bytes that all data of the file together take in memory.
+  std::size_t capacity() const;
   /// Flushes and closes. Throws WorkError (disk full, say). Only after it may a written file be committed.
   void close();
 
@@ -112,6 +115,7 @@ class Hdf5File {
   void write_checksum(const std::string& dataset, std::uint32_t crc32);
 
   // Reading.
+  /// InputError where what would tell is damaged.
   bool has_group(const std::string& path) const;
   bool has_dataset(const std::string& path) const;
   bool has_attribute(const std::string& object, const std::string& name) const;

@@ -15,16 +15,20 @@ class Validator {
   explicit Validator(const std::filesystem::path& path) : reader_(path, nullptr, &problems_) {}
 
   std::vector<std::string> run() {
-    const ReducedModel model = reader_.read({.groups = reader_.listed_groups()});
-    collect_known(model);
-    for (const auto& [path, schema] : datasets_)
-      reader_.attempt([&, &path = path, schema = schema] { check_labels(path, *schema); });
-    check_features();
-    reader_.attempt([&] { check_extras("/"); });
+    reader_.attempt([&] { check(); });
     return problems_;
   }
 
  private:
+  void check() {
+    const ReducedModel model = reader_.read({.groups = reader_.listed_groups()});
+    reader_.attempt([&] { collect_known(model); });
+    for (const auto& [path, schema] : datasets_)
+      reader_.attempt([&, &path = path, schema = schema] { check_labels(path, *schema); });
+    reader_.attempt([&] { check_features(); });
+    reader_.attempt([&] { check_extras("/"); });
+  }
+
   // Paths in the file that the schema knows, of the groups that were found.
   void collect_known(const ReducedModel& model) {
     for (const GroupSchema& group : bundle_schema().groups)

@@ -6,6 +6,8 @@ namespace exmat::precompute {
 namespace {
 
 constexpr int kVolumeDimension = 3;
+// Each tet of a volume is noted in each of its groups.
+constexpr std::uint64_t kMostGroups = 100;
 
 struct Block {
   std::int32_t dimension = 0, entity = 0, kind = 0;  // kind: parametric or not, or the element type
@@ -46,6 +48,8 @@ Header read_header(MshCursor& cursor, std::string_view what, std::size_t min_tex
 std::vector<std::int32_t> read_physical_tags(MshCursor& cursor) {
   std::vector<std::int32_t> tags;
   const std::uint64_t count = cursor.read_count("physical tags", 2, 4);
+  if (count > kMostGroups)
+    cursor.fail(fmt::format("at most {} physical tags of an entity", kMostGroups), fmt::format("{}", count));
   for (std::uint64_t i = 0; i < count; ++i) tags.push_back(read_physical_tag(cursor));
   return tags;
 }

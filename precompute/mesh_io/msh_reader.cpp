@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <fmt/format.h>
+#include <limits>
 #include <set>
 
 #include "common/core/log.h"
@@ -51,7 +52,9 @@ void read_physical_name(MshCursor& cursor, MshContents& contents) {
   const auto dimension = parse_integer(fields.next());
   const auto tag = parse_integer(fields.next());
   const std::size_t begin = line.find('"'), end = line.rfind('"');
-  if (!dimension || !tag || begin >= end || end == std::string_view::npos) cursor.fail(expected, quote(line));
+  constexpr std::int64_t kMostTag = std::numeric_limits<std::int32_t>::max();
+  const bool has_tag = tag && *tag > -kMostTag && *tag <= kMostTag;
+  if (!dimension || !has_tag || begin >= end || end == std::string_view::npos) cursor.fail(expected, quote(line));
   if (dimension == 3) contents.volume_names[static_cast<std::int32_t>(*tag)] = line.substr(begin + 1, end - begin - 1);
 }
 

@@ -40,6 +40,7 @@ class VtkReader {
   void read_rows(std::uint64_t cells, std::uint64_t size);
   void read_offsets(std::uint64_t offsets, std::uint64_t size);
   void read_cell_types(const Words& words);
+  void read_data_count(const Words& words);
   bool read_attribute(const Words& words);
   void read_field(const Words& words);
   void read_array(std::string_view name, std::uint64_t components, std::uint64_t tuples, const NumberType& type);
@@ -93,10 +94,7 @@ void VtkReader::read_section(const Words& words) {
   } else if (words[0] == "CELL_TYPES") {
     read_cell_types(words);
   } else if (words[0] == "CELL_DATA" || words[0] == "POINT_DATA") {
-    of_cells_ = words[0] == "CELL_DATA";
-    attribute_count_ = cursor_.number(words[1], of_cells_ ? "cells" : "points");
-    const std::size_t expected = of_cells_ ? ends_.size() : points_.size();
-    if (attribute_count_ != expected) cursor_.fail(fmt::format("{} {}", words[0], expected), quote(words[1]));
+    read_data_count(words);
   } else if (words[0] == "FIELD") {
     read_field(words);
   } else if (!read_attribute(words)) {
@@ -193,6 +191,14 @@ void VtkReader::read_cell_types(const Words& words) {
     if (std::ranges::find(kCurvedTetCells, type) != kCurvedTetCells.end())
       cursor_.fail("tets of first order (cell type 10)", fmt::format("tets of higher order (cell type {})", type));
   }
+}
+
+void VtkReader::read_data_count(const Words& words) {
+  of_cells_ = words[0] == "CELL_DATA";
+  attribute_count_ = cursor_.number(words[1], of_cells_ ? "cells" : "points");
+  const std::size_t expected = of_cells_ ? ends_.size() : points_.size();
+  if (expected == 0) cursor_.fail(fmt::format("{} before {}", of_cells_ ? "CELLS" : "POINTS", words[0]), "none");
+  if (attribute_count_ != expected) cursor_.fail(fmt::format("{} {}", words[0], expected), quote(words[1]));
 }
 
 // One array of the section of attributes; false where the keyword is none of them.

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fstream>
 #include <unistd.h>
 
@@ -20,6 +21,12 @@ std::filesystem::path input_file(const char* extension, std::string_view bytes) 
   const std::filesystem::path file = folder / (std::string("input") + extension);
   std::ofstream(file, std::ios::binary).write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   return file;
+}
+
+std::string_view split_off(std::string_view bytes, const char* extension) {
+  const std::size_t zero = std::min(bytes.find('\0'), bytes.size());
+  input_file(extension, bytes.substr(std::min(zero + 1, bytes.size())));
+  return bytes.substr(0, zero);
 }
 
 }  // namespace exmat::fuzz

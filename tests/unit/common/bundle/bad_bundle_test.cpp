@@ -77,18 +77,35 @@ class Spoiler {
     if (mend) set_attribute(path, "crc32", H5T_NATIVE_UINT32, &crc);
   }
 
-  // Another dataset in its place: ones.
-  void replace(const char* path, hid_t type, std::vector<hsize_t> sizes, hid_t properties = H5P_DEFAULT) {
+  void link(const std::string& target, const std::string& path) {
+    H5Lcreate_hard(file_, target.c_str(), file_, path.c_str(), H5P_DEFAULT, H5P_DEFAULT);
+  }
+
+  void replace_deflated(const char* path, std::vector<hsize_t> sizes, std::vector<hsize_t> chunk, int times,
+                        std::size_t most_written = 999) {
+    const hid_t properties = H5Pcreate(H5P_DATASET_CREATE);
+    H5Pset_chunk(properties, static_cast<int>(chunk.size()), chunk.data());
+    for (int i = 0; i < times; ++i) H5Pset_deflate(properties, 6);
+    replace(path, H5T_NATIVE_DOUBLE, std::move(sizes), properties, most_written);
+    H5Pclose(properties);
+  }
+
+  // Another dataset in its place: ones. It may grow where it has chunks.
+  void replace(const char* path, hid_t type, std::vector<hsize_t> sizes, hid_t properties = H5P_DEFAULT,
+               std::size_t most_written = 999) {
     H5Ldelete(file_, path, H5P_DEFAULT);
-    const hid_t space = H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), nullptr);
+    const std::vector<hsize_t> most(sizes.size(), H5S_UNLIMITED);
+    const bool has_chunks = properties != H5P_DEFAULT && H5Pget_layout(properties) == H5D_CHUNKED;
+    const hid_t space =
+        H5Screate_simple(static_cast<int>(sizes.size()), sizes.data(), has_chunks ? most.data() : nullptr);
     const hid_t dataset = H5Dcreate2(file_, path, type, space, H5P_DEFAULT, properties, H5P_DEFAULT);
     const std::size_t count = std::accumulate(sizes.begin(), sizes.end(), hsize_t{1}, std::multiplies<>());
-    if (count < 1000) {
-      const std::vector<double> ones(count, 1.0);
-      H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, ones.data());
-    }
+    const std::vector<double> ones(count <= most_written ? count : 0, 1.0);
+    if (!ones.empty()) H5Dwrite(dataset, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, ones.data());
     H5Dclose(dataset);
     H5Sclose(space);
+    const std::uint32_t crc = crc32_of(std::as_bytes(std::span(ones)));
+    set_attribute(path, "crc32", H5T_NATIVE_UINT32, &crc);
   }
 
  private:
@@ -243,6 +260,15 @@ const BadBundle kBadBundles[] = {
      "/modal/frequencies: expected some elements, found 0"},
     {"LargerThanTheFile", [](Spoiler& s) { s.replace("/modal/frequencies", H5T_NATIVE_DOUBLE, {hsize_t{1} << 60}); },
      "/modal/frequencies: expected sizes that fit in a file of "},
+    {"SizesThatOverflow",
+     [](Spoiler& s) {
+       s.replace("/shape_space/eigenfunctions", H5T_NATIVE_DOUBLE, {0, hsize_t{1} << 62});
+     },
+     "/shape_space/eigenfunctions: expected sizes that fit in a file of "},
+    {"LargeChunk", [](Spoiler& s) { s.replace_deflated("/modal/frequencies", {1000}, {hsize_t{1} << 28}, 1); },
+     "/modal/frequencies: expected chunks that fit in a file of "},
+    {"DeflatedTwice", [](Spoiler& s) { s.replace_deflated("/modal/frequencies", {999}, {999}, 2); },
+     "/modal/frequencies: expected contiguous data or deflate, found HDF5 filter 1 twice"},
     {"NeverWritten", [](Spoiler& s) { s.replace("/modal/frequencies", H5T_NATIVE_DOUBLE, {1000}); },
      "/modal/frequencies: expected data, found none"},
     {"ExternalData",
@@ -321,6 +347,25 @@ TEST(BadBundle, WithABasisThatMovesFixedVertices) {
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(), HasSubstr("/modal/basis: expected zeros on vertex 0, fixed by /object/fixed"));
+  }
+}
+
+// 800 kB that take a hundredth of that in the file, 200 times.
+TEST(BadBundle, WithManyNamesOfTheSameData) {
+  const TemporaryFolder folder;
+  write_bundle(small_model(true), folder / "a.h5");
+  {
+    Spoiler spoiler(folder / "a.h5");
+    spoiler.replace_deflated("/regions/left/projection/target_basis", {2, 50000}, {2, 50000}, 1, 100000);
+    for (int i = 0; i < 200; ++i) spoiler.link("/regions/left", "/regions/more " + std::to_string(i));
+  }
+  ASSERT_LT(std::filesystem::file_size(folder / "a.h5"), 100000);
+  try {
+    read_bundle(folder / "a.h5");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("/projection/target_basis: expected "));
+    EXPECT_THAT(error.what(), HasSubstr(" bytes in all datasets at most, for the size of the file, found "));
   }
 }
 

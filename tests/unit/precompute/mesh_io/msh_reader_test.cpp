@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <limits>
+#include <string>
 
 #include "common/core/log.h"
 #include "tests/unit/precompute/mesh_io/mesh_samples.h"
@@ -164,6 +165,8 @@ constexpr std::array kMalformed{
                  "'3 7 soft'"},
     MalformedMsh{"MissingName", kSound22, "$PhysicalNames\n1", "$PhysicalNames\n2", "line 7",
                  "'dimension tag \"name\"'", "'$EndPhysicalNames'"},
+    MalformedMsh{"NameOfAWideTag", kSound22, "3 7 \"soft part\"", "3 4294967303 \"soft part\"", "line 6",
+                 "'dimension tag \"name\"'", "'3 4294967303"},
     MalformedMsh{"NegativeNodeCount", kSound22, "$Nodes\n4", "$Nodes\n-4", "line 9", "the number of nodes", "'-4'"},
     MalformedMsh{"NodeCountBeyondTheFile", kSound22, "$Nodes\n4", "$Nodes\n1000000000", "line 9",
                  "which the rest of the file can hold", "1000000000"},
@@ -239,6 +242,16 @@ constexpr std::array kMalformed{
 
 INSTANTIATE_TEST_SUITE_P(Malformed, RefusesMsh, testing::ValuesIn(kMalformed),
                          [](const auto& param) { return std::string(param.param.name); });
+
+// Every tet is noted in every group of its volume: many of each would take their product.
+TEST_F(ReadMsh, RefusesAVolumeOfManyGroups) {
+  std::string groups = "1 1 1 101";
+  for (int i = 0; i < 101; ++i) groups += " " + std::to_string(i + 1);
+  const Complaint complaint = complaint_of_reading(edited(std::string(kSound41), "1 1 1 1 7", groups));
+  EXPECT_EQ(complaint.place, "line 6");
+  EXPECT_EQ(complaint.expected, "at most 100 physical tags of an entity");
+  EXPECT_EQ(complaint.found, "101");
+}
 
 /// `bytes` with the value that stands `offset` bytes after the first `marker` replaced.
 template <typename Value>
