@@ -44,7 +44,7 @@ template <typename T>
 bool take(std::string_view& bytes, T* values, std::size_t count) {
   const std::size_t size = count * sizeof(T);
   if (bytes.size() < size) return false;
-  std::memcpy(values, bytes.data(), size);
+  if (size > 0) std::memcpy(values, bytes.data(), size);
   bytes.remove_prefix(size);
   return true;
 }

@@ -3,6 +3,7 @@
 // What the target lets escape ends the program, as does asking for more than kMostMemory.
 #include <algorithm>
 #include <cstdio>
+#include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <random>
@@ -12,9 +13,16 @@
 
 #include "tests/fuzz/fuzz_target.h"
 
+#ifdef __SANITIZE_ADDRESS__
+// Of sanitizer/allocator_interface.h, which not every GCC has beside it.
+extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*allocated)(const volatile void*, std::size_t),
+                                                         void (*freed)(const volatile void*));
+#endif
+
 namespace {
 
-constexpr rlim_t kMostMemory = rlim_t{1} << 30;  // of address space [bytes]
+constexpr std::size_t kMostMemory = std::size_t{1} << 30;  // of address space [bytes]
 
 class Mutator {
  public:
@@ -64,6 +72,24 @@ void run(const std::string& text) {
   LLVMFuzzerTestOneInput(reinterpret_cast<const std::uint8_t*>(text.data()), text.size());
 }
 
+#ifdef __SANITIZE_ADDRESS__
+void check_heap(const volatile void*, std::size_t size) {
+  if (__sanitizer_get_current_allocated_bytes() <= kMostMemory) return;
+  std::fprintf(stderr, "the heap is larger than %zu bytes, the last request %zu\n", kMostMemory, size);
+  std::abort();
+}
+
+/// The sanitizer takes address space without end: here it is the heap, with what was freed lately, that is limited.
+bool limit_memory() {
+  return __sanitizer_install_malloc_and_free_hooks(check_heap, [](const volatile void*) {}) != 0;
+}
+#else
+bool limit_memory() {
+  const rlimit limit{kMostMemory, kMostMemory};
+  return setrlimit(RLIMIT_AS, &limit) == 0;
+}
+#endif
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -71,8 +97,10 @@ int main(int argc, char** argv) {
     std::fputs("exmat_fuzz_NAME CORPUS_FOLDER MUTATIONS\n", stderr);
     return 2;
   }
-  const rlimit limit{kMostMemory, kMostMemory};
-  setrlimit(RLIMIT_AS, &limit);
+  if (!limit_memory()) {
+    std::fputs("cannot limit the memory\n", stderr);
+    return 1;
+  }
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(argv[1])) files.push_back(entry.path());
   std::ranges::sort(files);

@@ -74,6 +74,17 @@ TEST(FramesFile, KeepsEveryBit) {
   EXPECT_EQ(read->step_seconds, 1e-3);
 }
 
+TEST(FramesFile, MayBeOfNoFrames) {
+  const test::TemporaryFolder folder;
+  BodyFrames frames;
+  frames.steps = 7;
+  write_frames(folder / "a.frames", frames);
+  const auto read = read_frames(folder / "a.frames");
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->steps, 7);
+  EXPECT_TRUE(read->times.empty());
+}
+
 TEST(FramesFile, IsNotTakenWhereItIsDamaged) {
   const test::TemporaryFolder folder;
   write_frames(folder / "a.frames", some_frames());
