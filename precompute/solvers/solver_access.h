@@ -22,10 +22,10 @@ struct SolverShare : Share {
   Layout layout;
   Eigen::Index border = 0, soft = 0;  ///< columns of R, of the soft fields
   bool direct = true;
-  MatHandle matrix;          ///< none where direct
-  MatHandle factor;          ///< of the bordered matrix, where direct
-  KspHandle iteration;       ///< conjugate gradients
-  MatHandle shifted;         ///< without null vectors, for multigrid
+  MatHandle matrix;     ///< none where direct
+  MatHandle factor;     ///< of the bordered matrix, where direct
+  KspHandle iteration;  ///< conjugate gradients
+  MatHandle shifted;    ///< without null vectors, for multigrid
   NullSpaceHandle soft_space;
   Eigen::MatrixXd null_space, mass_null_space;  ///< own rows of R and M R
 

@@ -1,5 +1,6 @@
 #include "runtime/sim/stepper.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "runtime/sim/contact_step.h"
@@ -187,6 +188,23 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   commit_targets(model, scene, workspace, state);
 }
 
+/// A step near obstacles that did not converge may leave contact forces that throw the body: it is slowed down until it
+/// has no more energy than before, or stands still. The force of the contacts tells the difference.
+void take_back_energy(const StepScene& scene, const Energies& before, State& state, StepReport& report) {
+  const Energies now = energies(scene, state);
+  const double allowed = before.kinetic + before.elastic + before.potential - now.elastic - now.potential;
+  if (state.carried || now.kinetic <= allowed) return;
+  const double share = std::sqrt(std::max(allowed, 0.0) / now.kinetic);
+  state.v *= share;
+  if (!state.body) return;
+  FreeState& body = *state.body;
+  report.contact_force -= (1 - share) / scene.time_step * body.linear_momentum;
+  body.linear_momentum *= share;
+  body.angular_momentum *= share;
+  body.spin *= share;
+  body.momentum *= share;
+}
+
 void add_newton_report(const NewtonReport& newton, StepReport& report) {
   report.newton_iterations = newton.iterations;
   report.line_search_evaluations += newton.line_search_evaluations;
@@ -231,6 +249,7 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   else
     gather_external_force(model, scene, state, midpoint, workspace);
   const bool near = is_near_obstacles(model, scene, state, workspace);
+  const Energies before = near ? energies(scene, state) : Energies{};
   const Integrator integrator = integrator_of_step(scene, state, near);
   if (state.body) move_free_body(model, scene, integrator, near, state, midpoint, workspace);
   prepare_integrator(model, scene, integrator, state, begins_anew(scene, state, midpoint), workspace, report);
@@ -254,6 +273,7 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.offset);
   if (small_q || small_v) report.status |= kStepSubnormal;
   commit(model, scene, elastic_energy, workspace, state);
+  if (near && newton.status != NewtonStatus::kConverged) take_back_energy(scene, before, state, report);
   state.begins_anew = near;
   commit_contacts(model, near, workspace, state);
   return report;
