@@ -35,8 +35,8 @@ SparseMatrix vertex_pattern(const TetMesh& mesh) {
     row.clear();
     for (auto k = around.starts[v]; k < around.starts[v + 1]; ++k)
       for (const auto vertex : mesh.tets.row(around.tets[static_cast<std::size_t>(k)])) row.push_back(vertex);
-    std::ranges::sort(row);
-    columns.insert(columns.end(), row.begin(), std::ranges::unique(row).begin());
+    std::sort(row.begin(), row.end());
+    columns.insert(columns.end(), row.begin(), std::unique(row.begin(), row.end()));
     starts.push_back(static_cast<int>(columns.size()));
   }
   const std::vector<double> zeros(columns.size());
