@@ -249,7 +249,6 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   else
     gather_external_force(model, scene, state, midpoint, workspace);
   const bool near = is_near_obstacles(model, scene, state, workspace);
-  const Energies before = near ? energies(scene, state) : Energies{};
   const Integrator integrator = integrator_of_step(scene, state, near);
   if (state.body) move_free_body(model, scene, integrator, near, state, midpoint, workspace);
   prepare_integrator(model, scene, integrator, state, begins_anew(scene, state, midpoint), workspace, report);
@@ -272,8 +271,10 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   }
   const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.offset);
   if (small_q || small_v) report.status |= kStepSubnormal;
+  const bool unbalanced = near && newton.status != NewtonStatus::kConverged;
+  const Energies before = unbalanced ? energies(scene, state) : Energies{};
   commit(model, scene, elastic_energy, workspace, state);
-  if (near && newton.status != NewtonStatus::kConverged) take_back_energy(scene, before, state, report);
+  if (unbalanced) take_back_energy(scene, before, state, report);
   state.begins_anew = near;
   commit_contacts(model, near, workspace, state);
   return report;
