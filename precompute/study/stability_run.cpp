@@ -53,10 +53,7 @@ class Run {
   }
   double kinetic() const;
   Eigen::Vector3d angular_momentum() const;
-  double mechanical() const {
-    const runtime::Energies energies = runtime::energies(scene_, state_);
-    return energies.kinetic + energies.elastic + energies.potential;
-  }
+  double mechanical() const { return runtime::energies(scene_, state_).total(); }
   double inverse_norm(const Eigen::VectorXd& force) const {
     return std::sqrt(std::max(0.0, force.dot(body_.rest_stiffness.llt().solve(force))));
   }

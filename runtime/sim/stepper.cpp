@@ -192,7 +192,7 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
 /// has no more energy than before, or stands still. The force of the contacts tells the difference.
 void take_back_energy(const StepScene& scene, const Energies& before, State& state, StepReport& report) {
   const Energies now = energies(scene, state);
-  const double allowed = before.kinetic + before.elastic + before.potential - now.elastic - now.potential;
+  const double allowed = before.total() - now.elastic - now.potential;
   if (state.carried || now.kinetic <= allowed) return;
   const double share = std::sqrt(std::max(allowed, 0.0) / now.kinetic);
   state.v *= share;

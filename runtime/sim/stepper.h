@@ -50,6 +50,8 @@ struct Energies {
   double kinetic = 0;    ///< 1/2 |v|^2 [J]
   double elastic = 0;    ///< E(q) [J]
   double potential = 0;  ///< of gravity, 0 at rest [J]
+
+  double total() const { return kinetic + elastic + potential; }
 };
 Energies energies(const StepScene& scene, const State& state) noexcept;
 

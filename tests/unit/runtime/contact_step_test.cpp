@@ -29,10 +29,7 @@ struct Dropped {
   }
 
   double mass() const { return bar.model.rigid->mass; }
-  double energy() const {
-    const Energies now = energies(scene, state);
-    return now.kinetic + now.elastic + now.potential;
-  }
+  double energy() const { return energies(scene, state).total(); }
 
   test::Bar bar;
   std::unique_ptr<const Model> model;

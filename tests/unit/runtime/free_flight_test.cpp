@@ -84,10 +84,7 @@ struct FreeBody {
   std::unique_ptr<const Model> model;
 };
 
-double total(const StepScene& scene, const State& state) {
-  const Energies now = energies(scene, state);
-  return now.kinetic + now.elastic + now.potential;
-}
+double total(const StepScene& scene, const State& state) { return energies(scene, state).total(); }
 
 TEST(FreeFlight, StateIsThatOfTheVertices) {
   const FreeBody body;

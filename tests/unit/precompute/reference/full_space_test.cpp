@@ -58,8 +58,7 @@ struct FreeBar {
 };
 
 double total_energy(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state) {
-  const runtime::Energies now = energies(model, scene, state);
-  return now.kinetic + now.elastic + now.potential;
+  return energies(model, scene, state).total();
 }
 
 FullSpaceScene scene_of(Integrator integrator, double time_step) {
