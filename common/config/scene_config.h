@@ -37,7 +37,7 @@ struct RegionForceConfig {
 };
 
 struct NewtonConfig {
-  int max_iterations = 20;
+  int max_iterations = 200;
   double tolerance = 1e-6;  ///< relative to |f_ext| + |f_int| + |inertia|
 };
 

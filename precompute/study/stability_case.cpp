@@ -289,15 +289,6 @@ const std::vector<KnownLimit>& known_limits() {
        0.8, "corotational, weight per area of a bar standing on end above 100 E",
        "the weight turns elements inside out; the energy has a kink where two singular values of F add up to 0, and "
        "minima lie on it",
-       kUnconverged},
-      {"stiff-contact", Check::kSolved,
-       [](const StabilityCase& test, const StudyBody&) {
-         return test.body.free && test.ground != Ground::kNone && test.contact_stiffness >= 1e10 &&
-                test.time_step >= kSixtieth;
-       },
-       0.5, "a free body, contact stiffness of 1e10 N/m^3, time step of 1/60 s or more",
-       "each vertex that touches or leaves is a kink of its force, and rotation couples them all: 20 iterations are "
-       "too few; momenta are then those of the way that the body went",
        kUnconverged}};
   return limits;
 }

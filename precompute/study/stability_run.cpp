@@ -53,6 +53,7 @@ class Run {
   }
   double kinetic() const;
   Eigen::Vector3d angular_momentum() const;
+  double rotation_energy() const;
   double mechanical() const { return runtime::energies(scene_, state_).total(); }
   double inverse_norm(const Eigen::VectorXd& force) const {
     return std::sqrt(std::max(0.0, force.dot(body_.rest_stiffness.llt().solve(force))));
@@ -80,7 +81,7 @@ class Run {
   runtime::State state_;
   StabilityResult result_;
   double bound_u_linear_ = 0, start_energy_ = 0, start_potential_ = 0, work_ = 0, gain_ = 0, exchanged_ = 0;
-  double peak_kinetic_ = 0, start_displacement_ = 0;
+  double peak_kinetic_ = 0, peak_rotation_ = 0, start_displacement_ = 0;
   Eigen::Vector3d start_momentum_ = Eigen::Vector3d::Zero();
   double momentum_drift_ = 0;
 };
@@ -260,6 +261,7 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
   result_.target_steps += (report.status & runtime::kTargetNotConverged) != 0 ? 1 : 0;
   result_.largest_displacement = std::max(result_.largest_displacement, largest(state_.q) / body_.size);
   peak_kinetic_ = std::max(peak_kinetic_, kinetic());
+  if (state_.body && !scene_.forces.empty()) peak_rotation_ = std::max(peak_rotation_, rotation_energy());
   const double midpoint = state_.time - 0.5 * test_.time_step;
   for (const runtime::ScriptedForce& load : scene_.forces)
     if (midpoint < load.end) work_ += load.force.dot(state_.q - before);
@@ -276,6 +278,13 @@ Eigen::Vector3d Run::angular_momentum() const {
   auto moments = model_.rigid->make_moments();
   model_.rigid->moments(state_.q, moments);
   return state_.body->orientation * (moments.inertia * state_.body->spin + moments.deformation.transpose() * state_.v);
+}
+
+// Of a free body as a rigid one.
+double Run::rotation_energy() const {
+  auto moments = model_.rigid->make_moments();
+  model_.rigid->moments(state_.q, moments);
+  return 0.5 * state_.body->spin.dot(moments.inertia * state_.body->spin);
 }
 
 void Run::step_all() {
@@ -311,7 +320,8 @@ void Run::judge(Check check, double value, double limit) {
 void Run::judge_all() {
   judge(Check::kFinite, static_cast<double>(result_.non_finite_steps), 0);
   if (result_.non_finite_steps > 0) return;
-  double bound = kSizes + kLinear * result_.linear_displacement + start_displacement_ / body_.size;
+  const double spun = body_.reach * std::sqrt(2 * peak_rotation_) / body_.size;
+  double bound = kSizes + kLinear * (result_.linear_displacement + spun) + start_displacement_ / body_.size;
   if (small(kSmall)) bound = kSmallMargin * result_.linear_displacement;
   if (!scene_.examples.empty())
     for (const ExampleData& example : body_.reduced.examples->examples)

@@ -16,6 +16,9 @@ namespace exmat::runtime {
 /// body loses. For newton_minimize.
 class ContactProblem {
  public:
+  /// Beyond the place where a contact begins the first length that is low enough may lie far up the other side.
+  static constexpr bool kSeeksLowest = true;
+
   /// `potential` after start() and prepare(); candidates gathered and frozen in workspace.near.
   ContactProblem(const Model& model, const StepScene& scene, const State& state, IncrementalPotential& potential,
                  Workspace& workspace) noexcept;

@@ -14,7 +14,7 @@
 namespace exmat::runtime {
 
 struct NewtonSettings {
-  int max_iterations = 20;
+  int max_iterations = 200;
   double tolerance = 1e-6;  ///< |gradient| <= tolerance * scale of the evaluation
 
   // Faults that the stability suite is to find; newton_minimize() alone looks at them, no file sets them.
@@ -142,6 +142,11 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
   return workspace.gradient.dot(direction);
 }
 
+template <class Problem>
+inline constexpr bool kSeeksLowest = requires {
+  requires Problem::kSeeksLowest;
+};
+
 /// Armijo backtracking along workspace.direction from `x`; leaves the accepted point in workspace.trial, its gradient
 /// in workspace.trial_gradient and the rest in `there`.
 template <class Problem>
@@ -157,15 +162,21 @@ bool line_search(Problem& problem, const Eigen::VectorXd& x, const PotentialValu
   // Forces without a potential may need what raises it.
   if constexpr (requires { problem.gyroscopic(); })
     if (workspace.trial_gradient.norm() <= 0.5 * workspace.gradient.norm()) return true;
-  double length = 0.5;
-  for (int halving = 0; halving < kHalvings; ++halving, length *= 0.5) {
-    workspace.trial = x + length * direction;
+  double length = 1, lowest = 0;
+  bool found = false;
+  for (int halving = 0; halving < kHalvings && (!found || kSeeksLowest<Problem>); ++halving) {
+    workspace.trial = x + 0.5 * length * direction;
     ++report.line_search_evaluations;
-    if (!low_enough(length, problem.value(workspace.trial))) continue;
-    there = problem.evaluate(workspace.trial, workspace.trial_gradient);
-    return true;
+    const PotentialValue value = problem.value(workspace.trial);
+    if (found && !(value.value < lowest)) break;
+    length *= 0.5;
+    lowest = value.value;
+    found = found || low_enough(length, value);
   }
-  return false;
+  if (!found) return false;
+  workspace.trial = x + length * direction;
+  there = problem.evaluate(workspace.trial, workspace.trial_gradient);
+  return true;
 }
 
 /// Whether the factor at hand brings the residual to its limit for less than a new Hessian costs.
@@ -187,6 +198,9 @@ inline bool factor_serves(double before, double now, double limit) {
 ///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
 ///                                                        of forces without a potential, or null where it is weak
 ///   int gyroscopic_terms(); VectorXd gyroscopic_product(x)   optional: how often a weak one is applied, its product
+///   bool kSeeksLowest                                    optional, constant: lengths are halved beyond the first that
+///   is
+///                                                        low enough, for as long as the potential falls
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
 /// On return the last evaluate() was at x.
 template <class Problem>

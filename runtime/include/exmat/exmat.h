@@ -72,7 +72,7 @@ typedef struct exmat_settings {
   double example_stiffness;  /* kappa >= 0 [1/s^2]; 0. All of examples: with use_examples */
   double example_damping;    /* c_kappa >= 0 [1/s]; 0 */
   double example_bias;       /* in [0, 1], factor on the weight of the rest pose; 1 */
-  int32_t newton_iterations; /* most in one step, 1 to 10000; 20 */
+  int32_t newton_iterations; /* most in one step, 1 to 10000; 200 */
   int32_t integrator;        /* EXMAT_BDF2 */
   int32_t internal_force;    /* EXMAT_INTERNAL_FORCE_AUTO: as the bundle says */
   int32_t use_examples;      /* 1: example force; 0 */

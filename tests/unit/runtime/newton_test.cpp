@@ -35,6 +35,10 @@ Function rounded_cone() {
           [](double x) { return std::pow(1 + x * x, -1.5); }};
 }
 
+struct LowestOfFunction : Function {
+  static constexpr bool kSeeksLowest = true;
+};
+
 /// Minima at -1 and 1, concave between -0.58 and 0.58.
 Function two_wells() {
   return {[](double x) { return 0.25 * std::pow(x * x - 1, 2); }, [](double x) { return x * (x * x - 1); },
@@ -64,6 +68,18 @@ TEST(Newton, LineSearchStopsFullStepsFromDiverging) {
   EXPECT_NEAR(x, 0, 1e-6);
   x = 2;
   EXPECT_NE(minimise(rounded_cone(), x, {.line_search = false}).status, NewtonStatus::kConverged);
+}
+
+// The first length that is low enough, 1/32, goes from 7.9 to -7.75, the next one to 0.07.
+TEST(Newton, HalvesOnForAsLongAsThePotentialFalls) {
+  double x = 7.9;
+  EXPECT_GE(minimise(rounded_cone(), x).iterations, 7);
+  EXPECT_NEAR(x, 0, 1e-6);
+  x = 7.9;
+  const NewtonReport report = minimise(LowestOfFunction(rounded_cone()), x);
+  EXPECT_EQ(report.status, NewtonStatus::kConverged);
+  EXPECT_LE(report.iterations, 4);
+  EXPECT_NEAR(x, 0, 1e-6);
 }
 
 TEST(Newton, ProjectionLeavesAConcavePlace) {

@@ -123,7 +123,7 @@ TEST(LoadScene, FillsInDefaults) {
   EXPECT_EQ(scene.integrator, "bdf2");
   EXPECT_EQ(scene.gravity, Eigen::Vector3d::Zero());
   EXPECT_FALSE(scene.examples || scene.trajectory || scene.render || needs_of(scene).render);
-  EXPECT_EQ(scene.newton.max_iterations, 20);
+  EXPECT_EQ(scene.newton.max_iterations, 200);
   EXPECT_EQ(scene.internal_force, "auto");
   EXPECT_EQ(scene.instances, 1);
   EXPECT_EQ(scene.every, 10);
