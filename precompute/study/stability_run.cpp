@@ -52,6 +52,11 @@ class Run {
     return u.reshaped<Eigen::RowMajor>(u.size() / 3, 3).rowwise().norm().maxCoeff();
   }
   double kinetic() const;
+  auto moments() const {
+    auto moments = model_.rigid->make_moments();
+    model_.rigid->moments(state_.q, moments);
+    return moments;
+  }
   Eigen::Vector3d angular_momentum() const;
   double rotation_energy() const;
   double mechanical() const { return runtime::energies(scene_, state_).total(); }
@@ -275,17 +280,12 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
 
 // Of the motion itself, not the state's variable.
 Eigen::Vector3d Run::angular_momentum() const {
-  auto moments = model_.rigid->make_moments();
-  model_.rigid->moments(state_.q, moments);
-  return state_.body->orientation * (moments.inertia * state_.body->spin + moments.deformation.transpose() * state_.v);
+  const auto now = moments();
+  return state_.body->orientation * (now.inertia * state_.body->spin + now.deformation.transpose() * state_.v);
 }
 
 // Of a free body as a rigid one.
-double Run::rotation_energy() const {
-  auto moments = model_.rigid->make_moments();
-  model_.rigid->moments(state_.q, moments);
-  return 0.5 * state_.body->spin.dot(moments.inertia * state_.body->spin);
-}
+double Run::rotation_energy() const { return 0.5 * state_.body->spin.dot(moments().inertia * state_.body->spin); }
 
 void Run::step_all() {
   runtime::Workspace workspace(model_, scene_);

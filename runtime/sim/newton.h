@@ -198,9 +198,8 @@ inline bool factor_serves(double before, double now, double limit) {
 ///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
 ///                                                        of forces without a potential, or null where it is weak
 ///   int gyroscopic_terms(); VectorXd gyroscopic_product(x)   optional: how often a weak one is applied, its product
-///   bool kSeeksLowest                                    optional, constant: lengths are halved beyond the first that
-///   is
-///                                                        low enough, for as long as the potential falls
+///   bool kSeeksLowest                                    optional constant: lengths are halved for as long as the
+///                                                        potential falls, beyond the first that is low enough
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
 /// On return the last evaluate() was at x.
 template <class Problem>
