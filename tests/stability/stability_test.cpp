@@ -147,7 +147,7 @@ TEST(Stability, ResultsDoNotDependOnTheNumberOfJobs) {
   EXPECT_EQ(stability_json(one), stability_json(two));
 }
 
-// What the suite is for: without a safeguard of the step it has to fail. Of 132 runs each, 24 and 49 did.
+// What the suite is for: without a safeguard of the step it has to fail. Of 132 runs each, 25 and 49 did.
 std::vector<StabilityRun> runs_with_fault(const PlantedFault& fault) {
   auto cases = cases_of({"loads", "starts"});
   std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != runtime::Integrator::kBdf2; });
