@@ -76,7 +76,7 @@ TEST(Newton, HalvesOnForAsLongAsThePotentialFalls) {
   EXPECT_GE(minimise(rounded_cone(), x).iterations, 7);
   EXPECT_NEAR(x, 0, 1e-6);
   x = 7.9;
-  const NewtonReport report = minimise(LowestOfFunction(rounded_cone()), x);
+  const NewtonReport report = minimise(LowestOfFunction{rounded_cone()}, x);
   EXPECT_EQ(report.status, NewtonStatus::kConverged);
   EXPECT_LE(report.iterations, 4);
   EXPECT_NEAR(x, 0, 1e-6);
