@@ -271,8 +271,9 @@ const std::vector<KnownLimit>& known_limits() {
        [](const StabilityCase& test, const StudyBody&) {
          return test.body.free && test.tip_load.norm() > 0 && test.time_step >= kSixtieth;
        },
-       0.95, "a free body that a load beside its centre of mass turns by more than 0.3 rad a step",
-       "the turn of such a step is not resolved; forces of the rotation have no potential, and the search ends early",
+       1, "a free body that a load beside its centre of mass turns by more than 0.3 rad a step",
+       "the turn of such a step is not resolved; forces of the rotation have no potential, and the search ends early, "
+       "where it ends at its start in every step from then on: the body turns on in the shape that it has",
        kUnconverged},
       {"corotational-kink", Check::kSolved,
        [](const StabilityCase& test, const StudyBody&) {
