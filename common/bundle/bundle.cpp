@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "common/bundle/bundle_reader.h"
+#include "common/bundle/file_schemas.h"
 #include "common/core/error.h"
 
 namespace exmat {

@@ -5,8 +5,10 @@
 #include <fmt/format.h>
 #include <span>
 
-#include "common/bundle/value_checks.h"
+#include "common/bundle/file_schemas.h"
+#include "common/bundle/table_checks.h"
 #include "common/core/error.h"
+#include "common/hdf5/value_checks.h"
 
 namespace exmat {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/fields.h"
-#include "common/bundle/hdf5_file.h"
-#include "common/bundle/schema.h"
+#include "common/hdf5/hdf5_file.h"
+#include "common/hdf5/schema.h"
 #include "common/model/reduced_model.h"
 
 namespace exmat {

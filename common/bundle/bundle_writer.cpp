@@ -6,11 +6,12 @@
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/fields.h"
-#include "common/bundle/hdf5_file.h"
-#include "common/bundle/schema.h"
-#include "common/bundle/value_checks.h"
+#include "common/bundle/file_schemas.h"
 #include "common/core/atomic_file.h"
 #include "common/core/error.h"
+#include "common/hdf5/hdf5_file.h"
+#include "common/hdf5/schema.h"
+#include "common/hdf5/value_checks.h"
 
 namespace exmat {
 namespace {

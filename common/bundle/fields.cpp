@@ -4,6 +4,8 @@
 #include <map>
 #include <set>
 
+#include "common/bundle/file_schemas.h"
+
 namespace exmat {
 namespace {
 

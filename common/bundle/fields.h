@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "common/bundle/hdf5_file.h"
-#include "common/bundle/schema.h"
+#include "common/hdf5/hdf5_file.h"
+#include "common/hdf5/schema.h"
 #include "common/model/reduced_model.h"
 
 namespace exmat {

@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <fmt/format.h>
 
-#include "common/bundle/schema.h"
+#include "common/bundle/file_schemas.h"
+#include "common/hdf5/schema.h"
 
 namespace exmat {
 namespace {

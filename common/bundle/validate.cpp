@@ -5,6 +5,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/bundle_reader.h"
+#include "common/bundle/file_schemas.h"
 #include "common/core/error.h"
 
 namespace exmat {

@@ -38,6 +38,11 @@ Eigen::Matrix<double, 4, 3> shape_gradients(const Eigen::Matrix<double, 4, 3>& p
   return gradients;
 }
 
+Eigen::Vector4d barycentric(const Eigen::Matrix<double, 4, 3>& corners, const Eigen::Vector3d& point) {
+  const Eigen::Vector3d middle = corners.colwise().mean();
+  return (shape_gradients(corners) * (point - middle)).array() + 0.25;  // linear from the middle, where all are 1/4
+}
+
 Eigen::Vector3d centroid(const TetMesh& mesh) {
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();

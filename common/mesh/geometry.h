@@ -15,6 +15,9 @@ Eigen::Matrix<double, 4, 3> shape_gradients(const Eigen::Matrix<double, 4, 3>& p
 /// [4 x 3] vertex positions of one tet.
 Eigen::Matrix<double, 4, 3> tet_positions(const TetMesh& mesh, Eigen::Index tet);
 
+/// Barycentric coordinates of a point in a tet with the given [4 x 3] corners, of any sign; they add up to 1.
+Eigen::Vector4d barycentric(const Eigen::Matrix<double, 4, 3>& corners, const Eigen::Vector3d& point);
+
 /// Volume-weighted centroid [m].
 Eigen::Vector3d centroid(const TetMesh& mesh);
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/contact/contact_vertices.h"
+#include "common/mesh/farthest_points.h"
 
 namespace exmat::precompute {
 namespace {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/mesh/nearest_point.h"
 #include "precompute/alignment/spectral_tree.h"
-#include "precompute/shape_space/nearest_point.h"
 #include "precompute/shape_space/transfer.h"
 
 namespace exmat::precompute {

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "precompute/contact/contact_vertices.h"
+#include "common/mesh/farthest_points.h"
 
 namespace exmat::precompute {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "precompute/contact/contact_vertices.h"
+#include "common/mesh/farthest_points.h"
 #include "precompute/shape_space/transfer.h"
 
 namespace exmat::precompute {

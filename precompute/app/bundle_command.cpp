@@ -6,11 +6,12 @@
 #include <utility>
 
 #include "common/bundle/bundle.h"
-#include "common/bundle/schema.h"
+#include "common/bundle/file_schemas.h"
 #include "common/config/config.h"
 #include "common/core/atomic_file.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/hdf5/schema.h"
 #include "common/mesh/geometry.h"
 #include "precompute/pipeline/build_model.h"
 #include "precompute/pipeline/depfile.h"

@@ -1,11 +1,11 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "common/bundle/library_versions.h"
 #include "common/config/config.h"
 #include "common/console/console.h"
 #include "common/core/log.h"
 #include "common/core/version.h"
+#include "common/hdf5/library_versions.h"
 #include "precompute/app/bundle_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"

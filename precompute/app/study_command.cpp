@@ -4,9 +4,9 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
-#include "precompute/study/report.h"
-#include "precompute/study/stability_report.h"
-#include "precompute/study/study.h"
+#include "precompute/study/stability/stability_report.h"
+#include "precompute/study/sweep/report.h"
+#include "precompute/study/sweep/study.h"
 
 namespace exmat {
 namespace {

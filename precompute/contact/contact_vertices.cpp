@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <limits>
-#include <numeric>
+
+#include "common/mesh/farthest_points.h"
 
 namespace exmat::precompute {
 namespace {
@@ -42,26 +42,6 @@ Eigen::VectorXd vertex_areas(const ObjectData& object) {
     for (const std::int32_t corner : triangle) areas[corner] += third;
   }
   return areas;
-}
-
-std::vector<Eigen::Index> farthest_points(const VertexArray& points, Eigen::Index count) {
-  std::vector<Eigen::Index> chosen;
-  if (count >= points.rows()) {
-    chosen.resize(static_cast<std::size_t>(points.rows()));
-    std::iota(chosen.begin(), chosen.end(), Eigen::Index{0});
-    return chosen;
-  }
-  const Eigen::RowVector3d centroid = points.colwise().mean();
-  Eigen::VectorXd distances = (points.rowwise() - centroid).rowwise().squaredNorm();
-  Eigen::Index next = 0;
-  distances.maxCoeff(&next);
-  distances.setConstant(std::numeric_limits<double>::infinity());
-  while (std::ssize(chosen) < count) {
-    chosen.push_back(next);
-    distances = distances.cwiseMin((points.rowwise() - points.row(next)).rowwise().squaredNorm());
-    distances.maxCoeff(&next);
-  }
-  return chosen;
 }
 
 ContactData contact_data(const ObjectData& object, const RowMatrix& basis, const FlagVector& may_touch,

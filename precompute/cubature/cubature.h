@@ -23,6 +23,13 @@ struct CubatureOptions {
   std::int64_t training_entries = 50'000'000;
 };
 
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, CubatureOptions& value) {
+  pass_all(archive, value.elements, value.tolerance, value.method, value.training_poses, value.seed,
+           value.training_entries);
+}
+
 /// Relative errors of a weighted element subset against all elements, root mean square over poses: forces in the norm
 /// of the inverse rest stiffness, |L^-1 (f - f_all)| / |L^-1 f_all| with L L^T = U^T K U; energies; stiffness
 /// (Frobenius, the first ten poses).

@@ -18,6 +18,13 @@ struct PoseSource {
   Eigen::MatrixXd examples;             ///< r x (K-1) reduced poses of the examples but the rest one, or no columns
 };
 
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, PoseSource& value) {
+  pass_all(archive, value.eigenvalues, value.reduced_modes, value.reduced_derivatives, value.basis,
+           value.rest_stiffness, value.body_size, value.examples);
+}
+
 /// The number of linear modes that poses are drawn from.
 constexpr Eigen::Index kTrainingModes = 12;
 

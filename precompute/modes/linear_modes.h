@@ -11,6 +11,12 @@ struct LinearModes {
   Eigen::VectorXd eigenvalues;  ///< k, omega^2 [1/s^2], ascending
   Eigen::MatrixXd modes;        ///< f x k, mass-orthonormal
 };
+
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, LinearModes& value) {
+  pass_all(archive, value.eigenvalues, value.modes);
+}
 LinearModes linear_modes(const ElasticSystem& system, const SemidefiniteSolver& solver, int count);
 
 /// [f x k(k+1)/2] modal derivatives phi_ij, i <= j, column pair_index(i, j): K phi_ij = -d2f/du2 [psi_i, psi_j], in the

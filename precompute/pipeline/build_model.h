@@ -8,7 +8,7 @@
 #include "common/config/asset_config.h"
 #include "common/model/needs.h"
 #include "common/model/reduced_model.h"
-#include "precompute/pipeline/alignment_verdict.h"
+#include "precompute/examples/alignment_verdict.h"
 #include "precompute/pipeline/build_report.h"
 
 namespace exmat::precompute {

@@ -10,7 +10,8 @@
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "common/model/needs.h"
-#include "precompute/pipeline/inputs.h"
+#include "precompute/cache/stage_cache.h"
+#include "precompute/inputs/inputs.h"
 
 namespace exmat::precompute {
 
@@ -18,12 +19,6 @@ struct StageTime {
   std::string stage;
   double seconds = 0;
   std::int64_t peak_memory_bytes = 0;  ///< most that any rank had until the stage's end
-};
-
-/// A result that was asked of the cache of stages.
-struct CacheUse {
-  std::string stage;
-  bool found = false;
 };
 
 /// What came of a run beside the model.

@@ -2,10 +2,11 @@
 
 #include <set>
 
-#include "common/bundle/schema.h"
+#include "common/bundle/file_schemas.h"
 #include "common/core/error.h"
 #include "common/core/version.h"
-#include "precompute/pipeline/sha256.h"
+#include "common/hdf5/schema.h"
+#include "precompute/cache/sha256.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
 namespace exmat::precompute {

@@ -6,22 +6,12 @@
 #include "common/mesh/geometry.h"
 
 namespace exmat::precompute {
-namespace {
-
-// Affine coordinates of a point, 1 at each of its tet's corners in turn: 1/4 at the middle, linear from there.
-Eigen::RowVector4d affine_coordinates(const TetMesh& mesh, Eigen::Index tet, const Eigen::Vector3d& point) {
-  const Eigen::Matrix<double, 4, 3> corners = tet_positions(mesh, tet);
-  const Eigen::Vector3d middle = corners.colwise().mean();
-  return (shape_gradients(corners) * (point - middle)).transpose().array() + 0.25;
-}
-
-}  // namespace
 
 Embedding embed_points(const TetMesh& mesh, const VertexArray& points, const std::string& name) {
   Embedding embedding{nearest_points(mesh, points)};
   auto& [tets, weights, distances] = embedding.points;
   for (Eigen::Index k = 0; k < points.rows(); ++k)
-    weights.row(k) = affine_coordinates(mesh, tets[k], points.row(k).transpose());
+    weights.row(k) = barycentric(tet_positions(mesh, tets[k]), points.row(k).transpose());
   if (points.rows() == 0) return embedding;
   const double diagonal = bounding_box_diagonal(mesh.vertices);
   embedding.outside = (distances.array() > kOnSurface * diagonal).count();

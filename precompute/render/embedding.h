@@ -2,8 +2,8 @@
 
 #include <string>
 
+#include "common/mesh/nearest_point.h"
 #include "common/mesh/tet_mesh.h"
-#include "precompute/shape_space/nearest_point.h"
 
 namespace exmat::precompute {
 

@@ -19,6 +19,12 @@ struct LaplaceBasis {
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [m]
 };
 
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, LaplaceBasis& value) {
+  pass_all(archive, value.eigenvalues, value.eigenfunctions, value.mass, value.vertices, value.volume, value.centroid);
+}
+
 /// The first `count` eigenpairs; `name` is for messages.
 LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::string& name);
 

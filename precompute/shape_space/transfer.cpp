@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "precompute/shape_space/nearest_point.h"
+#include "common/mesh/nearest_point.h"
 
 namespace exmat::precompute {
 namespace {

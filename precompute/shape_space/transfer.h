@@ -21,6 +21,13 @@ struct RestMap {
   Eigen::MatrixXd carried(const LaplaceBasis& object, const LaplaceBasis& rest_basis, const VertexArray& field) const;
 };
 
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, RestMap& value) {
+  pass_all(archive, value.functional_map, value.pull_back, value.residual, value.confidence, value.same_frame,
+           value.by_functions);
+}
+
 /// Residual up to which the rest example is taken to share the object's frame.
 constexpr double kSameFrame = 0.05;
 
@@ -65,6 +72,12 @@ struct CarriedShape {
   Eigen::MatrixXd coefficients;  ///< m x 3
   VertexArray points;            ///< n x 3, positions on the example at the object's vertices, found in another way
 };
+
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, CarriedShape& value) {
+  pass_all(archive, value.coefficients, value.points);
+}
 
 /// The same from what is carried of the rest and the posed example. The coefficients alone make the pose; the points
 /// give `displacement` and tell what is lost of it, shape_space_error.

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/core/arrays.h"
-#include "runtime/sim/target.h"
+#include "runtime/sim/examples/target.h"
 
 namespace exmat::precompute {
 

@@ -4,8 +4,8 @@
 #include <Eigen/QR>
 
 #include "common/core/arrays.h"
-#include "runtime/sim/target.h"
-#include "runtime/sim/target_table.h"
+#include "runtime/sim/examples/target.h"
+#include "runtime/sim/examples/target_table.h"
 
 namespace exmat::precompute {
 

@@ -7,7 +7,7 @@
 #include "common/model/reduced_model.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/table_error.h"
-#include "runtime/sim/target.h"
+#include "runtime/sim/examples/target.h"
 
 namespace exmat::precompute {
 

@@ -11,9 +11,9 @@
 #include "precompute/targets/simplex_points.h"
 #include "precompute/targets/table_error.h"
 #include "precompute/targets/target_pieces.h"
-#include "runtime/sim/bernstein_basis.h"
-#include "runtime/sim/target.h"
-#include "runtime/sim/target_table.h"
+#include "runtime/sim/examples/bernstein_basis.h"
+#include "runtime/sim/examples/target.h"
+#include "runtime/sim/examples/target_table.h"
 
 namespace exmat::precompute {
 namespace {

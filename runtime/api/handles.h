@@ -6,7 +6,7 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/point_set.h"
-#include "runtime/sim/stepper.h"
+#include "runtime/sim/step/stepper.h"
 
 // What the handles of the C API point to. NOLINTBEGIN(readability-identifier-naming): their names are the API's.
 

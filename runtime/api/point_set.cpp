@@ -6,8 +6,8 @@
 
 #include "common/bundle/bundle.h"
 #include "common/mesh/geometry.h"
+#include "common/mesh/nearest_point.h"
 #include "runtime/api/failures.h"
-#include "runtime/api/tet_tree.h"
 
 namespace exmat::runtime {
 namespace {
@@ -16,6 +16,9 @@ using Ids = std::vector<std::int64_t>;
 
 /// Rows of single vertices are read one by one up to this share of all.
 constexpr std::size_t kWholeBasisAbove = 8;
+
+/// Distances below this share of the diagonal of the bounding box are 0.
+constexpr double kRelativeRounding = 1e-12;
 
 ReducedModel read_rest(const Source& source, bool basis) {
   const std::string reason = "points are asked for";
@@ -70,14 +73,15 @@ PointSet read_all_vertices(const Source& source) {
 PointSet read_points_at(const Source& source, const VertexArray& rest) {
   const ReducedModel data = read_rest(source, /*basis=*/false);
   const TetMesh& mesh = data.object->mesh;
-  const TetTree tree(mesh);
+  const NearestPointSearch search(mesh);
+  const double rounding = kRelativeRounding * bounding_box_diagonal(mesh.vertices);
   PointSet points;
   points.distances.resize(rest.rows());
   Eigen::Matrix<std::int64_t, Eigen::Dynamic, 4> corners(rest.rows(), 4);
   Eigen::Matrix<double, Eigen::Dynamic, 4> shares(rest.rows(), 4);
   for (Eigen::Index i = 0; i < rest.rows(); ++i) {
-    const TetTree::Hit hit = tree.nearest(rest.row(i));
-    points.distances[i] = hit.distance;
+    const NearestPoint hit = search.nearest(rest.row(i));
+    points.distances[i] = hit.distance < rounding ? 0 : hit.distance;
     corners.row(i) = mesh.tets.row(hit.tet).cast<std::int64_t>();
     shares.row(i) = barycentric(tet_positions(mesh, hit.tet), rest.row(i));
   }

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <span>
 
-#include "runtime/io/scene_loader.h"
-#include "runtime/sim/vertex_positions.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/vertex_positions.h"
 
 namespace exmat::runtime {
 

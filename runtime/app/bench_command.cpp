@@ -5,7 +5,7 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
 #include "runtime/app/print.h"
-#include "runtime/io/bench.h"
+#include "runtime/bench/bench.h"
 
 namespace exmat::runtime {
 namespace {

@@ -3,7 +3,7 @@
 #include "common/core/error.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/print.h"
-#include "runtime/io/point_cache.h"
+#include "runtime/output/point_cache.h"
 
 namespace exmat::runtime {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "runtime/io/scene_loader.h"
+#include "runtime/scene/scene_loader.h"
 
 namespace exmat::runtime {
 

@@ -1,9 +1,9 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
-#include "common/bundle/library_versions.h"
 #include "common/console/console.h"
 #include "common/core/version.h"
+#include "common/hdf5/library_versions.h"
 #include "runtime/app/commands.h"
 
 int main(int argc, char** argv) {

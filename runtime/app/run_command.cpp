@@ -5,7 +5,7 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
 #include "runtime/app/print.h"
-#include "runtime/io/scene_run.h"
+#include "runtime/scene/scene_run.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,8 +1,8 @@
 #include <Eigen/Core>
 #include <memory>
 
-#include "runtime/io/step_work.h"
-#include "runtime/sim/vertex_positions.h"
+#include "runtime/scene/step_work.h"
+#include "runtime/sim/step/vertex_positions.h"
 #include "tests/benchmark/models.h"
 #include "tests/benchmark/register.h"
 #include "tests/support/random.h"

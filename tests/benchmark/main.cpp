@@ -1,4 +1,4 @@
-#include "runtime/io/dgemm_rate.h"
+#include "runtime/bench/dgemm_rate.h"
 #include "tests/benchmark/register.h"
 
 namespace exmat::benchmarks {

@@ -3,7 +3,7 @@
 #include <memory>
 #include <string>
 
-#include "runtime/sim/scene.h"
+#include "runtime/sim/step/scene.h"
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::benchmarks {

@@ -3,7 +3,7 @@
 
 #include "common/config/config.h"
 #include "common/mesh/geometry.h"
-#include "runtime/io/scene_loader.h"
+#include "runtime/scene/scene_loader.h"
 #include "tests/benchmark/models.h"
 #include "tests/benchmark/register.h"
 #include "tests/benchmark/steps.h"

@@ -1,7 +1,7 @@
 #pragma once
 
-#include "runtime/sim/scene.h"
-#include "runtime/sim/state.h"
+#include "runtime/sim/step/scene.h"
+#include "runtime/sim/step/state.h"
 #include "tests/benchmark/register.h"
 
 namespace exmat::benchmarks {

@@ -1,6 +1,6 @@
 #include <numeric>
 
-#include "runtime/io/bodies.h"
+#include "runtime/scene/bodies.h"
 #include "tests/benchmark/models.h"
 #include "tests/benchmark/steps.h"
 

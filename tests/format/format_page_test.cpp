@@ -4,8 +4,8 @@
 #include <string>
 
 #include "common/bundle/format_doc.h"
-#include "common/bundle/hdf5_file.h"
-#include "tests/unit/common/bundle/small_model.h"
+#include "common/hdf5/hdf5_file.h"
+#include "tests/common/bundle/small_model.h"
 
 namespace exmat {
 namespace {

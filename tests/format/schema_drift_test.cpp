@@ -5,9 +5,10 @@
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/fields.h"
-#include "common/bundle/schema.h"
+#include "common/bundle/file_schemas.h"
 #include "common/config/embedded_schema.h"
-#include "tests/unit/common/bundle/small_model.h"
+#include "common/hdf5/schema.h"
+#include "tests/common/bundle/small_model.h"
 
 namespace exmat {
 namespace {

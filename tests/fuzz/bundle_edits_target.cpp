@@ -11,11 +11,11 @@
 #include <vector>
 
 #include "common/bundle/bundle.h"
-#include "common/bundle/hdf5_file.h"
+#include "common/hdf5/hdf5_file.h"
+#include "tests/common/bundle/small_model.h"
 #include "tests/fuzz/bundle_checks.h"
 #include "tests/fuzz/fuzz_target.h"
 #include "tests/support/temporary_folder.h"
-#include "tests/unit/common/bundle/small_model.h"
 
 namespace exmat::fuzz {
 namespace {

@@ -17,8 +17,8 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MESH_IO = "precompute/mesh_io/"
-BUNDLE = ["common/bundle/bundle.cpp", "common/bundle/bundle_reader.cpp", "common/bundle/hdf5_file.cpp",
-          "common/bundle/validate.cpp", "common/bundle/value_checks.cpp"]
+BUNDLE = ["common/bundle/bundle.cpp", "common/bundle/bundle_reader.cpp", "common/hdf5/hdf5_file.cpp",
+          "common/bundle/validate.cpp", "common/hdf5/value_checks.cpp"]
 # What is each target's own, by the beginning of the path, and what the mesh readers share.
 SOURCES = {
     "veg": [MESH_IO + "veg_reader.cpp"],

@@ -7,7 +7,7 @@
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "precompute/alignment/kd_tree.h"
-#include "precompute/pipeline/example_stage.h"
+#include "precompute/examples/example_stage.h"
 #include "tests/integration/support.h"
 #include "tests/support/posed_bodies.h"
 

@@ -6,7 +6,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/core/error.h"
-#include "runtime/io/scene_loader.h"
+#include "runtime/scene/scene_loader.h"
 #include "tests/integration/support.h"
 
 namespace exmat::test {

@@ -10,8 +10,8 @@
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
-#include "runtime/io/scene_loader.h"
-#include "runtime/sim/stepper.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/stepper.h"
 #include "tests/integration/support.h"
 
 namespace exmat::test {

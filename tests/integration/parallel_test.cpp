@@ -8,8 +8,8 @@
 #include "common/config/config.h"
 #include "precompute/fem/assembly.h"
 #include "precompute/solvers/eigenpairs.h"
-#include "runtime/io/scene_loader.h"
-#include "runtime/sim/stepper.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/stepper.h"
 #include "tests/integration/support.h"
 
 namespace exmat::test {

@@ -9,8 +9,8 @@
 #include "common/config/config.h"
 #include "common/mesh/geometry.h"
 #include "precompute/cubature/element_samples.h"
-#include "runtime/io/scene_loader.h"
-#include "runtime/sim/stepper.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/stepper.h"
 #include "tests/integration/support.h"
 #include "tests/support/box_mesh.h"
 

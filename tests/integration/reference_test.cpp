@@ -3,10 +3,10 @@
 
 #include "common/config/config.h"
 #include "common/core/error.h"
-#include "precompute/reference/scene_setup.h"
-#include "runtime/io/obstacle_loader.h"
-#include "runtime/io/scene_loader.h"
-#include "runtime/sim/stepper.h"
+#include "precompute/full_space/scene_setup.h"
+#include "runtime/scene/obstacle_loader.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/stepper.h"
 #include "tests/integration/support.h"
 
 namespace exmat::test {

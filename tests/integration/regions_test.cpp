@@ -4,9 +4,9 @@
 #include <gtest/gtest.h>
 
 #include "common/bundle/bundle.h"
-#include "common/bundle/hdf5_file.h"
 #include "common/config/config.h"
-#include "runtime/io/scene_run.h"
+#include "common/hdf5/hdf5_file.h"
+#include "runtime/scene/scene_run.h"
 #include "tests/integration/support.h"
 
 namespace exmat {

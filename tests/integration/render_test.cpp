@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/bundle/bundle.h"
-#include "common/bundle/hdf5_file.h"
+#include "common/hdf5/hdf5_file.h"
 #include "common/mesh/geometry.h"
 #include "tests/integration/support.h"
 

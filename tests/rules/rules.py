@@ -10,6 +10,17 @@ from pathlib import Path
 
 TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "tests", "examples", "docs", "README.md", "LICENSE",
              "CHANGELOG.md", "CMakePresets.json", "install-dependencies"}
+# What may include what: from top to bottom, a folder sees itself and those below it.
+LAYERS = {
+    "common": "bundle hdf5 console config model mesh elastic core",
+    "runtime": "app api bench scene output sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
+    "precompute": "app study/sweep study/stability study/drawing study/measure study/baseline pipeline training examples inputs cache"
+                  " full_space alignment render shape_space targets polynomial cubature modes contact mesh_io solvers fem",
+}
+INNER = {f"{stage}/{folder}": (stage, depth) for stage, folders in LAYERS.items() for depth, folder in enumerate(folders.split())}
+OUTER = {"runtime/include"}
+SEEN_FROM = {"common": (), "runtime": ("common/",), "precompute": ("common/", "runtime/sim/", "runtime/kernels")}
+LONGEST = 500  # lines of a source
 LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime/kernels", "runtime/sim")
 LEAN_INCLUDES = LEAN + ("exmat",)
 POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of core/atomic_file alone
@@ -38,17 +49,31 @@ def without_comments_and_strings(text):
     return pattern.sub(lambda m: re.sub(r"[^\n]", " ", m.group()), text)
 
 
+def folder_of(name):
+    """The folder of the layers that a source or header is in; None where it is in none."""
+    return next((folder for folder in sorted(OUTER | INNER.keys(), key=len, reverse=True) if name.startswith(folder + "/")), None)
+
+
 def direction(root):
-    """runtime never includes precompute; common includes neither; precompute measures with runtime/sim and sees no more of it,
-    but for precompute/study, which runs scenes."""
-    forbidden = {"common": ("precompute/", "runtime/"), "runtime": ("precompute/",),
-                 "precompute": ("runtime/io/", "runtime/api/", "runtime/app/")}
+    """Every source is in a folder of the layers and includes its own folder and those below it alone; precompute measures with
+    runtime/sim and sees no more of the run time, but for precompute/study, which runs scenes."""
     for name, path in sources(root):
+        folder = folder_of(name)
+        if folder is None:
+            yield f"{name}:1: its folder is not in the layers"
+            continue
         for number, header in includes(path):
-            if name.startswith("precompute/study/") and header.startswith("runtime/io/"):
-                continue
-            if header.startswith(forbidden[name.split("/")[0]]):
+            if OWN.match(header) and not may_include(folder, folder_of(header)):
                 yield f"{name}:{number}: includes {header}"
+
+
+def may_include(folder, other):
+    if other is None or folder in OUTER:
+        return other == folder
+    (stage, depth), (other_stage, other_depth) = INNER[folder], INNER.get(other, (None, 0))
+    if stage == other_stage:
+        return depth <= other_depth
+    return other is not None and other.startswith(SEEN_FROM[stage] + (("runtime/scene",) if folder.startswith("precompute/study/") else ()))
 
 
 def lean(root):
@@ -87,10 +112,10 @@ def petsc(root):
 
 
 def hdf5(root):
-    """HDF5 is seen in common/bundle and runtime/io alone."""
+    """HDF5 is seen in common/hdf5 alone."""
     for name, path in sources(root):
         for number, header in includes(path):
-            if re.match(r"(hdf5|H5)", header) and not name.startswith(("common/bundle/", "runtime/io/")):
+            if re.match(r"(hdf5|H5)", header) and not name.startswith("common/hdf5/"):
                 yield f"{name}:{number}: includes {header}"
 
 
@@ -101,6 +126,23 @@ def public_headers(root):
         for number, header in includes(path):
             if not re.fullmatch(standard, header):
                 yield f"{name}:{number}: includes {header}"
+
+
+def length(root):
+    """Sources are short enough to be known."""
+    for name, path in sources(root, ("common", "precompute", "runtime", "tests")):
+        lines = len(path.read_text().splitlines())
+        if lines > LONGEST:
+            yield f"{name}: {lines} lines, more than {LONGEST}"
+
+
+def mirrored_tests(root):
+    """A unit test lies where its subject does."""
+    for stage in ("common", "precompute", "runtime"):
+        for path in sorted((root / "tests" / stage).rglob("*_test.cpp")):
+            folder = path.parent.relative_to(root / "tests")
+            if not (root / folder).is_dir():
+                yield f"tests/{folder}/{path.name}: there is no folder {folder}"
 
 
 def top_level(root):
@@ -122,7 +164,8 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, top_level, formatting)}
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, length, mirrored_tests, top_level,
+                                        formatting)}
 
 
 def violations(root):

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "common/model/reduced_model.h"
-#include "runtime/sim/bernstein_basis.h"
+#include "runtime/sim/examples/bernstein_basis.h"
 
 namespace exmat::test {
 

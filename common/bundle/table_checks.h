@@ -1,0 +1,19 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "common/core/arrays.h"
+#include "common/hdf5/value_checks.h"
+
+namespace exmat {
+
+// What the schema cannot say of a table of targets.
+
+/// Whether the rows are all vectors of integers >= 0 that add up to `degree`, lexicographic, descending.
+std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMatrix& rows);
+
+/// Whether they begin at 0 and end at 1, with others between for two examples only.
+std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index examples);
+
+}  // namespace exmat

@@ -1,0 +1,133 @@
+#include "precompute/examples/alignment_verdict.h"
+
+#include <fmt/format.h>
+#include <numbers>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
+constexpr double kInvertedLimit = 0.05;
+constexpr double kResidualWarning = 0.05, kResidualRefusal = 0.15;
+// Rotations of a whole pose that its frame, taken to be the object's, makes unlikely and incredible [rad].
+constexpr double kTurnWarning = 50 * std::numbers::pi / 180, kTurnRefusal = 80 * std::numbers::pi / 180;
+// A distance of landmarks, over the body's size, that is to blame for a doubt.
+constexpr double kMissedLandmarks = 0.1;
+// A displacement, over the body's size, that says nothing was found.
+constexpr double kNoPose = 0.03;
+
+const std::string kLandmarks = "alignment.landmarks (8 vertices that do not lie in a plane)";
+const std::string kSameMesh = "a pose of the rest example's own mesh, which needs no alignment";
+
+void judge_competitors(const PoseAlignment& alignment, bool free_frame, AlignmentOutcome& outcome) {
+  if (!alignment.ambiguous) return;
+  const std::string others = alignment.competing_maps == 1
+                                 ? "another pose fits as well"
+                                 : fmt::format("{} other poses fit as well", alignment.competing_maps);
+  object_to(outcome, AlignmentVerdict::kRefused,
+            free_frame ? fmt::format("{}, for the body is symmetric and the example's frame unknown; give {}, or "
+                                     "alignment.frame \"shared\" if it stands as the object does, or {}",
+                                     others, kLandmarks, kSameMesh)
+                       : fmt::format("{} and is no farther from rest; give {}, or {}", others, kLandmarks, kSameMesh));
+}
+
+void judge_revolution(const PoseAlignment& alignment, AlignmentOutcome& outcome) {
+  if (!alignment.hides_twist) return;
+  const std::string advice = fmt::format("give alignment.map, or {}", kSameMesh);
+  if (alignment.displacement < kNoPose)
+    object_to(
+        outcome, AlignmentVerdict::kRefused,
+        "the rest example is a body of revolution and the pose looks like it: a twist leaves no trace; " + advice);
+  else
+    object_to(outcome, AlignmentVerdict::kDoubtful,
+              "the rest example is a body of revolution: a turn about its axis leaves no trace; if the pose has any, " +
+                  advice);
+}
+
+void judge_turn(const PoseAlignment& alignment, AlignmentOutcome& outcome) {
+  const double degrees = alignment.turn * 180 / std::numbers::pi;
+  const auto message = fmt::format(
+      "the pose is turned by {:.0f} degrees as a whole, though its frame is taken to be the object's; say "
+      "alignment.frame \"shared\" if it is, or \"free\"",
+      degrees);
+  if (alignment.turn > kTurnRefusal) object_to(outcome, AlignmentVerdict::kRefused, message);
+  if (alignment.turn > kTurnWarning) object_to(outcome, AlignmentVerdict::kDoubtful, message);
+}
+
+}  // namespace
+
+const char* name_of(AlignmentVerdict verdict) {
+  if (verdict == AlignmentVerdict::kGood) return "good";
+  return verdict == AlignmentVerdict::kDoubtful ? "doubtful" : "refused";
+}
+
+void object_to(AlignmentOutcome& outcome, AlignmentVerdict verdict, const std::string& message) {
+  if (outcome.verdict >= verdict) return;
+  outcome.verdict = verdict;
+  outcome.message = message;
+}
+
+void judge_confidence(AlignmentOutcome& outcome, const std::string& advice) {
+  if (outcome.inverted_fraction >= kInvertedLimit)
+    object_to(outcome, AlignmentVerdict::kRefused,
+              fmt::format("the map turns {:.1f} % of the volume inside out (limit 5 %); {}",
+                          100 * outcome.inverted_fraction, advice));
+  const auto doubt = fmt::format("confidence {:.2f} (below {} is good, above {} refused); {}", outcome.confidence,
+                                 kConfidenceWarning, kConfidenceRefusal, advice);
+  if (outcome.confidence > kConfidenceRefusal) object_to(outcome, AlignmentVerdict::kRefused, doubt);
+  if (outcome.confidence > kConfidenceWarning) object_to(outcome, AlignmentVerdict::kDoubtful, doubt);
+}
+
+void judge_residual(AlignmentOutcome& outcome, const std::string& advice) {
+  const auto misfit = fmt::format("its surface is {:.1f} % from what was found (of the body's size); {}",
+                                  100 * outcome.residual, advice);
+  if (outcome.residual > kResidualRefusal) object_to(outcome, AlignmentVerdict::kRefused, misfit);
+  if (outcome.residual > kResidualWarning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
+}
+
+void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome) {
+  outcome.residual = alignment.residual;
+  outcome.confidence = alignment.confidence;
+  outcome.inverted_fraction = alignment.inverted_fraction;
+  outcome.competing_maps = alignment.competing_maps;
+  if (alignment.mirrored)
+    object_to(outcome, AlignmentVerdict::kRefused,
+              fmt::format("the mirror image of the rest example fits much better; mirror the example back, or give {}",
+                          kSameMesh));
+  const std::string advice =
+      alignment.missed_landmarks > kMissedLandmarks
+          ? fmt::format("the landmarks are {:.0f} % of the body's size from where they belong: do they correspond?",
+                        100 * alignment.missed_landmarks)
+          : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
+  judge_confidence(outcome, advice);
+  judge_residual(outcome, advice);
+  judge_competitors(alignment, free_frame, outcome);
+  judge_revolution(alignment, outcome);
+  if (frame == "auto" && !free_frame) judge_turn(alignment, outcome);
+}
+
+void require_aligned(const AssetConfig& asset, const std::vector<AlignmentOutcome>& outcomes,
+                     std::vector<std::string>& warnings) {
+  std::string refusals;
+  for (const AlignmentOutcome& outcome : outcomes) {
+    if (outcome.verdict == AlignmentVerdict::kGood) continue;
+    const bool refused = outcome.verdict == AlignmentVerdict::kRefused;
+    const std::string message =
+        fmt::format("example {}: alignment {}: {}", outcome.name, refused ? "refused" : "doubtful", outcome.message);
+    if (!refused || asset.alignment.accept)
+      warn(warnings, message + (refused ? " (taken, as alignment.accept says)" : ""));
+    else
+      refusals += (refusals.empty() ? "" : "\n") + message;
+  }
+  if (!refusals.empty()) throw WorkError(refusals);
+}
+
+void warn(std::vector<std::string>& warnings, const std::string& message) {
+  warnings.push_back(message);
+  log::warning(message);
+}
+
+}  // namespace exmat::precompute

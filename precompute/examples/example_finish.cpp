@@ -1,0 +1,160 @@
+#include "precompute/examples/example_finish.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "common/core/log.h"
+#include "precompute/shape_space/projection.h"
+#include "precompute/shape_space/region_poses.h"
+#include "precompute/solvers/eigenpairs.h"
+
+namespace exmat::precompute {
+namespace {
+
+// A share of an example's displacement lost to truncation that is worth a warning.
+constexpr double kTruncationWarning = 0.25;
+// Functions of the object looked through for how many would carry a pose.
+constexpr Eigen::Index kMostFunctions = 100;
+
+// The least number of the object's functions, no cluster cut, that loses at most the share worth a warning of a
+// displacement [3n]; 0 where kMostFunctions do not do.
+class FunctionCounter {
+ public:
+  FunctionCounter(const TetMesh& mesh, const std::string& name) : mesh_(mesh), name_(name) {}
+
+  Eigen::Index needed(const Eigen::VectorXd& field) {
+    if (!basis_) basis_ = laplace_basis(mesh_, std::min(kMostFunctions, mesh_.vertex_count() - 2), name_);
+    const VertexArray displacement = field.reshaped<Eigen::RowMajor>(field.size() / 3, 3);
+    const double whole = (displacement.transpose() * (basis_->mass * displacement)).trace();
+    const Eigen::VectorXd shares = coefficients(*basis_, displacement).rowwise().squaredNorm() / whole;
+    double carried = 0;
+    for (Eigen::Index count = 1; count < shares.size(); ++count) {
+      carried += shares[count - 1];
+      if (1 - carried <= kTruncationWarning * kTruncationWarning && !splits_cluster(basis_->eigenvalues, count))
+        return count;
+    }
+    return 0;
+  }
+
+ private:
+  const TetMesh& mesh_;
+  const std::string& name_;
+  std::optional<LaplaceBasis> basis_;
+};
+
+// [3m x (K-1)] changes of descriptor from the rest pose to the others.
+Eigen::MatrixXd descriptor_changes(const ExampleSet& set) {
+  const RowMatrix& rest = set.examples.front().descriptor;
+  Eigen::MatrixXd changes(rest.size(), std::ssize(set.examples) - 1);
+  for (Eigen::Index k = 0; k < changes.cols(); ++k)
+    changes.col(k) = (set.examples[static_cast<std::size_t>(k + 1)].descriptor - rest).reshaped<Eigen::RowMajor>();
+  return changes;
+}
+
+// `needed` functions of the object would carry the pose; 0 where too many would be needed.
+std::string advice_on_loss(const ExampleData& example, Eigen::Index functions, Eigen::Index needed) {
+  if (needed > functions)
+    return fmt::format("shape_space.eigenfunctions: {} would lose less than {:.0f} %", needed,
+                       100 * kTruncationWarning);
+  if (needed > 0 && example.method == "coupled")
+    return "coupled bases do, not the functions: give more landmarks or regions, or take alignment.method \"auto\"";
+  return fmt::format("the first {} do not carry it", kMostFunctions);
+}
+
+void log_losses(const ExampleGroup& group, const AssetConfig& asset, FunctionCounter& counter, const ExampleSet& set,
+                std::vector<std::string>& warnings) {
+  const std::string where = group.region.empty() ? "" : fmt::format(" in region {}", group.region);
+  for (Eigen::Index k = 0; k < group.fields.cols(); ++k) {
+    const ExampleData& example = set.examples[static_cast<std::size_t>(k + 1)];
+    log::info(fmt::format(
+        "example {}{}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
+        example.name, where, asset.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
+    if (example.shape_space_error <= kTruncationWarning) continue;
+    warn(warnings, fmt::format("example {}{}: {} eigenfunctions lose {:.0f} % of its displacement; {}", example.name,
+                               where, asset.eigenfunctions, 100 * example.shape_space_error,
+                               advice_on_loss(example, asset.eigenfunctions, counter.needed(group.fields.col(k)))));
+  }
+}
+
+IndexVector flagged(const FlagVector& flags) {
+  std::vector<std::int32_t> vertices;
+  for (Eigen::Index v = 0; v < flags.size(); ++v)
+    if (flags[v] != 0) vertices.push_back(static_cast<std::int32_t>(v));
+  return Eigen::Map<const IndexVector>(vertices.data(), std::ssize(vertices));
+}
+
+}  // namespace
+
+PoseFitter::PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
+                       const SemidefiniteSolver* solver, double highest, ShapeStage& stage)
+    : asset_(asset), object_(object), system_(system), stage_(stage), clamp_(system, highest, asset.name) {
+  for (const ExampleGroup& group : stage.groups) {
+    if (group.region.empty()) {
+      poses_.push_back(whole_body_poses(stage.object, stage.weights, object.fixed, clamp_));
+    } else {
+      const auto poses = std::make_shared<RegionPoses>(stage.object, stage.weights, *group.view, system, *solver,
+                                                       kRegionStiffness * highest);
+      poses_.emplace_back([poses](const Eigen::MatrixXd& changes) { return poses->displacements(changes); });
+    }
+    fields_.push_back(poses_.back()(descriptor_changes(group.examples)));
+  }
+}
+
+Eigen::MatrixXd PoseFitter::fields() const {
+  Eigen::MatrixXd fields(system_.mass.rows(), 0);
+  for (const Eigen::MatrixXd& more : fields_) {
+    fields.conservativeResize(Eigen::NoChange, fields.cols() + more.cols());
+    fields.rightCols(more.cols()) = more;
+  }
+  return fields;
+}
+
+PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedModel& model) {
+  ExampleGroup& group = stage_.groups[index];
+  const RowMatrix& basis = model.modal->basis;
+  const bool whole = group.region.empty();
+  Finished finished{std::move(group.examples), direct_projection(stage_.object, stage_.weights, system_.full_mass,
+                                                                 whole ? basis : RowMatrix(group.view->see(basis)))};
+  const RowMatrix map = whole && !system_.constrained()
+                            ? finished.projection.reduced_from_shape
+                            : pose_map(poses_[index], asset_.eigenfunctions, system_, basis);
+  finished.projection.target_basis = range_basis(map);
+  fill_weights_problem(stage_.data.rest_descriptor, finished.projection, map, finished.examples);
+  const Eigen::MatrixXd fields =
+      whole ? carried_fields(stage_.object, stage_.weights, object_.fixed, descriptor_changes(finished.examples))
+            : system_.extend(fields_[index]);
+  for (Eigen::Index k = 0; k < fields.cols(); ++k) {
+    ExampleData& example = finished.examples.examples[static_cast<std::size_t>(k + 1)];
+    const Eigen::VectorXd rest = fields.col(k) - basis * example.pose;
+    const double norm = fields.col(k).dot(system_.full_mass * fields.col(k));
+    example.basis_error = norm > 0 ? std::sqrt(std::max(0.0, rest.dot(system_.full_mass * rest) / norm)) : 0;
+  }
+  return finished;
+}
+
+void PoseFitter::finish(ReducedModel& model, std::vector<std::string>& warnings) {
+  FunctionCounter counter(model.object->mesh, asset_.name);
+  for (std::size_t i = 0; i < stage_.groups.size(); ++i) {
+    auto [examples, projection] = finish_group(i, model);
+    const ExampleGroup& group = stage_.groups[i];
+    log_losses(group, asset_, counter, examples, warnings);
+    if (group.region.empty()) {
+      model.projection = std::move(projection);
+      model.examples = std::move(examples);
+      continue;
+    }
+    RegionData& region = model.regions.emplace_back();
+    region.name = group.region;
+    region.index = std::ssize(model.regions) - 1;
+    region.vertices = flagged(group.view->inside());
+    region.examples = std::move(examples);
+    region.projection = std::move(projection);
+  }
+  model.shape_space = std::move(stage_.data);
+}
+
+}  // namespace exmat::precompute

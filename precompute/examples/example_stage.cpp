@@ -1,0 +1,217 @@
+#include "precompute/examples/example_stage.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <utility>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/mesh/geometry.h"
+#include "precompute/examples/example_alignment.h"
+#include "precompute/shape_space/pose_map.h"
+#include "precompute/shape_space/projection.h"
+#include "precompute/solvers/eigenpairs.h"
+
+namespace exmat::precompute {
+namespace {
+
+// Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
+constexpr Eigen::Index kExtraEigenfunctions = 4;
+// A displacement, over the object's size, that is none.
+constexpr double kNoPose = 1e-6;
+
+class ShapeStageBuilder {
+ public:
+  ShapeStageBuilder(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input, StageCache& cache,
+                    std::vector<std::string>& warnings)
+      : asset_(asset), object_(object), input_(input), cache_(cache), warnings_(warnings) {}
+
+  ShapeStage build();
+
+ private:
+  Eigen::VectorXd object_basis();
+  void set_shape_data(const Eigen::VectorXd& eigenvalues);
+  void add_examples();
+  SparseMatrix fit_weights() const;
+  void add_rest(const AlignedRest& rest, ExampleGroup& group) const;
+  TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
+  void add_pose(const PoseInput& input, const AlignmentOutcome& outcome, const TransferredPose& transferred,
+                ExampleGroup& group) const;
+  ExampleData example_data(const AlignmentOutcome& outcome, double volume, const ExampleGroup& group) const;
+  void add_groups(const AlignedRest& rest);
+  PoseFrame region_frame(const AlignedRest& rest, const RegionView& view) const;
+  Eigen::VectorXd share_of_region(const AlignedRest& rest, const RegionInput& input) const;
+  void cut(const RegionView& view, const Eigen::VectorXd& share, TransferredPose& pose) const;
+  VertexArray carried_displacement(const TransferredPose& pose) const;
+
+  const AssetConfig& asset_;
+  const ObjectInput& object_;
+  const ExampleInput& input_;
+  StageCache& cache_;
+  std::vector<std::string>& warnings_;
+  ShapeStage stage_;
+};
+
+// Leaves the first m functions in the stage and returns the eigenvalues of a few more.
+Eigen::VectorXd ShapeStageBuilder::object_basis() {
+  const Eigen::Index m = asset_.eigenfunctions;
+  const Eigen::Index available = object_.mesh.vertex_count() - 2;
+  if (m >= available)
+    throw InputError({"", "/shape_space/eigenfunctions",
+                      fmt::format("at most {} for a mesh of {} vertices", available - 1, object_.mesh.vertex_count()),
+                      std::to_string(m), "ask for fewer or refine the mesh"});
+  const Eigen::Index count = std::min(m + kExtraEigenfunctions, available);
+  stage_.object = cache_.get(
+      "eigenfunctions", [&] { return laplace_basis(object_.mesh, count, asset_.name); }, object_.mesh, count);
+  Eigen::VectorXd eigenvalues = stage_.object.eigenvalues;
+  stage_.object.eigenvalues.conservativeResize(m);
+  stage_.object.eigenfunctions.conservativeResize(Eigen::NoChange, m);
+  return eigenvalues;
+}
+
+void ShapeStageBuilder::set_shape_data(const Eigen::VectorXd& eigenvalues) {
+  const Eigen::Index m = asset_.eigenfunctions;
+  const LaplaceBasis& object = stage_.object;
+  stage_.weights = descriptor_weights(object, asset_.weighting);
+  stage_.rest_coefficients = coefficients(object, object.vertices);
+  stage_.data = {object.eigenvalues,
+                 object.eigenfunctions,
+                 stage_.weights.asDiagonal() * stage_.rest_coefficients,
+                 object.volume,
+                 object.centroid,
+                 asset_.weighting,
+                 splits_cluster(eigenvalues, m) ? 1 : 0};
+  if (stage_.data.splits_cluster != 0)
+    warn(warnings_,
+         fmt::format("shape_space.eigenfunctions: {} splits a cluster of nearly equal eigenvalues ({:.4g} and {:.4g}); "
+                     "{} would not",
+                     m, eigenvalues[m - 1], eigenvalues[m], next_uncut(eigenvalues, m)));
+}
+
+SparseMatrix ShapeStageBuilder::fit_weights() const {
+  if (!object_.fixed.any()) return scalar_mass(object_.mesh, object_.materials.density);
+  return SparseMatrix(Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal());
+}
+
+ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, double volume,
+                                            const ExampleGroup& group) const {
+  ExampleData example;
+  example.name = outcome.name;
+  example.index = std::ssize(group.examples.examples);
+  example.scale = std::cbrt(stage_.object.volume / volume);
+  example.method = outcome.method;
+  example.alignment_residual = outcome.residual;
+  example.confidence = outcome.confidence;
+  example.inverted_fraction = outcome.inverted_fraction;
+  example.competing_maps = outcome.competing_maps;
+  return example;
+}
+
+void ShapeStageBuilder::add_rest(const AlignedRest& rest, ExampleGroup& group) const {
+  ExampleData example = example_data(rest.outcome, rest.basis.volume, group);
+  example.is_rest = true;
+  example.rotation = rest.rotation;
+  example.descriptor = stage_.data.rest_descriptor;
+  group.examples.examples.push_back(std::move(example));
+}
+
+TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const AlignedPose& pose,
+                                            const PoseFrame& frame) const {
+  if (pose.carried)
+    return transfer_carried(stage_.object, stage_.rest_coefficients, rest.carried, *pose.carried, frame);
+  return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
+}
+
+void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignmentOutcome& outcome,
+                                 const TransferredPose& transferred, ExampleGroup& group) const {
+  ExampleData example = example_data(outcome, tet_volumes(input.mesh).sum(), group);
+  example.rotation = transferred.rotation;
+  example.shape_space_error = transferred.shape_space_error;
+  example.descriptor = stage_.weights.asDiagonal() * transferred.coefficients;
+  if (transferred.displacement.norm() <= kNoPose * stage_.object.vertices.norm())
+    throw InputError({"", "/examples, " + input.name,
+                      group.region.empty()
+                          ? "a pose that differs from the rest pose"
+                          : fmt::format("a pose that differs from the rest pose in the region {}", group.region),
+                      "the rest pose", "leave it out: the rest pose is always an example"});
+  group.fields.conservativeResize(3 * object_.mesh.vertex_count(), group.fields.cols() + 1);
+  group.fields.rightCols(1) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
+  group.examples.examples.push_back(std::move(example));
+}
+
+// 0 to 1 at each vertex of the object: how much of what a pose does there belongs to the region.
+Eigen::VectorXd ShapeStageBuilder::share_of_region(const AlignedRest& rest, const RegionInput& input) const {
+  const Eigen::VectorXd inside = input.inside.cast<double>();
+  if (input.inside_example.size() == 0) return inside;
+  return inside.cwiseProduct(rest.map.pull_back * input.inside_example.cast<double>());
+}
+
+// A pose is placed by the vertices that its region is seen from.
+PoseFrame ShapeStageBuilder::region_frame(const AlignedRest& rest, const RegionView& view) const {
+  if (view.frame().isZero(0)) return {rest.free_poses, fit_weights(), true};
+  return {rest.free_poses, SparseMatrix(view.frame().asDiagonal()), true};
+}
+
+// Leaves what the view sees of a pose that region_frame() placed.
+void ShapeStageBuilder::cut(const RegionView& view, const Eigen::VectorXd& share, TransferredPose& pose) const {
+  const double weight = view.frame().sum();
+  if (weight > 0) pose.displacement.rowwise() -= view.frame().transpose() * pose.displacement / weight;
+  pose.displacement = share.asDiagonal() * pose.displacement;
+  const Eigen::MatrixXd change = coefficients(stage_.object, pose.displacement);
+  pose.coefficients = stage_.rest_coefficients + change;
+  pose.shape_space_error = lost_share(stage_.object.mass, pose.displacement, stage_.object.eigenfunctions * change);
+}
+
+void ShapeStageBuilder::add_groups(const AlignedRest& rest) {
+  if (input_.whole_body) stage_.groups.push_back({""});
+  for (const RegionInput& input : input_.regions)
+    stage_.groups.push_back({input.name, RegionView(object_.mesh, input.inside, object_.fixed)});
+  for (ExampleGroup& group : stage_.groups) add_rest(rest, group);
+}
+
+void ShapeStageBuilder::add_examples() {
+  ExampleAligner aligner(asset_, stage_.object, object_, input_, cache_);
+  const AlignedRest rest = aligner.align_rest();
+  stage_.alignments.push_back(rest.outcome);
+  add_groups(rest);
+  const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
+  for (const PoseInput& input : input_.poses) {
+    const AlignedPose pose = aligner.align_pose(rest, input);
+    const TransferredPose whole = transfer(rest, pose, frame);
+    stage_.poses.push_back({whole.rotation, carried_displacement(whole)});
+    stage_.alignments.push_back(pose.outcome);
+    stage_.alignments.back().shape_space_error = whole.shape_space_error;
+    if (input_.whole_body && input.in_whole_body) add_pose(input, pose.outcome, whole, stage_.groups.front());
+    for (std::size_t i = 0; i < input_.regions.size(); ++i) {
+      const RegionInput& region = input_.regions[i];
+      if (std::ranges::find(region.examples, input.name) == region.examples.end()) continue;
+      ExampleGroup& group = stage_.groups[i + (input_.whole_body ? 1 : 0)];
+      TransferredPose local = transfer(rest, pose, region_frame(rest, *group.view));
+      cut(*group.view, share_of_region(rest, region), local);
+      add_pose(input, pose.outcome, local, group);
+    }
+  }
+}
+
+VertexArray ShapeStageBuilder::carried_displacement(const TransferredPose& pose) const {
+  const RowMatrix change = stage_.weights.asDiagonal() * (pose.coefficients - stage_.rest_coefficients);
+  const Eigen::MatrixXd field =
+      carried_fields(stage_.object, stage_.weights, object_.fixed, change.reshaped<Eigen::RowMajor>());
+  return field.reshaped<Eigen::RowMajor>(object_.mesh.vertex_count(), 3);
+}
+
+ShapeStage ShapeStageBuilder::build() {
+  set_shape_data(object_basis());
+  add_examples();
+  return std::move(stage_);
+}
+
+}  // namespace
+
+ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
+                             StageCache& cache, std::vector<std::string>& warnings) {
+  return ShapeStageBuilder(asset, object, input, cache, warnings).build();
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,200 @@
+#include "precompute/full_space/full_space_examples.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "common/core/error.h"
+#include "common/mesh/geometry.h"
+#include "precompute/cubature/element_samples.h"
+#include "precompute/modes/field_clamp.h"
+#include "precompute/shape_space/pose_map.h"
+#include "precompute/shape_space/projection.h"
+#include "precompute/shape_space/region_poses.h"
+#include "precompute/solvers/semidefinite_solver.h"
+
+namespace exmat::precompute {
+namespace {
+
+// Directions of the poses this much weaker than the strongest, squared, are rounding.
+constexpr double kRank = 1e-12;
+// Relative difference of P and its transpose that is rounding.
+constexpr double kSymmetric = 1e-12;
+
+using Field = Eigen::Map<const VertexArray>;
+
+// Squared angular frequency of the highest linear mode, as the pipeline's clamp has it.
+double clamp_decay(const ReducedModel& model) {
+  const double angular = 2 * std::numbers::pi * model.modal->frequencies.tail(1)[0];
+  return angular * angular;
+}
+
+Eigen::VectorXd flat(const RowMatrix& matrix) { return matrix.reshaped<Eigen::RowMajor>(); }
+
+void require_examples(const ReducedModel& model, bool there, const std::string& group) {
+  if (!there || !model.shape_space || !model.modal)
+    throw InputError({"", group, "this group, /shape_space and /modal", "none",
+                      "precompute the bundle again with a scene that has these examples"});
+}
+
+// The modal basis of a free body holds no rigid motions.
+void drop_rigid_motions(const ElasticSystem& system, Eigen::MatrixXd& fields) {
+  fields -= system.null_space * (system.null_space.transpose() * (system.mass * fields)).eval();
+}
+
+FlagVector flags(const IndexVector& vertices, Eigen::Index count) {
+  FlagVector flags = FlagVector::Zero(count);
+  flags(vertices).setOnes();
+  return flags;
+}
+
+bool inverts(const RowMatrix& gradient, const Eigen::VectorXd& pose) {
+  const Eigen::Matrix<double, 9, 1> H = gradient * pose;
+  return (Eigen::Matrix3d::Identity() + Eigen::Map<const RowMatrix3>(H.data())).determinant() <= 0;
+}
+
+}  // namespace
+
+ExamplePoses whole_body_example_poses(const ReducedModel& model, const ElasticSystem& system) {
+  require_examples(model, model.examples.has_value(), "/examples");
+  const LaplaceBasis object = laplace_basis_of(model);
+  const FieldClamp clamp(system, clamp_decay(model), model.asset_name);
+  const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting);
+  const PoseFields poses = whole_body_poses(object, weights, model.object->fixed, clamp);
+  ExamplePoses result{&*model.examples, {}, poses(Eigen::MatrixXd::Identity(3 * weights.size(), 3 * weights.size()))};
+  drop_rigid_motions(system, result.fields);
+  return result;
+}
+
+std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const ElasticSystem& system,
+                                               const std::vector<std::string>& regions) {
+  std::vector<ExamplePoses> result;
+  if (regions.empty()) return result;
+  require_examples(model, !model.regions.empty(), "/regions");
+  const ObjectData& body = *model.object;
+  const LaplaceBasis object = laplace_basis_of(model);
+  const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting);
+  const SemidefiniteSolver solver(system.stiffness, system.mass * system.null_space,
+                                  model.asset_name + ": elastic stiffness", system.rigid);
+  for (const std::string& name : regions) {
+    const auto region = std::ranges::find(model.regions, name, &RegionData::name);
+    require_examples(model, region != model.regions.end(), "/regions/" + name);
+    ExamplePoses& poses = result.emplace_back();
+    poses.examples = &region->examples;
+    poses.view.emplace(body.mesh, flags(region->vertices, body.mesh.vertex_count()), body.fixed);
+    const RegionPoses map(object, weights, *poses.view, system, solver, kRegionStiffness * clamp_decay(model));
+    poses.fields = map.displacements(Eigen::MatrixXd::Identity(3 * weights.size(), 3 * weights.size()));
+    drop_rigid_motions(system, poses.fields);
+  }
+  return result;
+}
+
+FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
+                                     runtime::EnergyReference reference)
+    : view_(poses.view), free_dofs_(system.free_dofs) {
+  set_filter(model, *poses.examples);
+  set_poses(model, system, poses);
+  set_target(model, system, *poses.examples, reference);
+}
+
+void FullSpaceExamples::set_filter(const ReducedModel& model, const ExampleSet& set) {
+  const LaplaceBasis object = laplace_basis_of(model);
+  analysis_ = object.mass * object.eigenfunctions;
+  synthesis_ = scalar_mass(model.object->mesh, model.object->materials.density) * object.eigenfunctions;
+  if (!view_) {
+    std::vector<std::int32_t> free_vertices;
+    for (std::size_t i = 0; i < free_dofs_.size(); i += 3) free_vertices.push_back(free_dofs_[i] / 3);
+    analysis_ = RowMatrix(analysis_(free_vertices, Eigen::all));
+    synthesis_ = RowMatrix(synthesis_(free_vertices, Eigen::all));
+  }
+  const double ratio = synthesis_.norm() / analysis_.norm();
+  symmetric_ = (synthesis_ - ratio * analysis_).norm() <= kSymmetric * synthesis_.norm();
+
+  const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting) / std::cbrt(object.volume);
+  RowMatrix slopes(std::ssize(set.examples), 3 * weights.size());
+  for (std::size_t k = 0; k < set.examples.size(); ++k)
+    slopes.row(static_cast<Eigen::Index>(k)) = flat(weights.asDiagonal() * set.examples[k].descriptor).transpose();
+  weights_ = runtime::ExampleWeights(set.gram, set.h0, slopes);
+}
+
+void FullSpaceExamples::set_poses(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses) {
+  const Eigen::MatrixXd& fields = poses.fields;
+  const Eigen::MatrixXd mass_fields = system.mass * fields;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * mass_fields);
+  const Eigen::VectorXd& values = gram.eigenvalues();
+  const Eigen::Index rank = (values.array() > kRank * values.tail(1)[0]).count();
+  const Eigen::VectorXd scales = values.tail(rank).cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd directions = gram.eigenvectors().rightCols(rank) * scales.asDiagonal();
+  pose_basis_ = fields * directions;
+  for (const ExampleData& example : poses.examples->examples) {
+    const Eigen::VectorXd change = flat(example.descriptor - model.shape_space->rest_descriptor);
+    poses_.push_back(directions.transpose() * (mass_fields.transpose() * (fields * change)));
+  }
+}
+
+void FullSpaceExamples::set_target(const ReducedModel& model, const ElasticSystem& system, const ExampleSet& set,
+                                   runtime::EnergyReference reference) {
+  const ObjectData& object = *model.object;
+  const RowMatrix basis = system.extend(pose_basis_);
+  const ElementSamples samples(object.mesh, object.materials, basis);
+  CubatureData all;
+  std::vector<Eigen::Index> kept;
+  all.gradient.resize(9 * samples.count(), basis.cols());
+  for (Eigen::Index t = 0; t < samples.count(); ++t) {
+    const RowMatrix gradient = samples.gradient(t);
+    const bool inverted = reference == runtime::EnergyReference::kExample &&
+                          std::ranges::any_of(poses_, [&](const auto& pose) { return inverts(gradient, pose); });
+    if (inverted) continue;
+    all.gradient.middleRows<9>(9 * std::ssize(kept)) = gradient;
+    kept.push_back(t);
+  }
+  left_out_ = samples.count() - std::ssize(kept);
+  all.gradient.conservativeResize(9 * std::ssize(kept), Eigen::NoChange);
+  all.weights = Eigen::VectorXd::Ones(std::ssize(kept));
+  all.volumes = tet_volumes(object.mesh)(kept);
+  all.youngs_modulus = object.materials.youngs_modulus(kept);
+  all.poisson_ratio = object.materials.poisson_ratio(kept);
+  std::vector<ExampleData> examples = set.examples;
+  for (std::size_t k = 0; k < examples.size(); ++k) examples[k].pose = poses_[k];
+  const auto complaint =
+      target_.build(object.materials.model, all, examples, RowMatrix::Identity(basis.cols(), basis.cols()), reference);
+  if (complaint) throw InputError(*complaint);
+  target_fields_ = pose_basis_ * target_.basis();
+}
+
+// [m x 3] functions^T times what is seen of u.
+Eigen::MatrixXd FullSpaceExamples::coefficients(const RowMatrix& functions, const Eigen::VectorXd& u) const {
+  if (!view_) return functions.transpose() * Field(u.data(), functions.rows(), 3);
+  Eigen::VectorXd all = Eigen::VectorXd::Zero(3 * functions.rows());
+  all(free_dofs_) = u;
+  const Eigen::VectorXd seen = view_->see(all);
+  return functions.transpose() * Field(seen.data(), functions.rows(), 3);
+}
+
+// Its transpose.
+Eigen::VectorXd FullSpaceExamples::force(const RowMatrix& functions, const Eigen::MatrixXd& coefficients) const {
+  const Eigen::VectorXd forces = flat(functions * coefficients);
+  if (!view_) return forces;
+  const Eigen::VectorXd felt = view_->transposed(forces);
+  return felt(free_dofs_);
+}
+
+Eigen::VectorXd FullSpaceExamples::weights(const Eigen::VectorXd& u) const {
+  runtime::ExampleWeights::Workspace workspace = weights_.make_workspace();
+  Eigen::VectorXd weights(count());
+  weights_.solve(flat(coefficients(analysis_, u)), workspace, weights);
+  return weights;
+}
+
+Eigen::VectorXd FullSpaceExamples::filter(const Eigen::VectorXd& u) const {
+  return force(synthesis_, coefficients(analysis_, u));
+}
+
+Eigen::VectorXd FullSpaceExamples::transposed_filter(const Eigen::VectorXd& u) const {
+  return force(analysis_, coefficients(synthesis_, u));
+}
+
+}  // namespace exmat::precompute

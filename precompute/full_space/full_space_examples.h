@@ -1,0 +1,84 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+#include "precompute/fem/elastic_system.h"
+#include "precompute/shape_space/region_view.h"
+#include "runtime/sim/examples/example_weights.h"
+#include "runtime/sim/examples/target.h"
+
+namespace exmat::precompute {
+
+/// The examples of the whole body or of a region, from what a bundle holds.
+struct ExamplePoses {
+  const ExampleSet* examples = nullptr;  ///< of the bundle
+  std::optional<RegionView> view;        ///< of a region
+  Eigen::MatrixXd fields;  ///< [f x 3m], displacements that changes of descriptor stand for; of a free body without
+                           ///< their rigid part
+};
+
+/// Poses by whole_body_poses(). Throws InputError where the model has no examples.
+ExamplePoses whole_body_example_poses(const ReducedModel& model, const ElasticSystem& system);
+
+/// Poses by RegionPoses, of each of the regions named. Throws InputError where the model has none of that name.
+std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const ElasticSystem& system,
+                                               const std::vector<std::string>& regions);
+
+/// Example forces without a modal basis, of which those of method.md, section 5, are the Galerkin projection: with the
+/// m eigenfunctions Phi of the shape space, T u = Lambda Phi^T (M_s/V) u / V^(1/3), and the filter P u = M Phi Phi^T
+/// (M_s/V) u, U^T P U = T^+ T, and of a region D''^T P D''. f free degrees of freedom, K examples. All tets take part
+/// in the energies of the target.
+class FullSpaceExamples {
+ public:
+  /// Of `poses` no more than the view is kept. Tets that an example turns inside out are left out of the energies of
+  /// the examples where these start from the examples.
+  FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
+                    runtime::EnergyReference reference);
+
+  Eigen::Index count() const { return weights_.examples(); }
+  Eigen::Index left_out_tets() const { return left_out_; }
+
+  /// n, 1 where the force acts; none of the whole body.
+  std::optional<FlagVector> inside() const { return view_ ? std::optional(view_->inside()) : std::nullopt; }
+
+  /// [K] weights of the deformation u [f], before the bias.
+  Eigen::VectorXd weights(const Eigen::VectorXd& u) const;
+
+  /// P u and P^T u [f]; the same where density is uniform.
+  Eigen::VectorXd filter(const Eigen::VectorXd& u) const;
+  Eigen::VectorXd transposed_filter(const Eigen::VectorXd& u) const;
+  bool symmetric() const { return symmetric_; }
+
+  /// [f x d] mass-orthonormal basis of the poses that descriptors stand for, and [d] the examples in it.
+  const Eigen::MatrixXd& pose_basis() const { return pose_basis_; }
+  const Eigen::VectorXd& pose(Eigen::Index k) const { return poses_[static_cast<std::size_t>(k)]; }
+
+  /// Minimises the energies of the examples over the tets, in coordinates y [d]: the displacement is [f x d] fields y.
+  const runtime::TargetSolver& target() const { return target_; }
+  const Eigen::MatrixXd& target_fields() const { return target_fields_; }
+
+ private:
+  void set_filter(const ReducedModel& model, const ExampleSet& set);
+  void set_poses(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses);
+  void set_target(const ReducedModel& model, const ElasticSystem& system, const ExampleSet& set,
+                  runtime::EnergyReference reference);
+  Eigen::MatrixXd coefficients(const RowMatrix& functions, const Eigen::VectorXd& u) const;
+  Eigen::VectorXd force(const RowMatrix& functions, const Eigen::MatrixXd& coefficients) const;
+
+  std::optional<RegionView> view_;
+  std::vector<std::int32_t> free_dofs_;  // of a region
+  RowMatrix analysis_;                   // vertices x m, (M_s/V) Phi; free vertices, of a region all
+  RowMatrix synthesis_;                  // likewise, M Phi
+  bool symmetric_ = true;
+  runtime::ExampleWeights weights_;  // of Phi^T (M_s/V) u [3m]
+  Eigen::MatrixXd pose_basis_, target_fields_;
+  std::vector<Eigen::VectorXd> poses_;
+  runtime::TargetSolver target_;
+  Eigen::Index left_out_ = 0;
+};
+
+}  // namespace exmat::precompute

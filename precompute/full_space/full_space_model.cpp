@@ -1,0 +1,86 @@
+#include "precompute/full_space/full_space_model.h"
+
+#include <Eigen/Geometry>
+#include <string>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+
+namespace exmat::precompute {
+namespace {
+
+VertexArray as_rows(const Eigen::VectorXd& field) { return field.reshaped<Eigen::RowMajor>(field.size() / 3, 3); }
+
+void add_examples(const ReducedModel& model, const FullSpaceOptions& options, FullSpaceModel& full) {
+  const auto add = [&](const ExamplePoses& poses, runtime::EnergyReference reference, const std::string& owner) {
+    const auto& added = full.examples.emplace_back(model, full.system, poses, reference);
+    if (const Eigen::Index left_out = added.left_out_tets(); left_out > 0)
+      log::warning(owner + ": the energies of the target leave out " + std::to_string(left_out) + " of " +
+                   std::to_string(model.object->mesh.tet_count()) + " tets, which an example turns inside out");
+  };
+  if (options.whole_body) add(whole_body_example_poses(model, full.system), options.energy_reference, model.asset_name);
+  if (options.regions.empty()) return;
+  std::vector<std::string> names;
+  for (const auto& region : options.regions) names.push_back(region.name);
+  const std::vector<ExamplePoses> poses = region_example_poses(model, full.system, names);
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    add(poses[i], options.regions[i].energy_reference, model.asset_name + ", region " + names[i]);
+}
+
+}  // namespace
+
+FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options) {
+  if (!model.object) throw InputError({"", "/object", "this group", "none", "precompute the bundle again"});
+  const ObjectData& object = *model.object;
+  FullSpaceModel full;
+  full.rest = object.mesh.vertices;
+  full.system = build_elastic_system(object.mesh, object.materials, object.fixed);
+  full.elasticity = MeshElasticity(object.mesh, object.materials, full.system.free_dofs);
+  full.mass_values = full.elasticity.values_of(full.system.mass);
+  Eigen::MatrixXd axes = Eigen::MatrixXd::Zero(full.system.full_mass.rows(), 3);
+  for (int axis = 0; axis < 3; ++axis) axes(Eigen::seqN(axis, axes.rows() / 3, 3), axis).setOnes();
+  full.gravity_load = full.system.restrict(full.system.full_mass * axes);
+  if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
+  if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
+  add_examples(model, options, full);
+  return full;
+}
+
+FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& displacement,
+                                     const Eigen::VectorXd& velocity) {
+  FullSpaceState state;
+  state.q = state.q_previous = model.system.restrict(displacement);
+  state.v = state.v_previous = model.system.restrict(velocity);
+  state.a = state.applied_force = Eigen::VectorXd::Zero(model.size());
+  state.elastic_energy = model.elasticity.energy(state.q);
+  for (const FullSpaceExamples& examples : model.examples)
+    state.examples.push_back(
+        {Eigen::VectorXd::Unit(examples.count(), 0), Eigen::VectorXd::Zero(examples.pose_basis().cols())});
+  return state;
+}
+
+FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& deformation,
+                                     const runtime::FreeMotion& motion) {
+  if (!model.frame)
+    throw InputError({"", "/body", "a free body, since it is to move", "a body with fixed vertices", ""});
+  const Eigen::Vector3d centre = model.frame->centre_at_rest();
+  const Eigen::Matrix3d rotation = motion.orientation.toRotationMatrix();
+  Eigen::VectorXd displacement(deformation.size()), velocity(deformation.size());
+  for (Eigen::Index i = 0; i < model.rest.rows(); ++i) {
+    const Eigen::Vector3d rest = model.rest.row(i).transpose();
+    const Eigen::Vector3d arm = rotation * (rest - centre + deformation.segment<3>(3 * i));
+    displacement.segment<3>(3 * i) = centre + motion.position + arm - rest;
+    velocity.segment<3>(3 * i) = motion.linear_velocity + motion.angular_velocity.cross(arm);
+  }
+  return make_full_space_state(model, displacement, velocity);
+}
+
+VertexArray world_positions(const FullSpaceModel& model, const FullSpaceState& state) {
+  return model.rest + as_rows(model.system.extend(state.q));
+}
+
+VertexArray world_velocities(const FullSpaceModel& model, const FullSpaceState& state) {
+  return as_rows(model.system.extend(state.v));
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,69 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+#include "precompute/fem/elastic_system.h"
+#include "precompute/full_space/fitted_frame.h"
+#include "precompute/full_space/full_space_examples.h"
+#include "precompute/full_space/mesh_elasticity.h"
+#include "precompute/full_space/target_method.h"
+#include "precompute/full_space/vertex_contacts.h"
+#include "runtime/sim/step/scene.h"
+#include "runtime/sim/step/state.h"
+
+namespace exmat::precompute {
+
+/// A body with all degrees of freedom of its mesh: what the reduced model of the same bundle is measured against.
+/// Immutable. n vertices, f free degrees of freedom (all 3n of a free body, which moves in the world by itself).
+struct FullSpaceModel {
+  VertexArray rest;                         ///< n x 3 [m]
+  ElasticSystem system;                     ///< consistent mass, f x f and 3n x 3n
+  MeshElasticity elasticity;                ///< all tets
+  Eigen::VectorXd mass_values;              ///< of the mass on the pattern of the stiffness [kg]
+  Eigen::MatrixXd gravity_load;             ///< f x 3, force per unit acceleration along each axis [kg]
+  std::optional<FittedFrame> frame;         ///< of a free body
+  std::optional<VertexContacts> contacts;   ///< of a bundle with /contact
+  std::vector<FullSpaceExamples> examples;  ///< of the whole body, if they are asked for, then of regions
+  /// In place of the targets of `examples`, one for each of them; or none.
+  std::vector<std::shared_ptr<const TargetMethod>> target_methods;
+
+  Eigen::Index size() const { return elasticity.size(); }
+};
+
+struct FullSpaceOptions {
+  bool whole_body = false;  ///< whether to have its examples
+  runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;
+  struct Region {
+    std::string name{};
+    runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;
+  };
+  std::vector<Region> regions{};  ///< whose examples to have
+};
+
+/// From /object; /contact if it is there; with examples also /examples or /regions, /shape_space and /modal. Throws
+/// InputError where a group is missing.
+FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options = {});
+
+/// A State of the run time, of a body without a frame of its own: q, v and a [f] are displacement from rest [m],
+/// velocity and acceleration of the free degrees of freedom, target [d] the coordinates of the last target.
+using FullSpaceState = runtime::State;
+
+/// At time 0 with the displacement and velocity [3n] of all vertices; those of fixed ones count for nothing.
+FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& displacement,
+                                     const Eigen::VectorXd& velocity);
+
+/// The same for a free body that is deformed by u [3n] and moved by `motion`: x = c + R (X + u), X about the centre of
+/// mass c at rest.
+FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& deformation,
+                                     const runtime::FreeMotion& motion);
+
+/// [n x 3] world positions [m] and velocities [m/s] of all vertices.
+VertexArray world_positions(const FullSpaceModel& model, const FullSpaceState& state);
+VertexArray world_velocities(const FullSpaceModel& model, const FullSpaceState& state);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,86 @@
+#include "precompute/full_space/scene_setup.h"
+
+#include <string>
+#include <utility>
+
+#include "common/core/error.h"
+
+namespace exmat::precompute {
+namespace {
+
+runtime::Integrator integrator_of(const SceneConfig& config) {
+  if (config.integrator == "backward_euler") return runtime::Integrator::kBackwardEuler;
+  if (config.integrator == "newmark") return runtime::Integrator::kNewmark;
+  return runtime::Integrator::kBdf2;
+}
+
+void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
+  const std::string file = config.file.string();
+  if (!config.body.motion.empty())
+    throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
+  if (config.examples && config.examples->force != "linear")
+    throw InputError({file, "/examples/force", "\"linear\"", '"' + config.examples->force + '"', ""});
+  const auto require_part = [&](bool needed, bool there, const char* group) {
+    if (needed && !there)
+      throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
+                        "precompute the bundle again with this scene (--scene)"});
+  };
+  require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
+  const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
+  require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
+  for (std::size_t i = 0; i < config.forces.size(); ++i)
+    for (const std::int64_t vertex : config.forces[i].vertices)
+      if (vertex < 0 || vertex >= model.rest.rows())
+        throw InputError({file, "/forces/" + std::to_string(i) + "/vertices",
+                          "vertices of the object, 0 to " + std::to_string(model.rest.rows() - 1),
+                          std::to_string(vertex), ""});
+}
+
+}  // namespace
+
+FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::Obstacle> obstacles,
+                                const FullSpaceModel& model) {
+  require_supported(config, model);
+  FullSpaceScene scene;
+  scene.time_step = config.time_step;
+  scene.integrator = integrator_of(config);
+  scene.mass_damping = config.mass_damping;
+  scene.stiffness_damping = config.stiffness_damping;
+  scene.gravity = config.gravity;
+  scene.forces = config.forces;
+  scene.obstacles = std::move(obstacles);
+  const auto add = [&](const ExampleForceConfig& force) {
+    scene.examples.push_back({force.stiffness, force.damping, force.bias});
+  };
+  if (config.examples) add(*config.examples);
+  for (const RegionForceConfig& region : config.regions) add(region.force);
+  return scene;
+}
+
+FullSpaceOptions full_space_options(const SceneConfig& config) {
+  FullSpaceOptions options;
+  options.whole_body = config.examples.has_value();
+  if (config.examples)
+    options.energy_reference = runtime::energy_reference_from_name(config.examples->energy_reference);
+  for (const auto& [name, force] : config.regions)
+    options.regions.push_back({name, runtime::energy_reference_from_name(force.energy_reference)});
+  return options;
+}
+
+FullSpaceState full_space_start(const SceneConfig& config, const FullSpaceModel& model,
+                                const Eigen::VectorXd& deformation) {
+  const BodyConfig& body = config.body;
+  const bool moves = body.position || body.orientation || body.linear_velocity || body.angular_velocity;
+  if (!model.frame && moves)
+    throw InputError(
+        {config.file.string(), "/body", "no position, orientation or velocity of a clamped body", "some", ""});
+  if (!model.frame) return make_full_space_state(model, deformation, Eigen::VectorXd::Zero(deformation.size()));
+  runtime::FreeMotion motion;
+  motion.position = body.position.value_or(motion.position);
+  motion.orientation = body.orientation.value_or(motion.orientation);
+  motion.linear_velocity = body.linear_velocity.value_or(motion.linear_velocity);
+  motion.angular_velocity = body.angular_velocity.value_or(motion.angular_velocity);
+  return make_full_space_state(model, deformation, motion);
+}
+
+}  // namespace exmat::precompute

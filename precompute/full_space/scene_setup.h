@@ -1,0 +1,25 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/config/scene_config.h"
+#include "precompute/full_space/full_space_stepper.h"
+
+namespace exmat::precompute {
+
+/// The scene of a file in full space; `obstacles` are the file's. Newton's tolerance is the reference's own, targets
+/// are solved to the end in every step. Throws InputError: a body that a motion carries, a vertex out of range, another
+/// example force than the linear one, obstacles or examples that the model was built without.
+FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::Obstacle> obstacles,
+                                const FullSpaceModel& model);
+
+/// The targets that the scene needs, those of the reduced model.
+FullSpaceOptions full_space_options(const SceneConfig& config);
+
+/// Where the scene begins, at the deformation u [3n], such as U q. Throws InputError where the scene moves a clamped
+/// body.
+FullSpaceState full_space_start(const SceneConfig& config, const FullSpaceModel& model,
+                                const Eigen::VectorXd& deformation);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,141 @@
+#include "precompute/full_space/sparse_newton.h"
+
+#include <cmath>
+#include <limits>
+
+namespace exmat::precompute {
+namespace {
+
+using runtime::NewtonReport;
+using runtime::NewtonStatus;
+using runtime::PotentialEvaluation;
+using runtime::PotentialValue;
+using runtime::Tangent;
+
+constexpr double kArmijo = 1e-4;
+constexpr int kHalvings = 30;
+constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+constexpr double kInfinity = std::numeric_limits<double>::infinity();
+
+class Minimisation {
+ public:
+  Minimisation(StepPotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
+               Eigen::VectorXd& d)
+      : potential_(potential), settings_(settings), solver_(solver), d_(d) {}
+
+  NewtonReport run();
+
+ private:
+  bool finished();
+  bool find_direction();
+  bool move();
+  bool line_search(double slope, Eigen::VectorXd& trial, Eigen::VectorXd& trial_gradient, PotentialEvaluation& there);
+
+  StepPotential& potential_;
+  const runtime::NewtonSettings& settings_;
+  SparseDirection& solver_;
+  Eigen::VectorXd& d_;
+  NewtonReport report_;
+  PotentialEvaluation here_;
+  Eigen::VectorXd gradient_, direction_;
+  double unchecked_from_ = kInfinity;  // residual before a step that no line search checked
+};
+
+bool Minimisation::finished() {
+  if (!std::isfinite(report_.residual) || !std::isfinite(here_.potential.value))
+    report_.status = NewtonStatus::kNonFinite;
+  else if (report_.residual <= settings_.tolerance * here_.force_scale)
+    report_.status = NewtonStatus::kConverged;
+  else if (report_.residual > 0.5 * unchecked_from_)
+    report_.status = NewtonStatus::kStagnated;
+  else if (report_.iterations == settings_.max_iterations)
+    report_.status = NewtonStatus::kIterationLimit;
+  else
+    return false;
+  return true;
+}
+
+bool Minimisation::find_direction() {
+  const auto product = [this](const Eigen::VectorXd& x) { return potential_.product(x); };
+  potential_.assemble(d_, Tangent::kExact);
+  if (solver_.solve(potential_.hessian(), product, -gradient_, direction_)) return true;
+  ++report_.projections;
+  potential_.assemble(d_, Tangent::kPositiveSemidefinite);
+  here_ = potential_.evaluate(d_, gradient_);
+  potential_.accept(here_);
+  report_.residual = gradient_.norm();
+  return solver_.solve_shifted(potential_.hessian(), product, -gradient_, direction_);
+}
+
+bool Minimisation::line_search(double slope, Eigen::VectorXd& trial, Eigen::VectorXd& trial_gradient,
+                               PotentialEvaluation& there) {
+  const auto low_enough = [&](double length, const PotentialValue& value) {
+    return value.value <= here_.potential.value + kArmijo * length * slope + kRounding * here_.potential.magnitude;
+  };
+  trial = d_ + direction_;
+  there = potential_.evaluate(trial, trial_gradient);
+  if (low_enough(1, there.potential)) return true;
+  double length = 0.5;
+  for (int halving = 0; halving < kHalvings; ++halving, length *= 0.5) {
+    trial = d_ + length * direction_;
+    ++report_.line_search_evaluations;
+    if (!low_enough(length, potential_.value(trial))) continue;
+    there = potential_.evaluate(trial, trial_gradient);
+    return true;
+  }
+  return false;
+}
+
+// Along the direction; false where nothing lowers the potential.
+bool Minimisation::move() {
+  const double slope = gradient_.dot(direction_);
+  const bool below_rounding = std::abs(slope) <= kRounding * here_.potential.magnitude;
+  unchecked_from_ = below_rounding ? report_.residual : kInfinity;
+  Eigen::VectorXd trial, trial_gradient;
+  PotentialEvaluation there;
+  if (below_rounding) {
+    // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
+    trial = d_ + direction_;
+    there = potential_.evaluate(trial, trial_gradient);
+    if (!(trial_gradient.norm() <= report_.residual)) {
+      here_ = potential_.evaluate(d_, gradient_);
+      return false;
+    }
+  } else if (!line_search(slope, trial, trial_gradient, there)) {
+    here_ = potential_.evaluate(d_, gradient_);
+    return false;
+  }
+  potential_.accept(there);
+  d_.swap(trial);
+  gradient_.swap(trial_gradient);
+  here_ = there;
+  ++report_.iterations;
+  report_.residual = gradient_.norm();
+  return true;
+}
+
+NewtonReport Minimisation::run() {
+  here_ = potential_.evaluate_first(d_, gradient_);
+  report_.residual = gradient_.norm();
+  const int before = solver_.factorisations();
+  while (!finished()) {
+    if (!find_direction() || !direction_.allFinite()) {
+      report_.status = NewtonStatus::kNonFinite;
+      break;
+    }
+    if (move()) continue;
+    report_.status = NewtonStatus::kStagnated;
+    break;
+  }
+  report_.factorisations = solver_.factorisations() - before;
+  return report_;
+}
+
+}  // namespace
+
+NewtonReport minimise_step(StepPotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
+                           Eigen::VectorXd& d) {
+  return Minimisation(potential, settings, solver, d).run();
+}
+
+}  // namespace exmat::precompute

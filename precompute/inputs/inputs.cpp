@@ -1,0 +1,326 @@
+#include "precompute/inputs/inputs.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <map>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/mesh/checks.h"
+#include "common/mesh/geometry.h"
+#include "precompute/cache/sha256.h"
+#include "precompute/inputs/correspondence_files.h"
+#include "precompute/inputs/object_materials.h"
+#include "precompute/mesh_io/mesh_file.h"
+#include "precompute/mesh_io/surface_file.h"
+#include "precompute/mesh_io/vertex_selection.h"
+#include "precompute/render/embedding.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr double kInvertedLimit = 0.05;
+
+// A checked mesh with what its file said.
+struct CheckedMesh {
+  MeshFile file;
+  MeshReport report;
+  std::vector<std::int32_t> file_tets;
+  VertexArray file_vertices;
+};
+
+std::vector<std::int32_t> flat_tets(const TetArray& tets) { return {tets.data(), tets.data() + tets.size()}; }
+
+void log_report(const std::string& name, const TetMesh& mesh, const MeshReport& report) {
+  log::info(fmt::format("{}: {} vertices, {} tets", name, mesh.vertex_count(), mesh.tet_count()));
+  if (report.reoriented_tets > 0)
+    log::warning(fmt::format("{}: re-oriented {} inverted tets", name, report.reoriented_tets));
+  if (report.dropped_degenerate_tets > 0)
+    log::warning(fmt::format("{}: dropped {} degenerate tets", name, report.dropped_degenerate_tets));
+  if (report.dropped_vertices > 0)
+    log::warning(fmt::format("{}: dropped {} unreferenced vertices", name, report.dropped_vertices));
+  if (report.dropped_components > 0)
+    log::warning(fmt::format("{}: dropped {} smaller components", name, report.dropped_components));
+}
+
+MeshFile read_recorded(const std::filesystem::path& path, InputFiles& files) {
+  MeshFile file = read_mesh(path);
+  files.insert(files.end(), file.files.begin(), file.files.end());
+  return file;
+}
+
+CheckedMesh check(MeshFile file, const std::filesystem::path& path, const DropConfig& drop) {
+  CheckedMesh checked{std::move(file), {}, {}, {}};
+  checked.file_tets = flat_tets(checked.file.mesh.tets);
+  checked.file_vertices = checked.file.mesh.vertices;
+  checked.report = check_mesh(checked.file.mesh, path.string(),
+                              {drop.degenerate_tets, drop.unreferenced_vertices, drop.smaller_components});
+  log_report(path.string(), checked.file.mesh, checked.report);
+  return checked;
+}
+
+// 1 for the selected vertices, whose ids are the file's; `absent` for all where none are selected.
+FlagVector flag(const std::optional<VertexSelection>& selection, std::uint8_t absent, const AssetConfig& asset,
+                const CheckedMesh& checked, InputFiles& files) {
+  if (!selection) return FlagVector::Constant(checked.file.mesh.vertex_count(), absent);
+  FlagVector in_file = FlagVector::Zero(checked.file_vertices.rows());
+  for (const auto vertex : select_vertices(checked.file_vertices, *selection, asset.file.string())) in_file[vertex] = 1;
+  if (const auto* file = std::get_if<FileSelection>(&*selection)) files.push_back(file->file);
+  return in_file(checked.report.kept_vertices);
+}
+
+// How the vertices of a mesh are numbered in its file.
+struct FileNumbers {
+  std::vector<std::int32_t> kept;  // new index -> index in the file
+  Eigen::Index count = 0;          // in the file
+
+  // File index -> new index, -1 for a vertex that was dropped.
+  IndexVector inverse() const {
+    IndexVector result = IndexVector::Constant(count, -1);
+    for (std::size_t v = 0; v < kept.size(); ++v) result[kept[v]] = static_cast<std::int32_t>(v);
+    return result;
+  }
+};
+
+FileNumbers numbers_of(const CheckedMesh& checked) {
+  return {checked.report.kept_vertices, checked.file_vertices.rows()};
+}
+
+// The examples as they are read, with what finds vertices of their files in their meshes.
+class ExampleReader {
+ public:
+  ExampleReader(const AssetConfig& asset, const ObjectInput& object, InputFiles& files)
+      : asset_(asset),
+        object_(object),
+        files_(files),
+        object_numbers_{object.kept_vertices, object.file_positions.rows()} {}
+
+  ExampleInput read();
+
+ private:
+  struct Mesh {
+    FileNumbers numbers;
+    VertexArray file_vertices;
+  };
+
+  void read_rest();
+  void read_pose(const ExampleConfig& example);
+  bool poses_rest(const MeshFile& file) const;
+  void read_correspondences(PoseInput& example);
+  void read_landmark_file();
+  void read_regions();
+  FlagVector flagged(const VertexArray& file_vertices, const FileNumbers& numbers, const VertexSelection& selection);
+  IndexVector selected(const VertexArray& file_vertices, const FileNumbers& numbers, const VertexSelection& selection);
+
+  const AssetConfig& asset_;
+  const ObjectInput& object_;
+  InputFiles& files_;
+  FileNumbers object_numbers_;
+  std::map<std::string, Mesh> meshes_;  // of the examples, by name
+  std::vector<std::int32_t> rest_file_tets_;
+  FileNumbers rest_numbers_;
+  ExampleInput input_;
+};
+
+void refuse_inverted(const PoseInput& pose) {
+  if (pose.inverted_fraction > kInvertedLimit)
+    throw InputError({pose.file.string(), "tets", "a pose that turns less than 5 % of the volume inside out",
+                      fmt::format("{:.1f} %", 100 * pose.inverted_fraction), "mend the pose"});
+  if (pose.inverted_fraction > 0)
+    log::warning(
+        fmt::format("example {}: {:.2f} % of its volume is inverted", pose.name, 100 * pose.inverted_fraction));
+}
+
+// Also of fewer vertices than the rest example's file, where those left out are not of its tets.
+bool ExampleReader::poses_rest(const MeshFile& file) const {
+  const auto& kept = rest_numbers_.kept;
+  return flat_tets(file.mesh.tets) == rest_file_tets_ &&
+         file.mesh.vertex_count() > *std::max_element(kept.begin(), kept.end());
+}
+
+void ExampleReader::read_rest() {
+  input_.rest = {"rest", asset_.object_mesh, object_.mesh};
+  input_.rest.column = -1;
+  rest_file_tets_ = object_.file_tets;
+  rest_numbers_ = object_numbers_;
+  for (std::size_t k = 0; k < asset_.examples.size(); ++k) {
+    const ExampleConfig& example = asset_.examples[k];
+    if (!example.rest) continue;
+    const auto checked = check(read_recorded(example.mesh, files_), example.mesh, example.drop);
+    input_.object_is_rest = false;
+    input_.rest = {example.name, example.mesh, checked.file.mesh};
+    rest_file_tets_ = checked.file_tets;
+    rest_numbers_ = numbers_of(checked);
+    meshes_[example.name] = {rest_numbers_, checked.file_vertices};
+    read_correspondences(input_.rest);
+  }
+  const bool name_is_taken = std::ranges::find(asset_.examples, "rest", &ExampleConfig::name) != asset_.examples.end();
+  if (input_.object_is_rest && name_is_taken) input_.rest.name = "object_rest";
+}
+
+void ExampleReader::read_pose(const ExampleConfig& example) {
+  MeshFile file = read_recorded(example.mesh, files_);
+  PoseInput pose{example.name, example.mesh, {}};
+  pose.same_connectivity = poses_rest(file);
+  if (pose.same_connectivity) {
+    pose.mesh = {file.mesh.vertices(rest_numbers_.kept, Eigen::all), input_.rest.mesh.tets};
+    meshes_[example.name] = {{rest_numbers_.kept, file.mesh.vertex_count()}, file.mesh.vertices};
+    if (!pose.mesh.vertices.allFinite())
+      throw InputError(
+          {example.mesh.string(), "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
+    const Eigen::VectorXd volumes = tet_volumes(pose.mesh);
+    pose.inverted_fraction = (-volumes).cwiseMax(0).sum() / volumes.cwiseAbs().sum();
+    refuse_inverted(pose);
+  } else {
+    const auto checked = check(std::move(file), example.mesh, example.drop);
+    pose.mesh = checked.file.mesh;
+    meshes_[example.name] = {numbers_of(checked), checked.file_vertices};
+  }
+  read_correspondences(pose);
+  input_.poses.push_back(std::move(pose));
+}
+
+IndexVector ExampleReader::selected(const VertexArray& file_vertices, const FileNumbers& numbers,
+                                    const VertexSelection& selection) {
+  const auto ids = select_vertices(file_vertices, selection, asset_.file.string());
+  if (const auto* file = std::get_if<FileSelection>(&selection)) files_.push_back(file->file);
+  const IndexVector inverse = numbers.inverse();
+  std::vector<std::int32_t> kept;
+  for (const auto id : ids)
+    if (inverse[id] >= 0) kept.push_back(inverse[id]);
+  return Eigen::Map<const IndexVector>(kept.data(), std::ssize(kept));
+}
+
+FlagVector ExampleReader::flagged(const VertexArray& file_vertices, const FileNumbers& numbers,
+                                  const VertexSelection& selection) {
+  FlagVector flags = FlagVector::Zero(std::ssize(numbers.kept));
+  for (const auto vertex : selected(file_vertices, numbers, selection)) flags[vertex] = 1;
+  return flags;
+}
+
+void ExampleReader::read_regions() {
+  const Mesh object{object_numbers_, object_.file_positions};
+  const Mesh& rest = input_.object_is_rest ? object : meshes_.at(input_.rest.name);
+  for (std::size_t i = 0; i < asset_.regions.size(); ++i) {
+    const RegionConfig& config = asset_.regions[i];
+    RegionInput region{
+        config.name, flagged(object.file_vertices, object.numbers, config.vertices), {}, config.examples};
+    if (!(region.inside.array() != 0 && object_.fixed.array() == 0).any())
+      throw InputError({asset_.file.string(), fmt::format("/regions/{}/vertices", i),
+                        "vertices of the object, some of them not fixed", "none", "choose others"});
+    if (config.example_vertices)
+      region.inside_example = flagged(rest.file_vertices, rest.numbers, *config.example_vertices);
+    for (PoseInput& pose : input_.poses)
+      if (std::ranges::find(config.examples, pose.name) != config.examples.end()) pose.in_whole_body = false;
+    input_.regions.push_back(std::move(region));
+  }
+  input_.whole_body = input_.regions.empty() || std::ranges::any_of(input_.poses, &PoseInput::in_whole_body);
+}
+
+// The dense map and the corresponding parts of one example.
+void ExampleReader::read_correspondences(PoseInput& example) {
+  const Mesh& mesh = meshes_.at(example.name);
+  const auto at = std::ranges::find(asset_.examples, example.name, &ExampleConfig::name);
+  example.column = 1 + (at - asset_.examples.begin());
+  for (const ExampleMapConfig& map : asset_.alignment.maps) {
+    if (map.example != example.name) continue;
+    const IndexVector in_file = read_vertex_map(map.file, object_numbers_.count, mesh.numbers.count);
+    files_.push_back(map.file);
+    const IndexVector inverse = mesh.numbers.inverse();
+    example.on_object = in_file(object_numbers_.kept);
+    for (auto& vertex : example.on_object)
+      if (vertex >= 0) vertex = inverse[vertex];
+  }
+  for (const CorrespondingRegionConfig& region : asset_.alignment.regions) {
+    example.parts.emplace_back();
+    for (const auto& [name, vertices] : region.examples)
+      if (name == example.name) example.parts.back() = selected(mesh.file_vertices, mesh.numbers, vertices);
+  }
+}
+
+void ExampleReader::read_landmark_file() {
+  if (!asset_.alignment.landmarks) return;
+  const auto& file = *asset_.alignment.landmarks;
+  std::vector<Eigen::Index> sizes{object_numbers_.count};
+  std::vector<IndexVector> inverses{object_numbers_.inverse()};
+  for (const ExampleConfig& example : asset_.examples) {
+    const FileNumbers& numbers = meshes_.at(example.name).numbers;
+    sizes.push_back(numbers.count);
+    inverses.push_back(numbers.inverse());
+  }
+  input_.landmarks = read_landmarks(file, sizes);
+  files_.push_back(file);
+  for (Eigen::Index column = 0; column < input_.landmarks.cols(); ++column)
+    for (auto& vertex : input_.landmarks.col(column)) {
+      if (vertex < 0) continue;
+      const auto in_file = vertex;
+      vertex = inverses[static_cast<std::size_t>(column)][in_file];
+      if (vertex < 0)
+        throw InputError({file.string(), "", "vertices that belong to tets",
+                          fmt::format("{}, which was dropped from its mesh", in_file + 1), ""});
+    }
+}
+
+ExampleInput ExampleReader::read() {
+  read_rest();
+  for (const auto& example : asset_.examples)
+    if (!example.rest) read_pose(example);
+  read_regions();
+  read_landmark_file();
+  for (const CorrespondingRegionConfig& region : asset_.alignment.regions)
+    input_.parts.push_back(selected(object_.file_positions, object_numbers_, region.object));
+  return std::move(input_);
+}
+
+}  // namespace
+
+ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
+  const auto checked = check(read_recorded(asset.object_mesh, files), asset.object_mesh, asset.object_drop);
+  ObjectInput object;
+  object.mesh = checked.file.mesh;
+  const TetMesh file_mesh{checked.file_vertices,
+                          Eigen::Map<const TetArray>(checked.file_tets.data(), std::ssize(checked.file_tets) / 4, 4)};
+  object.materials = object_materials(asset, file_mesh, checked.file.tet_sets, checked.file.materials,
+                                      checked.report.kept_tets, files);
+  object.fixed = flag(asset.fixed, 0, asset, checked, files);
+  object.contact = flag(asset.contact_vertices, 1, asset, checked, files);
+  object.file_tets = checked.file_tets;
+  object.kept_vertices = checked.report.kept_vertices;
+  object.kept_tets = checked.report.kept_tets;
+  object.file_positions = checked.file_vertices;
+  return object;
+}
+
+ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, InputFiles& files) {
+  return ExampleReader(asset, object, files).read();
+}
+
+RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object, InputFiles& files,
+                            std::vector<std::string>& warnings) {
+  const std::string name = asset.render_mesh->string();
+  SurfaceMesh surface = read_surface(*asset.render_mesh);
+  files.push_back(*asset.render_mesh);
+  const Embedding embedding = embed_points(object.mesh, surface.vertices, name);
+  const double share = embedding.farthest / bounding_box_diagonal(object.mesh.vertices);
+  if (share > kFarOutside) {
+    warnings.push_back(
+        fmt::format("{}: a vertex is {:.3g} m outside the object, {:.0f} % of the diagonal of its bounding box; does "
+                    "the render mesh "
+                    "stand where the object does, in metres?",
+                    name, embedding.farthest, 100 * share));
+    log::warning(warnings.back());
+  }
+  const auto& [tets, weights, distances] = embedding.points;
+  return {std::move(surface.vertices), tets, weights, std::move(surface.triangles), embedding.outside,
+          embedding.farthest};
+}
+
+std::string hash_inputs(const InputFiles& files, const std::string& salt) {
+  Sha256 hash;
+  // With their lengths, so that no byte can change sides.
+  for (const auto& path : files) hash.add(fmt::format("\n{} bytes\n", hash.add_file(path)));
+  hash.add(salt);
+  return hash.digest();
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,175 @@
+#include "precompute/study/measure/runs.h"
+
+#include <cmath>
+#include <fmt/format.h>
+#include <utility>
+
+#include "common/bundle/bundle.h"
+#include "common/core/error.h"
+#include "common/core/timer.h"
+#include "precompute/full_space/scene_setup.h"
+#include "precompute/study/baseline/surface_targets.h"
+#include "runtime/scene/bodies.h"
+#include "runtime/scene/obstacle_loader.h"
+#include "runtime/scene/samples.h"
+
+namespace exmat::precompute {
+namespace {
+
+// [n x 3] U v.
+VertexArray field(const ReducedModel& data, const Eigen::VectorXd& v) {
+  return (data.modal->basis * v).reshaped<Eigen::RowMajor>(data.object->mesh.vertex_count(), 3);
+}
+
+[[noreturn]] void fail_non_finite(std::int64_t step, double time) {
+  throw WorkError(
+      fmt::format("step {} (time {:g} s): a number that is not finite; try a smaller time step", step, time));
+}
+
+// What a run counts on its way.
+class Meter {
+ public:
+  Meter(std::int64_t steps, BodyFrames& frames) : frames_(frames), seconds_(steps) {}
+
+  void add(const runtime::StepReport& report, double seconds) {
+    ++frames_.steps;
+    frames_.unconverged += (report.status & runtime::kStepUnconverged) != 0;
+    frames_.newton_iterations += report.newton_iterations;
+    frames_.factorisations += report.factorisations;
+    seconds_.add(seconds);
+  }
+  void finish() {
+    frames_.newton_iterations /= static_cast<double>(frames_.steps);
+    frames_.factorisations /= static_cast<double>(frames_.steps);
+    frames_.step_seconds = seconds_.quantile(0.5);
+  }
+
+ private:
+  BodyFrames& frames_;
+  runtime::Samples seconds_;
+};
+
+// Takes steps and records frames; `take` makes one step, `record` adds the positions and velocities of a frame.
+template <typename Take, typename Record, typename Energy>
+BodyFrames run(double time_step, const std::vector<double>& times, Take take, Record record, Energy energy) {
+  BodyFrames frames;
+  frames.times = times;
+  Meter meter(std::llround(times.back() / time_step), frames);
+  for (const double time : times) {
+    const std::int64_t until = std::llround(time / time_step);
+    while (frames.steps < until) {
+      const Timer timer;
+      const runtime::StepReport report = take();
+      meter.add(report, timer.seconds());
+      if (report.status & runtime::kStepNonFinite) fail_non_finite(frames.steps, time);
+    }
+    record(frames);
+    const runtime::Energies now = energy();
+    frames.kinetic.push_back(now.kinetic);
+    frames.elastic.push_back(now.elastic);
+    frames.potential.push_back(now.potential);
+  }
+  meter.finish();
+  return frames;
+}
+
+FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data, bool baseline) {
+  FullSpaceModel model = build_full_space_model(data, full_space_options(config));
+  if (baseline) use_surface_targets(*data.object, model);
+  return model;
+}
+
+// [3n] deformation.
+Eigen::VectorXd start_of(const SceneConfig& config, const ReducedModel& data, bool baseline) {
+  const RowMatrix& basis = data.modal->basis;
+  if (baseline) return Eigen::VectorXd::Zero(basis.rows());
+  return basis * runtime::start_coordinates(config, data, basis.cols());
+}
+
+}  // namespace
+
+VertexArray world_positions(const ReducedModel& data, const runtime::State& state) {
+  VertexArray positions = data.object->mesh.vertices + field(data, state.q);
+  if (state.body) {
+    const Eigen::RowVector3d centre = data.rigid->centre_of_mass.transpose();
+    positions = (positions.rowwise() - centre) * state.body->orientation.toRotationMatrix().transpose();
+    positions.rowwise() += centre + state.body->position.transpose();
+  }
+  if (state.carried)
+    for (auto x : positions.rowwise()) x = state.carried->frame.to_world(x.transpose()).transpose();
+  return positions;
+}
+
+VertexArray world_velocities(const ReducedModel& data, const runtime::State& state) {
+  VertexArray velocities = field(data, state.v);
+  if (!state.body && !state.carried) return velocities;
+  const VertexArray positions = world_positions(data, state);
+  if (state.carried) {
+    const auto& frame = state.carried->frame;
+    for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+      const Eigen::Vector3d own = frame.rotation * velocities.row(i).transpose();
+      velocities.row(i) = frame.velocity_at(positions.row(i).transpose()) + own;
+    }
+    return velocities;
+  }
+  const runtime::FreeMotion motion = runtime::motion_of(*state.body);
+  const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix();
+  const Eigen::Vector3d centre = data.rigid->centre_of_mass + state.body->position;
+  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+    const Eigen::Vector3d arm = positions.row(i).transpose() - centre, own = rotation * velocities.row(i).transpose();
+    velocities.row(i) = motion.linear_velocity + motion.angular_velocity.cross(arm) + own;
+  }
+  return velocities;
+}
+
+std::string target_of(const runtime::LoadedScene& loaded) {
+  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i)
+    if (runtime::acts(loaded.scene.examples[i])) return loaded.model->examples[i].table ? "table" : "solve";
+  return "none";
+}
+
+ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times) {
+  const runtime::LoadedScene loaded = runtime::load_run(config);
+  runtime::State state = loaded.start;
+  runtime::Workspace workspace(*loaded.model, loaded.scene);
+  ReducedRun result;
+  result.modes = static_cast<std::size_t>(loaded.model->modes());
+  result.elements = static_cast<std::size_t>(loaded.summary.cubature_elements);
+  result.internal_force = loaded.model->internal_force.polynomial() ? "polynomial" : "cubature";
+  result.target = target_of(loaded);
+  result.frames = run(
+      config.time_step, times, [&] { return runtime::step(*loaded.model, loaded.scene, state, workspace); },
+      [&](BodyFrames& frames) {
+        frames.positions.push_back(world_positions(loaded.data, state));
+        frames.velocities.push_back(world_velocities(loaded.data, state));
+      },
+      [&] { return runtime::energies(loaded.scene, state); });
+  return result;
+}
+
+FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline)
+    : model(model_of(config, data, baseline)),
+      scene(full_space_scene(config, runtime::make_obstacles(config), model)),
+      state(full_space_start(config, model, start_of(config, data, baseline))),
+      workspace(model) {
+  if (baseline) scene.example_elasticity = 1;
+}
+
+FullSpaceReport FullSpaceRun::sound_step() {
+  const FullSpaceReport report = step(model, scene, state, workspace);
+  if (report.status & runtime::kStepNonFinite) fail_non_finite(state.step, state.time);
+  return report;
+}
+
+BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times) {
+  FullSpaceRun body(config, data, false);
+  return run(
+      config.time_step, times, [&] { return step(body.model, body.scene, body.state, body.workspace); },
+      [&](BodyFrames& frames) {
+        frames.positions.push_back(world_positions(body.model, body.state));
+        frames.velocities.push_back(world_velocities(body.model, body.state));
+      },
+      [&] { return energies(body.model, body.scene, body.state); });
+}
+
+}  // namespace exmat::precompute

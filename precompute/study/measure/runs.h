@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "common/config/scene_config.h"
+#include "common/model/reduced_model.h"
+#include "precompute/full_space/full_space_stepper.h"
+#include "precompute/study/measure/frames.h"
+#include "runtime/scene/scene_loader.h"
+
+namespace exmat::precompute {
+
+/// [n x 3] world positions and velocities of the reduced body of a bundle in a state; `data` with /object, /modal and,
+/// where it moves, /rigid.
+VertexArray world_positions(const ReducedModel& data, const runtime::State& state);
+VertexArray world_velocities(const ReducedModel& data, const runtime::State& state);
+
+/// What came of a reduced run.
+struct ReducedRun {
+  BodyFrames frames;
+  std::size_t modes = 0, elements = 0;  ///< r, s
+  std::string internal_force, target;   ///< as the run took them: "polynomial", "cubature"; "table", "solve", "none"
+};
+
+/// How targets of a loaded scene are found.
+std::string target_of(const runtime::LoadedScene& loaded);
+
+/// Steps a scene that writes positions up to the last of `times`, each a multiple of its time step. Throws WorkError
+/// at a number that is not finite.
+ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times);
+
+/// The same in full space, of the body of a whole bundle, from the deformation that the reduced scene begins at.
+BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times);
+
+/// A body in full space, ready to step.
+struct FullSpaceRun {
+  /// As run_full_space() steps it, or the baseline of the paper's Table 2: that of surface targets, from rest.
+  FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline);
+
+  /// Throws WorkError at a number that is not finite.
+  FullSpaceReport sound_step();
+
+  FullSpaceModel model;
+  FullSpaceScene scene;
+  FullSpaceState state;
+  FullSpaceWorkspace workspace;
+};
+
+}  // namespace exmat::precompute

@@ -1,0 +1,318 @@
+#include "precompute/study/stability/stability_case.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <limits>
+
+namespace exmat::precompute {
+namespace {
+
+using runtime::Integrator;
+
+constexpr std::array kIntegrators{Integrator::kBdf2, Integrator::kBackwardEuler, Integrator::kNewmark};
+constexpr std::array kMaterials{MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
+                                MaterialModel::kCorotational};
+constexpr double kGravity = 9.81;
+constexpr double kSixtieth = 1.0 / 60, kThirtieth = 1.0 / 30;
+const Eigen::Vector3d kDown(0, 0, -1), kInward(-1, 0, 0);
+
+using Cases = std::vector<StabilityCase>;
+
+bool is_newmark(const StabilityCase& test) { return test.integrator == Integrator::kNewmark; }
+
+/// Every integrator.
+void add(StabilityCase test, Cases& cases) {
+  for (const Integrator integrator : kIntegrators) {
+    test.integrator = integrator;
+    cases.push_back(test);
+  }
+}
+
+/// Every material, clamped and free, every integrator.
+void add_all(StabilityCase test, Cases& cases) {
+  for (const MaterialModel material : kMaterials)
+    for (const bool free : {false, true}) {
+      test.body.material = material;
+      test.body.free = free;
+      add(test, cases);
+    }
+}
+
+/// A body let go under its weight; a free one is struck as well.
+StabilityCase let_go(const std::string& group, const BodySpec& body, double time_step) {
+  StabilityCase test{.group = group, .body = body, .time_step = time_step, .gravity = kGravity};
+  if (body.free) {
+    test.start = Start::kImpulse;
+    test.impulse = 0.1 * kDown;
+  }
+  test.extreme =
+      fmt::format("E {:g} Pa, nu {:g}, density {:g} kg/m^3", body.youngs_modulus, body.poisson_ratio, body.density);
+  return test;
+}
+
+void add_let_go(BodySpec body, double time_step, Cases& cases) {
+  for (const MaterialModel material : kMaterials)
+    for (const bool free : {false, true}) {
+      body.material = material;
+      body.free = free;
+      add(let_go("stiffness", body, time_step), cases);
+    }
+}
+
+// The ends of the ranges of E, nu and density, at three time steps each.
+void add_stiffness(Cases& cases) {
+  struct Numbers {
+    double youngs_modulus, poisson_ratio, density;
+  };
+  for (const auto& [E, nu, density] :
+       {Numbers{1e3, 0, 1e5}, {1e3, 0.4999, 1}, {1e6, 0.4999, 1e3}, {1e12, 0.4999, 1}, {1e12, 0, 1e5}})
+    for (const double time_step : {1e-4, 1e-3, kThirtieth})
+      add_let_go({.youngs_modulus = E, .poisson_ratio = nu, .density = density}, time_step, cases);
+}
+
+void add_loads(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth}) {
+    StabilityCase test{.group = "loads", .time_step = time_step};
+    test.extreme = "100 times the load that bends it by L/10";
+    test.tip_load = 10 * kDown;
+    add_all(test, cases);
+    test.extreme = "10 times the load that shortens it by L, along its axis";
+    test.tip_load = 10 * kInward;
+    add_all(test, cases);
+    test.extreme = "100 times gravity";
+    test.tip_load.setZero();
+    test.gravity = 100 * kGravity;
+    add_all(test, cases);
+    test.gravity = 0;
+    test.start = Start::kImpulse;
+    for (const double size : {1.0, 10.0}) {
+      test.extreme = fmt::format("impulse sideways that takes it {:g} L far", size);
+      test.impulse = size * kDown;
+      add_all(test, cases);
+    }
+    test.extreme = "impulse along the axis that takes it 10 L far";
+    test.impulse = 10 * kInward;
+    add_all(test, cases);
+  }
+}
+
+void add_starts(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth}) {
+    StabilityCase test{.group = "starts", .time_step = time_step};
+    test.extreme = "compressed into a plane";
+    test.start = Start::kFlattened;
+    add_all(test, cases);
+    test.extreme = "collapsed into a point";
+    test.start = Start::kCollapsed;
+    add_all(test, cases);
+    test.extreme = "inverted";
+    test.start = Start::kInverted;
+    add_all(test, cases);
+    test.start = Start::kTangled;
+    for (const double reach : {1.0, 10.0}) {
+      test.extreme = fmt::format("random coordinates, displaced by {:g} L", reach);
+      test.reach = reach;
+      add_all(test, cases);
+    }
+  }
+}
+
+void add_spins(Cases& cases) {
+  for (const double youngs_modulus : {1e6, 1e9})
+    for (const double spin : {10.0, 1000.0})
+      for (const double time_step : {1e-4, 1e-3, kThirtieth}) {
+        StabilityCase test{.group = "spin", .time_step = time_step};
+        test.extreme = fmt::format("spin {:g} rad/s about an inclined axis, E {:g} Pa", spin, youngs_modulus);
+        test.body = {.youngs_modulus = youngs_modulus, .free = true};
+        test.spin = spin;
+        for (const MaterialModel material : kMaterials) {
+          test.body.material = material;
+          test.principal_axis = false;
+          add(test, cases);
+          test.principal_axis = true;
+          test.extreme = fmt::format("spin {:g} rad/s about its axis of most inertia, E {:g} Pa", spin, youngs_modulus);
+          add(test, cases);
+          test.extreme = fmt::format("spin {:g} rad/s about an inclined axis, E {:g} Pa", spin, youngs_modulus);
+        }
+      }
+}
+
+void add_contacts(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth})
+    for (const double stiffness : {1e4, 1e7, 1e10}) {
+      StabilityCase test{.group = "contact", .time_step = time_step, .gravity = kGravity};
+      test.ground = Ground::kPlane;
+      test.contact_stiffness = stiffness;
+      test.friction = 0.5;
+      for (const bool free : {false, true}) {
+        test.body.free = free;
+        test.velocity = free ? 5 : 0;
+        test.extreme = fmt::format("contact stiffness {:g} N/m^3", stiffness);
+        test.ground = Ground::kPlane;
+        add(test, cases);
+        test.velocity = 0;
+        test.extreme = fmt::format("pressed flat, contact stiffness {:g} N/m^3", stiffness);
+        test.ground = Ground::kPress;
+        for (const MaterialModel material : kMaterials) {
+          test.body.material = material;
+          add(test, cases);
+        }
+        test.body.material = MaterialModel::kStVenantKirchhoff;
+      }
+    }
+}
+
+void add_examples(Cases& cases) {
+  const auto add_forces = [&](BodyExamples examples, bool table, const std::string& what) {
+    for (const bool free : {false, true})
+      for (const double time_step : {1e-3, kThirtieth})
+        for (const double kappa : {1e3, 1e10}) {
+          StabilityCase test{.group = "examples", .time_step = time_step};
+          test.body = {.free = free, .examples = examples, .target_table = table};
+          test.extreme = fmt::format("{}, kappa {:g} 1/s^2", what, kappa);
+          test.examples = {.stiffness = kappa, .damping = 2, .bias = 0.5};
+          test.start = Start::kImpulse;
+          test.impulse = kDown;
+          add(test, cases);
+        }
+  };
+  add_forces(BodyExamples::kBendAndTwist, true, "bend and twist by a table");
+  add_forces(BodyExamples::kBendAndTwist, false, "bend and twist solved for");
+  add_forces(BodyExamples::kNearDuplicates, false, "examples that differ by 1e-7 rad");
+  add_forces(BodyExamples::kDuplicates, false, "the same example twice");
+  add_forces(BodyExamples::kRestAlone, false, "the rest pose alone");
+}
+
+void add_slivers(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth}) {
+    StabilityCase test{.group = "slivers", .body = {.slivers = true}, .time_step = time_step, .gravity = kGravity};
+    test.extreme = "dihedral angles of one degree";
+    add_all(test, cases);
+    test.extreme = "dihedral angles of one degree, 100 times the load that bends it by L/10";
+    test.tip_load = 10 * kDown;
+    add_all(test, cases);
+    test.extreme = "dihedral angles of one degree, random coordinates, displaced by L";
+    test.tip_load.setZero();
+    test.start = Start::kTangled;
+    add_all(test, cases);
+  }
+}
+
+void add_nothing(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth}) {
+    StabilityCase test{.group = "no damping", .time_step = time_step, .damping = 0};
+    test.extreme = "nothing acts";
+    add_all(test, cases);
+    test.extreme = "zero damping, released under its weight";
+    test.gravity = kGravity;
+    add_all(test, cases);
+    test.extreme = "zero gravity and damping, impulse that takes it L far";
+    test.gravity = 0;
+    test.start = Start::kImpulse;
+    test.impulse = kDown;
+    add_all(test, cases);
+    test.extreme = "zero gravity and damping, inverted";
+    test.start = Start::kInverted;
+    add_all(test, cases);
+  }
+}
+
+// The full product of the first group's numbers.
+void add_product(Cases& cases) {
+  for (const double E : {1e3, 1e6, 1e9, 1e12})
+    for (const double nu : {0.0, 0.3, 0.45, 0.499, 0.4999})
+      for (const double density : {1.0, 1e3, 1e5})
+        for (const double time_step : {1e-4, 1e-3, kSixtieth, kThirtieth})
+          add_let_go({.youngs_modulus = E, .poisson_ratio = nu, .density = density}, time_step, cases);
+}
+
+}  // namespace
+
+std::string_view name_of(Integrator integrator) {
+  switch (integrator) {
+    case Integrator::kBackwardEuler:
+      return "backward_euler";
+    case Integrator::kNewmark:
+      return "newmark";
+    default:
+      return "bdf2";
+  }
+}
+
+std::string describe(const StabilityCase& test) {
+  return fmt::format("{}: {}; {}, {}, {}, dt {:.4g} s", test.group, test.extreme, exmat::name_of(test.body.material),
+                     test.body.free ? "free" : "clamped", name_of(test.integrator), test.time_step);
+}
+
+const std::vector<KnownLimit>& known_limits() {
+  constexpr std::string_view kUnconverged =
+      "status kStepIterationLimit or kStepStagnated; run: \"N of M steps did not reach the tolerance ...; a smaller "
+      "time_step or more newton.max_iterations may help\"";
+  static const std::vector<KnownLimit> limits{
+      {"newmark-rings", Check::kRest,
+       [](const StabilityCase& test, const StudyBody& body) {
+         const double example_frequency = std::sqrt(test.examples.stiffness);
+         return is_newmark(test) && test.time_step * std::max(body.highest_frequency, example_frequency) > 1;
+       },
+       1, "newmark, time step above 1 over the highest frequency of the basis or sqrt(kappa)",
+       "the amplification of modes that the time step does not resolve tends to -1: they ring on, whatever the damping",
+       "none: the summary's kinetic energy does not fall; take bdf2"},
+      {"newmark-grows", Check::kBounded, [](const StabilityCase& test, const StudyBody&) { return is_newmark(test); },
+       std::numeric_limits<double>::infinity(), "newmark, far from linear elasticity",
+       "stable without condition for linear elasticity alone: in large motions that the time step does not resolve its "
+       "energy grows, in the end until numbers overflow",
+       kUnconverged},
+      {"newmark-unconverged", Check::kSolved,
+       [](const StabilityCase& test, const StudyBody&) { return is_newmark(test); }, 1,
+       "newmark, far from linear elasticity",
+       "accelerations of unresolved modes make each step's problem as hard as the first", kUnconverged},
+      {"unresolved-turn", Check::kSolved,
+       [](const StabilityCase& test, const StudyBody&) {
+         return test.body.free && test.tip_load.norm() > 0 && test.time_step >= kSixtieth;
+       },
+       1, "a free body that a load beside its centre of mass turns by more than 0.3 rad a step",
+       "the turn of such a step is not resolved; forces of the rotation have no potential, and the search ends early, "
+       "where it ends at its start in every step from then on: the body turns on in the shape that it has",
+       kUnconverged},
+      {"corotational-kink", Check::kSolved,
+       [](const StabilityCase& test, const StudyBody&) {
+         return test.body.material == MaterialModel::kCorotational && test.tip_load.norm() > 0;
+       },
+       0.1, "corotational, loads that turn elements inside out",
+       "the energy has a kink where two singular values of F add up to 0, and minima lie on it", kUnconverged},
+      {"corotational-weight", Check::kSolved,
+       [](const StabilityCase& test, const StudyBody& body) {
+         const BodySpec& spec = test.body;
+         return spec.material == MaterialModel::kCorotational &&
+                spec.density * test.gravity * body.size > 100 * spec.youngs_modulus;
+       },
+       0.8, "corotational, weight per area of a bar standing on end above 100 E",
+       "the weight turns elements inside out; the energy has a kink where two singular values of F add up to 0, and "
+       "minima lie on it",
+       kUnconverged}};
+  return limits;
+}
+
+std::vector<StabilityCase> short_stability_suite() {
+  Cases cases;
+  add_stiffness(cases);
+  add_loads(cases);
+  add_starts(cases);
+  add_spins(cases);
+  add_contacts(cases);
+  add_examples(cases);
+  add_slivers(cases);
+  add_nothing(cases);
+  return cases;
+}
+
+std::vector<StabilityCase> long_stability_suite() {
+  Cases cases;
+  add_product(cases);
+  for (StabilityCase& test : short_stability_suite())
+    if (test.group != "stiffness") cases.push_back(std::move(test));
+  return cases;
+}
+
+}  // namespace exmat::precompute

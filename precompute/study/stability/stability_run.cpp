@@ -1,0 +1,365 @@
+#include "precompute/study/stability/stability_run.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "common/core/timer.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::precompute {
+namespace {
+
+using runtime::Integrator;
+
+constexpr double kSizes = 3, kLinear = 2;           // bound: 3 L + 2 u_lin
+constexpr double kSmall = 0.2, kSmallMargin = 1.5;  // of L: up to there u_lin itself, and half, is the bound
+constexpr double kLinearRange = 0.01;  // of L: linear elasticity, for which Newmark's method keeps the energy
+constexpr double kUnconverged = 0.01;  // of the steps
+constexpr double kRestKinetic = 1e-6;  // of the largest kinetic energy
+constexpr double kRestTime = 20;       // over the rate of the slowest mode
+constexpr int kLeastRestSteps = 60, kUndampedSteps = 300;
+constexpr double kEulerGain = 1e-9, kOtherGain = 1e-6;  // of the energies that a run exchanges
+constexpr double kMomentumDrift = 1e-9;
+constexpr double kClearance = 0.02;  // between body and ground [m]
+
+class Run {
+ public:
+  Run(const StabilityCase& test, const StudyBody& body, int most_steps, const PlantedFault& fault)
+      : test_(test), body_(body), model_(*body.model), steps_(most_steps) {
+    make_scene(fault);
+    make_start();
+    plan_steps(most_steps);
+  }
+
+  StabilityResult finish();
+
+ private:
+  void make_scene(const PlantedFault& fault);
+  void add_tip_load();
+  void add_ground();
+  void make_start();
+  Eigen::VectorXd start_pose() const;
+  void plan_steps(int most_steps);
+  void step_all();
+  void watch(const runtime::StepReport& report, const Eigen::VectorXd& before);
+  double linear_displacement() const;
+  double largest(const Eigen::VectorXd& q) const {
+    const Eigen::VectorXd u = body_.reduced.modal->basis * q;
+    return u.reshaped<Eigen::RowMajor>(u.size() / 3, 3).rowwise().norm().maxCoeff();
+  }
+  double kinetic() const;
+  auto moments() const {
+    auto moments = model_.rigid->make_moments();
+    model_.rigid->moments(state_.q, moments);
+    return moments;
+  }
+  Eigen::Vector3d angular_momentum() const;
+  double rotation_energy() const;
+  double mechanical() const { return runtime::energies(scene_, state_).total(); }
+  double inverse_norm(const Eigen::VectorXd& force) const {
+    return std::sqrt(std::max(0.0, force.dot(body_.rest_stiffness.llt().solve(force))));
+  }
+  RowMatrix end_rows() const;
+  double surface_density() const {  // mass over the area that it lies on [kg/m^2]
+    return test_.body.density * body_.reduced.object->mesh.vertices.col(2).maxCoeff();
+  }
+  /// Whether the body ends up in a rotation about another axis than a principal one, which bends it for ever.
+  bool tumbles() const {
+    return test_.body.free && ((test_.spin > 0 && !test_.principal_axis) || !scene_.forces.empty());
+  }
+  /// Whether the run stays in the range where displacements are below so many L in linear elasticity.
+  bool small(double sizes) const;
+  bool conservative() const;
+  void judge(Check check, double value, double limit);
+  void judge_all();
+
+  const StabilityCase& test_;
+  const StudyBody& body_;
+  const runtime::Model& model_;
+  std::int64_t steps_;
+  bool expects_rest_ = false;
+  runtime::StepScene scene_;
+  runtime::State state_;
+  StabilityResult result_;
+  double bound_u_linear_ = 0, start_energy_ = 0, start_potential_ = 0, work_ = 0, gain_ = 0, exchanged_ = 0;
+  double peak_kinetic_ = 0, peak_rotation_ = 0, start_displacement_ = 0;
+  Eigen::Vector3d start_momentum_ = Eigen::Vector3d::Zero();
+  double momentum_drift_ = 0;
+};
+
+void Run::make_scene(const PlantedFault& fault) {
+  scene_.time_step = test_.time_step;
+  scene_.integrator = test_.integrator;
+  scene_.newton.line_search = fault.line_search;
+  scene_.newton.projection = fault.projection;
+  scene_.mass_damping = 2 * test_.damping * body_.lowest_frequency;
+  scene_.stiffness_damping = test_.stiffness_damping / body_.lowest_frequency;
+  scene_.gravity = Eigen::Vector3d(0, 0, -test_.gravity);
+  scene_.gravity_force = runtime::gravity_force(model_, scene_.gravity);
+  if (!model_.examples.empty()) scene_.examples.push_back(test_.examples);
+  if (test_.tip_load.norm() > 0) add_tip_load();
+  if (test_.ground != Ground::kNone) add_ground();
+}
+
+// Rows of the basis of the vertices at the far end.
+RowMatrix Run::end_rows() const {
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  const double end = X.col(0).maxCoeff() - 1e-9;
+  RowMatrix rows(0, model_.modes());
+  for (Eigen::Index v = 0; v < X.rows(); ++v) {
+    if (X(v, 0) < end) continue;
+    rows.conservativeResize(rows.rows() + 3, Eigen::NoChange);
+    rows.bottomRows<3>() = body_.reduced.modal->basis.middleRows<3>(3 * v);
+  }
+  return rows;
+}
+
+void Run::add_tip_load() {
+  const RowMatrix rows = end_rows();
+  runtime::ScriptedForce load;
+  load.end = (kLoadSteps - 0.25) * test_.time_step;
+  const Eigen::VectorXd unit = runtime::vertex_force(rows, test_.tip_load.normalized());
+  const double moved = largest(body_.rest_stiffness.llt().solve(unit));
+  const Eigen::Vector3d force = body_.size / moved * test_.tip_load;  // on each vertex
+  const double count = static_cast<double>(rows.rows()) / 3;
+  load.force = runtime::vertex_force(rows, force);
+  load.total = count * force;
+  load.mean_basis.setZero(3, rows.cols());
+  for (Eigen::Index v = 0; v < rows.rows() / 3; ++v) load.mean_basis += rows.middleRows<3>(3 * v) / count;
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  if (model_.rigid)
+    load.lever = Eigen::Vector3d(X.col(0).maxCoeff(), 0.5 * X.col(1).maxCoeff(), 0.5 * X.col(2).maxCoeff()) -
+                 model_.rigid->centre_of_mass();
+  scene_.forces.push_back(load);
+}
+
+void Run::add_ground() {
+  const VertexArray& X = body_.reduced.object->mesh.vertices;
+  const double height = X.col(2).maxCoeff();
+  runtime::Obstacle ground;
+  ground.shape = runtime::Plane{{0, 0, -kClearance}, Eigen::Vector3d::UnitZ()};
+  ground.stiffness = test_.contact_stiffness;
+  ground.damping = 2 * std::sqrt(test_.contact_stiffness * surface_density());  // a vertex of that mass does not bounce
+  ground.friction = test_.friction;
+  scene_.obstacles.push_back(ground);
+  if (test_.ground != Ground::kPress) return;
+  runtime::Obstacle press = ground;
+  press.shape = runtime::Plane{{0, 0, height + kClearance}, -Eigen::Vector3d::UnitZ()};
+  const double time = kLoadSteps * test_.time_step, way = height + 2 * kClearance;  // the planes meet
+  press.motion = runtime::RigidMotion(
+      {{0, Eigen::Vector3d::Zero()}, {time, Eigen::Vector3d(0, 0, -way)}, {2 * time, Eigen::Vector3d::Zero()}});
+  scene_.obstacles.push_back(press);
+}
+
+Eigen::VectorXd Run::start_pose() const {
+  const RowMatrix& basis = body_.reduced.modal->basis;
+  const Eigen::Index modes = model_.modes();
+  if (test_.start == Start::kRest || test_.start == Start::kImpulse) return Eigen::VectorXd::Zero(modes);
+  if (test_.start == Start::kTangled) {
+    std::mt19937 generator(1);
+    Eigen::VectorXd q(modes);
+    for (double& number : q) number = 2 * (static_cast<double>(generator()) / 4294967295.0) - 1;
+    return test_.reach * body_.size / largest(q) * q;
+  }
+  VertexArray field = body_.reduced.object->mesh.vertices;
+  const Eigen::RowVector3d middle = 0.5 * field.colwise().maxCoeff();
+  field.rowwise() -= Eigen::RowVector3d(model_.rigid ? middle[0] : 0, middle[1], middle[2]);
+  if (test_.start != Start::kCollapsed) field.rightCols<2>().setZero();
+  const double factor = test_.start == Start::kInverted ? -2 : -1;
+  const Eigen::VectorXd flat = field.reshaped<Eigen::RowMajor>();
+  const Eigen::MatrixXd normal = basis.transpose() * basis;
+  return factor * normal.llt().solve(basis.transpose() * flat);
+}
+
+void Run::make_start() {
+  const Eigen::VectorXd q = start_pose();
+  Eigen::VectorXd v = Eigen::VectorXd::Zero(model_.modes());
+  if (test_.start == Start::kImpulse) {
+    v = runtime::vertex_force(end_rows(), test_.impulse.normalized());
+    v *= test_.impulse.norm() * body_.size / body_.reach / v.norm();
+  }
+  state_ = runtime::make_state(model_, q, v);
+  runtime::prepare_contacts(model_, scene_.obstacles.size(), state_);
+  if (state_.body) {
+    runtime::FreeMotion motion;
+    motion.linear_velocity = Eigen::Vector3d(0, 0, -test_.velocity);
+    const Eigen::Vector3d inclined(0.5, std::sqrt(0.5), 0.5);
+    motion.angular_velocity = test_.spin * (test_.principal_axis ? Eigen::Vector3d::UnitZ() : inclined);
+    runtime::set_motion(model_, motion, state_);
+    start_momentum_ = angular_momentum();
+  }
+  const CubatureData& cubature = *body_.reduced.cubature;
+  const Eigen::VectorXd H = cubature.gradient * q;
+  for (Eigen::Index j = 0; j < cubature.weights.size(); ++j) {
+    const RowMatrix3 F = Eigen::Map<const RowMatrix3>(H.data() + 9 * j) + RowMatrix3::Identity();
+    result_.start_determinant = std::min(result_.start_determinant, F.determinant());
+    result_.start_inverted += F.determinant() <= 0 ? 1.0 / static_cast<double>(cubature.weights.size()) : 0;
+  }
+  start_displacement_ = largest(q);
+  start_energy_ = mechanical();
+  start_potential_ = runtime::energies(scene_, state_).potential;
+  peak_kinetic_ = kinetic();
+}
+
+// Until the slowest mode is at rest after the load, if that is soon enough.
+void Run::plan_steps(int most_steps) {
+  if (!(test_.damping > 0)) {
+    steps_ = std::min(most_steps, kUndampedSteps);
+    return;
+  }
+  double rate = body_.lowest_frequency * std::min(test_.damping, 1 / (2 * test_.damping));
+  if (test_.ground != Ground::kNone) rate = std::min(rate, std::sqrt(test_.contact_stiffness / surface_density()));
+  const double load_steps = test_.ground == Ground::kPress ? 2 * kLoadSteps : kLoadSteps;
+  const double needed = load_steps + std::max<double>(kLeastRestSteps, kRestTime / (rate * test_.time_step));
+  expects_rest_ = needed <= most_steps && !tumbles();
+  steps_ = needed <= most_steps ? static_cast<std::int64_t>(std::ceil(needed)) : most_steps;
+}
+
+// Of what comes to rest: the deformation, and all of a body that may touch the ground.
+double Run::kinetic() const {
+  if (test_.ground != Ground::kNone) return runtime::energies(scene_, state_).kinetic;
+  return 0.5 * state_.v.squaredNorm();
+}
+
+/// What the start and the loads can do in linear elasticity: a body of the energy W deflects to |q|_K = sqrt(2 W), a
+/// load that sets in at once to 2 |f|_(K^-1), and |u| <= reach |q|_K.
+double Run::linear_displacement() const {
+  const runtime::Energies energies = runtime::energies(scene_, state_);
+  double energy = energies.elastic + energies.kinetic;
+  double norm = 2 * inverse_norm(scene_.gravity_force);
+  if (state_.body && test_.ground == Ground::kNone)
+    energy -= 0.5 * state_.body->linear_momentum.squaredNorm() / state_.body->mass;
+  if (state_.body && test_.ground != Ground::kNone) energy += state_.body->mass * test_.gravity * body_.size;
+  for (const runtime::ScriptedForce& load : scene_.forces) norm += 2 * inverse_norm(load.force);
+  const double elastic = body_.reach * (norm + std::sqrt(2 * energy));
+  if (state_.body) return elastic;
+  // Nor does it move farther than if nothing held it.
+  const double time = static_cast<double>(steps_) * test_.time_step;
+  Eigen::VectorXd force = scene_.gravity_force;
+  for (const runtime::ScriptedForce& load : scene_.forces) force += load.force;
+  return std::min(elastic, body_.mass_reach * time * (std::sqrt(2 * energy) + 0.5 * time * force.norm()));
+}
+
+bool Run::small(double sizes) const {
+  return bound_u_linear_ < sizes * body_.size && scene_.examples.empty() && test_.ground == Ground::kNone &&
+         !(test_.spin > 0);
+}
+
+// Whether the energy that energies() adds up may not grow but by the work of the tip's load: obstacles that stand
+// still store some of it.
+bool Run::conservative() const {
+  return scene_.examples.empty() && test_.ground != Ground::kPress && !(state_.body && !scene_.forces.empty());
+}
+
+void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before) {
+  result_.newton_iterations += report.newton_iterations;
+  result_.factorisations += report.factorisations;
+  result_.line_search_evaluations += report.line_search_evaluations;
+  result_.projections += report.projections;
+  result_.most_iterations = std::max(result_.most_iterations, report.newton_iterations);
+  result_.limited_steps += (report.status & runtime::kStepIterationLimit) != 0 ? 1 : 0;
+  result_.stagnated_steps += (report.status & runtime::kStepStagnated) != 0 ? 1 : 0;
+  result_.target_steps += (report.status & runtime::kTargetNotConverged) != 0 ? 1 : 0;
+  result_.largest_displacement = std::max(result_.largest_displacement, largest(state_.q) / body_.size);
+  peak_kinetic_ = std::max(peak_kinetic_, kinetic());
+  if (state_.body && !scene_.forces.empty()) peak_rotation_ = std::max(peak_rotation_, rotation_energy());
+  const double midpoint = state_.time - 0.5 * test_.time_step;
+  for (const runtime::ScriptedForce& load : scene_.forces)
+    if (midpoint < load.end) work_ += load.force.dot(state_.q - before);
+  const runtime::Energies energies = runtime::energies(scene_, state_);
+  gain_ = std::max(gain_, mechanical() - work_ - start_energy_);
+  exchanged_ = std::max({exchanged_, energies.kinetic + energies.elastic,
+                         std::abs(energies.potential - start_potential_), std::abs(work_)});
+  if (test_.spin > 0)
+    momentum_drift_ = std::max(momentum_drift_, (angular_momentum() - start_momentum_).norm() / start_momentum_.norm());
+}
+
+// Of the motion itself, not the state's variable.
+Eigen::Vector3d Run::angular_momentum() const {
+  const auto now = moments();
+  return state_.body->orientation * (now.inertia * state_.body->spin + now.deformation.transpose() * state_.v);
+}
+
+// Of a free body as a rigid one.
+double Run::rotation_energy() const { return 0.5 * state_.body->spin.dot(moments().inertia * state_.body->spin); }
+
+void Run::step_all() {
+  runtime::Workspace workspace(model_, scene_);
+  result_.largest_displacement = start_displacement_ / body_.size;
+  exchanged_ = runtime::energies(scene_, state_).kinetic + state_.elastic_energy;
+  Eigen::VectorXd before;
+  const Timer timer;
+  for (; result_.steps < steps_; ++result_.steps) {
+    before = state_.q;
+    const runtime::StepReport report = runtime::step(model_, scene_, state_, workspace);
+    if ((report.status & runtime::kStepNonFinite) != 0) {
+      ++result_.non_finite_steps;
+      break;
+    }
+    watch(report, before);
+  }
+  result_.seconds = timer.seconds();
+}
+
+void Run::judge(Check check, double value, double limit) {
+  CheckResult& result = result_[check];
+  result = {value <= limit ? Verdict::kPass : Verdict::kFail, value, limit, {}};
+  if (result.verdict == Verdict::kPass) return;
+  for (const KnownLimit& known : known_limits()) {
+    if (known.check != check || !(value <= known.most) || !known.covers(test_, body_)) continue;
+    result.verdict = Verdict::kKnownLimit;
+    result.limit_id = known.id;
+    return;
+  }
+}
+
+void Run::judge_all() {
+  judge(Check::kFinite, static_cast<double>(result_.non_finite_steps), 0);
+  if (result_.non_finite_steps > 0) return;
+  const double spun = body_.reach * std::sqrt(2 * peak_rotation_) / body_.size;
+  double bound = kSizes + kLinear * (result_.linear_displacement + spun) + start_displacement_ / body_.size;
+  if (small(kSmall)) bound = kSmallMargin * result_.linear_displacement;
+  if (!scene_.examples.empty())
+    for (const ExampleData& example : body_.reduced.examples->examples)
+      bound = std::max(bound, kSizes + 2 * largest(example.pose) / body_.size);
+  judge(Check::kBounded, result_.largest_displacement, bound);
+  judge(Check::kSolved,
+        static_cast<double>(result_.limited_steps + result_.stagnated_steps) / static_cast<double>(result_.steps),
+        kUnconverged);
+  if (expects_rest_) judge(Check::kRest, peak_kinetic_ > 0 ? kinetic() / peak_kinetic_ : 0, kRestKinetic);
+  const bool euler = test_.integrator == Integrator::kBackwardEuler;
+  const bool newmark = test_.integrator == Integrator::kNewmark;
+  if (conservative() && (!newmark || small(kLinearRange)))
+    judge(Check::kEnergy, exchanged_ > 0 ? gain_ / exchanged_ : 0, euler ? kEulerGain : kOtherGain);
+  if (test_.spin > 0 && test_.ground == Ground::kNone && scene_.forces.empty())
+    judge(Check::kMomentum, momentum_drift_, kMomentumDrift);
+}
+
+StabilityResult Run::finish() {
+  bound_u_linear_ = linear_displacement();
+  result_.linear_displacement = bound_u_linear_ / body_.size;
+  step_all();
+  judge_all();
+  return result_;
+}
+
+}  // namespace
+
+Verdict StabilityResult::verdict() const {
+  Verdict worst = Verdict::kPass;
+  for (const CheckResult& check : checks) {
+    if (check.verdict == Verdict::kFail) return Verdict::kFail;
+    if (check.verdict == Verdict::kKnownLimit) worst = Verdict::kKnownLimit;
+  }
+  return worst;
+}
+
+StabilityResult run_case(const StabilityCase& test, const StudyBody& body, int most_steps, const PlantedFault& fault) {
+  return Run(test, body, most_steps, fault).finish();
+}
+
+}  // namespace exmat::precompute

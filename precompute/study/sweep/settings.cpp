@@ -1,0 +1,160 @@
+#include "precompute/study/sweep/settings.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "common/core/error.h"
+#include "precompute/cubature/cubature.h"
+#include "precompute/polynomial/internal_force.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr std::size_t kMostPoints = 2000;
+
+bool has_examples(const SceneConfig& scene) { return scene.examples || !scene.regions.empty(); }
+
+// The scene's own way to find targets; one for all its example forces.
+std::string own_target(const SceneConfig& scene) {
+  if (scene.examples) return scene.examples->target;
+  return scene.regions.empty() ? kNoTarget : scene.regions.front().force.target;
+}
+
+// Each setting of `points` once with each of `values`.
+template <typename Value, typename Member, typename T>
+void multiply(std::vector<PointSettings>& points, const std::vector<Value>& values, T Member::*member) {
+  if (values.empty()) return;
+  std::vector<PointSettings> product;
+  for (const PointSettings& point : points)
+    for (const Value& value : values) {
+      product.push_back(point);
+      product.back().*member = value;
+    }
+  points = std::move(product);
+}
+
+// What has no effect is left as it is in the files, so that equal points are seen to be equal.
+PointSettings normalised(PointSettings point, const PointSettings& own, const AssetConfig& asset, bool examples) {
+  if (point.internal_force == kAllElements)
+    point.cubature_elements.reset();
+  else if (!point.cubature_elements && !asset.cubature_tolerance)
+    point.cubature_elements = 2 * point.basis_size;
+  if (!examples) point.eigenfunctions = own.eigenfunctions;
+  if (!examples) point.target = kNoTarget;
+  return point;
+}
+
+std::vector<PointSettings> product(const SweepConfig& sweep, const PointSettings& own) {
+  std::vector<PointSettings> points{own};
+  multiply(points, sweep.eigenfunctions, &PointSettings::eigenfunctions);
+  multiply(points, sweep.basis_size, &PointSettings::basis_size);
+  multiply(points, sweep.cubature_elements, &PointSettings::cubature_elements);
+  multiply(points, sweep.material, &PointSettings::material);
+  multiply(points, sweep.time_step, &PointSettings::time_step);
+  multiply(points, sweep.integrator, &PointSettings::integrator);
+  multiply(points, sweep.internal_force, &PointSettings::internal_force);
+  multiply(points, sweep.target, &PointSettings::target);
+  return points;
+}
+
+void require_possible(const PointSettings& point, const StudyConfig& study, std::size_t sweep) {
+  if (point.internal_force != "polynomial") return;
+  try {
+    require_polynomial(point.material, point.basis_size);
+  } catch (const InputError& error) {
+    const Complaint& complaint = error.complaint();
+    throw InputError({study.file.string(), fmt::format("/sweeps/{}/internal_force", sweep), complaint.expected,
+                      complaint.found, complaint.advice + "; give it a sweep of its own"});
+  }
+}
+
+}  // namespace
+
+PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
+  PointSettings own;
+  own.eigenfunctions = asset.eigenfunctions;
+  own.basis_size = asset.basis_size;
+  own.cubature_elements = asset.cubature_elements;
+  own.material = asset.material.model;
+  own.time_step = scene.time_step;
+  own.integrator = scene.integrator;
+  own.internal_force = scene.internal_force == "auto" ? asset.internal_force : scene.internal_force;
+  if (asset.cubature_method == kAllElementsMethod) own.internal_force = kAllElements;
+  own.target = own_target(scene);
+  return normalised(own, own, asset, has_examples(scene));
+}
+
+std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& asset, const SceneConfig& scene) {
+  PointSettings own = own_settings(asset, scene);
+  const PointSettings normal = own;
+  own.cubature_elements = asset.cubature_elements;  // 2 r follows the point's r
+  std::vector<PointSettings> points;
+  for (std::size_t i = 0; i < study.sweeps.size(); ++i)
+    for (const PointSettings& raw : product(study.sweeps[i], own)) {
+      const PointSettings point = normalised(raw, normal, asset, has_examples(scene));
+      require_possible(point, study, i);
+      if (std::ranges::find(points, point) == points.end()) points.push_back(point);
+      if (points.size() > kMostPoints)
+        throw InputError({study.file.string(), "/sweeps", fmt::format("at most {} points", kMostPoints), "more", ""});
+    }
+  return points;
+}
+
+AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
+  asset.eigenfunctions = settings.eigenfunctions;
+  asset.basis_size = settings.basis_size;
+  asset.material.model = settings.material;
+  if (settings.cubature_elements || settings.internal_force == kAllElements) asset.cubature_tolerance.reset();
+  if (settings.internal_force == kAllElements)
+    asset.cubature_method = kAllElementsMethod;
+  else if (asset.cubature_method == kAllElementsMethod)
+    asset.cubature_method = CubatureOptions{}.method;
+  asset.cubature_elements = settings.cubature_elements;
+  return asset;
+}
+
+SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
+  scene.time_step = settings.time_step;
+  scene.integrator = settings.integrator;
+  scene.internal_force = settings.internal_force == kAllElements ? "cubature" : settings.internal_force;
+  if (scene.examples) scene.examples->target = settings.target;
+  for (RegionForceConfig& region : scene.regions) region.force.target = settings.target;
+  scene.instances = 1;
+  scene.trajectory = "positions";  // is never written
+  return scene;
+}
+
+nlohmann::ordered_json to_json(const PointSettings& settings) {
+  nlohmann::ordered_json json{{"eigenfunctions", settings.eigenfunctions}, {"basis_size", settings.basis_size}};
+  json["cubature_elements"] = nullptr;
+  if (settings.cubature_elements) json["cubature_elements"] = *settings.cubature_elements;
+  json["material"] = settings.material;
+  json["time_step"] = settings.time_step;
+  json["integrator"] = settings.integrator;
+  json["internal_force"] = settings.internal_force;
+  json["target"] = settings.target;
+  return json;
+}
+
+PointSettings settings_from_json(const nlohmann::ordered_json& json) {
+  PointSettings settings;
+  settings.eigenfunctions = json.at("eigenfunctions").get<int>();
+  settings.basis_size = json.at("basis_size").get<int>();
+  if (!json.at("cubature_elements").is_null()) settings.cubature_elements = json.at("cubature_elements").get<int>();
+  settings.material = json.at("material").get<std::string>();
+  settings.time_step = json.at("time_step").get<double>();
+  settings.integrator = json.at("integrator").get<std::string>();
+  settings.internal_force = json.at("internal_force").get<std::string>();
+  settings.target = json.at("target").get<std::string>();
+  return settings;
+}
+
+std::string describe(const PointSettings& settings) {
+  std::string text = fmt::format("m {}, r {}, ", settings.eigenfunctions, settings.basis_size);
+  if (settings.cubature_elements) text += fmt::format("s {}, ", *settings.cubature_elements);
+  return text + fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
+                            settings.integrator, settings.internal_force, settings.target);
+}
+
+}  // namespace exmat::precompute

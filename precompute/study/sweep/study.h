@@ -1,0 +1,68 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "precompute/study/sweep/pareto.h"
+#include "precompute/study/sweep/point_result.h"
+#include "precompute/study/sweep/study_config.h"
+
+namespace exmat::precompute {
+
+struct StudyOptions {
+  std::filesystem::path folder;  ///< made where it is not there
+  int jobs = 1;                  ///< processes; times are measured by one
+  Budget budget;                 ///< absent limits: nothing is recommended
+};
+
+/// One full-space run that points are measured against.
+struct ReferenceResult {
+  std::string key;
+  int eigenfunctions = 0;  ///< of its examples; 0: none
+  double time_step = 0;    ///< [s]
+  std::string integrator, material, failure;
+  std::int64_t steps = 0, unconverged_steps = 0;
+  double newton_iterations = 0, factorisations = 0, step_seconds = 0;  ///< means; median, of one run
+};
+
+/// A point's worst frame: positions [n x 3], reduced and in full space.
+struct WorstFrame {
+  std::size_t point = 0;
+  VertexArray reduced, full;
+};
+
+struct StudyResult {
+  StudyConfig config;
+  std::string asset_name;
+  std::int64_t vertices = 0, tets = 0;
+  bool free_body = false;
+  bool has_examples = false;         ///< of the whole body or of regions
+  std::vector<std::string> regions;  ///< that the scene names
+  std::vector<double> times;         ///< of the frames [s]
+  std::vector<PointResult> points;
+  std::vector<ReferenceResult> references;
+  std::vector<std::size_t> front;     ///< of `points`, ascending in time
+  std::size_t own = 0;                ///< the point of the files' own settings, else the first
+  std::optional<StepTimes> baseline;  ///< of the settings of `own`
+  std::string baseline_failure;       ///< empty: none
+  Budget budget;
+  std::optional<std::size_t> recommended, nearest;
+  std::vector<WorstFrame> worst_frames;  ///< of the least accurate point, the files' own and the recommended one
+  TriangleArray surface;                 ///< n_f x 3
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity
+  std::string processor, instruction_set;
+
+  std::size_t failures() const;  ///< points, references and baselines
+};
+
+/// Error and time of a step of each point; those of failed ones are not finite.
+std::vector<Outcome> outcomes(const std::vector<PointResult>& points);
+
+/// Runs what is not finished in the folder, times all points, and writes report.html, results.csv, results.json and,
+/// where a budget is met, recommended_asset.json and recommended_scene.json. A point that fails is told in the result
+/// and the study goes on. Throws InputError for what is wrong with the files.
+StudyResult run_study(const StudyConfig& config, const StudyOptions& options);
+
+}  // namespace exmat::precompute

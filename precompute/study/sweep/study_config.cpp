@@ -1,0 +1,54 @@
+#include "precompute/study/sweep/study_config.h"
+
+#include "common/config/json_file.h"
+#include "common/config/json_values.h"
+
+namespace exmat::precompute {
+namespace {
+
+template <typename T>
+std::vector<T> list(const Json& json, const char* name) {
+  return optional_member<std::vector<T>>(json, name).value_or(std::vector<T>{});
+}
+
+SweepConfig read_sweep(const Json& json) {
+  return {.eigenfunctions = list<int>(json, "eigenfunctions"),
+          .basis_size = list<int>(json, "basis_size"),
+          .cubature_elements = list<int>(json, "cubature_elements"),
+          .material = list<std::string>(json, "material"),
+          .time_step = list<double>(json, "time_step"),
+          .integrator = list<std::string>(json, "integrator"),
+          .internal_force = list<std::string>(json, "internal_force"),
+          .target = list<std::string>(json, "target")};
+}
+
+}  // namespace
+
+StudyConfig load_study(const std::filesystem::path& file) {
+  const Json json = read_json(file);
+  check_against_schema(json, "study", file);
+  StudyConfig study;
+  study.file = file;
+  study.name = json["name"];
+  study.asset = resolve_path(file, json["asset"]);
+  study.scene = resolve_path(file, json["scene"]);
+  study.steps = optional_member<std::int64_t>(json, "steps");
+  study.frames = json.value("frames", study.frames);
+  for (const Json& sweep : member_or(json, "sweeps", Json::array({Json::object()})))
+    study.sweeps.push_back(read_sweep(sweep));
+  const Json reference = member_or(json, "reference", Json::object());
+  study.reference = {optional_member<double>(reference, "time_step"),
+                     optional_member<std::string>(reference, "integrator")};
+  const Json timing = member_or(json, "timing", Json::object());
+  study.timing.rounds = timing.value("rounds", study.timing.rounds);
+  study.timing.steps = timing.value("steps", study.timing.steps);
+  study.timing.baseline_steps = timing.value("baseline_steps", study.timing.baseline_steps);
+  study.baseline = json.value("baseline", study.baseline);
+  if (json.contains("paper")) {
+    const Json& paper = json["paper"];
+    study.paper = PaperTimes{paper["interp_ms"], paper["total_ms"], paper["zhu_interp_ms"], paper["zhu_total_ms"]};
+  }
+  return study;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "precompute/study/measure/timing.h"
+
+namespace exmat::precompute {
+
+/// Lists of settings; an empty one stands for the asset's or the scene's own.
+struct SweepConfig {
+  std::vector<int> eigenfunctions{};          ///< m
+  std::vector<int> basis_size{};              ///< r
+  std::vector<int> cubature_elements{};       ///< s
+  std::vector<std::string> material{};        ///< names of MaterialModel
+  std::vector<double> time_step{};            ///< [s]
+  std::vector<std::string> integrator{};      ///< "bdf2", "backward_euler", "newmark"
+  std::vector<std::string> internal_force{};  ///< "cubature", "polynomial", "all_elements"
+  std::vector<std::string> target{};          ///< "table", "solve"
+};
+
+/// How the full space is integrated; absent: as the point.
+struct ReferenceConfig {
+  std::optional<double> time_step;  ///< [s]
+  std::optional<std::string> integrator;
+};
+
+/// Times of the paper's Table 2 [ms].
+struct PaperTimes {
+  double interp = 0, total = 0, zhu_interp = 0, zhu_total = 0;
+};
+
+/// STUDY.json after validation, paths resolved against its folder.
+struct StudyConfig {
+  std::filesystem::path file, asset, scene;
+  std::string name;
+  std::optional<std::int64_t> steps;
+  int frames = 200;
+  std::vector<SweepConfig> sweeps;
+  ReferenceConfig reference;
+  TimingConfig timing;
+  bool baseline = false;
+  std::optional<PaperTimes> paper;
+};
+
+/// Reads STUDY.json and validates it against schemas/study.json. Throws InputError.
+StudyConfig load_study(const std::filesystem::path& file);
+
+}  // namespace exmat::precompute

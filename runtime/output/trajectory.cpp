@@ -1,0 +1,281 @@
+#include "runtime/output/trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <optional>
+#include <span>
+
+#include "common/bundle/file_schemas.h"
+#include "common/mesh/geometry.h"
+#include "runtime/output/momentum.h"
+
+namespace exmat::runtime {
+namespace {
+
+SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
+  SymbolSizes sizes;
+  sizes.set("F", info.frames, "the scene");
+  sizes.set("n", model.object->mesh.vertex_count(), "the bundle");
+  sizes.set("n_t", model.object->mesh.tet_count(), "the bundle");
+  sizes.set("r", model.modal->basis.cols(), "the bundle");
+  if (!model.render) return sizes;
+  sizes.set("v", model.render->tets.size(), "the bundle");
+  sizes.set("f", model.render->triangles.rows(), "the bundle");
+  return sizes;
+}
+
+Hdf5File create_file(const AtomicFile& output, const ReducedModel& model, const TrajectoryInfo& info) {
+  Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
+  write_header(file, trajectory_schema(), generator_name());
+  file.write_attribute("/", "asset_name", model.asset_name);
+  file.write_attribute("/", "input_sha256", model.input_sha256);
+  file.write_attribute("/", "integrator", info.integrator);
+  file.write_attribute("/", "time_step", info.time_step);
+  const auto regional = [](const WeightInfo& weights) { return !weights.region.empty(); };
+  for (const GroupSchema& group : trajectory_schema().groups) {
+    if (group.group == "examples" && std::ranges::all_of(info.weights, regional)) continue;
+    if (group.group == "regions" && std::ranges::none_of(info.weights, regional)) continue;
+    if (group.group == "render" && !model.render) continue;
+    if (is_single(group.path)) {
+      write_group(file, group, group.path);
+      continue;
+    }
+    for (const WeightInfo& weights : info.weights)
+      if (regional(weights)) write_group(file, group, fill_name(group.path, kRegionPlaceholder, weights.region));
+  }
+  return file;
+}
+
+std::span<const double> row_of(const Eigen::VectorXd& vector) {
+  return {vector.data(), static_cast<std::size_t>(vector.size())};
+}
+
+std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.data(), 3}; }
+
+/// Positions as a row of single precision.
+void append_drawn(const VertexArray& positions, RowWriter& dataset) {
+  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
+  dataset.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
+}
+
+/// The cells that an .xdmf shows, and the datasets that hold them and the frames of their vertices.
+struct Drawn {
+  std::string_view cell, cells_path, vertices_path;
+  Eigen::Index corners = 0, cells = 0, vertices = 0;
+};
+
+/// One grid of the temporal collection: a hyperslab of the vertices on the shared cells.
+std::string xdmf_frame(const std::string& h5, const Drawn& drawn, std::int64_t frames, std::size_t frame, double time) {
+  return fmt::format(
+      "      <Grid Name=\"frame {0}\">\n"
+      "        <Time Value=\"{1}\"/>\n"
+      "        <Topology TopologyType=\"{6}\" NumberOfElements=\"{2}\">\n"
+      "          <DataItem Dimensions=\"{2} {7}\" NumberType=\"Int\" Precision=\"4\" "
+      "Format=\"HDF\">{3}:{8}</DataItem>\n"
+      "        </Topology>\n"
+      "        <Geometry GeometryType=\"XYZ\">\n"
+      "          <DataItem ItemType=\"HyperSlab\" Dimensions=\"1 {4} 3\">\n"
+      "            <DataItem Dimensions=\"3 3\" NumberType=\"Int\" Format=\"XML\">{0} 0 0 1 1 1 1 {4} 3</DataItem>\n"
+      "            <DataItem Dimensions=\"{5} {4} 3\" NumberType=\"Float\" Precision=\"4\" Format=\"HDF\">{3}:{9}"
+      "</DataItem>\n"
+      "          </DataItem>\n"
+      "        </Geometry>\n"
+      "      </Grid>\n",
+      frame, time, drawn.cells, h5, drawn.vertices, frames, drawn.cell, drawn.corners, drawn.cells_path,
+      drawn.vertices_path);
+}
+
+std::string escape_xml(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string xdmf_text(const std::filesystem::path& trajectory, const std::string& name, const Drawn& drawn,
+                      std::int64_t frames, const std::vector<double>& times) {
+  const std::string h5 = escape_xml(trajectory.filename().string());
+  std::string text = fmt::format(
+      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
+      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
+      escape_xml(name));
+  for (std::size_t frame = 0; frame < times.size(); ++frame) text += xdmf_frame(h5, drawn, frames, frame, times[frame]);
+  return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
+}
+
+}  // namespace
+
+/// Open datasets, in the order of the format.
+struct TrajectoryWriter::Datasets {
+  Datasets(Hdf5File& file, const SymbolSizes& sizes, const std::vector<WeightInfo>& forces)
+      : file_(file), sizes_(sizes) {
+    for (const WeightInfo& force : forces) {
+      DatasetSchema schema =
+          trajectory_schema().dataset(force.region.empty() ? "/examples/weights" : "/regions/{region}/weights");
+      schema.path = fill_name(schema.path, kRegionPlaceholder, force.region);
+      SymbolSizes own = sizes;
+      own.set("K", force.count, "the bundle");
+      weights.emplace_back(file, schema, own);
+    }
+    if (sizes.find("v") != nullptr) render.emplace(rows("/render/vertices"));
+  }
+
+  void finish() {
+    for (RowWriter* dataset : {&time, &positions, &reduced, &reduced_velocity, &body_position, &body_orientation,
+                               &linear_momentum, &angular_momentum, &kinetic, &elastic, &potential, &step_time})
+      dataset->finish();
+    for (RowWriter& dataset : weights) dataset.finish();
+    if (render) render->finish();
+  }
+
+ private:
+  RowWriter rows(const char* path) const { return {file_, trajectory_schema().dataset(path), sizes_}; }
+
+  Hdf5File& file_;
+  const SymbolSizes& sizes_;
+
+ public:
+  RowWriter time = rows("/time");
+  RowWriter positions = rows("/vertices");
+  RowWriter reduced = rows("/reduced");
+  RowWriter reduced_velocity = rows("/reduced_velocity");
+  RowWriter body_position = rows("/body/position");
+  RowWriter body_orientation = rows("/body/orientation");
+  RowWriter linear_momentum = rows("/linear_momentum");
+  RowWriter angular_momentum = rows("/angular_momentum");
+  RowWriter kinetic = rows("/energy/kinetic");
+  RowWriter elastic = rows("/energy/elastic");
+  RowWriter potential = rows("/energy/potential");
+  RowWriter step_time = rows("/step_time");
+  std::vector<RowWriter> weights;   // as TrajectoryInfo::weights
+  std::optional<RowWriter> render;  // vertices of the render mesh
+};
+
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model,
+                                   const TrajectoryInfo& info)
+    : model_(model),
+      info_(info),
+      output_(path),
+      file_(create_file(output_, model, info)),
+      rest_masses_(tet_volumes(model.object->mesh).cwiseProduct(model.object->materials.density)),
+      displacements_(model.object->mesh.vertex_count(), 3),
+      velocities_(model.object->mesh.vertex_count(), 3) {
+  const SymbolSizes sizes = sizes_of(model, info);
+  const auto write = [&](const char* name, const auto& array) {
+    const DatasetSchema& schema = trajectory_schema().dataset(name);
+    write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), array.data());
+  };
+  write("/tets", model.object->mesh.tets);
+  if (model.render) write("/render/triangles", model.render->triangles);
+  datasets_ = std::make_unique<Datasets>(file_, sizes, info.weights);
+}
+
+TrajectoryWriter::~TrajectoryWriter() = default;
+
+void TrajectoryWriter::append(const State& state, const Energies& energies, double step_seconds) {
+  FreeState where;
+  if (state.carried) {
+    const FreeMotion frame = motion_of(state.carried->frame);
+    where.position = frame.position;
+    where.orientation = frame.orientation;
+  }
+  const FreeState& body = state.body ? *state.body : where;
+  const Eigen::Quaterniond& turn = body.orientation;
+  const std::array orientation{turn.w(), turn.x(), turn.y(), turn.z()};
+  times_.push_back(state.time);
+  datasets_->time.append(state.time);
+  append_positions(state);
+  datasets_->reduced.append(row_of(state.q));
+  datasets_->reduced_velocity.append(row_of(state.v));
+  datasets_->body_position.append(row_of(body.position));
+  datasets_->body_orientation.append(std::span<const double>(orientation));
+  datasets_->kinetic.append(energies.kinetic);
+  datasets_->elastic.append(energies.elastic);
+  datasets_->potential.append(energies.potential);
+  datasets_->step_time.append(step_seconds);
+  for (std::size_t i = 0; i < info_.weights.size(); ++i)
+    datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
+}
+
+void TrajectoryWriter::append_positions(const State& state) {
+  const RowMatrix& basis = model_.modal->basis;
+  displacements_.reshaped<Eigen::RowMajor>().noalias() = basis * state.q;
+  velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
+  VertexArray positions = model_.object->mesh.vertices + displacements_;
+  if (state.body) place(*state.body, positions);
+  if (state.carried) carry(state.carried->frame, positions);
+  append_drawn(positions, datasets_->positions);
+  if (model_.render) append_render_mesh(positions);
+  largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
+  const Momenta now = state.body ? Momenta{state.body->linear_momentum, state.body->angular_momentum}
+                                 : momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
+  datasets_->linear_momentum.append(row_of(now.linear));
+  datasets_->angular_momentum.append(row_of(now.angular));
+}
+
+/// From the positions of the tets' vertices, which the trajectory holds in any case: 12 products a vertex, where rows
+/// of the basis of its own would take 3 r and as much memory. Weights add up to 1, so that the world frame serves.
+void TrajectoryWriter::append_render_mesh(const VertexArray& positions) {
+  const RenderData& render = *model_.render;
+  VertexArray drawn(render.tets.size(), 3);
+  for (Eigen::Index k = 0; k < drawn.rows(); ++k) {
+    const auto corners = model_.object->mesh.tets.row(render.tets[k]);
+    drawn.row(k) = render.barycentric(k, 0) * positions.row(corners[0]);
+    for (int c = 1; c < 4; ++c) drawn.row(k) += render.barycentric(k, c) * positions.row(corners[c]);
+  }
+  append_drawn(drawn, *datasets_->render);
+}
+
+/// From the body's frame at rest to the world.
+void TrajectoryWriter::place(const FreeState& body, VertexArray& positions) const {
+  const Eigen::RowVector3d centre = model_.rigid->centre_of_mass.transpose();
+  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix();
+  positions = (positions.rowwise() - centre) * rotation.transpose();
+  positions.rowwise() += centre + body.position.transpose();
+}
+
+/// Positions and velocities from the moving frame to the world.
+void TrajectoryWriter::carry(const MotionSample& frame, VertexArray& positions) {
+  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
+    const Eigen::Vector3d point = frame.to_world(positions.row(i).transpose());
+    velocities_.row(i) = frame.velocity_at(point) + frame.rotation * velocities_.row(i).transpose();
+    positions.row(i) = point;
+  }
+}
+
+void TrajectoryWriter::finish() {
+  datasets_->finish();
+  datasets_.reset();
+  file_.close();
+  output_.commit();
+  const std::filesystem::path& target = output_.target();
+  const TetMesh& mesh = model_.object->mesh;
+  const Drawn body{"Tetrahedron", "/tets", "/vertices", 4, mesh.tet_count(), mesh.vertex_count()};
+  write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
+                        xdmf_text(target, model_.asset_name, body, info_.frames, times_));
+  if (!model_.render) return;
+  const Drawn surface{"Triangle",
+                      "/render/triangles",
+                      "/render/vertices",
+                      3,
+                      model_.render->triangles.rows(),
+                      model_.render->tets.size()};
+  write_file_atomically(target.parent_path() / (target.stem().string() + "_render.xdmf"),
+                        xdmf_text(target, model_.asset_name, surface, info_.frames, times_));
+}
+
+}  // namespace exmat::runtime

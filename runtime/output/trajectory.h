@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/core/atomic_file.h"
+#include "common/hdf5/hdf5_file.h"
+#include "common/model/reduced_model.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+
+/// An example force whose weights a trajectory shows.
+struct WeightInfo {
+  std::size_t force = 0;   ///< in State::examples
+  std::string region;      ///< empty: the whole body
+  std::int64_t count = 0;  ///< K
+};
+
+/// What a trajectory says of its run.
+struct TrajectoryInfo {
+  std::string integrator;
+  double time_step = 0;     ///< [s]
+  std::int64_t frames = 0;  ///< that will be appended
+  std::vector<WeightInfo> weights{};
+};
+
+/// Writes the trajectory of a body and an .xdmf beside it, and NAME_render.xdmf where the model holds /render.
+/// interfaces.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is left.
+/// Two equal runs give the same bytes except /step_time.
+class TrajectoryWriter {
+ public:
+  /// `model` holds /object and the basis, perhaps /render, and outlives the writer. Throws WorkError.
+  TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const TrajectoryInfo& info);
+  ~TrajectoryWriter();
+
+  /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
+  void append(const State& state, const Energies& energies, double step_seconds);
+
+  /// To be called after the last frame. Throws WorkError.
+  void finish();
+
+  /// Largest displacement of a vertex in the frames so far [m].
+  double largest_displacement() const { return largest_displacement_; }
+
+ private:
+  struct Datasets;
+  void append_positions(const State& state);
+  void append_render_mesh(const VertexArray& positions);
+  void place(const FreeState& body, VertexArray& positions) const;
+  void carry(const MotionSample& frame, VertexArray& positions);
+
+  const ReducedModel& model_;
+  TrajectoryInfo info_;
+  AtomicFile output_;
+  Hdf5File file_;
+  std::unique_ptr<Datasets> datasets_;
+  Eigen::VectorXd rest_masses_;             ///< n_t
+  VertexArray displacements_, velocities_;  ///< n x 3
+  std::vector<double> times_;
+  double largest_displacement_ = 0;
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,92 @@
+#include "runtime/scene/bodies.h"
+
+#include <algorithm>
+#include <omp.h>
+#include <utility>
+
+#include "common/core/fnv_hash.h"
+#include "common/core/timer.h"
+
+namespace exmat::runtime {
+
+Bodies::Bodies(const Model& model, const StepScene& scene, State start, int count)
+    : model_(model),
+      scene_(scene),
+      start_(std::move(start)),
+      reports_(static_cast<std::size_t>(count)),
+      threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene}, {}}) {
+  refresh_weights(model, scene, start_, threads_.front().workspace);
+  states_.assign(reports_.size(), start_);
+}
+
+void Bodies::restart() {
+  for (State& state : states_) state = start_;
+}
+
+/// The bodies of one thread: a contiguous share, which depends on the number of threads and on nothing else.
+void Bodies::step_share(int thread) noexcept {
+  auto& [workspace, measured] = threads_[static_cast<std::size_t>(thread)];
+  const std::size_t first = states_.size() * static_cast<std::size_t>(thread) / threads_.size();
+  const std::size_t last = states_.size() * static_cast<std::size_t>(thread + 1) / threads_.size();
+  for (std::size_t body = first; body < last; ++body) {
+    if (workspace.profile == nullptr) {
+      reports_[body] = runtime::step(model_, scene_, states_[body], workspace);
+      continue;
+    }
+    const Timer timer;
+    reports_[body] = runtime::step(model_, scene_, states_[body], workspace);
+    measured.seconds += timer.seconds();
+    measured.work += step_work(model_, scene_, reports_[body]);
+  }
+}
+
+std::span<const StepReport> Bodies::step() noexcept {
+  const int threads = this->threads();
+  if (threads == 1) {
+    step_share(0);
+    return reports_;
+  }
+#pragma omp parallel for schedule(static, 1) num_threads(threads)
+  for (int thread = 0; thread < threads; ++thread) step_share(thread);
+  return reports_;
+}
+
+std::optional<int> Bodies::first_non_finite() const {
+  for (int body = 0; body < count(); ++body)
+    if ((reports_[static_cast<std::size_t>(body)].status & kStepNonFinite) != 0) return body;
+  return std::nullopt;
+}
+
+std::uint64_t Bodies::hash() const {
+  FnvHash hash;
+  for (const State& state : states_) {
+    hash.add_all(state.q);
+    hash.add_all(state.v);
+    if (!state.body) continue;
+    hash.add_all(state.body->position);
+    hash.add_all(state.body->orientation.coeffs());
+    hash.add_all(state.body->linear_momentum);
+    hash.add_all(state.body->angular_momentum);
+  }
+  return hash.value();
+}
+
+void Bodies::set_profiled(bool profiled) {
+  for (Thread& thread : threads_) thread.workspace.profile = profiled ? &thread.measured.profile : nullptr;
+}
+
+Bodies::Measured Bodies::take_measured() {
+  Measured sum;
+  for (Thread& thread : threads_) {
+    for (std::size_t stage = 0; stage < kStageNames.size(); ++stage) {
+      sum.profile.seconds[stage] += thread.measured.profile.seconds[stage];
+      sum.profile.flops[stage] += thread.measured.profile.flops[stage];
+    }
+    sum.seconds += thread.measured.seconds;
+    sum.work += thread.measured.work;
+    thread.measured = {};
+  }
+  return sum;
+}
+
+}  // namespace exmat::runtime

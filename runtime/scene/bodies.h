@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "runtime/scene/step_work.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+
+/// N bodies of one model in one scene, stepped together from the same start. OpenMP over the bodies in fixed shares,
+/// one Workspace for each thread: no body depends on another, nor on the number of threads.
+class Bodies {
+ public:
+  /// Refers to model and scene as long as it lives; count >= 1. As many threads as OpenMP gives, at most one for each
+  /// body.
+  Bodies(const Model& model, const StepScene& scene, State start, int count);
+
+  int count() const { return static_cast<int>(states_.size()); }
+  int threads() const { return static_cast<int>(threads_.size()); }
+  State& operator[](int body) { return states_[static_cast<std::size_t>(body)]; }
+  const State& operator[](int body) const { return states_[static_cast<std::size_t>(body)]; }
+
+  /// All back to the start.
+  void restart();
+
+  /// One step of each body, without allocation. Reports in the order of the bodies.
+  std::span<const StepReport> step() noexcept;
+
+  /// The first body that the last step left because of a number that is not finite.
+  std::optional<int> first_non_finite() const;
+
+  /// FNV-1a over the bits of q and v of all bodies, in order; of a free body also where it is and its momenta.
+  std::uint64_t hash() const;
+
+  /// Lets steps measure their stages and count their work.
+  void set_profiled(bool profiled);
+
+  struct Measured {
+    double seconds = 0;  ///< of whole steps
+    Profile profile;
+    StepWork work;
+  };
+  /// Of all steps of all bodies since the last call.
+  Measured take_measured();
+
+ private:
+  struct alignas(128) Thread {  // no cache line of two threads
+    Workspace workspace;
+    Measured measured;
+  };
+  void step_share(int thread) noexcept;
+
+  const Model& model_;
+  const StepScene& scene_;
+  State start_;
+  std::vector<State> states_;
+  std::vector<StepReport> reports_;
+  std::vector<Thread> threads_;
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,90 @@
+#include "runtime/scene/obstacle_loader.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <vector>
+
+#include "common/core/error.h"
+
+namespace exmat::runtime {
+namespace {
+
+Shape make_shape(const PlaneConfig& plane) { return Plane{plane.point, plane.normal}; }
+Shape make_shape(const SphereConfig& sphere) { return Sphere{sphere.center, sphere.radius}; }
+Shape make_shape(const BoxConfig& box) { return Box{box.center, box.half_extents, box.orientation.toRotationMatrix()}; }
+Shape make_shape(const CapsuleConfig& capsule) { return Capsule{capsule.start, capsule.end, capsule.radius}; }
+
+/// Of the whole body first, then of regions.
+std::vector<const ExampleData*> examples_of(const ReducedModel& data) {
+  std::vector<const ExampleData*> examples;
+  const auto add = [&](const ExampleSet& set) {
+    for (const ExampleData& example : set.examples) examples.push_back(&example);
+  };
+  if (data.examples) add(*data.examples);
+  for (const RegionData& region : data.regions) add(region.examples);
+  return examples;
+}
+
+std::string example_names(const ReducedModel& data) {
+  std::string names;
+  for (const ExampleData* example : examples_of(data))
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", example->name);
+  return names.empty() ? "it has none" : "it has " + names;
+}
+
+Eigen::VectorXd example_coordinates(const SceneConfig& config, const ReducedModel& data) {
+  const PoseConfig& pose = *config.body.pose;
+  const auto examples = examples_of(data);
+  const auto example = std::ranges::find(examples, pose.example, &ExampleData::name);
+  if (example == examples.end())
+    throw InputError({config.file.string(), "/body/pose/example",
+                      fmt::format("an example of {}; {}", config.bundle.string(), example_names(data)),
+                      '"' + pose.example + '"', ""});
+  return pose.weight * (*example)->pose;
+}
+
+}  // namespace
+
+RigidMotion make_motion(const std::vector<KeyframeConfig>& keys) {
+  std::vector<Keyframe> frames;
+  for (const KeyframeConfig& key : keys) frames.push_back({key.time, key.position, key.orientation});
+  return RigidMotion(frames);
+}
+
+std::vector<Obstacle> make_obstacles(const SceneConfig& config) {
+  std::vector<Obstacle> obstacles;
+  for (const ObstacleConfig& obstacle : config.obstacles)
+    obstacles.push_back({std::visit([](const auto& shape) { return make_shape(shape); }, obstacle.shape),
+                         make_motion(obstacle.motion), obstacle.stiffness, obstacle.damping, obstacle.friction});
+  return obstacles;
+}
+
+void check_body(const SceneConfig& config, bool constrained) {
+  const BodyConfig& body = config.body;
+  const std::pair<const char*, bool> rigid_state[] = {{"position", body.position.has_value()},
+                                                      {"orientation", body.orientation.has_value()},
+                                                      {"linear_velocity", body.linear_velocity.has_value()},
+                                                      {"angular_velocity", body.angular_velocity.has_value()}};
+  for (const auto& [name, given] : rigid_state)
+    if (given && constrained)
+      throw InputError({config.file.string(), fmt::format("/body/{}", name), "no such member",
+                        "one, and the bundle's body has fixed vertices",
+                        "\"motion\" says where they are; an asset without \"fixed\" makes a free body"});
+  if (!body.motion.empty() && !constrained)
+    throw InputError({config.file.string(), "/body/motion", "no such member",
+                      "one, and the bundle's body has no fixed vertices to carry",
+                      "name \"fixed\" vertices in the asset"});
+}
+
+Eigen::VectorXd start_coordinates(const SceneConfig& config, const ReducedModel& data, Eigen::Index modes) {
+  const BodyConfig& body = config.body;
+  if (body.pose) return example_coordinates(config, data);
+  if (!body.reduced) return Eigen::VectorXd::Zero(modes);
+  if (body.reduced->size() != modes)
+    throw InputError({config.file.string(), "/body/reduced",
+                      fmt::format("{} numbers, as many as {} has modes", modes, config.bundle.string()),
+                      std::to_string(body.reduced->size()), ""});
+  return *body.reduced;
+}
+
+}  // namespace exmat::runtime

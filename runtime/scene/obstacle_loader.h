@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "common/bundle/bundle.h"
+#include "common/config/scene_config.h"
+#include "runtime/sim/contact/obstacle.h"
+
+namespace exmat::runtime {
+
+RigidMotion make_motion(const std::vector<KeyframeConfig>& keys);
+
+std::vector<Obstacle> make_obstacles(const SceneConfig& config);
+
+/// Throws InputError where the scene gives a constrained body a rigid state or a free one a motion.
+void check_body(const SceneConfig& config, bool constrained);
+
+/// q at the beginning [r], for `modes` of them: that of body.reduced or body.pose, else 0. A pose needs /examples.
+/// Throws InputError: another number of coordinates, no example of that name.
+Eigen::VectorXd start_coordinates(const SceneConfig& config, const ReducedModel& data, Eigen::Index modes);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,284 @@
+#include "runtime/scene/scene_loader.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <string_view>
+#include <utility>
+
+#include "common/config/config.h"
+#include "common/core/error.h"
+#include "runtime/scene/obstacle_loader.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+namespace {
+
+Integrator integrator_from_name(std::string_view name) {
+  if (name == "backward_euler") return Integrator::kBackwardEuler;
+  if (name == "newmark") return Integrator::kNewmark;
+  return Integrator::kBdf2;
+}
+
+void check_examples(const SceneConfig& config, const BundleSummary& summary) {
+  const std::string bundle = config.bundle.string();
+  if (config.examples && summary.examples == 0)
+    throw InputError({bundle, "/examples", "this group, since the scene asks for an example force", "none",
+                      "precompute the asset with its examples, or drop \"examples\" from " + config.file.string()});
+}
+
+void check_regions(const SceneConfig& config, const BundleSummary& summary) {
+  std::string names;
+  for (const RegionSummary& region : summary.regions)
+    names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", region.name);
+  for (std::size_t i = 0; i < config.regions.size(); ++i) {
+    const std::string& name = config.regions[i].name;
+    if (std::ranges::find(summary.regions, name, &RegionSummary::name) != summary.regions.end()) continue;
+    throw InputError(
+        {config.file.string(), fmt::format("/regions/{}/name", i),
+         fmt::format("a region of {}; {}", config.bundle.string(), names.empty() ? "it has none" : "it has " + names),
+         '"' + name + '"', "name regions in the asset and precompute it again"});
+  }
+}
+
+/// A table of targets where the scene insists on one. `owner` is the member of the scene, `group` that of the bundle.
+void check_table(const SceneConfig& config, const ExampleForceConfig& force, const std::string& owner,
+                 const std::string& group, bool has_targets, const std::string& energy_reference) {
+  if (force.target != "table") return;
+  const std::string bundle = config.bundle.string();
+  const std::string advice =
+      fmt::format("precompute the asset with this scene (--scene), or let the scene's {}.target say \"auto\"", owner);
+  if (!has_targets)
+    throw InputError({bundle, group, "this group, since the scene asks for a table of targets", "none", advice});
+  if (energy_reference != force.energy_reference)
+    throw InputError({bundle, group, "targets of energy_reference \"" + force.energy_reference + '"',
+                      '"' + energy_reference + '"', advice});
+}
+
+void check_methods(const SceneConfig& config, const BundleSummary& summary) {
+  const std::string bundle = config.bundle.string();
+  if (config.internal_force == "polynomial" && !summary.has_polynomial)
+    throw InputError({bundle, "/polynomial", "this group, since the scene asks for it by internal_force", "none",
+                      "precompute the asset with internal_force \"polynomial\", or let the scene say \"auto\""});
+  if (config.examples)
+    check_table(config, *config.examples, "examples", "/targets", summary.has_targets, summary.energy_reference);
+  for (std::size_t i = 0; i < config.regions.size(); ++i) {
+    const auto& [name, force] = config.regions[i];
+    const RegionSummary& region = *std::ranges::find(summary.regions, name, &RegionSummary::name);
+    check_table(config, force, fmt::format("regions[{}]", i), fmt::format("/regions/{}/targets", name),
+                region.has_targets, region.energy_reference);
+  }
+}
+
+void check_render(const SceneConfig& config, const BundleSummary& summary) {
+  if (!config.render || !config.trajectory || summary.render_vertices > 0) return;
+  throw InputError({config.bundle.string(), "/render", "this group, since the scene asks for output.render", "none",
+                    "name object.render_mesh in the asset and precompute it again, or drop \"render\" from " +
+                        config.file.string()});
+}
+
+void check_force_vertices(const SceneConfig& config, const BundleSummary& summary) {
+  for (std::size_t i = 0; i < config.forces.size(); ++i)
+    for (const std::int64_t vertex : config.forces[i].vertices)
+      if (vertex < 0 || vertex >= summary.vertices)
+        throw InputError({config.file.string(), fmt::format("/forces/{}/vertices", i),
+                          fmt::format("vertices of the object, 0 to {} (0-based)", summary.vertices - 1),
+                          std::to_string(vertex), ""});
+}
+
+void count_bytes(const std::vector<ReadRecord>& records, std::vector<LedgerEntry>& ledger) {
+  for (LedgerEntry& entry : ledger) {
+    const std::string folder = fmt::format("/{}/", entry.group);
+    for (const ReadRecord& record : records)
+      if (record.dataset.starts_with(folder)) entry.bytes += record.bytes;
+    if (!entry.included || entry.bytes > 0) continue;
+    entry.included = false;
+    entry.reason = "not needed to step";
+  }
+}
+
+RowMatrix basis_rows(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
+  const RowMatrix& basis = loaded.data.modal->basis;
+  if (basis.rows() == 0) return read_basis_rows(config.bundle, force.vertices, &loaded.records);
+  RowMatrix rows(3 * force.vertices.size(), basis.cols());
+  for (std::size_t i = 0; i < force.vertices.size(); ++i)
+    rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * force.vertices[i]);
+  return rows;
+}
+
+ScriptedForce scripted_force(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
+  const RowMatrix rows = basis_rows(config, force, loaded);
+  ScriptedForce scripted;
+  scripted.start = force.start;
+  scripted.end = force.end;
+  scripted.force = vertex_force(rows, force.force);
+  const Model& model = *loaded.model;
+  if (!model.rigid && !model.carried) return scripted;
+  const auto count = static_cast<double>(force.vertices.size());
+  scripted.total = count * force.force;
+  scripted.mean_basis.setZero(3, rows.cols());
+  scripted.lever = -(model.rigid ? *model.rigid : model.carried->moments).centre_of_mass();
+  for (std::size_t i = 0; i < force.vertices.size(); ++i) {
+    scripted.lever += loaded.data.object->mesh.vertices.row(force.vertices[i]).transpose() / count;
+    scripted.mean_basis += rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) / count;
+  }
+  return scripted;
+}
+
+ExampleSettings example_settings(const ExampleForceConfig& config) {
+  return {config.stiffness, config.damping, config.bias, config.target_iterations};
+}
+
+StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
+  StepScene scene;
+  scene.time_step = config.time_step;
+  scene.integrator = integrator_from_name(config.integrator);
+  scene.mass_damping = config.mass_damping;
+  scene.stiffness_damping = config.stiffness_damping;
+  scene.newton = {config.newton.max_iterations, config.newton.tolerance};
+  scene.obstacles = make_obstacles(config);
+  if (loaded.model->carried) scene.carrier = make_motion(config.body.motion);
+  scene.gravity = config.gravity;
+  scene.gravity_force = gravity_force(*loaded.model, config.gravity);
+  for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force(config, force, loaded));
+  if (config.examples) scene.examples.push_back(example_settings(*config.examples));
+  for (const RegionForceConfig& region : config.regions) scene.examples.push_back(example_settings(region.force));
+  return scene;
+}
+
+State start_state(const SceneConfig& config, const LoadedScene& loaded) {
+  const Eigen::Index modes = loaded.model->modes();
+  State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
+  prepare_contacts(*loaded.model, config.obstacles.size(), state);
+  if (loaded.model->carried) place_on_carrier(*loaded.model, loaded.scene, state);
+  if (!state.body) return state;
+  FreeMotion motion;
+  motion.position = config.body.position.value_or(motion.position);
+  motion.orientation = config.body.orientation.value_or(motion.orientation);
+  motion.linear_velocity = config.body.linear_velocity.value_or(motion.linear_velocity);
+  motion.angular_velocity = config.body.angular_velocity.value_or(motion.angular_velocity);
+  set_motion(*loaded.model, motion, state);
+  return state;
+}
+
+std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedModel& data) {
+  ModelOptions options;
+  options.examples = config.examples.has_value();
+  options.target_table = data.targets.has_value();
+  options.polynomial = data.polynomial.has_value();
+  options.carried = !config.body.motion.empty();
+  if (config.examples) options.energy_reference = energy_reference_from_name(config.examples->energy_reference);
+  for (const auto& [name, force] : config.regions)
+    options.regions.push_back({name, std::ranges::find(data.regions, name, &RegionData::name)->targets.has_value(),
+                               energy_reference_from_name(force.energy_reference)});
+  ModelResult result = build_model(data, options);
+  if (result.model) return std::move(result.model);
+  result.complaint.file = config.bundle.string();
+  throw InputError(std::move(result.complaint));
+}
+
+std::string describe_target(const ExampleModel& examples, const ExampleSettings& settings) {
+  if (examples.table) return fmt::format("target: table, one polynomial of degree {}", examples.table->degree());
+  return fmt::format("target: Newton in d = {} coordinates, s = {} elements, at most {} iterations a step",
+                     examples.target->dimension(), examples.target->elements(), settings.target_iterations);
+}
+
+void describe_examples(const ExampleModel& examples, const ExampleSettings& settings, std::vector<std::string>& plan) {
+  const std::string owner = examples.region.empty() ? "" : fmt::format("region {}: ", examples.region);
+  if (!acts(settings)) {
+    plan.push_back(owner + "weights, target, example_force: left out, stiffness and damping are 0");
+    return;
+  }
+  const Eigen::Index modes = examples.filter.matrix().rows();
+  plan.push_back(owner +
+                 fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias));
+  plan.push_back(owner + describe_target(examples, settings));
+  plan.push_back(owner + fmt::format("example_force: linear, {} filter of {} x {}",
+                                     examples.filter.is_symmetric() ? "symmetric" : "unsymmetric", modes, modes));
+}
+
+}  // namespace
+
+LoadedScene load_run(const SceneConfig& config) {
+  LoadedScene loaded;
+  loaded.summary = summarise_bundle(config.bundle);
+  check_body(config, loaded.summary.constrained);
+  check_examples(config, loaded.summary);
+  check_regions(config, loaded.summary);
+  check_methods(config, loaded.summary);
+  check_force_vertices(config, loaded.summary);
+  check_render(config, loaded.summary);
+  Needs needs = fit_needs(needs_of(config), loaded.summary);
+  needs.render = needs.render && config.trajectory;
+  loaded.ledger = plan_groups(needs, loaded.summary.constrained, loaded.summary.examples,
+                              std::ssize(loaded.summary.regions), loaded.summary.render_vertices > 0);
+  // A force on a body that moves needs to know where it acts.
+  const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
+  const bool positions = config.trajectory || (moves && !config.forces.empty());
+  const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions};
+  loaded.data = read_bundle(config.bundle, request, &loaded.records);
+  loaded.model = prepare(config, loaded.data);
+  loaded.scene = step_scene(config, loaded);
+  loaded.start = start_state(config, loaded);
+  count_bytes(loaded.records, loaded.ledger);
+  // The model holds its own, prepared for stepping.
+  loaded.data.cubature.reset();
+  loaded.data.examples.reset();
+  loaded.data.projection.reset();
+  loaded.data.polynomial.reset();
+  loaded.data.targets.reset();
+  loaded.data.contact.reset();
+  loaded.data.regions.clear();
+  return loaded;
+}
+
+std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneConfig& config) {
+  const Model& model = *loaded.model;
+  const StepScene& scene = loaded.scene;
+  std::vector<std::string> plan;
+  plan.push_back(
+      fmt::format("integrator: {}, time step {:g} s, r = {} modes", config.integrator, scene.time_step, model.modes()));
+  const auto left_out = [&plan](std::string_view stage, std::string_view why) {
+    plan.push_back(fmt::format("{}: left out, {}", stage, why));
+  };
+  for (std::size_t i = 0; i < scene.examples.size(); ++i) describe_examples(model.examples[i], scene.examples[i], plan);
+  if (scene.examples.empty()) left_out("weights, target, example_force", "the scene names no examples");
+  plan.push_back(model.internal_force.polynomial() ? std::string("internal_force: exact polynomial")
+                                                   : fmt::format("internal_force: cubature, s = {} elements",
+                                                                 model.internal_force.cubature().elements()));
+  plan.push_back(fmt::format("instruction set: {}", kernels().name));
+  plan.push_back(fmt::format("solve: Newton, Cholesky of {} x {}, at most {} iterations", model.modes(), model.modes(),
+                             scene.newton.max_iterations));
+  if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {
+    plan.push_back(
+        fmt::format("damping: mass {:g} 1/s, stiffness {:g} s", scene.mass_damping, scene.stiffness_damping));
+  } else {
+    left_out("damping", "both factors are 0");
+  }
+  if (scene.forces.empty()) {
+    left_out("scripted forces", "the scene names none");
+  } else {
+    plan.push_back(fmt::format("scripted forces: {}", scene.forces.size()));
+  }
+  if (model.rigid)
+    plan.push_back("rigid motion: momenta, rotation by the spin that keeps the angular momentum");
+  else if (model.carried)
+    plan.push_back("rigid motion: prescribed, with the inertial forces that it causes");
+  else
+    left_out("rigid motion", "the body is constrained");
+  if (touches(model, scene))
+    plan.push_back(fmt::format("contact: {} vertices against {} obstacles, backward Euler near them",
+                               model.contact->vertices(), scene.obstacles.size()));
+  else
+    left_out("contact", "the scene names no obstacles");
+  if (config.trajectory) {
+    const RenderData* const render = loaded.data.render ? &*loaded.data.render : nullptr;
+    plan.push_back(fmt::format("output: n = {} positions{} every {} steps", loaded.summary.vertices,
+                               render ? fmt::format(" and {} of the render mesh", render->tets.size()) : "",
+                               config.every));
+  } else {
+    left_out("output", "no trajectory is asked for; positions are not loaded");
+  }
+  return plan;
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "common/bundle/bundle.h"
+#include "common/config/scene_config.h"
+#include "runtime/sim/step/scene.h"
+#include "runtime/sim/step/state.h"
+
+namespace exmat::runtime {
+
+/// A scene ready to step, and how it came to be.
+struct LoadedScene {
+  std::unique_ptr<const Model> model;
+  StepScene scene;
+  State start;  ///< where every body begins
+  BundleSummary summary;
+  std::vector<LedgerEntry> ledger;  ///< groups in and out, bytes as read
+  std::vector<ReadRecord> records;  ///< datasets that were read, in order
+  ReducedModel data;                ///< /object and /modal, complete only if the scene writes positions, and /render
+};
+
+/// Reads of the bundle what the scene needs, no more: positions only if it writes a trajectory. Throws InputError: a
+/// group that the scene needs and the bundle lacks, a vertex out of range, an example that inverts an
+/// element.
+LoadedScene load_run(const SceneConfig& config);
+
+/// The plan of the step: one line for each stage, with its sizes, or why it is left out. method.md, section 7.
+std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneConfig& config);
+
+}  // namespace exmat::runtime

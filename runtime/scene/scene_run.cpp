@@ -1,0 +1,103 @@
+#include "runtime/scene/scene_run.h"
+
+#include <fmt/format.h>
+
+#include "common/core/error.h"
+#include "common/core/progress.h"
+#include "common/core/timer.h"
+#include "runtime/output/trajectory.h"
+
+namespace exmat::runtime {
+namespace {
+
+std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
+  if (!config.trajectory) return nullptr;
+  TrajectoryInfo info{config.integrator, config.time_step, 1 + config.steps / config.every};
+  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i) {
+    const ExampleModel& examples = loaded.model->examples[i];
+    if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
+  }
+  return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, info);
+}
+
+void add_reports(std::span<const StepReport> reports, double seconds, RunSummary& summary) {
+  const auto bodies = static_cast<double>(reports.size());
+  std::int64_t newton = 0, target = 0;
+  for (const StepReport& report : reports) {
+    newton += report.newton_iterations;
+    target += report.target_iterations;
+    summary.projections += report.projections;
+    if ((report.status & kStepUnconverged) != 0) ++summary.unconverged_steps;
+  }
+  ++summary.steps;
+  summary.step_seconds.add(seconds / bodies);
+  summary.newton_iterations.add(static_cast<double>(newton) / bodies);
+  summary.target_iterations.add(static_cast<double>(target) / bodies);
+}
+
+void add_profile(const Profile& profile, const Profile& output, int bodies,
+                 std::array<Samples, kStageNames.size()>& stages) {
+  for (std::size_t stage = 0; stage < stages.size(); ++stage)
+    stages[stage].add(profile.seconds[stage] / bodies + output.seconds[stage]);
+}
+
+RunSummary empty_summary(std::int64_t steps, const Bodies& bodies, bool profiled) {
+  RunSummary summary;
+  summary.bodies = bodies.count();
+  summary.threads = bodies.threads();
+  summary.step_seconds = summary.newton_iterations = summary.target_iterations = Samples(steps);
+  if (profiled) summary.stage_seconds.emplace().fill(Samples(steps));
+  return summary;
+}
+
+}  // namespace
+
+Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config) {
+  return {*loaded.model, loaded.scene, loaded.start, config.instances};
+}
+
+void require_finite(const Bodies& bodies, const SceneConfig& config) {
+  const std::optional<int> body = bodies.first_non_finite();
+  if (!body) return;
+  const State& state = bodies[*body];
+  throw WorkError(fmt::format(
+      "{}: step {} (t = {:g} s), body {} of {}: the state is no longer finite; try a smaller time_step (now {:g} s), "
+      "smaller loads or example stiffness, or the integrator backward_euler. No trajectory was written",
+      config.file.string(), state.step + 1, state.time + config.time_step, *body + 1, bodies.count(),
+      config.time_step));
+}
+
+RunSummary run(const LoadedScene& loaded, const SceneConfig& config, bool profiled) {
+  Bodies bodies = make_bodies(loaded, config);
+  bodies.set_profiled(profiled);
+  const State& shown = bodies[0];
+  RunSummary summary = empty_summary(config.steps, bodies, profiled);
+  const auto trajectory = open_trajectory(loaded, config);
+  if (trajectory) trajectory->append(shown, energies(loaded.scene, shown), 0);
+
+  Progress progress("steps", config.steps);
+  while (shown.step < config.steps) {
+    const Timer timer;
+    const std::span<const StepReport> reports = bodies.step();
+    const double seconds = timer.seconds();
+    require_finite(bodies, config);
+    add_reports(reports, seconds, summary);
+    Profile output;
+    if (trajectory && shown.step % config.every == 0) {
+      const StageTimer stage(profiled ? &output : nullptr, Stage::kOutput);
+      trajectory->append(shown, energies(loaded.scene, shown), seconds / bodies.count());
+    }
+    if (profiled) add_profile(bodies.take_measured().profile, output, bodies.count(), *summary.stage_seconds);
+    progress.advance();
+  }
+  if (trajectory) {
+    trajectory->finish();
+    summary.largest_displacement = trajectory->largest_displacement();
+  }
+  summary.simulated_seconds = shown.time;
+  summary.energies = energies(loaded.scene, shown);
+  summary.state_hash = bodies.hash();
+  return summary;
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,137 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+#include "runtime/sim/contact/contact_law.h"
+
+namespace exmat::runtime {
+
+/// Where a body is: x = position + rotation (X + U q). X are rest positions about `position` at rest: about the centre
+/// of mass for a free body; for a constrained one in the world, so that the identity leaves it where it was meshed.
+struct BodyPose {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< world [m]
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< body to world
+  const Eigen::VectorXd& q;                                ///< [r]
+};
+
+/// How it moves: the velocity at x is linear + angular x (x - position) + rotation U v.
+struct BodyVelocity {
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< world [m/s]
+  Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< world [rad/s]
+  const Eigen::VectorXd& v;                           ///< [r]
+};
+
+class ContactSet;
+
+/// Scratch of one step of one body, sized once; holds nothing from step to step.
+struct ContactWorkspace {
+  ContactWorkspace() = default;
+  ContactWorkspace(const ContactSet& set, std::size_t obstacle_count);
+
+  std::vector<PlacedObstacle> obstacles;     ///< at the end of the step
+  std::vector<ContactCandidate> candidates;  ///< the first candidate_count, in order of vertex and obstacle
+  std::size_t candidate_count = 0;
+
+  // Of the last evaluation.
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< sum of f_i, world [N]
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< sum of (x_i - position) x f_i, world [N m]
+  Eigen::VectorXd generalised;                       ///< sum of U_i^T rotation^T f_i [r]
+  double potential = 0;                              ///< W [J], f = -dW/dx; none of it without candidates
+  int touching = 0;                                  ///< candidates with a normal force
+
+  // Of the last gather().
+  int visited_nodes = 0;
+  int tested_vertices = 0;
+
+  Eigen::MatrixXd factors;  ///< (6 + r) x some columns
+};
+
+/// Contact of a body's surface with obstacles, by the law of contact_law.h. method.md, section 6.
+///
+/// One step: gather, freeze, then evaluate, potential and add_stiffness as often as needed, then evaluate at the
+/// accepted pose and commit. An obstacle that is thinner than a vertex moves in one step may be passed through.
+class ContactSet {
+ public:
+  ContactSet() = default;
+  /// `origin` [m], world: what rest positions are about; the centre of mass at rest of a free body, else 0.
+  explicit ContactSet(const ContactData& data, const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
+
+  Eigen::Index vertices() const noexcept { return areas_.size(); }
+  Eigen::Index modes() const noexcept { return basis_.cols(); }
+
+  /// Place in ContactData of a vertex; the set has an order of its own.
+  int data_index(int vertex) const noexcept { return data_indices_[static_cast<std::size_t>(vertex)]; }
+
+  /// Nothing touches.
+  ContactState make_state(std::size_t obstacle_count) const;
+
+  /// Bound on how far a vertex goes in `time_step` at this velocity [m].
+  double travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept;
+
+  /// Finds the candidates: vertices of this pose, that of the beginning or near, at most `margin` [m] away from the
+  /// obstacles as they are at `end_time` [s]. Costs O(obstacles + r) where the whole body is farther away.
+  void gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
+              double margin, ContactWorkspace& workspace) const noexcept;
+
+  /// Sets what the step keeps of each candidate, from pose and velocity at its beginning.
+  void freeze(const BodyPose& pose, const BodyVelocity& velocity, double time_step, const ContactState& state,
+              ContactWorkspace& workspace) const noexcept;
+
+  /// Forces, their sums and stiffness at a pose at the end of the step.
+  void evaluate(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
+
+  /// W alone [J]; leaves the last evaluation as it is.
+  double potential(const BodyPose& pose, const ContactWorkspace& workspace) const noexcept;
+
+  /// Takes lambda from the last evaluation. Returns the largest change of mu lambda over the largest mu lambda.
+  double refresh_friction(ContactWorkspace& workspace) const noexcept;
+
+  /// Adds sum_i J_i^T K_i J_i to the lower triangle of `stiffness` [(6 + r) x (6 + r)], J = [I, -[x - position]x,
+  /// rotation U_i], K = -df/dx: positive semi-definite, exact but for the curvature of the obstacle.
+  void add_stiffness(const BodyPose& pose, ContactWorkspace& workspace, Eigen::MatrixXd& stiffness) const noexcept;
+
+  /// The same for the reduced coordinates alone [r x r].
+  void add_reduced_stiffness(const BodyPose& pose, ContactWorkspace& workspace,
+                             Eigen::MatrixXd& stiffness) const noexcept;
+
+  /// Writes the contacts of the last evaluation, anchors moved where they slid.
+  void commit(const BodyPose& pose, const ContactWorkspace& workspace, ContactState& state) const noexcept;
+
+ private:
+  /// A node of a bounded deformation tree (James and Pai 2004), depth first: its vertices lie in the ball about
+  /// centre + mean q of radius + min(deviation . |q|, deviation_norm |q|).
+  struct Node {
+    int first = 0, last = 0;  // vertices
+    int next = 0;             // node after the whole branch
+    bool is_leaf = false;
+    double radius = 0, deviation_norm = 0;             // [m], [kg^-1/2]
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // body frame [m]
+  };
+  void build_branch(std::vector<int>& order, int first, int last, const RowMatrix& basis, const VertexArray& rest);
+  void set_bounds(Node& node, const std::vector<int>& order, const RowMatrix& basis, const VertexArray& rest);
+  bool is_near(int node, const BodyPose& pose, double q_norm, double margin,
+               const ContactWorkspace& workspace) const noexcept;
+  bool body_is_near(const BodyPose& pose, double q_norm, double margin,
+                    const ContactWorkspace& workspace) const noexcept;
+  void test_vertices(const Node& node, const BodyPose& pose, double margin, ContactWorkspace& workspace) const noexcept;
+  Eigen::Vector3d world_arm(int vertex, const BodyPose& pose) const noexcept;
+  Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
+                                 const BodyVelocity& velocity) const noexcept;
+  template <int kRigid>
+  void add_stiffness_of(const BodyPose& pose, ContactWorkspace& workspace, Eigen::MatrixXd& stiffness) const noexcept;
+
+  VertexArray rest_;       // k x 3, X
+  RowMatrix basis_;        // 3k x r
+  Eigen::VectorXd areas_;  // k
+  std::vector<int> data_indices_;
+  std::vector<Node> nodes_;
+  RowMatrix means_;        // 3 nodes x r
+  RowMatrix deviations_;   // nodes x r
+  double reach_ = 0;       // largest |X|
+  double basis_norm_ = 0;  // largest |U_i|
+};
+
+}  // namespace exmat::runtime

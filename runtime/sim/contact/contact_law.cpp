@@ -1,0 +1,141 @@
+#include "runtime/sim/contact/contact_law.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace exmat::runtime {
+namespace {
+
+/// Friction of size `limit` as a function of the slip l: f1(l) / l, its derivative f1' and its integral f0, all times
+/// the limit.
+struct SlipLaw {
+  double secant = 0, tangent = 0, energy = 0;
+
+  SlipLaw(double limit, double stiffness, double slip) {
+    const double full = 2 * limit / stiffness;  // where the force reaches its limit
+    if (slip < full) {
+      secant = stiffness * (1 - 0.5 * slip / full);
+      tangent = stiffness * (1 - slip / full);
+      energy = stiffness * slip * slip * (0.5 - slip / full / 6);
+    } else {
+      secant = limit / slip;
+      energy = limit * (slip - full / 3);
+    }
+  }
+};
+
+Eigen::Vector3d tangential(const Eigen::Vector3d& vector, const Eigen::Vector3d& normal) {
+  return vector - normal.dot(vector) * normal;
+}
+
+/// y, see contact_law.h.
+Eigen::Vector3d slip_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) {
+  return tangential(point - candidate.anchor + candidate.damping * (point - candidate.carried), candidate.normal);
+}
+
+/// d - tau v_n.
+double damped_depth(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) {
+  return -gap - candidate.damping * candidate.normal.dot(point - candidate.carried);
+}
+
+void evaluate_normal(ContactCandidate& candidate, const SurfacePoint& surface, const Eigen::Vector3d& point) {
+  candidate.gap = surface.distance;
+  const double depth = damped_depth(candidate, surface.distance, point);
+  if (depth <= 0) return;
+  const double factor = 1 + candidate.damping;
+  const Eigen::Vector3d direction = (surface.normal + candidate.damping * candidate.normal) / factor;
+  candidate.force = candidate.stiffness * depth * direction;
+  candidate.normal_force = candidate.force.norm();
+  candidate.directions.col(0) = direction;
+  candidate.weights[0] = candidate.stiffness * factor;
+}
+
+void evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& point) {
+  candidate.slip = slip_of(candidate, point);
+  if (candidate.friction_force <= 0) return;
+  const double length = candidate.slip.norm();
+  const SlipLaw law(candidate.friction_force, candidate.stiffness, length);
+  const Eigen::Vector3d along =
+      length > 0 ? Eigen::Vector3d(candidate.slip / length) : candidate.normal.unitOrthogonal();
+  candidate.force -= law.secant * candidate.slip;
+  candidate.directions.col(1) = along;
+  candidate.directions.col(2) = candidate.normal.cross(along);
+  candidate.weights[1] = (1 + candidate.damping) * law.tangent;
+  candidate.weights[2] = (1 + candidate.damping) * law.secant;
+}
+
+bool precedes(const HeldContact& held, const ContactCandidate& candidate) {
+  return held.vertex != candidate.vertex ? held.vertex < candidate.vertex : held.obstacle < candidate.obstacle;
+}
+
+}  // namespace
+
+void freeze_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const Eigen::Vector3d& predicted,
+                    double area, double time_step, ContactCandidate& candidate) noexcept {
+  const Obstacle& obstacle = *placed.obstacle;
+  candidate.carried = candidate.anchor = placed.carried(point);
+  const SurfacePoint surface = placed.nearest_surface_point(candidate.carried);
+  const double predicted_gap = surface.distance + surface.normal.dot(predicted - candidate.carried);
+  const bool touches = std::min(surface.distance, predicted_gap) < 0;
+  candidate.normal = surface.normal;
+  candidate.stiffness = obstacle.stiffness * area;
+  candidate.damping = touches ? obstacle.damping / (obstacle.stiffness * time_step) : 0;
+  candidate.friction_force = 0;
+}
+
+void take_friction(const PlacedObstacle& placed, const ContactState& state, std::size_t& next,
+                   ContactCandidate& candidate) noexcept {
+  while (next < state.count && precedes(state.held[next], candidate)) ++next;
+  if (next == state.count) return;
+  const HeldContact& held = state.held[next];
+  if (held.vertex != candidate.vertex || held.obstacle != candidate.obstacle) return;
+  candidate.anchor = placed.pose.to_world(held.anchor);
+  candidate.friction_force = placed.obstacle->friction * held.normal_force;
+}
+
+void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
+                      ContactCandidate& candidate) noexcept {
+  candidate.force.setZero();
+  candidate.weights.setZero();
+  candidate.normal_force = 0;
+  evaluate_normal(candidate, placed.nearest_surface_point(point), point);
+  evaluate_friction(candidate, point);
+}
+
+double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept {
+  const double depth = std::max(0.0, damped_depth(candidate, gap, point));
+  double energy = 0.5 * candidate.stiffness * depth * depth;
+  if (candidate.friction_force > 0)
+    energy += SlipLaw(candidate.friction_force, candidate.stiffness, slip_of(candidate, point).norm()).energy;
+  return energy / (1 + candidate.damping);
+}
+
+double refresh_friction(const std::vector<PlacedObstacle>& obstacles, std::vector<ContactCandidate>& candidates,
+                        std::size_t count) noexcept {
+  double largest = 0, change = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    ContactCandidate& candidate = candidates[i];
+    const double friction = obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction;
+    const double force = friction * candidate.normal_force;
+    change = std::max(change, std::abs(force - candidate.friction_force));
+    largest = std::max({largest, force, candidate.friction_force});
+    candidate.friction_force = force;
+  }
+  return largest > 0 ? change / largest : 0;
+}
+
+void hold_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const ContactCandidate& candidate,
+                  ContactState& state) noexcept {
+  if (candidate.normal_force <= 0) return;
+  const double full = 2 * placed.obstacle->friction * candidate.normal_force / candidate.stiffness;
+  const double length = candidate.slip.norm();
+  const Eigen::Vector3d stretch = length > full ? Eigen::Vector3d(candidate.slip * (full / length))
+                                                : tangential(point - candidate.anchor, candidate.normal);
+  HeldContact& held = state.held[state.count++];
+  held.vertex = candidate.vertex;
+  held.obstacle = candidate.obstacle;
+  held.normal_force = candidate.normal_force;
+  held.anchor = placed.pose.to_frame(point - stretch);
+}
+
+}  // namespace exmat::runtime

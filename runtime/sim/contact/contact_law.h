@@ -1,0 +1,88 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "runtime/sim/contact/obstacle.h"
+
+namespace exmat::runtime {
+
+// The law of contact of one vertex with one obstacle, for bodies of any description. method.md, section 6.
+//
+// With depth d, area A, kappa = A stiffness and the mean velocity v of the step relative to the obstacle, v h = x -
+// x_0, tau = damping / stiffness, a vertex feels
+//   normal    kappa max(0, d - tau n_0 . v) n: a spring and a damper that never pull. The damper acts in steps in which
+//             the vertex touches at the beginning or would by its velocity.
+//   friction  -mu lambda f1(|y|) y / |y|, y = (I - n_0 n_0^T) (x - anchor + tau v): a spring and a damper of initial
+//             stiffness kappa, capped by Coulomb's law: f1(l) = 2 l / e - (l / e)^2 up to e = 2 mu lambda / kappa,
+//             then 1 (the mollifier of Li et al. 2020 on a displacement). The anchor sticks to the obstacle and is
+//             dragged along where it slides (Cundall and Strack 1979), so that nothing creeps below the cone.
+// lambda is the normal force at the end of the last step, or at the last refresh_friction(). Both forces are minus the
+// gradient of a potential of the positions x at the end of the step, whatever the integrator.
+
+inline constexpr double kContactMarginSteps = 2;  ///< way of a vertex that candidates are looked for in
+inline constexpr int kFrictionRounds = 3;         ///< solutions of one step for the normal forces of friction
+inline constexpr double kSameFriction = 0.05;     ///< relative change of friction that needs no further one
+
+/// What a touching vertex remembers from step to step.
+struct HeldContact {
+  int vertex = 0, obstacle = 0;
+  double normal_force = 0;                           ///< at the end of the last step [N]
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the obstacle [m]
+};
+
+/// The contacts of a State: the first `count` of `held`, in order of vertex and obstacle.
+struct ContactState {
+  std::vector<HeldContact> held;
+  std::size_t count = 0;
+};
+
+/// A vertex that may touch an obstacle in this step.
+struct ContactCandidate {
+  int vertex = 0, obstacle = 0;
+
+  // Frozen for the step.
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< n_0, where the step begins
+  Eigen::Vector3d carried = Eigen::Vector3d::Zero();  ///< x_0, where the obstacle would carry the vertex [m]
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();   ///< of the tangential spring, world [m]
+  double stiffness = 0;                               ///< kappa = area * stiffness [N/m]
+  double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
+  double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
+
+  // Of the last evaluation.
+  double gap = 0;                                            ///< [m]
+  double normal_force = 0;                                   ///< [N]
+  Eigen::Vector3d arm = Eigen::Vector3d::Zero();             ///< x - position [m]
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();           ///< on the vertex [N]
+  Eigen::Vector3d slip = Eigen::Vector3d::Zero();            ///< y, tangential [m]
+  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  ///< columns d_i: -df/dx = sum_i w_i d_i d_i^T
+  Eigen::Vector3d weights = Eigen::Vector3d::Zero();         ///< w_i >= 0 [N/m]
+};
+
+/// Sets what a step keeps of a candidate whose vertex, of the share `area` of the surface [m^2], is at `point` where
+/// the step begins and would be at `predicted` at its end.
+void freeze_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const Eigen::Vector3d& predicted,
+                    double area, double time_step, ContactCandidate& candidate) noexcept;
+
+/// Then friction and anchor of the last step, if the vertex touched. Candidates come in order; `next`, 0 before the
+/// first one, is where the search in `state` goes on.
+void take_friction(const PlacedObstacle& placed, const ContactState& state, std::size_t& next,
+                   ContactCandidate& candidate) noexcept;
+
+/// Force and stiffness of the vertex at `point` at the end of the step.
+void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
+
+/// W [J] of the vertex at `point` whose distance is `gap` [m].
+double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;
+
+/// Takes lambda of the first `count` candidates from their last evaluation. Returns the largest change of mu lambda
+/// over the largest mu lambda.
+double refresh_friction(const std::vector<PlacedObstacle>& obstacles, std::vector<ContactCandidate>& candidates,
+                        std::size_t count) noexcept;
+
+/// Writes a candidate of the last evaluation, its vertex at `point`, if it touches; its anchor is moved where it slid.
+void hold_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const ContactCandidate& candidate,
+                  ContactState& state) noexcept;
+
+}  // namespace exmat::runtime

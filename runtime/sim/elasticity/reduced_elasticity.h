@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "common/elastic/material.h"
+#include "common/elastic/material_model.h"
+#include "common/model/reduced_model.h"
+#include "runtime/sim/elasticity/element_potential.h"
+
+namespace exmat::runtime {
+
+/// [s] Lame parameters of the cubature elements.
+std::vector<LameParameters> cubature_lame(const CubatureData& cubature);
+
+/// c_j mu_j and c_j lambda_j [N m], s each, c_j = w_j V_j.
+struct WeightedLame {
+  AlignedArray mu, lambda;
+
+  WeightedLame() = default;
+  WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame);
+};
+
+/// Elasticity of a reduced body by cubature: E(q) = sum_j c_j Psi(I + B_j q), c_j = w_j V_j. method.md, section 6.
+/// s elements, r coordinates. Immutable; all scratch is the caller's, no call allocates or throws.
+class ReducedElasticity {
+ public:
+  using Workspace = ElementPotential::Workspace;
+
+  ReducedElasticity() = default;
+
+  /// `gradient` [9s x r] is B, `weighted_volumes` [s] the c_j [m^3], `lame` [s].
+  ReducedElasticity(MaterialModel material, const RowMatrix& gradient, const Eigen::VectorXd& weighted_volumes,
+                    const std::vector<LameParameters>& lame);
+
+  explicit ReducedElasticity(MaterialModel material, const CubatureData& cubature);
+
+  Workspace make_workspace() const { return potential_.make_workspace(); }
+
+  Eigen::Index modes() const { return potential_.modes(); }
+  Eigen::Index elements() const { return potential_.elements(); }
+  const ElementPotential& potential() const { return potential_; }
+
+  /// E(q) [J], q [r].
+  double energy(const Eigen::VectorXd& q) const noexcept { return potential_.energy(law(), q); }
+
+  /// `force` [r] = dE/dq = sum_j c_j B_j^T P_j. Returns E(q).
+  double force(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& force) const noexcept {
+    return potential_.force(law(), q, workspace, force);
+  }
+
+  /// Lower triangle of `stiffness` [r x r] = sum_j c_j B_j^T (dP/dF)_j B_j; the upper one is left as it was.
+  void stiffness(const Eigen::VectorXd& q, Tangent tangent, Workspace& workspace,
+                 Eigen::MatrixXd& stiffness) const noexcept {
+    potential_.stiffness(law(), q, tangent, workspace, stiffness);
+  }
+
+  /// force() and the exact stiffness() in one pass. Returns E(q).
+  double force_and_stiffness(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& force,
+                             Eigen::MatrixXd& stiffness) const noexcept {
+    return potential_.force_and_stiffness(law(), q, workspace, force, stiffness);
+  }
+
+ private:
+  ElementLaw law() const noexcept;
+
+  ElementLaw::Kind kind_ = ElementLaw::Kind::kStVenantKirchhoff;
+  ElementPotential potential_;
+  WeightedLame lame_;
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,277 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "runtime/kernels/aligned_array.h"
+#include "runtime/sim/elasticity/element_potential.h"
+#include "runtime/sim/solver/profile.h"
+
+namespace exmat::runtime {
+
+struct NewtonSettings {
+  int max_iterations = 200;
+  double tolerance = 1e-6;  ///< |gradient| <= tolerance * scale of the evaluation
+
+  // Faults that the stability suite is to find; newton_minimize() alone looks at them, no file sets them.
+  bool line_search = true;  ///< false: every full step is taken
+  bool projection = true;   ///< false: stagnates where the exact Hessian is not positive definite
+};
+
+enum class NewtonStatus {
+  kConverged,
+  kIterationLimit,
+  kStagnated,  ///< no lower value along the direction, or all of the decrease below rounding
+  kNonFinite,  ///< x may hold anything
+};
+
+struct NewtonReport {
+  NewtonStatus status = NewtonStatus::kConverged;
+  int iterations = 0;
+  int factorisations = 0;           ///< of the Hessian; fewer than iterations where an older one served
+  int line_search_evaluations = 0;  ///< beyond the one that each iteration needs
+  int projections = 0;              ///< times that the exact Hessian was not positive definite
+  double residual = 0;              ///< |gradient| at the end
+};
+
+/// A potential and the size of the terms that add up to it, by which rounding is judged.
+struct PotentialValue {
+  double value = 0;
+  double magnitude = 0;
+};
+
+/// At one point: the potential, and the force scale that the gradient is compared with.
+struct PotentialEvaluation {
+  PotentialValue potential;
+  double force_scale = 0;
+};
+
+/// Of one size, allocated once.
+struct NewtonWorkspace {
+  explicit NewtonWorkspace(Eigen::Index size = 0)
+      : gradient(size),
+        trial(size),
+        trial_gradient(size),
+        hessian(Eigen::MatrixXd::Zero(size, size)),
+        factor(size * padded(size)),
+        direction(size) {}
+
+  Eigen::VectorXd gradient, trial, trial_gradient;
+  Eigen::MatrixXd hessian;  ///< lower triangle
+  AlignedArray factor;      ///< its Cholesky factor, see Kernels::cholesky
+  AlignedArray direction;
+  Profile* profile = nullptr;
+  std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> lu;  ///< only for problems with a gyroscopic() part
+};
+
+namespace detail {
+
+inline constexpr double kArmijo = 1e-4;
+inline constexpr int kHalvings = 30;
+inline constexpr int kShifts = 12;
+inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
+inline constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
+inline constexpr double kChordRate = 0.25;  // of the residual from one iteration to the next
+inline constexpr double kChordSteps = 4;    // that cost less than a new Hessian
+
+inline bool factorize(NewtonWorkspace& workspace, NewtonReport& report) {
+  const Eigen::Index size = workspace.hessian.rows();
+  const StageTimer timer(workspace.profile, Stage::kSolve, static_cast<double>(size * size * size) / 3);
+  ++report.factorisations;
+  return kernels().cholesky(workspace.hessian.data(), size, workspace.hessian.outerStride(), workspace.factor.data());
+}
+
+/// A Hessian that even projected tangents leave indefinite is shifted until it is not.
+inline bool factorize_shifted(NewtonWorkspace& workspace, NewtonReport& report) {
+  if (factorize(workspace, report)) return true;
+  double shift = kFirstShift * workspace.hessian.diagonal().cwiseAbs().maxCoeff();
+  for (int attempt = 0; attempt < kShifts; ++attempt, shift *= 10) {
+    workspace.hessian.diagonal().array() += shift;
+    if (factorize(workspace, report)) return true;
+  }
+  return false;
+}
+
+template <class Problem>
+const Eigen::MatrixXd* gyroscopic_part(const Problem& problem) {
+  if constexpr (requires { problem.gyroscopic(); })
+    return problem.gyroscopic();
+  else
+    return nullptr;
+}
+
+/// H + G, G antisymmetric: whatever G is, the direction of a positive definite H is one of descent.
+inline void factorize_gyroscopic(const Eigen::MatrixXd& gyroscopic, NewtonWorkspace& workspace) {
+  const Eigen::Index size = workspace.hessian.rows();
+  const StageTimer timer(workspace.profile, Stage::kSolve, 2 * static_cast<double>(size * size * size) / 3);
+  workspace.hessian.triangularView<Eigen::StrictlyUpper>() = workspace.hessian.transpose();
+  workspace.hessian += gyroscopic;
+  workspace.lu->compute(workspace.hessian);
+}
+
+/// workspace.direction = -(H + G)^-1 gradient, by the LU factors or, where G is weak, as -H^-1 (gradient + G (-H^-1
+/// (gradient + ...))), as many terms as the problem asks for; returns its slope.
+template <class Problem>
+double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyroscopic) {
+  const Eigen::Index size = workspace.gradient.size();
+  const StageTimer timer(workspace.profile, Stage::kSolve, 2.0 * static_cast<double>(size * size));
+  Eigen::Map<Eigen::VectorXd> direction(workspace.direction.data(), size);
+  if (gyroscopic) {
+    direction.noalias() = workspace.lu->solve(-workspace.gradient);
+    return workspace.gradient.dot(direction);
+  }
+  const auto solve = [&] { kernels().cholesky_solve(workspace.factor.data(), size, direction.data()); };
+  direction = -workspace.gradient;
+  solve();
+  if constexpr (requires { problem.gyroscopic_terms(); }) {
+    for (int term = problem.gyroscopic_terms(); term > 0; --term) {
+      workspace.trial = direction;
+      direction = -workspace.gradient - problem.gyroscopic_product(workspace.trial);
+      solve();
+    }
+    // A series cut short may ascend.
+    if (workspace.gradient.dot(direction) >= 0) {
+      direction = -workspace.gradient;
+      solve();
+    }
+  }
+  return workspace.gradient.dot(direction);
+}
+
+template <class Problem>
+inline constexpr bool kSeeksLowest = requires {
+  requires Problem::kSeeksLowest;
+};
+
+/// Armijo backtracking along workspace.direction from `x`; leaves the accepted point in workspace.trial, its gradient
+/// in workspace.trial_gradient and the rest in `there`.
+template <class Problem>
+bool line_search(Problem& problem, const Eigen::VectorXd& x, const PotentialValue& start, double slope,
+                 NewtonWorkspace& workspace, NewtonReport& report, PotentialEvaluation& there) {
+  const Eigen::Map<const Eigen::VectorXd> direction(workspace.direction.data(), x.size());
+  const auto low_enough = [&](double length, const PotentialValue& value) {
+    return value.value <= start.value + kArmijo * length * slope + kRounding * start.magnitude;
+  };
+  workspace.trial = x + direction;
+  there = problem.evaluate(workspace.trial, workspace.trial_gradient);
+  if (low_enough(1, there.potential)) return true;
+  // Forces without a potential may need what raises it.
+  if constexpr (requires { problem.gyroscopic(); })
+    if (workspace.trial_gradient.norm() <= 0.5 * workspace.gradient.norm()) return true;
+  double length = 1, lowest = 0;
+  bool found = false;
+  for (int halving = 0; halving < kHalvings && (!found || kSeeksLowest<Problem>); ++halving) {
+    workspace.trial = x + 0.5 * length * direction;
+    ++report.line_search_evaluations;
+    const PotentialValue value = problem.value(workspace.trial);
+    if (found && !(value.value < lowest)) break;
+    length *= 0.5;
+    lowest = value.value;
+    found = found || low_enough(length, value);
+  }
+  if (!found) return false;
+  workspace.trial = x + length * direction;
+  there = problem.evaluate(workspace.trial, workspace.trial_gradient);
+  return true;
+}
+
+/// Whether the factor at hand brings the residual to its limit for less than a new Hessian costs.
+inline bool factor_serves(double before, double now, double limit) {
+  const double rate = now / before;
+  return rate <= kChordRate && std::log(now / limit) <= -kChordSteps * std::log(rate);
+}
+
+}  // namespace detail
+
+/// Minimises a potential from `x` by Newton's method: exact Hessian and Cholesky, positive semi-definite element
+/// tangents only where Cholesky fails, Armijo line search. An earlier factor serves for as long as it brings the
+/// residual down fast. reduction.md, "Integration". Problem offers, for x of the workspace's size,
+///   PotentialEvaluation evaluate(x, gradient, hessian)   at the first iterate, lower triangle
+///   PotentialEvaluation evaluate(x, gradient)
+///   PotentialValue value(x)
+///   void hessian(x, Tangent, hessian)                    lower triangle; x of the last evaluate()
+///   void accept(evaluation)                              x of the last evaluate(x, gradient) is the next iterate
+///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
+///                                                        of forces without a potential, or null where it is weak
+///   int gyroscopic_terms(); VectorXd gyroscopic_product(x)   optional: how often a weak one is applied, its product
+///   bool kSeeksLowest                                    optional constant: lengths are halved for as long as the
+///                                                        potential falls, beyond the first that is low enough
+/// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
+/// On return the last evaluate() was at x.
+template <class Problem>
+NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
+                             NewtonWorkspace& workspace) noexcept {
+  NewtonReport report;
+  auto& [gradient, trial, trial_gradient, hessian, factor, direction, profile, lu] = workspace;
+  PotentialEvaluation here = problem.evaluate(x, gradient, hessian);
+  enum class Hessian { kEvaluated, kFactorised, kStale } state = Hessian::kEvaluated;
+  const auto finish = [&](NewtonStatus status) {
+    report.status = status;
+    return report;
+  };
+  bool gyroscopic = false;
+  double unchecked_from =
+      std::numeric_limits<double>::infinity();  // residual before a step that no line search checked
+  report.residual = gradient.norm();
+  for (;;) {
+    const double limit = settings.tolerance * here.force_scale;
+    if (std::isfinite(unchecked_from) && !(report.residual <= unchecked_from)) {
+      x.swap(trial);
+      here = problem.evaluate(x, gradient);
+      report.residual = gradient.norm();
+      return finish(NewtonStatus::kStagnated);
+    }
+    if (!std::isfinite(report.residual) || !std::isfinite(here.potential.value))
+      return finish(NewtonStatus::kNonFinite);
+    if (report.residual <= limit) return finish(NewtonStatus::kConverged);
+    if (report.residual > 0.5 * unchecked_from) return finish(NewtonStatus::kStagnated);
+    if (report.iterations == settings.max_iterations) return finish(NewtonStatus::kIterationLimit);
+
+    const bool fresh = state != Hessian::kFactorised;
+    if (state == Hessian::kStale) problem.hessian(x, Tangent::kExact, hessian);
+    if (fresh && !detail::factorize(workspace, report)) {
+      if (!settings.projection) return finish(NewtonStatus::kStagnated);
+      ++report.projections;
+      problem.hessian(x, Tangent::kPositiveSemidefinite, hessian);
+      here = problem.evaluate(x, gradient);
+      problem.accept(here);
+      report.residual = gradient.norm();
+      if (!detail::factorize_shifted(workspace, report)) return finish(NewtonStatus::kNonFinite);
+    }
+    if (fresh) {
+      const Eigen::MatrixXd* part = detail::gyroscopic_part(problem);
+      gyroscopic = part != nullptr;
+      if (gyroscopic) detail::factorize_gyroscopic(*part, workspace);
+    }
+    const double slope = detail::solve_direction(problem, workspace, gyroscopic);
+    if (!std::isfinite(slope)) return finish(NewtonStatus::kNonFinite);
+    const bool below_rounding = std::abs(slope) <= detail::kRounding * here.potential.magnitude;
+    unchecked_from = below_rounding ? report.residual : std::numeric_limits<double>::infinity();
+    PotentialEvaluation there;
+    if (below_rounding || !settings.line_search) {
+      // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
+      trial = x + Eigen::Map<const Eigen::VectorXd>(direction.data(), x.size());
+      there = problem.evaluate(trial, trial_gradient);
+    } else if (!detail::line_search(problem, x, here.potential, slope, workspace, report, there)) {
+      here = problem.evaluate(x, gradient);
+      if (fresh) return finish(NewtonStatus::kStagnated);
+      state = Hessian::kStale;
+      continue;
+    }
+    problem.accept(there);
+    x.swap(trial);
+    gradient.swap(trial_gradient);
+    here = there;
+    ++report.iterations;
+    const double before = report.residual;
+    report.residual = gradient.norm();
+    const double next_limit = settings.tolerance * here.force_scale;
+    state = detail::factor_serves(before, report.residual, next_limit) ? Hessian::kFactorised : Hessian::kStale;
+  }
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "runtime/sim/contact/contact.h"
+#include "runtime/sim/step/incremental_potential.h"
+
+namespace exmat::runtime {
+
+/// A step near obstacles, by backward Euler: IncrementalPotential and the potential of the contacts in the unknowns
+///   d   displacement of the centre of mass beyond what external forces make of it [m],
+///   t   rotation of the step, R = R_n exp([t]x) [rad],
+///   y   q - q_n,
+/// d and t of a free body alone. method.md, section 6: mass [[m I, 0, 0], [0, J, H], [0, H^T, I]], contact Jacobians
+/// [I, -[x - c]x, R U_i]. Momenta follow from the forces of the solution, so what the contacts take is exactly what the
+/// body loses. For newton_minimize.
+class ContactProblem {
+ public:
+  /// Beyond the place where a contact begins the first length that is low enough may lie far up the other side.
+  static constexpr bool kSeeksLowest = true;
+
+  /// `potential` after start() and prepare(); candidates gathered and frozen in workspace.near.
+  ContactProblem(const Model& model, const StepScene& scene, const State& state, IncrementalPotential& potential,
+                 Workspace& workspace) noexcept;
+
+  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
+  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
+  PotentialValue value(const Eigen::VectorXd& x) noexcept;
+  void hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept;
+  void accept(PotentialEvaluation& evaluation) noexcept;
+  const Eigen::MatrixXd* gyroscopic() const noexcept { return nullptr; }  // backward Euler damps what it is for
+
+  /// Pose at the unknowns x.
+  BodyPose place(const Eigen::VectorXd& x) noexcept;
+
+ private:
+  double add_rigid_terms(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) noexcept;
+  void assemble_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;
+  PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& inner,
+                             Eigen::VectorXd& gradient) noexcept;
+
+  const Model& model_;
+  const StepScene& scene_;
+  const State& state_;
+  IncrementalPotential& potential_;
+  Workspace& workspace_;
+  ContactProblemWorkspace& near_;
+  Eigen::Index rigid_;  // 6 or 0
+  Eigen::Matrix3d start_rotation_ = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d start_inertia_ = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d expected_turn_ = Eigen::Vector3d::Zero();  // t of free flight at the first pose
+  Eigen::Vector3d frozen_turn_ = Eigen::Vector3d::Zero(), next_frozen_turn_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace exmat::runtime

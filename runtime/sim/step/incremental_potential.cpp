@@ -1,0 +1,231 @@
+#include "runtime/sim/step/incremental_potential.h"
+
+#include <cmath>
+#include <limits>
+
+namespace exmat::runtime {
+namespace {
+
+constexpr double kSmallRatio = 0.1;  // of inertia: beyond it a factorisation costs less than the terms of a series
+constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
+constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();  // of trace(K) |q|
+
+bool has_skew_forces(const Model& model, const StepScene& scene) noexcept {
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (acts(scene.examples[i]) && !model.examples[i].filter.is_symmetric()) return true;
+  return false;
+}
+
+}  // namespace
+
+IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& scene, const State& state,
+                                           Workspace& workspace) noexcept
+    : model_(model),
+      scene_(scene),
+      state_(state),
+      workspace_(workspace),
+      skew_(has_skew_forces(model, scene)),
+      rotates_(state.body.has_value()),
+      carried_(model.carried.has_value()) {}
+
+double IncrementalPotential::internal_flops(bool stiffness) const noexcept {
+  return model_.internal_force.force_flops() + (stiffness ? model_.internal_force.stiffness_flops() : 0);
+}
+
+double IncrementalPotential::inertia_and_load(const Eigen::VectorXd& q) const noexcept {
+  const StepForm& form = workspace_.form;
+  return 0.5 * form.acceleration_factor * (q - form.acceleration_centre).squaredNorm() -
+         workspace_.external_force.dot(q);
+}
+
+double IncrementalPotential::start(const Eigen::VectorXd& first_iterate) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(true));
+  elastic_energy_ = model_.internal_force.force_and_stiffness(first_iterate, workspace_.elasticity,
+                                                              workspace_.internal_force, workspace_.newton.hessian);
+  force_rounding_ = kForceRounding * workspace_.newton.hessian.diagonal().cwiseAbs().sum();
+  return elastic_energy_ + inertia_and_load(first_iterate);
+}
+
+double IncrementalPotential::potential_at_start() const noexcept {
+  return state_.elastic_energy + inertia_and_load(state_.q);
+}
+
+/// A and its gradient g at q_n: value 1/2 x^T A x + g^T x, x = q - q_n. Differences from q_n keep the digits that
+/// products with c_a would lose.
+void IncrementalPotential::prepare() noexcept {
+  const StepForm& form = workspace_.form;
+  Eigen::MatrixXd& A = workspace_.quadratic;
+  Eigen::VectorXd& g = workspace_.linear;
+  const Eigen::Index modes = model_.modes();
+  const double diagonal = form.acceleration_factor + form.velocity_factor * scene_.mass_damping;
+  const auto symmetric = workspace_.newton.hessian.selfadjointView<Eigen::Lower>();
+
+  g = form.acceleration_factor * (state_.q - form.acceleration_centre) - workspace_.external_force;
+  workspace_.offset = form.velocity_factor * (state_.q - form.velocity_centre);
+  if (scene_.mass_damping > 0) g += scene_.mass_damping * workspace_.offset;
+  auto used = A.topRows(modes);
+  if (scene_.stiffness_damping > 0) {
+    g.noalias() += scene_.stiffness_damping * (symmetric * workspace_.offset);
+    used = scene_.stiffness_damping * form.velocity_factor * workspace_.newton.hessian;
+    used.triangularView<Eigen::StrictlyUpper>() = used.transpose();
+  } else {
+    used.setZero();
+  }
+  add_example_forces();
+  A.diagonal().array() += diagonal;
+  workspace_.frozen_force.setZero();
+}
+
+void IncrementalPotential::add_example_forces() noexcept {
+  auto used = workspace_.quadratic.topRows(model_.modes());
+  Eigen::VectorXd& g = workspace_.linear;
+  for (std::size_t i = 0; i < scene_.examples.size(); ++i) {
+    if (!acts(scene_.examples[i])) continue;
+    const ExampleForce& example = workspace_.examples[i].force;
+    const ShapeFilter& filter = model_.examples[i].filter;
+    used += example.stiffness * filter.symmetric_part();
+    workspace_.offset = example.stiffness * (state_.q - example.centre);
+    g.noalias() += filter.matrix() * workspace_.offset;
+    g -= example.pull;
+  }
+}
+
+PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient,
+                                                   Eigen::MatrixXd& hessian) noexcept {
+  PotentialEvaluation evaluation = assemble(q, gradient);
+  accept(evaluation);
+  add_quadratic(hessian);
+  return evaluation;
+}
+
+PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(false));
+  at_first_iterate_ = false;
+  elastic_energy_ = model_.internal_force.force(q, workspace_.elasticity, workspace_.internal_force);
+  return assemble(q, gradient);
+}
+
+PotentialValue IncrementalPotential::value(const Eigen::VectorXd& q) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(false));
+  set_offset(q);
+  return quadratic(model_.internal_force.energy(q, workspace_.elasticity));
+}
+
+void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(true));
+  model_.internal_force.stiffness(q, tangent, workspace_.elasticity, hessian);
+  // Damping by a stiffness that had to be projected would feed energy in.
+  if (at_first_iterate_ && scene_.stiffness_damping > 0) prepare();
+  add_quadratic(hessian);
+}
+
+void IncrementalPotential::accept(PotentialEvaluation& evaluation) noexcept {
+  if (!has_frozen_force()) return;
+  workspace_.frozen_force.swap(workspace_.next_frozen_force);
+  evaluation.potential.value +=
+      workspace_.frozen_force.dot(workspace_.offset) - workspace_.next_frozen_force.dot(workspace_.offset);
+}
+
+/// q - q_n and its product with A.
+void IncrementalPotential::set_offset(const Eigen::VectorXd& q) noexcept {
+  workspace_.offset = q - state_.q;
+  const Eigen::MatrixXd& A = workspace_.quadratic;
+  kernels().matrix_vector(A.data(), A.rows(), A.cols(), A.outerStride(), workspace_.offset.data(),
+                          workspace_.product.data());
+}
+
+/// Of internal_force and elastic_energy_ at q; leaves q - q_n in the workspace.
+PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept {
+  const StepForm& form = workspace_.form;
+  set_offset(q);
+  gradient = workspace_.internal_force + workspace_.linear + workspace_.product.head(q.size());
+  const double inertia = form.acceleration_factor * (q - form.acceleration_centre).norm();
+  // Elements deformed without stress, as those that StVK reflects, cancel to rounding: no residual comes below it.
+  const double rounding = force_rounding_ * q.norm() / scene_.newton.tolerance;
+  PotentialEvaluation evaluation{quadratic(elastic_energy_), workspace_.external_force.norm() +
+                                                                 workspace_.internal_force.norm() + inertia + rounding};
+  if (has_frozen_force()) {
+    if (!update_frozen_force(q)) evaluation.potential.value = std::numeric_limits<double>::infinity();
+    gradient += workspace_.next_frozen_force;
+  }
+  return evaluation;
+}
+
+/// Of q, into next_frozen_force. False where the rotation has no solution.
+bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
+  workspace_.next_frozen_force.setZero();
+  for (std::size_t i = 0; skew_ && i < scene_.examples.size(); ++i)
+    if (acts(scene_.examples[i]))
+      workspace_.next_frozen_force.noalias() +=
+          workspace_.examples[i].force.stiffness * (model_.examples[i].filter.skew_part() * workspace_.offset);
+  if (carried_) {
+    workspace_.carried->velocity = workspace_.form.velocity_factor * (q - workspace_.form.velocity_centre);
+    carried_force(*model_.carried, q, *workspace_.carried);
+    workspace_.next_frozen_force -= workspace_.carried->force;
+  }
+  if (!rotates_) return true;
+  FreeMotionWorkspace& free = *workspace_.free;
+  const StepForm& form = workspace_.form;
+  free.velocity = form.velocity_factor * (q - form.velocity_centre);
+  const bool found = update_spin(*model_.rigid, q, free);
+  rotation_force(*model_.rigid, form.velocity_factor, free);
+  workspace_.next_frozen_force -= free.force;
+  return found;
+}
+
+/// The antisymmetric part of the rotation, where it is not small beside c_a.
+const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
+  if (gyroscopic_ratio() <= kSmallRatio) return nullptr;
+  const double factor = workspace_.form.velocity_factor;
+  if (carried_) {
+    set_gyroscopic(*model_.carried, factor, *workspace_.carried);
+    return &workspace_.carried->gyroscopic;
+  }
+  set_gyroscopic(*model_.rigid, factor, *workspace_.free);
+  return &workspace_.free->gyroscopic;
+}
+
+/// About what the antisymmetric part is of inertia.
+double IncrementalPotential::gyroscopic_ratio() const noexcept {
+  const double factor = workspace_.form.velocity_factor;
+  if (rotates_) return 2 * workspace_.free->solution.spin.norm() / factor;
+  if (!carried_) return 0;
+  return (2 * workspace_.carried->spin.norm() + workspace_.carried->spin_rate.norm() / factor) / factor;
+}
+
+int IncrementalPotential::gyroscopic_terms() const noexcept {
+  const double ratio = gyroscopic_ratio();
+  if (!(ratio <= kSmallRatio)) return 0;  // since the factorisation it has grown beyond what the series is for
+  double error = ratio;
+  int terms = 0;
+  for (; error > kGyroscopicError; error *= ratio) ++terms;
+  return terms;
+}
+
+const Eigen::VectorXd& IncrementalPotential::gyroscopic_product(const Eigen::VectorXd& x) const noexcept {
+  const double factor = workspace_.form.velocity_factor;
+  if (carried_) {
+    runtime::gyroscopic_product(*model_.carried, factor, x, *workspace_.carried);
+    return workspace_.carried->product;
+  }
+  runtime::gyroscopic_product(*model_.rigid, factor, x, *workspace_.free);
+  return workspace_.free->product;
+}
+
+/// Of offset and its product with A.
+PotentialValue IncrementalPotential::quadratic(double elastic_energy) noexcept {
+  const double square = 0.5 * workspace_.offset.dot(workspace_.product.head(workspace_.offset.size()));
+  const double linear = workspace_.linear.dot(workspace_.offset);
+  PotentialValue sum{elastic_energy + square + linear, std::abs(elastic_energy) + std::abs(square) + std::abs(linear)};
+  if (has_frozen_force()) sum.value += workspace_.frozen_force.dot(workspace_.offset);
+  return sum;
+}
+
+void IncrementalPotential::add_quadratic(Eigen::MatrixXd& hessian) const noexcept {
+  hessian.triangularView<Eigen::Lower>() += workspace_.quadratic.topRows(hessian.rows());
+  const double factor = workspace_.form.velocity_factor;
+  if (rotates_) add_rotation_stiffness(*model_.rigid, factor, *workspace_.free, hessian);
+  if (carried_) model_.carried->moments.add_softening(workspace_.carried->spin, factor, hessian);
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "runtime/sim/solver/newton.h"
+#include "runtime/sim/step/workspace.h"
+
+namespace exmat::runtime {
+
+/// What one step minimises:
+///   c_a/2 |q - q_a|^2 + c_v/2 (q - q_v)^T D (q - q_v) + E(q) - f_ext . q
+///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa P_s p* . q,
+/// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
+/// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
+/// the skew part of P_s and those of a rotation (free_motion.h, carried_motion.h): in values they are those of the
+/// iterate last accepted, so that the gradient is exact. reduction.md, "Integration"; ExampleForce. Reads form and
+/// external_force of the workspace.
+class IncrementalPotential {
+ public:
+  IncrementalPotential(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;
+
+  /// Elasticity of the first iterate, force and stiffness, into the workspace. Returns inertia, elasticity and external
+  /// force alone; comparable with potential_at_start().
+  double start(const Eigen::VectorXd& first_iterate) noexcept;
+  double potential_at_start() const noexcept;
+
+  /// The quadratic form. After start(); with example forces, after prepare_example_forces().
+  void prepare() noexcept;
+
+  // For newton_minimize; the first evaluation with a Hessian is of the first iterate.
+  PotentialEvaluation evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
+  PotentialEvaluation evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept;
+  PotentialValue value(const Eigen::VectorXd& q) noexcept;
+  void hessian(const Eigen::VectorXd& q, Tangent tangent, Eigen::MatrixXd& hessian) noexcept;
+  void accept(PotentialEvaluation& evaluation) noexcept;
+  const Eigen::MatrixXd* gyroscopic() const noexcept;
+  int gyroscopic_terms() const noexcept;
+  const Eigen::VectorXd& gyroscopic_product(const Eigen::VectorXd& x) const noexcept;
+
+  /// E at the last evaluate().
+  double elastic_energy() const noexcept { return elastic_energy_; }
+
+ private:
+  void set_offset(const Eigen::VectorXd& q) noexcept;
+  double inertia_and_load(const Eigen::VectorXd& q) const noexcept;
+  PotentialEvaluation assemble(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept;
+  bool update_frozen_force(const Eigen::VectorXd& q) noexcept;
+  PotentialValue quadratic(double elastic_energy) noexcept;
+  void add_example_forces() noexcept;
+  void add_quadratic(Eigen::MatrixXd& hessian) const noexcept;
+  double gyroscopic_ratio() const noexcept;
+  bool has_frozen_force() const noexcept { return skew_ || rotates_ || carried_; }
+  double internal_flops(bool stiffness) const noexcept;
+
+  const Model& model_;
+  const StepScene& scene_;
+  const State& state_;
+  Workspace& workspace_;
+  bool skew_;
+  bool rotates_;
+  bool carried_;
+  bool at_first_iterate_ = true;
+  double elastic_energy_ = 0;
+  double force_rounding_ = 0;  // of internal forces over |q|
+};
+
+}  // namespace exmat::runtime

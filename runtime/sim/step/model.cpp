@@ -1,0 +1,97 @@
+#include "runtime/sim/step/model.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace exmat::runtime {
+namespace {
+
+Complaint missing_group(const std::string& group) {
+  return {"", group, "this part", "none", "precompute the bundle again with this scene (--scene)"};
+}
+
+/// What the energies of targets need beside the examples.
+struct RestModel {
+  MaterialModel material;
+  const CubatureData& cubature;
+};
+
+/// The parts of a bundle behind one example force.
+struct ExampleParts {
+  std::string region;  ///< empty: the whole body
+  const ExampleSet& set;
+  const ProjectionData& projection;
+  const std::optional<TargetTableData>& targets;
+
+  std::string group(const char* part) const { return (region.empty() ? "" : "/regions/" + region) + part; }
+};
+
+std::optional<Complaint> add_examples(const RestModel& rest, const ExampleParts& parts, bool target_table,
+                                      EnergyReference reference, Model& model) {
+  ExampleModel examples;
+  examples.region = parts.region;
+  examples.weights = ExampleWeights(parts.set.gram, parts.set.h0, parts.set.hq);
+  examples.filter = ShapeFilter(parts.projection);
+  if (target_table) {
+    if (!parts.targets) return missing_group(parts.group("/targets"));
+    TargetTableData filtered = *parts.targets;
+    filtered.control_points *= examples.filter.matrix().transpose();
+    examples.table.emplace(filtered);
+  } else {
+    auto complaint = examples.target.emplace().build(rest.material, rest.cubature, parts.set.examples,
+                                                     parts.projection.target_basis, reference);
+    if (complaint) {
+      complaint->place = parts.group("") + complaint->place;
+      return complaint;
+    }
+    examples.filtered_basis = examples.filter.matrix() * examples.target->basis();
+  }
+  model.examples.push_back(std::move(examples));
+  return std::nullopt;
+}
+
+}  // namespace
+
+ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options) {
+  if (!reduced.object) return {nullptr, missing_group("/object")};
+  if (!reduced.modal) return {nullptr, missing_group("/modal")};
+  if (!reduced.cubature) return {nullptr, missing_group("/cubature")};
+  const auto material = material_from_name(reduced.object->material);
+  if (!material) {
+    const std::string found = '"' + reduced.object->material + '"';
+    return {nullptr, {"", "/object: attribute material", material_names(), found, "use a newer exmat-runtime"}};
+  }
+  auto model = std::make_unique<Model>();
+  const CubatureData& cubature = *reduced.cubature;
+  if (options.polynomial && !reduced.polynomial) return {nullptr, missing_group("/polynomial")};
+  std::optional<ReducedPolynomial> polynomial;
+  if (options.polynomial) polynomial.emplace(*reduced.polynomial);
+  model->internal_force = InternalForce(ReducedElasticity(*material, cubature), std::move(polynomial));
+  model->gravity_load = reduced.modal->gravity_load;
+  if (options.carried && !(reduced.rigid && reduced.rigid->spin_load.size() > 0))
+    return {nullptr, missing_group("/rigid/spin_load")};
+  if (options.carried)
+    model->carried = CarriedFrame{RigidFrame(*reduced.rigid), reduced.rigid->spin_load};
+  else if (reduced.rigid)
+    model->rigid.emplace(*reduced.rigid);
+  if (reduced.contact)
+    model->contact.emplace(*reduced.contact,
+                           model->rigid ? reduced.rigid->centre_of_mass : Eigen::Vector3d::Zero().eval());
+  const RestModel rest{*material, cubature};
+  if (options.examples && reduced.examples) {
+    if (!reduced.projection) return {nullptr, missing_group("/projection")};
+    const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets};
+    if (auto complaint = add_examples(rest, parts, options.target_table, options.energy_reference, *model))
+      return {nullptr, std::move(*complaint)};
+  }
+  for (const RegionOptions& region : options.regions) {
+    const auto found = std::ranges::find(reduced.regions, region.region, &RegionData::name);
+    if (found == reduced.regions.end()) return {nullptr, missing_group("/regions/" + region.region)};
+    const ExampleParts parts{found->name, found->examples, found->projection, found->targets};
+    if (auto complaint = add_examples(rest, parts, region.target_table, region.energy_reference, *model))
+      return {nullptr, std::move(*complaint)};
+  }
+  return {std::move(model), {}};
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,46 @@
+#include "runtime/sim/step/workspace.h"
+
+namespace exmat::runtime {
+
+ContactProblemWorkspace::ContactProblemWorkspace(const Model& model, const StepScene& scene)
+    : contact(*model.contact, scene.obstacles.size()),
+      newton(model.modes() + (model.rigid ? 6 : 0)),
+      x(Eigen::VectorXd::Zero(model.modes() + (model.rigid ? 6 : 0))),
+      q(Eigen::VectorXd::Zero(model.modes())),
+      gradient_q(q),
+      stiffness(Eigen::MatrixXd::Zero(x.size(), x.size())) {}
+
+ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(model.weights.make_workspace()) {
+  if (model.table) target_table = model.table->make_workspace();
+  if (model.target) {
+    target_solver = model.target->make_workspace();
+    solved_target.setZero(model.target->dimension());
+  }
+  weights.setZero(model.weights.examples());
+  target.setZero(model.filter.matrix().rows());
+  force.centre = force.pull = target;
+}
+
+Workspace::Workspace(const Model& model, const StepScene& scene)
+    : newton(model.modes()), elasticity(model.internal_force.make_workspace()) {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.modes());
+  form.velocity_centre = form.acceleration_centre = zero;
+  q = predictor = external_force = internal_force = acceleration = offset = linear = zero;
+  frozen_force = next_frozen_force = zero;
+  if (model.rigid) {
+    free.emplace(model);
+    body.emplace();
+    body->momentum = body->momentum_previous = zero;
+    newton.lu.emplace(model.modes());
+  }
+  if (model.carried) {
+    carried.emplace(*model.carried);
+    newton.lu.emplace(model.modes());
+  }
+  if (touches(model, scene)) near.emplace(model, scene);
+  product.setZero(padded(model.modes()));
+  quadratic.setZero(padded(model.modes()), model.modes());
+  for (std::size_t i = 0; i < scene.examples.size(); ++i) examples.emplace_back(model.examples[i]);
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "runtime/sim/contact/contact.h"
+#include "runtime/sim/solver/newton.h"
+#include "runtime/sim/solver/profile.h"
+#include "runtime/sim/step/free_motion.h"
+#include "runtime/sim/step/integrator.h"
+#include "runtime/sim/step/model.h"
+#include "runtime/sim/step/scene.h"
+
+namespace exmat::runtime {
+
+/// Scratch of steps near obstacles, sized once.
+struct ContactProblemWorkspace {
+  ContactProblemWorkspace() = default;
+  ContactProblemWorkspace(const Model& model, const StepScene& scene);
+
+  ContactWorkspace contact;
+  NewtonWorkspace newton;         ///< of the unknowns below
+  Eigen::VectorXd x;              ///< 6 + r, or r of a constrained body
+  Eigen::VectorXd q, gradient_q;  ///< r
+  Eigen::MatrixXd stiffness;      ///< of the contacts, as the unknowns
+};
+
+/// Scratch of one example force. K examples, d target coordinates.
+struct ExampleWorkspace {
+  explicit ExampleWorkspace(const ExampleModel& model);
+
+  ExampleWeights::Workspace weights_solver;
+  TargetTable::Workspace target_table;
+  TargetSolver::Workspace target_solver;
+  Eigen::VectorXd weights;        ///< K
+  Eigen::VectorXd solved_target;  ///< d
+  bool target_converged = false;  ///< of solved_target
+  Eigen::VectorXd target;         ///< r, P_s p*
+  ExampleForce force;
+};
+
+/// Scratch of one step, sized once for a model and a scene; holds nothing from step to step. One per thread.
+struct Workspace {
+  Workspace(const Model& model, const StepScene& scene);
+
+  Profile* profile = nullptr;  ///< times every stage, if set
+
+  NewtonWorkspace newton;
+  InternalForce::Workspace elasticity;
+  StepForm form;
+  Eigen::VectorXd q, predictor;    ///< r
+  Eigen::VectorXd external_force;  ///< r
+  Eigen::VectorXd internal_force;  ///< r
+  Eigen::VectorXd acceleration;    ///< r, at the beginning of the step
+  Eigen::VectorXd offset;          ///< r
+  Eigen::MatrixXd quadratic;       ///< padded(r) x r, see IncrementalPotential
+  Eigen::VectorXd linear;          ///< r
+  Eigen::VectorXd product;         ///< padded(r)
+
+  Eigen::VectorXd frozen_force, next_frozen_force;  ///< r, see IncrementalPotential
+
+  std::optional<ContactProblemWorkspace> near;  ///< with obstacles
+  std::optional<FreeMotionWorkspace> free;      ///< of a free body
+  std::optional<CarriedWorkspace> carried;      ///< of one that a motion carries
+  std::optional<FreeState> body;                ///< and where it will be
+  std::vector<ExampleWorkspace> examples;       ///< one for each of the scene's
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,681 @@
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <exmat/exmat.hpp>
+#include <fmt/format.h>
+#include <functional>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <limits>
+#include <span>
+#include <thread>
+
+#include "common/config/config.h"
+#include "common/mesh/geometry.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/stepper.h"
+#include "tests/integration/embedding/bar_files.h"
+#include "tests/support/allocation_counter.h"
+#include "tests/support/random.h"
+
+namespace exmat {
+namespace {
+
+using test::AllocationCounter;
+using test::BarFiles;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr std::array kIntegratorNames{"bdf2", "backward_euler", "newmark"};
+
+template <typename Matrix>
+auto span_of(Matrix& matrix) {
+  return std::span(matrix.data(), static_cast<std::size_t>(matrix.size()));
+}
+
+/// The library's own stepping of a scene.
+struct Reference {
+  explicit Reference(const std::string& scene) : loaded(runtime::load_run(load_scene(scene))) {
+    refresh_weights(*loaded.model, loaded.scene, state, workspace);
+  }
+  /// Status bits of all steps.
+  std::uint32_t step(int steps) {
+    std::uint32_t status = 0;
+    for (int i = 0; i < steps; ++i) status |= runtime::step(*loaded.model, loaded.scene, state, workspace).status;
+    return status;
+  }
+
+  runtime::LoadedScene loaded;
+  runtime::State state = runtime::make_state(*loaded.model);
+  runtime::Workspace workspace{*loaded.model, loaded.scene};
+};
+
+Eigen::VectorXd displacement(const Body& body, std::size_t modes) {
+  Eigen::VectorXd q(static_cast<Eigen::Index>(modes));
+  body.read_displacement(span_of(q));
+  return q;
+}
+
+Eigen::VectorXd velocity(const Body& body, std::size_t modes) {
+  Eigen::VectorXd v(static_cast<Eigen::Index>(modes));
+  body.read_velocity(span_of(v));
+  return v;
+}
+
+class ApiTest : public ::testing::Test {
+ protected:
+  /// The settings that kDampedExamples has in a scene file.
+  static exmat_settings damped_examples() {
+    exmat_settings settings = default_settings();
+    settings.time_step = 0.005;
+    settings.gravity[1] = -9.81;
+    settings.integrator = EXMAT_NEWMARK;
+    settings.mass_damping = 0.1;
+    settings.stiffness_damping = 0.001;
+    settings.use_examples = 1;
+    settings.example_stiffness = 100;
+    settings.example_damping = 1;
+    settings.example_bias = 0.5;
+    return settings;
+  }
+
+  Model model() const { return Model(files_.bundle(), damped_examples()); }
+
+  BarFiles files_;
+};
+
+TEST_F(ApiTest, StepsAreThoseOfTheLibraryBitForBit) {
+  const std::string scene = files_.scene(
+      test::kDampedExamples + fmt::format(", \"forces\": [{{\"vertices\": {{\"ids\": [{}]}}, \"force\": [0, 0, 5], "
+                                          "\"start\": 0.02, \"end\": 0.1}}]",
+                                          files_.tip()));
+  Reference reference(scene);
+  const Model scripted = Model::from_scene(scene);
+  EXPECT_EQ(scripted.modes(), static_cast<std::size_t>(files_.bar().modes()));
+  EXPECT_EQ(scripted.vertices(), static_cast<std::size_t>(files_.vertices()));
+  EXPECT_EQ(scripted.examples(), 3u);
+  EXPECT_EQ(scripted.time_step(), 0.005);
+  Body body(scripted);
+  for (const int steps : {0, 1, 30}) {
+    reference.step(steps);
+    EXPECT_EQ(body.step(steps).steps, steps);
+    EXPECT_EQ(displacement(body, scripted.modes()), reference.state.q);
+    EXPECT_EQ(velocity(body, scripted.modes()), reference.state.v);
+    Eigen::VectorXd weights(3);
+    body.read_weights(span_of(weights));
+    EXPECT_EQ(weights, reference.state.examples.front().weights);
+    const runtime::Energies expected = energies(reference.loaded.scene, reference.state);
+    EXPECT_EQ(body.energies().kinetic, expected.kinetic);
+    EXPECT_EQ(body.energies().elastic, expected.elastic);
+    EXPECT_EQ(body.energies().potential, expected.potential);
+    EXPECT_EQ(body.time(), reference.state.time);
+  }
+}
+
+TEST_F(ApiTest, RegionsHaveWeightsOfTheirOwn) {
+  test::Bar bar = test::make_bar({.examples = 3});
+  RegionData& region = bar.model.regions.emplace_back();
+  region.name = "outer";
+  region.vertices = IndexVector::Constant(1, 5);
+  region.examples = *bar.model.examples;
+  region.projection = *bar.model.projection;
+  write_bundle(bar.model, files_.bundle());
+  const std::string scene = files_.scene(R"("regions": [{"name": "outer", "stiffness": 100, "bias": 0.5}])");
+  Reference reference(scene);
+  const Model model = Model::from_scene(scene);
+  EXPECT_EQ(model.examples(), 0u);
+  ASSERT_EQ(model.regions(), 1u);
+  EXPECT_EQ(model.region_examples(0), 3u);
+  EXPECT_EQ(model.region_name(0), "outer");
+  EXPECT_EQ(exmat_model_region_examples(model.get(), 1), -1);
+  EXPECT_EQ(exmat_model_region_name(model.get(), -1), nullptr);
+  Body body(model);
+  body.step(5);
+  reference.step(5);
+  Eigen::VectorXd weights(3);
+  body.read_region_weights(0, span_of(weights));
+  EXPECT_EQ(weights, reference.state.examples.front().weights);
+  EXPECT_LE(weights[0], 0.5);
+  EXPECT_EQ(exmat_body_region_weights(body.get(), 1, weights.data(), 3), EXMAT_INVALID_ARGUMENT);
+  EXPECT_NE(std::string(exmat_last_error()).find("region = 1: expected one of the model's 1"), std::string::npos);
+  EXPECT_EQ(exmat_body_region_weights(body.get(), 0, weights.data(), 2), EXMAT_INVALID_ARGUMENT);
+}
+
+TEST_F(ApiTest, FreeBodiesArePlacedPushedAndRead) {
+  const test::Bar bar = test::make_bar({.free = true, .examples = 3});
+  write_bundle(bar.model, files_.bundle());
+  const Model free = model();
+  Body body(free);
+  exmat_motion motion{{1, 2, 3}, {0.8, 0, 0.6, 0}, {0.5, 0, 0}, {0, 0, 2}};
+  body.set_motion(motion);
+  const std::vector<std::int64_t> ids{0, 7};
+  const Points points = Points::vertices(free, ids);
+  std::vector<float> xyz(6);
+  body.read_positions(points, xyz);
+  const Eigen::Quaterniond turn(0.8, 0, 0.6, 0);
+  const Eigen::Vector3d centre = bar.model.rigid->centre_of_mass;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const Eigen::Vector3d rest = bar.model.object->mesh.vertices.row(ids[i]);
+    const Eigen::Vector3d expected = centre + Eigen::Vector3d(1, 2, 3) + turn * (rest - centre);
+    for (int axis = 0; axis < 3; ++axis) EXPECT_NEAR(xyz[3 * i + static_cast<std::size_t>(axis)], expected[axis], 1e-6);
+  }
+  // Two opposite forces: a couple, which changes the angular momentum alone.
+  const std::vector<double> couple{0, 0, 4, 0, 0, -4};
+  body.apply_forces(points, couple);
+  body.step(1);
+  const exmat_motion turned = body.motion();
+  EXPECT_EQ(turned.linear_velocity[0], 0.5);
+  EXPECT_NE(turned.angular_velocity[0], motion.angular_velocity[0]);
+  body.clear_forces();
+  const std::vector<double> push{0, 8, 0, 0, 8, 0};
+  body.apply_forces(points, push);
+  body.step(10);
+  const double gained = body.motion().linear_velocity[1] - turned.linear_velocity[1];
+  EXPECT_NEAR(gained, 10 * free.time_step() * (16 / bar.model.rigid->mass - 9.81), 1e-12);
+  motion.orientation[0] = motion.orientation[2] = 0;
+  EXPECT_THROW(body.set_motion(motion), Error);
+}
+
+TEST_F(ApiTest, SettingsGiveTheScene) {
+  Reference reference(files_.scene(test::kDampedExamples));
+  const std::uint32_t status = reference.step(25);
+  const Model same = model();
+  Body body(same);
+  const exmat_report report = body.step(25);
+  EXPECT_EQ(displacement(body, same.modes()), reference.state.q);
+  EXPECT_EQ(report.status, status);
+  EXPECT_GE(report.newton_iterations, 25);
+  EXPECT_GE(report.factorisations, 1);
+  EXPECT_GT(report.seconds, 0);
+  EXPECT_EQ(body.report().newton_iterations, report.newton_iterations);
+}
+
+TEST_F(ApiTest, AppliedForcesAreThoseOfAScript) {
+  for (std::size_t integrator = 0; integrator < kIntegratorNames.size(); ++integrator) {
+    const std::string members = fmt::format("\"integrator\": \"{}\"", kIntegratorNames[integrator]);
+    Reference scripted(files_.scene(
+        members + fmt::format(", \"forces\": [{{\"vertices\": {{\"ids\": [{}, 30]}}, \"force\": [1, 2, -3], "
+                              "\"start\": 0.05, \"end\": 0.1}}]",
+                              files_.tip())));
+    const Model model = Model::from_scene(files_.scene(members));
+    const std::array<std::int64_t, 2> ids{files_.tip(), 30};
+    const Points points = Points::vertices(model, ids);
+    const std::array<double, 6> forces{1, 2, -3, 1, 2, -3};
+    Body body(model);
+    body.step(10);
+    body.apply_forces(points, forces);
+    body.restart_integrator();
+    body.step(10);
+    body.clear_forces();
+    body.restart_integrator();
+    body.step(10);
+    scripted.step(30);
+    const Eigen::VectorXd q = displacement(body, model.modes());
+    EXPECT_GT(q.norm(), 0);
+    EXPECT_LE((q - scripted.state.q).norm(), 1e-9 * q.norm()) << kIntegratorNames[integrator];
+  }
+}
+
+TEST_F(ApiTest, ForcesAddUpUntilTheyAreCleared) {
+  const Model model = this->model();
+  const std::array<std::int64_t, 1> ids{files_.tip()};
+  const Points points = Points::vertices(model, ids);
+  Body once(model), twice(model), never(model), cleared(model);
+  once.apply_forces(points, std::array{2.0, 0.0, 4.0});
+  for (int i = 0; i < 2; ++i) twice.apply_forces(points, std::array{1.0, 0.0, 2.0});
+  cleared.apply_forces(points, std::array{1.0, 0.0, 2.0});
+  cleared.clear_forces();
+  for (Body* body : {&once, &twice, &never, &cleared}) body->step(10);
+  EXPECT_EQ(displacement(once, model.modes()), displacement(twice, model.modes()));
+  EXPECT_EQ(displacement(never, model.modes()), displacement(cleared, model.modes()));
+  EXPECT_NE(displacement(once, model.modes()), displacement(never, model.modes()));
+}
+
+TEST_F(ApiTest, PointsInATetMoveAsItDoes) {
+  const Model model = this->model();
+  const TetMesh& mesh = files_.bar().model.object->mesh;
+  const Eigen::Vector4d shares(0.4, 0.3, 0.2, 0.1);
+  const VertexArray corners = tet_positions(mesh, 57);
+  const Eigen::Vector3d inside = corners.transpose() * shares;
+  const Points point = Points::at(model, span_of(inside));
+  EXPECT_EQ(point.distances(), std::vector<double>{0});
+  std::array<std::int64_t, 4> ids{};
+  for (int c = 0; c < 4; ++c) ids[static_cast<std::size_t>(c)] = mesh.tets(57, c);
+  const Points vertices = Points::vertices(model, ids);
+  ASSERT_EQ(vertices.size(), 4u);
+
+  // A force on the point is its share of that force on each corner: the same virtual work.
+  const Eigen::Vector3d force(3, -2, 1);
+  const VertexArray on_corners = shares * force.transpose();
+  Body a(model), b(model);
+  a.apply_forces(point, span_of(force));
+  b.apply_forces(vertices, span_of(on_corners));
+  a.step(20);
+  b.step(20);
+  const Eigen::VectorXd q = displacement(a, model.modes());
+  EXPECT_LE((q - displacement(b, model.modes())).norm(), 1e-9 * q.norm());
+
+  Eigen::Vector3f found;
+  Eigen::Matrix<float, 4, 3, Eigen::RowMajor> moved;
+  a.read_positions(point, span_of(found));
+  a.read_positions(vertices, span_of(moved));
+  EXPECT_LE((found - moved.transpose() * shares.cast<float>()).norm(), 1e-6f);
+  EXPECT_GT((found.cast<double>() - inside).norm(), 1e-4);
+}
+
+/// Of a point to a box with a corner at the origin.
+double distance_to_bar(const Eigen::Vector3d& point, const std::array<double, 3>& lengths) {
+  const Eigen::Vector3d upper(lengths.data());
+  return (point - point.cwiseMax(Eigen::Vector3d::Zero()).cwiseMin(upper)).norm();
+}
+
+TEST_F(ApiTest, PointsAreInTheNearestTet) {
+  const Model model = this->model();
+  constexpr Eigen::Index kPoints = 400;
+  VertexArray xyz = 0.4 * test::random_matrix(kPoints, 3, 5);
+  xyz.col(0).array() += 0.5;
+  const TetMesh& mesh = files_.bar().model.object->mesh;
+  xyz.topRows<63>() = mesh.vertices.topRows<63>();
+  const Points points = Points::at(model, span_of(xyz));
+  const std::vector<double> distances = points.distances();
+  Body body(model);
+  Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> read(kPoints, 3);
+  body.read_positions(points, span_of(read));
+  Eigen::Index inside = 0;
+  for (Eigen::Index i = 0; i < kPoints; ++i) {
+    EXPECT_NEAR(distances[static_cast<std::size_t>(i)], distance_to_bar(xyz.row(i), {1.0, 0.25, 0.25}), 1e-12);
+    inside += distances[static_cast<std::size_t>(i)] == 0;
+  }
+  EXPECT_GT(inside, 63);
+  EXPECT_LT(inside, kPoints);
+  // At rest each is where it was given.
+  EXPECT_EQ(read, xyz.cast<float>());
+
+  // What was given as the place of a vertex moves as that vertex.
+  std::vector<float> all(3 * model.vertices());
+  const Points vertices = Points::all_vertices(model);
+  body.step(20);
+  body.read_positions(vertices, all);
+  body.read_positions(points, span_of(read));
+  for (std::size_t i = 0; i < 3 * 63; ++i) EXPECT_NEAR(read.data()[i], all[i], 1e-6f);
+}
+
+TEST_F(ApiTest, PositionsAreThoseOfTheReducedState) {
+  const Model model = this->model();
+  Body body(model);
+  body.step(30);
+  const Eigen::VectorXd q = displacement(body, model.modes());
+  const VertexArray& rest = files_.bar().model.object->mesh.vertices;
+  const Eigen::VectorXd exact = rest.reshaped<Eigen::RowMajor>() + files_.bar().basis() * q;
+  Eigen::VectorXf xyz(exact.size());
+  body.read_positions(Points::all_vertices(model), span_of(xyz));
+  EXPECT_LE((xyz.cast<double>() - exact).cwiseAbs().maxCoeff(), 3e-7);
+
+  // Repeated and in any order.
+  const std::array<std::int64_t, 3> ids{40, 7, 40};
+  Eigen::Matrix<float, 9, 1> some;
+  body.read_positions(Points::vertices(model, ids), span_of(some));
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(some.segment<3>(3 * i), xyz.segment<3>(3 * ids[static_cast<std::size_t>(i)]));
+}
+
+TEST_F(ApiTest, ResetAndSetReducedBeginAnew) {
+  const Model model = this->model();
+  const std::array<std::int64_t, 1> ids{files_.tip()};
+  const Points points = Points::vertices(model, ids);
+  Body fresh(model), body(model);
+  body.apply_forces(points, std::array{1.0, 2.0, 3.0});
+  body.step(7);
+  body.restart_integrator();
+  body.reset();
+  EXPECT_EQ(body.time(), 0);
+  fresh.step(20);
+  body.step(20);
+  EXPECT_EQ(displacement(fresh, model.modes()), displacement(body, model.modes()));
+
+  const Eigen::VectorXd q = 0.02 * test::random_vector(static_cast<Eigen::Index>(model.modes()), 1);
+  const Eigen::VectorXd v = test::random_vector(q.size(), 2);
+  Reference reference(files_.scene(test::kDampedExamples));
+  reference.state = runtime::make_state(*reference.loaded.model, q, v);
+  body.set_reduced(span_of(q), span_of(v));
+  EXPECT_EQ(body.energies().elastic, reference.state.elastic_energy);
+  EXPECT_EQ(body.energies().kinetic, 0.5 * v.squaredNorm());
+  reference.step(10);
+  body.step(10);
+  EXPECT_EQ(displacement(body, model.modes()), reference.state.q);
+}
+
+TEST_F(ApiTest, AnyNumberOfThreadsGivesTheSameBits) {
+  const Model damped = model(), plain(files_.bundle());
+  const auto hash = [&](int threads) {
+    Bodies bodies;
+    const std::array<std::int64_t, 1> ids{files_.tip()};
+    for (int i = 0; i < 9; ++i) {
+      const Model& its = i % 2 == 0 ? damped : plain;
+      bodies.add(Body(its));
+      bodies[bodies.size() - 1].apply_forces(Points::vertices(its, ids), std::array{0.1 * i, 1.0, 0.0});
+    }
+    bodies.step(15, threads);
+    std::vector<double> all;
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      const Eigen::VectorXd q = displacement(bodies[i], damped.modes());
+      all.insert(all.end(), q.begin(), q.end());
+      EXPECT_EQ(bodies[i].report().steps, 15);
+    }
+    return all;
+  };
+  const std::vector<double> alone = hash(1);
+  for (const int threads : {0, 2, 3, 20}) EXPECT_EQ(hash(threads), alone) << threads << " threads";
+}
+
+TEST_F(ApiTest, ANonFiniteStepLeavesItsBodyAndStopsNoOther) {
+  const Model model = this->model();
+  const std::array<std::int64_t, 1> ids{files_.tip()};
+  const Points points = Points::vertices(model, ids);
+  Bodies bodies;
+  for (int i = 0; i < 3; ++i) bodies.add(Body(model));
+  bodies.step(3);
+  const Eigen::VectorXd before = displacement(bodies[1], model.modes());
+  bodies[1].apply_forces(points, std::array{0.0, 1e300, 0.0});
+  try {
+    bodies.step(5);
+    FAIL() << "stepped";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.status(), EXMAT_NON_FINITE);
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("bodies[1], step 4 (t = 0.02 s)"), HasSubstr("smaller time_step")));
+  }
+  EXPECT_EQ(displacement(bodies[1], model.modes()), before);
+  EXPECT_EQ(bodies[1].report().status, EXMAT_STEP_NON_FINITE);
+  EXPECT_EQ(bodies[1].report().steps, 0);
+  EXPECT_EQ(bodies[0].report().steps, 5);
+  EXPECT_EQ(bodies[2].report().steps, 5);
+  bodies[1].clear_forces();
+  EXPECT_EQ(bodies[1].step(5).steps, 5);
+  EXPECT_EQ(displacement(bodies[1], model.modes()), displacement(bodies[0], model.modes()));
+}
+
+TEST_F(ApiTest, StepsForcesAndReadsDoNotAllocate) {
+  if (!AllocationCounter::works()) GTEST_SKIP() << "a sanitizer owns malloc";
+  const Model model = this->model();
+  const std::array<std::int64_t, 3> ids{1, 2, files_.tip()};
+  const Points points = Points::vertices(model, ids), all = Points::all_vertices(model);
+  Body first(model), second(model);
+  const std::array<exmat_body*, 2> bodies{first.get(), second.get()};
+  std::array<double, 9> forces{};
+  forces[8] = 5;
+  std::vector<float> xyz(9), every(3 * model.vertices());
+  std::vector<double> q(model.modes()), v(model.modes()), weights(3);
+  exmat_energies energies;
+  exmat_report report{};
+  report.size = sizeof report;
+  exmat_bodies_step(bodies.data(), 2, 1, 2);  // starts the threads
+  const AllocationCounter counter;
+  exmat_body* const body = first.get();
+  int status = exmat_body_apply_forces(body, points.get(), forces.data(), 9);
+  status |= exmat_body_step(body, 10, &report);
+  status |= exmat_body_restart_integrator(body);
+  status |= exmat_bodies_step(bodies.data(), 2, 5, 1);
+  status |= exmat_bodies_step(bodies.data(), 2, 5, 2);
+  status |= exmat_body_read_positions(body, points.get(), xyz.data(), 9);
+  status |= exmat_body_read_positions(body, all.get(), every.data(), static_cast<std::int64_t>(every.size()));
+  status |= exmat_body_read_reduced(body, q.data(), v.data(), static_cast<std::int64_t>(q.size()));
+  status |= exmat_body_weights(body, weights.data(), 3);
+  status |= exmat_body_energies(body, &energies);
+  status |= exmat_body_report(body, &report);
+  status |= exmat_body_clear_forces(body);
+  status |= exmat_body_set_reduced(body, q.data(), v.data(), static_cast<std::int64_t>(q.size()));
+  status |= exmat_body_step(body, 5, nullptr);
+  status |= exmat_body_reset(body);
+  const bool refused = exmat_body_step(nullptr, 1, nullptr) == EXMAT_INVALID_ARGUMENT;
+  EXPECT_EQ(counter.count(), 0u);
+  EXPECT_EQ(status, EXMAT_OK);
+  EXPECT_TRUE(refused);
+}
+
+// ---- errors ---------------------------------------------------------------------------------------------------------
+
+exmat_status created(const std::string& bundle, const exmat_settings* settings = nullptr) {
+  exmat_model* model = reinterpret_cast<exmat_model*>(1);
+  const exmat_status status = exmat_model_create(bundle.c_str(), settings, &model);
+  EXPECT_EQ(model == nullptr, status != EXMAT_OK);
+  exmat_model_destroy(model);
+  return status;
+}
+
+TEST_F(ApiTest, FaultyFilesAreBadInput) {
+  EXPECT_EQ(created(files_.folder() / "none.h5"), EXMAT_BAD_INPUT);
+  EXPECT_THAT(exmat_last_error(), AllOf(HasSubstr("none.h5"), HasSubstr("no such file")));
+
+  const std::string whole = test::read_file(files_.bundle());
+  for (const std::size_t size : {std::size_t{0}, std::size_t{100}, whole.size() / 2, whole.size() - 1}) {
+    const auto cut = files_.folder().write("cut.h5", whole.substr(0, size));
+    EXPECT_EQ(created(cut), EXMAT_BAD_INPUT) << size;
+    EXPECT_THAT(exmat_last_error(), AllOf(HasSubstr("cut.h5"), HasSubstr("expected"), HasSubstr("found"))) << size;
+  }
+
+  exmat_model* model = nullptr;
+  EXPECT_EQ(exmat_model_create_from_scene(files_.scene("\"setps\": 3").c_str(), &model), EXMAT_BAD_INPUT);
+  EXPECT_THAT(exmat_last_error(), AllOf(HasSubstr("scene.json"), HasSubstr("/setps"), HasSubstr("steps")));
+  EXPECT_EQ(model, nullptr);
+
+  exmat_settings settings = default_settings();
+  settings.internal_force = EXMAT_POLYNOMIAL;
+  EXPECT_EQ(created(files_.bundle(), &settings), EXMAT_BAD_INPUT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("/polynomial"));
+}
+
+TEST_F(ApiTest, PointsOfAnotherBundleThanTheModelsAreRefused) {
+  const Model model = this->model();
+  test::Bar other = test::make_bar({.cells = {5, 2, 2}, .examples = 3});
+  other.model.input_sha256[0] = '1';
+  write_bundle(other.model, files_.bundle());
+  try {
+    Points::all_vertices(model);
+    FAIL() << "read";
+  } catch (const Error& error) {
+    EXPECT_EQ(error.status(), EXMAT_BAD_INPUT);
+    EXPECT_THAT(error.what(), HasSubstr("create the model again"));
+  }
+}
+
+TEST_F(ApiTest, SettingsOutOfRangeAreInvalid) {
+  const std::vector<std::pair<std::function<void(exmat_settings&)>, std::string>> faults{
+      {[](auto& s) { s.time_step = 0; }, "/time_step: expected"},
+      {[](auto& s) { s.time_step = kNaN; }, "settings.time_step = nan"},
+      {[](auto& s) { s.gravity[2] = INFINITY; }, "settings.gravity[2] = inf"},
+      {[](auto& s) { s.mass_damping = -1; }, "/damping/mass: expected"},
+      {[](auto& s) { s.newton_tolerance = 1; }, "/newton/tolerance: expected"},
+      {[](auto& s) { s.newton_iterations = 0; }, "/newton/max_iterations: expected"},
+      {[](auto& s) { s.example_bias = 1.5; }, "/examples/bias: expected"},
+      {[](auto& s) { s.target_iterations = 0; }, "/examples/target_iterations: expected"},
+      {[](auto& s) { s.integrator = 3; }, "settings.integrator = 3: expected 0 to 2"},
+      {[](auto& s) { s.energy_reference = -1; }, "settings.energy_reference = -1: expected 0 to 1"},
+      {[](auto& s) { s.use_examples = 2; }, "settings.use_examples = 2"},
+      {[](auto& s) { s.size = 0; }, "settings.size = 0"},
+      {[](auto& s) { s.size = std::size_t{1} << 60; }, "settings.size"}};
+  for (const auto& [damage, message] : faults) {
+    exmat_settings settings = default_settings();
+    damage(settings);
+    EXPECT_EQ(created(files_.bundle(), &settings), EXMAT_INVALID_ARGUMENT) << message;
+    EXPECT_THAT(exmat_last_error(), HasSubstr(message));
+  }
+}
+
+TEST_F(ApiTest, ProgramsOfANewerVersionAreServedUnlessTheyAskForMore) {
+  struct Newer {
+    exmat_settings known;
+    double more;
+  };
+  Newer settings{{}, 1};
+  ASSERT_EQ(exmat_settings_default(&settings.known, sizeof settings), EXMAT_OK);
+  EXPECT_EQ(settings.known.size, sizeof settings);
+  EXPECT_EQ(settings.known.time_step, 0.001);
+  EXPECT_EQ(created(files_.bundle(), &settings.known), EXMAT_OK) << exmat_last_error();
+  settings.more = 2;
+  EXPECT_EQ(created(files_.bundle(), &settings.known), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_settings_default(&settings.known, 8), EXMAT_INVALID_ARGUMENT);
+
+  struct NewerReport {
+    exmat_report known;
+    double more;
+  };
+  NewerReport report{{}, 1};
+  report.known.size = sizeof report;
+  const Model model = this->model();
+  const Body body(model);
+  ASSERT_EQ(exmat_body_step(body.get(), 1, &report.known), EXMAT_OK);
+  EXPECT_EQ(report.known.size, sizeof report);
+  EXPECT_EQ(report.known.steps, 1);
+  EXPECT_EQ(report.more, 0);
+  report.known.size = 0;
+  EXPECT_EQ(exmat_body_step(body.get(), 1, &report.known), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(body.time(), 0.005);
+}
+
+TEST_F(ApiTest, WrongArgumentsAreCodes) {
+  const Model model = this->model(), other = this->model();
+  const Body body(model);
+  const std::array<std::int64_t, 2> ids{0, files_.tip()};
+  const Points points = Points::vertices(model, ids), all = Points::all_vertices(model);
+  const Points foreign = Points::vertices(other, ids);
+  const auto r = static_cast<std::int64_t>(model.modes());
+  exmat_model* no_model = nullptr;
+  exmat_points* no_points = nullptr;
+  exmat_body* no_body = nullptr;
+  exmat_settings settings;
+  exmat_report report{};
+  report.size = sizeof report;
+  exmat_energies energies;
+  std::array<double, 6> numbers{};
+  std::array<float, 6> xyz{};
+  std::vector<double> q(model.modes());
+  std::vector<double> bad_q(model.modes(), kNaN);
+  const std::array<std::int64_t, 2> bad_ids{0, files_.vertices()};
+  const std::array<double, 6> bad_numbers{0, 0, 0, 0, kNaN, 0};
+  exmat_body* const b = body.get();
+  const std::array<exmat_body*, 2> twice{b, b}, with_null{b, nullptr};
+  const char* const bundle = files_.bundle().c_str();
+
+  EXPECT_EQ(exmat_settings_default(nullptr, sizeof settings), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_model_create(nullptr, nullptr, &no_model), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_model_create(bundle, nullptr, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_model_create_from_scene(nullptr, &no_model), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_model_create_from_scene(bundle, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_model_modes(nullptr), -1);
+  EXPECT_EQ(exmat_model_vertices(nullptr), -1);
+  EXPECT_EQ(exmat_model_examples(nullptr), -1);
+  EXPECT_EQ(exmat_model_time_step(nullptr), -1);
+  EXPECT_EQ(exmat_points_count(nullptr), -1);
+  EXPECT_EQ(exmat_body_time(nullptr), -1);
+
+  EXPECT_EQ(exmat_points_create_vertices(nullptr, ids.data(), 2, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_vertices(model.get(), nullptr, 2, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_vertices(model.get(), ids.data(), 2, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_vertices(model.get(), ids.data(), 0, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_vertices(model.get(), ids.data(), -1, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_vertices(model.get(), bad_ids.data(), 2, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("ids[1] = 63: expected vertices of the object, 0 to 62"));
+  EXPECT_EQ(exmat_points_create_all_vertices(nullptr, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_all_vertices(model.get(), nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_at(nullptr, numbers.data(), 6, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_at(model.get(), nullptr, 6, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_at(model.get(), numbers.data(), 6, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_at(model.get(), numbers.data(), 4, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_at(model.get(), numbers.data(), 0, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_create_at(model.get(), bad_numbers.data(), 6, &no_points), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_distances(nullptr, numbers.data(), 2), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_distances(points.get(), nullptr, 2), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_points_distances(points.get(), numbers.data(), 3), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(no_points, nullptr);
+
+  EXPECT_EQ(exmat_body_create(nullptr, &no_body), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_create(model.get(), nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_reset(nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_set_reduced(nullptr, q.data(), q.data(), r), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_set_reduced(b, nullptr, q.data(), r), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_set_reduced(b, q.data(), nullptr, r), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_set_reduced(b, q.data(), q.data(), r + 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_set_reduced(b, q.data(), bad_q.data(), r), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_step(nullptr, 1, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_step(b, -1, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_bodies_step(nullptr, 1, 1, 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_bodies_step(nullptr, 0, 1, 1), EXMAT_OK);
+  EXPECT_EQ(exmat_bodies_step(&b, -1, 1, 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_bodies_step(&b, 1, -1, 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_bodies_step(&b, 1, 1, -1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_bodies_step(with_null.data(), 2, 1, 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_bodies_step(twice.data(), 2, 1, 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("bodies[1] is listed twice"));
+  EXPECT_EQ(exmat_body_report(nullptr, &report), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_report(b, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_apply_forces(nullptr, points.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_apply_forces(b, nullptr, numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_apply_forces(b, points.get(), nullptr, 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_apply_forces(b, points.get(), numbers.data(), 2), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_apply_forces(b, points.get(), bad_numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("expected finite numbers"));
+  EXPECT_EQ(exmat_body_apply_forces(b, foreign.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_apply_forces(b, all.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("can only be read"));
+  EXPECT_EQ(exmat_body_clear_forces(nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_restart_integrator(nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_positions(nullptr, points.get(), xyz.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_positions(b, nullptr, xyz.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_positions(b, points.get(), nullptr, 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_positions(b, points.get(), xyz.data(), 2), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_positions(b, foreign.get(), xyz.data(), 6), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_reduced(nullptr, q.data(), nullptr, r), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_reduced(b, q.data(), nullptr, r - 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_read_reduced(b, nullptr, nullptr, r), EXMAT_OK);
+  EXPECT_EQ(exmat_body_weights(nullptr, numbers.data(), 3), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_weights(b, nullptr, 3), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_weights(b, numbers.data(), 2), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_energies(nullptr, &energies), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_body_energies(b, nullptr), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_body_energies: energies is NULL"));
+  exmat_model_destroy(nullptr);
+  exmat_points_destroy(nullptr);
+  exmat_body_destroy(nullptr);
+
+  // None of it has left a trace.
+  Body untouched(model);
+  untouched.step(5);
+  exmat_body_step(b, 5, nullptr);
+  EXPECT_EQ(displacement(untouched, model.modes()), displacement(body, model.modes()));
+}
+
+TEST_F(ApiTest, MessagesBelongToTheirThread) {
+  EXPECT_EQ(exmat_body_reset(nullptr), EXMAT_INVALID_ARGUMENT);
+  std::string elsewhere = "?";
+  std::thread([&] { elsewhere = exmat_last_error(); }).join();
+  EXPECT_EQ(elsewhere, "");
+  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_body_reset: body is NULL"));
+}
+
+TEST_F(ApiTest, ABodyAndPointsOutliveTheirModel) {
+  std::vector<float> xyz(3);
+  auto model = std::make_unique<Model>(this->model());
+  const std::array<std::int64_t, 1> ids{files_.tip()};
+  const Points points = Points::vertices(*model, ids);
+  Body body(*model);
+  model.reset();
+  body.step(3);
+  body.read_positions(points, xyz);
+  EXPECT_TRUE(std::isfinite(xyz[0]));
+}
+
+TEST_F(ApiTest, ThreadsMayCreateModelsAtOnce) {
+  std::vector<std::thread> threads;
+  std::array<exmat_status, 4> statuses{};
+  for (exmat_status& status : statuses) threads.emplace_back([&] { status = created(files_.bundle()); });
+  for (std::thread& thread : threads) thread.join();
+  for (const exmat_status status : statuses) EXPECT_EQ(status, EXMAT_OK);
+}
+
+TEST(ApiVersionTest, IsThatOfTheProject) {
+  EXPECT_THAT(exmat_version(), ::testing::MatchesRegex("[0-9]+.[0-9]+.[0-9]+"));
+}
+
+}  // namespace
+}  // namespace exmat

@@ -1,0 +1,267 @@
+#include "precompute/mesh_io/surface_file.h"
+
+#include <array>
+#include <bit>
+#include <fmt/format.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <random>
+
+#include "common/mesh/geometry.h"
+#include "tests/precompute/mesh_io/mesh_samples.h"
+#include "tests/support/box_mesh.h"
+
+namespace exmat::precompute {
+namespace {
+
+using test::ByteWriter;
+using test::complaint_of;
+using test::edited;
+using test::TemporaryFolder;
+using testing::HasSubstr;
+
+// A surface whose coordinates take all their digits.
+SurfaceMesh sample() {
+  const TetMesh cube = exmat::test::cube_grid(1, 0.1);
+  SurfaceMesh surface{cube.vertices, surface_triangles(cube.tets)};
+  for (Eigen::Index v = 0; v < surface.vertices.rows(); ++v)
+    surface.vertices.row(v) +=
+        0.01 * Eigen::RowVector3d(std::sin(v), std::cos(v), std::sin(2.0 * static_cast<double>(v)));
+  return surface;
+}
+
+bool same_surface(const SurfaceMesh& a, const SurfaceMesh& b) {
+  return a.vertices.rows() == b.vertices.rows() && a.triangles.rows() == b.triangles.rows() &&
+         a.vertices == b.vertices && a.triangles == b.triangles;
+}
+
+std::string to_obj(const SurfaceMesh& surface) {
+  std::string text = "# sample\nmtllib none.mtl\no cube\n";
+  for (const auto& x : surface.vertices.rowwise()) text += fmt::format("v {} {} {}\n", x[0], x[1], x[2]);
+  text += "vt 0 0\nvn 0 0 1\ns off\n";
+  for (const auto& t : surface.triangles.rowwise())
+    text += fmt::format("f {}/1 {}//1 {}/1/1\n", t[0] + 1, t[1] + 1, t[2] + 1);
+  return text;
+}
+
+enum class Encoding { kText, kLittle, kBig };
+
+// With a property and an element that are not used.
+std::string to_ply(const SurfaceMesh& surface, Encoding encoding) {
+  const bool text = encoding == Encoding::kText;
+  const bool little = encoding == Encoding::kLittle;
+  ByteWriter out(!text && little != (std::endian::native == std::endian::little));
+  out.text(fmt::format("ply\nformat {} 1.0\ncomment sample\n", text     ? "ascii"
+                                                               : little ? "binary_little_endian"
+                                                                        : "binary_big_endian"));
+  out.text(
+      fmt::format("element vertex {}\nproperty double x\nproperty double y\nproperty int mark\nproperty double z\n",
+                  surface.vertices.rows()));
+  out.text("element edge 1\nproperty int vertex1\nproperty list int double lengths\n");
+  out.text(
+      fmt::format("element face {}\nproperty list int int vertex_indices\nend_header\n", surface.triangles.rows()));
+  const auto real = [&](double value) { text ? out.text(fmt::format("{} ", value)) : out.real(value); };
+  const auto integer = [&](int value) { text ? out.text(fmt::format("{} ", value)) : out.integer(value); };
+  const auto end_row = [&] { out.text(text ? "\n" : ""); };
+  for (const auto& x : surface.vertices.rowwise()) {
+    real(x[0]);
+    real(x[1]);
+    integer(7);
+    real(x[2]);
+    end_row();
+  }
+  integer(0);
+  integer(2);
+  real(0.5);
+  real(1.5);
+  end_row();
+  for (const auto& triangle : surface.triangles.rowwise()) {
+    integer(3);
+    for (const auto corner : triangle) integer(corner);
+    end_row();
+  }
+  return out.bytes();
+}
+
+struct SurfaceFlavour {
+  std::string name, extension;
+  std::string (*write)(const SurfaceMesh&);
+};
+
+void PrintTo(const SurfaceFlavour& flavour, std::ostream* stream) { *stream << flavour.name; }
+
+class EachSurfaceFlavour : public testing::TestWithParam<SurfaceFlavour> {
+ protected:
+  SurfaceMesh read(std::string_view bytes) const {
+    return read_surface(folder_.write("body" + GetParam().extension, bytes));
+  }
+
+  TemporaryFolder folder_;
+};
+
+TEST_P(EachSurfaceFlavour, GivesTheSameSurface) {
+  EXPECT_TRUE(same_surface(read(GetParam().write(sample())), sample()));
+}
+
+TEST_P(EachSurfaceFlavour, IsRefusedAtEveryTruncationOrHasFewerFaces) {
+  const std::string whole = GetParam().write(sample());
+  std::size_t accepted = 0;
+  for (std::size_t length = 0; length < whole.size(); ++length) try {
+      const SurfaceMesh result = read(std::string_view(whole).substr(0, length));
+      ++accepted;
+      EXPECT_EQ(result.vertices, sample().vertices) << length;
+    } catch (const InputError& error) {
+      EXPECT_FALSE(error.complaint().expected.empty());
+    }
+  // An .obj does not say how many faces it has; the last line of a text .ply needs neither its blank nor its end.
+  EXPECT_LE(accepted, GetParam().extension == ".obj" ? whole.size() - whole.find("f 1/1") : 2);
+}
+
+TEST_P(EachSurfaceFlavour, IsReadOrRefusedWithAnyByteChanged) {
+  const std::string whole = GetParam().write(sample());
+  std::mt19937 random(7);
+  for (int trial = 0; trial < 500; ++trial) {
+    std::string bytes = whole;
+    bytes[random() % bytes.size()] = trial % 2 == 0 ? static_cast<char>(random()) : "0123456789-./# \n"[random() % 16];
+    try {
+      const SurfaceMesh result = read(bytes);
+      ASSERT_GT(result.triangles.rows(), 0);
+      EXPECT_GE(result.triangles.minCoeff(), 0);
+      EXPECT_LT(result.triangles.maxCoeff(), result.vertices.rows());
+      EXPECT_TRUE(result.vertices.allFinite());
+    } catch (const InputError& error) {
+      EXPECT_FALSE(error.complaint().expected.empty());
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Surface, EachSurfaceFlavour,
+    testing::Values(SurfaceFlavour{"Obj", ".obj", to_obj},
+                    SurfaceFlavour{"PlyText", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kText); }},
+                    SurfaceFlavour{"PlyLittle", ".ply",
+                                   [](const SurfaceMesh& s) { return to_ply(s, Encoding::kLittle); }},
+                    SurfaceFlavour{"PlyBig", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kBig); }}),
+    [](const auto& param) { return param.param.name; });
+
+constexpr auto kObj = R"(# a square and a triangle
+v 0 0 0
+v 1 0 0 1.0
+v 1 1 0 0.5 0.5 0.5
+v 0 1 0
+f 1 2 3 4
+v 0 0 1
+f -1 1 \
+  -4
+)";
+
+constexpr auto kPly = R"(ply
+format ascii 1.0
+element vertex 4
+property float x
+property float y
+property float z
+element face 1
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+1 1 0
+0 1 0
+4 0 1 2 3
+)";
+
+TEST(ReadSurface, NeedsNoLineEndAfterTheLastLine) {
+  const TemporaryFolder folder;
+  for (const auto& [name, text] : {std::pair("a.obj", kObj), std::pair("a.ply", kPly)}) {
+    const SurfaceMesh expected = read_surface(folder.write(name, text));
+    EXPECT_TRUE(
+        same_surface(read_surface(folder.write(name, std::string(text, std::string_view(text).size() - 1))), expected));
+  }
+}
+
+TEST(ReadSurface, TakesPolygonsAsFansAndIndicesFromTheEnd) {
+  const TemporaryFolder folder;
+  const SurfaceMesh obj = read_surface(folder.write("body.obj", kObj));
+  EXPECT_EQ(obj.vertices.rows(), 5);
+  ASSERT_EQ(obj.triangles.rows(), 3);
+  EXPECT_EQ(obj.triangles.row(0), Eigen::RowVector3i(0, 1, 2));
+  EXPECT_EQ(obj.triangles.row(1), Eigen::RowVector3i(0, 2, 3));
+  EXPECT_EQ(obj.triangles.row(2), Eigen::RowVector3i(4, 0, 1));
+  const SurfaceMesh ply = read_surface(folder.write("body.ply", kPly));
+  EXPECT_EQ(ply.triangles, obj.triangles.topRows(2));
+  EXPECT_EQ(ply.vertices, obj.vertices.topRows(4));
+}
+
+struct Malformed {
+  const char *name, *extension, *from, *to, *place, *expected, *found;
+};
+
+void PrintTo(const Malformed& malformed, std::ostream* stream) { *stream << malformed.name; }
+
+class RefusesSurface : public testing::TestWithParam<Malformed> {};
+
+TEST_P(RefusesSurface, WithPlaceExpectedAndFound) {
+  const TemporaryFolder folder;
+  const bool is_obj = std::string(GetParam().extension) == ".obj";
+  const auto file = folder.write(std::string("bad") + GetParam().extension,
+                                 edited(is_obj ? kObj : kPly, GetParam().from, GetParam().to));
+  const Complaint complaint = complaint_of([&] { read_surface(file); });
+  EXPECT_EQ(complaint.file, file.string());
+  EXPECT_EQ(complaint.place, GetParam().place);
+  EXPECT_THAT(complaint.expected, HasSubstr(GetParam().expected));
+  EXPECT_THAT(complaint.found, HasSubstr(GetParam().found));
+}
+
+constexpr std::array kMalformed{
+    Malformed{"ObjNanCoordinate", ".obj", "v 0 1 0", "v 0 nan 0", "line 5", "a y coordinate, a finite number", "'nan'"},
+    Malformed{"ObjMissingCoordinate", ".obj", "v 0 1 0", "v 0 1", "line 5", "a z coordinate", "the end of the line"},
+    Malformed{"ObjFaceOfTwo", ".obj", "f 1 2 3 4", "f 1 2", "line 6", "a face of at least 3 vertices", "2"},
+    Malformed{"ObjVertexZero", ".obj", "f 1 2 3 4", "f 0 2 3 4", "line 6", "the number of a vertex", "'0'"},
+    Malformed{"ObjVertexAbove", ".obj", "f 1 2 3 4", "f 1 2 3 6", "line 6", "vertices 1 to 5", "6"},
+    Malformed{"ObjVertexBeforeTheFirst", ".obj", "f 1 2 3 4", "f 1 2 3 -5", "line 6", "the number of a vertex", "'-5'"},
+    Malformed{"ObjVertexOutOfRange", ".obj", "f 1 2 3 4", "f 1 2 3 99999999999999999999", "line 6",
+              "the number of a vertex", "'99999999999999999999'"},
+    Malformed{"ObjNotANumber", ".obj", "f 1 2 3 4", "f 1 2 three", "line 6", "the number of a vertex", "'three'"},
+    Malformed{"ObjNoFaces", ".obj", "f 1 2 3 4\nv 0 0 1\nf -1 1 \\\n  -4\n", "", "line 5", "faces ('f 1 2 3')",
+              "the end of the file"},
+    Malformed{"ObjEndsInAStatement", ".obj", "\\\n  -4\n", "-4 \\\n", "line 8", "a line after one that ends with '\\'",
+              "the end of the file"},
+    Malformed{"PlyNotAPly", ".ply", "ply\n", "solid\n", "line 1", "'ply'", "'solid'"},
+    Malformed{"PlyUnknownFormat", ".ply", "ascii", "text", "line 2", "ascii, binary_little_endian", "'text'"},
+    Malformed{"PlyOtherVersion", ".ply", "ascii 1.0", "ascii 2.0", "line 2", "version 1.0", "'2.0'"},
+    Malformed{"PlyNoFormat", ".ply", "format ascii 1.0\n", "", "line 8", "a line 'format'", "none"},
+    Malformed{"PlyUnknownStatement", ".ply", "element face 1", "elements face 1", "line 7", "'element'",
+              "'elements face 1'"},
+    Malformed{"PlyUnknownType", ".ply", "float y", "real y", "line 5", "a type of numbers", "'real'"},
+    Malformed{"PlyCountOfReals", ".ply", "list uchar int", "list float int", "line 8", "a count of integers",
+              "one of reals"},
+    Malformed{"PlyPropertyFirst", ".ply", "element vertex 4\n", "", "line 3", "an element before its properties",
+              "none"},
+    Malformed{"PlyNoZ", ".ply", "property float z\n", "", "line 8", "properties x, y and z", "fewer"},
+    Malformed{"PlyNoCorners", ".ply", "vertex_indices", "corners", "line 9", "'vertex_indices' of the faces", "none"},
+    Malformed{"PlyNegativeCount", ".ply", "face 1", "face -1", "line 7", "the number of elements 'face'", "'-1'"},
+    Malformed{"PlyCountBeyondTheFile", ".ply", "vertex 4", "vertex 400", "line 9",
+              "which the rest of the file can hold", "400"},
+    Malformed{"PlyTooManyRows", ".ply", "face 1", "face 0", "line 14", "the end of the file", "'4'"},
+    Malformed{"PlyTooFewRows", ".ply", "face 1", "face 2", "line 15", "the length of a list", "the end of the file"},
+    Malformed{"PlyNanCoordinate", ".ply", "0 1 0\n", "0 nan 0\n", "line 13", "coordinate y, a finite number", "'nan'"},
+    Malformed{"PlyVertexAbove", ".ply", "4 0 1 2 3", "4 0 1 2 4", "line 14", "a vertex from 0 to 3", "4"},
+    Malformed{"PlyVertexBelow", ".ply", "4 0 1 2 3", "4 0 1 2 -1", "line 14", "a vertex from 0 to 3", "-1"},
+    Malformed{"PlyFaceOfTwo", ".ply", "4 0 1 2 3", "2 0 1", "line 14", "a face of at least 3 vertices", "2"},
+    Malformed{"PlyNegativeLength", ".ply", "4 0 1 2 3", "-4 0 1 2 3", "line 14", "the length of a list", "-4"},
+    Malformed{"PlyHugeLength", ".ply", "4 0 1 2 3", "2000000000 0 1 2 3", "line 14",
+              "which the rest of the file can hold", "2000000000"},
+};
+
+INSTANTIATE_TEST_SUITE_P(Malformed, RefusesSurface, testing::ValuesIn(kMalformed),
+                         [](const auto& param) { return std::string(param.param.name); });
+
+TEST(ReadSurface, NamesTheKnownExtensions) {
+  const Complaint complaint = complaint_of([] { read_surface("body.stl"); });
+  EXPECT_THAT(complaint.expected, HasSubstr(".obj or .ply"));
+  EXPECT_EQ(complaint.found, "'.stl'");
+}
+
+}  // namespace
+}  // namespace exmat::precompute

@@ -1,0 +1,147 @@
+#include "precompute/study/measure/runs.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+
+#include "common/bundle/bundle.h"
+#include "common/core/error.h"
+#include "precompute/study/measure/error_metrics.h"
+#include "precompute/study/measure/timing.h"
+#include "tests/precompute/full_space/full_space_bar.h"
+#include "tests/support/temporary_folder.h"
+
+namespace exmat::precompute {
+namespace {
+
+// A bundle with all modes, and scenes on it.
+class Runs : public testing::Test {
+ protected:
+  void make(const test::BarOptions& options) {
+    bar_ = complete_bar(options);
+    write_bundle(bar_.model, folder_ / "bar.h5");
+  }
+  SceneConfig scene() const {
+    SceneConfig config;
+    config.file = folder_ / "scene.json";
+    config.bundle = folder_ / "bar.h5";
+    config.time_step = 0.01;
+    config.gravity = {0, -12, 4};
+    config.newton = {60, 1e-10};
+    config.trajectory = "positions";
+    return config;
+  }
+  TrajectoryErrors errors(const SceneConfig& config, const std::vector<double>& times) {
+    reduced_ = run_reduced(config, times);
+    full_ = run_full_space(config, bar_.model, times);
+    return trajectory_errors(reduced_.frames, full_, bar_.model.object->mesh.vertices,
+                             scalar_mass(bar_.model.object->mesh, bar_.model.object->materials.density),
+                             bar_.model.rigid.has_value());
+  }
+
+  test::TemporaryFolder folder_;
+  test::Bar bar_;
+  ReducedRun reduced_;
+  BodyFrames full_;
+};
+
+// The full space solves each step to a residual of 1e-8 of the forces.
+TEST_F(Runs, WithAllModesAreTheFullSpace) {
+  make({.cells = {2, 1, 1}, .examples = 3});
+  SceneConfig config = scene();
+  config.mass_damping = 0.5;
+  config.examples.emplace();
+  config.examples->stiffness = 400;
+  config.examples->damping = 2;
+  config.examples->bias = 0.5;
+  config.examples->target_iterations = 50;
+  const TrajectoryErrors found = errors(config, {0.05, 0.1, 0.2, 0.4});
+  EXPECT_LE(found.position.max, 1e-7);
+  EXPECT_LE(found.velocity.max, 1e-6);
+  EXPECT_LE(found.energy, 1e-6);
+  EXPECT_EQ(reduced_.frames.steps, 40);
+  EXPECT_EQ(reduced_.modes, static_cast<std::size_t>(bar_.modes()));
+  EXPECT_EQ(reduced_.target, "solve");
+  EXPECT_EQ(reduced_.frames.unconverged, 0);
+  EXPECT_GE(mass_norm(scalar_mass(bar_.model.object->mesh, bar_.model.object->materials.density), full_.velocities[1]),
+            0.01)
+      << "it does not move";
+}
+
+// Of a free body the two integrate a turn in different ways, to second order in the time step.
+TEST_F(Runs, OfAFreeBodyComeNearerToTheFullSpaceWithTheTimeStep) {
+  make({.cells = {2, 1, 1}, .free = true});
+  SceneConfig config = scene();
+  config.body.linear_velocity = Eigen::Vector3d(1, 2, 0);
+  config.body.angular_velocity = Eigen::Vector3d(2, -1, 3);
+  std::vector<TrajectoryErrors> found;
+  for (const double step : {0.001, 0.00025}) {
+    config.time_step = step;
+    found.push_back(errors(config, {0.08, 0.16}));
+  }
+  constexpr double kSecondOrder = 1.0 / 13;  // 1 / 16, and a little more while the steps are not endlessly small
+  EXPECT_LE(found[1].position.max, kSecondOrder * found[0].position.max);
+  EXPECT_LE(found[1].velocity.max, kSecondOrder * found[0].velocity.max);
+  EXPECT_LE(found[1].shape.value().max, kSecondOrder * found[0].shape->max);
+  EXPECT_LE(found[1].position.max, 1e-5);
+}
+
+// Positions a little later and earlier give the velocities.
+TEST_F(Runs, VelocitiesAreTheRatesOfPositions) {
+  make({.cells = {2, 1, 1}, .free = true});
+  const auto model = runtime::build_model(bar_.model, {}).model;
+  runtime::State state = runtime::make_state(*model);
+  state.q.setLinSpaced(state.q.size(), -0.02, 0.03);
+  state.v.setLinSpaced(state.v.size(), 0.4, -0.3);
+  runtime::FreeMotion motion;
+  motion.position = {1, 2, 3};
+  motion.orientation = Eigen::Quaterniond(0.5, 0.1, -0.7, 0.3).normalized();
+  motion.linear_velocity = {1, -2, 0.5};
+  motion.angular_velocity = {0.3, 2, -1};
+  runtime::set_motion(*model, motion, state);
+  const VertexArray velocities = world_velocities(bar_.model, state);
+  constexpr double kStep = 1e-5;
+  const auto moved = [&](double time) {
+    runtime::State later = state;
+    later.q += time * state.v;
+    later.body->position += time * motion.linear_velocity;
+    const double angle = time * motion.angular_velocity.norm();
+    later.body->orientation = Eigen::AngleAxisd(angle, motion.angular_velocity.normalized()) * state.body->orientation;
+    return world_positions(bar_.model, later);
+  };
+  const VertexArray rates = (moved(kStep) - moved(-kStep)) / (2 * kStep);
+  EXPECT_LE((rates - velocities).lpNorm<Eigen::Infinity>(), 1e-8 * velocities.lpNorm<Eigen::Infinity>());
+}
+
+TEST_F(Runs, AreTimedInTurns) {
+  make({.cells = {2, 1, 1}, .examples = 3});
+  SceneConfig plain = scene(), with_examples = scene();
+  plain.steps = with_examples.steps = 40;
+  with_examples.examples.emplace();
+  with_examples.examples->stiffness = 400;
+  FullSpaceRun baseline(with_examples, bar_.model, true);
+  const Timings timings =
+      time_steps({plain, with_examples}, {.rounds = 3, .steps = 30, .baseline_steps = 2}, &baseline);
+  ASSERT_EQ(timings.points.size(), 2U);
+  for (const StepTimes& times : timings.points) {
+    EXPECT_EQ(times.steps, 90);
+    EXPECT_GT(times.median, 0);
+    EXPECT_GE(times.p95, times.median);
+    EXPECT_GT(times.stages[2], 0) << "the internal force";
+    EXPECT_LT(times.stages[2], times.p95);
+  }
+  EXPECT_EQ(timings.points[0].interpolation, 0);
+  EXPECT_GT(timings.points[1].interpolation, 0);
+  EXPECT_EQ(timings.baseline.steps, 6);
+  EXPECT_GT(timings.baseline.median, timings.baseline.interpolation);
+  EXPECT_EQ(time_steps({plain}, {.rounds = 1, .steps = 5}, nullptr).baseline.steps, 0);
+}
+
+TEST_F(Runs, StopAtNumbersThatAreNotFinite) {
+  make({.cells = {2, 1, 1}});
+  SceneConfig config = scene();
+  config.gravity = {0, 1e300, 0};
+  EXPECT_THROW(run_reduced(config, {0.1}), WorkError);
+}
+
+}  // namespace
+}  // namespace exmat::precompute
