@@ -60,7 +60,7 @@ FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::V
 }
 
 FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& deformation,
-                                     const runtime::FreeMotion& motion) {
+                                     const runtime::FrameMotion& motion) {
   if (!model.frame)
     throw InputError({"", "/body", "a free body, since it is to move", "a body with fixed vertices", ""});
   const Eigen::Vector3d centre = model.frame->centre_at_rest();

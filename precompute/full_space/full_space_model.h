@@ -60,7 +60,7 @@ FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::V
 /// The same for a free body that is deformed by u [3n] and moved by `motion`: x = c + R (X + u), X about the centre of
 /// mass c at rest.
 FullSpaceState make_full_space_state(const FullSpaceModel& model, const Eigen::VectorXd& deformation,
-                                     const runtime::FreeMotion& motion);
+                                     const runtime::FrameMotion& motion);
 
 /// [n x 3] world positions [m] and velocities [m/s] of all vertices.
 VertexArray world_positions(const FullSpaceModel& model, const FullSpaceState& state);

@@ -28,6 +28,7 @@ class Stepper {
  private:
   void gather_external_force();
   bool begins_anew() const;
+  runtime::StepHistory history() const { return {state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous}; }
   bool find_contacts();
   void set_form(Integrator integrator);
   void set_rate_centre(Integrator integrator);
@@ -85,11 +86,11 @@ bool Stepper::find_contacts() {
 
 void Stepper::set_form(Integrator integrator) {
   if (integrator == Integrator::kNewmark)
-    runtime::newmark_form(state_, begins_anew() ? start_acceleration() : state_.a, scene_.time_step, terms_.form);
+    runtime::newmark_form(history(), begins_anew() ? start_acceleration() : state_.a, scene_.time_step, terms_.form);
   else if (integrator == Integrator::kBdf2 && !begins_anew())
-    runtime::bdf2_form(state_, scene_.time_step, terms_.form);
+    runtime::bdf2_form(history(), scene_.time_step, terms_.form);
   else
-    runtime::backward_euler_form(state_, scene_.time_step, terms_.form);
+    runtime::backward_euler_form(history(), scene_.time_step, terms_.form);
 }
 
 // u_v by the formulas of the velocity's centre, of the deformations at the beginning and one step before.

@@ -75,7 +75,7 @@ FullSpaceState full_space_start(const SceneConfig& config, const FullSpaceModel&
     throw InputError(
         {config.file.string(), "/body", "no position, orientation or velocity of a clamped body", "some", ""});
   if (!model.frame) return make_full_space_state(model, deformation, Eigen::VectorXd::Zero(deformation.size()));
-  runtime::FreeMotion motion;
+  runtime::FrameMotion motion;
   motion.position = body.position.value_or(motion.position);
   motion.orientation = body.orientation.value_or(motion.orientation);
   motion.linear_velocity = body.linear_velocity.value_or(motion.linear_velocity);

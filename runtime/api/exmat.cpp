@@ -52,14 +52,6 @@ exmat_model* load_model(SceneConfig config) {
   return new exmat_model{std::move(source)};
 }
 
-/// Where a point of a free body at rest in the world is now.
-template <typename Scalar>
-Eigen::Vector3<Scalar> placed(const exmat_body& body, const Eigen::Vector3<Scalar>& point) {
-  const FreeState& free = *body.state.body;
-  const Eigen::Vector3<Scalar> centre = body.model().rigid->centre_of_mass().cast<Scalar>();
-  return centre + free.position.cast<Scalar>() + free.orientation.cast<Scalar>() * (point - centre);
-}
-
 exmat_points* new_points(const exmat_model& model, PointSet set) {
   return new exmat_points{model.source, std::move(set)};
 }
@@ -127,8 +119,7 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source)
       start(source->loaded.start),
       workspace(model(), scene),
       drawing(VertexPositions::make_workspace(model().modes())),
-      force(Eigen::VectorXd::Zero(model().modes())),
-      moments(model().rigid ? model().rigid->make_moments() : RigidFrame::Moments{}) {
+      force(Eigen::VectorXd::Zero(model().modes())) {
   refresh_weights(model(), scene, start, workspace);
   state = start;
 }
@@ -283,8 +274,7 @@ exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const dou
   state.q = state.q_previous = Eigen::Map<const Eigen::VectorXd>(q, modes);
   state.v = state.v_previous = Eigen::Map<const Eigen::VectorXd>(v, modes);
   state.elastic_energy = body->model().internal_force.energy(state.q, body->workspace.elasticity);
-  if (state.body) set_motion(body->model(), motion_of(*state.body), body->moments, state);
-  if (state.carried) place_on_carrier(body->model(), body->scene, state);
+  follow_frame(body->model(), body->scene, state, body->workspace);
   refresh_weights(body->model(), body->scene, state, body->workspace);
   return EXMAT_OK;
 }
@@ -356,40 +346,31 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
                 "exmat_points_create_vertices()",
                 __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, rows.rows());
+  const BodyFrame& frame = *body->model().frame;
+  const Placement placement = frame.placement(body->state.frame);
   Eigen::VectorXd& sum = body->force;
   sum.setZero();
   Eigen::Vector3d total = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
-    Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
-    if (body->state.body) {
-      const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
-      const Eigen::Vector3d now = placed<double>(*body, points->set.rest.row(i / 3).transpose() + displacement);
-      const Eigen::Vector3d centre = body->model().rigid->centre_of_mass() + body->state.body->position;
-      total += force;
-      torque += (now - centre).cross(force);
-      force = body->state.body->orientation.conjugate() * force;
-    }
-    if (body->state.carried) force = body->state.carried->frame.rotation.transpose() * force;
-    sum += rows.middleRows<3>(i).transpose().lazyProduct(force);
+    const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
+    const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
+    const Eigen::Vector3d now = placement.to_world(points->set.rest.row(i / 3).transpose() + displacement);
+    total += force;
+    torque += (now - placement.position).cross(force);
+    sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
   }
   // A force that is not finite makes every sum so, unless it is where nothing moves.
   if (!all_finite(forces, coordinates) || !sum.allFinite())
     return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
   body->state.applied_force += sum;
-  if (body->state.body) {
-    body->state.body->applied_force += total;
-    body->state.body->applied_torque += torque;
-  }
+  frame.apply(total, torque, body->state.frame);
   return EXMAT_OK;
 }
 
 exmat_status exmat_body_clear_forces(exmat_body* body) noexcept {
   EXMAT_REQUIRE(body);
   body->state.applied_force.setZero();
-  if (body->state.body) {
-    body->state.body->applied_force.setZero();
-    body->state.body->applied_torque.setZero();
-  }
+  body->model().frame->clear_forces(body->state.frame);
   return EXMAT_OK;
 }
 
@@ -408,13 +389,11 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, 3 * points->set.positions.points());
   points->set.positions.evaluate(body->state.q, body->drawing, xyz);
-  if (!body->state.body && !body->state.carried) return EXMAT_OK;
+  if (!body->model().frame->moves()) return EXMAT_OK;
+  const Placement placement = body->model().frame->placement(body->state.frame);
   for (std::int64_t i = 0; i < coordinates; i += 3) {
     Eigen::Map<Eigen::Vector3f> point(xyz + i);
-    if (body->state.body)
-      point = placed<float>(*body, point);
-    else
-      point = body->state.carried->frame.to_world(point.cast<double>()).cast<float>();
+    point = placement.to_world(point.cast<double>()).cast<float>();
   }
   return EXMAT_OK;
 }
@@ -422,9 +401,7 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
 exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion) noexcept {
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(motion);
-  *motion = {{0, 0, 0}, {1, 0, 0, 0}, {0, 0, 0}, {0, 0, 0}};
-  if (!body->state.body && !body->state.carried) return EXMAT_OK;
-  const FreeMotion now = body->state.body ? motion_of(*body->state.body) : motion_of(body->state.carried->frame);
+  const FrameMotion now = body->model().frame->motion(body->state.frame);
   for (int i = 0; i < 3; ++i) {
     motion->position[i] = now.position[i];
     motion->orientation[i + 1] = now.orientation.vec()[i];
@@ -438,8 +415,7 @@ exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion
 exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion) noexcept {
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(motion);
-  if (!body->state.body) return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
-  FreeMotion wanted;
+  FrameMotion wanted;
   wanted.position = Eigen::Vector3d(motion->position);
   wanted.linear_velocity = Eigen::Vector3d(motion->linear_velocity);
   wanted.angular_velocity = Eigen::Vector3d(motion->angular_velocity);
@@ -450,7 +426,9 @@ exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion)
                       wanted.angular_velocity.allFinite() && std::isfinite(length);
   if (!finite || !(length > 0))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
-  set_motion(body->model(), wanted, body->moments, body->state);
+  State& state = body->state;
+  if (!body->model().frame->set_motion(wanted, state.q, state.v, body->workspace.frame, state.frame))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
   body->state.begins_anew = true;
   return EXMAT_OK;
 }
@@ -489,7 +467,7 @@ exmat_status exmat_body_region_weights(const exmat_body* body, std::int64_t regi
 exmat_status exmat_body_energies(const exmat_body* body, exmat_energies* result) noexcept {
   EXMAT_REQUIRE(body);
   if (result == nullptr) return null_argument(__func__, "energies");
-  const Energies now = energies(body->scene, body->state);
+  const Energies now = energies(body->model(), body->scene, body->state);
   *result = {now.kinetic, now.elastic, now.potential};
   return EXMAT_OK;
 }

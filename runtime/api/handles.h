@@ -32,8 +32,7 @@ struct exmat_body {
   exmat::runtime::State start, state;
   exmat::runtime::Workspace workspace;
   exmat::runtime::VertexPositions::Workspace drawing;
-  Eigen::VectorXd force;                        ///< r
-  exmat::runtime::RigidFrame::Moments moments;  ///< scratch, of a free body
+  Eigen::VectorXd force;  ///< r
   exmat_report report{};
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
 };

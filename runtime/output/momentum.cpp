@@ -4,8 +4,8 @@
 
 namespace exmat::runtime {
 
-Momenta momenta(const TetArray& tets, const Eigen::VectorXd& rest_masses, const VertexArray& positions,
-                const VertexArray& velocities) {
+FrameMomenta momenta(const TetArray& tets, const Eigen::VectorXd& rest_masses, const VertexArray& positions,
+                     const VertexArray& velocities) {
   double mass = 0;
   Eigen::Vector3d first_moment = Eigen::Vector3d::Zero(), linear = Eigen::Vector3d::Zero();
   Eigen::Vector3d about_origin = Eigen::Vector3d::Zero();

@@ -9,6 +9,7 @@
 #include "common/bundle/file_schemas.h"
 #include "common/mesh/geometry.h"
 #include "runtime/output/momentum.h"
+#include "runtime/output/world_vertices.h"
 
 namespace exmat::runtime {
 namespace {
@@ -165,9 +166,10 @@ struct TrajectoryWriter::Datasets {
   std::optional<RowWriter> render;  // vertices of the render mesh
 };
 
-TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model,
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
                                    const TrajectoryInfo& info)
     : model_(model),
+      frame_(frame),
       info_(info),
       output_(path),
       file_(create_file(output_, model, info)),
@@ -187,21 +189,15 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const Redu
 TrajectoryWriter::~TrajectoryWriter() = default;
 
 void TrajectoryWriter::append(const State& state, const Energies& energies, double step_seconds) {
-  FreeState where;
-  if (state.carried) {
-    const FreeMotion frame = motion_of(state.carried->frame);
-    where.position = frame.position;
-    where.orientation = frame.orientation;
-  }
-  const FreeState& body = state.body ? *state.body : where;
-  const Eigen::Quaterniond& turn = body.orientation;
+  const FrameMotion motion = frame_.motion(state.frame);
+  const Eigen::Quaterniond& turn = motion.orientation;
   const std::array orientation{turn.w(), turn.x(), turn.y(), turn.z()};
   times_.push_back(state.time);
   datasets_->time.append(state.time);
   append_positions(state);
   datasets_->reduced.append(row_of(state.q));
   datasets_->reduced_velocity.append(row_of(state.v));
-  datasets_->body_position.append(row_of(body.position));
+  datasets_->body_position.append(row_of(motion.position));
   datasets_->body_orientation.append(std::span<const double>(orientation));
   datasets_->kinetic.append(energies.kinetic);
   datasets_->elastic.append(energies.elastic);
@@ -216,13 +212,12 @@ void TrajectoryWriter::append_positions(const State& state) {
   displacements_.reshaped<Eigen::RowMajor>().noalias() = basis * state.q;
   velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
   VertexArray positions = model_.object->mesh.vertices + displacements_;
-  if (state.body) place(*state.body, positions);
-  if (state.carried) carry(state.carried->frame, positions);
+  if (frame_.moves()) to_world(frame_.placement(state.frame), frame_.velocity(state.frame), positions, velocities_);
   append_drawn(positions, datasets_->positions);
   if (model_.render) append_render_mesh(positions);
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
-  const Momenta now = state.body ? Momenta{state.body->linear_momentum, state.body->angular_momentum}
-                                 : momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
+  const std::optional<FrameMomenta> own = frame_.momenta(state.frame);
+  const FrameMomenta now = own ? *own : momenta(model_.object->mesh.tets, rest_masses_, positions, velocities_);
   datasets_->linear_momentum.append(row_of(now.linear));
   datasets_->angular_momentum.append(row_of(now.angular));
 }
@@ -238,23 +233,6 @@ void TrajectoryWriter::append_render_mesh(const VertexArray& positions) {
     for (int c = 1; c < 4; ++c) drawn.row(k) += render.barycentric(k, c) * positions.row(corners[c]);
   }
   append_drawn(drawn, *datasets_->render);
-}
-
-/// From the body's frame at rest to the world.
-void TrajectoryWriter::place(const FreeState& body, VertexArray& positions) const {
-  const Eigen::RowVector3d centre = model_.rigid->centre_of_mass.transpose();
-  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix();
-  positions = (positions.rowwise() - centre) * rotation.transpose();
-  positions.rowwise() += centre + body.position.transpose();
-}
-
-/// Positions and velocities from the moving frame to the world.
-void TrajectoryWriter::carry(const MotionSample& frame, VertexArray& positions) {
-  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
-    const Eigen::Vector3d point = frame.to_world(positions.row(i).transpose());
-    velocities_.row(i) = frame.velocity_at(point) + frame.rotation * velocities_.row(i).transpose();
-    positions.row(i) = point;
-  }
 }
 
 void TrajectoryWriter::finish() {

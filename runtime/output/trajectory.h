@@ -33,8 +33,10 @@ struct TrajectoryInfo {
 /// Two equal runs give the same bytes except /step_time.
 class TrajectoryWriter {
  public:
-  /// `model` holds /object and the basis, perhaps /render, and outlives the writer. Throws WorkError.
-  TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const TrajectoryInfo& info);
+  /// `model` holds /object and the basis, perhaps /render, and outlives the writer, as the frame of the body does.
+  /// Throws WorkError.
+  TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
+                   const TrajectoryInfo& info);
   ~TrajectoryWriter();
 
   /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
@@ -50,10 +52,9 @@ class TrajectoryWriter {
   struct Datasets;
   void append_positions(const State& state);
   void append_render_mesh(const VertexArray& positions);
-  void place(const FreeState& body, VertexArray& positions) const;
-  void carry(const MotionSample& frame, VertexArray& positions);
 
   const ReducedModel& model_;
+  const BodyFrame& frame_;
   TrajectoryInfo info_;
   AtomicFile output_;
   Hdf5File file_;

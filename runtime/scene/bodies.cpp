@@ -62,11 +62,7 @@ std::uint64_t Bodies::hash() const {
   for (const State& state : states_) {
     hash.add_all(state.q);
     hash.add_all(state.v);
-    if (!state.body) continue;
-    hash.add_all(state.body->position);
-    hash.add_all(state.body->orientation.coeffs());
-    hash.add_all(state.body->linear_momentum);
-    hash.add_all(state.body->angular_momentum);
+    hash.add_all(model_.frame->coordinates(state.frame));
   }
   return hash.value();
 }

@@ -111,12 +111,12 @@ ScriptedForce scripted_force(const SceneConfig& config, const VertexForceConfig&
   scripted.start = force.start;
   scripted.end = force.end;
   scripted.force = vertex_force(rows, force.force);
-  const Model& model = *loaded.model;
-  if (!model.rigid && !model.carried) return scripted;
+  const BodyFrame& frame = *loaded.model->frame;
+  if (!frame.moves()) return scripted;
   const auto count = static_cast<double>(force.vertices.size());
   scripted.total = count * force.force;
   scripted.mean_basis.setZero(3, rows.cols());
-  scripted.lever = -(model.rigid ? *model.rigid : model.carried->moments).centre_of_mass();
+  scripted.lever = -frame.centre_of_mass();
   for (std::size_t i = 0; i < force.vertices.size(); ++i) {
     scripted.lever += loaded.data.object->mesh.vertices.row(force.vertices[i]).transpose() / count;
     scripted.mean_basis += rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) / count;
@@ -136,7 +136,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
   scene.obstacles = make_obstacles(config);
-  if (loaded.model->carried) scene.carrier = make_motion(config.body.motion);
+  if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
   for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force(config, force, loaded));
@@ -149,9 +149,9 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   const Eigen::Index modes = loaded.model->modes();
   State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
   prepare_contacts(*loaded.model, config.obstacles.size(), state);
-  if (loaded.model->carried) place_on_carrier(*loaded.model, loaded.scene, state);
-  if (!state.body) return state;
-  FreeMotion motion;
+  Workspace workspace(*loaded.model, loaded.scene);
+  follow_frame(*loaded.model, loaded.scene, state, workspace);
+  FrameMotion motion;
   motion.position = config.body.position.value_or(motion.position);
   motion.orientation = config.body.orientation.value_or(motion.orientation);
   motion.linear_velocity = config.body.linear_velocity.value_or(motion.linear_velocity);
@@ -259,10 +259,8 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   } else {
     plan.push_back(fmt::format("scripted forces: {}", scene.forces.size()));
   }
-  if (model.rigid)
-    plan.push_back("rigid motion: momenta, rotation by the spin that keeps the angular momentum");
-  else if (model.carried)
-    plan.push_back("rigid motion: prescribed, with the inertial forces that it causes");
+  if (model.frame->moves())
+    plan.push_back(fmt::format("rigid motion: {}", model.frame->description()));
   else
     left_out("rigid motion", "the body is constrained");
   if (touches(model, scene))

@@ -17,7 +17,7 @@ std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, con
     const ExampleModel& examples = loaded.model->examples[i];
     if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
   }
-  return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, info);
+  return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, *loaded.model->frame, info);
 }
 
 void add_reports(std::span<const StepReport> reports, double seconds, RunSummary& summary) {
@@ -73,7 +73,7 @@ RunSummary run(const LoadedScene& loaded, const SceneConfig& config, bool profil
   const State& shown = bodies[0];
   RunSummary summary = empty_summary(config.steps, bodies, profiled);
   const auto trajectory = open_trajectory(loaded, config);
-  if (trajectory) trajectory->append(shown, energies(loaded.scene, shown), 0);
+  if (trajectory) trajectory->append(shown, energies(*loaded.model, loaded.scene, shown), 0);
 
   Progress progress("steps", config.steps);
   while (shown.step < config.steps) {
@@ -85,7 +85,7 @@ RunSummary run(const LoadedScene& loaded, const SceneConfig& config, bool profil
     Profile output;
     if (trajectory && shown.step % config.every == 0) {
       const StageTimer stage(profiled ? &output : nullptr, Stage::kOutput);
-      trajectory->append(shown, energies(loaded.scene, shown), seconds / bodies.count());
+      trajectory->append(shown, energies(*loaded.model, loaded.scene, shown), seconds / bodies.count());
     }
     if (profiled) add_profile(bodies.take_measured().profile, output, bodies.count(), *summary.stage_seconds);
     progress.advance();
@@ -95,7 +95,7 @@ RunSummary run(const LoadedScene& loaded, const SceneConfig& config, bool profil
     summary.largest_displacement = trajectory->largest_displacement();
   }
   summary.simulated_seconds = shown.time;
-  summary.energies = energies(loaded.scene, shown);
+  summary.energies = energies(*loaded.model, loaded.scene, shown);
   summary.state_hash = bodies.hash();
   return summary;
 }

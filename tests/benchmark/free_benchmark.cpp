@@ -35,7 +35,7 @@ void time_flight(::benchmark::State& state, int modes, int elements) {
   runtime::StepScene scene = swing(*model, Target::kTable);
   scene.gravity = Eigen::Vector3d(0, -3, 0);
   runtime::State start = make_state(*model);
-  runtime::FreeMotion motion;
+  runtime::FrameMotion motion;
   motion.angular_velocity = kSpin * Eigen::Vector3d(0.3, 0.9, 0.2).normalized();
   set_motion(*model, motion, start);
   time_steps(state, *model, scene, start);

@@ -9,6 +9,7 @@
 #include "common/core/timer.h"
 #include "precompute/full_space/scene_setup.h"
 #include "precompute/study/baseline/surface_targets.h"
+#include "runtime/output/world_vertices.h"
 #include "runtime/scene/bodies.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/samples.h"
@@ -88,38 +89,11 @@ Eigen::VectorXd start_of(const SceneConfig& config, const ReducedModel& data, bo
 
 }  // namespace
 
-VertexArray world_positions(const ReducedModel& data, const runtime::State& state) {
-  VertexArray positions = data.object->mesh.vertices + field(data, state.q);
-  if (state.body) {
-    const Eigen::RowVector3d centre = data.rigid->centre_of_mass.transpose();
-    positions = (positions.rowwise() - centre) * state.body->orientation.toRotationMatrix().transpose();
-    positions.rowwise() += centre + state.body->position.transpose();
-  }
-  if (state.carried)
-    for (auto x : positions.rowwise()) x = state.carried->frame.to_world(x.transpose()).transpose();
-  return positions;
-}
-
-VertexArray world_velocities(const ReducedModel& data, const runtime::State& state) {
-  VertexArray velocities = field(data, state.v);
-  if (!state.body && !state.carried) return velocities;
-  const VertexArray positions = world_positions(data, state);
-  if (state.carried) {
-    const auto& frame = state.carried->frame;
-    for (Eigen::Index i = 0; i < positions.rows(); ++i) {
-      const Eigen::Vector3d own = frame.rotation * velocities.row(i).transpose();
-      velocities.row(i) = frame.velocity_at(positions.row(i).transpose()) + own;
-    }
-    return velocities;
-  }
-  const runtime::FreeMotion motion = runtime::motion_of(*state.body);
-  const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix();
-  const Eigen::Vector3d centre = data.rigid->centre_of_mass + state.body->position;
-  for (Eigen::Index i = 0; i < positions.rows(); ++i) {
-    const Eigen::Vector3d arm = positions.row(i).transpose() - centre, own = rotation * velocities.row(i).transpose();
-    velocities.row(i) = motion.linear_velocity + motion.angular_velocity.cross(arm) + own;
-  }
-  return velocities;
+WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state) {
+  WorldFrame found{data.object->mesh.vertices + field(data, state.q), field(data, state.v)};
+  if (frame.moves())
+    runtime::to_world(frame.placement(state.frame), frame.velocity(state.frame), found.positions, found.velocities);
+  return found;
 }
 
 std::string target_of(const runtime::LoadedScene& loaded) {
@@ -140,10 +114,11 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
   result.frames = run(
       config.time_step, times, [&] { return runtime::step(*loaded.model, loaded.scene, state, workspace); },
       [&](BodyFrames& frames) {
-        frames.positions.push_back(world_positions(loaded.data, state));
-        frames.velocities.push_back(world_velocities(loaded.data, state));
+        WorldFrame now = world_frame(loaded.data, *loaded.model->frame, state);
+        frames.positions.push_back(std::move(now.positions));
+        frames.velocities.push_back(std::move(now.velocities));
       },
-      [&] { return runtime::energies(loaded.scene, state); });
+      [&] { return runtime::energies(*loaded.model, loaded.scene, state); });
   return result;
 }
 

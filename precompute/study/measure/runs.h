@@ -12,10 +12,13 @@
 
 namespace exmat::precompute {
 
-/// [n x 3] world positions and velocities of the reduced body of a bundle in a state; `data` with /object, /modal and,
-/// where it moves, /rigid.
-VertexArray world_positions(const ReducedModel& data, const runtime::State& state);
-VertexArray world_velocities(const ReducedModel& data, const runtime::State& state);
+/// [n x 3] each, world [m], [m/s].
+struct WorldFrame {
+  VertexArray positions, velocities;
+};
+
+/// Of the reduced body of a bundle in a state of its frame; `data` with /object and /modal.
+WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state);
 
 /// What came of a reduced run.
 struct ReducedRun {

@@ -53,13 +53,14 @@ class Run {
   }
   double kinetic() const;
   auto moments() const {
-    auto moments = model_.rigid->make_moments();
-    model_.rigid->moments(state_.q, moments);
+    const runtime::DeformingInertia inertia(*body_.reduced.rigid);
+    auto moments = inertia.make_moments();
+    inertia.moments(state_.q, moments);
     return moments;
   }
   Eigen::Vector3d angular_momentum() const;
   double rotation_energy() const;
-  double mechanical() const { return runtime::energies(scene_, state_).total(); }
+  double mechanical() const { return runtime::energies(model_, scene_, state_).total(); }
   double inverse_norm(const Eigen::VectorXd& force) const {
     return std::sqrt(std::max(0.0, force.dot(body_.rest_stiffness.llt().solve(force))));
   }
@@ -131,9 +132,9 @@ void Run::add_tip_load() {
   load.mean_basis.setZero(3, rows.cols());
   for (Eigen::Index v = 0; v < rows.rows() / 3; ++v) load.mean_basis += rows.middleRows<3>(3 * v) / count;
   const VertexArray& X = body_.reduced.object->mesh.vertices;
-  if (model_.rigid)
+  if (test_.body.free)
     load.lever = Eigen::Vector3d(X.col(0).maxCoeff(), 0.5 * X.col(1).maxCoeff(), 0.5 * X.col(2).maxCoeff()) -
-                 model_.rigid->centre_of_mass();
+                 model_.frame->centre_of_mass();
   scene_.forces.push_back(load);
 }
 
@@ -167,7 +168,7 @@ Eigen::VectorXd Run::start_pose() const {
   }
   VertexArray field = body_.reduced.object->mesh.vertices;
   const Eigen::RowVector3d middle = 0.5 * field.colwise().maxCoeff();
-  field.rowwise() -= Eigen::RowVector3d(model_.rigid ? middle[0] : 0, middle[1], middle[2]);
+  field.rowwise() -= Eigen::RowVector3d(test_.body.free ? middle[0] : 0, middle[1], middle[2]);
   if (test_.start != Start::kCollapsed) field.rightCols<2>().setZero();
   const double factor = test_.start == Start::kInverted ? -2 : -1;
   const Eigen::VectorXd flat = field.reshaped<Eigen::RowMajor>();
@@ -184,8 +185,8 @@ void Run::make_start() {
   }
   state_ = runtime::make_state(model_, q, v);
   runtime::prepare_contacts(model_, scene_.obstacles.size(), state_);
-  if (state_.body) {
-    runtime::FreeMotion motion;
+  if (test_.body.free) {
+    runtime::FrameMotion motion;
     motion.linear_velocity = Eigen::Vector3d(0, 0, -test_.velocity);
     const Eigen::Vector3d inclined(0.5, std::sqrt(0.5), 0.5);
     motion.angular_velocity = test_.spin * (test_.principal_axis ? Eigen::Vector3d::UnitZ() : inclined);
@@ -201,7 +202,7 @@ void Run::make_start() {
   }
   start_displacement_ = largest(q);
   start_energy_ = mechanical();
-  start_potential_ = runtime::energies(scene_, state_).potential;
+  start_potential_ = runtime::energies(model_, scene_, state_).potential;
   peak_kinetic_ = kinetic();
 }
 
@@ -221,22 +222,23 @@ void Run::plan_steps(int most_steps) {
 
 // Of what comes to rest: the deformation, and all of a body that may touch the ground.
 double Run::kinetic() const {
-  if (test_.ground != Ground::kNone) return runtime::energies(scene_, state_).kinetic;
+  if (test_.ground != Ground::kNone) return runtime::energies(model_, scene_, state_).kinetic;
   return 0.5 * state_.v.squaredNorm();
 }
 
 /// What the start and the loads can do in linear elasticity: a body of the energy W deflects to |q|_K = sqrt(2 W), a
 /// load that sets in at once to 2 |f|_(K^-1), and |u| <= reach |q|_K.
 double Run::linear_displacement() const {
-  const runtime::Energies energies = runtime::energies(scene_, state_);
+  const runtime::Energies energies = runtime::energies(model_, scene_, state_);
   double energy = energies.elastic + energies.kinetic;
   double norm = 2 * inverse_norm(scene_.gravity_force);
-  if (state_.body && test_.ground == Ground::kNone)
-    energy -= 0.5 * state_.body->linear_momentum.squaredNorm() / state_.body->mass;
-  if (state_.body && test_.ground != Ground::kNone) energy += state_.body->mass * test_.gravity * body_.size;
+  if (test_.body.free && test_.ground == Ground::kNone)
+    energy -= 0.5 * runtime::free_state(state_).linear_momentum.squaredNorm() / runtime::free_state(state_).mass;
+  if (test_.body.free && test_.ground != Ground::kNone)
+    energy += runtime::free_state(state_).mass * test_.gravity * body_.size;
   for (const runtime::ScriptedForce& load : scene_.forces) norm += 2 * inverse_norm(load.force);
   const double elastic = body_.reach * (norm + std::sqrt(2 * energy));
-  if (state_.body) return elastic;
+  if (test_.body.free) return elastic;
   // Nor does it move farther than if nothing held it.
   const double time = static_cast<double>(steps_) * test_.time_step;
   Eigen::VectorXd force = scene_.gravity_force;
@@ -252,7 +254,7 @@ bool Run::small(double sizes) const {
 // Whether the energy that energies() adds up may not grow but by the work of the tip's load: obstacles that stand
 // still store some of it.
 bool Run::conservative() const {
-  return scene_.examples.empty() && test_.ground != Ground::kPress && !(state_.body && !scene_.forces.empty());
+  return scene_.examples.empty() && test_.ground != Ground::kPress && !(test_.body.free && !scene_.forces.empty());
 }
 
 void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before) {
@@ -266,11 +268,11 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
   result_.target_steps += (report.status & runtime::kTargetNotConverged) != 0 ? 1 : 0;
   result_.largest_displacement = std::max(result_.largest_displacement, largest(state_.q) / body_.size);
   peak_kinetic_ = std::max(peak_kinetic_, kinetic());
-  if (state_.body && !scene_.forces.empty()) peak_rotation_ = std::max(peak_rotation_, rotation_energy());
+  if (test_.body.free && !scene_.forces.empty()) peak_rotation_ = std::max(peak_rotation_, rotation_energy());
   const double midpoint = state_.time - 0.5 * test_.time_step;
   for (const runtime::ScriptedForce& load : scene_.forces)
     if (midpoint < load.end) work_ += load.force.dot(state_.q - before);
-  const runtime::Energies energies = runtime::energies(scene_, state_);
+  const runtime::Energies energies = runtime::energies(model_, scene_, state_);
   gain_ = std::max(gain_, mechanical() - work_ - start_energy_);
   exchanged_ = std::max({exchanged_, energies.kinetic + energies.elastic,
                          std::abs(energies.potential - start_potential_), std::abs(work_)});
@@ -281,16 +283,20 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
 // Of the motion itself, not the state's variable.
 Eigen::Vector3d Run::angular_momentum() const {
   const auto now = moments();
-  return state_.body->orientation * (now.inertia * state_.body->spin + now.deformation.transpose() * state_.v);
+  const runtime::FreeState& body = runtime::free_state(state_);
+  return body.orientation * (now.inertia * body.spin + now.deformation.transpose() * state_.v);
 }
 
 // Of a free body as a rigid one.
-double Run::rotation_energy() const { return 0.5 * state_.body->spin.dot(moments().inertia * state_.body->spin); }
+double Run::rotation_energy() const {
+  const Eigen::Vector3d& spin = runtime::free_state(state_).spin;
+  return 0.5 * spin.dot(moments().inertia * spin);
+}
 
 void Run::step_all() {
   runtime::Workspace workspace(model_, scene_);
   result_.largest_displacement = start_displacement_ / body_.size;
-  exchanged_ = runtime::energies(scene_, state_).kinetic + state_.elastic_energy;
+  exchanged_ = runtime::energies(model_, scene_, state_).kinetic + state_.elastic_energy;
   Eigen::VectorXd before;
   const Timer timer;
   for (; result_.steps < steps_; ++result_.steps) {

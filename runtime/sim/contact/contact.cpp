@@ -131,7 +131,7 @@ Eigen::Vector3d ContactSet::world_arm(int vertex, const BodyPose& pose) const no
 Eigen::Vector3d ContactSet::world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
                                            const BodyVelocity& velocity) const noexcept {
   const Eigen::Vector3d own = basis_.middleRows<3>(3 * vertex).lazyProduct(velocity.v);
-  return velocity.linear + velocity.angular.cross(arm) + pose.rotation * own;
+  return velocity.at(arm) + pose.rotation * own;
 }
 
 void ContactSet::test_vertices(const Node& node, const BodyPose& pose, double margin,

@@ -6,22 +6,18 @@
 
 #include "common/model/reduced_model.h"
 #include "runtime/sim/contact/contact_law.h"
+#include "runtime/sim/frame/placement.h"
 
 namespace exmat::runtime {
 
-/// Where a body is: x = position + rotation (X + U q). X are rest positions about `position` at rest: about the centre
-/// of mass for a free body; for a constrained one in the world, so that the identity leaves it where it was meshed.
-struct BodyPose {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< world [m]
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< body to world
-  const Eigen::VectorXd& q;                                ///< [r]
+/// Where a body is: x = position + rotation (X + U q), rest positions X about the frame's origin.
+struct BodyPose : Placement {
+  const Eigen::VectorXd& q;  ///< [r]
 };
 
 /// How it moves: the velocity at x is linear + angular x (x - position) + rotation U v.
-struct BodyVelocity {
-  Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< world [m/s]
-  Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< world [rad/s]
-  const Eigen::VectorXd& v;                           ///< [r]
+struct BodyVelocity : FrameVelocity {
+  const Eigen::VectorXd& v;  ///< [r]
 };
 
 class ContactSet;
@@ -56,7 +52,7 @@ struct ContactWorkspace {
 class ContactSet {
  public:
   ContactSet() = default;
-  /// `origin` [m], world: what rest positions are about; the centre of mass at rest of a free body, else 0.
+  /// `origin` [m], world: what rest positions are about, BodyFrame::origin().
   explicit ContactSet(const ContactData& data, const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
 
   Eigen::Index vertices() const noexcept { return areas_.size(); }

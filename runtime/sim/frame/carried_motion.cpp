@@ -12,7 +12,7 @@ Eigen::Vector3d acceleration_at(const MotionSample& frame, const Eigen::Vector3d
 
 }  // namespace
 
-CarriedWorkspace::CarriedWorkspace(const CarriedFrame& carried)
+CarriedWorkspace::CarriedWorkspace(const CarriedInertia& carried)
     : moments(carried.moments.make_moments()),
       scratch(3 * padded(carried.moments.modes())),
       force(Eigen::VectorXd::Zero(carried.moments.modes())),
@@ -26,7 +26,7 @@ void set_frame(const MotionSample& frame, CarriedWorkspace& workspace) noexcept 
   workspace.spin_rate = frame.rotation.transpose() * frame.angular_acceleration;
 }
 
-void add_carried_load(const CarriedFrame& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
+void add_carried_load(const CarriedInertia& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
                       const CarriedWorkspace& workspace, Eigen::VectorXd& force) noexcept {
   const MotionSample& frame = workspace.frame;
   const Eigen::Vector3d felt = gravity - acceleration_at(frame, carried.moments.centre_of_mass());
@@ -34,8 +34,8 @@ void add_carried_load(const CarriedFrame& carried, const RowMatrix& gravity_load
   force.noalias() -= carried.spin_load.transpose() * workspace.spin_rate;
 }
 
-void carried_force(const CarriedFrame& carried, const Eigen::VectorXd& q, CarriedWorkspace& workspace) noexcept {
-  const RigidFrame& frame = carried.moments;
+void carried_force(const CarriedInertia& carried, const Eigen::VectorXd& q, CarriedWorkspace& workspace) noexcept {
+  const DeformingInertia& frame = carried.moments;
   frame.moments(q, workspace.moments);
   frame.centrifugal_force(workspace.moments, workspace.spin, workspace.force);
   frame.gyroscopic_product(workspace.spin, workspace.velocity, workspace.scratch, workspace.product);
@@ -43,18 +43,18 @@ void carried_force(const CarriedFrame& carried, const Eigen::VectorXd& q, Carrie
   workspace.force += 2 * workspace.product - workspace.moments.deformation.lazyProduct(workspace.spin_rate);
 }
 
-void set_gyroscopic(const CarriedFrame& carried, double velocity_factor, CarriedWorkspace& workspace) noexcept {
+void set_gyroscopic(const CarriedInertia& carried, double velocity_factor, CarriedWorkspace& workspace) noexcept {
   workspace.gyroscopic.setZero();
   carried.moments.add_gyroscopic(2 * velocity_factor * workspace.spin + workspace.spin_rate, -1, workspace.gyroscopic);
 }
 
-void gyroscopic_product(const CarriedFrame& carried, double velocity_factor, const Eigen::VectorXd& x,
+void gyroscopic_product(const CarriedInertia& carried, double velocity_factor, const Eigen::VectorXd& x,
                         CarriedWorkspace& workspace) noexcept {
   const Eigen::Vector3d turn = -2 * velocity_factor * workspace.spin - workspace.spin_rate;
   carried.moments.gyroscopic_product(turn, x, workspace.scratch, workspace.product);
 }
 
-CarriedState carried_state(const CarriedFrame& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
+CarriedState carried_state(const CarriedInertia& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
                            const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                            const CarriedWorkspace& workspace) noexcept {
   const MotionSample& frame = workspace.frame;

@@ -3,8 +3,8 @@
 #include <Eigen/Core>
 
 #include "common/model/reduced_model.h"
+#include "runtime/sim/frame/deforming_inertia.h"
 #include "runtime/sim/frame/motion.h"
-#include "runtime/sim/frame/rigid_frame.h"
 
 namespace exmat::runtime {
 
@@ -13,8 +13,8 @@ namespace exmat::runtime {
 /// mass c at rest and a_c the acceleration that the motion gives c,
 ///   qddot = 2 W qdot + W' q + d/dq (1/2 w^T J w) - (sum m X x U)^T w' + U^T M R^T (g - a_c) - f_int + ...,
 /// which are method.md's equations of a free body (section 6) with w given. r modes. No call allocates or throws.
-struct CarriedFrame {
-  RigidFrame moments;
+struct CarriedInertia {
+  DeformingInertia moments;
   Eigen::Matrix3Xd spin_load;  ///< 3 x r, sum m X x U about the centre of mass
 };
 
@@ -27,11 +27,11 @@ struct CarriedState {
 
 struct CarriedWorkspace {
   CarriedWorkspace() = default;
-  explicit CarriedWorkspace(const CarriedFrame& carried);
+  explicit CarriedWorkspace(const CarriedInertia& carried);
 
   MotionSample frame;                                                                   ///< at the end of the step
   Eigen::Vector3d spin = Eigen::Vector3d::Zero(), spin_rate = Eigen::Vector3d::Zero();  ///< moving frame
-  RigidFrame::Moments moments;
+  DeformingInertia::Moments moments;
   AlignedArray scratch;
   Eigen::VectorXd force, product, velocity;  ///< r, product padded(r)
   Eigen::MatrixXd gyroscopic;                ///< r x r
@@ -41,22 +41,22 @@ struct CarriedWorkspace {
 void set_frame(const MotionSample& frame, CarriedWorkspace& workspace) noexcept;
 
 /// Adds the part of the inertial force that depends on the frame alone, and gravity [m/s^2], to `force` [r].
-void add_carried_load(const CarriedFrame& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
+void add_carried_load(const CarriedInertia& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
                       const CarriedWorkspace& workspace, Eigen::VectorXd& force) noexcept;
 
 /// workspace.force = 2 W v + W' q + d/dq (1/2 w^T J w) at q and the velocity in workspace.velocity.
-void carried_force(const CarriedFrame& carried, const Eigen::VectorXd& q, CarriedWorkspace& workspace) noexcept;
+void carried_force(const CarriedInertia& carried, const Eigen::VectorXd& q, CarriedWorkspace& workspace) noexcept;
 
 /// -(2 c_v W + W') into workspace.gyroscopic: the derivative of -force for v = c_v (q - q_v), but for the centrifugal
 /// part.
-void set_gyroscopic(const CarriedFrame& carried, double velocity_factor, CarriedWorkspace& workspace) noexcept;
+void set_gyroscopic(const CarriedInertia& carried, double velocity_factor, CarriedWorkspace& workspace) noexcept;
 
 /// The product of that matrix with `x` [r] into workspace.product, without the matrix.
-void gyroscopic_product(const CarriedFrame& carried, double velocity_factor, const Eigen::VectorXd& x,
+void gyroscopic_product(const CarriedInertia& carried, double velocity_factor, const Eigen::VectorXd& x,
                         CarriedWorkspace& workspace) noexcept;
 
 /// Energies at the end of a step, after carried_force(): frame of the workspace.
-CarriedState carried_state(const CarriedFrame& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
+CarriedState carried_state(const CarriedInertia& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
                            const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                            const CarriedWorkspace& workspace) noexcept;
 

@@ -20,7 +20,7 @@ class ContactProblem {
   static constexpr bool kSeeksLowest = true;
 
   /// `potential` after start() and prepare(); candidates gathered and frozen in workspace.near.
-  ContactProblem(const Model& model, const StepScene& scene, const State& state, IncrementalPotential& potential,
+  ContactProblem(const Model& model, const State& state, IncrementalPotential& potential,
                  Workspace& workspace) noexcept;
 
   PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
@@ -34,22 +34,16 @@ class ContactProblem {
   BodyPose place(const Eigen::VectorXd& x) noexcept;
 
  private:
-  double add_rigid_terms(const Eigen::VectorXd& x, Eigen::VectorXd* gradient) noexcept;
   void assemble_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;
   PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& inner,
                              Eigen::VectorXd& gradient) noexcept;
 
   const Model& model_;
-  const StepScene& scene_;
+  const BodyFrame& frame_;
   const State& state_;
   IncrementalPotential& potential_;
   Workspace& workspace_;
   ContactProblemWorkspace& near_;
-  Eigen::Index rigid_;  // 6 or 0
-  Eigen::Matrix3d start_rotation_ = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d start_inertia_ = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d expected_turn_ = Eigen::Vector3d::Zero();  // t of free flight at the first pose
-  Eigen::Vector3d frozen_turn_ = Eigen::Vector3d::Zero(), next_frozen_turn_ = Eigen::Vector3d::Zero();
 };
 
 }  // namespace exmat::runtime

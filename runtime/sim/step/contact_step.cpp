@@ -1,44 +1,11 @@
 #include "runtime/sim/step/contact_step.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 
 namespace exmat::runtime {
 namespace {
 
-BodyPose pose_of(const Model& model, const State& state) {
-  BodyPose pose{.q = state.q};
-  if (state.carried) {
-    pose.position = state.carried->frame.position;
-    pose.rotation = state.carried->frame.rotation;
-  }
-  if (!state.body) return pose;
-  pose.position = model.rigid->centre_of_mass() + state.body->position;
-  pose.rotation = state.body->orientation.toRotationMatrix();
-  return pose;
-}
-
-/// Pose and momenta of the solution x of a ContactProblem, into the workspace. Momenta come from the forces of the
-/// contacts, or, where these are not balanced for want of convergence, from the way that the body went.
-void take_contact_solution(const StepScene& scene, const State& state, bool converged, Workspace& workspace) {
-  ContactProblemWorkspace& near = *workspace.near;
-  workspace.q = state.q + near.x.tail(state.q.size());
-  if (!state.body) return;
-  FreeState& body = *workspace.body;
-  FreeMotionWorkspace& free = *workspace.free;
-  body.position += near.x.head<3>();
-  const Eigen::Matrix3d rotation = state.body->orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
-  const Eigen::Vector3d deformation = free.moments.deformation.transpose() * free.velocity;
-  if (converged) {
-    body.angular_momentum += scene.time_step * near.contact.torque;
-    free.solution.spin = free.moments.inertia.inverse() * (rotation.transpose() * body.angular_momentum - deformation);
-  } else {
-    near.contact.force = body.mass / (scene.time_step * scene.time_step) * near.x.head<3>();
-    free.solution.spin = free.solution.rotation / scene.time_step;
-    body.angular_momentum = rotation * (free.moments.inertia * free.solution.spin + deformation);
-  }
-  body.linear_momentum += scene.time_step * near.contact.force;
-}
+BodyPose pose_of(const Model& model, const State& state) { return {model.frame->placement(state.frame), state.q}; }
 
 void add(const NewtonReport& more, NewtonReport& total) {
   total.status = more.status;
@@ -55,22 +22,11 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
   if (!touches(model, scene)) return false;
   const StageTimer timer(workspace.profile, Stage::kContact);
   const BodyPose pose = pose_of(model, state);
-  BodyVelocity velocity{.v = state.v};
-  if (state.body) {
-    velocity.linear = state.body->linear_momentum / state.body->mass;
-    velocity.angular = pose.rotation * state.body->spin;
-  }
-  if (state.carried) {
-    velocity.linear = state.carried->frame.linear_velocity;
-    velocity.angular = state.carried->frame.angular_velocity;
-  }
+  const BodyVelocity velocity{model.frame->velocity(state.frame), state.v};
+  const BodyVelocity expected{model.frame->expected_velocity(state.frame, workspace.frame), state.v};
   const ContactSet& set = *model.contact;
   const double dt = scene.time_step;
-  double travel = set.travel_bound(pose, velocity, dt);
-  if (state.carried) {
-    const MotionSample& end = workspace.carried->frame;
-    travel = std::max(travel, set.travel_bound(pose, {end.linear_velocity, end.angular_velocity, state.v}, dt));
-  }
+  const double travel = std::max(set.travel_bound(pose, velocity, dt), set.travel_bound(pose, expected, dt));
   const double margin = kContactMarginSteps * travel + dt * dt * scene.gravity.norm();
   ContactWorkspace& contact = workspace.near->contact;
   set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
@@ -84,13 +40,9 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
   ContactProblemWorkspace& near = *workspace.near;
   near.x.setZero();
   near.x.tail(state.q.size()) = workspace.q - state.q;
-  if (state.body) {
-    workspace.free->spin_is_given = true;
-    near.x.segment<3>(3) = workspace.free->solution.rotation;
-    model.rigid->moments(workspace.q, workspace.free->moments);
-  }
+  model.frame->begin_contact(state.frame, workspace.q, scene.time_step, workspace.frame, near.x);
   near.newton.profile = workspace.profile;
-  ContactProblem problem(model, scene, state, potential, workspace);
+  ContactProblem problem(model, state, potential, workspace);
   NewtonReport total;
   for (int round = 0; round < kFrictionRounds; ++round) {
     if (round > 0) {
@@ -101,7 +53,9 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
   }
-  take_contact_solution(scene, state, total.status == NewtonStatus::kConverged, workspace);
+  workspace.q = state.q + near.x.tail(state.q.size());
+  model.frame->end_contact(near.x, total.status == NewtonStatus::kConverged, near.contact.torque, state.frame,
+                           workspace.frame, near.contact.force);
   return total;
 }
 

@@ -25,8 +25,7 @@ IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& 
       state_(state),
       workspace_(workspace),
       skew_(has_skew_forces(model, scene)),
-      rotates_(state.body.has_value()),
-      carried_(model.carried.has_value()) {}
+      frame_forces_(model.frame->exerts_forces()) {}
 
 double IncrementalPotential::internal_flops(bool stiffness) const noexcept {
   return model_.internal_force.force_flops() + (stiffness ? model_.internal_force.stiffness_flops() : 0);
@@ -151,50 +150,29 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
   return evaluation;
 }
 
-/// Of q, into next_frozen_force. False where the rotation has no solution.
+/// Of q, into next_frozen_force. False where the frame has no motion for it.
 bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
   workspace_.next_frozen_force.setZero();
   for (std::size_t i = 0; skew_ && i < scene_.examples.size(); ++i)
     if (acts(scene_.examples[i]))
       workspace_.next_frozen_force.noalias() +=
           workspace_.examples[i].force.stiffness * (model_.examples[i].filter.skew_part() * workspace_.offset);
-  if (carried_) {
-    workspace_.carried->velocity = workspace_.form.velocity_factor * (q - workspace_.form.velocity_centre);
-    carried_force(*model_.carried, q, *workspace_.carried);
-    workspace_.next_frozen_force -= workspace_.carried->force;
-  }
-  if (!rotates_) return true;
-  FreeMotionWorkspace& free = *workspace_.free;
+  if (!frame_forces_) return true;
   const StepForm& form = workspace_.form;
-  free.velocity = form.velocity_factor * (q - form.velocity_centre);
-  const bool found = update_spin(*model_.rigid, q, free);
-  rotation_force(*model_.rigid, form.velocity_factor, free);
-  workspace_.next_frozen_force -= free.force;
+  const bool found = model_.frame->update_force(q, form.velocity_factor, form.velocity_centre, workspace_.frame);
+  workspace_.next_frozen_force -= *model_.frame->force(workspace_.frame);
   return found;
 }
 
-/// The antisymmetric part of the rotation, where it is not small beside c_a.
+/// The antisymmetric part of the frame's forces, where it is not small beside c_a.
 const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
-  if (gyroscopic_ratio() <= kSmallRatio) return nullptr;
   const double factor = workspace_.form.velocity_factor;
-  if (carried_) {
-    set_gyroscopic(*model_.carried, factor, *workspace_.carried);
-    return &workspace_.carried->gyroscopic;
-  }
-  set_gyroscopic(*model_.rigid, factor, *workspace_.free);
-  return &workspace_.free->gyroscopic;
-}
-
-/// About what the antisymmetric part is of inertia.
-double IncrementalPotential::gyroscopic_ratio() const noexcept {
-  const double factor = workspace_.form.velocity_factor;
-  if (rotates_) return 2 * workspace_.free->solution.spin.norm() / factor;
-  if (!carried_) return 0;
-  return (2 * workspace_.carried->spin.norm() + workspace_.carried->spin_rate.norm() / factor) / factor;
+  if (model_.frame->gyroscopic_ratio(factor, workspace_.frame) <= kSmallRatio) return nullptr;
+  return model_.frame->gyroscopic(factor, workspace_.frame);
 }
 
 int IncrementalPotential::gyroscopic_terms() const noexcept {
-  const double ratio = gyroscopic_ratio();
+  const double ratio = model_.frame->gyroscopic_ratio(workspace_.form.velocity_factor, workspace_.frame);
   if (!(ratio <= kSmallRatio)) return 0;  // since the factorisation it has grown beyond what the series is for
   double error = ratio;
   int terms = 0;
@@ -203,13 +181,7 @@ int IncrementalPotential::gyroscopic_terms() const noexcept {
 }
 
 const Eigen::VectorXd& IncrementalPotential::gyroscopic_product(const Eigen::VectorXd& x) const noexcept {
-  const double factor = workspace_.form.velocity_factor;
-  if (carried_) {
-    runtime::gyroscopic_product(*model_.carried, factor, x, *workspace_.carried);
-    return workspace_.carried->product;
-  }
-  runtime::gyroscopic_product(*model_.rigid, factor, x, *workspace_.free);
-  return workspace_.free->product;
+  return *model_.frame->gyroscopic_product(workspace_.form.velocity_factor, x, workspace_.frame);
 }
 
 /// Of offset and its product with A.
@@ -223,9 +195,7 @@ PotentialValue IncrementalPotential::quadratic(double elastic_energy) noexcept {
 
 void IncrementalPotential::add_quadratic(Eigen::MatrixXd& hessian) const noexcept {
   hessian.triangularView<Eigen::Lower>() += workspace_.quadratic.topRows(hessian.rows());
-  const double factor = workspace_.form.velocity_factor;
-  if (rotates_) add_rotation_stiffness(*model_.rigid, factor, *workspace_.free, hessian);
-  if (carried_) model_.carried->moments.add_softening(workspace_.carried->spin, factor, hessian);
+  model_.frame->add_stiffness(workspace_.form.velocity_factor, workspace_.frame, hessian);
 }
 
 }  // namespace exmat::runtime

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "runtime/sim/solver/newton.h"
+#include "runtime/sim/step/state.h"
 #include "runtime/sim/step/workspace.h"
 
 namespace exmat::runtime {
@@ -12,7 +13,7 @@ namespace exmat::runtime {
 ///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa P_s p* . q,
 /// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
 /// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
-/// the skew part of P_s and those of a rotation (free_motion.h, carried_motion.h): in values they are those of the
+/// the skew part of P_s and those of the frame (BodyFrame::force()): in values they are those of the
 /// iterate last accepted, so that the gradient is exact. reduction.md, "Integration"; ExampleForce. Reads form and
 /// external_force of the workspace.
 class IncrementalPotential {
@@ -48,8 +49,7 @@ class IncrementalPotential {
   PotentialValue quadratic(double elastic_energy) noexcept;
   void add_example_forces() noexcept;
   void add_quadratic(Eigen::MatrixXd& hessian) const noexcept;
-  double gyroscopic_ratio() const noexcept;
-  bool has_frozen_force() const noexcept { return skew_ || rotates_ || carried_; }
+  bool has_frozen_force() const noexcept { return skew_ || frame_forces_; }
   double internal_flops(bool stiffness) const noexcept;
 
   const Model& model_;
@@ -57,8 +57,7 @@ class IncrementalPotential {
   const State& state_;
   Workspace& workspace_;
   bool skew_;
-  bool rotates_;
-  bool carried_;
+  bool frame_forces_;
   bool at_first_iterate_ = true;
   double elastic_energy_ = 0;
   double force_rounding_ = 0;  // of internal forces over |q|

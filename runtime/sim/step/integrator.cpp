@@ -2,27 +2,28 @@
 
 namespace exmat::runtime {
 
-void backward_euler_form(const State& state, double time_step, StepForm& form) noexcept {
+void backward_euler_form(const StepHistory& history, double time_step, StepForm& form) noexcept {
   form.velocity_factor = 1 / time_step;
   form.acceleration_factor = 1 / (time_step * time_step);
-  form.velocity_centre = state.q;
-  form.acceleration_centre = state.q + time_step * state.momentum();
+  form.velocity_centre = history.q;
+  form.acceleration_centre = history.q + time_step * history.momentum;
 }
 
-void bdf2_form(const State& state, double time_step, StepForm& form) noexcept {
+void bdf2_form(const StepHistory& history, double time_step, StepForm& form) noexcept {
   const double h = 2 * time_step / 3;
   form.velocity_factor = 1 / h;
   form.acceleration_factor = 1 / (h * h);
-  form.velocity_centre = (4 * state.q - state.q_previous) / 3;
-  form.acceleration_centre = form.velocity_centre + h / 3 * (4 * state.momentum() - state.momentum_previous());
+  form.velocity_centre = (4 * history.q - history.q_previous) / 3;
+  form.acceleration_centre = form.velocity_centre + h / 3 * (4 * history.momentum - history.momentum_previous);
 }
 
-void newmark_form(const State& state, const Eigen::VectorXd& acceleration, double time_step, StepForm& form) noexcept {
+void newmark_form(const StepHistory& history, const Eigen::VectorXd& acceleration, double time_step,
+                  StepForm& form) noexcept {
   form.velocity_factor = 2 / time_step;
   form.acceleration_factor = 4 / (time_step * time_step);
-  form.velocity_centre = state.q + time_step / 2 * state.v;
+  form.velocity_centre = history.q + time_step / 2 * history.v;
   form.acceleration_centre =
-      form.velocity_centre + time_step / 2 * state.momentum() + time_step * time_step / 4 * acceleration;
+      form.velocity_centre + time_step / 2 * history.momentum + time_step * time_step / 4 * acceleration;
 }
 
 }  // namespace exmat::runtime

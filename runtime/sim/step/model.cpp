@@ -70,13 +70,8 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   model->gravity_load = reduced.modal->gravity_load;
   if (options.carried && !(reduced.rigid && reduced.rigid->spin_load.size() > 0))
     return {nullptr, missing_group("/rigid/spin_load")};
-  if (options.carried)
-    model->carried = CarriedFrame{RigidFrame(*reduced.rigid), reduced.rigid->spin_load};
-  else if (reduced.rigid)
-    model->rigid.emplace(*reduced.rigid);
-  if (reduced.contact)
-    model->contact.emplace(*reduced.contact,
-                           model->rigid ? reduced.rigid->centre_of_mass : Eigen::Vector3d::Zero().eval());
+  model->frame = make_frame(reduced.rigid ? &*reduced.rigid : nullptr, options.carried, model->gravity_load);
+  if (reduced.contact) model->contact.emplace(*reduced.contact, model->frame->origin());
   const RestModel rest{*material, cubature};
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};

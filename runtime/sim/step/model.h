@@ -11,12 +11,11 @@
 #include "common/model/reduced_model.h"
 #include "runtime/sim/contact/contact.h"
 #include "runtime/sim/elasticity/internal_force.h"
-#include "runtime/sim/examples/example_force.h"
 #include "runtime/sim/examples/example_weights.h"
+#include "runtime/sim/examples/shape_filter.h"
 #include "runtime/sim/examples/target.h"
 #include "runtime/sim/examples/target_table.h"
-#include "runtime/sim/frame/carried_motion.h"
-#include "runtime/sim/frame/rigid_frame.h"
+#include "runtime/sim/frame/body_frame.h"
 
 namespace exmat::runtime {
 
@@ -33,11 +32,10 @@ struct ExampleModel {
 /// A reduced body prepared for stepping: immutable, shared by any number of States.
 struct Model {
   InternalForce internal_force;
-  RowMatrix gravity_load;               ///< 3 x r
-  std::optional<ContactSet> contact;    ///< of a scene with obstacles
-  std::optional<RigidFrame> rigid;      ///< of a free body
-  std::optional<CarriedFrame> carried;  ///< of a body whose fixed part a motion carries
-  std::vector<ExampleModel> examples;   ///< the whole body's, then those of regions; none where prepared without
+  RowMatrix gravity_load;                  ///< 3 x r
+  std::shared_ptr<const BodyFrame> frame;  ///< what the body deforms in
+  std::optional<ContactSet> contact;       ///< of a scene with obstacles
+  std::vector<ExampleModel> examples;      ///< the whole body's, then those of regions; none where prepared without
 
   Eigen::Index modes() const { return internal_force.modes(); }
   bool has_whole_body_examples() const { return !examples.empty() && examples.front().region.empty(); }

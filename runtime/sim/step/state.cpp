@@ -15,10 +15,8 @@ State make_state(const Model& model, const Eigen::VectorXd& q, const Eigen::Vect
   state.applied_force = Eigen::VectorXd::Zero(model.modes());
   auto scratch = model.internal_force.make_workspace();
   state.elastic_energy = model.internal_force.energy(q, scratch);
-  if (model.rigid) {
-    state.body.emplace();
-    set_motion(model, {}, state);
-  }
+  state.frame = model.frame->make_state();
+  set_motion(model, {}, state);
   for (const ExampleModel& examples : model.examples) {
     ExampleState& start = state.examples.emplace_back();
     start.weights = Eigen::VectorXd::Unit(examples.weights.examples(), 0);
@@ -31,30 +29,9 @@ void prepare_contacts(const Model& model, std::size_t obstacles, State& state) {
   if (model.contact) state.contacts = model.contact->make_state(obstacles);
 }
 
-FreeMotion motion_of(const FreeState& body) {
-  return {body.position, body.orientation, body.linear_momentum / body.mass, body.orientation * body.spin};
-}
-
-FreeMotion motion_of(const MotionSample& frame) {
-  return {frame.position, Eigen::Quaterniond(frame.rotation), frame.linear_velocity, frame.angular_velocity};
-}
-
-void set_motion(const Model& model, const FreeMotion& motion, State& state) {
-  auto moments = model.rigid->make_moments();
-  set_motion(model, motion, moments, state);
-}
-
-void set_motion(const Model& model, const FreeMotion& motion, RigidFrame::Moments& moments, State& state) {
-  FreeState& body = *state.body;
-  model.rigid->moments(state.q, moments);
-  body.mass = model.rigid->mass();
-  body.position = motion.position;
-  body.orientation = motion.orientation.normalized();
-  body.spin = body.orientation.conjugate() * motion.angular_velocity;
-  body.linear_momentum = model.rigid->mass() * motion.linear_velocity;
-  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation.transpose() * state.v);
-  body.momentum = state.v + moments.deformation.lazyProduct(body.spin);
-  body.momentum_previous = body.momentum;
+bool set_motion(const Model& model, const FrameMotion& motion, State& state) {
+  FrameWorkspace workspace = model.frame->make_workspace();
+  return model.frame->set_motion(motion, state.q, state.v, workspace, state.frame);
 }
 
 }  // namespace exmat::runtime

@@ -1,28 +1,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cstdint>
-#include <optional>
+#include <variant>
 #include <vector>
 
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
-
-/// Where a free body is and how it moves: x = c + R (X + U q). World frame unless it says body frame. The momenta are
-/// what it carries; spin and velocities follow from them.
-struct FreeState {
-  double mass = 0;                                                  ///< [kg]
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< c - c at rest [m]
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< R
-  Eigen::Vector3d linear_momentum = Eigen::Vector3d::Zero();        ///< p [kg m/s]
-  Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();       ///< L about c [kg m^2/s]
-  Eigen::Vector3d spin = Eigen::Vector3d::Zero();                   ///< omega, body frame [rad/s]
-  Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< of the caller, beside State::applied_force [N]
-  Eigen::Vector3d applied_torque = Eigen::Vector3d::Zero();         ///< about c [N m]
-  Eigen::VectorXd momentum, momentum_previous;                      ///< [r] pi = qdot - sum_c omega_c A_c q
-};
 
 /// What one example force carries from step to step. K examples, d target coordinates.
 struct ExampleState {
@@ -44,28 +29,15 @@ struct State {
   std::vector<ExampleState> examples;      ///< one for each of the model's example forces
   ContactState contacts;                   ///< what touches; sized for its scene by prepare_contacts()
   bool begins_anew = true;                 ///< the last step was no smooth one: the first, or one near obstacles
-  std::optional<FreeState> body;           ///< of a free body
-  std::optional<CarriedState> carried;     ///< of a body whose fixed part a motion carries
-
-  /// [r] momentum of q: that of a free body, else qdot.
-  const Eigen::VectorXd& momentum() const { return body ? body->momentum : v; }
-  const Eigen::VectorXd& momentum_previous() const { return body ? body->momentum_previous : v_previous; }
+  FrameState frame;                        ///< of the model's frame; nothing of a clamped body
 };
 
-/// Linear velocity [m/s] and spin [rad/s] of a free body in the world frame, and where it is.
-struct FreeMotion {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< c - c at rest [m]
-  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< R
-  Eigen::Vector3d linear_velocity = Eigen::Vector3d::Zero();        ///< [m/s]
-  Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();       ///< [rad/s]
-};
+/// Those of a free body.
+inline FreeState& free_state(State& state) { return *std::get_if<FreeState>(&state.frame); }
+inline const FreeState& free_state(const State& state) { return *std::get_if<FreeState>(&state.frame); }
 
-FreeMotion motion_of(const FreeState& body);
-FreeMotion motion_of(const MotionSample& frame);
-
-/// Sets how a free body moves; its q and v stay. `moments` is scratch: with it nothing is allocated.
-void set_motion(const Model& model, const FreeMotion& motion, RigidFrame::Moments& moments, State& state);
-void set_motion(const Model& model, const FreeMotion& motion, State& state);
+/// Sets how a free body moves; its q and v stay. False, and nothing is done, for other bodies.
+bool set_motion(const Model& model, const FrameMotion& motion, State& state);
 
 /// Sizes what a state remembers of its contacts with so many obstacles.
 void prepare_contacts(const Model& model, std::size_t obstacles, State& state);

@@ -11,97 +11,36 @@ namespace exmat::runtime {
 namespace {
 
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
-constexpr double kBesideKey = 1e-6;    // of a step
-
-bool acts_at(const ScriptedForce& force, double time) { return force.start <= time && time < force.end; }
-
-/// Of a free body only what the caller applies; the rest acts on its momenta first.
-void gather_external_force(const Model& model, const StepScene& scene, const State& state, double midpoint,
-                           Workspace& workspace) {
-  Eigen::VectorXd& external_force = workspace.external_force;
-  external_force = state.applied_force;
-  if (!model.carried) external_force += scene.gravity_force;
-  if (model.carried)
-    add_carried_load(*model.carried, model.gravity_load, scene.gravity, *workspace.carried, external_force);
-  if (state.body) return;
-  for (const ScriptedForce& force : scene.forces) {
-    if (!acts_at(force, midpoint)) continue;
-    if (model.carried)
-      external_force.noalias() +=
-          force.mean_basis.transpose() * (workspace.carried->frame.rotation.transpose() * force.total);
-    else
-      external_force += force.force;
-  }
+FrameStep frame_step(const StepScene& scene, const State& state) {
+  const double end = static_cast<double>(state.step + 1) * scene.time_step;
+  return {scene, scene.time_step, state.time, end, state.q, state.v, state.applied_force};
 }
 
-/// The motion at `time`, with the accelerations `beside` [s] it: they may jump at keys, and a step has those within it.
-MotionSample sample_beside(const RigidMotion& motion, double time, double beside) {
-  MotionSample sample = motion.sample(time);
-  const MotionSample within = motion.sample(time + beside);
-  sample.linear_acceleration = within.linear_acceleration;
-  sample.angular_acceleration = within.angular_acceleration;
-  return sample;
-}
-
-/// The motion that carries a body at `frame`, and the external forces there, into the workspace.
-void take_frame(const Model& model, const StepScene& scene, const State& state, const MotionSample& frame,
-                double midpoint, Workspace& workspace) {
-  set_frame(frame, *workspace.carried);
-  gather_external_force(model, scene, state, midpoint, workspace);
-}
-
-/// Momenta and centre of mass of a free body at the end of the step, and its forces on q, into the workspace. Scripted
-/// forces act where the body would be at the middle of the step by its spin. The centre of mass is exact for them, away
-/// from obstacles.
-void move_free_body(const Model& model, const StepScene& scene, Integrator integrator, bool near, const State& state,
-                    double midpoint, Workspace& workspace) {
-  FreeState& body = *workspace.body;
-  body = *state.body;
-  const double dt = scene.time_step;
-  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
-  Eigen::Vector3d force = model.rigid->mass() * scene.gravity + body.applied_force, torque = body.applied_torque;
-  for (const ScriptedForce& scripted : scene.forces) {
-    if (!acts_at(scripted, midpoint)) continue;
-    const Eigen::Vector3d local = rotation.transpose() * scripted.total;
-    const Eigen::Vector3d arm = scripted.lever + scripted.mean_basis * state.q;
-    force += scripted.total;
-    torque += rotation * arm.cross(local);
-    workspace.external_force.noalias() += scripted.mean_basis.transpose() * local;
-  }
-  // Forces that contacts balance have to act on the position as those do.
-  const double share = near ? 1 : 0.5;
-  body.position += dt / model.rigid->mass() * (body.linear_momentum + share * dt * force);
-  body.linear_momentum += dt * force;
-  body.angular_momentum += dt * torque;
-  begin_rotation(body, dt, integrator == Integrator::kBackwardEuler, *workspace.free);
+StepHistory history_of(const Model& model, const State& state) {
+  return {state.q, state.v, state.q_previous, model.frame->momentum(state.v, state.frame),
+          model.frame->former_momentum(state.v_previous, state.frame)};
 }
 
 /// What resolves a step: backward Euler where a body that is not clamped in the world turns too far in it for anything
 /// of second order.
-Integrator integrator_of_step(const StepScene& scene, const State& state, bool near) {
-  double spin = state.body ? state.body->spin.norm() : 0;
-  if (state.carried) spin = state.carried->frame.angular_velocity.norm();
-  const bool resolved = !near && spin * scene.time_step <= kResolvedTurn;
+Integrator integrator_of_step(const Model& model, const StepScene& scene, const State& state, bool near) {
+  const bool resolved = !near && model.frame->turn_rate(state.frame) * scene.time_step <= kResolvedTurn;
   return resolved ? scene.integrator : Integrator::kBackwardEuler;
 }
 
-/// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with, or that a key
-/// of the motion that carries the body lies at.
-bool begins_anew(const StepScene& scene, const State& state, double midpoint) {
+/// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with, or in which
+/// the accelerations of the frame jump.
+bool begins_anew(const Model& model, const StepScene& scene, const State& state, double midpoint) {
   if (state.begins_anew) return true;
   for (const ScriptedForce& force : scene.forces)
-    if (acts_at(force, midpoint) != acts_at(force, midpoint - scene.time_step)) return true;
-  return scene.carrier && scene.carrier->has_key(midpoint - scene.time_step, midpoint);
+    if (force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step)) return true;
+  return model.frame->jumps(scene, midpoint - scene.time_step, midpoint);
 }
 
 /// a_n of Newmark's method from the equation of motion at the beginning of the step.
-void start_acceleration(const Model& model, const StepScene& scene, const State& state, Workspace& workspace,
-                        StepReport& report) {
-  const double midpoint = state.time + 0.5 * scene.time_step;
-  const MotionSample end = model.carried ? workspace.carried->frame : MotionSample{};
-  if (model.carried)
-    take_frame(model, scene, state, sample_beside(*scene.carrier, state.time, kBesideKey * scene.time_step), midpoint,
-               workspace);
+void start_acceleration(const Model& model, const StepScene& scene, const FrameStep& frame_step, const State& state,
+                        Workspace& workspace, StepReport& report) {
+  model.frame->enter_start(frame_step, workspace.frame, workspace.external_force);
   Eigen::VectorXd& a = workspace.acceleration;
   if (scene.stiffness_damping > 0) {
     Eigen::MatrixXd& stiffness = workspace.newton.hessian;
@@ -113,38 +52,28 @@ void start_acceleration(const Model& model, const StepScene& scene, const State&
     a = workspace.external_force - workspace.internal_force;
   }
   a -= scene.mass_damping * state.v;
-  if (state.body) {
-    FreeMotionWorkspace& free = *workspace.free;
-    free.velocity = state.v;
-    free.solution.spin = state.body->spin;
-    model.rigid->moments(state.q, free.moments);
-    rotation_force(*model.rigid, 0, free);
-    a += free.force;
-  }
-  if (model.carried) {
-    workspace.carried->velocity = state.v;
-    carried_force(*model.carried, state.q, *workspace.carried);
-    a += workspace.carried->force;
-    take_frame(model, scene, state, end, midpoint, workspace);
-  }
+  model.frame->add_start_force(frame_step, state.frame, workspace.frame, a);
+  model.frame->leave_start(frame_step, workspace.frame, workspace.external_force);
   if (!runs_examples(scene)) return;
   update_targets(model, scene, state, state.q, workspace, report);
   add_example_forces(model, scene, state, workspace, a);
 }
 
-void prepare_integrator(const Model& model, const StepScene& scene, Integrator integrator, const State& state,
-                        bool anew, Workspace& workspace, StepReport& report) {
+void prepare_integrator(const Model& model, const StepScene& scene, const FrameStep& frame_step, Integrator integrator,
+                        const State& state, Workspace& workspace, StepReport& report) {
+  const bool anew = begins_anew(model, scene, state, frame_step.midpoint());
+  const StepHistory history = history_of(model, state);
   if (integrator == Integrator::kNewmark) {
     if (anew) {
-      start_acceleration(model, scene, state, workspace, report);
+      start_acceleration(model, scene, frame_step, state, workspace, report);
     } else {
       workspace.acceleration = state.a;
     }
-    newmark_form(state, workspace.acceleration, scene.time_step, workspace.form);
+    newmark_form(history, workspace.acceleration, scene.time_step, workspace.form);
   } else if (integrator == Integrator::kBdf2 && !anew) {
-    bdf2_form(state, scene.time_step, workspace.form);
+    bdf2_form(history, scene.time_step, workspace.form);
   } else {
-    backward_euler_form(state, scene.time_step, workspace.form);
+    backward_euler_form(history, scene.time_step, workspace.form);
   }
 }
 
@@ -175,12 +104,9 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   state.q_previous = state.q;
   state.v_previous = state.v;
   state.q = workspace.q;
-  state.v = workspace.offset;
+  state.v = workspace.v;
   state.a = form.acceleration_factor * (state.q - form.acceleration_centre);
-  if (state.body) commit_free_motion(workspace.form.velocity_factor, workspace.body.value(), *workspace.free, state);
-  if (model.carried)
-    state.carried =
-        carried_state(*model.carried, model.gravity_load, scene.gravity, state.q, state.v, *workspace.carried);
+  model.frame->commit(scene, form.velocity_factor, state.q, state.v, state.a, workspace.frame, state.frame);
   state.elastic_energy = elastic_energy;
   ++state.step;
   state.time = static_cast<double>(state.step) * scene.time_step;
@@ -190,19 +116,14 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
 
 /// A step near obstacles that did not converge may leave contact forces that throw the body: it is slowed down until it
 /// has no more energy than before, or stands still. The force of the contacts tells the difference.
-void take_back_energy(const StepScene& scene, const Energies& before, State& state, StepReport& report) {
-  const Energies now = energies(scene, state);
+void take_back_energy(const Model& model, const StepScene& scene, const Energies& before, State& state,
+                      StepReport& report) {
+  const Energies now = energies(model, scene, state);
   const double allowed = before.total() - now.elastic - now.potential;
-  if (state.carried || now.kinetic <= allowed) return;
+  if (model.frame->is_driven() || now.kinetic <= allowed) return;
   const double share = std::sqrt(std::max(allowed, 0.0) / now.kinetic);
   state.v *= share;
-  if (!state.body) return;
-  FreeState& body = *state.body;
-  report.contact_force -= (1 - share) / scene.time_step * body.linear_momentum;
-  body.linear_momentum *= share;
-  body.angular_momentum *= share;
-  body.spin *= share;
-  body.momentum *= share;
+  report.contact_force -= (1 - share) / scene.time_step * model.frame->slow_down(share, state.frame);
 }
 
 void add_newton_report(const NewtonReport& newton, StepReport& report) {
@@ -241,40 +162,36 @@ NewtonReport solve(const Model& model, const StepScene& scene, const State& stat
 
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   StepReport report;
-  const double midpoint = state.time + 0.5 * scene.time_step;
-  const double end = static_cast<double>(state.step + 1) * scene.time_step;
-  if (model.carried)
-    take_frame(model, scene, state, sample_beside(*scene.carrier, end, -kBesideKey * scene.time_step), midpoint,
-               workspace);
-  else
-    gather_external_force(model, scene, state, midpoint, workspace);
+  const BodyFrame& frame = *model.frame;
+  const FrameStep in_frame = frame_step(scene, state);
+  frame.begin(in_frame, workspace.frame, workspace.external_force);
   const bool near = is_near_obstacles(model, scene, state, workspace);
-  const Integrator integrator = integrator_of_step(scene, state, near);
-  if (state.body) move_free_body(model, scene, integrator, near, state, midpoint, workspace);
-  prepare_integrator(model, scene, integrator, state, begins_anew(scene, state, midpoint), workspace, report);
+  const Integrator integrator = integrator_of_step(model, scene, state, near);
+  frame.move(in_frame, near, integrator == Integrator::kBackwardEuler, state.frame, workspace.frame,
+             workspace.external_force);
+  prepare_integrator(model, scene, in_frame, integrator, state, workspace, report);
 
   workspace.newton.profile = workspace.profile;
   double elastic_energy = 0;
   NewtonReport newton = solve(model, scene, state, near, workspace, report, elastic_energy);
-  if (newton.status == NewtonStatus::kNonFinite && state.body && !near) {
-    backward_euler_form(state, scene.time_step, workspace.form);
-    turn_rigidly(*model.rigid, state.q, state.v, scene.time_step, *workspace.free);
+  if (newton.status == NewtonStatus::kNonFinite && !near && frame.fall_back(in_frame, workspace.frame)) {
+    backward_euler_form(history_of(model, state), scene.time_step, workspace.form);
     newton = solve(model, scene, state, near, workspace, report, elastic_energy);
   }
   add_newton_report(newton, report);
-  workspace.offset = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
-  if (!workspace.q.allFinite() || !workspace.offset.allFinite()) report.status |= kStepNonFinite;
+  workspace.v = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
+  if (!workspace.q.allFinite() || !workspace.v.allFinite()) report.status |= kStepNonFinite;
   if (report.status & kStepNonFinite) return report;
   if (near) {
     report.contacts = workspace.near->contact.touching;
     report.contact_force = workspace.near->contact.force;
   }
-  const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.offset);
+  const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.v);
   if (small_q || small_v) report.status |= kStepSubnormal;
   const bool unbalanced = near && newton.status != NewtonStatus::kConverged;
-  const Energies before = unbalanced ? energies(scene, state) : Energies{};
+  const Energies before = unbalanced ? energies(model, scene, state) : Energies{};
   commit(model, scene, elastic_energy, workspace, state);
-  if (unbalanced) take_back_energy(scene, before, state, report);
+  if (unbalanced) take_back_energy(model, scene, before, state, report);
   state.begins_anew = near;
   commit_contacts(model, near, workspace, state);
   return report;
@@ -285,28 +202,13 @@ void refresh_weights(const Model& model, const StepScene& scene, State& state, W
   commit_weights(scene, workspace, state);
 }
 
-void place_on_carrier(const Model& model, const StepScene& scene, State& state) {
-  CarriedWorkspace workspace(*model.carried);
-  set_frame(scene.carrier->sample(state.time), workspace);
-  workspace.velocity = state.v;
-  carried_force(*model.carried, state.q, workspace);
-  state.carried = carried_state(*model.carried, model.gravity_load, scene.gravity, state.q, state.v, workspace);
+void follow_frame(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
+  model.frame->follow(scene, state.time, state.q, state.v, workspace.frame, state.frame);
 }
 
-Energies energies(const StepScene& scene, const State& state) noexcept {
-  Energies energies{0.5 * state.v.squaredNorm(), state.elastic_energy, -scene.gravity_force.dot(state.q)};
-  if (state.carried) {
-    energies.kinetic = state.carried->kinetic_energy;
-    energies.potential += state.carried->potential_of_frame;
-  }
-  if (!state.body) return energies;
-  const FreeState& body = *state.body;
-  // w . l = w . (J w + h) and (pi - v) . v = w . h.
-  const Eigen::Vector3d l = body.orientation.conjugate() * body.angular_momentum;
-  energies.kinetic += 0.5 * body.linear_momentum.squaredNorm() / body.mass;
-  energies.kinetic += 0.5 * (body.spin.dot(l) + (body.momentum - state.v).dot(state.v));
-  energies.potential -= body.mass * scene.gravity.dot(body.position);
-  return energies;
+Energies energies(const Model& model, const StepScene& scene, const State& state) noexcept {
+  return {model.frame->kinetic_energy(state.v, state.frame), state.elastic_energy,
+          -scene.gravity_force.dot(state.q) + model.frame->potential_energy(scene.gravity, state.frame)};
 }
 
 }  // namespace exmat::runtime

@@ -4,8 +4,8 @@ namespace exmat::runtime {
 
 ContactProblemWorkspace::ContactProblemWorkspace(const Model& model, const StepScene& scene)
     : contact(*model.contact, scene.obstacles.size()),
-      newton(model.modes() + (model.rigid ? 6 : 0)),
-      x(Eigen::VectorXd::Zero(model.modes() + (model.rigid ? 6 : 0))),
+      newton(model.modes() + model.frame->rigid_unknowns()),
+      x(Eigen::VectorXd::Zero(model.modes() + model.frame->rigid_unknowns())),
       q(Eigen::VectorXd::Zero(model.modes())),
       gradient_q(q),
       stiffness(Eigen::MatrixXd::Zero(x.size(), x.size())) {}
@@ -22,21 +22,12 @@ ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(m
 }
 
 Workspace::Workspace(const Model& model, const StepScene& scene)
-    : newton(model.modes()), elasticity(model.internal_force.make_workspace()) {
+    : newton(model.modes()), elasticity(model.internal_force.make_workspace()), frame(model.frame->make_workspace()) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.modes());
   form.velocity_centre = form.acceleration_centre = zero;
-  q = predictor = external_force = internal_force = acceleration = offset = linear = zero;
+  q = v = external_force = internal_force = acceleration = offset = linear = zero;
   frozen_force = next_frozen_force = zero;
-  if (model.rigid) {
-    free.emplace(model);
-    body.emplace();
-    body->momentum = body->momentum_previous = zero;
-    newton.lu.emplace(model.modes());
-  }
-  if (model.carried) {
-    carried.emplace(*model.carried);
-    newton.lu.emplace(model.modes());
-  }
+  if (model.frame->exerts_forces()) newton.lu.emplace(model.modes());
   if (touches(model, scene)) near.emplace(model, scene);
   product.setZero(padded(model.modes()));
   quadratic.setZero(padded(model.modes()), model.modes());

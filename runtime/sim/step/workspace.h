@@ -7,7 +7,6 @@
 #include "runtime/sim/contact/contact.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/solver/profile.h"
-#include "runtime/sim/step/free_motion.h"
 #include "runtime/sim/step/integrator.h"
 #include "runtime/sim/step/model.h"
 #include "runtime/sim/step/scene.h"
@@ -49,7 +48,7 @@ struct Workspace {
   NewtonWorkspace newton;
   InternalForce::Workspace elasticity;
   StepForm form;
-  Eigen::VectorXd q, predictor;    ///< r
+  Eigen::VectorXd q, v;            ///< r, at the end of the step
   Eigen::VectorXd external_force;  ///< r
   Eigen::VectorXd internal_force;  ///< r
   Eigen::VectorXd acceleration;    ///< r, at the beginning of the step
@@ -61,9 +60,7 @@ struct Workspace {
   Eigen::VectorXd frozen_force, next_frozen_force;  ///< r, see IncrementalPotential
 
   std::optional<ContactProblemWorkspace> near;  ///< with obstacles
-  std::optional<FreeMotionWorkspace> free;      ///< of a free body
-  std::optional<CarriedWorkspace> carried;      ///< of one that a motion carries
-  std::optional<FreeState> body;                ///< and where it will be
+  FrameWorkspace frame;                         ///< of the model's frame
   std::vector<ExampleWorkspace> examples;       ///< one for each of the scene's
 };
 

@@ -106,7 +106,7 @@ TEST_F(ApiTest, StepsAreThoseOfTheLibraryBitForBit) {
     Eigen::VectorXd weights(3);
     body.read_weights(span_of(weights));
     EXPECT_EQ(weights, reference.state.examples.front().weights);
-    const runtime::Energies expected = energies(reference.loaded.scene, reference.state);
+    const runtime::Energies expected = energies(*reference.loaded.model, reference.loaded.scene, reference.state);
     EXPECT_EQ(body.energies().kinetic, expected.kinetic);
     EXPECT_EQ(body.energies().elastic, expected.elastic);
     EXPECT_EQ(body.energies().potential, expected.potential);

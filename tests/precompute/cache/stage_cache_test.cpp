@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/core/error.h"
+#include "precompute/examples/example_alignment.h"
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::precompute {

@@ -25,7 +25,7 @@ struct FreeBar {
 
   FullSpaceState moving(double spin) const {
     const Eigen::VectorXd first = bar.basis().col(0) + 0.3 * bar.basis().col(3);
-    runtime::FreeMotion motion;
+    runtime::FrameMotion motion;
     motion.position = Eigen::Vector3d(1, 2, 3);
     motion.orientation = Eigen::Quaterniond(0.5, 0.1, -0.7, 0.3).normalized();
     motion.linear_velocity = Eigen::Vector3d(1, -2, 0.5);
@@ -224,7 +224,7 @@ TEST(FullSpace, FreeBodiesWithDampingAndExamplesAreThoseOfTheRunTime) {
       complete_bar({.cells = {2, 1, 1}, .density_gradient = 0.5, .free = true, .eigenfunctions = 3, .examples = 2});
   const auto reduced = runtime::build_model(bar.model, {}).model;
   const FullSpaceModel full = build_full_space_model(bar.model, {.whole_body = true});
-  runtime::FreeMotion motion;
+  runtime::FrameMotion motion;
   motion.linear_velocity = Eigen::Vector3d(1, 0, -1);
   motion.angular_velocity = Eigen::Vector3d(1, 6, -3);
   constexpr double kTime = 0.1;

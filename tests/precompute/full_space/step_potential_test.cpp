@@ -55,7 +55,7 @@ class StepPotentialTest : public testing::TestWithParam<bool> {
   }
 
   void turn() {
-    runtime::FreeMotion motion;
+    runtime::FrameMotion motion;
     motion.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(0.4, Eigen::Vector3d(1, 2, 3).normalized()));
     const Eigen::VectorXd v = state_.v;
     state_ = make_full_space_state(model_, 0.02 * test::random_vector(model_.size(), 3), motion);

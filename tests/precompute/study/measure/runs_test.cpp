@@ -92,21 +92,22 @@ TEST_F(Runs, VelocitiesAreTheRatesOfPositions) {
   runtime::State state = runtime::make_state(*model);
   state.q.setLinSpaced(state.q.size(), -0.02, 0.03);
   state.v.setLinSpaced(state.v.size(), 0.4, -0.3);
-  runtime::FreeMotion motion;
+  runtime::FrameMotion motion;
   motion.position = {1, 2, 3};
   motion.orientation = Eigen::Quaterniond(0.5, 0.1, -0.7, 0.3).normalized();
   motion.linear_velocity = {1, -2, 0.5};
   motion.angular_velocity = {0.3, 2, -1};
   runtime::set_motion(*model, motion, state);
-  const VertexArray velocities = world_velocities(bar_.model, state);
+  const VertexArray velocities = world_frame(bar_.model, *model->frame, state).velocities;
   constexpr double kStep = 1e-5;
   const auto moved = [&](double time) {
     runtime::State later = state;
     later.q += time * state.v;
-    later.body->position += time * motion.linear_velocity;
+    free_state(later).position += time * motion.linear_velocity;
     const double angle = time * motion.angular_velocity.norm();
-    later.body->orientation = Eigen::AngleAxisd(angle, motion.angular_velocity.normalized()) * state.body->orientation;
-    return world_positions(bar_.model, later);
+    free_state(later).orientation =
+        Eigen::AngleAxisd(angle, motion.angular_velocity.normalized()) * free_state(state).orientation;
+    return world_frame(bar_.model, *model->frame, later).positions;
   };
   const VertexArray rates = (moved(kStep) - moved(-kStep)) / (2 * kStep);
   EXPECT_LE((rates - velocities).lpNorm<Eigen::Infinity>(), 1e-8 * velocities.lpNorm<Eigen::Infinity>());

@@ -60,8 +60,8 @@ struct Scenario {
         angular(random_vector(3, seed + 4)),
         v(random_vector(kModes, seed + 5)) {}
 
-  BodyPose pose() const { return {position, rotation, q}; }
-  BodyVelocity velocity() const { return {linear, angular, v}; }
+  BodyPose pose() const { return {{Eigen::Vector3d::Zero(), position, rotation}, q}; }
+  BodyVelocity velocity() const { return {{linear, angular}, v}; }
 
   /// With contacts of the step before, so that there is friction.
   void begin() {
@@ -315,7 +315,7 @@ TEST(Contact, StepsWithoutAllocations) {
 TEST(Contact, OfNoVerticesOrObstaclesDoesNothing) {
   ContactWorkspace workspace(ContactSet(), 0);
   const Eigen::VectorXd none;
-  ContactSet().gather({}, 0, 1, {{0, 0, 0}, Eigen::Matrix3d::Identity(), none}, 1, workspace);
+  ContactSet().gather({}, 0, 1, {Placement(), none}, 1, workspace);
   EXPECT_EQ(workspace.candidate_count, 0u);
   Scenario scenario({});
   scenario.begin();
@@ -368,8 +368,10 @@ class Particle {
     data.basis = RowMatrix::Zero(3, 1);
     return data;
   }
-  BodyPose pose(const Eigen::Vector3d& x) const { return {x, Eigen::Matrix3d::Identity(), zero_}; }
-  BodyVelocity speed(const Eigen::Vector3d& v) const { return {v, Eigen::Vector3d::Zero(), zero_}; }
+  BodyPose pose(const Eigen::Vector3d& x) const {
+    return {{Eigen::Vector3d::Zero(), x, Eigen::Matrix3d::Identity()}, zero_};
+  }
+  BodyVelocity speed(const Eigen::Vector3d& v) const { return {{v, Eigen::Vector3d::Zero()}, zero_}; }
   Eigen::VectorXd zero_ = Eigen::VectorXd::Zero(1);
 };
 

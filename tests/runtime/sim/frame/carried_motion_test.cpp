@@ -45,23 +45,26 @@ struct CarriedBar {
 
   State start(const StepScene& scene, const Eigen::VectorXd& q, const Eigen::VectorXd& v) const {
     State state = make_state(*model, q, v);
-    place_on_carrier(*model, scene, state);
+    Workspace workspace(*model, scene);
+    follow_frame(*model, scene, state, workspace);
     return state;
   }
 
   /// World positions and velocities of all vertices, interleaved.
   Eigen::VectorXd positions(const State& state) const {
     Eigen::VectorXd x = rest() + bar.basis() * state.q;
+    const Placement placement = model->frame->placement(state.frame);
     for (Eigen::Index i = 0; i < x.size(); i += 3)
-      x.segment<3>(i) = state.carried->frame.to_world(Eigen::Vector3d(x.segment<3>(i)));
+      x.segment<3>(i) = placement.to_world(Eigen::Vector3d(x.segment<3>(i)));
     return x;
   }
   Eigen::VectorXd velocities(const State& state) const {
     const Eigen::VectorXd x = positions(state);
     Eigen::VectorXd velocity = bar.basis() * state.v;
+    const MotionSample frame = swing().sample(state.time);
     for (Eigen::Index i = 0; i < x.size(); i += 3)
-      velocity.segment<3>(i) = state.carried->frame.velocity_at(x.segment<3>(i)) +
-                               state.carried->frame.rotation * Eigen::Vector3d(velocity.segment<3>(i));
+      velocity.segment<3>(i) =
+          frame.velocity_at(x.segment<3>(i)) + frame.rotation * Eigen::Vector3d(velocity.segment<3>(i));
     return velocity;
   }
   Eigen::VectorXd rest() const { return bar.model.object->mesh.vertices.reshaped<Eigen::RowMajor>(); }
@@ -146,7 +149,7 @@ TEST(CarriedMotion, EnergiesAreThoseOfTheVertices) {
   for (int i = 0; i < 57; ++i) step(*carried.model, scene, state, workspace);
   const Eigen::VectorXd x = carried.positions(state), v = carried.velocities(state), rest = carried.rest();
   const Eigen::VectorXd down = scene.gravity.replicate(rest.size() / 3, 1);
-  const Energies now = energies(scene, state);
+  const Energies now = energies(*carried.model, scene, state);
   const double kinetic = 0.5 * v.dot(carried.bar.mass * v);
   EXPECT_NEAR(now.kinetic, kinetic, 1e-12 * kinetic);
   EXPECT_NEAR(now.potential, -down.dot(carried.bar.mass * (x - rest)), 1e-10 * std::abs(now.potential));
@@ -198,11 +201,9 @@ TEST(CarriedMotion, OntoAFloorIsAFloorOntoTheBody) {
                                floor_moves ? motion : RigidMotion(), 1e6, 0, 0});
     State state = make_state(*model);
     prepare_contacts(*model, 1, state);
-    if (!floor_moves) {
-      scene.carrier = motion;
-      place_on_carrier(*model, scene, state);
-    }
+    if (!floor_moves) scene.carrier = motion;
     Workspace workspace(*model, scene);
+    follow_frame(*model, scene, state, workspace);
     for (int i = 0; i < 4000; ++i) step(*model, scene, state, workspace);
     at_end[floor_moves ? 1 : 0] = state.q;
   }

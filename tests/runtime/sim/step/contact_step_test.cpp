@@ -29,7 +29,7 @@ struct Dropped {
   }
 
   double mass() const { return bar.model.rigid->mass; }
-  double energy() const { return energies(scene, state).total(); }
+  double energy() const { return energies(*model, scene, state).total(); }
 
   test::Bar bar;
   std::unique_ptr<const Model> model;
@@ -41,7 +41,7 @@ TEST(ContactStep, ADroppedBodyComesToRestAndTheFloorCarriesIt) {
   Dropped dropped(2e-3, 1e7, 0.5, 2e4);
   dropped.scene.mass_damping = 2;
   dropped.scene.stiffness_damping = 2e-3;
-  dropped.state.body->position = Eigen::Vector3d(0, 0, 0.05);
+  free_state(dropped.state).position = Eigen::Vector3d(0, 0, 0.05);
   Workspace workspace(*dropped.model, dropped.scene);
   const double energy = dropped.mass() * kGravity * 0.05;
   StepReport report;
@@ -49,11 +49,11 @@ TEST(ContactStep, ADroppedBodyComesToRestAndTheFloorCarriesIt) {
   for (int i = 0; i < 3000; ++i) {
     report = step(*dropped.model, dropped.scene, dropped.state, workspace);
     ASSERT_FALSE(report.status & kStepNonFinite) << i;
-    if (i == 1500) there = dropped.state.body->position;
+    if (i == 1500) there = free_state(dropped.state).position;
   }
-  EXPECT_LE(energies(dropped.scene, dropped.state).kinetic, 1e-8 * energy);
+  EXPECT_LE(energies(*dropped.model, dropped.scene, dropped.state).kinetic, 1e-8 * energy);
   EXPECT_NEAR(report.contact_force[2], dropped.mass() * kGravity, 1e-3 * dropped.mass() * kGravity);
-  EXPECT_LE((dropped.state.body->position - there).norm(), 1e-6);
+  EXPECT_LE((free_state(dropped.state).position - there).norm(), 1e-6);
   EXPECT_GT(report.contacts, 3);
 }
 
@@ -67,15 +67,15 @@ TEST(ContactStep, SlidesOrStaysOnASlope) {
     body.scene.stiffness_damping = 2e-3;
     Workspace workspace(*body.model, body.scene);
     for (int i = 0; i < 500; ++i) step(*body.model, body.scene, body.state, workspace);
-    const Eigen::Vector3d position = body.state.body->position;
-    const double velocity = body.state.body->linear_momentum[0] / body.mass();
+    const Eigen::Vector3d position = free_state(body.state).position;
+    const double velocity = free_state(body.state).linear_momentum[0] / body.mass();
     constexpr int kSteps = 5000;
     for (int i = 0; i < kSteps; ++i) step(*body.model, body.scene, body.state, workspace);
     const double time = kSteps * body.scene.time_step;
     if (friction > std::tan(kSlope)) {
-      EXPECT_LE((body.state.body->position - position).norm(), 1e-6);
+      EXPECT_LE((free_state(body.state).position - position).norm(), 1e-6);
     } else {
-      const double acceleration = (body.state.body->linear_momentum[0] / body.mass() - velocity) / time;
+      const double acceleration = (free_state(body.state).linear_momentum[0] / body.mass() - velocity) / time;
       const double expected = kGravity * (std::sin(kSlope) - friction * std::cos(kSlope));
       EXPECT_NEAR(acceleration, expected, 0.02 * expected);
     }
@@ -86,7 +86,7 @@ TEST(ContactStep, ImpactTakesNoEnergyAndMomentumIsTheIntegralOfTheForces) {
   for (const double time_step : {1e-4, 1e-3, 5e-3, 1e-2})
     for (const double stiffness : {1e4, 1e6, 1e8}) {
       Dropped dropped(time_step, stiffness, 0.3);
-      FreeMotion motion;
+      FrameMotion motion;
       motion.position = Eigen::Vector3d(0, 0, 0.2);
       motion.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(0.5, Eigen::Vector3d(1, 2, 0.5).normalized()));
       motion.linear_velocity = Eigen::Vector3d(1, 0, -3);
@@ -94,7 +94,7 @@ TEST(ContactStep, ImpactTakesNoEnergyAndMomentumIsTheIntegralOfTheForces) {
       set_motion(*dropped.model, motion, dropped.state);
       Workspace workspace(*dropped.model, dropped.scene);
       const double energy = dropped.energy();
-      const Eigen::Vector3d momentum = dropped.state.body->linear_momentum;
+      const Eigen::Vector3d momentum = free_state(dropped.state).linear_momentum;
       Eigen::Vector3d impulse = Eigen::Vector3d::Zero();
       double highest = energy;
       int touching = 0;
@@ -107,7 +107,7 @@ TEST(ContactStep, ImpactTakesNoEnergyAndMomentumIsTheIntegralOfTheForces) {
         highest = std::max(highest, dropped.energy());
       }
       EXPECT_GT(touching, 0);
-      EXPECT_LE((dropped.state.body->linear_momentum - momentum - impulse).norm(),
+      EXPECT_LE((free_state(dropped.state).linear_momentum - momentum - impulse).norm(),
                 1e-10 * dropped.mass() * motion.linear_velocity.norm());
       EXPECT_LE(highest, energy + 1e-6 * dropped.mass() * 5) << time_step << " " << stiffness;
       EXPECT_LE((dropped.bar.basis() * dropped.state.q).lpNorm<Eigen::Infinity>(), dropped.bar.length);
@@ -120,7 +120,7 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
   for (const double stiffness : {1e6, 1e8}) {
     Dropped dropped(1.0 / 30, stiffness, 0.5);
     dropped.scene.newton.max_iterations = 1;
-    FreeMotion motion;
+    FrameMotion motion;
     motion.position = Eigen::Vector3d(0, 0, 0.05);
     motion.linear_velocity = Eigen::Vector3d(1, 0, -3);
     motion.angular_velocity = Eigen::Vector3d(0, 4, 1);
@@ -129,19 +129,19 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
     const double dt = dropped.scene.time_step;
     int unconverged = 0, slowed = 0;
     for (int i = 0; i < 10; ++i) {
-      const FreeState before = *dropped.state.body;
+      const FreeState before = free_state(dropped.state);
       const double energy = dropped.energy();
       const StepReport report = step(*dropped.model, dropped.scene, dropped.state, workspace);
       ASSERT_FALSE(report.status & kStepNonFinite);
       if ((report.status & kStepUnconverged) == 0) continue;
       ++unconverged;
-      const FreeState& after = *dropped.state.body;
+      const FreeState& after = free_state(dropped.state);
       const Eigen::Vector3d of_way = dropped.mass() / dt * (after.position - before.position);
       const double share = std::min(1.0, after.linear_momentum.norm() / of_way.norm());
       if (share < 1 - 1e-9) ++slowed;
       EXPECT_LE((after.linear_momentum - share * of_way).norm(), 1e-9 * of_way.norm()) << stiffness << " step " << i;
       // Standing still where the pose alone has more energy than there was.
-      if (energies(dropped.scene, dropped.state).kinetic > 0) {
+      if (energies(*dropped.model, dropped.scene, dropped.state).kinetic > 0) {
         EXPECT_LE(dropped.energy(), energy + 1e-9 * std::abs(energy)) << stiffness << " step " << i;
       }
       const Eigen::Vector3d force = report.contact_force + dropped.mass() * dropped.scene.gravity;
@@ -154,7 +154,7 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
 
 TEST(ContactStep, AwayFromObstaclesNothingIsLookedAt) {
   Dropped dropped(1e-3, 1e6);
-  dropped.state.body->position = Eigen::Vector3d(0, 0, 50);
+  free_state(dropped.state).position = Eigen::Vector3d(0, 0, 50);
   Workspace workspace(*dropped.model, dropped.scene);
   StepScene without = dropped.scene;
   without.obstacles.clear();
@@ -166,7 +166,7 @@ TEST(ContactStep, AwayFromObstaclesNothingIsLookedAt) {
     ASSERT_EQ(workspace.near->contact.tested_vertices, 0);
   }
   EXPECT_EQ(dropped.state.q, alone.q);
-  EXPECT_EQ(dropped.state.body->position, alone.body->position);
+  EXPECT_EQ(free_state(dropped.state).position, free_state(alone).position);
 }
 
 TEST(ContactStep, AllocatesNothing) {

@@ -86,7 +86,7 @@ TEST_F(LinearOscillation, NewmarkConservesEnergy) {
   State state = make_state(*model_, start_, velocity_);
   Workspace workspace(*model_, scene);
   const auto total = [&] {
-    const Energies now = energies(scene, state);
+    const Energies now = energies(*model_, scene, state);
     return now.kinetic + now.elastic;
   };
   const double initial = total();
@@ -100,8 +100,8 @@ TEST_F(LinearOscillation, BackwardEulerAndBdf2OnlyLoseEnergy) {
   for (const Integrator integrator : {Integrator::kBackwardEuler, Integrator::kBdf2}) {
     const State coarse = run(integrator, 100, 0, 0);
     const StepScene scene = free_scene(*model_, integrator, 1);
-    const Energies first = energies(scene, make_state(*model_, start_, velocity_));
-    const Energies last = energies(scene, coarse);
+    const Energies first = energies(*model_, scene, make_state(*model_, start_, velocity_));
+    const Energies last = energies(*model_, scene, coarse);
     EXPECT_LT(last.kinetic + last.elastic, first.kinetic + first.elastic);
   }
 }

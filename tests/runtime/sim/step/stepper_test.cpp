@@ -188,7 +188,7 @@ TEST(StepperTest, EnergiesAreThoseOfTheFullSpace) {
   State state = make_state(*model);
   Workspace workspace(*model, scene);
   for (int i = 0; i < 20; ++i) step(*model, scene, state, workspace);
-  const Energies now = energies(scene, state);
+  const Energies now = energies(*model, scene, state);
   const Eigen::VectorXd velocity = bar.basis() * state.v, displacement = bar.basis() * state.q;
   EXPECT_NEAR(now.kinetic, 0.5 * velocity.dot(bar.mass * velocity), 1e-12 * now.kinetic);
   EXPECT_EQ(now.elastic, model->internal_force.energy(state.q, workspace.elasticity));
@@ -318,7 +318,7 @@ std::size_t allocations_of_steps(const Model& model, const StepScene& scene, boo
   if (profiled) workspace.profile = &profile;
   const test::AllocationCounter counter;
   for (int i = 0; i < 4; ++i) step(model, scene, state, workspace);
-  energies(scene, state);
+  energies(model, scene, state);
   return counter.count();
 }
 

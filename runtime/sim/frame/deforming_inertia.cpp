@@ -1,4 +1,4 @@
-#include "runtime/sim/frame/rigid_frame.h"
+#include "runtime/sim/frame/deforming_inertia.h"
 
 namespace exmat::runtime {
 namespace {
@@ -19,7 +19,7 @@ Eigen::Matrix<double, 6, 1> energy_slopes(const Eigen::Vector3d& spin) {
 
 }  // namespace
 
-RigidFrame::RigidFrame(const RigidData& data)
+DeformingInertia::DeformingInertia(const RigidData& data)
     : mass_(data.mass),
       centre_of_mass_(data.centre_of_mass),
       second_moments_(data.second_moments),
@@ -39,12 +39,12 @@ RigidFrame::RigidFrame(const RigidData& data)
   }
 }
 
-RigidFrame::Moments RigidFrame::make_moments() const {
+DeformingInertia::Moments DeformingInertia::make_moments() const {
   return {AlignedArray(kProducts * padded(modes())), Eigen::Matrix3d::Zero(), Eigen::MatrixX3d::Zero(modes(), 3),
           Eigen::MatrixXd::Zero(modes(), kSymmetric)};
 }
 
-void RigidFrame::moments(const Eigen::VectorXd& q, Moments& moments) const noexcept {
+void DeformingInertia::moments(const Eigen::VectorXd& q, Moments& moments) const noexcept {
   const Eigen::Index stride = padded(modes()), rows = kProducts * stride;
   kernels().matrix_vector(stacked_.data(), rows, modes(), rows, q.data(), moments.products.data());
   const auto product = [&](int i) {
@@ -61,26 +61,28 @@ void RigidFrame::moments(const Eigen::VectorXd& q, Moments& moments) const noexc
   for (int c = 0; c < 3; ++c) moments.deformation.col(c) = -product(kSymmetric + c);
 }
 
-void RigidFrame::centrifugal_force(const Moments& moments, const Eigen::Vector3d& spin,
-                                   Eigen::VectorXd& force) const noexcept {
+void DeformingInertia::centrifugal_force(const Moments& moments, const Eigen::Vector3d& spin,
+                                         Eigen::VectorXd& force) const noexcept {
   force.noalias() = moments.gradients.lazyProduct(energy_slopes(spin));
 }
 
-void RigidFrame::gyroscopic_product(const Eigen::Vector3d& spin, const Eigen::VectorXd& v, AlignedArray& scratch,
-                                    Eigen::VectorXd& product) const noexcept {
+void DeformingInertia::gyroscopic_product(const Eigen::Vector3d& spin, const Eigen::VectorXd& v, AlignedArray& scratch,
+                                          Eigen::VectorXd& product) const noexcept {
   const Eigen::Index stride = padded(modes()), all = kProducts * stride;
   kernels().matrix_vector(stacked_.data() + kSymmetric * stride, 3 * stride, modes(), all, v.data(), scratch.data());
   const auto part = [&](int c) { return Eigen::Map<const Eigen::VectorXd>(scratch.data() + c * stride, modes()); };
   product = spin[0] * part(0) + spin[1] * part(1) + spin[2] * part(2);
 }
 
-void RigidFrame::add_gyroscopic(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept {
+void DeformingInertia::add_gyroscopic(const Eigen::Vector3d& spin, double factor,
+                                      Eigen::MatrixXd& matrix) const noexcept {
   const Eigen::Index stride = padded(modes());
   const Eigen::Map<const Eigen::MatrixXd> stacked(stacked_.data(), kProducts * stride, modes());
   for (int c = 0; c < 3; ++c) matrix += factor * spin[c] * stacked.middleRows((kSymmetric + c) * stride, modes());
 }
 
-void RigidFrame::add_centrifugal(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept {
+void DeformingInertia::add_centrifugal(const Eigen::Vector3d& spin, double factor,
+                                       Eigen::MatrixXd& matrix) const noexcept {
   const Eigen::Index stride = padded(modes());
   const Eigen::Matrix<double, 6, 1> slopes = 2 * factor * energy_slopes(spin);
   for (Eigen::Index j = 0; j < modes(); ++j) {
@@ -93,14 +95,14 @@ void RigidFrame::add_centrifugal(const Eigen::Vector3d& spin, double factor, Eig
   }
 }
 
-void RigidFrame::add_softening(const Eigen::Vector3d& spin, double velocity_factor,
-                               Eigen::MatrixXd& hessian) const noexcept {
+void DeformingInertia::add_softening(const Eigen::Vector3d& spin, double velocity_factor,
+                                     Eigen::MatrixXd& hessian) const noexcept {
   const double share = spin.squaredNorm() / (velocity_factor * velocity_factor);
   if (share >= kLeastSoftening && share <= kMostSoftening) add_centrifugal(spin, -1, hessian);
 }
 
-void RigidFrame::inertia_slope(const Moments& moments, const Eigen::Vector3d& spin,
-                               Eigen::MatrixX3d& slope) const noexcept {
+void DeformingInertia::inertia_slope(const Moments& moments, const Eigen::Vector3d& spin,
+                                     Eigen::MatrixX3d& slope) const noexcept {
   // J w = tr(P) w - P w.
   for (int axis = 0; axis < 3; ++axis)
     slope.col(axis) = spin[axis] * (moments.gradients.col(0) + moments.gradients.col(1) + moments.gradients.col(2));

@@ -10,7 +10,7 @@ namespace exmat::runtime {
 /// Rotation of a free body x = c + R (X + U q) by its moments: no sum over vertices. method.md, section 6. r modes;
 /// body frame. Second moments P_ab(q) = P0_ab + p1_ab . q + q^T S_ab q, inertia J = tr(P) I - P, angular momentum of
 /// the deformation h_c = q^T A_c v, A_c = S_ab - S_ba with (c, a, b) cyclic. Immutable; no call allocates or throws.
-class RigidFrame {
+class DeformingInertia {
  public:
   /// What depends on q alone.
   struct Moments {
@@ -20,8 +20,8 @@ class RigidFrame {
     Eigen::MatrixXd gradients;     ///< r x 6, dP_ab/dq in the order xx, yy, zz, yz, xz, xy
   };
 
-  RigidFrame() = default;
-  explicit RigidFrame(const RigidData& data);
+  DeformingInertia() = default;
+  explicit DeformingInertia(const RigidData& data);
 
   Moments make_moments() const;
 

@@ -1,4 +1,4 @@
-#include "runtime/sim/step/free_motion.h"
+#include "runtime/sim/frame/free_motion.h"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -12,7 +12,7 @@ constexpr double kSubTurn = 0.3;  // [rad] of turn_rigidly()
 constexpr int kMostSubSteps = 1000;
 
 /// D + V, see free_motion.h, and what J^-1 makes of it and of H.
-void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace) {
+void set_rotation_slope(const DeformingInertia& frame, FreeMotionWorkspace& workspace) {
   frame.inertia_slope(workspace.moments, workspace.solution.spin, workspace.slope);
   const Eigen::Index stride = padded(frame.modes());
   for (int c = 0; c < 3; ++c)
@@ -24,16 +24,18 @@ void set_rotation_slope(const RigidFrame& frame, FreeMotionWorkspace& workspace)
 
 }  // namespace
 
-FreeMotionWorkspace::FreeMotionWorkspace(const Model& model)
-    : moments(model.rigid->make_moments()),
-      scratch(3 * padded(model.modes())),
-      force(Eigen::VectorXd::Zero(model.modes())),
-      product(Eigen::VectorXd::Zero(model.modes())),
-      velocity(Eigen::VectorXd::Zero(model.modes())),
-      slope(Eigen::MatrixX3d::Zero(model.modes(), 3)),
-      inverse_slope(Eigen::MatrixX3d::Zero(model.modes(), 3)),
-      inverse_deformation(Eigen::MatrixX3d::Zero(model.modes(), 3)),
-      gyroscopic(Eigen::MatrixXd::Zero(model.modes(), model.modes())) {}
+FreeMotionWorkspace::FreeMotionWorkspace(const DeformingInertia& inertia)
+    : moments(inertia.make_moments()),
+      scratch(3 * padded(inertia.modes())),
+      force(Eigen::VectorXd::Zero(inertia.modes())),
+      product(Eigen::VectorXd::Zero(inertia.modes())),
+      velocity(Eigen::VectorXd::Zero(inertia.modes())),
+      slope(Eigen::MatrixX3d::Zero(inertia.modes(), 3)),
+      inverse_slope(Eigen::MatrixX3d::Zero(inertia.modes(), 3)),
+      inverse_deformation(Eigen::MatrixX3d::Zero(inertia.modes(), 3)),
+      gyroscopic(Eigen::MatrixXd::Zero(inertia.modes(), inertia.modes())) {
+  moved.momentum = moved.momentum_previous = force;
+}
 
 void begin_rotation(const FreeState& body, double time_step, bool dissipative,
                     FreeMotionWorkspace& workspace) noexcept {
@@ -45,7 +47,7 @@ void begin_rotation(const FreeState& body, double time_step, bool dissipative,
   workspace.spin_is_given = workspace.turn_is_given = false;
 }
 
-void turn_rigidly(const RigidFrame& frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step,
+void turn_rigidly(const DeformingInertia& frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step,
                   FreeMotionWorkspace& workspace) noexcept {
   frame.moments(q, workspace.moments);
   const Eigen::Matrix3d& inertia = workspace.moments.inertia;
@@ -69,7 +71,7 @@ void turn_rigidly(const RigidFrame& frame, const Eigen::VectorXd& q, const Eigen
   workspace.turn_is_given = true;
 }
 
-bool update_spin(const RigidFrame& frame, const Eigen::VectorXd& q, FreeMotionWorkspace& workspace) noexcept {
+bool update_spin(const DeformingInertia& frame, const Eigen::VectorXd& q, FreeMotionWorkspace& workspace) noexcept {
   frame.moments(q, workspace.moments);
   if (workspace.spin_is_given) return true;
   const Eigen::Vector3d deformation = workspace.moments.deformation.transpose() * workspace.velocity;
@@ -81,7 +83,7 @@ bool update_spin(const RigidFrame& frame, const Eigen::VectorXd& q, FreeMotionWo
   return workspace.solution.converged;
 }
 
-void rotation_force(const RigidFrame& frame, double rate, FreeMotionWorkspace& workspace) noexcept {
+void rotation_force(const DeformingInertia& frame, double rate, FreeMotionWorkspace& workspace) noexcept {
   const Eigen::Vector3d& spin = workspace.solution.spin;
   frame.centrifugal_force(workspace.moments, spin, workspace.force);
   frame.gyroscopic_product(spin, workspace.velocity, workspace.scratch, workspace.product);
@@ -89,7 +91,7 @@ void rotation_force(const RigidFrame& frame, double rate, FreeMotionWorkspace& w
   workspace.force += workspace.product - rate * workspace.moments.deformation.lazyProduct(spin);
 }
 
-void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace,
+void add_rotation_stiffness(const DeformingInertia& frame, double velocity_factor, FreeMotionWorkspace& workspace,
                             Eigen::MatrixXd& hessian) noexcept {
   const Eigen::Vector3d& spin = workspace.solution.spin;
   const double inertia = velocity_factor * velocity_factor;
@@ -107,7 +109,7 @@ void add_rotation_stiffness(const RigidFrame& frame, double velocity_factor, Fre
   frame.add_softening(spin, velocity_factor, hessian);
 }
 
-void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept {
+void set_gyroscopic(const DeformingInertia& frame, double velocity_factor, FreeMotionWorkspace& workspace) noexcept {
   Eigen::MatrixXd& G = workspace.gyroscopic;
   G.setZero();
   frame.add_gyroscopic(workspace.solution.spin, -2 * velocity_factor, G);
@@ -120,7 +122,7 @@ void set_gyroscopic(const RigidFrame& frame, double velocity_factor, FreeMotionW
     }
 }
 
-void gyroscopic_product(const RigidFrame& frame, double velocity_factor, const Eigen::VectorXd& x,
+void gyroscopic_product(const DeformingInertia& frame, double velocity_factor, const Eigen::VectorXd& x,
                         FreeMotionWorkspace& workspace) noexcept {
   frame.gyroscopic_product(workspace.solution.spin, x, workspace.scratch, workspace.product);
   const Eigen::Vector3d by_slope = velocity_factor * (workspace.inverse_slope.transpose() * x);
@@ -129,19 +131,18 @@ void gyroscopic_product(const RigidFrame& frame, double velocity_factor, const E
                       workspace.moments.deformation.lazyProduct(by_slope) - 2 * velocity_factor * workspace.product;
 }
 
-void commit_free_motion(double rate, const FreeState& moved, const FreeMotionWorkspace& workspace,
-                        State& state) noexcept {
-  FreeState& body = *state.body;
+void commit_free_motion(double rate, const Eigen::VectorXd& v, const FreeMotionWorkspace& workspace, Eigen::VectorXd& a,
+                        FreeState& body) noexcept {
   const Eigen::Vector3d& spin = workspace.solution.spin;
   body.momentum.swap(body.momentum_previous);
-  body.momentum.noalias() = state.v + workspace.moments.deformation.lazyProduct(spin);
-  state.a += rate * (body.momentum - state.v);
+  body.momentum.noalias() = v + workspace.moments.deformation.lazyProduct(spin);
+  a += rate * (body.momentum - v);
   body.orientation = body.orientation * quaternion_of(workspace.solution.rotation);
   body.orientation.normalize();
   body.spin = spin;
-  body.position = moved.position;
-  body.linear_momentum = moved.linear_momentum;
-  body.angular_momentum = moved.angular_momentum;
+  body.position = workspace.moved.position;
+  body.linear_momentum = workspace.moved.linear_momentum;
+  body.angular_momentum = workspace.moved.angular_momentum;
 }
 
 }  // namespace exmat::runtime

@@ -1,4 +1,4 @@
-#include "runtime/sim/examples/example_force.h"
+#include "runtime/sim/examples/shape_filter.h"
 
 namespace exmat::runtime {
 namespace {

@@ -1,0 +1,210 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+#include <string_view>
+#include <variant>
+
+#include "common/model/reduced_model.h"
+#include "runtime/sim/frame/carried_motion.h"
+#include "runtime/sim/frame/free_motion.h"
+#include "runtime/sim/frame/placement.h"
+#include "runtime/sim/frame/world_loads.h"
+
+namespace exmat::runtime {
+
+/// What a frame carries from step to step, part of a State; nothing for a clamped body.
+using FrameState = std::variant<std::monostate, FreeState, CarriedState>;
+
+/// Scratch of a step, sized once; nothing for a clamped body.
+using FrameWorkspace = std::variant<std::monostate, FreeMotionWorkspace, CarriedWorkspace>;
+
+/// One step as a frame sees it. Refers to what the step works on.
+struct FrameStep {
+  const WorldLoads& loads;
+  double time_step;                      ///< [s]
+  double start, end;                     ///< [s]
+  const Eigen::VectorXd &q, &v;          ///< [r] at the beginning
+  const Eigen::VectorXd& applied_force;  ///< [r] of the host
+
+  double midpoint() const noexcept { return start + 0.5 * time_step; }
+};
+
+/// The frame that a body deforms in: how it moves in the world, what that adds to mass, force and Hessian of the
+/// reduced coordinates q, and how the body at rest becomes the body in the world. Clamped: the world itself. Free:
+/// moved by the body's momenta. Carried: moved by a prescribed motion. Immutable, part of a Model; what changes is in
+/// FrameState. No call allocates or throws, but for make_state() and make_workspace(). r modes.
+///
+/// A body of another kind of frame is a class here, with its state and its workspace among the alternatives above; a
+/// step, contact, trajectories and the API ask this interface alone.
+class BodyFrame {
+ public:
+  virtual ~BodyFrame() = default;
+
+  // ---- What it is.
+
+  /// How it moves, in words; empty where it stands still.
+  virtual std::string_view description() const noexcept { return {}; }
+  bool moves() const noexcept { return !description().empty(); }
+  /// What rest positions are measured from: Placement::origin.
+  virtual Eigen::Vector3d origin() const noexcept { return Eigen::Vector3d::Zero(); }
+  /// Of the body at rest, world [m]; 0 of a frame that does not move.
+  virtual Eigen::Vector3d centre_of_mass() const noexcept { return Eigen::Vector3d::Zero(); }
+  /// Whether it exerts forces on q that depend on q and its velocity and have no potential.
+  virtual bool exerts_forces() const noexcept { return false; }
+
+  // ---- Its state.
+
+  /// At rest where the body was meshed.
+  virtual FrameState make_state() const { return {}; }
+  virtual FrameWorkspace make_workspace() const { return {}; }
+
+  /// After q or its velocity v were set from outside at `time`: the frame moves on as it did.
+  virtual void follow(const WorldLoads& /*loads*/, double /*time*/, const Eigen::VectorXd& /*q*/,
+                      const Eigen::VectorXd& /*v*/, FrameWorkspace& /*workspace*/,
+                      FrameState& /*state*/) const noexcept {}
+  /// Sets how it moves; false where that is not for others to say.
+  virtual bool set_motion(const FrameMotion& /*motion*/, const Eigen::VectorXd& /*q*/, const Eigen::VectorXd& /*v*/,
+                          FrameWorkspace& /*workspace*/, FrameState& /*state*/) const noexcept {
+    return false;
+  }
+
+  virtual Placement placement(const FrameState& /*state*/) const noexcept { return {}; }
+  virtual FrameVelocity velocity(const FrameState& /*state*/) const noexcept { return {}; }
+  virtual FrameMotion motion(const FrameState& /*state*/) const noexcept { return {}; }
+  /// Of the body, where they are what the frame moves by.
+  virtual std::optional<FrameMomenta> momenta(const FrameState& /*state*/) const noexcept { return std::nullopt; }
+  /// [rad/s] in the world.
+  virtual double turn_rate(const FrameState& /*state*/) const noexcept { return 0; }
+  /// [r] the momentum of q, now and one step earlier: its velocity where the frame does not turn by itself.
+  virtual const Eigen::VectorXd& momentum(const Eigen::VectorXd& v, const FrameState& /*state*/) const noexcept {
+    return v;
+  }
+  virtual const Eigen::VectorXd& former_momentum(const Eigen::VectorXd& v_previous,
+                                                 const FrameState& /*state*/) const noexcept {
+    return v_previous;
+  }
+  /// All of the body's kinetic energy [J].
+  virtual double kinetic_energy(const Eigen::VectorXd& v, const FrameState& /*state*/) const noexcept {
+    return 0.5 * v.squaredNorm();
+  }
+  /// Of gravity [m/s^2], beyond that of q [J].
+  virtual double potential_energy(const Eigen::Vector3d& /*gravity*/, const FrameState& /*state*/) const noexcept {
+    return 0;
+  }
+  /// What it integrates by itself, for hashes: c, the quaternion's x y z w, p, L of a free body.
+  using Coordinates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 13, 1>;
+  virtual Coordinates coordinates(const FrameState& /*state*/) const noexcept { return {}; }
+
+  /// A force [N] and a torque about the centre of mass [N m] of the host, world, on the frame until clear_forces().
+  virtual void apply(const Eigen::Vector3d& /*force*/, const Eigen::Vector3d& /*torque*/,
+                     FrameState& /*state*/) const noexcept {}
+  virtual void clear_forces(FrameState& /*state*/) const noexcept {}
+
+  /// Scales all of its motion, where that is its own. Returns the linear momentum that it had.
+  virtual Eigen::Vector3d slow_down(double /*share*/, FrameState& /*state*/) const noexcept {
+    return Eigen::Vector3d::Zero();
+  }
+  /// Whether something outside moves it whatever energy that takes.
+  virtual bool is_driven() const noexcept { return false; }
+
+  // ---- A step, in this order.
+
+  /// The frame as far as it is known before forces act, and [r] the external force on q, into the workspace and
+  /// `external_force`.
+  virtual void begin(const FrameStep& step, FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept;
+  /// At the end of the step as far as it is known after begin().
+  virtual FrameVelocity expected_velocity(const FrameState& state, const FrameWorkspace& /*workspace*/) const noexcept {
+    return velocity(state);
+  }
+  /// Moves what external forces move. `near`: obstacles may touch in this step; `dissipative`: by backward Euler.
+  virtual void move(const FrameStep& /*step*/, bool /*near*/, bool /*dissipative*/, const FrameState& /*state*/,
+                    FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*external_force*/) const noexcept {}
+  /// Whether its accelerations may jump in [from, to).
+  virtual bool jumps(const WorldLoads& /*loads*/, double /*from*/, double /*to*/) const noexcept { return false; }
+
+  /// External force and force() of the beginning of the step, for an acceleration there; leave_start() goes back to the
+  /// end.
+  virtual void enter_start(const FrameStep& /*step*/, FrameWorkspace& /*workspace*/,
+                           Eigen::VectorXd& /*external_force*/) const noexcept {}
+  virtual void add_start_force(const FrameStep& /*step*/, const FrameState& /*state*/, FrameWorkspace& /*workspace*/,
+                               Eigen::VectorXd& /*force*/) const noexcept {}
+  virtual void leave_start(const FrameStep& /*step*/, FrameWorkspace& /*workspace*/,
+                           Eigen::VectorXd& /*external_force*/) const noexcept {}
+
+  // Of frames that exert forces, q with the velocity c_v (q - q_v).
+
+  /// Evaluates force(). False where there is no motion of the frame for q.
+  virtual bool update_force(const Eigen::VectorXd& /*q*/, double /*velocity_factor*/,
+                            const Eigen::VectorXd& /*velocity_centre*/, FrameWorkspace& /*workspace*/) const noexcept {
+    return true;
+  }
+  /// [r] on q, of the last update_force().
+  virtual const Eigen::VectorXd* force(const FrameWorkspace& /*workspace*/) const noexcept { return nullptr; }
+  /// Adds the symmetric part of the derivative of -force to the lower triangle, as far as it keeps it positive
+  /// definite.
+  virtual void add_stiffness(double /*velocity_factor*/, FrameWorkspace& /*workspace*/,
+                             Eigen::MatrixXd& /*hessian*/) const noexcept {}
+  /// About what the antisymmetric part is of inertia.
+  virtual double gyroscopic_ratio(double /*velocity_factor*/, const FrameWorkspace& /*workspace*/) const noexcept {
+    return 0;
+  }
+  /// The antisymmetric part [r x r], after add_stiffness(), and its product with x [r].
+  virtual const Eigen::MatrixXd* gyroscopic(double /*velocity_factor*/, FrameWorkspace& /*workspace*/) const noexcept {
+    return nullptr;
+  }
+  virtual const Eigen::VectorXd* gyroscopic_product(double /*velocity_factor*/, const Eigen::VectorXd& /*x*/,
+                                                    FrameWorkspace& /*workspace*/) const noexcept {
+    return nullptr;
+  }
+  /// Where the step has no solution: takes a motion that always exists instead. False where there is none.
+  virtual bool fall_back(const FrameStep& /*step*/, FrameWorkspace& /*workspace*/) const noexcept { return false; }
+
+  /// Takes the solution: q and v are those of the end of the step, `a` [r] = rate (v - ...) so far.
+  virtual void commit(const WorldLoads& /*loads*/, double /*rate*/, const Eigen::VectorXd& /*q*/,
+                      const Eigen::VectorXd& /*v*/, Eigen::VectorXd& /*a*/, FrameWorkspace& /*workspace*/,
+                      FrameState& /*state*/) const noexcept {}
+
+  // ---- A step near obstacles, by backward Euler, in the unknowns x = (rigid unknowns of the frame, q - q_n).
+
+  /// How many unknowns the frame has: 6 where contacts move it (d [m] and the rotation vector t [rad] of the step),
+  /// else none.
+  virtual Eigen::Index rigid_unknowns() const noexcept { return 0; }
+  /// Takes the frame's motion as unknowns, from those of free flight at q [r], into the head of x.
+  virtual void begin_contact(const FrameState& /*state*/, const Eigen::VectorXd& /*q*/, double /*time_step*/,
+                             FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*x*/) const noexcept {}
+  /// Where it stands at x, at the end of the step.
+  virtual Placement place(const Eigen::VectorXd& /*x*/, FrameWorkspace& /*workspace*/) const noexcept { return {}; }
+  /// Inertia of the unknowns, less the work of the contacts' force [N] and torque [N m, about the centre of mass]:
+  /// value, and with `gradient` its head. That of t is exact in the gradient, a quadratic form and a frozen rest in the
+  /// value.
+  virtual double rigid_potential(const Eigen::VectorXd& /*x*/, FrameWorkspace& /*workspace*/) const noexcept {
+    return 0;
+  }
+  virtual void rigid_gradient(const Eigen::VectorXd& /*x*/, const FrameMomenta& /*contact*/,
+                              FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*gradient*/) const noexcept {}
+  /// Change of the value where the gradient last asked for becomes that of the iterate.
+  virtual double accept_rigid(FrameWorkspace& /*workspace*/) const noexcept { return 0; }
+  /// Adds the stiffness of contacts about world axes [(6 + r) x (6 + r), lower triangle; used up] as the unknowns have
+  /// it, and the frame's inertia.
+  virtual void add_rigid_hessian(const Eigen::VectorXd& /*x*/, const Placement& /*placement*/,
+                                 Eigen::MatrixXd& /*contact_stiffness*/, FrameWorkspace& /*workspace*/,
+                                 Eigen::MatrixXd& /*hessian*/) const noexcept {}
+  /// A force [N] in the units of the residual [kg^1/2 m/s^2].
+  virtual double residual_of(const Eigen::Vector3d& /*force*/) const noexcept { return 0; }
+  /// Pose and momenta of the solution x. Momenta come from the contacts' force and torque; where those are not balanced
+  /// for want of convergence, from the way that the body went, and `force` becomes what that took.
+  virtual void end_contact(const Eigen::VectorXd& /*x*/, bool /*converged*/, const Eigen::Vector3d& /*torque*/,
+                           const FrameState& /*state*/, FrameWorkspace& /*workspace*/,
+                           Eigen::Vector3d& /*force*/) const noexcept {}
+};
+
+/// The world itself: a body whose fixed vertices stay where they are.
+class ClampedFrame final : public BodyFrame {};
+
+/// Of the bundle's body: free where it has /rigid, unless a motion carries its fixed part. `carried` takes spin_load of
+/// `rigid`; gravity_load [3 x r].
+std::shared_ptr<const BodyFrame> make_frame(const RigidData* rigid, bool carried, const RowMatrix& gravity_load);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,310 @@
+#include "runtime/sim/frame/free_frame.h"
+
+#include <Eigen/LU>
+#include <cmath>
+
+namespace exmat::runtime {
+namespace {
+
+FreeState& own(FrameState& state) { return *std::get_if<FreeState>(&state); }
+const FreeState& own(const FrameState& state) { return *std::get_if<FreeState>(&state); }
+FreeMotionWorkspace& own(FrameWorkspace& workspace) { return *std::get_if<FreeMotionWorkspace>(&workspace); }
+const FreeMotionWorkspace& own(const FrameWorkspace& workspace) {
+  return *std::get_if<FreeMotionWorkspace>(&workspace);
+}
+
+}  // namespace
+
+// ---- Its state ------------------------------------------------------------------------------------------------------
+
+FrameState FreeFrame::make_state() const {
+  FreeState body;
+  body.mass = inertia_.mass();
+  body.momentum = body.momentum_previous = Eigen::VectorXd::Zero(inertia_.modes());
+  return body;
+}
+
+void FreeFrame::follow(const WorldLoads& /*loads*/, double /*time*/, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                       FrameWorkspace& workspace, FrameState& state) const noexcept {
+  set_motion(motion(state), q, v, workspace, state);
+}
+
+bool FreeFrame::set_motion(const FrameMotion& motion, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                           FrameWorkspace& workspace, FrameState& state) const noexcept {
+  FreeState& body = own(state);
+  DeformingInertia::Moments& moments = own(workspace).moments;
+  inertia_.moments(q, moments);
+  body.position = motion.position;
+  body.orientation = motion.orientation.normalized();
+  body.spin = body.orientation.conjugate() * motion.angular_velocity;
+  body.linear_momentum = body.mass * motion.linear_velocity;
+  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation.transpose() * v);
+  body.momentum = v + moments.deformation.lazyProduct(body.spin);
+  body.momentum_previous = body.momentum;
+  return true;
+}
+
+Placement FreeFrame::placement(const FrameState& state) const noexcept {
+  const FreeState& body = own(state);
+  return {origin(), origin() + body.position, body.orientation.toRotationMatrix()};
+}
+
+FrameVelocity FreeFrame::velocity(const FrameState& state) const noexcept {
+  const FreeState& body = own(state);
+  return {body.linear_momentum / body.mass, body.orientation.toRotationMatrix() * body.spin};
+}
+
+FrameMotion FreeFrame::motion(const FrameState& state) const noexcept {
+  const FreeState& body = own(state);
+  return {body.position, body.orientation, body.linear_momentum / body.mass, body.orientation * body.spin};
+}
+
+std::optional<FrameMomenta> FreeFrame::momenta(const FrameState& state) const noexcept {
+  return FrameMomenta{own(state).linear_momentum, own(state).angular_momentum};
+}
+
+double FreeFrame::turn_rate(const FrameState& state) const noexcept { return own(state).spin.norm(); }
+
+const Eigen::VectorXd& FreeFrame::momentum(const Eigen::VectorXd& /*v*/, const FrameState& state) const noexcept {
+  return own(state).momentum;
+}
+
+const Eigen::VectorXd& FreeFrame::former_momentum(const Eigen::VectorXd& /*v_previous*/,
+                                                  const FrameState& state) const noexcept {
+  return own(state).momentum_previous;
+}
+
+double FreeFrame::kinetic_energy(const Eigen::VectorXd& v, const FrameState& state) const noexcept {
+  const FreeState& body = own(state);
+  // w . l = w . (J w + h) and (pi - v) . v = w . h.
+  const Eigen::Vector3d l = body.orientation.conjugate() * body.angular_momentum;
+  double energy = 0.5 * v.squaredNorm();
+  energy += 0.5 * body.linear_momentum.squaredNorm() / body.mass;
+  energy += 0.5 * (body.spin.dot(l) + (body.momentum - v).dot(v));
+  return energy;
+}
+
+double FreeFrame::potential_energy(const Eigen::Vector3d& gravity, const FrameState& state) const noexcept {
+  return -(own(state).mass * gravity.dot(own(state).position));
+}
+
+BodyFrame::Coordinates FreeFrame::coordinates(const FrameState& state) const noexcept {
+  const FreeState& body = own(state);
+  Coordinates coordinates(13);
+  coordinates << body.position, body.orientation.coeffs(), body.linear_momentum, body.angular_momentum;
+  return coordinates;
+}
+
+void FreeFrame::apply(const Eigen::Vector3d& force, const Eigen::Vector3d& torque, FrameState& state) const noexcept {
+  own(state).applied_force += force;
+  own(state).applied_torque += torque;
+}
+
+void FreeFrame::clear_forces(FrameState& state) const noexcept {
+  own(state).applied_force.setZero();
+  own(state).applied_torque.setZero();
+}
+
+Eigen::Vector3d FreeFrame::slow_down(double share, FrameState& state) const noexcept {
+  FreeState& body = own(state);
+  const Eigen::Vector3d before = body.linear_momentum;
+  body.linear_momentum *= share;
+  body.angular_momentum *= share;
+  body.spin *= share;
+  body.momentum *= share;
+  return before;
+}
+
+// ---- A step ---------------------------------------------------------------------------------------------------------
+
+/// Scripted forces act on its momenta first, in move().
+void FreeFrame::begin(const FrameStep& step, FrameWorkspace& /*workspace*/,
+                      Eigen::VectorXd& external_force) const noexcept {
+  external_force = step.applied_force;
+  external_force += step.loads.gravity_force;
+}
+
+/// Scripted forces act where the body would be at the middle of the step by its spin. The centre of mass is exact for
+/// them, away from obstacles.
+void FreeFrame::move(const FrameStep& step, bool near, bool dissipative, const FrameState& state,
+                     FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept {
+  FreeState& body = own(workspace).moved;
+  body = own(state);
+  const double dt = step.time_step, mass = inertia_.mass();
+  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
+  Eigen::Vector3d force = mass * step.loads.gravity + body.applied_force, torque = body.applied_torque;
+  for (const ScriptedForce& scripted : step.loads.forces) {
+    if (!scripted.acts_at(step.midpoint())) continue;
+    const Eigen::Vector3d local = rotation.transpose() * scripted.total;
+    const Eigen::Vector3d arm = scripted.lever + scripted.mean_basis * step.q;
+    force += scripted.total;
+    torque += rotation * arm.cross(local);
+    external_force.noalias() += scripted.mean_basis.transpose() * local;
+  }
+  // Forces that contacts balance have to act on the position as those do.
+  const double share = near ? 1 : 0.5;
+  body.position += dt / mass * (body.linear_momentum + share * dt * force);
+  body.linear_momentum += dt * force;
+  body.angular_momentum += dt * torque;
+  begin_rotation(body, dt, dissipative, own(workspace));
+}
+
+void FreeFrame::add_start_force(const FrameStep& step, const FrameState& state, FrameWorkspace& workspace,
+                                Eigen::VectorXd& force) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  free.velocity = step.v;
+  free.solution.spin = own(state).spin;
+  inertia_.moments(step.q, free.moments);
+  rotation_force(inertia_, 0, free);
+  force += free.force;
+}
+
+bool FreeFrame::update_force(const Eigen::VectorXd& q, double velocity_factor, const Eigen::VectorXd& velocity_centre,
+                             FrameWorkspace& workspace) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  free.velocity = velocity_factor * (q - velocity_centre);
+  const bool found = update_spin(inertia_, q, free);
+  rotation_force(inertia_, velocity_factor, free);
+  return found;
+}
+
+const Eigen::VectorXd* FreeFrame::force(const FrameWorkspace& workspace) const noexcept {
+  return &own(workspace).force;
+}
+
+void FreeFrame::add_stiffness(double velocity_factor, FrameWorkspace& workspace,
+                              Eigen::MatrixXd& hessian) const noexcept {
+  add_rotation_stiffness(inertia_, velocity_factor, own(workspace), hessian);
+}
+
+double FreeFrame::gyroscopic_ratio(double velocity_factor, const FrameWorkspace& workspace) const noexcept {
+  return 2 * own(workspace).solution.spin.norm() / velocity_factor;
+}
+
+const Eigen::MatrixXd* FreeFrame::gyroscopic(double velocity_factor, FrameWorkspace& workspace) const noexcept {
+  set_gyroscopic(inertia_, velocity_factor, own(workspace));
+  return &own(workspace).gyroscopic;
+}
+
+const Eigen::VectorXd* FreeFrame::gyroscopic_product(double velocity_factor, const Eigen::VectorXd& x,
+                                                     FrameWorkspace& workspace) const noexcept {
+  runtime::gyroscopic_product(inertia_, velocity_factor, x, own(workspace));
+  return &own(workspace).product;
+}
+
+bool FreeFrame::fall_back(const FrameStep& step, FrameWorkspace& workspace) const noexcept {
+  turn_rigidly(inertia_, step.q, step.v, step.time_step, own(workspace));
+  return true;
+}
+
+void FreeFrame::commit(const WorldLoads& /*loads*/, double rate, const Eigen::VectorXd& /*q*/, const Eigen::VectorXd& v,
+                       Eigen::VectorXd& a, FrameWorkspace& workspace, FrameState& state) const noexcept {
+  commit_free_motion(rate, v, own(workspace), a, own(state));
+}
+
+// ---- Near obstacles -------------------------------------------------------------------------------------------------
+
+void FreeFrame::begin_contact(const FrameState& state, const Eigen::VectorXd& q, double time_step,
+                              FrameWorkspace& workspace, Eigen::VectorXd& x) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  free.spin_is_given = true;
+  x.segment<3>(3) = free.solution.rotation;
+  inertia_.moments(q, free.moments);
+  free.unknowns.time_step = time_step;
+  free.unknowns.start_rotation = own(state).orientation.toRotationMatrix();
+  free.unknowns.start_inertia = free.moments.inertia;
+  free.unknowns.expected_turn = free.solution.rotation;
+  free.unknowns.frozen_turn.setZero();
+  free.unknowns.next_frozen_turn.setZero();
+}
+
+Placement FreeFrame::place(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  const Eigen::Vector3d turn = x.segment<3>(3);
+  free.solution.rotation = turn;
+  free.solution.spin = turn / free.unknowns.time_step;
+  return {origin(), origin() + free.moved.position + x.head<3>(), free.unknowns.start_rotation * rotation_of(turn)};
+}
+
+double FreeFrame::rigid_potential(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept {
+  const RigidUnknowns& unknowns = own(workspace).unknowns;
+  const double dt = unknowns.time_step;
+  const Eigen::Vector3d d = x.head<3>(), t = x.segment<3>(3);
+  const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (dt * dt);
+  return 0.5 * inertia_.mass() / (dt * dt) * d.squaredNorm() + 0.5 * (t - unknowns.expected_turn).dot(quadratic) +
+         unknowns.frozen_turn.dot(t);
+}
+
+void FreeFrame::rigid_gradient(const Eigen::VectorXd& x, const FrameMomenta& contact, FrameWorkspace& workspace,
+                               Eigen::VectorXd& gradient) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  RigidUnknowns& unknowns = free.unknowns;
+  const double dt = unknowns.time_step, mass = inertia_.mass();
+  const Eigen::Vector3d d = x.head<3>(), t = x.segment<3>(3);
+  const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (dt * dt);
+  const Eigen::Matrix3d turn = rotation_of(t);
+  const Eigen::Vector3d momentum =
+      free.moments.inertia * free.solution.spin + free.moments.deformation.transpose() * free.velocity;
+  const Eigen::Matrix3d to_turn = right_jacobian(t).transpose();
+  const Eigen::Vector3d inertia = to_turn * ((momentum - turn.transpose() * free.problem.momentum) / dt);
+  unknowns.next_frozen_turn = inertia - quadratic;
+  gradient.head<3>() = mass / (dt * dt) * d - contact.linear;
+  gradient.segment<3>(3) =
+      inertia - to_turn * (turn.transpose() * (unknowns.start_rotation.transpose() * contact.angular));
+}
+
+double FreeFrame::accept_rigid(FrameWorkspace& workspace) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  RigidUnknowns& unknowns = free.unknowns;
+  const double change = (unknowns.next_frozen_turn - unknowns.frozen_turn).dot(free.solution.rotation);
+  unknowns.frozen_turn = unknowns.next_frozen_turn;
+  return change;
+}
+
+void FreeFrame::add_rigid_hessian(const Eigen::VectorXd& x, const Placement& placement,
+                                  Eigen::MatrixXd& contact_stiffness, FrameWorkspace& workspace,
+                                  Eigen::MatrixXd& hessian) const noexcept {
+  const FreeMotionWorkspace& free = own(workspace);
+  const double dt = free.unknowns.time_step;
+  // The contacts turn about world axes, the unknown t is a rotation vector.
+  const Eigen::Matrix3d to_world = placement.rotation * right_jacobian(x.segment<3>(3));
+  Eigen::MatrixXd& K = contact_stiffness;
+  K.triangularView<Eigen::StrictlyUpper>() = K.transpose();
+  for (Eigen::Index i = 0; i < K.rows(); ++i) {
+    const Eigen::RowVector3d row = K.block<1, 3>(i, 3) * to_world;
+    K.block<1, 3>(i, 3) = row;
+  }
+  for (Eigen::Index j = 0; j < K.cols(); ++j) {
+    const Eigen::Vector3d column = to_world.transpose() * K.block<3, 1>(3, j);
+    K.block<3, 1>(3, j) = column;
+  }
+  hessian.triangularView<Eigen::Lower>() += K;
+  hessian.diagonal().head<3>().array() += inertia_.mass() / (dt * dt);
+  hessian.block<3, 3>(3, 3).triangularView<Eigen::Lower>() += free.moments.inertia / (dt * dt);
+  hessian.block(6, 3, inertia_.modes(), 3) += free.moments.deformation / (dt * dt);
+}
+
+double FreeFrame::residual_of(const Eigen::Vector3d& force) const noexcept {
+  return force.norm() / std::sqrt(inertia_.mass());
+}
+
+void FreeFrame::end_contact(const Eigen::VectorXd& x, bool converged, const Eigen::Vector3d& torque,
+                            const FrameState& state, FrameWorkspace& workspace, Eigen::Vector3d& force) const noexcept {
+  FreeMotionWorkspace& free = own(workspace);
+  FreeState& body = free.moved;
+  const double dt = free.unknowns.time_step;
+  body.position += x.head<3>();
+  const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
+  const Eigen::Vector3d deformation = free.moments.deformation.transpose() * free.velocity;
+  if (converged) {
+    body.angular_momentum += dt * torque;
+    free.solution.spin = free.moments.inertia.inverse() * (rotation.transpose() * body.angular_momentum - deformation);
+  } else {
+    force = body.mass / (dt * dt) * x.head<3>();
+    free.solution.spin = free.solution.rotation / dt;
+    body.angular_momentum = rotation * (free.moments.inertia * free.solution.spin + deformation);
+  }
+  body.linear_momentum += dt * force;
+}
+
+}  // namespace exmat::runtime

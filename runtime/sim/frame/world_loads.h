@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "runtime/sim/frame/motion.h"
+
+namespace exmat::runtime {
+
+/// A constant world-space force on each of some vertices that acts in every step whose midpoint lies in [start, end).
+struct ScriptedForce {
+  Eigen::VectorXd force;                                 ///< [r] generalised, of a body that stays where it is
+  double start = 0;                                      ///< [s]
+  double end = std::numeric_limits<double>::infinity();  ///< [s]
+  Eigen::Vector3d total = Eigen::Vector3d::Zero();       ///< sum over the vertices [N]
+  Eigen::Vector3d lever = Eigen::Vector3d::Zero();       ///< mean of the vertices' X about the centre of mass [m]
+  Eigen::Matrix3Xd mean_basis{};                         ///< [3 x r] mean of their U; these three for a body that moves
+
+  bool acts_at(double time) const noexcept { return start <= time && time < end; }
+};
+
+/// What acts on a body from outside, but for what it touches and what its host applies.
+struct WorldLoads {
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; moves a free body
+  Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
+  std::vector<ScriptedForce> forces;
+  std::optional<RigidMotion> carrier;  ///< of a body that is carried: what carries its fixed part
+};
+
+}  // namespace exmat::runtime
