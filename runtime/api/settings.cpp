@@ -16,6 +16,7 @@ namespace {
 using Json = nlohmann::json;
 
 static_assert(kSettingsSizes.now >= kSettingsSizes.first && kReportSizes.now >= kReportSizes.first);
+static_assert(kMotionSizes.now >= kMotionSizes.first && kEnergiesSizes.now >= kEnergiesSizes.first);
 
 constexpr std::array kIntegrators{"bdf2", "backward_euler", "newmark"};
 constexpr std::array kInternalForces{"auto", "cubature", "polynomial"};

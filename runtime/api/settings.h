@@ -13,6 +13,8 @@ struct StructSizes {
 };
 inline constexpr StructSizes kSettingsSizes{120, sizeof(exmat_settings)};
 inline constexpr StructSizes kReportSizes{80, sizeof(exmat_report)};
+inline constexpr StructSizes kMotionSizes{112, sizeof(exmat_motion)};
+inline constexpr StructSizes kEnergiesSizes{32, sizeof(exmat_energies)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
 
 /// The defaults of a scene file.

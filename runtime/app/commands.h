@@ -4,13 +4,15 @@
 #include <filesystem>
 #include <optional>
 
+#include "runtime/scene/scene_run.h"
+
 namespace exmat::runtime {
 
-struct RunOptions {
+struct RunCommandOptions {
   std::filesystem::path scene;
   std::optional<std::filesystem::path> trajectory;  ///< instead of the scene's
   std::optional<std::int64_t> steps;                ///< instead of the scene's
-  bool profile = false;
+  RunOptions run;
 };
 
 struct BenchCommandOptions {
@@ -26,7 +28,7 @@ struct ExportOptions {
 };
 
 // The commands of exmat-runtime: results on stdout, logs and progress on stderr; failures are InputError or WorkError.
-void run_command(const RunOptions& options);
+void run_command(const RunCommandOptions& options);
 void bench_command(const BenchCommandOptions& options);
 void export_command(const ExportOptions& options);
 void info_command(const std::filesystem::path& bundle);

@@ -14,14 +14,17 @@ int main(int argc, char** argv) {
   CommonOptions common;
   add_common_options(app, common);
 
-  runtime::RunOptions options;
+  runtime::RunCommandOptions options;
   CLI::App& run = *app.add_subcommand("run", "Step a scene on its bundle");
   run.add_option("scene", options.scene, "SCENE.json")->required();
   run.add_option("-o,--output", options.trajectory,
                  "Trajectory (HDF5; an .xdmf comes beside it), instead of the scene's");
   const CLI::Range step_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
   run.add_option("--steps", options.steps, "Number of steps, instead of the scene's")->check(step_range);
-  run.add_flag("--profile", options.profile, "Print the time of each stage");
+  run.add_flag("--profile", options.run.profiled, "Print the time of each stage");
+  run.add_option("--from-state", options.run.from_state, "Begin at the state of this file, which --dump-state wrote");
+  run.add_option("--dump-state", options.run.dump_state,
+                 "File for the state at the end, or before a step that fails: the run goes on from it to the last bit");
 
   runtime::BenchCommandOptions bench_options;
   CLI::App& bench = *app.add_subcommand("bench", "Step a scene without output and say how fast each stage is");

@@ -52,19 +52,20 @@ void print_profile(const RunSummary& summary) {
 
 }  // namespace
 
-void run_command(const RunOptions& options) {
+void run_command(const RunCommandOptions& options) {
   SceneConfig config = load_scene(options.scene);
   if (options.trajectory) config.trajectory = options.trajectory;
   if (options.steps) config.steps = *options.steps;
   const LoadedScene loaded = load_run(config);
   log_loaded(loaded, config);
-  const RunSummary summary = run(loaded, config, options.profile);
+  const RunSummary summary = run(loaded, config, options.run);
   if (summary.unconverged_steps > 0)
     log::warning(
         fmt::format("{} of {} steps did not reach the tolerance {:g} (target included); a smaller time_step or more "
                     "newton.max_iterations may help",
                     summary.unconverged_steps, summary.steps * summary.bodies, config.newton.tolerance));
   print_summary(summary, loaded, config);
+  if (options.run.dump_state) print("state", options.run.dump_state->string());
   print_profile(summary);
 }
 

@@ -6,6 +6,7 @@
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/output/trajectory.h"
+#include "runtime/scene/state_file.h"
 
 namespace exmat::runtime {
 namespace {
@@ -67,34 +68,41 @@ void require_finite(const Bodies& bodies, const SceneConfig& config) {
       config.time_step));
 }
 
-RunSummary run(const LoadedScene& loaded, const SceneConfig& config, bool profiled) {
+RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOptions& options) {
   Bodies bodies = make_bodies(loaded, config);
-  bodies.set_profiled(profiled);
+  if (options.from_state) read_states(*options.from_state, loaded, bodies);
+  bodies.set_profiled(options.profiled);
   const State& shown = bodies[0];
-  RunSummary summary = empty_summary(config.steps, bodies, profiled);
+  const std::int64_t first = shown.step;
+  RunSummary summary = empty_summary(config.steps, bodies, options.profiled);
   const auto trajectory = open_trajectory(loaded, config);
-  if (trajectory) trajectory->append(shown, energies(*loaded.model, loaded.scene, shown), 0);
+  const auto append = [&](double seconds) {
+    trajectory->append(shown, energies(*loaded.model, loaded.scene, shown), seconds);
+  };
+  if (trajectory) append(0);
 
   Progress progress("steps", config.steps);
-  while (shown.step < config.steps) {
+  while (shown.step - first < config.steps) {
     const Timer timer;
     const std::span<const StepReport> reports = bodies.step();
     const double seconds = timer.seconds();
+    if (options.dump_state && bodies.first_non_finite()) write_states(bodies, loaded, *options.dump_state);
     require_finite(bodies, config);
     add_reports(reports, seconds, summary);
     Profile output;
-    if (trajectory && shown.step % config.every == 0) {
-      const StageTimer stage(profiled ? &output : nullptr, Stage::kOutput);
-      trajectory->append(shown, energies(*loaded.model, loaded.scene, shown), seconds / bodies.count());
+    if (trajectory && (shown.step - first) % config.every == 0) {
+      const StageTimer stage(options.profiled ? &output : nullptr, Stage::kOutput);
+      append(seconds / bodies.count());
     }
-    if (profiled) add_profile(bodies.take_measured().profile, output, bodies.count(), *summary.stage_seconds);
+    if (options.profiled) add_profile(bodies.take_measured().profile, output, bodies.count(), *summary.stage_seconds);
     progress.advance();
   }
   if (trajectory) {
     trajectory->finish();
     summary.largest_displacement = trajectory->largest_displacement();
   }
-  summary.simulated_seconds = shown.time;
+  if (options.dump_state) write_states(bodies, loaded, *options.dump_state);
+  summary.simulated_seconds = static_cast<double>(config.steps) * config.time_step;
   summary.energies = energies(*loaded.model, loaded.scene, shown);
   summary.state_hash = bodies.hash();
   return summary;

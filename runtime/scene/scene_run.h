@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <filesystem>
 #include <optional>
 
 #include "runtime/scene/bodies.h"
@@ -28,10 +29,16 @@ struct RunSummary {
   std::optional<std::array<Samples, kStageNames.size()>> stage_seconds;
 };
 
-/// Steps the bodies of a loaded scene from rest and writes the trajectory of the first, if it names one. Throws
-/// WorkError where a state becomes non-finite (see require_finite; no trajectory is left) or the trajectory cannot be
-/// written.
-RunSummary run(const LoadedScene& loaded, const SceneConfig& config, bool profiled);
+struct RunOptions {
+  bool profiled = false;                              ///< measure each stage
+  std::optional<std::filesystem::path> from_state{};  ///< a state file to begin at, instead of the scene's start
+  std::optional<std::filesystem::path> dump_state{};  ///< a state file to write at the end, or before a bad step
+};
+
+/// Steps the bodies of a loaded scene from its start, as many steps as it says, and writes the trajectory of the first,
+/// if it names one. Throws WorkError where a state becomes non-finite (see require_finite; no trajectory is left) or a
+/// file cannot be written, InputError where the state file does not fit.
+RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOptions& options = {});
 
 /// The scene's bodies as they start; refers to `loaded`.
 Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config);

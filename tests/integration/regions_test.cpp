@@ -209,7 +209,7 @@ TEST_F(Regions, HaveTheirWeightsInTheTrajectory) {
                                              {"steps", 3},
                                              {"output", {{"trajectory", "run.h5"}, {"every", 1}}}}));
   const auto loaded = runtime::load_run(config);
-  runtime::run(loaded, config, false);
+  runtime::run(loaded, config);
   auto file = Hdf5File::open(folder_.path("run.h5"));
   EXPECT_TRUE(file.has_dataset("/regions/outer/weights"));
   EXPECT_FALSE(file.has_group("/examples"));

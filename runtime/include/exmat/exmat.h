@@ -182,20 +182,20 @@ EXMAT_API exmat_status exmat_bodies_step(exmat_body* const* bodies, int64_t coun
                                          int32_t threads) EXMAT_NOEXCEPT;
 
 /* Of the last call that stepped this body. */
-EXMAT_API exmat_status exmat_body_report(const exmat_body* body, exmat_report* report) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report) EXMAT_NOEXCEPT;
 
 /* Adds `forces` [coordinates = 3k] [N] on the points, constant in the world, to those that act in every step from now
-   on. Points of another model and forces that are not finite are refused. */
+   on. Points of another model and forces that are not finite are refused. A free body's forces act at where the points
+   are when this is called: their sum and their torque about the centre of mass stay in the world, what they do to the
+   shape turns with the body. Call it again as the body moves. */
 EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* points, const double* forces,
                                                int64_t coordinates) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
 
-/* A free body's forces act at where the points are when this is called: their sum and their torque about the centre of
-   mass stay in the world, what they do to the shape turns with the body. Call it again as the body moves. */
-
 /* How a free body moves, world frame: displacement of the centre of mass from rest [m], unit quaternion (w first),
    velocity of the centre of mass [m/s] and angular velocity [rad/s]. */
 typedef struct exmat_motion {
+  size_t size; /* sizeof(exmat_motion), set by the caller */
   double position[3];
   double orientation[4];
   double linear_velocity[3];
@@ -223,20 +223,22 @@ EXMAT_API exmat_status exmat_body_read_reduced(const exmat_body* body, double* q
                                                int64_t modes) EXMAT_NOEXCEPT;
 
 /* Example weights [count = K] of the last step, after the bias. */
-EXMAT_API exmat_status exmat_body_weights(const exmat_body* body, double* weights, int64_t count) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_weights(const exmat_body* body, double* weights, int64_t count) EXMAT_NOEXCEPT;
 
 /* The same of a region, 0 <= region < exmat_model_regions(). */
-EXMAT_API exmat_status exmat_body_region_weights(const exmat_body* body, int64_t region, double* weights,
-                                                 int64_t count) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_region_weights(const exmat_body* body, int64_t region, double* weights,
+                                                      int64_t count) EXMAT_NOEXCEPT;
 
+/* Of the last step. */
 typedef struct exmat_energies {
-  double kinetic;   /* [J] */
+  size_t size;      /* sizeof(exmat_energies), set by the caller */
+  double kinetic;   /* of the body in the world [J] */
   double elastic;   /* [J] */
   double potential; /* of gravity, 0 at rest [J] */
 } exmat_energies;
-EXMAT_API exmat_status exmat_body_energies(const exmat_body* body, exmat_energies* energies) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* energies) EXMAT_NOEXCEPT;
 
-/* [s]; negative where `body` is NULL. */
+/* Time of the body: its steps times the time step [s]; negative where `body` is NULL. */
 EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
 
 #ifdef __cplusplus

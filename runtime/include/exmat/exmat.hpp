@@ -151,7 +151,7 @@ class Body {
   exmat_report report() const {
     exmat_report report;
     report.size = sizeof report;
-    detail::check(exmat_body_report(get(), &report));
+    detail::check(exmat_body_read_report(get(), &report));
     return report;
   }
 
@@ -163,11 +163,16 @@ class Body {
   void restart_integrator() { detail::check(exmat_body_restart_integrator(get())); }
 
   exmat_motion motion() const {
-    exmat_motion motion{};
+    exmat_motion motion;
+    motion.size = sizeof motion;
     detail::check(exmat_body_read_motion(get(), &motion));
     return motion;
   }
-  void set_motion(const exmat_motion& motion) { detail::check(exmat_body_set_motion(get(), &motion)); }
+  /// Sets motion.size itself.
+  void set_motion(exmat_motion motion) {
+    motion.size = sizeof motion;
+    detail::check(exmat_body_set_motion(get(), &motion));
+  }
 
   /// `xyz` [3k].
   void read_positions(const Points& points, std::span<float> xyz) {
@@ -183,16 +188,17 @@ class Body {
   }
   /// `weights` [K].
   void read_weights(std::span<double> weights) const {
-    detail::check(exmat_body_weights(get(), weights.data(), detail::length(weights)));
+    detail::check(exmat_body_read_weights(get(), weights.data(), detail::length(weights)));
   }
   /// `weights` [K of the region].
   void read_region_weights(std::size_t region, std::span<double> weights) const {
     const auto index = static_cast<std::int64_t>(region);
-    detail::check(exmat_body_region_weights(get(), index, weights.data(), detail::length(weights)));
+    detail::check(exmat_body_read_region_weights(get(), index, weights.data(), detail::length(weights)));
   }
   exmat_energies energies() const {
     exmat_energies energies;
-    detail::check(exmat_body_energies(get(), &energies));
+    energies.size = sizeof energies;
+    detail::check(exmat_body_read_energies(get(), &energies));
     return energies;
   }
   double time() const noexcept { return exmat_body_time(get()); }

@@ -3,8 +3,10 @@
 #include <Eigen/Core>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "common/model/reduced_model.h"
 #include "runtime/sim/frame/carried_motion.h"
@@ -34,7 +36,7 @@ struct FrameStep {
 /// The frame that a body deforms in: how it moves in the world, what that adds to mass, force and Hessian of the
 /// reduced coordinates q, and how the body at rest becomes the body in the world. Clamped: the world itself. Free:
 /// moved by the body's momenta. Carried: moved by a prescribed motion. Immutable, part of a Model; what changes is in
-/// FrameState. No call allocates or throws, but for make_state() and make_workspace(). r modes.
+/// FrameState. No call allocates or throws, but for make_state(), make_workspace() and numbers(). r modes.
 ///
 /// A body of another kind of frame is a class here, with its state and its workspace among the alternatives above; a
 /// step, contact, trajectories and the API ask this interface alone.
@@ -96,6 +98,10 @@ class BodyFrame {
   /// What it integrates by itself, for hashes: c, the quaternion's x y z w, p, L of a free body.
   using Coordinates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 13, 1>;
   virtual Coordinates coordinates(const FrameState& /*state*/) const noexcept { return {}; }
+
+  /// All numbers of a state, for files, and a state of so many numbers.
+  virtual std::vector<double> numbers(const FrameState& /*state*/) const { return {}; }
+  virtual void set_numbers(std::span<const double> /*numbers*/, FrameState& /*state*/) const noexcept {}
 
   /// A force [N] and a torque about the centre of mass [N m] of the host, world, on the frame until clear_forces().
   virtual void apply(const Eigen::Vector3d& /*force*/, const Eigen::Vector3d& /*torque*/,

@@ -1,5 +1,7 @@
 #include "runtime/sim/frame/carried_frame.h"
 
+#include "runtime/sim/frame/frame_numbers.h"
+
 namespace exmat::runtime {
 namespace {
 
@@ -20,6 +22,13 @@ MotionSample sample_beside(const RigidMotion& motion, double time, double beside
 
 Placement placement_of(const MotionSample& sample) {
   return {Eigen::Vector3d::Zero(), sample.position, sample.rotation};
+}
+
+template <typename State, typename Visitor>
+void visit(State& state, Visitor& visitor) {
+  auto& frame = state.frame;
+  visitor(frame.position, frame.rotation, frame.linear_velocity, frame.angular_velocity, frame.linear_acceleration,
+          frame.angular_acceleration, state.kinetic_energy, state.potential_of_frame);
 }
 
 }  // namespace
@@ -54,6 +63,17 @@ double CarriedFrame::kinetic_energy(const Eigen::VectorXd& /*v*/, const FrameSta
 
 double CarriedFrame::potential_energy(const Eigen::Vector3d& /*gravity*/, const FrameState& state) const noexcept {
   return std::get_if<CarriedState>(&state)->potential_of_frame;
+}
+
+std::vector<double> CarriedFrame::numbers(const FrameState& state) const {
+  NumberWriter writer;
+  visit(*std::get_if<CarriedState>(&state), writer);
+  return writer.numbers;
+}
+
+void CarriedFrame::set_numbers(std::span<const double> numbers, FrameState& state) const noexcept {
+  NumberReader reader{numbers};
+  visit(*std::get_if<CarriedState>(&state), reader);
 }
 
 /// The motion at `sample`, and the external forces there.

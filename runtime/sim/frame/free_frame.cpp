@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "runtime/sim/frame/frame_numbers.h"
+
 namespace exmat::runtime {
 namespace {
 
@@ -11,6 +13,12 @@ const FreeState& own(const FrameState& state) { return *std::get_if<FreeState>(&
 FreeMotionWorkspace& own(FrameWorkspace& workspace) { return *std::get_if<FreeMotionWorkspace>(&workspace); }
 const FreeMotionWorkspace& own(const FrameWorkspace& workspace) {
   return *std::get_if<FreeMotionWorkspace>(&workspace);
+}
+
+template <typename Body, typename Visitor>
+void visit(Body& body, Visitor& visitor) {
+  visitor(body.position, body.orientation.coeffs(), body.linear_momentum, body.angular_momentum, body.spin,
+          body.applied_force, body.applied_torque, body.momentum, body.momentum_previous);
 }
 
 }  // namespace
@@ -93,6 +101,17 @@ BodyFrame::Coordinates FreeFrame::coordinates(const FrameState& state) const noe
   Coordinates coordinates(13);
   coordinates << body.position, body.orientation.coeffs(), body.linear_momentum, body.angular_momentum;
   return coordinates;
+}
+
+std::vector<double> FreeFrame::numbers(const FrameState& state) const {
+  NumberWriter writer;
+  visit(own(state), writer);
+  return writer.numbers;
+}
+
+void FreeFrame::set_numbers(std::span<const double> numbers, FrameState& state) const noexcept {
+  NumberReader reader{numbers};
+  visit(own(state), reader);
 }
 
 void FreeFrame::apply(const Eigen::Vector3d& force, const Eigen::Vector3d& torque, FrameState& state) const noexcept {

@@ -127,7 +127,7 @@ TEST_F(BenchTest, ARoundIsARunOfTheScene) {
     SceneConfig config = scene(kExamples + members);
     const BenchResult result = bench(load_run(config), config, {.steps = 17, .seconds = 0.02});
     config.steps = 17;
-    const RunSummary summary = run(load_run(config), config, false);
+    const RunSummary summary = run(load_run(config), config);
     EXPECT_EQ(result.steps, 17);
     EXPECT_EQ(result.instances, config.instances);
     EXPECT_EQ(result.threads, std::min(config.instances, omp_get_max_threads()));

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <algorithm>
+#include <cinttypes>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+
+#include "runtime/api/failures.h"
+#include "runtime/api/settings.h"
+
+namespace exmat::runtime {
+
+// Arguments of the functions of the C API.
+
+inline exmat_status null_argument(const char* function, const char* argument) {
+  return fail(EXMAT_INVALID_ARGUMENT, "%s: %s is NULL", function, argument);
+}
+
+inline exmat_status wrong_length(const char* function, const char* argument, std::int64_t found,
+                                 std::int64_t expected) {
+  return fail(EXMAT_INVALID_ARGUMENT, "%s: %s = %" PRId64 ": expected %" PRId64, function, argument, found, expected);
+}
+
+// Returns from the function that it stands in.
+#define EXMAT_REQUIRE(argument) \
+  if ((argument) == nullptr) return null_argument(__func__, #argument)
+#define EXMAT_REQUIRE_LENGTH(length, expected) \
+  if ((length) != static_cast<std::int64_t>(expected)) return wrong_length(__func__, #length, length, expected)
+
+inline bool all_finite(const double* numbers, std::int64_t count) {
+  return std::all_of(numbers, numbers + count, [](double number) { return std::isfinite(number); });
+}
+
+/// Whether a struct that a caller hands over begins with a size that some version of it has.
+inline exmat_status check_size(const char* function, std::size_t size, const StructSizes& sizes) noexcept {
+  if (sizes.first <= size && size <= kMostStructBytes) return EXMAT_OK;
+  return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected %zu, the sizeof of the struct", function, size,
+              sizes.now);
+}
+
+/// As much as a caller of another version knows.
+template <typename Struct>
+void give(Struct from, std::size_t size, Struct* to) noexcept {
+  from.size = size;
+  if (size > sizeof from) std::memset(static_cast<void*>(to), 0, size);
+  std::memcpy(static_cast<void*>(to), &from, std::min(size, sizeof from));
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,300 @@
+#include <algorithm>
+#include <cinttypes>
+#include <omp.h>
+#include <span>
+
+#include "common/core/timer.h"
+#include "exmat/exmat.h"
+#include "runtime/api/arguments.h"
+#include "runtime/api/handles.h"
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+/// Only one caller at a time may step a body.
+bool acquire(exmat_body& body) noexcept { return !body.in_use.test_and_set(std::memory_order_acquire); }
+void release(exmat_body& body) noexcept { body.in_use.clear(std::memory_order_release); }
+
+void add(const StepReport& step, exmat_report& sum) noexcept {
+  sum.status |= step.status;
+  sum.newton_iterations += step.newton_iterations;
+  sum.factorisations += step.factorisations;
+  sum.line_search_evaluations += step.line_search_evaluations;
+  sum.projections += step.projections;
+  sum.target_iterations += step.target_iterations;
+  sum.residual = step.residual;
+}
+
+void advance(exmat_body& body, std::int64_t steps) noexcept {
+  const Timer timer;
+  body.report = {};
+  while (body.report.steps < steps) {
+    const StepReport report = step(body.model(), body.scene, body.state, body.workspace);
+    add(report, body.report);
+    if ((report.status & kStepNonFinite) != 0) break;
+    ++body.report.steps;
+  }
+  body.report.seconds = timer.seconds();
+}
+
+bool non_finite(const exmat_body& body) noexcept { return (body.report.status & kStepNonFinite) != 0; }
+
+exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept {
+  return fail(EXMAT_NON_FINITE,
+              "%s: %s, step %" PRId64
+              " (t = %g s): NaN or infinity; the body is as it was before. Try a smaller "
+              "time_step (now %g s), smaller loads or example stiffness, or EXMAT_BACKWARD_EULER",
+              function, which, body.state.step + 1, body.state.time + body.scene.time_step, body.scene.time_step);
+}
+
+void put_to_rest(exmat_body& body) noexcept {
+  body.state = body.start;  // vectors of the same lengths: no allocation
+  body.report = {};
+}
+
+}  // namespace
+
+exmat_body::exmat_body(std::shared_ptr<const Source> its_source)
+    : source(std::move(its_source)),
+      scene(source->loaded.scene),
+      start(source->loaded.start),
+      workspace(model(), scene),
+      drawing(VertexPositions::make_workspace(model().modes())),
+      force(Eigen::VectorXd::Zero(model().modes())) {
+  refresh_weights(model(), scene, start, workspace);
+  state = start;
+}
+
+exmat_status exmat_body_create(const exmat_model* model, exmat_body** body) noexcept {
+  EXMAT_REQUIRE(body);
+  *body = nullptr;
+  EXMAT_REQUIRE(model);
+  return guarded(__func__, [&] { *body = std::make_unique<exmat_body>(model->source).release(); });
+}
+
+void exmat_body_destroy(exmat_body* body) noexcept { delete body; }
+
+exmat_status exmat_body_reset(exmat_body* body) noexcept {
+  EXMAT_REQUIRE(body);
+  put_to_rest(*body);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const double* v, std::int64_t modes) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(q);
+  EXMAT_REQUIRE(v);
+  EXMAT_REQUIRE_LENGTH(modes, body->modes());
+  if (!all_finite(q, modes) || !all_finite(v, modes))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: q, v: expected finite numbers", __func__);
+  put_to_rest(*body);
+  State& state = body->state;
+  state.q = state.q_previous = Eigen::Map<const Eigen::VectorXd>(q, modes);
+  state.v = state.v_previous = Eigen::Map<const Eigen::VectorXd>(v, modes);
+  state.elastic_energy = body->model().internal_force.energy(state.q, body->workspace.elasticity);
+  follow_frame(body->model(), body->scene, state, body->workspace);
+  refresh_weights(body->model(), body->scene, state, body->workspace);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_step(exmat_body* body, std::int64_t steps, exmat_report* report) noexcept {
+  EXMAT_REQUIRE(body);
+  if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
+  if (report != nullptr)
+    if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
+  if (!acquire(*body)) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps this body", __func__);
+  advance(*body, steps);
+  const bool finite = !non_finite(*body);
+  if (report != nullptr) give(body->report, report->size, report);
+  const exmat_status status = finite ? EXMAT_OK : fail_non_finite(__func__, "body", *body);
+  release(*body);
+  return status;
+}
+
+exmat_status exmat_bodies_step(exmat_body* const* bodies, std::int64_t count, std::int64_t steps,
+                               std::int32_t threads) noexcept {
+  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
+  if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
+  if (threads < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: threads = %" PRId32 ": expected >= 0", __func__, threads);
+  if (count == 0) return EXMAT_OK;
+  EXMAT_REQUIRE(bodies);
+  const std::span all(bodies, static_cast<std::size_t>(count));
+  const auto null = std::ranges::find(all, nullptr);
+  if (null != all.end()) return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is NULL", __func__, null - all.begin());
+  const auto taken = std::ranges::find_if(all, [](exmat_body* body) { return !acquire(*body); });
+  if (taken != all.end()) {
+    std::for_each(all.begin(), taken, [](exmat_body* body) { release(*body); });
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is listed twice, or another thread steps it", __func__,
+                taken - all.begin());
+  }
+  const int wanted = threads > 0 ? threads : omp_get_num_procs();
+  const int used = static_cast<int>(std::min<std::int64_t>(wanted, count));
+#pragma omp parallel for schedule(dynamic) num_threads(used) if (used > 1)
+  for (std::int64_t i = 0; i < count; ++i) advance(*bodies[i], steps);
+  exmat_status status = EXMAT_OK;
+  const auto failed = std::ranges::find_if(all, [](const exmat_body* body) { return non_finite(*body); });
+  if (failed != all.end()) {
+    char which[40];
+    std::snprintf(which, sizeof which, "bodies[%td]", failed - all.begin());
+    status = fail_non_finite(__func__, which, **failed);
+  }
+  for (exmat_body* body : all) release(*body);
+  return status;
+}
+
+exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(report);
+  if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
+  give(body->report, report->size, report);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* points, const double* forces,
+                                     std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  EXMAT_REQUIRE(forces);
+  if (points->source != body->source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
+  const RowMatrix& rows = points->set.basis_rows;
+  if (rows.rows() == 0)
+    return fail(EXMAT_INVALID_ARGUMENT,
+                "%s: points of exmat_points_create_all_vertices() can only be read; create those to be pushed by "
+                "exmat_points_create_vertices()",
+                __func__);
+  EXMAT_REQUIRE_LENGTH(coordinates, rows.rows());
+  const BodyFrame& frame = *body->model().frame;
+  const Placement placement = frame.placement(body->state.frame);
+  Eigen::VectorXd& sum = body->force;
+  sum.setZero();
+  Eigen::Vector3d total = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
+  for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
+    const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
+    const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
+    const Eigen::Vector3d now = placement.to_world(points->set.rest.row(i / 3).transpose() + displacement);
+    total += force;
+    torque += (now - placement.position).cross(force);
+    sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
+  }
+  // A force that is not finite makes every sum so, unless it is where nothing moves.
+  if (!all_finite(forces, coordinates) || !sum.allFinite())
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
+  body->state.applied_force += sum;
+  frame.apply(total, torque, body->state.frame);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_clear_forces(exmat_body* body) noexcept {
+  EXMAT_REQUIRE(body);
+  body->state.applied_force.setZero();
+  body->model().frame->clear_forces(body->state.frame);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_restart_integrator(exmat_body* body) noexcept {
+  EXMAT_REQUIRE(body);
+  body->state.begins_anew = true;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* points, float* xyz,
+                                       std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  EXMAT_REQUIRE(xyz);
+  if (points->source != body->source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
+  EXMAT_REQUIRE_LENGTH(coordinates, 3 * points->set.positions.points());
+  points->set.positions.evaluate(body->state.q, body->drawing, xyz);
+  if (!body->model().frame->moves()) return EXMAT_OK;
+  const Placement placement = body->model().frame->placement(body->state.frame);
+  for (std::int64_t i = 0; i < coordinates; i += 3) {
+    Eigen::Map<Eigen::Vector3f> point(xyz + i);
+    point = placement.to_world(point.cast<double>()).cast<float>();
+  }
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(motion);
+  if (const exmat_status status = check_size(__func__, motion->size, kMotionSizes)) return status;
+  const FrameMotion now = body->model().frame->motion(body->state.frame);
+  exmat_motion found{};
+  for (int i = 0; i < 3; ++i) {
+    found.position[i] = now.position[i];
+    found.orientation[i + 1] = now.orientation.vec()[i];
+    found.linear_velocity[i] = now.linear_velocity[i];
+    found.angular_velocity[i] = now.angular_velocity[i];
+  }
+  found.orientation[0] = now.orientation.w();
+  give(found, motion->size, motion);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(motion);
+  if (const exmat_status status = check_size(__func__, motion->size, kMotionSizes)) return status;
+  FrameMotion wanted;
+  wanted.position = Eigen::Vector3d(motion->position);
+  wanted.linear_velocity = Eigen::Vector3d(motion->linear_velocity);
+  wanted.angular_velocity = Eigen::Vector3d(motion->angular_velocity);
+  const double* turn = motion->orientation;
+  wanted.orientation = Eigen::Quaterniond(turn[0], turn[1], turn[2], turn[3]);
+  const double length = wanted.orientation.norm();
+  const bool finite = wanted.position.allFinite() && wanted.linear_velocity.allFinite() &&
+                      wanted.angular_velocity.allFinite() && std::isfinite(length);
+  if (!finite || !(length > 0))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
+  State& state = body->state;
+  if (!body->model().frame->set_motion(wanted, state.q, state.v, body->workspace.frame, state.frame))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
+  body->state.begins_anew = true;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_reduced(const exmat_body* body, double* q, double* v, std::int64_t modes) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE_LENGTH(modes, body->modes());
+  if (q != nullptr) std::copy_n(body->state.q.data(), modes, q);
+  if (v != nullptr) std::copy_n(body->state.v.data(), modes, v);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_weights(const exmat_body* body, double* weights, std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE_LENGTH(count, body->model().example_count());
+  if (count == 0) return EXMAT_OK;
+  EXMAT_REQUIRE(weights);
+  std::copy_n(body->state.examples.front().weights.data(), count, weights);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_region_weights(const exmat_body* body, std::int64_t region, double* weights,
+                                            std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  const ExampleModel* examples = body->model().region(region);
+  if (examples == nullptr)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: region = %" PRId64 ": expected one of the model's %" PRId64, __func__,
+                region, static_cast<std::int64_t>(body->model().region_count()));
+  EXMAT_REQUIRE_LENGTH(count, examples->weights.examples());
+  EXMAT_REQUIRE(weights);
+  const auto force = static_cast<std::size_t>(examples - body->model().examples.data());
+  std::copy_n(body->state.examples[force].weights.data(), count, weights);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* result) noexcept {
+  EXMAT_REQUIRE(body);
+  if (result == nullptr) return null_argument(__func__, "energies");
+  if (const exmat_status status = check_size(__func__, result->size, kEnergiesSizes)) return status;
+  const Energies now = energies(body->model(), body->scene, body->state);
+  give(exmat_energies{0, now.kinetic, now.elastic, now.potential}, result->size, result);
+  return EXMAT_OK;
+}
+
+double exmat_body_time(const exmat_body* body) noexcept { return body != nullptr ? body->state.time : -1; }
