@@ -41,10 +41,10 @@ struct ShapeStage {
   bool has_regions() const { return !groups.empty() && !groups.back().region.empty(); }
 };
 
-/// Computes the object's shape space and brings every example into it. method.md, sections 1 and 5; alignment.md.
-/// Eigenfunctions and registered poses come from the cache where it has them. `warnings` receives what is also logged
-/// as such. Refused alignments are in the stage, for require_aligned. Throws InputError (no file named where it is the
-/// asset's) and WorkError.
+/// Computes the object's shape space and brings every example into it. docs/method.md, "Shape space";
+/// docs/alignment.md. Eigenfunctions and registered poses come from the cache where it has them. `warnings` receives
+/// what is also logged as such. Refused alignments are in the stage, for require_aligned. Throws InputError (no file
+/// named where it is the asset's) and WorkError.
 ShapeStage build_shape_stage(const AssetConfig& asset, const ObjectInput& object, const ExampleInput& input,
                              StageCache& cache, std::vector<std::string>& warnings);
 

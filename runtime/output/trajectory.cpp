@@ -9,7 +9,7 @@
 #include "common/bundle/file_schemas.h"
 #include "common/mesh/geometry.h"
 #include "runtime/output/momentum.h"
-#include "runtime/output/world_vertices.h"
+#include "runtime/sim/frame/world_vertices.h"
 
 namespace exmat::runtime {
 namespace {

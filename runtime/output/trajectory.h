@@ -29,8 +29,8 @@ struct TrajectoryInfo {
 };
 
 /// Writes the trajectory of a body and an .xdmf beside it, and NAME_render.xdmf where the model holds /render.
-/// interfaces.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is left.
-/// Two equal runs give the same bytes except /step_time.
+/// docs/bundle_format.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is
+/// left. Two equal runs give the same bytes except /step_time.
 class TrajectoryWriter {
  public:
   /// `model` holds /object and the basis, perhaps /render, and outlives the writer, as the frame of the body does.

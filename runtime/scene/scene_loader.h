@@ -27,7 +27,7 @@ struct LoadedScene {
 /// element.
 LoadedScene load_run(const SceneConfig& config);
 
-/// The plan of the step: one line for each stage, with its sizes, or why it is left out. method.md, section 7.
+/// The plan of the step: one line for each stage, with its sizes, or why it is left out. docs/overview.md.
 std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneConfig& config);
 
 }  // namespace exmat::runtime

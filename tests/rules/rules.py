@@ -8,6 +8,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+sys.path.insert(0, str(Path(__file__).parent))
+from references import references  # noqa: E402
+
 TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "tests", "examples", "docs", "README.md", "LICENSE",
              "CHANGELOG.md", "CMakePresets.json", "install-dependencies"}
 # What may include what: from top to bottom, a folder sees itself and those below it.
@@ -164,7 +167,7 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, length, mirrored_tests, top_level,
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, length, mirrored_tests, references, top_level,
                                         formatting)}
 
 

@@ -50,6 +50,18 @@ PLANTED = [
     ("public_headers", "runtime/include/exmat/x.h", "#include <vector>\n"),
     ("length", "common/core/x.cpp", "// line\n" * 501),
     ("mirrored_tests", "tests/runtime/sim/nowhere/x_test.cpp", "\n"),
+    ("references", "common/core/x.h", "/// As method.md, section 3, says.\n"),
+    ("references", "common/core/x.h", "// See the page of\n// docs/nothing.md.\n"),
+    ("references", "common/core/x.cpp", "int x = 1;  // of common/core/nothing.h\n"),
+    ("references", "common/core/x.cpp", "// of nothing.h\n"),
+    ("references", "docs/x.md", "# X\n\n## One\n\nSee `docs/x.md`, \"Two\".\n"),
+    ("references", "docs/x.md", "# X\n\n## 1. One\n\nSee docs/x.md, section 2.\n"),
+    ("references", "docs/x.md", "[there](nothing.md)\n"),
+    ("references", "docs/x.md", "# X\n\n[there](#nothing)\n"),
+    ("references", "docs/x.md", "Call `exmat-runtime walk SCENE.json`.\n"),
+    ("references", "docs/x.md", "```\nexmat-runtime run SCENE.json --backwards\n```\n"),
+    ("references", "tests/rules/x.py", '"""As in docs/nothing.md."""\n'),
+    ("references", "tests/run.sh", "# as tests/nothing/at_all does\n"),
     ("top_level", "scratch/x.txt", "\n"),
     ("formatting", "common/core/x.cpp", "int  f( ) {return 1 ;}\n"),
 ]
@@ -63,6 +75,8 @@ HARMLESS = [
     ("runtime/include/exmat/x.h", "#include <stdint.h>\n"),
     ("runtime/include/exmat/x.hpp", '#include <vector>\n\n#include "exmat/exmat.h"\n'),
     ("common/core/x.cpp", "// line\n" * 500),
+    ("docs/x.md", "# X\n\n## 1. One (`docs`)\n\n[there](x.md#1-one-docs), docs/x.md, \"One\", docs/x.md, section 1, `docs/{x,x}.md`, NAME.vtk, docs/PAGE.md\n"),
+    ("common/core/x.h", "/// Of common/core/x.h, <vector.h> and x.h. A car.veg, tests/NAME.cpp.\n"),
 ]
 
 

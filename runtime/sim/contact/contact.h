@@ -45,7 +45,7 @@ struct ContactWorkspace {
   Eigen::MatrixXd factors;  ///< (6 + r) x some columns
 };
 
-/// Contact of a body's surface with obstacles, by the law of contact_law.h. method.md, section 6.
+/// Contact of a body's surface with obstacles, by the law of contact_law.h. docs/method.md, "Contact".
 ///
 /// One step: gather, freeze, then evaluate, potential and add_stiffness as often as needed, then evaluate at the
 /// accepted pose and commit. An obstacle that is thinner than a vertex moves in one step may be passed through.

@@ -8,7 +8,7 @@
 
 namespace exmat::runtime {
 
-// The law of contact of one vertex with one obstacle, for bodies of any description. method.md, section 6.
+// The law of contact of one vertex with one obstacle, for bodies of any description. docs/method.md, "Contact".
 //
 // With depth d, area A, kappa = A stiffness and the mean velocity v of the step relative to the obstacle, v h = x -
 // x_0, tau = damping / stiffness, a vertex feels

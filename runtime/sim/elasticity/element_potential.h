@@ -54,7 +54,8 @@ class ElementPotential {
   void stiffness(const ElementLaw& law, const Eigen::VectorXd& x, Tangent tangent, Workspace& workspace,
                  Eigen::MatrixXd& stiffness) const noexcept;
 
-  /// Floating-point operations: products with B, and half of the symmetric product B^T (D B). reduction.md, "Kernel".
+  /// Floating-point operations: products with B, and half of the symmetric product B^T (D B). docs/step_in_detail.md,
+  /// "Inner loops".
   double force_flops() const { return 36.0 * static_cast<double>(elements_ * modes_); }
   double stiffness_flops() const {
     return 162.0 * static_cast<double>(elements_ * modes_) +

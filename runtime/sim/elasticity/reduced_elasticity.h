@@ -22,8 +22,8 @@ struct WeightedLame {
   WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame);
 };
 
-/// Elasticity of a reduced body by cubature: E(q) = sum_j c_j Psi(I + B_j q), c_j = w_j V_j. method.md, section 6.
-/// s elements, r coordinates. Immutable; all scratch is the caller's, no call allocates or throws.
+/// Elasticity of a reduced body by cubature: E(q) = sum_j c_j Psi(I + B_j q), c_j = w_j V_j. docs/step_in_detail.md,
+/// "Internal force". s elements, r coordinates. Immutable; all scratch is the caller's, no call allocates or throws.
 class ReducedElasticity {
  public:
   using Workspace = ElementPotential::Workspace;

@@ -7,10 +7,9 @@
 
 namespace exmat::runtime {
 
-/// The exact reduced energy of St.Venant-Kirchhoff, a quartic polynomial of q [r]. reduction.md, "St.Venant-Kirchhoff
-/// without cubature error"; Barbic and James 2005. With K3 = C q and K4 = 1/2 D q q (PolynomialData):
-/// stiffness K + K3 + K4, force (K + K3/2 + K4/3) q, energy 1/2 q^T (K + K3/3 + K4/6) q. Immutable; all scratch is the
-/// caller's, no call allocates or throws.
+/// The exact reduced energy of St.Venant-Kirchhoff, a quartic polynomial of q [r]. docs/method.md, "Exact polynomial";
+/// Barbic and James 2005. With K3 = C q and K4 = 1/2 D q q (PolynomialData): stiffness K + K3 + K4, force (K + K3/2 +
+/// K4/3) q, energy 1/2 q^T (K + K3/3 + K4/6) q. Immutable; all scratch is the caller's, no call allocates or throws.
 class ReducedPolynomial {
  public:
   struct Workspace {

@@ -6,10 +6,10 @@
 
 namespace exmat::runtime {
 
-/// Example weights w(q): min 1/2 w^T G w - h(q)^T w subject to sum w = 1, w >= 0, h(q) = h0 + hq q. method.md,
-/// section 5. That is the point of the convex hull of the K examples nearest to the current descriptor, found exactly
-/// by the algorithm of Wolfe 1976 in Gram form, for any K and for repeated or affinely dependent examples.
-/// Deterministic; no call allocates or throws.
+/// Example weights w(q): min 1/2 w^T G w - h(q)^T w subject to sum w = 1, w >= 0, h(q) = h0 + hq q.
+/// docs/step_in_detail.md, "Weights". That is the point of the convex hull of the K examples nearest to the current
+/// descriptor, found exactly by the algorithm of Wolfe 1976 in Gram form, for any K and for repeated or affinely
+/// dependent examples. Deterministic; no call allocates or throws.
 class ExampleWeights {
  public:
   struct Workspace {
@@ -42,8 +42,8 @@ class ExampleWeights {
   RowMatrix hq_;          ///< (e_k - e_0)^T T
 };
 
-/// w_0 <- bias w_0, the rest of it shared equally among the others; nothing for K = 1. `bias` in [0, 1]. method.md,
-/// section 5.
+/// w_0 <- bias w_0, the rest of it shared equally among the others; nothing for K = 1. `bias` in [0, 1].
+/// docs/step_in_detail.md, "Weights".
 void apply_example_bias(double bias, Eigen::VectorXd& weights) noexcept;
 
 }  // namespace exmat::runtime

@@ -6,8 +6,8 @@
 
 namespace exmat::runtime {
 
-/// P_s = T^+ T [r x r], the low-pass filter of the shape space seen from the reduced space. method.md, section 4.
-/// Symmetric where density is uniform; otherwise its skew part has no potential.
+/// P_s = T^+ T [r x r], the low-pass filter of the shape space seen from the reduced space. docs/method.md, "Direct
+/// projection". Symmetric where density is uniform; otherwise its skew part has no potential.
 class ShapeFilter {
  public:
   ShapeFilter() = default;
@@ -24,7 +24,8 @@ class ShapeFilter {
 };
 
 /// The linear example force within one step, where qdot = c_v (q - q_v): f = -kappa P_s (q - p*) - c_kappa P_s qdot
-/// = -k P_s (q - q_c) + kappa P_s p*, k = kappa + c_kappa c_v, q_c = c_kappa c_v q_v / k. method.md, section 5.
+/// = -k P_s (q - q_c) + kappa P_s p*, k = kappa + c_kappa c_v, q_c = c_kappa c_v q_v / k. docs/step_in_detail.md, "The
+/// incremental potential".
 struct ExampleForce {
   double stiffness = 0;    ///< k > 0
   Eigen::VectorXd centre;  ///< q_c [r]

@@ -14,7 +14,7 @@
 
 namespace exmat::runtime {
 
-/// The undeformed shape of an example's energy. method.md, section 5.
+/// The undeformed shape of an example's energy. docs/step_in_detail.md, "Target".
 enum class EnergyReference {
   kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)
   kRest,     ///< E_k(p) = sum_j w_j V_j Psi(I + B_j (p - p_k))
@@ -24,8 +24,8 @@ enum class EnergyReference {
 EnergyReference energy_reference_from_name(std::string_view name);
 
 /// Target p*(w) = argmin_p sum_k w_k E_k(p) over p = Z y, Z [r x d] a basis of the range of T^+ in which the stiffness
-/// at rest is the identity, so that |y| is an energy norm. method.md, section 5. Immutable; no call of solve()
-/// allocates or throws.
+/// at rest is the identity, so that |y| is an energy norm. docs/step_in_detail.md, "Target". Immutable; no call of
+/// solve() allocates or throws.
 ///
 /// With F_jk as the undeformed shape, the Green strain of E_k is F_jk^-T (E - E_jk) F_jk^-1, linear in that of F_j(p):
 /// sum_k w_k E_k of St.Venant-Kirchhoff is one quadratic form of E for each element, whatever the number of examples.

@@ -9,8 +9,8 @@
 namespace exmat::runtime {
 
 /// The targets p*(w) of K >= 2 examples from a table, exact at the examples: one polynomial on the simplex of weights,
-/// so infinitely smooth, or for K = 2 several pieces, continuous with their slopes. method.md, section 5. Immutable; no
-/// evaluation allocates or throws.
+/// so infinitely smooth, or for K = 2 several pieces, continuous with their slopes. docs/method.md, "Table of targets".
+/// Immutable; no evaluation allocates or throws.
 class TargetTable {
  public:
   struct Workspace {

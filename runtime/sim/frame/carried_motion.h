@@ -12,7 +12,8 @@ namespace exmat::runtime {
 /// world. With w and w' the spin and its rate in the moving frame, W = sum_c w_c A_c, y = X + U q about the centre of
 /// mass c at rest and a_c the acceleration that the motion gives c,
 ///   qddot = 2 W qdot + W' q + d/dq (1/2 w^T J w) - (sum m X x U)^T w' + U^T M R^T (g - a_c) - f_int + ...,
-/// which are method.md's equations of a free body (section 6) with w given. r modes. No call allocates or throws.
+/// which are the equations of a free body (docs/step_in_detail.md, "Free bodies") with w given. r modes. No call
+/// allocates or throws.
 struct CarriedInertia {
   DeformingInertia moments;
   Eigen::Matrix3Xd spin_load;  ///< 3 x r, sum m X x U about the centre of mass

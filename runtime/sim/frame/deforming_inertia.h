@@ -7,9 +7,10 @@
 
 namespace exmat::runtime {
 
-/// Rotation of a free body x = c + R (X + U q) by its moments: no sum over vertices. method.md, section 6. r modes;
-/// body frame. Second moments P_ab(q) = P0_ab + p1_ab . q + q^T S_ab q, inertia J = tr(P) I - P, angular momentum of
-/// the deformation h_c = q^T A_c v, A_c = S_ab - S_ba with (c, a, b) cyclic. Immutable; no call allocates or throws.
+/// Rotation of a free body x = c + R (X + U q) by its moments: no sum over vertices. docs/step_in_detail.md, "Free
+/// bodies". r modes; body frame. Second moments P_ab(q) = P0_ab + p1_ab . q + q^T S_ab q, inertia J = tr(P) I - P,
+/// angular momentum of the deformation h_c = q^T A_c v, A_c = S_ab - S_ba with (c, a, b) cyclic. Immutable; no call
+/// allocates or throws.
 class DeformingInertia {
  public:
   /// What depends on q alone.

@@ -5,7 +5,7 @@
 namespace exmat::runtime {
 
 /// The frame of a free body: its centre of mass and the rotation that keeps its modes free of rigid motion, moved by
-/// the body's momenta. method.md, section 6.
+/// the body's momenta. docs/step_in_detail.md, "Free bodies".
 class FreeFrame final : public BodyFrame {
  public:
   explicit FreeFrame(const RigidData& data) : inertia_(data) {}

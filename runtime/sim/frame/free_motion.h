@@ -35,7 +35,7 @@ struct RigidUnknowns {
 /// Rotation of a free body within one step, and what it does to q: with the spin w(q, v) that keeps the angular
 /// momentum and W = sum_c w_c A_c, pi = v - W q and
 ///   dpi/dt = W v + d/dq (1/2 w^T J w) - f_int + f_ext + f_example.
-/// method.md, section 6. r modes. No call allocates or throws.
+/// docs/step_in_detail.md, "Free bodies". r modes. No call allocates or throws.
 struct FreeMotionWorkspace {
   FreeMotionWorkspace() = default;
   explicit FreeMotionWorkspace(const DeformingInertia& inertia);

@@ -7,7 +7,7 @@
 namespace exmat::runtime {
 
 // The example forces of a step, that of the whole body and those of regions: independent of each other, they add up.
-// method.md, section 5. No call allocates or throws. Those that do not act are left out.
+// docs/step_in_detail.md, "Target". No call allocates or throws. Those that do not act are left out.
 
 /// Weights after the bias at the pose q [r], into the workspace.
 void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,

@@ -14,8 +14,8 @@ namespace exmat::runtime {
 /// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
 /// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
 /// the skew part of P_s and those of the frame (BodyFrame::force()): in values they are those of the
-/// iterate last accepted, so that the gradient is exact. reduction.md, "Integration"; ExampleForce. Reads form and
-/// external_force of the workspace.
+/// iterate last accepted, so that the gradient is exact. docs/step_in_detail.md, "The incremental potential";
+/// ExampleForce. Reads form and external_force of the workspace.
 class IncrementalPotential {
  public:
   IncrementalPotential(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;

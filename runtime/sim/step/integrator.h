@@ -10,9 +10,9 @@ struct StepHistory {
   const Eigen::VectorXd &momentum, &momentum_previous;  ///< BodyFrame::momentum(); v where the frame stands still
 };
 
-/// An implicit integrator within one step: v = c_v (q - q_v), a = c_a (q - q_a) at the end of the step. reduction.md,
-/// "Integration". For a free body a is the rate of change of its momentum pi as far as pi is qdot: the centres then
-/// come from pi where those of a constrained body come from v.
+/// An implicit integrator within one step: v = c_v (q - q_v), a = c_a (q - q_a) at the end of the step.
+/// docs/step_in_detail.md, "Integrators". For a free body a is the rate of change of its momentum pi as far as pi is
+/// qdot: the centres then come from pi where those of a constrained body come from v.
 struct StepForm {
   double velocity_factor = 0;                            ///< c_v [1/s]
   double acceleration_factor = 0;                        ///< c_a [1/s^2]

@@ -14,7 +14,7 @@ namespace exmat::runtime {
 
 enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 
-/// A linear example force, of the whole body or of a region. method.md, section 5.
+/// A linear example force, of the whole body or of a region. docs/step_in_detail.md, "The incremental potential".
 struct ExampleSettings {
   double stiffness = 0;                                  ///< kappa >= 0 [1/s^2]
   double damping = 0;                                    ///< c_kappa >= 0 [1/s]

@@ -11,7 +11,7 @@
 namespace exmat::runtime {
 
 /// Advances a body by one time step: qddot + (alpha I + beta K) qdot + f_int(q) = f_ext + f_example, for a free body
-/// with the forces of its rotation, near obstacles with those of its contacts. method.md, section 6. No allocation, no
+/// with the forces of its rotation, near obstacles with those of its contacts.  No allocation, no
 /// exception. docs/step_in_detail.md.
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 

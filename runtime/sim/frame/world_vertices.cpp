@@ -1,4 +1,4 @@
-#include "runtime/output/world_vertices.h"
+#include "runtime/sim/frame/world_vertices.h"
 
 namespace exmat::runtime {
 
