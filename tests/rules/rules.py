@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from references import references  # noqa: E402
 
 TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "tests", "examples", "docs", "README.md", "LICENSE",
-             "CHANGELOG.md", "CMakePresets.json", "install-dependencies"}
+             "CHANGELOG.md", "CONTRIBUTING.md", "CMakePresets.json", "install-dependencies"}
 # What may include what: from top to bottom, a folder sees itself and those below it.
 LAYERS = {
     "common": "bundle hdf5 console config model mesh elastic core",
