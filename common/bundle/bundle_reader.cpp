@@ -195,8 +195,9 @@ const AttributeSchema& BundleReader::attribute_schema(std::string_view name) con
 }
 
 AttributeValue BundleReader::read_value(const AttributeSchema& schema) {
-  AttributeValue value = file_.read_attribute(path_, schema.name);
-  const std::string place = path_ + "@" + schema.name;
+  const std::string& name = schema.name_in(format_version_);
+  AttributeValue value = file_.read_attribute(path_, name);
+  const std::string place = path_ + "@" + name;
   if (const auto fault = check_value(schema, value, sizes_)) refuse(place, fault->expected, fault->found);
   sound_.insert(place);
   return value;

@@ -65,7 +65,7 @@ void visit_example(const FieldPlace& place, Example& example, Visitor& visit) {
   visit.attribute("scale", example.scale);
   visit.attribute("method", example.method);
   visit.attribute("alignment_residual", example.alignment_residual);
-  visit.attribute("confidence", example.confidence);
+  visit.attribute("doubt", example.doubt);
   visit.attribute("inverted_fraction", example.inverted_fraction);
   visit.attribute("competing_maps", example.competing_maps);
   visit.attribute("shape_space_error", example.shape_space_error);

@@ -42,7 +42,7 @@ struct ExampleData {
   double scale = 1;                 ///< object's length unit over the example's: (V_object / V_example)^(1/3)
   std::string method;               ///< how it was mapped to the object
   double alignment_residual = 0;    ///< relative
-  double confidence = 0;            ///< J of alignment.md; 0 is certain, above 1.2 refused
+  double doubt = 0;                 ///< J of alignment.md; 0 is certain, above 1.2 refused
   double inverted_fraction = 0;     ///< share of the volume that the pose turns inside out
   std::int64_t competing_maps = 0;  ///< other poses that fit the example about as well
   double shape_space_error = 0;     ///< share of its displacement that the m functions lose, relative M-norm

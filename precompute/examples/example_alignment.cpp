@@ -15,11 +15,11 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGoodConfidence = 0.5;     // of a rest example that stands as the object does
-constexpr double kBetterRotation = 0.5;     // of the confidence as it stands, for a rotation to be believed
-constexpr double kCompetingRotation = 1.4;  // of the best one's confidence
+constexpr double kGoodDoubt = 0.5;          // of a rest example that stands as the object does
+constexpr double kBetterRotation = 0.5;     // of the doubt as it stands, for a rotation to be believed
+constexpr double kCompetingRotation = 1.4;  // of the best one's doubt
 constexpr double kCompetingFloor = 0.05;    // added to it: below, rotations differ by the tessellation alone
-constexpr double kSameMesh = 1e-6;          // a confidence that only the object's own mesh has
+constexpr double kSameMesh = 1e-6;          // a doubt that only the object's own mesh has
 constexpr double kSameRotation = 0.5;       // [rad]
 constexpr Eigen::Index kFewestLandmarks = 4;
 constexpr double kMissedLandmarks = 0.25;  // share of their displacement, RMS, that coupled bases may miss unremarked
@@ -64,7 +64,7 @@ AlignedRest ExampleAligner::map_rest(const LaplaceBasis& basis, const Eigen::Mat
 // principal axes and the object's that fits best.
 AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
   AlignedRest as_it_stands = map_rest(basis, Eigen::Matrix3d::Identity());
-  if (asset_.alignment.frame == "shared" || as_it_stands.map.confidence <= kGoodConfidence) return as_it_stands;
+  if (asset_.alignment.frame == "shared" || as_it_stands.map.doubt <= kGoodDoubt) return as_it_stands;
   std::vector<Eigen::Vector3d> ours, theirs;
   for (Eigen::Index k = 0; k < examples_.landmarks.rows(); ++k) {
     const auto on_object = examples_.landmarks(k, 0), on_rest = examples_.landmarks(k, examples_.rest.column);
@@ -81,15 +81,15 @@ AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
   const Eigen::Matrix3d from = principal_axes(basis), to = principal_axes(object_);
   std::vector<AlignedRest> turned;
   for (const Eigen::Matrix3d& turn : cube_rotations()) turned.push_back(map_rest(basis, to * turn * from.transpose()));
-  std::ranges::stable_sort(turned, {}, [](const AlignedRest& rest) { return rest.map.confidence; });
+  std::ranges::stable_sort(turned, {}, [](const AlignedRest& rest) { return rest.map.doubt; });
   AlignedRest& best = turned.front();
-  if (best.map.confidence > kBetterRotation * as_it_stands.map.confidence) return as_it_stands;
-  const double most = best.map.confidence < kSameMesh
+  if (best.map.doubt > kBetterRotation * as_it_stands.map.doubt) return as_it_stands;
+  const double most = best.map.doubt < kSameMesh
                           ? kSameMesh
-                          : std::max(kCompetingRotation * best.map.confidence, best.map.confidence + kCompetingFloor);
+                          : std::max(kCompetingRotation * best.map.doubt, best.map.doubt + kCompetingFloor);
   for (const AlignedRest& other : turned) {
     const double apart = Eigen::AngleAxisd(Eigen::Matrix3d(best.rotation.transpose() * other.rotation)).angle();
-    if (apart > kSameRotation && other.map.confidence < most) ++best.outcome.competing_maps;
+    if (apart > kSameRotation && other.map.doubt < most) ++best.outcome.competing_maps;
   }
   if (best.outcome.competing_maps > 0)
     object_to(
@@ -144,16 +144,16 @@ AlignedRest ExampleAligner::align_rest() {
       rest.map.by_functions = true;
       rest.outcome.method = "coupled";
     }
-    log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)",
-                          examples_.rest.name, 100 * rest.map.residual, rest.map.confidence));
+    log::info(fmt::format("rest example {}: {:.1f} % from the object, doubt {:.3f} (0 is certain)", examples_.rest.name,
+                          100 * rest.map.residual, rest.map.doubt));
   }
   rest.carried = {rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
                   rest.map.pull_back * rest.basis.vertices};
   rest.outcome.name = examples_.rest.name;
   rest.outcome.residual = rest.map.residual;
-  rest.outcome.confidence = rest.map.confidence;
+  rest.outcome.doubt = rest.map.doubt;
   if (rest.outcome.method == "rest_map")
-    judge_confidence(rest.outcome, "expected a rest example that has about the object's shape and lies where it does");
+    judge_doubt(rest.outcome, "expected a rest example that has about the object's shape and lies where it does");
   rest.free_poses = asset_.alignment.frame == "free" || (asset_.alignment.frame == "auto" && !rest.map.same_frame);
   if (asset_.alignment.frame == "auto")
     log::info(rest.free_poses ? "examples are rotated to the object's frame: the rest example does not coincide with it"
@@ -219,10 +219,10 @@ AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput&
   aligned.outcome.name = pose.name;
   aligned.outcome.method = is_mapped ? "map" : hints.correspondences.count() > 0 ? "landmarks" : "registered";
   judge_pose(alignment, asset_.alignment.frame, rest.free_poses, aligned.outcome);
-  log::info(fmt::format(
-      "example {}: registered from {}, {:.2f} % from its surface, confidence {:.3f} (0 is certain), {} "
-      "competing poses",
-      pose.name, alignment.start, 100 * alignment.residual, alignment.confidence, alignment.competing_maps));
+  log::info(
+      fmt::format("example {}: registered from {}, {:.2f} % from its surface, doubt {:.3f} (0 is certain), {} "
+                  "competing poses",
+                  pose.name, alignment.start, 100 * alignment.residual, alignment.doubt, alignment.competing_maps));
   return aligned;
 }
 
@@ -306,10 +306,10 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
   const double missed = missed_landmarks(rest, pose, posed, displacement);
-  aligned.outcome.confidence = score.total() + missed;
+  aligned.outcome.doubt = score.total() + missed;
   aligned.outcome.inverted_fraction = score.inverted;
   const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
-  judge_confidence(aligned.outcome, advice);
+  judge_doubt(aligned.outcome, advice);
   judge_residual(aligned.outcome, advice);
   if (missed > kMissedLandmarks)
     object_to(aligned.outcome, AlignmentVerdict::kDoubtful,
@@ -324,7 +324,7 @@ AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput&
   if (pose.same_connectivity) {
     AlignedPose aligned;
     aligned.positions = normalised_positions(pose.mesh);
-    aligned.outcome = {pose.name, "same_connectivity", rest.outcome.residual, rest.outcome.confidence,
+    aligned.outcome = {pose.name, "same_connectivity", rest.outcome.residual, rest.outcome.doubt,
                        pose.inverted_fraction};
     return aligned;
   }

@@ -68,7 +68,7 @@ void add_examples(const std::string& region, const ExampleSet& set, Json& exampl
     examples.push_back({{"name", example.name},
                         {"region", region},
                         {"method", example.method},
-                        {"confidence", example.confidence},
+                        {"doubt", example.doubt},
                         {"alignment_residual", example.alignment_residual},
                         {"inverted_fraction", example.inverted_fraction},
                         {"competing_maps", example.competing_maps},
@@ -118,7 +118,7 @@ void add_model(const ReducedModel& model, Json& json) {
 
 nlohmann::ordered_json to_json(const RunReport& report, const ReducedModel* model) {
   Json json{{"format", "exmat-report"},
-            {"format_version", 1},
+            {"format_version", 2},
             {"program", "exmat-precompute " + std::string(version())},
             {"solvers", solver_versions()},
             {"status", report.status},

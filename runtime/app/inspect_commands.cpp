@@ -17,11 +17,11 @@ void print_groups(const ReducedModel& model, const BundleSummary& summary) {
 }
 
 void print_examples(const ExampleSet& set) {
-  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12}\n", "example", "mapped by", "residual", "confidence",
+  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12}\n", "example", "mapped by", "residual", "doubt",
              "shape error", "basis error");
   for (const ExampleData& example : set.examples)
     fmt::print("{:<20} {:<20} {:>10.3g} {:>12.3g} {:>14.3g} {:>12.3g}\n", example.name, example.method,
-               example.alignment_residual, example.confidence, example.shape_space_error, example.basis_error);
+               example.alignment_residual, example.doubt, example.shape_space_error, example.basis_error);
 }
 
 }  // namespace

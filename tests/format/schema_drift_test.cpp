@@ -54,6 +54,8 @@ TEST(BundleSchema, HasNothingOlderThanItsGroup) {
     for (const AttributeSchema& attribute : group.attributes) {
       EXPECT_GE(attribute.since, group.since) << group.path << attribute.name;
       EXPECT_LE(attribute.since, bundle_schema().format_version) << group.path << attribute.name;
+      EXPECT_LE(attribute.renamed, bundle_schema().format_version) << group.path << attribute.name;
+      EXPECT_EQ(attribute.renamed > attribute.since, !attribute.former_name.empty()) << group.path << attribute.name;
     }
   for (const DatasetSchema& dataset : bundle_schema().datasets)
     EXPECT_GE(dataset.since, bundle_schema().group(dataset.path.substr(0, dataset.path.rfind('/'))).since)

@@ -38,6 +38,9 @@ class Spoiler {
     H5Lcreate_external("/dev/null", "/x", file_, path, H5P_DEFAULT, H5P_DEFAULT);
   }
 
+  void rename_attribute(const char* object, const char* from, const char* to) {
+    H5Arename_by_name(file_, object, from, to, H5P_DEFAULT);
+  }
   void remove_attribute(const char* object, const char* name) { H5Adelete_by_name(file_, object, name, H5P_DEFAULT); }
 
   void set_attribute(const char* object, const char* name, hid_t type, const void* value,
@@ -150,8 +153,8 @@ const BadBundle kBadBundles[] = {
     {"OtherFormat", [](Spoiler& s) { s.set_text("/", "format", "other"); },
      "/@format: expected \"exmat-bundle\", found \"other\""},
     {"NoFormat", [](Spoiler& s) { s.remove_attribute("/", "format"); }, "/@format: expected an attribute, found none"},
-    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 6); },
-     "/@format_version: expected at most 5, found 6; a newer version of exmat"},
+    {"NewerVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 7); },
+     "/@format_version: expected at most 6, found 7; a newer version of exmat"},
     {"NoVersion", [](Spoiler& s) { s.set_integer("/", "format_version", 0); },
      "/@format_version: expected a number > 0, found 0"},
     {"TextVersion", [](Spoiler& s) { s.set_text("/", "format_version", "1"); },
@@ -383,6 +386,48 @@ TEST(BadBundle, OfAnotherKindOfFile) {
   }
 }
 
+// Before version 6 `doubt` had another name.
+void name_doubt_as_before(Spoiler& spoiler, const std::string& folder, const ExampleSet& set) {
+  for (const ExampleData& example : set.examples)
+    spoiler.rename_attribute((folder + "/" + example.name).c_str(), "doubt", "confidence");
+}
+
+// small_model(false) as version 5 wrote it.
+void write_version_5(const std::filesystem::path& path) {
+  const ReducedModel model = small_model(false);
+  write_bundle(model, path);
+  Spoiler spoiler(path);
+  spoiler.set_integer("/", "format_version", 5);
+  name_doubt_as_before(spoiler, "/examples", *model.examples);
+  for (const RegionData& region : model.regions)
+    name_doubt_as_before(spoiler, "/regions/" + region.name + "/examples", region.examples);
+}
+
+TEST(BundleOfVersion5, HasTheDoubtUnderItsFormerName) {
+  const TemporaryFolder folder;
+  write_version_5(folder / "a.h5");
+  const ReducedModel model = read_bundle(folder / "a.h5");
+  for (const ExampleData& example : model.examples->examples) EXPECT_EQ(example.doubt, 0.25);
+  ASSERT_EQ(model.regions.size(), 2U);
+  EXPECT_EQ(model.regions.back().examples.examples.back().doubt, 0.25);
+  EXPECT_THAT(validate_bundle(folder / "a.h5"), ::testing::IsEmpty());
+}
+
+TEST(BundleOfVersion5, IsRefusedByThatNameWhereItsValueIsBad) {
+  const TemporaryFolder folder;
+  write_version_5(folder / "a.h5");
+  Spoiler(folder / "a.h5").set_number("/examples/bend", "confidence", -1);
+  EXPECT_THAT(validate_bundle(folder / "a.h5"),
+              ::testing::ElementsAre(HasSubstr("/examples/bend@confidence: expected a number >= 0, found -1")));
+}
+
+TEST(BundleOfVersion6, HasNoDoubtUnderItsFormerName) {
+  const TemporaryFolder folder;
+  write_bundle(small_model(), folder / "a.h5");
+  Spoiler(folder / "a.h5").rename_attribute("/examples/bend", "doubt", "confidence");
+  EXPECT_THAT(validate_bundle(folder / "a.h5"), ::testing::ElementsAre(HasSubstr("/examples/bend@doubt")));
+}
+
 // small_model() as version 1 wrote it.
 void write_version_1(const std::filesystem::path& path) {
   ReducedModel model = small_model();
@@ -396,6 +441,7 @@ void write_version_1(const std::filesystem::path& path) {
   spoiler.set_integer("/", "format_version", 1);
   spoiler.remove_attribute("/cubature", "internal_force");
   spoiler.remove_attribute("/cubature", "internal_force_reason");
+  name_doubt_as_before(spoiler, "/examples", *model.examples);
 }
 
 TEST(BundleOfVersion1, IsRead) {

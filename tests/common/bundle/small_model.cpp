@@ -55,7 +55,7 @@ ExampleData small_example(const std::string& name, std::int64_t index) {
   example.alignment_residual = 0.01;
   example.inverted_fraction = 0.02;
   example.competing_maps = 3;
-  example.confidence = 0.25;
+  example.doubt = 0.25;
   example.shape_space_error = 0.125;
   example.basis_error = 0.0625;
   example.descriptor = numbers(kEigenfunctions, 3, static_cast<double>(index));
