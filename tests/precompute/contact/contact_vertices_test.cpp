@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/mesh/farthest_points.h"
 #include "common/mesh/geometry.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"
