@@ -59,9 +59,7 @@ inline test::Bar complete_bar(test::BarOptions options) {
   return bar;
 }
 
-inline FullSpaceOptions targets_of(const test::BarOptions& options) {
-  return {.targets = options.examples > 0 ? ExampleTargets::kTets : ExampleTargets::kNone};
-}
+inline FullSpaceOptions targets_of(const test::BarOptions& options) { return {.whole_body = options.examples > 0}; }
 
 /// Steps, and expects each one to be sound.
 inline void run(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state, int steps) {
