@@ -13,7 +13,7 @@
 #include "common/core/log.h"
 #include "common/hdf5/schema.h"
 #include "common/mesh/geometry.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/pipeline/depfile.h"
 #include "precompute/pipeline/run_report.h"
 
@@ -120,7 +120,7 @@ void make_bundle(const BundleOptions& options, RunReport& report, std::optional<
     return;
   }
   report.build = {};
-  model = precompute::build_model(asset, needs, report.build, {options.alignment_report, options.cache});
+  model = precompute::build_reduced_model(asset, needs, report.build, {options.alignment_report, options.cache});
   precompute::timed_stage("writing the bundle", report.build, [&] { write_bundle(*model, options.bundle); });
   fill_bytes(*model, report.build.ledger);
   write_depfile(options, report.build);

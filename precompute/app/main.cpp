@@ -9,7 +9,7 @@
 #include "precompute/app/bundle_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/solvers/ranks.h"
 #include "precompute/solvers/semidefinite_solver.h"
 

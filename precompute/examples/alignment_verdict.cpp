@@ -88,7 +88,7 @@ void judge_residual(AlignmentOutcome& outcome, const std::string& advice) {
   if (outcome.residual > kResidualWarning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
 }
 
-void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome) {
+void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome) {
   outcome.residual = alignment.residual;
   outcome.doubt = alignment.doubt;
   outcome.inverted_fraction = alignment.inverted_fraction;
@@ -106,7 +106,7 @@ void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool f
   judge_residual(outcome, advice);
   judge_competitors(alignment, free_frame, outcome);
   judge_revolution(alignment, outcome);
-  if (frame == "auto" && !free_frame) judge_turn(alignment, outcome);
+  if (frame == AlignmentFrame::kAuto && !free_frame) judge_turn(alignment, outcome);
 }
 
 void require_aligned(const AssetConfig& asset, const std::vector<AlignmentOutcome>& outcomes,

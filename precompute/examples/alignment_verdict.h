@@ -41,7 +41,7 @@ void judge_doubt(AlignmentOutcome& outcome, const std::string& advice);
 void judge_residual(AlignmentOutcome& outcome, const std::string& advice);
 
 /// Fills in an outcome from a registered pose. `frame` is that of the asset; `free_frame` what it came to.
-void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome);
+void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome);
 
 /// Throws WorkError that names every refused example, unless the asset accepts them. Doubts, and refusals that are
 /// accepted, are warnings: appended and logged.

@@ -64,7 +64,7 @@ AlignedRest ExampleAligner::map_rest(const LaplaceBasis& basis, const Eigen::Mat
 // principal axes and the object's that fits best.
 AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
   AlignedRest as_it_stands = map_rest(basis, Eigen::Matrix3d::Identity());
-  if (asset_.alignment.frame == "shared" || as_it_stands.map.doubt <= kGoodDoubt) return as_it_stands;
+  if (asset_.alignment.frame == AlignmentFrame::kShared || as_it_stands.map.doubt <= kGoodDoubt) return as_it_stands;
   std::vector<Eigen::Vector3d> ours, theirs;
   for (Eigen::Index k = 0; k < examples_.landmarks.rows(); ++k) {
     const auto on_object = examples_.landmarks(k, 0), on_rest = examples_.landmarks(k, examples_.rest.column);
@@ -111,7 +111,7 @@ void ExampleAligner::use_vertex_map(AlignedRest& rest) const {
                         fmt::format("'-' for vertex {}", v + 1), "leave out vertices in maps of poses alone"});
     points.insert(v, map[v]) = 1;
   }
-  const bool moves = asset_.alignment.frame != "shared" && !rest.map.same_frame;
+  const bool moves = asset_.alignment.frame != AlignmentFrame::kShared && !rest.map.same_frame;
   const VertexArray mapped = points * rest.basis.vertices;
   if (moves) {
     const Eigen::Matrix3d turn = procrustes_rotation(object_.vertices.transpose() * (object_.mass * mapped));
@@ -139,7 +139,7 @@ AlignedRest ExampleAligner::align_rest() {
         count);
     rest = best_rotation(basis);
     use_vertex_map(rest);
-    if (asset_.alignment.method == "coupled") {
+    if (asset_.alignment.method == AlignmentMethod::kCoupled) {
       rest.map.functional_map = coupled_map(examples_.rest, rest.basis);
       rest.map.by_functions = true;
       rest.outcome.method = "coupled";
@@ -154,8 +154,9 @@ AlignedRest ExampleAligner::align_rest() {
   rest.outcome.doubt = rest.map.doubt;
   if (rest.outcome.method == "rest_map")
     judge_doubt(rest.outcome, "expected a rest example that has about the object's shape and lies where it does");
-  rest.free_poses = asset_.alignment.frame == "free" || (asset_.alignment.frame == "auto" && !rest.map.same_frame);
-  if (asset_.alignment.frame == "auto")
+  rest.free_poses = asset_.alignment.frame == AlignmentFrame::kFree ||
+                    (asset_.alignment.frame == AlignmentFrame::kAuto && !rest.map.same_frame);
+  if (asset_.alignment.frame == AlignmentFrame::kAuto)
     log::info(rest.free_poses ? "examples are rotated to the object's frame: the rest example does not coincide with it"
                               : "examples share the object's frame: the rest example coincides with it");
   return rest;
@@ -182,7 +183,7 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
       }
     return {rows_of(rest.map.pull_back, on_object), at_vertices(on_pose, pose_size)};
   }
-  if (asset_.alignment.method == "map")
+  if (asset_.alignment.method == AlignmentMethod::kMap)
     throw InputError({asset_.file.string(), "/alignment/map", "a map for " + pose.name, "none",
                       "give one, or take another alignment.method"});
   std::vector<Eigen::Triplet<double>> entries;
@@ -199,7 +200,7 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
     on_pose.push_back(landmarks(k, pose.column));
   }
   if (asset_.alignment.landmarks && std::ssize(on_pose) < kFewestLandmarks &&
-      (asset_.alignment.method == "landmarks" || !on_pose.empty()))
+      (asset_.alignment.method == AlignmentMethod::kLandmarks || !on_pose.empty()))
     throw InputError({asset_.alignment.landmarks->string(), "",
                       fmt::format("at least {} landmarks of example {}", kFewestLandmarks, pose.name),
                       std::to_string(on_pose.size()), "8 that do not lie in a plane are usual"});
@@ -209,7 +210,7 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
 }
 
 AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput& pose) {
-  AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != "auto"};
+  AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != AlignmentMethod::kAuto};
   const bool is_mapped = pose.on_object.size() > 0;
   hints.landmarks_alone = hints.landmarks_alone || is_mapped;
   const AlignedShape shape = aligned_shape(pose.mesh, 0, pose.name);
@@ -331,8 +332,8 @@ AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput&
   const AlignmentConfig& config = asset_.alignment;
   return cache_.get(
       "alignment of " + pose.name,
-      [&] { return config.method == "coupled" ? coupled(rest, pose) : registered(rest, pose); }, object_,
-      object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
+      [&] { return config.method == AlignmentMethod::kCoupled ? coupled(rest, pose) : registered(rest, pose); },
+      object_, object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
       landmarks_of(pose), config.landmarks.has_value(), examples_.parts, pose.parts, config.method, config.frame);
 }
 

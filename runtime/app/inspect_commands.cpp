@@ -35,7 +35,7 @@ void info_command(const std::filesystem::path& bundle) {
   fmt::print("mesh           {} vertices, {} tets\n", summary.vertices, summary.tets);
   fmt::print("modes          {}\n", summary.modes);
   fmt::print("cubature       {} elements\n", summary.cubature_elements);
-  if (model.object) fmt::print("material       {}\n", model.object->material);
+  if (model.object) fmt::print("material       {}\n", name_of(model.object->materials.model));
   if (model.modal && model.modal->frequencies.size() > 0)
     fmt::print("frequencies    {:.4g} to {:.4g} Hz ({} linear modes)\n", model.modal->frequencies.minCoeff(),
                model.modal->frequencies.maxCoeff(), model.modal->frequencies.size());

@@ -7,13 +7,12 @@
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "common/model/choices.h"
 #include "runtime/sim/contact/obstacle.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
-
-enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 
 /// A constant world-space force on each of some vertices that acts in every step whose midpoint lies in [start, end).
 struct ScriptedForce {

@@ -448,13 +448,13 @@ TEST(BundleOfVersion1, IsRead) {
   const TemporaryFolder folder;
   write_version_1(folder / "a.h5");
   const ReducedModel model = read_bundle(folder / "a.h5");
-  EXPECT_EQ(model.cubature->internal_force, "cubature");
+  EXPECT_EQ(model.cubature->internal_force, ForceMethod::kCubature);
   EXPECT_EQ(model.cubature->internal_force_reason, "");
-  EXPECT_EQ(model.cubature->method, "greedy");
+  EXPECT_EQ(model.cubature->method, CubatureMethod::kGreedy);
   EXPECT_THAT(validate_bundle(folder / "a.h5"), ::testing::IsEmpty());
   const BundleSummary summary = summarise_bundle(folder / "a.h5");
   EXPECT_EQ(summary.format_version, 1);
-  EXPECT_EQ(summary.internal_force, "cubature");
+  EXPECT_EQ(summary.internal_force, ForceMethod::kCubature);
   EXPECT_FALSE(summary.has_polynomial || summary.has_targets);
 }
 
@@ -463,7 +463,7 @@ TEST(BundleOfVersion1, HasNoNewerGroups) {
   write_version_1(folder / "a.h5");
   Spoiler(folder / "a.h5").add_group("/polynomial");
   try {
-    read_bundle(folder / "a.h5", {.groups = plan_groups({.internal_force = "polynomial"}, true, 3)});
+    read_bundle(folder / "a.h5", {.groups = plan_groups({.internal_force = ForceMethod::kPolynomial}, true, 3)});
     FAIL();
   } catch (const InputError& error) {
     EXPECT_THAT(error.what(),

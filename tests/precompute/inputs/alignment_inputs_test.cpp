@@ -64,7 +64,7 @@ PoseAlignment good() {
 AlignmentOutcome judged(const PoseAlignment& alignment, bool free_frame = false) {
   AlignmentOutcome outcome;
   outcome.name = "bend";
-  judge_pose(alignment, "auto", free_frame, outcome);
+  judge_pose(alignment, AlignmentFrame::kAuto, free_frame, outcome);
   return outcome;
 }
 

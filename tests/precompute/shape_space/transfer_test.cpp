@@ -153,7 +153,7 @@ TEST(DirectProjection, AgreesWithTheWayThroughFullSpace) {
   Eigen::VectorXd density = Eigen::VectorXd::LinSpaced(s.object_mesh.tet_count(), 500, 1500);
   const SparseMatrix mass = expand_to_vectors(scalar_mass(s.object_mesh, density));
   const RowMatrix U = RowMatrix::Random(3 * n, r);
-  for (const char* weighting : {"eigenvalue", "none"}) {
+  for (const Weighting weighting : {Weighting::kEigenvalue, Weighting::kNone}) {
     const auto weights = descriptor_weights(s.object, weighting);
     const auto projection = direct_projection(s.object, weights, mass, U);
     const Eigen::VectorXd q = Eigen::VectorXd::Random(r);
