@@ -100,7 +100,7 @@ void add_model(const ReducedModel& model, Json& json) {
                    {"cubature_elements", model.cubature->elements.size()},
                    {"eigenfunctions", model.shape_space ? model.shape_space->eigenvalues.size() : 0}};
   json["examples"] = examples_of(model);
-  json["cubature"] = {{"method", model.cubature->method},
+  json["cubature"] = {{"method", name_of(model.cubature->method)},
                       {"internal_force", name_of(model.cubature->internal_force)},
                       {"training_error", model.cubature->training_error},
                       {"heldout_error", model.cubature->heldout_error},
