@@ -27,13 +27,11 @@ RegionSummary summarise_region(BundleReader& reader, const std::string& name) {
   summary.examples = std::ssize(reader.example_names(path + "/examples"));
   summary.has_targets = reader.file().has_group(path + "/targets");
   if (summary.has_targets)
-    reader.read_text("/regions/{region}/targets", path + "/targets", "energy_reference", summary.energy_reference);
+    reader.read_attribute("/regions/{region}/targets", path + "/targets", "energy_reference", summary.energy_reference);
   return summary;
 }
 
-bool serves(bool has_targets, const std::string& table, const std::string& wanted) {
-  return has_targets && table == wanted;
-}
+bool serves(bool has_targets, EnergyReference table, EnergyReference wanted) { return has_targets && table == wanted; }
 
 }  // namespace
 
@@ -60,8 +58,8 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   summary.has_targets = includes(groups, "targets");
   summary.internal_force = CubatureData{}.internal_force;
   if (includes(groups, "cubature"))
-    reader.read_text("/cubature", "/cubature", "internal_force", summary.internal_force);
-  if (summary.has_targets) reader.read_text("/targets", "/targets", "energy_reference", summary.energy_reference);
+    reader.read_attribute("/cubature", "/cubature", "internal_force", summary.internal_force);
+  if (summary.has_targets) reader.read_attribute("/targets", "/targets", "energy_reference", summary.energy_reference);
   summary.render_vertices = value_of(sizes, "v");
   if (includes(groups, "regions"))
     for (const std::string& name : reader.region_names()) summary.regions.push_back(summarise_region(reader, name));
@@ -69,7 +67,7 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
 }
 
 Needs fit_needs(Needs needs, const BundleSummary& summary) {
-  if (needs.internal_force == "auto") needs.internal_force = summary.internal_force;
+  if (needs.internal_force == ForceMethod::kAuto) needs.internal_force = summary.internal_force;
   needs.targets = needs.targets && serves(summary.has_targets, summary.energy_reference, needs.energy_reference);
   if (!needs.regions) return needs;
   for (RegionNeeds& region : *needs.regions) {

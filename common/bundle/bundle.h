@@ -22,9 +22,9 @@ void fill_bytes(const ReducedModel& model, std::vector<LedgerEntry>& ledger);
 /// One region, as a bundle lists it.
 struct RegionSummary {
   std::string name;
-  std::int64_t examples = 0;       ///< K
-  bool has_targets = false;        ///< /regions/NAME/targets is there
-  std::string energy_reference{};  ///< of its targets; empty where there are none
+  std::int64_t examples = 0;                                     ///< K
+  bool has_targets = false;                                      ///< /regions/NAME/targets is there
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< of its targets, where they are there
 };
 
 /// What a bundle says of itself: read from its attributes and table of contents alone.
@@ -34,10 +34,10 @@ struct BundleSummary {
   std::vector<std::string> groups;  ///< present, in bundle order
   bool constrained = false;         ///< root attribute of that name (int64, 0 or 1)
   std::int64_t vertices = 0, tets = 0, modes = 0, cubature_elements = 0, eigenfunctions = 0, examples = 0;
-  std::string internal_force;    ///< "cubature" or "polynomial": what `auto` takes
-  std::string energy_reference;  ///< of /targets; empty where there are none
-  bool has_polynomial = false;   ///< /polynomial is there
-  bool has_targets = false;      ///< /targets is there
+  ForceMethod internal_force = ForceMethod::kCubature;           ///< what `auto` takes, one of the two others
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< of /targets, where they are there
+  bool has_polynomial = false;                                   ///< /polynomial is there
+  bool has_targets = false;                                      ///< /targets is there
   std::vector<RegionSummary> regions;
   std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
 };

@@ -60,12 +60,6 @@ std::string BundleReader::text_attribute(const std::string& name) const {
   return std::get<std::string>(header_value(name));
 }
 
-void BundleReader::read_text(std::string_view schema_path, std::string_view path, const std::string& name,
-                             std::string& text) {
-  group(schema_path, path);
-  attribute(name, text);
-}
-
 std::vector<LedgerEntry> BundleReader::listed_groups() const {
   std::vector<LedgerEntry> ledger = plan_groups(Needs{}, constrained_, 0);
   for (LedgerEntry& entry : ledger) {
@@ -132,8 +126,6 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
   if (model.examples)  // before version 3
     for (ExampleData& example : model.examples->examples)
       if (example.pose.size() == 0) example.pose = example.reduced;
-  if (model.object)
-    if (const auto material = material_from_name(model.object->material)) model.object->materials.model = *material;
   check_model(model);
   if (model.examples) std::ranges::stable_sort(model.examples->examples, {}, &ExampleData::index);
   for (RegionData& region : model.regions) std::ranges::stable_sort(region.examples.examples, {}, &ExampleData::index);
@@ -195,8 +187,9 @@ const AttributeSchema& BundleReader::attribute_schema(std::string_view name) con
 }
 
 AttributeValue BundleReader::read_value(const AttributeSchema& schema) {
-  AttributeValue value = file_.read_attribute(path_, schema.name);
-  const std::string place = path_ + "@" + schema.name;
+  const std::string& name = schema.name_in(format_version_);
+  AttributeValue value = file_.read_attribute(path_, name);
+  const std::string place = path_ + "@" + name;
   if (const auto fault = check_value(schema, value, sizes_)) refuse(place, fault->expected, fault->found);
   sound_.insert(place);
   return value;

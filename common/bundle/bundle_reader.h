@@ -39,8 +39,12 @@ class BundleReader {
   ReducedModel read(const BundleRequest& request);
   /// Of the root.
   std::string text_attribute(const std::string& name) const;
-  /// Of another group; `text` stays as it is where the file is older than the attribute.
-  void read_text(std::string_view schema_path, std::string_view path, const std::string& name, std::string& text);
+  /// Of another group; the member stays as it is where the file is older than the attribute.
+  template <typename T>
+  void read_attribute(std::string_view schema_path, std::string_view path, std::string_view name, T& member) {
+    group(schema_path, path);
+    attribute(name, member);
+  }
   /// Opens a dataset and checks its type and sizes, which binds its symbols; reads no data.
   Hdf5Dataset open_checked(const DatasetSchema& schema, const std::string& path);
   void note(const std::string& dataset, std::size_t bytes);

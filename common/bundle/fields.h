@@ -34,7 +34,7 @@ void enter(const FieldPlace& place, std::string_view group, Visitor& visit) {
 template <typename Object, typename Visitor>
 void visit_object(Object& object, Visitor& visit) {
   enter(kTopPlace, "/object", visit);
-  visit.attribute("material", object.material);
+  visit.attribute("material", object.materials.model);
   visit.dataset("vertices", object.mesh.vertices);
   visit.dataset("tets", object.mesh.tets);
   visit.dataset("surface", object.surface);
@@ -65,7 +65,7 @@ void visit_example(const FieldPlace& place, Example& example, Visitor& visit) {
   visit.attribute("scale", example.scale);
   visit.attribute("method", example.method);
   visit.attribute("alignment_residual", example.alignment_residual);
-  visit.attribute("confidence", example.confidence);
+  visit.attribute("doubt", example.doubt);
   visit.attribute("inverted_fraction", example.inverted_fraction);
   visit.attribute("competing_maps", example.competing_maps);
   visit.attribute("shape_space_error", example.shape_space_error);
@@ -250,11 +250,13 @@ void* resized(Eigen::PlainObjectBase<Derived>& array, std::int64_t rows, std::in
   return array.data();
 }
 
-/// A member as an attribute: flags as 0 or 1, matrices row-major.
+/// A member as an attribute: flags as 0 or 1, choices by their names, matrices row-major.
 template <typename T>
 AttributeValue to_attribute(const T& member) {
   if constexpr (std::is_same_v<T, bool>)
     return std::int64_t{member ? 1 : 0};
+  else if constexpr (Named<T>)
+    return std::string(name_of(member));
   else if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>) {
     const RowMatrix values = member;
     return std::vector<double>(values.data(), values.data() + values.size());
@@ -262,11 +264,13 @@ AttributeValue to_attribute(const T& member) {
     return member;
 }
 
-/// The inverse; the value must have the type and size that to_attribute gives.
+/// The inverse; the value must have the type and size that to_attribute gives, and be one of the names.
 template <typename T>
 void from_attribute(const AttributeValue& value, T& member) {
   if constexpr (std::is_same_v<T, bool>)
     member = std::get<std::int64_t>(value) != 0;
+  else if constexpr (Named<T>)
+    member = from_name<T>(std::get<std::string>(value)).value();
   else if constexpr (std::is_base_of_v<Eigen::MatrixBase<T>, T>)
     member = Eigen::Map<const RowMatrix>(std::get<std::vector<double>>(value).data(), member.rows(), member.cols());
   else

@@ -21,7 +21,7 @@ and little-endian), each group of a bundle the attribute `description`. Text is 
 `ascending` no element below the one before it; `increasing` each above; `symmetric` a symmetric matrix; `one_of:a|b` one of these texts;
 `may_be_empty` unlike all others, no elements are allowed.
 
-`since` is the format version that brought an entry; a reader refuses files of a newer version.
+`since` is the format version that brought an entry, and the version that renamed it, if one did; a reader refuses files of a newer version.
 )";
 
 constexpr std::string_view kUseOfBundle = R"(
@@ -43,13 +43,19 @@ std::string constraints_text(const std::vector<Constraint>& constraints) {
   return text;
 }
 
+// "1, before 6 as `confidence`".
+std::string since_text(const AttributeSchema& attribute) {
+  if (attribute.renamed == 0) return fmt::format("{}", attribute.since);
+  return fmt::format("{}, before {} as {}", attribute.since, attribute.renamed, code(attribute.former_name));
+}
+
 std::string attribute_table(const std::vector<AttributeSchema>& attributes) {
   std::string text =
       "| attribute | type | dims | units | range | since | |\n| --- | --- | --- | --- | --- | --- | --- |\n";
   for (const AttributeSchema& attribute : attributes)
     text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", code(attribute.name), name_of(attribute.type),
                         cell(attribute.dims_text), attribute.units, constraints_text(attribute.constraints),
-                        attribute.since, cell(attribute.description));
+                        since_text(attribute), cell(attribute.description));
   return text;
 }
 

@@ -69,8 +69,8 @@ class Validator {
   }
 
   void check_features() {
-    const auto always =
-        plan_groups({.examples = false, .rigid = false, .contact = false, .internal_force = "cubature"}, true, 0);
+    const auto always = plan_groups(
+        {.examples = false, .rigid = false, .contact = false, .internal_force = ForceMethod::kCubature}, true, 0);
     for (const LedgerEntry& entry : reader_.listed_groups()) {
       if (entry.included) continue;
       const bool is_present = reader_.file().has_group("/" + entry.group);

@@ -1,3 +1,29 @@
+# Warnings and sanitizers, of every target.
+add_library(exmat_flags INTERFACE)
+target_compile_options(exmat_flags INTERFACE
+  $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)  # false alarms of GCC 12 on string concatenation (bug 105329)
+if(EXMAT_SANITIZE)
+  target_compile_options(exmat_flags INTERFACE -fsanitize=${EXMAT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+  target_link_options(exmat_flags INTERFACE -fsanitize=${EXMAT_SANITIZE})
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+    target_compile_options(exmat_flags INTERFACE -Wno-maybe-uninitialized)  # false alarms of what sanitizers put in
+  endif()
+endif()
+
+# exmat_target(NAME): what all targets have in common. Without the extensions of GNU products are not contracted.
+function(exmat_target name)
+  target_compile_features(${name} PRIVATE cxx_std_20)
+  set_target_properties(${name} PROPERTIES CXX_EXTENSIONS OFF)
+  target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:exmat_flags>)
+  if(exmat_IS_TOP_LEVEL OR NOT CMAKE_RUNTIME_OUTPUT_DIRECTORY)
+    set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${exmat_BINARY_DIR}/bin)
+  endif()
+  if(exmat_IS_TOP_LEVEL OR NOT CMAKE_LIBRARY_OUTPUT_DIRECTORY)
+    set_target_properties(${name} PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${exmat_BINARY_DIR}/lib)
+  endif()
+endfunction()
+
 # exmat_library(NAME FOLDER...): a static library of all sources in the named folders of the current directory.
 function(exmat_library name)
   set(sources)
@@ -6,9 +32,28 @@ function(exmat_library name)
     list(APPEND sources ${found})
   endforeach()
   add_library(${name} STATIC ${sources})
+  exmat_target(${name})
   set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
-  target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>)
+  target_include_directories(${name} PUBLIC $<BUILD_INTERFACE:${exmat_SOURCE_DIR}>)
   # Eigen parallelises products by blocks that depend on the number of threads, and with them the last digits.
   target_compile_definitions(${name} PUBLIC EIGEN_DONT_PARALLELIZE)
-  target_link_libraries(${name} PUBLIC Eigen3::Eigen PRIVATE $<BUILD_INTERFACE:exmat_flags>)
+  target_link_libraries(${name} PUBLIC Eigen3::Eigen)
+endfunction()
+
+# exmat_precompile(NAME HEADER...): of a library or program whose sources nearly all include these. No source needs it.
+function(exmat_precompile name)
+  if(EXMAT_PRECOMPILED_HEADERS)
+    target_precompile_headers(${name} PRIVATE ${ARGN})
+  endif()
+endfunction()
+
+# exmat_header_library(NAME HEADER PACKAGE): a target for headers that come without a CMake or pkg-config file.
+function(exmat_header_library name header package)
+  string(TOUPPER ${name}_INCLUDE_DIR variable)
+  find_path(${variable} ${header})
+  if(NOT ${variable})
+    message(FATAL_ERROR "exmat: there is no ${header}; install ${package} or set ${variable} to the folder that it is in")
+  endif()
+  add_library(${name} INTERFACE)
+  target_include_directories(${name} SYSTEM INTERFACE ${${variable}})
 endfunction()

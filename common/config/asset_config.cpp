@@ -33,7 +33,7 @@ class AssetReader {
     read_cubature(member_or(json, "cubature", Json::object()), asset);
     const Json targets = member_or(json, "targets", Json::object());
     asset.target_tolerance = targets.value("tolerance", asset.target_tolerance);
-    asset.internal_force = json.value("internal_force", asset.internal_force);
+    asset.internal_force = choice_or(json, "internal_force", asset.internal_force);
     const Json contact = member_or(json, "contact", Json::object());
     if (contact.contains("vertices")) asset.contact_vertices = read_selection(contact["vertices"], "/contact/vertices");
     asset.contact_count = optional_member<int>(contact, "count");
@@ -46,7 +46,7 @@ class AssetReader {
   void read_object(const Json& json, AssetConfig& asset) const {
     asset.object_mesh = resolve_path(file_, json["mesh"]);
     const Json material = member_or(json, "material", Json::object());
-    asset.material.model = material.value("model", asset.material.model);
+    asset.material.model = choice_or(material, "model", asset.material.model);
     asset.material.youngs_modulus = optional_member<double>(material, "youngs_modulus");
     asset.material.poisson_ratio = optional_member<double>(material, "poisson_ratio");
     asset.material.density = optional_member<double>(material, "density");
@@ -94,7 +94,7 @@ class AssetReader {
   static void read_shape_space(const Json& json, AssetConfig& asset) {
     const Json shape_space = member_or(json, "shape_space", Json::object());
     asset.eigenfunctions = shape_space.value("eigenfunctions", asset.eigenfunctions);
-    asset.weighting = shape_space.value("weighting", asset.weighting);
+    asset.weighting = choice_or(shape_space, "weighting", asset.weighting);
   }
 
   void read_examples(const Json& json, AssetConfig& asset) const {
@@ -157,8 +157,8 @@ class AssetReader {
 
   void read_alignment(const Json& json, AssetConfig& asset) const {
     AlignmentConfig& alignment = asset.alignment;
-    alignment.method = json.value("method", alignment.method);
-    alignment.frame = json.value("frame", alignment.frame);
+    alignment.method = choice_or(json, "method", alignment.method);
+    alignment.frame = choice_or(json, "frame", alignment.frame);
     if (json.contains("landmarks")) alignment.landmarks = resolve_path(file_, json["landmarks"]);
     const Json maps = member_or(json, "map", Json::array());
     for (std::size_t i = 0; i < maps.size(); ++i) {
@@ -193,16 +193,17 @@ class AssetReader {
   }
 
   void check_alignment(const AlignmentConfig& alignment) const {
-    const auto require = [&](bool is_there, const char* method, const char* what) {
+    const auto require = [&](bool is_there, AlignmentMethod method, const char* what) {
       if (alignment.method == method && !is_there)
-        refuse("/alignment/method", fmt::format("{} beside the method \"{}\"", what, method), "none");
+        refuse("/alignment/method", fmt::format("{} beside the method \"{}\"", what, name_of(method)), "none");
     };
-    require(alignment.landmarks.has_value(), "landmarks", "alignment.landmarks");
-    require(!alignment.maps.empty(), "map", "alignment.map");
-    require(alignment.landmarks || !alignment.regions.empty(), "coupled", "alignment.landmarks or alignment.regions");
-    if (!alignment.regions.empty() && alignment.method != "coupled")
+    require(alignment.landmarks.has_value(), AlignmentMethod::kLandmarks, "alignment.landmarks");
+    require(!alignment.maps.empty(), AlignmentMethod::kMap, "alignment.map");
+    require(alignment.landmarks || !alignment.regions.empty(), AlignmentMethod::kCoupled,
+            "alignment.landmarks or alignment.regions");
+    if (!alignment.regions.empty() && alignment.method != AlignmentMethod::kCoupled)
       refuse("/alignment/regions", "none but with the method \"coupled\"",
-             fmt::format("the method \"{}\"", alignment.method));
+             fmt::format("the method \"{}\"", name_of(alignment.method)));
   }
 
   static void read_basis(const Json& json, AssetConfig& asset) {
@@ -215,7 +216,7 @@ class AssetReader {
     asset.cubature_elements = optional_member<int>(json, "elements");
     asset.cubature_tolerance = optional_member<double>(json, "tolerance");
     if (asset.cubature_elements && asset.cubature_tolerance) refuse("/cubature", "elements or tolerance", "both");
-    asset.cubature_method = json.value("method", asset.cubature_method);
+    asset.cubature_method = choice_or(json, "method", asset.cubature_method);
     asset.training_poses = json.value("training_poses", asset.training_poses);
   }
 

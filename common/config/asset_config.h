@@ -8,6 +8,9 @@
 #include <variant>
 #include <vector>
 
+#include "common/elastic/material_model.h"
+#include "common/model/choices.h"
+
 namespace exmat {
 
 /// Vertices inside an axis-aligned box, bounds included [m].
@@ -38,7 +41,7 @@ struct SetSelection {
 using TetSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, SetSelection>;
 
 struct MaterialConfig {
-  std::string model = "stvk";
+  MaterialModel model = MaterialModel::kStVenantKirchhoff;
   std::optional<double> youngs_modulus, poisson_ratio, density;  ///< absent: the mesh file's own
 };
 
@@ -79,8 +82,8 @@ struct CorrespondingRegionConfig {
 };
 
 struct AlignmentConfig {
-  std::string method = "auto";  ///< "auto", "coupled", "landmarks" or "map"
-  std::string frame = "auto";   ///< "auto", "shared" or "free"
+  AlignmentMethod method = AlignmentMethod::kAuto;
+  AlignmentFrame frame = AlignmentFrame::kAuto;
   std::optional<std::filesystem::path> landmarks;
   std::vector<ExampleMapConfig> maps;
   std::vector<CorrespondingRegionConfig> regions;
@@ -108,8 +111,8 @@ struct AssetConfig {
   std::vector<ExampleConfig> examples;
   std::vector<RegionConfig> regions;
 
-  int eigenfunctions = 20;               ///< m
-  std::string weighting = "eigenvalue";  ///< or "none"
+  int eigenfunctions = 20;  ///< m
+  Weighting weighting = Weighting::kEigenvalue;
   AlignmentConfig alignment;
 
   int basis_size = 30;  ///< r
@@ -118,12 +121,12 @@ struct AssetConfig {
 
   std::optional<int> cubature_elements;      ///< s; both absent: 2 r
   std::optional<double> cubature_tolerance;  ///< held-out relative force error
-  std::string cubature_method = "greedy_swap";
+  CubatureMethod cubature_method = CubatureMethod::kGreedySwap;
   int training_poses = 200;
 
   double target_tolerance = 1e-4;  ///< relative error of the table of targets
 
-  std::string internal_force = "auto";  ///< "auto", "cubature" or "polynomial"
+  ForceMethod internal_force = ForceMethod::kAuto;
 
   std::optional<VertexSelection> contact_vertices;  ///< absent: all of the surface
   std::optional<int> contact_count;                 ///< sampled from these; absent: all of them

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "common/core/names.h"
+
 namespace exmat {
 
 using Json = nlohmann::json;
@@ -15,6 +17,12 @@ using Json = nlohmann::json;
 
 inline Json member_or(const Json& object, const char* name, Json fallback) {
   return object.contains(name) ? object[name] : std::move(fallback);
+}
+
+/// A choice by its name; the schema lists those of kNames.
+template <Named Choice>
+Choice choice_or(const Json& object, const char* name, Choice fallback) {
+  return object.contains(name) ? from_name<Choice>(object[name].template get<std::string>()).value() : fallback;
 }
 
 template <typename T>

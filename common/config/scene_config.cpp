@@ -19,10 +19,9 @@ ExampleForceConfig read_example_force(const Json& json) {
   config.stiffness = json["stiffness"];
   config.damping = json.value("damping", config.damping);
   config.bias = json.value("bias", config.bias);
-  config.target = json.value("target", config.target);
+  config.target = choice_or(json, "target", config.target);
   config.target_iterations = json.value("target_iterations", config.target_iterations);
-  config.force = json.value("force", config.force);
-  config.energy_reference = json.value("energy_reference", config.energy_reference);
+  config.energy_reference = choice_or(json, "energy_reference", config.energy_reference);
   return config;
 }
 
@@ -86,8 +85,8 @@ SceneConfig load_scene(const std::filesystem::path& file) {
   scene.time_step = json.value("time_step", scene.time_step);
   scene.steps = json.value("steps", scene.steps);
   if (json.contains("gravity")) scene.gravity = read_vector(json["gravity"]);
-  scene.integrator = json.value("integrator", scene.integrator);
-  scene.internal_force = json.value("internal_force", scene.internal_force);
+  scene.integrator = choice_or(json, "integrator", scene.integrator);
+  scene.internal_force = choice_or(json, "internal_force", scene.internal_force);
   const Json damping = member_or(json, "damping", Json::object());
   scene.mass_damping = damping.value("mass", scene.mass_damping);
   scene.stiffness_damping = damping.value("stiffness", scene.stiffness_damping);
@@ -114,14 +113,14 @@ SceneConfig load_scene(const std::filesystem::path& file) {
 Needs needs_of(const SceneConfig& scene) {
   Needs needs{.examples = scene.examples || scene.body.pose,
               .carried = !scene.body.motion.empty(),
-              .targets = scene.examples && scene.examples->target != "solve",
+              .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
               .contact = !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};
   if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
   std::vector<RegionNeeds>& regions = needs.regions.emplace();
   for (const auto& [name, force] : scene.regions)
-    regions.push_back({name, force.target != "solve", force.energy_reference});
+    regions.push_back({name, force.target != TargetSource::kSolve, force.energy_reference});
   return needs;
 }
 

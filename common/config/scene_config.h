@@ -10,6 +10,8 @@
 #include <variant>
 #include <vector>
 
+#include "common/model/choices.h"
+
 namespace exmat {
 
 /// A constant world-space force on each of the named vertices while start <= t < end.
@@ -21,13 +23,12 @@ struct VertexForceConfig {
 };
 
 struct ExampleForceConfig {
-  double stiffness = 0;         ///< kappa >= 0 [1/s^2]
-  double damping = 0;           ///< c_kappa >= 0 [1/s]
-  double bias = 1;              ///< in [0, 1]
-  std::string target = "auto";  ///< "table", "solve" or "auto": the bundle's table if it has one
-  int target_iterations = 4;    ///< most Newton iterations of "solve" in one step; the next step carries on
-  std::string force = "linear";
-  std::string energy_reference = "example";  ///< or "rest"
+  double stiffness = 0;  ///< kappa >= 0 [1/s^2]
+  double damping = 0;    ///< c_kappa >= 0 [1/s]
+  double bias = 1;       ///< in [0, 1]
+  TargetSource target = TargetSource::kAuto;
+  int target_iterations = 4;  ///< most Newton iterations of `solve` in one step; the next step carries on
+  EnergyReference energy_reference = EnergyReference::kExample;
 };
 
 /// The example force of one region of the bundle.
@@ -98,10 +99,10 @@ struct SceneConfig {
   double time_step = 0.001;  ///< [s]
   std::int64_t steps = 1000;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]
-  std::string integrator = "bdf2";                    ///< "bdf2", "backward_euler" or "newmark"
-  std::string internal_force = "auto";                ///< "cubature", "polynomial" or "auto": the bundle's choice
-  double mass_damping = 0;                            ///< alpha [1/s]
-  double stiffness_damping = 0;                       ///< beta [s]
+  Integrator integrator = Integrator::kBdf2;
+  ForceMethod internal_force = ForceMethod::kAuto;  ///< auto: the bundle's choice
+  double mass_damping = 0;                          ///< alpha [1/s]
+  double stiffness_damping = 0;                     ///< beta [s]
   NewtonConfig newton;
   std::optional<ExampleForceConfig> examples;  ///< of the whole body
   std::vector<RegionForceConfig> regions;

@@ -1,19 +1,13 @@
 #pragma once
 
-#include <optional>
-#include <string>
-#include <string_view>
+#include "common/core/names.h"
 
 namespace exmat {
 
 enum class MaterialModel { kStVenantKirchhoff, kStableNeoHookean, kCorotational };
 
-/// "stvk", "stable_neo_hookean" or "corotational"; nothing for a name that this version does not know.
-std::optional<MaterialModel> material_from_name(std::string_view name);
-std::string_view name_of(MaterialModel model);
-
-/// "\"stvk\", \"stable_neo_hookean\" or \"corotational\"", for messages.
-std::string material_names();
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<MaterialModel>{"stvk", "stable_neo_hookean", "corotational"};
 
 /// Below this Poisson ratio a material has states of less energy than its rest; all of them end at 0.5. -1 for
 /// St.Venant-Kirchhoff and corotational, whose energies are positive definite in their strains down to it.

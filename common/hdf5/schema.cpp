@@ -121,6 +121,10 @@ AttributeSchema parse_attribute(const Json& json) {
   AttributeSchema attribute;
   attribute.name = json.at("name");
   parse_value(json, attribute);
+  if (json.contains("renamed")) {
+    attribute.renamed = json["renamed"].at("version");
+    attribute.former_name = json["renamed"].at("from");
+  }
   return attribute;
 }
 

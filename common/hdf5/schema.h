@@ -77,6 +77,11 @@ struct AttributeSchema {
   std::string dims_text, units, description;
   std::int64_t since = 1;  ///< format version
   std::vector<Constraint> constraints;
+  std::int64_t renamed = 0;  ///< format version that brought its name; 0: `since`
+  std::string former_name;   ///< in files of versions before that
+
+  /// In files of a version.
+  const std::string& name_in(std::int64_t version) const { return version < renamed ? former_name : name; }
 };
 
 struct GroupSchema {

@@ -15,8 +15,10 @@ LedgerEntry plan_targets(const Needs& needs, const LedgerEntry& examples, std::i
 }
 
 LedgerEntry plan_polynomial(const Needs& needs) {
-  if (needs.internal_force == "cubature") return {"polynomial", false, 0, "the internal force is by cubature"};
-  if (needs.internal_force == "polynomial") return {"polynomial", true, 0, "the internal force is a polynomial"};
+  if (needs.internal_force == ForceMethod::kCubature)
+    return {"polynomial", false, 0, "the internal force is by cubature"};
+  if (needs.internal_force == ForceMethod::kPolynomial)
+    return {"polynomial", true, 0, "the internal force is a polynomial"};
   return {"polynomial", true, 0, "the internal force may be a polynomial"};
 }
 

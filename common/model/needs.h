@@ -6,6 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "common/model/choices.h"
+
 namespace exmat {
 
 /// Most examples, the rest pose among them, that a table of targets is made for; it takes two.
@@ -14,8 +16,8 @@ inline constexpr std::int64_t kMostTableExamples = 4;
 /// What a scene asks of one region.
 struct RegionNeeds {
   std::string name;
-  bool targets = true;                       ///< its table of targets
-  std::string energy_reference = "example";  ///< or "rest"
+  bool targets = true;  ///< its table of targets
+  EnergyReference energy_reference = EnergyReference::kExample;
 };
 
 /// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
@@ -27,8 +29,8 @@ struct Needs {
   bool contact = true;                                ///< /contact
   bool render = true;                                 ///< /render, of an asset that names a render mesh
   std::optional<std::vector<RegionNeeds>> regions{};  ///< /regions, those named; absent: all, with tables as `targets`
-  std::string internal_force = "auto";                ///< "auto", "cubature" or "polynomial" (/polynomial)
-  std::string energy_reference = "example";           ///< or "rest": undeformed shape in the energy of the targets
+  ForceMethod internal_force = ForceMethod::kAuto;    ///< any but cubature: /polynomial
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< of the targets
 };
 
 /// One line of the ledger: a bundle group, whether it is in, and why.

@@ -7,6 +7,7 @@
 
 #include "common/core/arrays.h"
 #include "common/mesh/tet_mesh.h"
+#include "common/model/choices.h"
 
 namespace exmat {
 
@@ -19,7 +20,6 @@ struct ObjectData {
   TriangleArray surface;   ///< n_f x 3, outward
   FlagVector fixed;        ///< n, 1 where the vertex is clamped
   TetMaterials materials;  ///< n_t each
-  std::string material;    ///< "stvk", "stable_neo_hookean" or "corotational"
 };
 
 /// Group /shape_space: Laplace-Beltrami eigenpairs of the object at centroid 0 and volume 1, the constant one dropped.
@@ -29,8 +29,8 @@ struct ShapeSpaceData {
   RowMatrix rest_descriptor;                           ///< m x 3
   double volume = 0;                                   ///< of the object [m^3]
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< of the object [m]
-  std::string weighting;                               ///< "eigenvalue" or "none"
-  std::int64_t splits_cluster = 0;                     ///< 1 where the m-th and the next eigenvalue are (nearly) equal
+  Weighting weighting = Weighting::kEigenvalue;
+  std::int64_t splits_cluster = 0;  ///< 1 where the m-th and the next eigenvalue are (nearly) equal
 };
 
 /// One group /examples/NAME: an example in the object's frame and basis. docs/method.md, "Shape space".
@@ -42,7 +42,7 @@ struct ExampleData {
   double scale = 1;                 ///< object's length unit over the example's: (V_object / V_example)^(1/3)
   std::string method;               ///< how it was mapped to the object
   double alignment_residual = 0;    ///< relative
-  double confidence = 0;            ///< J of docs/alignment.md; 0 is certain, above 1.2 refused
+  double doubt = 0;                 ///< J of docs/alignment.md; 0 is certain, above 1.2 refused
   double inverted_fraction = 0;     ///< share of the volume that the pose turns inside out
   std::int64_t competing_maps = 0;  ///< other poses that fit the example about as well
   double shape_space_error = 0;     ///< share of its displacement that the m functions lose, relative M-norm
@@ -70,20 +70,20 @@ struct ModalData {
 
 /// Group /cubature.
 struct CubatureData {
-  IndexVector elements;                     ///< s, distinct tets of the object, ascending
-  Eigen::VectorXd weights;                  ///< s, >= 0
-  Eigen::VectorXd volumes;                  ///< s [m^3]
-  RowMatrix gradient;                       ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
-  Eigen::VectorXd youngs_modulus;           ///< s [Pa]
-  Eigen::VectorXd poisson_ratio;            ///< s
-  RowMatrix heldout_poses;                  ///< N x r reduced poses that the held-out errors are measured on
-  std::string internal_force = "cubature";  ///< what `auto` takes: "cubature" or "polynomial"
-  std::string internal_force_reason;        ///< why
-  std::string method;                       ///< "greedy_swap", "greedy", "nn_htp" or "all_elements"
-  double training_error = 0;                ///< relative, force, as heldout_error
-  double heldout_error = 0;                 ///< relative, force in the norm of the inverse rest stiffness
-  double heldout_energy_error = 0;          ///< relative
-  double heldout_stiffness_error = 0;       ///< relative, Frobenius norm
+  IndexVector elements;            ///< s, distinct tets of the object, ascending
+  Eigen::VectorXd weights;         ///< s, >= 0
+  Eigen::VectorXd volumes;         ///< s [m^3]
+  RowMatrix gradient;              ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
+  Eigen::VectorXd youngs_modulus;  ///< s [Pa]
+  Eigen::VectorXd poisson_ratio;   ///< s
+  RowMatrix heldout_poses;         ///< N x r reduced poses that the held-out errors are measured on
+  ForceMethod internal_force = ForceMethod::kCubature;  ///< what `auto` takes, one of the two others
+  std::string internal_force_reason;                    ///< why
+  CubatureMethod method = CubatureMethod::kGreedySwap;
+  double training_error = 0;           ///< relative, force, as heldout_error
+  double heldout_error = 0;            ///< relative, force in the norm of the inverse rest stiffness
+  double heldout_energy_error = 0;     ///< relative
+  double heldout_stiffness_error = 0;  ///< relative, Frobenius norm
 };
 
 /// Group /polynomial: derivatives at rest of the reduced energy of St.Venant-Kirchhoff over all tets, which is an exact
@@ -104,8 +104,8 @@ struct TargetTableData {
   IndexMatrix exponents;     ///< c x K, a, each row adds up to D; lexicographic, descending
   RowMatrix control_points;  ///< P c x r (dataset P c r), P_a in reduced coordinates, pieces in order
   Eigen::VectorXd knots = Eigen::Vector2d(0, 1);  ///< P + 1, t_i: 0, ..., 1, each above the one before it
-  double error = 0;              ///< largest found, in the energy norm at rest, relative to the largest example
-  std::string energy_reference;  ///< "example" or "rest"
+  double error = 0;  ///< largest found, in the energy norm at rest, relative to the largest example
+  EnergyReference energy_reference = EnergyReference::kExample;
 };
 
 /// Group /projection. docs/method.md, "Direct projection".

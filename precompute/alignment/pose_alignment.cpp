@@ -282,10 +282,10 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   alignment.start = taken.start;
   alignment.residual = std::sqrt(registered.chamfer) / size_;
   alignment.missed_landmarks = registered.landmark_rms / size_;
-  alignment.confidence = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)),
-                                  registered.distortion, registered.inverted}
-                             .total() +
-                         2 * alignment.missed_landmarks;
+  alignment.doubt = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)), registered.distortion,
+                             registered.inverted}
+                        .total() +
+                    2 * alignment.missed_landmarks;
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const Eigen::Matrix3d turn =

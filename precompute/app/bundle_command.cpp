@@ -13,7 +13,7 @@
 #include "common/core/log.h"
 #include "common/hdf5/schema.h"
 #include "common/mesh/geometry.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/pipeline/depfile.h"
 #include "precompute/pipeline/run_report.h"
 
@@ -41,9 +41,9 @@ void print_ledger(const std::vector<LedgerEntry>& ledger) {
 }
 
 void print_examples(const std::string& title, const ExampleSet& set) {
-  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", title, "method", "confidence", "lost by m [%]", "by basis [%]");
+  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", title, "method", "doubt", "lost by m [%]", "by basis [%]");
   for (const auto& example : set.examples)
-    fmt::print("{:<20}{:>14.13}{:>12.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.confidence,
+    fmt::print("{:<20}{:>14.13}{:>12.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.doubt,
                100 * example.shape_space_error, 100 * example.basis_error);
 }
 
@@ -120,7 +120,7 @@ void make_bundle(const BundleOptions& options, RunReport& report, std::optional<
     return;
   }
   report.build = {};
-  model = precompute::build_model(asset, needs, report.build, {options.alignment_report, options.cache});
+  model = precompute::build_reduced_model(asset, needs, report.build, {options.alignment_report, options.cache});
   precompute::timed_stage("writing the bundle", report.build, [&] { write_bundle(*model, options.bundle); });
   fill_bytes(*model, report.build.ledger);
   write_depfile(options, report.build);

@@ -9,7 +9,7 @@
 #include "precompute/app/bundle_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/solvers/ranks.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
@@ -23,11 +23,11 @@ struct CheckOptions {
 };
 
 void print_alignments(const std::vector<precompute::AlignmentOutcome>& outcomes) {
-  fmt::print("\n{:<20}{:<20}{:>12}{:>14}{:>14}{:>12}{:>16}  {}\n", "example", "method", "confidence", "residual [%]",
+  fmt::print("\n{:<20}{:<20}{:>12}{:>14}{:>14}{:>12}{:>16}  {}\n", "example", "method", "doubt", "residual [%]",
              "inverted [%]", "competing", "lost by m [%]", "alignment");
   for (const auto& outcome : outcomes)
     fmt::print("{:<20}{:<20}{:>12.3f}{:>14.2f}{:>14.2f}{:>12}{:>16.2f}  {}\n", outcome.name, outcome.method,
-               outcome.confidence, 100 * outcome.residual, 100 * outcome.inverted_fraction, outcome.competing_maps,
+               outcome.doubt, 100 * outcome.residual, 100 * outcome.inverted_fraction, outcome.competing_maps,
                100 * outcome.shape_space_error, precompute::name_of(outcome.verdict));
 }
 

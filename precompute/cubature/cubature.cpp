@@ -191,8 +191,8 @@ class ErrorMeter {
 
 Selection select(const SelectionProblem& problem, const CubatureOptions& options, std::size_t count,
                  const std::vector<Eigen::Index>& start, const StopRule* stop) {
-  if (options.method == "greedy") return select_greedy_random(problem, count, start, stop, options.seed);
-  if (options.method == "nn_htp") return select_hard_thresholding(problem, count);
+  if (options.method == CubatureMethod::kGreedy) return select_greedy_random(problem, count, start, stop, options.seed);
+  if (options.method == CubatureMethod::kNnHtp) return select_hard_thresholding(problem, count);
   return select_greedy_swap(problem, count, start, stop);
 }
 
@@ -209,7 +209,7 @@ Choice all_elements(Eigen::Index tets) {
 
 Choice choose(const ElementSamples& samples, const PoseSource& source, const CubatureOptions& options,
               const ErrorMeter& training, const ErrorMeter& heldout) {
-  if (options.method == kAllElementsMethod) return all_elements(samples.count());
+  if (options.method == CubatureMethod::kAllElements) return all_elements(samples.count());
   const RowMatrix& poses = training.poses();
   const Totals& totals = training.totals();
   const TrainingRows rows(source, totals.response);
@@ -244,10 +244,10 @@ void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
   if (options.elements && *options.elements > tets)
     throw InputError({"", "/cubature/elements", "at most the number of tets, " + std::to_string(tets),
                       std::to_string(*options.elements), ""});
-  if (options.tolerance && options.method == "nn_htp")
+  if (options.tolerance && options.method == CubatureMethod::kNnHtp)
     throw InputError({"", "/cubature/tolerance", "cubature.elements with method nn_htp, which needs a fixed number",
                       "a tolerance", ""});
-  if (options.method == kAllElementsMethod && (options.elements || options.tolerance))
+  if (options.method == CubatureMethod::kAllElements && (options.elements || options.tolerance))
     throw InputError({"", options.elements ? "/cubature/elements" : "/cubature/tolerance",
                       "neither elements nor tolerance with method all_elements", "one of them", ""});
 }

@@ -1,20 +1,16 @@
 #pragma once
 
 #include <optional>
-#include <string>
 
 #include "common/model/reduced_model.h"
 #include "precompute/cubature/training_poses.h"
 
 namespace exmat::precompute {
 
-/// The method that takes every tet with the weight 1: exact, and as slow as there are tets.
-inline constexpr const char* kAllElementsMethod = "all_elements";
-
 struct CubatureOptions {
-  std::optional<int> elements;         ///< s
-  std::optional<double> tolerance;     ///< held-out force error; both absent: 2 r elements
-  std::string method = "greedy_swap";  ///< "greedy_swap", "greedy", "nn_htp" or "all_elements", which has neither
+  std::optional<int> elements;                          ///< s
+  std::optional<double> tolerance;                      ///< held-out force error; both absent: 2 r elements
+  CubatureMethod method = CubatureMethod::kGreedySwap;  ///< all elements have neither of these
   int training_poses = 200;
   std::uint64_t seed = 1;
   /// Most entries of the training matrix [(r + 1) poses x candidates], 8 bytes each: where all tets would be more, each

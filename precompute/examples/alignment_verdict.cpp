@@ -9,7 +9,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kConfidenceWarning = 0.5, kConfidenceRefusal = 1.2;
+constexpr double kDoubtWarning = 0.5, kDoubtRefusal = 1.2;
 constexpr double kInvertedLimit = 0.05;
 constexpr double kResidualWarning = 0.05, kResidualRefusal = 0.15;
 // Rotations of a whole pose that its frame, taken to be the object's, makes unlikely and incredible [rad].
@@ -70,15 +70,15 @@ void object_to(AlignmentOutcome& outcome, AlignmentVerdict verdict, const std::s
   outcome.message = message;
 }
 
-void judge_confidence(AlignmentOutcome& outcome, const std::string& advice) {
+void judge_doubt(AlignmentOutcome& outcome, const std::string& advice) {
   if (outcome.inverted_fraction >= kInvertedLimit)
     object_to(outcome, AlignmentVerdict::kRefused,
               fmt::format("the map turns {:.1f} % of the volume inside out (limit 5 %); {}",
                           100 * outcome.inverted_fraction, advice));
-  const auto doubt = fmt::format("confidence {:.2f} (below {} is good, above {} refused); {}", outcome.confidence,
-                                 kConfidenceWarning, kConfidenceRefusal, advice);
-  if (outcome.confidence > kConfidenceRefusal) object_to(outcome, AlignmentVerdict::kRefused, doubt);
-  if (outcome.confidence > kConfidenceWarning) object_to(outcome, AlignmentVerdict::kDoubtful, doubt);
+  const auto objection = fmt::format("doubt {:.2f} (below {} is good, above {} refused); {}", outcome.doubt,
+                                     kDoubtWarning, kDoubtRefusal, advice);
+  if (outcome.doubt > kDoubtRefusal) object_to(outcome, AlignmentVerdict::kRefused, objection);
+  if (outcome.doubt > kDoubtWarning) object_to(outcome, AlignmentVerdict::kDoubtful, objection);
 }
 
 void judge_residual(AlignmentOutcome& outcome, const std::string& advice) {
@@ -88,9 +88,9 @@ void judge_residual(AlignmentOutcome& outcome, const std::string& advice) {
   if (outcome.residual > kResidualWarning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
 }
 
-void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome) {
+void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome) {
   outcome.residual = alignment.residual;
-  outcome.confidence = alignment.confidence;
+  outcome.doubt = alignment.doubt;
   outcome.inverted_fraction = alignment.inverted_fraction;
   outcome.competing_maps = alignment.competing_maps;
   if (alignment.mirrored)
@@ -102,11 +102,11 @@ void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool f
           ? fmt::format("the landmarks are {:.0f} % of the body's size from where they belong: do they correspond?",
                         100 * alignment.missed_landmarks)
           : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
-  judge_confidence(outcome, advice);
+  judge_doubt(outcome, advice);
   judge_residual(outcome, advice);
   judge_competitors(alignment, free_frame, outcome);
   judge_revolution(alignment, outcome);
-  if (frame == "auto" && !free_frame) judge_turn(alignment, outcome);
+  if (frame == AlignmentFrame::kAuto && !free_frame) judge_turn(alignment, outcome);
 }
 
 void require_aligned(const AssetConfig& asset, const std::vector<AlignmentOutcome>& outcomes,

@@ -17,7 +17,7 @@ const char* name_of(AlignmentVerdict verdict);
 struct AlignmentOutcome {
   std::string name;
   std::string method;
-  double residual = 0, confidence = 0, inverted_fraction = 0;
+  double residual = 0, doubt = 0, inverted_fraction = 0;
   std::int64_t competing_maps = 0;
   double shape_space_error = 0;  ///< filled in where the pose is transferred
   AlignmentVerdict verdict = AlignmentVerdict::kGood;
@@ -27,21 +27,21 @@ struct AlignmentOutcome {
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, AlignmentOutcome& value) {
-  pass_all(archive, value.name, value.method, value.residual, value.confidence, value.inverted_fraction,
+  pass_all(archive, value.name, value.method, value.residual, value.doubt, value.inverted_fraction,
            value.competing_maps, value.shape_space_error, value.verdict, value.message);
 }
 
 /// Raises the verdict to `verdict` with a message; one as grave or graver stands.
 void object_to(AlignmentOutcome& outcome, AlignmentVerdict verdict, const std::string& message);
 
-/// Confidence J and share of inverted volume against their limits; `advice` says what input would help.
-void judge_confidence(AlignmentOutcome& outcome, const std::string& advice);
+/// Doubt J and share of inverted volume against their limits; `advice` says what input would help.
+void judge_doubt(AlignmentOutcome& outcome, const std::string& advice);
 
 /// Residual, the distance of the pose's surface from what was found, against its limits.
 void judge_residual(AlignmentOutcome& outcome, const std::string& advice);
 
 /// Fills in an outcome from a registered pose. `frame` is that of the asset; `free_frame` what it came to.
-void judge_pose(const PoseAlignment& alignment, const std::string& frame, bool free_frame, AlignmentOutcome& outcome);
+void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome);
 
 /// Throws WorkError that names every refused example, unless the asset accepts them. Doubts, and refusals that are
 /// accepted, are warnings: appended and logged.

@@ -15,11 +15,11 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGoodConfidence = 0.5;     // of a rest example that stands as the object does
-constexpr double kBetterRotation = 0.5;     // of the confidence as it stands, for a rotation to be believed
-constexpr double kCompetingRotation = 1.4;  // of the best one's confidence
+constexpr double kGoodDoubt = 0.5;          // of a rest example that stands as the object does
+constexpr double kBetterRotation = 0.5;     // of the doubt as it stands, for a rotation to be believed
+constexpr double kCompetingRotation = 1.4;  // of the best one's doubt
 constexpr double kCompetingFloor = 0.05;    // added to it: below, rotations differ by the tessellation alone
-constexpr double kSameMesh = 1e-6;          // a confidence that only the object's own mesh has
+constexpr double kSameMesh = 1e-6;          // a doubt that only the object's own mesh has
 constexpr double kSameRotation = 0.5;       // [rad]
 constexpr Eigen::Index kFewestLandmarks = 4;
 constexpr double kMissedLandmarks = 0.25;  // share of their displacement, RMS, that coupled bases may miss unremarked
@@ -64,7 +64,7 @@ AlignedRest ExampleAligner::map_rest(const LaplaceBasis& basis, const Eigen::Mat
 // principal axes and the object's that fits best.
 AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
   AlignedRest as_it_stands = map_rest(basis, Eigen::Matrix3d::Identity());
-  if (asset_.alignment.frame == "shared" || as_it_stands.map.confidence <= kGoodConfidence) return as_it_stands;
+  if (asset_.alignment.frame == AlignmentFrame::kShared || as_it_stands.map.doubt <= kGoodDoubt) return as_it_stands;
   std::vector<Eigen::Vector3d> ours, theirs;
   for (Eigen::Index k = 0; k < examples_.landmarks.rows(); ++k) {
     const auto on_object = examples_.landmarks(k, 0), on_rest = examples_.landmarks(k, examples_.rest.column);
@@ -81,15 +81,15 @@ AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
   const Eigen::Matrix3d from = principal_axes(basis), to = principal_axes(object_);
   std::vector<AlignedRest> turned;
   for (const Eigen::Matrix3d& turn : cube_rotations()) turned.push_back(map_rest(basis, to * turn * from.transpose()));
-  std::ranges::stable_sort(turned, {}, [](const AlignedRest& rest) { return rest.map.confidence; });
+  std::ranges::stable_sort(turned, {}, [](const AlignedRest& rest) { return rest.map.doubt; });
   AlignedRest& best = turned.front();
-  if (best.map.confidence > kBetterRotation * as_it_stands.map.confidence) return as_it_stands;
-  const double most = best.map.confidence < kSameMesh
+  if (best.map.doubt > kBetterRotation * as_it_stands.map.doubt) return as_it_stands;
+  const double most = best.map.doubt < kSameMesh
                           ? kSameMesh
-                          : std::max(kCompetingRotation * best.map.confidence, best.map.confidence + kCompetingFloor);
+                          : std::max(kCompetingRotation * best.map.doubt, best.map.doubt + kCompetingFloor);
   for (const AlignedRest& other : turned) {
     const double apart = Eigen::AngleAxisd(Eigen::Matrix3d(best.rotation.transpose() * other.rotation)).angle();
-    if (apart > kSameRotation && other.map.confidence < most) ++best.outcome.competing_maps;
+    if (apart > kSameRotation && other.map.doubt < most) ++best.outcome.competing_maps;
   }
   if (best.outcome.competing_maps > 0)
     object_to(
@@ -111,7 +111,7 @@ void ExampleAligner::use_vertex_map(AlignedRest& rest) const {
                         fmt::format("'-' for vertex {}", v + 1), "leave out vertices in maps of poses alone"});
     points.insert(v, map[v]) = 1;
   }
-  const bool moves = asset_.alignment.frame != "shared" && !rest.map.same_frame;
+  const bool moves = asset_.alignment.frame != AlignmentFrame::kShared && !rest.map.same_frame;
   const VertexArray mapped = points * rest.basis.vertices;
   if (moves) {
     const Eigen::Matrix3d turn = procrustes_rotation(object_.vertices.transpose() * (object_.mass * mapped));
@@ -139,23 +139,24 @@ AlignedRest ExampleAligner::align_rest() {
         count);
     rest = best_rotation(basis);
     use_vertex_map(rest);
-    if (asset_.alignment.method == "coupled") {
+    if (asset_.alignment.method == AlignmentMethod::kCoupled) {
       rest.map.functional_map = coupled_map(examples_.rest, rest.basis);
       rest.map.by_functions = true;
       rest.outcome.method = "coupled";
     }
-    log::info(fmt::format("rest example {}: {:.1f} % from the object, confidence {:.3f} (0 is certain)",
-                          examples_.rest.name, 100 * rest.map.residual, rest.map.confidence));
+    log::info(fmt::format("rest example {}: {:.1f} % from the object, doubt {:.3f} (0 is certain)", examples_.rest.name,
+                          100 * rest.map.residual, rest.map.doubt));
   }
   rest.carried = {rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
                   rest.map.pull_back * rest.basis.vertices};
   rest.outcome.name = examples_.rest.name;
   rest.outcome.residual = rest.map.residual;
-  rest.outcome.confidence = rest.map.confidence;
+  rest.outcome.doubt = rest.map.doubt;
   if (rest.outcome.method == "rest_map")
-    judge_confidence(rest.outcome, "expected a rest example that has about the object's shape and lies where it does");
-  rest.free_poses = asset_.alignment.frame == "free" || (asset_.alignment.frame == "auto" && !rest.map.same_frame);
-  if (asset_.alignment.frame == "auto")
+    judge_doubt(rest.outcome, "expected a rest example that has about the object's shape and lies where it does");
+  rest.free_poses = asset_.alignment.frame == AlignmentFrame::kFree ||
+                    (asset_.alignment.frame == AlignmentFrame::kAuto && !rest.map.same_frame);
+  if (asset_.alignment.frame == AlignmentFrame::kAuto)
     log::info(rest.free_poses ? "examples are rotated to the object's frame: the rest example does not coincide with it"
                               : "examples share the object's frame: the rest example coincides with it");
   return rest;
@@ -182,7 +183,7 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
       }
     return {rows_of(rest.map.pull_back, on_object), at_vertices(on_pose, pose_size)};
   }
-  if (asset_.alignment.method == "map")
+  if (asset_.alignment.method == AlignmentMethod::kMap)
     throw InputError({asset_.file.string(), "/alignment/map", "a map for " + pose.name, "none",
                       "give one, or take another alignment.method"});
   std::vector<Eigen::Triplet<double>> entries;
@@ -199,7 +200,7 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
     on_pose.push_back(landmarks(k, pose.column));
   }
   if (asset_.alignment.landmarks && std::ssize(on_pose) < kFewestLandmarks &&
-      (asset_.alignment.method == "landmarks" || !on_pose.empty()))
+      (asset_.alignment.method == AlignmentMethod::kLandmarks || !on_pose.empty()))
     throw InputError({asset_.alignment.landmarks->string(), "",
                       fmt::format("at least {} landmarks of example {}", kFewestLandmarks, pose.name),
                       std::to_string(on_pose.size()), "8 that do not lie in a plane are usual"});
@@ -209,7 +210,7 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
 }
 
 AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput& pose) {
-  AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != "auto"};
+  AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != AlignmentMethod::kAuto};
   const bool is_mapped = pose.on_object.size() > 0;
   hints.landmarks_alone = hints.landmarks_alone || is_mapped;
   const AlignedShape shape = aligned_shape(pose.mesh, 0, pose.name);
@@ -219,10 +220,10 @@ AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput&
   aligned.outcome.name = pose.name;
   aligned.outcome.method = is_mapped ? "map" : hints.correspondences.count() > 0 ? "landmarks" : "registered";
   judge_pose(alignment, asset_.alignment.frame, rest.free_poses, aligned.outcome);
-  log::info(fmt::format(
-      "example {}: registered from {}, {:.2f} % from its surface, confidence {:.3f} (0 is certain), {} "
-      "competing poses",
-      pose.name, alignment.start, 100 * alignment.residual, alignment.confidence, alignment.competing_maps));
+  log::info(
+      fmt::format("example {}: registered from {}, {:.2f} % from its surface, doubt {:.3f} (0 is certain), {} "
+                  "competing poses",
+                  pose.name, alignment.start, 100 * alignment.residual, alignment.doubt, alignment.competing_maps));
   return aligned;
 }
 
@@ -306,10 +307,10 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
   aligned.outcome.name = pose.name;
   aligned.outcome.method = "coupled";
   const double missed = missed_landmarks(rest, pose, posed, displacement);
-  aligned.outcome.confidence = score.total() + missed;
+  aligned.outcome.doubt = score.total() + missed;
   aligned.outcome.inverted_fraction = score.inverted;
   const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
-  judge_confidence(aligned.outcome, advice);
+  judge_doubt(aligned.outcome, advice);
   judge_residual(aligned.outcome, advice);
   if (missed > kMissedLandmarks)
     object_to(aligned.outcome, AlignmentVerdict::kDoubtful,
@@ -324,15 +325,15 @@ AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput&
   if (pose.same_connectivity) {
     AlignedPose aligned;
     aligned.positions = normalised_positions(pose.mesh);
-    aligned.outcome = {pose.name, "same_connectivity", rest.outcome.residual, rest.outcome.confidence,
+    aligned.outcome = {pose.name, "same_connectivity", rest.outcome.residual, rest.outcome.doubt,
                        pose.inverted_fraction};
     return aligned;
   }
   const AlignmentConfig& config = asset_.alignment;
   return cache_.get(
       "alignment of " + pose.name,
-      [&] { return config.method == "coupled" ? coupled(rest, pose) : registered(rest, pose); }, object_,
-      object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
+      [&] { return config.method == AlignmentMethod::kCoupled ? coupled(rest, pose) : registered(rest, pose); },
+      object_, object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
       landmarks_of(pose), config.landmarks.has_value(), examples_.parts, pose.parts, config.method, config.frame);
 }
 

@@ -102,7 +102,7 @@ ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, dou
   example.scale = std::cbrt(stage_.object.volume / volume);
   example.method = outcome.method;
   example.alignment_residual = outcome.residual;
-  example.confidence = outcome.confidence;
+  example.doubt = outcome.doubt;
   example.inverted_fraction = outcome.inverted_fraction;
   example.competing_maps = outcome.competing_maps;
   return example;

@@ -93,7 +93,7 @@ std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const 
 }
 
 FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
-                                     runtime::EnergyReference reference)
+                                     EnergyReference reference)
     : view_(poses.view), free_dofs_(system.free_dofs) {
   set_filter(model, *poses.examples);
   set_poses(model, system, poses);
@@ -136,7 +136,7 @@ void FullSpaceExamples::set_poses(const ReducedModel& model, const ElasticSystem
 }
 
 void FullSpaceExamples::set_target(const ReducedModel& model, const ElasticSystem& system, const ExampleSet& set,
-                                   runtime::EnergyReference reference) {
+                                   EnergyReference reference) {
   const ObjectData& object = *model.object;
   const RowMatrix basis = system.extend(pose_basis_);
   const ElementSamples samples(object.mesh, object.materials, basis);
@@ -145,7 +145,7 @@ void FullSpaceExamples::set_target(const ReducedModel& model, const ElasticSyste
   all.gradient.resize(9 * samples.count(), basis.cols());
   for (Eigen::Index t = 0; t < samples.count(); ++t) {
     const RowMatrix gradient = samples.gradient(t);
-    const bool inverted = reference == runtime::EnergyReference::kExample &&
+    const bool inverted = reference == EnergyReference::kExample &&
                           std::ranges::any_of(poses_, [&](const auto& pose) { return inverts(gradient, pose); });
     if (inverted) continue;
     all.gradient.middleRows<9>(9 * std::ssize(kept)) = gradient;

@@ -37,7 +37,7 @@ class FullSpaceExamples {
   /// Of `poses` no more than the view is kept. Tets that an example turns inside out are left out of the energies of
   /// the examples where these start from the examples.
   FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
-                    runtime::EnergyReference reference);
+                    EnergyReference reference);
 
   Eigen::Index count() const { return weights_.examples(); }
   Eigen::Index left_out_tets() const { return left_out_; }
@@ -65,7 +65,7 @@ class FullSpaceExamples {
   void set_filter(const ReducedModel& model, const ExampleSet& set);
   void set_poses(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses);
   void set_target(const ReducedModel& model, const ElasticSystem& system, const ExampleSet& set,
-                  runtime::EnergyReference reference);
+                  EnergyReference reference);
   Eigen::MatrixXd coefficients(const RowMatrix& functions, const Eigen::VectorXd& u) const;
   Eigen::VectorXd force(const RowMatrix& functions, const Eigen::MatrixXd& coefficients) const;
 

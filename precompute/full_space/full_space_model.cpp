@@ -12,7 +12,7 @@ namespace {
 VertexArray as_rows(const Eigen::VectorXd& field) { return field.reshaped<Eigen::RowMajor>(field.size() / 3, 3); }
 
 void add_examples(const ReducedModel& model, const FullSpaceOptions& options, FullSpaceModel& full) {
-  const auto add = [&](const ExamplePoses& poses, runtime::EnergyReference reference, const std::string& owner) {
+  const auto add = [&](const ExamplePoses& poses, EnergyReference reference, const std::string& owner) {
     const auto& added = full.examples.emplace_back(model, full.system, poses, reference);
     if (const Eigen::Index left_out = added.left_out_tets(); left_out > 0)
       log::warning(owner + ": the energies of the target leave out " + std::to_string(left_out) + " of " +

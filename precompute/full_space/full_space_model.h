@@ -37,10 +37,10 @@ struct FullSpaceModel {
 
 struct FullSpaceOptions {
   bool whole_body = false;  ///< whether to have its examples
-  runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;
+  EnergyReference energy_reference = EnergyReference::kExample;
   struct Region {
     std::string name{};
-    runtime::EnergyReference energy_reference = runtime::EnergyReference::kExample;
+    EnergyReference energy_reference = EnergyReference::kExample;
   };
   std::vector<Region> regions{};  ///< whose examples to have
 };

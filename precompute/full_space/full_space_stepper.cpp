@@ -10,7 +10,6 @@ namespace exmat::precompute {
 namespace {
 
 using runtime::ExampleState;
-using runtime::Integrator;
 using runtime::NewtonReport;
 using runtime::NewtonStatus;
 

@@ -17,7 +17,7 @@ namespace exmat::precompute {
 /// motion carries has no full-space scene.
 struct FullSpaceScene {
   double time_step = 0.001;  ///< > 0 [s]
-  runtime::Integrator integrator = runtime::Integrator::kBdf2;
+  Integrator integrator = Integrator::kBdf2;
   double mass_damping = 0;       ///< alpha >= 0 [1/s]
   double stiffness_damping = 0;  ///< beta >= 0 [s]
   runtime::NewtonSettings newton{50, 1e-8};

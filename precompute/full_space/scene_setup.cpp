@@ -8,18 +8,10 @@
 namespace exmat::precompute {
 namespace {
 
-runtime::Integrator integrator_of(const SceneConfig& config) {
-  if (config.integrator == "backward_euler") return runtime::Integrator::kBackwardEuler;
-  if (config.integrator == "newmark") return runtime::Integrator::kNewmark;
-  return runtime::Integrator::kBdf2;
-}
-
 void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
   const std::string file = config.file.string();
   if (!config.body.motion.empty())
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
-  if (config.examples && config.examples->force != "linear")
-    throw InputError({file, "/examples/force", "\"linear\"", '"' + config.examples->force + '"', ""});
   const auto require_part = [&](bool needed, bool there, const char* group) {
     if (needed && !there)
       throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
@@ -43,7 +35,7 @@ FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::
   require_supported(config, model);
   FullSpaceScene scene;
   scene.time_step = config.time_step;
-  scene.integrator = integrator_of(config);
+  scene.integrator = config.integrator;
   scene.mass_damping = config.mass_damping;
   scene.stiffness_damping = config.stiffness_damping;
   scene.gravity = config.gravity;
@@ -60,10 +52,8 @@ FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::
 FullSpaceOptions full_space_options(const SceneConfig& config) {
   FullSpaceOptions options;
   options.whole_body = config.examples.has_value();
-  if (config.examples)
-    options.energy_reference = runtime::energy_reference_from_name(config.examples->energy_reference);
-  for (const auto& [name, force] : config.regions)
-    options.regions.push_back({name, runtime::energy_reference_from_name(force.energy_reference)});
+  if (config.examples) options.energy_reference = config.examples->energy_reference;
+  for (const auto& [name, force] : config.regions) options.regions.push_back({name, force.energy_reference});
   return options;
 }
 

@@ -1,6 +1,5 @@
 #include "precompute/full_space/sparse_newton.h"
 
-#include <cmath>
 #include <limits>
 
 namespace exmat::precompute {
@@ -9,12 +8,8 @@ namespace {
 using runtime::NewtonReport;
 using runtime::NewtonStatus;
 using runtime::PotentialEvaluation;
-using runtime::PotentialValue;
 using runtime::Tangent;
 
-constexpr double kArmijo = 1e-4;
-constexpr int kHalvings = 30;
-constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class Minimisation {
@@ -29,7 +24,6 @@ class Minimisation {
   bool finished();
   bool find_direction();
   bool move();
-  bool line_search(double slope, Eigen::VectorXd& trial, Eigen::VectorXd& trial_gradient, PotentialEvaluation& there);
 
   StepPotential& potential_;
   const runtime::NewtonSettings& settings_;
@@ -42,17 +36,9 @@ class Minimisation {
 };
 
 bool Minimisation::finished() {
-  if (!std::isfinite(report_.residual) || !std::isfinite(here_.potential.value))
-    report_.status = NewtonStatus::kNonFinite;
-  else if (report_.residual <= settings_.tolerance * here_.force_scale)
-    report_.status = NewtonStatus::kConverged;
-  else if (report_.residual > 0.5 * unchecked_from_)
-    report_.status = NewtonStatus::kStagnated;
-  else if (report_.iterations == settings_.max_iterations)
-    report_.status = NewtonStatus::kIterationLimit;
-  else
-    return false;
-  return true;
+  const auto reason = runtime::reason_to_end(report_, settings_, here_, unchecked_from_);
+  if (reason) report_.status = *reason;
+  return reason.has_value();
 }
 
 bool Minimisation::find_direction() {
@@ -67,29 +53,11 @@ bool Minimisation::find_direction() {
   return solver_.solve_shifted(potential_.hessian(), product, -gradient_, direction_);
 }
 
-bool Minimisation::line_search(double slope, Eigen::VectorXd& trial, Eigen::VectorXd& trial_gradient,
-                               PotentialEvaluation& there) {
-  const auto low_enough = [&](double length, const PotentialValue& value) {
-    return value.value <= here_.potential.value + kArmijo * length * slope + kRounding * here_.potential.magnitude;
-  };
-  trial = d_ + direction_;
-  there = potential_.evaluate(trial, trial_gradient);
-  if (low_enough(1, there.potential)) return true;
-  double length = 0.5;
-  for (int halving = 0; halving < kHalvings; ++halving, length *= 0.5) {
-    trial = d_ + length * direction_;
-    ++report_.line_search_evaluations;
-    if (!low_enough(length, potential_.value(trial))) continue;
-    there = potential_.evaluate(trial, trial_gradient);
-    return true;
-  }
-  return false;
-}
-
 // Along the direction; false where nothing lowers the potential.
 bool Minimisation::move() {
-  const double slope = gradient_.dot(direction_);
-  const bool below_rounding = std::abs(slope) <= kRounding * here_.potential.magnitude;
+  const runtime::SearchLine<Eigen::VectorXd> line{d_, gradient_, direction_, here_.potential,
+                                                  gradient_.dot(direction_)};
+  const bool below_rounding = line.below_rounding();
   unchecked_from_ = below_rounding ? report_.residual : kInfinity;
   Eigen::VectorXd trial, trial_gradient;
   PotentialEvaluation there;
@@ -101,7 +69,7 @@ bool Minimisation::move() {
       here_ = potential_.evaluate(d_, gradient_);
       return false;
     }
-  } else if (!line_search(slope, trial, trial_gradient, there)) {
+  } else if (!runtime::search_line(potential_, line, {trial, trial_gradient, there}, report_.line_search_evaluations)) {
     here_ = potential_.evaluate(d_, gradient_);
     return false;
   }

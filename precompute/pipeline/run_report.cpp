@@ -68,7 +68,7 @@ void add_examples(const std::string& region, const ExampleSet& set, Json& exampl
     examples.push_back({{"name", example.name},
                         {"region", region},
                         {"method", example.method},
-                        {"confidence", example.confidence},
+                        {"doubt", example.doubt},
                         {"alignment_residual", example.alignment_residual},
                         {"inverted_fraction", example.inverted_fraction},
                         {"competing_maps", example.competing_maps},
@@ -100,8 +100,8 @@ void add_model(const ReducedModel& model, Json& json) {
                    {"cubature_elements", model.cubature->elements.size()},
                    {"eigenfunctions", model.shape_space ? model.shape_space->eigenvalues.size() : 0}};
   json["examples"] = examples_of(model);
-  json["cubature"] = {{"method", model.cubature->method},
-                      {"internal_force", model.cubature->internal_force},
+  json["cubature"] = {{"method", name_of(model.cubature->method)},
+                      {"internal_force", name_of(model.cubature->internal_force)},
                       {"training_error", model.cubature->training_error},
                       {"heldout_error", model.cubature->heldout_error},
                       {"heldout_energy_error", model.cubature->heldout_energy_error},
@@ -118,7 +118,7 @@ void add_model(const ReducedModel& model, Json& json) {
 
 nlohmann::ordered_json to_json(const RunReport& report, const ReducedModel* model) {
   Json json{{"format", "exmat-report"},
-            {"format_version", 1},
+            {"format_version", 2},
             {"program", "exmat-precompute " + std::string(version())},
             {"solvers", solver_versions()},
             {"status", report.status},

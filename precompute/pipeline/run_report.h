@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 
 namespace exmat::precompute {
 

@@ -14,7 +14,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr const char* kMaterial = "stvk";
+constexpr MaterialModel kMaterial = MaterialModel::kStVenantKirchhoff;
 // Beyond these `auto` makes no polynomial: minutes of work, or slower than cubature as far as can be told.
 constexpr Eigen::Index kMostAutoModes = 64;
 constexpr double kMostAutoFlops = 200e9;
@@ -91,8 +91,7 @@ double modelled_ratio(const runtime::ReducedElasticity& cubature) {
 }
 
 runtime::ReducedElasticity elasticity_of(const ReducedModel& model) {
-  const auto material = material_from_name(model.object->material);
-  return runtime::ReducedElasticity(material.value(), *model.cubature);
+  return runtime::ReducedElasticity(model.object->materials.model, *model.cubature);
 }
 
 bool is_polynomial_faster(const ReducedModel& model) {
@@ -112,16 +111,17 @@ std::string slower_text(const CubatureData& cubature) {
 
 }  // namespace
 
-void require_polynomial(const std::string& material, Eigen::Index modes) {
+void require_polynomial(MaterialModel material, Eigen::Index modes) {
   if (material != kMaterial)
-    throw InputError({"", "/internal_force", "\"cubature\" or \"auto\"", "\"polynomial\" for " + material,
-                      fmt::format("only {} has one", kMaterial)});
+    throw InputError({"", "/internal_force", "\"cubature\" or \"auto\"",
+                      fmt::format("\"polynomial\" for {}", name_of(material)),
+                      fmt::format("only {} has one", name_of(kMaterial))});
   require_polynomial_modes(modes);
 }
 
 std::string reason_against_polynomial(const ReducedModel& model, std::optional<double> tolerance) {
   const Eigen::Index modes = model.cubature->gradient.cols();
-  if (model.object->material != kMaterial) return "the material has no polynomial";
+  if (model.object->materials.model != kMaterial) return "the material has no polynomial";
   if (modes > kMostAutoModes) return fmt::format("a polynomial of more than {} modes is slow", kMostAutoModes);
   if (polynomial_flops(modes, model.object->mesh.tet_count()) > kMostAutoFlops)
     return "the polynomial takes too long to precompute";
@@ -136,14 +136,14 @@ bool takes_polynomial(double measured_ratio, double modelled_ratio) {
   return modelled_ratio < 1;
 }
 
-void choose_internal_force(const std::string& asked, std::optional<double> tolerance, ReducedModel& model) {
+void choose_internal_force(ForceMethod asked, std::optional<double> tolerance, ReducedModel& model) {
   CubatureData& cubature = *model.cubature;
   const auto choose = [&](bool polynomial, const std::string& reason) {
-    cubature.internal_force = polynomial ? "polynomial" : "cubature";
+    cubature.internal_force = polynomial ? ForceMethod::kPolynomial : ForceMethod::kCubature;
     cubature.internal_force_reason = reason;
     if (!polynomial) model.polynomial.reset();
   };
-  if (asked != "auto") return choose(asked == "polynomial", "it is asked for");
+  if (asked != ForceMethod::kAuto) return choose(asked == ForceMethod::kPolynomial, "it is asked for");
   if (!model.polynomial) return choose(false, reason_against_polynomial(model, tolerance));
   const Eigen::Index modes = cubature.gradient.cols(), elements = cubature.elements.size();
   if (misses(cubature, tolerance))

@@ -8,7 +8,7 @@
 namespace exmat::precompute {
 
 /// Throws InputError where `polynomial` cannot be had at all: another material than stvk, or too many modes.
-void require_polynomial(const std::string& material, Eigen::Index modes);
+void require_polynomial(MaterialModel material, Eigen::Index modes);
 
 /// Why `auto` does without a polynomial before there is one, for a model with cubature; empty where it is worth making.
 /// `tolerance` is that of cubature, if it has one.
@@ -19,9 +19,9 @@ std::string reason_against_polynomial(const ReducedModel& model, std::optional<d
 bool takes_polynomial(double measured_ratio, double modelled_ratio);
 
 /// Sets internal_force of model.cubature and its reason, and drops model.polynomial where cubature is chosen. `asked`
-/// is "cubature", "polynomial" or "auto": then the polynomial, if there is one, where cubature misses its tolerance,
+/// may be auto: then the polynomial, if there is one, where cubature misses its tolerance,
 /// else the faster for one force_and_stiffness and two forces, as the run time's own classes are measured. Measured
 /// times go to the log.
-void choose_internal_force(const std::string& asked, std::optional<double> tolerance, ReducedModel& model);
+void choose_internal_force(ForceMethod asked, std::optional<double> tolerance, ReducedModel& model);
 
 }  // namespace exmat::precompute

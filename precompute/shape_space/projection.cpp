@@ -14,8 +14,8 @@ Eigen::VectorXd flatten(const RowMatrix& descriptor) { return descriptor.reshape
 
 }  // namespace
 
-Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, const std::string& weighting) {
-  if (weighting == "eigenvalue") return object.eigenvalues;
+Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, Weighting weighting) {
+  if (weighting == Weighting::kEigenvalue) return object.eigenvalues;
   return Eigen::VectorXd::Ones(object.eigenvalues.size());
 }
 

@@ -5,8 +5,8 @@
 
 namespace exmat::precompute {
 
-/// Lambda of docs/method.md, "Shape space": the eigenvalues, or ones with `weighting` "none".
-Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, const std::string& weighting);
+/// Lambda of docs/method.md, "Shape space": the eigenvalues, or ones.
+Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, Weighting weighting);
 
 /// T and T^+; the range of the targets is left to range_basis(). `basis` is U, 3n x r; `mass` M, 3n x 3n; `object`
 /// holds the first m functions. docs/method.md, "Direct projection".

@@ -86,7 +86,7 @@ RestMap rest_map(const LaplaceBasis& object, const TetMesh& rest_mesh, const Lap
   const Eigen::JacobiSVD<Eigen::MatrixXd> svd(map, Eigen::ComputeThinU | Eigen::ComputeThinV);
   result.functional_map = svd.matrixU() * svd.matrixV().transpose();
   result.residual = nearest.distances.norm() / object.vertices.rowwise().norm().norm();
-  result.confidence =
+  result.doubt =
       result.residual + (svd.singularValues().array() - 1).matrix().norm() / std::sqrt(static_cast<double>(map.rows()));
 
   result.same_frame = result.residual <= kSameFrame;

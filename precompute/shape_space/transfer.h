@@ -12,8 +12,8 @@ namespace exmat::precompute {
 struct RestMap {
   Eigen::MatrixXd functional_map;  ///< C_0, m x K_e, orthonormal rows
   SparseMatrix pull_back;          ///< n x n_e, values at the nearest point of the rest example for each object vertex
-  double residual = 0;    ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
-  double confidence = 0;  ///< residual + |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 is certain
+  double residual = 0;  ///< RMS distance of the object's vertices from the rest example, over the object's RMS radius
+  double doubt = 0;     ///< residual + |C - polar(C)|_F / sqrt(m) of the pulled-back functions; 0 is certain
   bool same_frame = true;     ///< the rest example coincides with the object within kSameFrame
   bool by_functions = false;  ///< fields come over by the functional map, not by the pull-back
 
@@ -24,7 +24,7 @@ struct RestMap {
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, RestMap& value) {
-  pass_all(archive, value.functional_map, value.pull_back, value.residual, value.confidence, value.same_frame,
+  pass_all(archive, value.functional_map, value.pull_back, value.residual, value.doubt, value.same_frame,
            value.by_functions);
 }
 

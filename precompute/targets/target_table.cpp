@@ -216,10 +216,9 @@ std::optional<TargetTableData> build_target_table(const ReducedModel& model, con
                                 count, kMostTableExamples);
     return std::nullopt;
   }
-  const auto reference = runtime::energy_reference_from_name(options.energy_reference);
   TargetSolver target;
-  if (const auto complaint = target.build(*material_from_name(model.object->material), *model.cubature, examples,
-                                          projection.target_basis, reference)) {
+  if (const auto complaint = target.build(model.object->materials.model, *model.cubature, examples,
+                                          projection.target_basis, options.energy_reference)) {
     report.message = "no table of targets: " + to_string(*complaint);
     return std::nullopt;
   }

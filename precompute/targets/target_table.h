@@ -10,10 +10,10 @@
 namespace exmat::precompute {
 
 struct TargetTableOptions {
-  double tolerance = 1e-4;                   ///< of the error as TargetTableData has it [Limit: > 0]
-  std::string energy_reference = "example";  ///< or "rest"
-  int most_degree = 0;                       ///< of one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
-  std::int64_t most_pieces = 256;            ///< for K = 2
+  double tolerance = 1e-4;  ///< of the error as TargetTableData has it [Limit: > 0]
+  EnergyReference energy_reference = EnergyReference::kExample;
+  int most_degree = 0;             ///< of one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
+  std::int64_t most_pieces = 256;  ///< for K = 2
 };
 
 /// One table that was tried, and its largest error at the weights of the check.

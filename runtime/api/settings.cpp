@@ -18,16 +18,13 @@ using Json = nlohmann::json;
 static_assert(kSettingsSizes.now >= kSettingsSizes.first && kReportSizes.now >= kReportSizes.first);
 static_assert(kMotionSizes.now >= kMotionSizes.first && kEnergiesSizes.now >= kEnergiesSizes.first);
 
-constexpr std::array kIntegrators{"bdf2", "backward_euler", "newmark"};
-constexpr std::array kInternalForces{"auto", "cubature", "polynomial"};
-constexpr std::array kTargets{"auto", "table", "solve"};
-constexpr std::array kEnergyReferences{"example", "rest"};
-
-template <std::size_t N>
-const char* name_of(std::int32_t value, const std::array<const char*, N>& names, const char* member) {
-  if (value < 0 || static_cast<std::size_t>(value) >= N)
-    throw InvalidArgument(fmt::format("settings.{} = {}: expected 0 to {}", member, value, N - 1));
-  return names[static_cast<std::size_t>(value)];
+/// The choice of a number, which counts as the enumeration does.
+template <Named Choice>
+Choice choice_of(std::int32_t value, const char* member) {
+  constexpr std::size_t kCount = kNames<Choice>.size();
+  if (value < 0 || static_cast<std::size_t>(value) >= kCount)
+    throw InvalidArgument(fmt::format("settings.{} = {}: expected 0 to {}", member, value, kCount - 1));
+  return static_cast<Choice>(value);
 }
 
 /// Callers that were compiled with an older version leave out members, those with a newer one may set none that are
@@ -113,8 +110,8 @@ SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* 
   scene.bundle = bundle;
   scene.time_step = settings.time_step;
   scene.gravity = Eigen::Vector3d(settings.gravity);
-  scene.integrator = name_of(settings.integrator, kIntegrators, "integrator");
-  scene.internal_force = name_of(settings.internal_force, kInternalForces, "internal_force");
+  scene.integrator = choice_of<Integrator>(settings.integrator, "integrator");
+  scene.internal_force = choice_of<ForceMethod>(settings.internal_force, "internal_force");
   scene.mass_damping = settings.mass_damping;
   scene.stiffness_damping = settings.stiffness_damping;
   scene.newton = {settings.newton_iterations, settings.newton_tolerance};
@@ -122,9 +119,9 @@ SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* 
   examples.stiffness = settings.example_stiffness;
   examples.damping = settings.example_damping;
   examples.bias = settings.example_bias;
-  examples.target = name_of(settings.example_target, kTargets, "example_target");
+  examples.target = choice_of<TargetSource>(settings.example_target, "example_target");
   examples.target_iterations = settings.target_iterations;
-  examples.energy_reference = name_of(settings.energy_reference, kEnergyReferences, "energy_reference");
+  examples.energy_reference = choice_of<EnergyReference>(settings.energy_reference, "energy_reference");
   if (settings.use_examples == 1) scene.examples = examples;
   return scene;
 }

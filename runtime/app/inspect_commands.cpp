@@ -17,11 +17,11 @@ void print_groups(const ReducedModel& model, const BundleSummary& summary) {
 }
 
 void print_examples(const ExampleSet& set) {
-  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12}\n", "example", "mapped by", "residual", "confidence",
+  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12}\n", "example", "mapped by", "residual", "doubt",
              "shape error", "basis error");
   for (const ExampleData& example : set.examples)
     fmt::print("{:<20} {:<20} {:>10.3g} {:>12.3g} {:>14.3g} {:>12.3g}\n", example.name, example.method,
-               example.alignment_residual, example.confidence, example.shape_space_error, example.basis_error);
+               example.alignment_residual, example.doubt, example.shape_space_error, example.basis_error);
 }
 
 }  // namespace
@@ -35,7 +35,7 @@ void info_command(const std::filesystem::path& bundle) {
   fmt::print("mesh           {} vertices, {} tets\n", summary.vertices, summary.tets);
   fmt::print("modes          {}\n", summary.modes);
   fmt::print("cubature       {} elements\n", summary.cubature_elements);
-  if (model.object) fmt::print("material       {}\n", model.object->material);
+  if (model.object) fmt::print("material       {}\n", name_of(model.object->materials.model));
   if (model.modal && model.modal->frequencies.size() > 0)
     fmt::print("frequencies    {:.4g} to {:.4g} Hz ({} linear modes)\n", model.modal->frequencies.minCoeff(),
                model.modal->frequencies.maxCoeff(), model.modal->frequencies.size());

@@ -184,7 +184,7 @@ BenchResult bench(const LoadedScene& loaded, const SceneConfig& config, const Be
   result.vertices = loaded.summary.vertices;
   result.tets = loaded.summary.tets;
   for (const ExampleModel& examples : loaded.model->examples) result.examples += examples.weights.examples();
-  result.integrator = config.integrator;
+  result.integrator = name_of(config.integrator);
   result.internal_force = force.polynomial() ? "polynomial" : "cubature";
   result.target = target_name(loaded);
   result.instruction_set = kernels().name;

@@ -13,12 +13,6 @@
 namespace exmat::runtime {
 namespace {
 
-Integrator integrator_from_name(std::string_view name) {
-  if (name == "backward_euler") return Integrator::kBackwardEuler;
-  if (name == "newmark") return Integrator::kNewmark;
-  return Integrator::kBdf2;
-}
-
 void check_examples(const SceneConfig& config, const BundleSummary& summary) {
   const std::string bundle = config.bundle.string();
   if (config.examples && summary.examples == 0)
@@ -42,21 +36,21 @@ void check_regions(const SceneConfig& config, const BundleSummary& summary) {
 
 /// A table of targets where the scene insists on one. `owner` is the member of the scene, `group` that of the bundle.
 void check_table(const SceneConfig& config, const ExampleForceConfig& force, const std::string& owner,
-                 const std::string& group, bool has_targets, const std::string& energy_reference) {
-  if (force.target != "table") return;
+                 const std::string& group, bool has_targets, EnergyReference energy_reference) {
+  if (force.target != TargetSource::kTable) return;
   const std::string bundle = config.bundle.string();
   const std::string advice =
       fmt::format("precompute the asset with this scene (--scene), or let the scene's {}.target say \"auto\"", owner);
   if (!has_targets)
     throw InputError({bundle, group, "this group, since the scene asks for a table of targets", "none", advice});
   if (energy_reference != force.energy_reference)
-    throw InputError({bundle, group, "targets of energy_reference \"" + force.energy_reference + '"',
-                      '"' + energy_reference + '"', advice});
+    throw InputError({bundle, group, fmt::format("targets of energy_reference \"{}\"", name_of(force.energy_reference)),
+                      fmt::format("\"{}\"", name_of(energy_reference)), advice});
 }
 
 void check_methods(const SceneConfig& config, const BundleSummary& summary) {
   const std::string bundle = config.bundle.string();
-  if (config.internal_force == "polynomial" && !summary.has_polynomial)
+  if (config.internal_force == ForceMethod::kPolynomial && !summary.has_polynomial)
     throw InputError({bundle, "/polynomial", "this group, since the scene asks for it by internal_force", "none",
                       "precompute the asset with internal_force \"polynomial\", or let the scene say \"auto\""});
   if (config.examples)
@@ -131,7 +125,7 @@ ExampleSettings example_settings(const ExampleForceConfig& config) {
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   StepScene scene;
   scene.time_step = config.time_step;
-  scene.integrator = integrator_from_name(config.integrator);
+  scene.integrator = config.integrator;
   scene.mass_damping = config.mass_damping;
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
@@ -166,10 +160,10 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   options.target_table = data.targets.has_value();
   options.polynomial = data.polynomial.has_value();
   options.carried = !config.body.motion.empty();
-  if (config.examples) options.energy_reference = energy_reference_from_name(config.examples->energy_reference);
+  if (config.examples) options.energy_reference = config.examples->energy_reference;
   for (const auto& [name, force] : config.regions)
-    options.regions.push_back({name, std::ranges::find(data.regions, name, &RegionData::name)->targets.has_value(),
-                               energy_reference_from_name(force.energy_reference)});
+    options.regions.push_back(
+        {name, std::ranges::find(data.regions, name, &RegionData::name)->targets.has_value(), force.energy_reference});
   ModelResult result = build_model(data, options);
   if (result.model) return std::move(result.model);
   result.complaint.file = config.bundle.string();
@@ -235,8 +229,8 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   const Model& model = *loaded.model;
   const StepScene& scene = loaded.scene;
   std::vector<std::string> plan;
-  plan.push_back(
-      fmt::format("integrator: {}, time step {:g} s, r = {} modes", config.integrator, scene.time_step, model.modes()));
+  plan.push_back(fmt::format("integrator: {}, time step {:g} s, r = {} modes", name_of(config.integrator),
+                             scene.time_step, model.modes()));
   const auto left_out = [&plan](std::string_view stage, std::string_view why) {
     plan.push_back(fmt::format("{}: left out, {}", stage, why));
   };

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <sstream>
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/fields.h"
@@ -54,6 +55,8 @@ TEST(BundleSchema, HasNothingOlderThanItsGroup) {
     for (const AttributeSchema& attribute : group.attributes) {
       EXPECT_GE(attribute.since, group.since) << group.path << attribute.name;
       EXPECT_LE(attribute.since, bundle_schema().format_version) << group.path << attribute.name;
+      EXPECT_LE(attribute.renamed, bundle_schema().format_version) << group.path << attribute.name;
+      EXPECT_EQ(attribute.renamed > attribute.since, !attribute.former_name.empty()) << group.path << attribute.name;
     }
   for (const DatasetSchema& dataset : bundle_schema().datasets)
     EXPECT_GE(dataset.since, bundle_schema().group(dataset.path.substr(0, dataset.path.rfind('/'))).since)
@@ -100,6 +103,62 @@ TEST(WrittenBundle, HoldsExactlyTheSchemasDatasets) {
         EXPECT_TRUE(file.has_attribute(path, attribute.name)) << path << attribute.name;
   for (const AttributeSchema& attribute : bundle_schema().attributes)
     EXPECT_TRUE(file.has_attribute("/", attribute.name));
+}
+
+// What the schemas list for a choice is what the programs know of it.
+template <typename Choice>
+void expect_names(const char* schema, const char* pointer) {
+  const Json listed = Json::parse(embedded_schema(schema)).at(Json::json_pointer(pointer));
+  EXPECT_EQ(listed, Json(kNames<Choice>)) << schema << pointer;
+}
+
+TEST(Choices, AreThoseOfTheAsset) {
+  expect_names<MaterialModel>("asset", "/properties/object/properties/material/properties/model/enum");
+  expect_names<Weighting>("asset", "/properties/shape_space/properties/weighting/enum");
+  expect_names<AlignmentMethod>("asset", "/properties/alignment/properties/method/enum");
+  expect_names<AlignmentFrame>("asset", "/properties/alignment/properties/frame/enum");
+  expect_names<CubatureMethod>("asset", "/properties/cubature/properties/method/enum");
+  expect_names<ForceMethod>("asset", "/properties/internal_force/enum");
+}
+
+TEST(Choices, AreThoseOfTheScene) {
+  expect_names<Integrator>("scene", "/properties/integrator/enum");
+  expect_names<ForceMethod>("scene", "/properties/internal_force/enum");
+  for (const std::string examples : {"/properties/examples", "/properties/regions/items"}) {
+    expect_names<TargetSource>("scene", (examples + "/properties/target/enum").c_str());
+    expect_names<EnergyReference>("scene", (examples + "/properties/energy_reference/enum").c_str());
+  }
+}
+
+// Notes each text that the schema lets a choice have and the programs do not know.
+class ChoiceCheck {
+ public:
+  void group(std::string_view schema_path, std::string_view) { group_ = schema_path; }
+  template <typename T>
+  void attribute(std::string_view name, const T&) {
+    if constexpr (Named<T>) {
+      ++choices;
+      const auto& attributes = bundle_schema().group(group_).attributes;
+      const auto schema = std::ranges::find(attributes, name, &AttributeSchema::name);
+      ASSERT_EQ(schema->constraints.size(), 1U);
+      std::istringstream listed(schema->constraints.front().argument);
+      for (std::string text; std::getline(listed, text, '|');) EXPECT_TRUE(from_name<T>(text)) << name << text;
+    }
+  }
+  template <typename T>
+  void dataset(std::string_view, const T&) {}
+
+  int choices = 0;
+
+ private:
+  std::string group_;
+};
+
+TEST(Choices, AreThoseOfTheBundle) {
+  ChoiceCheck check;
+  const ReducedModel model = test::small_model(false);
+  visit_fields(model, check);
+  EXPECT_EQ(check.choices, 6);  // material, weighting, internal force, method, targets of the body and of a region
 }
 
 class FileSchemaOf : public ::testing::TestWithParam<const char*> {

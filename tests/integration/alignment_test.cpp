@@ -42,7 +42,7 @@ TEST_F(Alignment, APoseOnAnotherMeshComesOverAsOnTheRestExamplesOwn) {
   EXPECT_EQ(example.method, "registered");
   const Eigen::MatrixXd rest = model.shape_space->rest_descriptor;
   EXPECT_LE((example.descriptor - expected.descriptor).norm(), 0.08 * (expected.descriptor - rest).norm());
-  EXPECT_LE(example.confidence, 0.5);
+  EXPECT_LE(example.doubt, 0.5);
   EXPECT_LE(example.alignment_residual, 0.01);
   EXPECT_EQ(example.inverted_fraction, 0);
   EXPECT_GE(example.competing_maps, 1);  // the bar turned upon itself, which is farther from rest

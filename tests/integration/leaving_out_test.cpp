@@ -142,10 +142,10 @@ TEST_F(LeavingOut, TheAssetNamesItsNeeds) {
 TEST_F(LeavingOut, APolynomialIsWrittenWhereItIsAskedFor) {
   const Json cubature = Json::parse(R"({ "internal_force": "cubature", "examples": [] })");
   expect_groups(cubature, std::nullopt, and_contact(without_group(kPlain, "polynomial")));
-  EXPECT_EQ(summarise_bundle(bundle_).internal_force, "cubature");
+  EXPECT_EQ(summarise_bundle(bundle_).internal_force, ForceMethod::kCubature);
   // The scene decides before the asset does.
   expect_groups(cubature, needs_of_scene(R"({ "internal_force": "polynomial" })"), kPlain);
-  EXPECT_EQ(summarise_bundle(bundle_).internal_force, "polynomial");
+  EXPECT_EQ(summarise_bundle(bundle_).internal_force, ForceMethod::kPolynomial);
   expect_groups(cubature, needs_of_scene("{}"), without_group(kPlain, "polynomial"));
   expect_groups(Json::parse(R"({ "examples": [] })"), needs_of_scene(R"({ "internal_force": "cubature" })"),
                 without_group(kPlain, "polynomial"));

@@ -34,7 +34,7 @@ TEST_F(ReferenceFiles, ExamplePosesAreThoseOfTheBundleBeforeTheirReduction) {
         precompute::build_elastic_system(model.object->mesh, model.object->materials, model.object->fixed);
     const auto poses = precompute::whole_body_example_poses(model, system);
     const Eigen::MatrixXd reduce = (system.mass * system.restrict(model.modal->basis)).transpose();
-    const precompute::FullSpaceExamples examples(model, system, poses, runtime::EnergyReference::kExample);
+    const precompute::FullSpaceExamples examples(model, system, poses, EnergyReference::kExample);
     const ExampleData& twist = model.examples->examples[1];
     const Eigen::VectorXd pose = examples.pose_basis() * examples.pose(1);
     EXPECT_LE((reduce * pose - twist.pose).norm(), 1e-9 * twist.pose.norm()) << object;

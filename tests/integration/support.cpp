@@ -135,7 +135,7 @@ void write_msh(const std::filesystem::path& path, const TetMesh& mesh) {
 Built build(const std::filesystem::path& asset, const std::optional<Needs>& needs) {
   const AssetConfig config = load_asset(asset);
   Built built;
-  built.model = precompute::build_model(config, precompute::resolve_needs(config, needs), built.report);
+  built.model = precompute::build_reduced_model(config, precompute::resolve_needs(config, needs), built.report);
   return built;
 }
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::test {

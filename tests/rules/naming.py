@@ -29,10 +29,10 @@ def local_names(path):
 
 
 def flags_of(entry):
-    """Without the file and where it is compiled to."""
+    """Without the file, where it is compiled to, and the precompiled headers, which are the compiler's own."""
     words = shlex.split(entry["command"])
     return tuple(word for i, word in enumerate(words[1:], 1)
-                 if not (word in ("-o", "-c", entry["file"]) or words[i - 1] == "-o"))
+                 if not (word in ("-o", "-c", "-include", "-Winvalid-pch", entry["file"]) or words[i - 1] in ("-o", "-include")))
 
 
 def units(root, build):

@@ -161,7 +161,7 @@ class Naming(unittest.TestCase):
             for name, text in files.items():
                 (root / name).parent.mkdir(parents=True, exist_ok=True)
                 (root / name).write_text(text)
-            commands = [{"file": str(root / name), "command": f"c++ -std=c++20 -I{root} -o x.o -c {root / name}"} for name in files if name.endswith(".cpp")]
+            commands = [{"file": str(root / name), "command": f"c++ -std=c++20 -I{root} -Winvalid-pch -include {root}/cmake_pch.hxx -o x.o -c {root / name}"} for name in files if name.endswith(".cpp")]
             (root / "compile_commands.json").write_text(json.dumps(commands))
             return "\n".join(naming.violations(root, root))
 
@@ -202,7 +202,7 @@ class RuntimeAlone(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             blind = dict(os.environ, PKG_CONFIG_PATH="/nowhere")
             options = ["-DEXMAT_BUILD_PRECOMPUTE=OFF", "-DEXMAT_BUILD_TESTS=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON",
-                       self.cached("CMAKE_BUILD_TYPE"), self.cached("EXMAT_SANITIZE"), self.cached("CMAKE_CXX_COMPILER")]
+                       self.cached("CMAKE_BUILD_TYPE"), self.cached("EXMAT_SANITIZE"), self.cached("EXMAT_PRECOMPILED_HEADERS"), self.cached("CMAKE_CXX_COMPILER")]
             subprocess.run(["cmake", "-S", str(ROOT), "-B", folder, "-GNinja", *options], check=True, env=blind, capture_output=True)
             alone = self.commands(Path(folder))
         self.assertGreater(len([line for line in alone if " -c " in line]), 50)

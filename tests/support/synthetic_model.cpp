@@ -209,7 +209,7 @@ CubatureData all_elements(const ObjectData& object, const ModalData& modal) {
   cubature.youngs_modulus = object.materials.youngs_modulus;
   cubature.poisson_ratio = object.materials.poisson_ratio;
   cubature.heldout_poses.resize(0, modal.basis.cols());
-  cubature.method = "greedy_swap";
+  cubature.method = CubatureMethod::kGreedySwap;
   cubature.gradient.resize(9 * count, modal.basis.cols());
   for (Eigen::Index t = 0; t < count; ++t) {
     Eigen::MatrixXd rows(12, modal.basis.cols());
@@ -225,7 +225,7 @@ ShapeSpaceData shape_space(const ObjectData& object, const FullMatrices& full, i
   ShapeSpaceData space;
   space.volume = full.scalar_mass.sum();
   space.centroid = centroid(object.mesh);
-  space.weighting = "eigenvalue";
+  space.weighting = Weighting::kEigenvalue;
   space.eigenvalues = solver.eigenvalues().segment(1, eigenfunctions) * std::pow(space.volume, 2.0 / 3.0);
   space.eigenfunctions = solver.eigenvectors().middleCols(1, eigenfunctions) * std::sqrt(space.volume);
   const VertexArray normalised =
@@ -301,7 +301,6 @@ ObjectData bar_object(const BarOptions& options) {
   object.materials.youngs_modulus = Eigen::VectorXd::Constant(tets, options.youngs_modulus);
   object.materials.poisson_ratio = Eigen::VectorXd::Constant(tets, options.poisson_ratio);
   object.materials.model = options.material;
-  object.material = name_of(options.material);
   return object;
 }
 

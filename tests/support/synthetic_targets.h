@@ -14,7 +14,7 @@ inline TargetTableData linear_targets(const std::vector<ExampleData>& examples, 
   data.control_points = RowMatrix::Zero(data.exponents.rows(), examples.front().pose.size());
   for (int k = 0; k < count; ++k)
     data.control_points += data.exponents.col(k).cast<double>() / degree * examples[k].pose.transpose();
-  data.energy_reference = "example";
+  data.energy_reference = EnergyReference::kExample;
   return data;
 }
 

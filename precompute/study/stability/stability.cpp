@@ -40,7 +40,7 @@ std::vector<StabilityRun> run_stability(std::vector<StabilityCase> cases, const 
   for (std::size_t i = 0; i < runs.size(); ++i) {
     StabilityRun& run = runs[i];
     if (run.refusal.empty())
-      run.result = run_case(run.test, bodies.at(run.test.body), options.most_steps, options.fault);
+      run.result = run_case(run.test, bodies.at(run.test.body), options.most_steps, options.policy);
 #pragma omp critical
     progress.advance();
   }

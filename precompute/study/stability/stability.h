@@ -19,7 +19,7 @@ struct StabilityRun {
 struct StabilityOptions {
   int most_steps = 600;  ///< of a run
   int jobs = 0;          ///< runs at a time; 0: as many as there are threads
-  PlantedFault fault{};
+  runtime::NewtonPolicy policy{};
 };
 
 inline constexpr int kShortSteps = 600, kLongSteps = 2000;

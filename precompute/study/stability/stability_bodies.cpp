@@ -16,7 +16,7 @@
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
 #include "precompute/examples/alignment_report.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 
 namespace exmat::precompute {
 namespace {
@@ -69,14 +69,14 @@ std::vector<std::pair<std::string, TetMesh>> example_meshes(BodyExamples example
 AssetConfig asset_of(const BodySpec& spec) {
   AssetConfig asset;
   asset.name = "bar";
-  asset.material = {std::string(name_of(spec.material)), spec.youngs_modulus, spec.poisson_ratio, spec.density};
+  asset.material = {spec.material, spec.youngs_modulus, spec.poisson_ratio, spec.density};
   if (!spec.free) asset.fixed = BoxSelection{{-1e-6, -1, -1}, {1e-6, 1, 1}};
   asset.eigenfunctions = kEigenfunctions;
   asset.basis_size = kModes;
   asset.linear_modes = kLinearModes;
   asset.cubature_elements = kElements;
   asset.training_poses = kTrainingPoses;
-  asset.internal_force = spec.polynomial ? "polynomial" : "cubature";
+  asset.internal_force = spec.polynomial ? ForceMethod::kPolynomial : ForceMethod::kCubature;
   return asset;
 }
 
@@ -84,7 +84,7 @@ Needs needs_of(const BodySpec& spec) {
   Needs needs;
   needs.examples = spec.examples != BodyExamples::kNone;
   needs.targets = spec.target_table;
-  needs.internal_force = spec.polynomial ? "polynomial" : "cubature";
+  needs.internal_force = spec.polynomial ? ForceMethod::kPolynomial : ForceMethod::kCubature;
   return needs;
 }
 
@@ -132,7 +132,7 @@ std::unique_ptr<StudyBody> build(const BodySpec& spec, const std::filesystem::pa
   }
   auto body = std::make_unique<StudyBody>();
   BuildReport report;
-  body->reduced = build_model(asset, needs_of(spec), report);
+  body->reduced = build_reduced_model(asset, needs_of(spec), report);
   runtime::ModelOptions options;
   options.examples = spec.examples != BodyExamples::kNone;
   options.target_table = body->reduced.targets.has_value();

@@ -63,7 +63,7 @@ class BodyStore {
   BodyStore(const BodyStore&) = delete;
   BodyStore& operator=(const BodyStore&) = delete;
 
-  /// Builds what is missing. Throws as build_model.
+  /// Builds what is missing. Throws as build_reduced_model.
   const StudyBody& get(const BodySpec& spec);
 
   /// Of a body that has been built.

@@ -8,8 +8,6 @@
 namespace exmat::precompute {
 namespace {
 
-using runtime::Integrator;
-
 constexpr std::array kIntegrators{Integrator::kBdf2, Integrator::kBackwardEuler, Integrator::kNewmark};
 constexpr std::array kMaterials{MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
                                 MaterialModel::kCorotational};
@@ -228,17 +226,6 @@ void add_product(Cases& cases) {
 }
 
 }  // namespace
-
-std::string_view name_of(Integrator integrator) {
-  switch (integrator) {
-    case Integrator::kBackwardEuler:
-      return "backward_euler";
-    case Integrator::kNewmark:
-      return "newmark";
-    default:
-      return "bdf2";
-  }
-}
 
 std::string describe(const StabilityCase& test) {
   return fmt::format("{}: {}; {}, {}, {}, dt {:.4g} s", test.group, test.extreme, exmat::name_of(test.body.material),

@@ -34,7 +34,7 @@ struct StabilityCase {
   std::string group{};
   std::string extreme{};  ///< what is extreme in it
   BodySpec body{};
-  runtime::Integrator integrator = runtime::Integrator::kBdf2;
+  Integrator integrator = Integrator::kBdf2;
   double time_step = 1e-3;  ///< [s]
   double gravity = 0;       ///< along -z [m/s^2]
   /// Force on the free end in the first kLoadSteps steps, in units of what would move it by L in linear elasticity.
@@ -85,8 +85,6 @@ std::vector<StabilityCase> short_stability_suite();
 
 /// That, and the full product of E, nu, density, time step, material, integrator and constraint.
 std::vector<StabilityCase> long_stability_suite();
-
-std::string_view name_of(runtime::Integrator integrator);
 
 /// One line that says all of a case.
 std::string describe(const StabilityCase& test);

@@ -92,7 +92,7 @@ Table limits(const std::vector<StabilityRun>& runs) {
     for (const StabilityRun& run : runs) {
       if (run.result[limit.check].limit_id != limit.id) continue;
       ++count;
-      default_count += run.test.integrator == runtime::Integrator::kBdf2 ? 1 : 0;
+      default_count += run.test.integrator == Integrator::kBdf2 ? 1 : 0;
     }
     table.rows.push_back({std::string(limit.id), std::string(kCheckNames[static_cast<std::size_t>(limit.check)]),
                           std::to_string(count), std::to_string(default_count), std::string(limit.what),
@@ -143,7 +143,7 @@ std::string html(const Table& table) {
 std::string headline(const std::vector<StabilityRun>& runs) {
   const auto failed = runs_with(runs, Verdict::kFail).size(), limited = runs_with(runs, Verdict::kKnownLimit).size();
   const auto non_finite = std::ranges::count_if(runs, [](const StabilityRun& run) {
-    return run.test.integrator == runtime::Integrator::kBdf2 && run.result.non_finite_steps > 0;
+    return run.test.integrator == Integrator::kBdf2 && run.result.non_finite_steps > 0;
   });
   return fmt::format("{} runs: {} passed, {} ended at a known limit, {} FAILED. Non-finite runs of bdf2: {}.",
                      runs.size(), runs.size() - failed - limited, limited, failed, non_finite);

@@ -13,8 +13,6 @@
 namespace exmat::precompute {
 namespace {
 
-using runtime::Integrator;
-
 constexpr double kSizes = 3, kLinear = 2;           // bound: 3 L + 2 u_lin
 constexpr double kSmall = 0.2, kSmallMargin = 1.5;  // of L: up to there u_lin itself, and half, is the bound
 constexpr double kLinearRange = 0.01;  // of L: linear elasticity, for which Newmark's method keeps the energy
@@ -28,9 +26,9 @@ constexpr double kClearance = 0.02;  // between body and ground [m]
 
 class Run {
  public:
-  Run(const StabilityCase& test, const StudyBody& body, int most_steps, const PlantedFault& fault)
-      : test_(test), body_(body), model_(*body.model), steps_(most_steps) {
-    make_scene(fault);
+  Run(const StabilityCase& test, const StudyBody& body, int most_steps, const runtime::NewtonPolicy& policy)
+      : test_(test), body_(body), model_(*body.model), policy_(policy), steps_(most_steps) {
+    make_scene();
     make_start();
     plan_steps(most_steps);
   }
@@ -38,7 +36,7 @@ class Run {
   StabilityResult finish();
 
  private:
-  void make_scene(const PlantedFault& fault);
+  void make_scene();
   void add_tip_load();
   void add_ground();
   void make_start();
@@ -81,6 +79,7 @@ class Run {
   const StabilityCase& test_;
   const StudyBody& body_;
   const runtime::Model& model_;
+  const runtime::NewtonPolicy policy_;
   std::int64_t steps_;
   bool expects_rest_ = false;
   runtime::StepScene scene_;
@@ -92,11 +91,9 @@ class Run {
   double momentum_drift_ = 0;
 };
 
-void Run::make_scene(const PlantedFault& fault) {
+void Run::make_scene() {
   scene_.time_step = test_.time_step;
   scene_.integrator = test_.integrator;
-  scene_.newton.line_search = fault.line_search;
-  scene_.newton.projection = fault.projection;
   scene_.mass_damping = 2 * test_.damping * body_.lowest_frequency;
   scene_.stiffness_damping = test_.stiffness_damping / body_.lowest_frequency;
   scene_.gravity = Eigen::Vector3d(0, 0, -test_.gravity);
@@ -295,6 +292,8 @@ double Run::rotation_energy() const {
 
 void Run::step_all() {
   runtime::Workspace workspace(model_, scene_);
+  workspace.newton.policy = policy_;
+  if (workspace.near) workspace.near->newton.policy = policy_;
   result_.largest_displacement = start_displacement_ / body_.size;
   exchanged_ = runtime::energies(model_, scene_, state_).kinetic + state_.elastic_energy;
   Eigen::VectorXd before;
@@ -364,8 +363,9 @@ Verdict StabilityResult::verdict() const {
   return worst;
 }
 
-StabilityResult run_case(const StabilityCase& test, const StudyBody& body, int most_steps, const PlantedFault& fault) {
-  return Run(test, body, most_steps, fault).finish();
+StabilityResult run_case(const StabilityCase& test, const StudyBody& body, int most_steps,
+                         const runtime::NewtonPolicy& policy) {
+  return Run(test, body, most_steps, policy).finish();
 }
 
 }  // namespace exmat::precompute

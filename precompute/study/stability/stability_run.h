@@ -35,14 +35,10 @@ struct StabilityResult {
   Verdict verdict() const;
 };
 
-/// Safeguards to leave out, which the suite has to notice.
-struct PlantedFault {
-  bool line_search = true, projection = true;
-};
-
 /// Steps a case until it is to be at rest, at most `most_steps` steps; what is not at rest then is not judged. Bounds
 /// and their reasons: docs/stability.md. Thread-safe.
+/// `policy` plants a fault, which the suite has to notice.
 StabilityResult run_case(const StabilityCase& test, const StudyBody& body, int most_steps,
-                         const PlantedFault& fault = {});
+                         const runtime::NewtonPolicy& policy = {});
 
 }  // namespace exmat::precompute

@@ -17,8 +17,8 @@ bool has_examples(const SceneConfig& scene) { return scene.examples || !scene.re
 
 // The scene's own way to find targets; one for all its example forces.
 std::string own_target(const SceneConfig& scene) {
-  if (scene.examples) return scene.examples->target;
-  return scene.regions.empty() ? kNoTarget : scene.regions.front().force.target;
+  if (scene.examples) return std::string(name_of(scene.examples->target));
+  return scene.regions.empty() ? kNoTarget : std::string(name_of(scene.regions.front().force.target));
 }
 
 // Each setting of `points` once with each of `values`.
@@ -61,7 +61,7 @@ std::vector<PointSettings> product(const SweepConfig& sweep, const PointSettings
 void require_possible(const PointSettings& point, const StudyConfig& study, std::size_t sweep) {
   if (point.internal_force != "polynomial") return;
   try {
-    require_polynomial(point.material, point.basis_size);
+    require_polynomial(from_name<MaterialModel>(point.material).value(), point.basis_size);
   } catch (const InputError& error) {
     const Complaint& complaint = error.complaint();
     throw InputError({study.file.string(), fmt::format("/sweeps/{}/internal_force", sweep), complaint.expected,
@@ -76,11 +76,12 @@ PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
   own.eigenfunctions = asset.eigenfunctions;
   own.basis_size = asset.basis_size;
   own.cubature_elements = asset.cubature_elements;
-  own.material = asset.material.model;
+  own.material = name_of(asset.material.model);
   own.time_step = scene.time_step;
-  own.integrator = scene.integrator;
-  own.internal_force = scene.internal_force == "auto" ? asset.internal_force : scene.internal_force;
-  if (asset.cubature_method == kAllElementsMethod) own.internal_force = kAllElements;
+  own.integrator = name_of(scene.integrator);
+  own.internal_force =
+      name_of(scene.internal_force == ForceMethod::kAuto ? asset.internal_force : scene.internal_force);
+  if (asset.cubature_method == CubatureMethod::kAllElements) own.internal_force = kAllElements;
   own.target = own_target(scene);
   return normalised(own, own, asset, has_examples(scene));
 }
@@ -104,11 +105,11 @@ std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& a
 AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
   asset.eigenfunctions = settings.eigenfunctions;
   asset.basis_size = settings.basis_size;
-  asset.material.model = settings.material;
+  asset.material.model = from_name<MaterialModel>(settings.material).value();
   if (settings.cubature_elements || settings.internal_force == kAllElements) asset.cubature_tolerance.reset();
   if (settings.internal_force == kAllElements)
-    asset.cubature_method = kAllElementsMethod;
-  else if (asset.cubature_method == kAllElementsMethod)
+    asset.cubature_method = CubatureMethod::kAllElements;
+  else if (asset.cubature_method == CubatureMethod::kAllElements)
     asset.cubature_method = CubatureOptions{}.method;
   asset.cubature_elements = settings.cubature_elements;
   return asset;
@@ -116,10 +117,14 @@ AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
 
 SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
   scene.time_step = settings.time_step;
-  scene.integrator = settings.integrator;
-  scene.internal_force = settings.internal_force == kAllElements ? "cubature" : settings.internal_force;
-  if (scene.examples) scene.examples->target = settings.target;
-  for (RegionForceConfig& region : scene.regions) region.force.target = settings.target;
+  scene.integrator = from_name<Integrator>(settings.integrator).value();
+  scene.internal_force = settings.internal_force == kAllElements
+                             ? ForceMethod::kCubature
+                             : from_name<ForceMethod>(settings.internal_force).value();
+  // A scene without examples has none to set.
+  const TargetSource target = from_name<TargetSource>(settings.target).value_or(TargetSource::kAuto);
+  if (scene.examples) scene.examples->target = target;
+  for (RegionForceConfig& region : scene.regions) region.force.target = target;
   scene.instances = 1;
   scene.trajectory = "positions";  // is never written
   return scene;

@@ -15,10 +15,9 @@
 #include "common/config/json_file.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
-#include "common/core/version.h"
-#include "common/mesh/geometry.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/study/sweep/results_files.h"
+#include "precompute/study/sweep/study_plan.h"
 #include "precompute/study/sweep/workers.h"
 #include "runtime/kernels/kernels.h"
 
@@ -26,31 +25,6 @@ namespace exmat::precompute {
 namespace {
 
 using Ordered = nlohmann::ordered_json;
-
-constexpr std::size_t kKeyLength = 16;  // hexadecimal digits
-
-// A bundle that some points share.
-struct BundlePlan {
-  std::string key;
-  AssetConfig asset;
-  Needs needs;
-  std::string failure;
-};
-
-// A full-space run that some points share.
-struct ReferencePlan {
-  std::string key, bundle;
-  SceneConfig scene;
-  int eigenfunctions = 0;
-  std::string material, failure;
-};
-
-struct PointPlan {
-  PointSettings settings;
-  std::string key;
-  std::size_t bundle = 0, reference = 0;
-  std::optional<std::size_t> all_elements;  ///< the point with all elements to compare with
-};
 
 void make_folder(const std::filesystem::path& folder) {
   std::error_code error;
@@ -75,11 +49,6 @@ class Study {
   StudyResult run();
 
  private:
-  void read_inputs();
-  void plan();
-  std::size_t plan_bundle(const PointSettings& settings, const std::vector<PointSettings>& all);
-  std::size_t plan_reference(const PointSettings& settings, std::size_t bundle);
-  void plan_comparisons();
   bool is_finished(const PointPlan& point) const;
 
   void build_bundles(int jobs);
@@ -99,9 +68,6 @@ class Study {
   void add_worst_frame(std::size_t point);
   void add_worst_frames();
 
-  std::string key_of(const Ordered& settings) const {
-    return hash_inputs({}, inputs_ + settings.dump()).substr(0, kKeyLength);
-  }
   SceneConfig scene_of(const PointPlan& point, const std::string& bundle) const {
     SceneConfig scene = with_settings(scene_, point.settings);
     scene.bundle = bundle_file(bundle);
@@ -127,122 +93,10 @@ class Study {
   const StudyOptions& options_;
   AssetConfig asset_;
   SceneConfig scene_;
-  std::string inputs_;  // hash of all files and of what is the same for all points
-  std::vector<BundlePlan> bundles_;
-  std::vector<ReferencePlan> references_;
-  std::vector<PointPlan> points_;
+  StudyPlan plan_;
   std::vector<std::string> failures_;  // of each point
   StudyResult result_;
 };
-
-void Study::read_inputs() {
-  InputFiles files{asset_.file};
-  const ObjectInput object = read_object(asset_, files);
-  if (!asset_.examples.empty()) read_examples(asset_, object, files);
-  result_.vertices = object.mesh.vertex_count();
-  result_.tets = object.mesh.tet_count();
-  result_.free_body = !object.fixed.any();
-  result_.surface = surface_triangles(object.mesh.tets);
-  if (!scene_.gravity.isZero()) result_.up = -scene_.gravity.normalized();
-  result_.has_examples = scene_.examples || !scene_.regions.empty();
-  for (const RegionForceConfig& region : scene_.regions) result_.regions.push_back(region.name);
-  files.push_back(scene_.file);
-  std::string salt = fmt::format("{}\n{}\n{}\n", version(), scene_.steps, config_.frames);
-  for (const VertexForceConfig& force : scene_.forces) salt += fmt::format("{}\n", fmt::join(force.vertices, " "));
-  inputs_ = hash_inputs(files, salt);
-}
-
-// Settings that make a bundle; the run time chooses between cubature and polynomial.
-Ordered bundle_settings(const PointSettings& settings) {
-  Ordered json = to_json(settings);
-  for (const char* name : {"time_step", "integrator", "target"}) json.erase(name);
-  if (settings.internal_force == "polynomial") json["internal_force"] = "cubature";
-  return json;
-}
-
-std::size_t Study::plan_bundle(const PointSettings& settings, const std::vector<PointSettings>& all) {
-  const Ordered own = bundle_settings(settings);
-  SceneConfig scene = with_settings(scene_, settings);
-  Needs needs = needs_of(scene);
-  for (const PointSettings& other : all) {
-    if (bundle_settings(other) != own) continue;
-    const Needs more = needs_of(with_settings(scene_, other));
-    if (other.internal_force == "polynomial") needs.internal_force = "polynomial";
-    if (more.targets) needs.targets = true;
-    if (other.target != "solve") needs.regions = more.regions;
-  }
-  BundlePlan plan;
-  plan.key = key_of({{"bundle", own},
-                     {"targets", needs.targets},
-                     {"internal_force", needs.internal_force},
-                     {"tables", needs.regions && !needs.regions->empty() && needs.regions->front().targets}});
-  const auto found = std::ranges::find(bundles_, plan.key, &BundlePlan::key);
-  if (found != bundles_.end()) return static_cast<std::size_t>(found - bundles_.begin());
-  plan.asset = with_settings(asset_, settings);
-  plan.needs = needs;
-  bundles_.push_back(std::move(plan));
-  return bundles_.size() - 1;
-}
-
-std::size_t Study::plan_reference(const PointSettings& settings, std::size_t bundle) {
-  PointSettings own = settings;
-  own.time_step = config_.reference.time_step.value_or(settings.time_step);
-  own.integrator = config_.reference.integrator.value_or(settings.integrator);
-  Ordered identity{{"reference", own.material}, {"time_step", own.time_step}, {"integrator", own.integrator}};
-  if (result_.has_examples) identity["eigenfunctions"] = own.eigenfunctions;
-  // A start in reduced coordinates is another one in each basis.
-  if (scene_.body.reduced || scene_.body.pose) identity["bundle"] = bundles_[bundle].key;
-  identity["times"] = result_.times;
-  const std::string key = key_of(identity);
-  const auto found = std::ranges::find(references_, key, &ReferencePlan::key);
-  if (found != references_.end()) return static_cast<std::size_t>(found - references_.begin());
-  references_.push_back({key, bundles_[bundle].key, with_settings(scene_, own),
-                         result_.has_examples ? own.eigenfunctions : 0, own.material, ""});
-  return references_.size() - 1;
-}
-
-// A point with all elements serves those that differ in the internal force alone, best with the same target.
-void Study::plan_comparisons() {
-  for (PointPlan& point : points_) {
-    if (point.settings.internal_force == kAllElements) continue;
-    for (std::size_t i = 0; i < points_.size(); ++i) {
-      PointSettings other = points_[i].settings;
-      if (other.internal_force != kAllElements) continue;
-      const bool same_target = other.target == point.settings.target;
-      other.internal_force = point.settings.internal_force;
-      other.cubature_elements = point.settings.cubature_elements;
-      other.target = point.settings.target;
-      if (other == point.settings && (same_target || !point.all_elements)) point.all_elements = i;
-    }
-  }
-}
-
-void Study::plan() {
-  const auto all = expand(config_, asset_, scene_);
-  std::vector<double> time_steps;
-  for (const PointSettings& settings : all) time_steps.push_back(settings.time_step);
-  if (config_.reference.time_step) time_steps.push_back(*config_.reference.time_step);
-  try {
-    result_.times = frame_times(static_cast<double>(scene_.steps) * scene_.time_step, time_steps, config_.frames);
-  } catch (const InputError& error) {
-    Complaint complaint = error.complaint();
-    complaint.file = config_.file.string();
-    throw InputError(std::move(complaint));
-  }
-  for (const PointSettings& settings : all) {
-    PointPlan point{settings, "", plan_bundle(settings, all), 0, std::nullopt};
-    point.reference = plan_reference(settings, point.bundle);
-    points_.push_back(std::move(point));
-  }
-  plan_comparisons();
-  for (PointPlan& point : points_) {
-    Ordered identity{{"point", to_json(point.settings)}, {"reference", references_[point.reference].key}};
-    identity["compared"] = nullptr;
-    if (point.all_elements) identity["compared"] = to_json(points_[*point.all_elements].settings);
-    point.key = key_of(identity);
-  }
-  failures_.resize(points_.size());
-}
 
 bool Study::is_finished(const PointPlan& point) const {
   const auto result = read_point(point_file(point.key));
@@ -252,7 +106,7 @@ bool Study::is_finished(const PointPlan& point) const {
 
 void Study::build_bundle(const BundlePlan& plan) const {
   BuildReport report;
-  const ReducedModel model = build_model(plan.asset, plan.needs, report);
+  const ReducedModel model = build_reduced_model(plan.asset, plan.needs, report);
   Ordered stages = Ordered::object();
   double total = 0;
   for (const StageTime& stage : report.stages) {
@@ -291,7 +145,7 @@ BodyFrames only(const BodyFrames& frames, std::size_t i) {
 }
 
 void Study::run_point(const PointPlan& plan) const {
-  const SceneConfig scene = scene_of(plan, bundles_[plan.bundle].key);
+  const SceneConfig scene = scene_of(plan, plan_.bundles[plan.bundle].key);
   const ReducedModel data = read_bundle(scene.bundle);
   const SparseMatrix mass = scalar_mass(data.object->mesh, data.object->materials.density);
   const auto& rest = data.object->mesh.vertices;
@@ -299,14 +153,15 @@ void Study::run_point(const PointPlan& plan) const {
   PointResult result;
   result.settings = plan.settings;
   result.key = plan.key;
-  result.bundle = bundles_[plan.bundle].key;
-  result.reference = references_[plan.reference].key;
+  result.bundle = plan_.bundles[plan.bundle].key;
+  result.reference = plan_.references[plan.reference].key;
   result.errors =
       trajectory_errors(run.frames, read_or_fail(frames_file(result.reference)), rest, mass, result_.free_body);
   result.worst_time = result_.times[result.errors.worst_frame];
   if (plan.all_elements)
     result.from_all_elements =
-        trajectory_errors(run.frames, read_or_fail(frames_file(points_[*plan.all_elements].key)), rest, mass, false)
+        trajectory_errors(run.frames, read_or_fail(frames_file(plan_.points[*plan.all_elements].key)), rest, mass,
+                          false)
             .position;
   result.modes = run.modes;
   result.elements = run.elements;
@@ -328,52 +183,54 @@ void Study::run_point(const PointPlan& plan) const {
 
 void Study::build_bundles(int jobs) {
   std::set<std::size_t> needed;
-  for (const PointPlan& point : points_)
+  for (const PointPlan& point : plan_.points)
     if (!is_finished(point)) needed.insert(point.bundle);
   std::vector<Job> work;
   std::vector<std::size_t> which;
   for (const std::size_t i : needed) {
-    if (std::filesystem::exists(bundle_file(bundles_[i].key)) && read_sealed(stages_file(bundles_[i].key))) continue;
-    work.push_back({"bundle " + bundles_[i].key, [this, i] { build_bundle(bundles_[i]); }});
+    if (std::filesystem::exists(bundle_file(plan_.bundles[i].key)) && read_sealed(stages_file(plan_.bundles[i].key)))
+      continue;
+    work.push_back({"bundle " + plan_.bundles[i].key, [this, i] { build_bundle(plan_.bundles[i]); }});
     which.push_back(i);
   }
   const auto failures = run_in_processes("bundles", work, jobs);
-  for (std::size_t k = 0; k < which.size(); ++k) bundles_[which[k]].failure = failures[k].value_or("");
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    if (!is_finished(points_[i])) failures_[i] = bundles_[points_[i].bundle].failure;
+  for (std::size_t k = 0; k < which.size(); ++k) plan_.bundles[which[k]].failure = failures[k].value_or("");
+  for (std::size_t i = 0; i < plan_.points.size(); ++i)
+    if (!is_finished(plan_.points[i])) failures_[i] = plan_.bundles[plan_.points[i].bundle].failure;
 }
 
 void Study::run_references(int jobs) {
   std::set<std::size_t> needed;
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    if (failures_[i].empty() && !is_finished(points_[i])) {
-      needed.insert(points_[i].reference);
-      references_[points_[i].reference].bundle = bundles_[points_[i].bundle].key;  // one that is there
+  for (std::size_t i = 0; i < plan_.points.size(); ++i)
+    if (failures_[i].empty() && !is_finished(plan_.points[i])) {
+      needed.insert(plan_.points[i].reference);
+      plan_.references[plan_.points[i].reference].bundle =
+          plan_.bundles[plan_.points[i].bundle].key;  // one that is there
     }
   std::vector<Job> work;
   std::vector<std::size_t> which;
   for (const std::size_t i : needed) {
-    if (read_frames(frames_file(references_[i].key))) continue;
-    work.push_back({"full space " + references_[i].key, [this, i] { run_reference(references_[i]); }});
+    if (read_frames(frames_file(plan_.references[i].key))) continue;
+    work.push_back({"full space " + plan_.references[i].key, [this, i] { run_reference(plan_.references[i]); }});
     which.push_back(i);
   }
   const auto failures = run_in_processes("full space", work, jobs);
-  for (std::size_t k = 0; k < which.size(); ++k) references_[which[k]].failure = failures[k].value_or("");
-  for (std::size_t i = 0; i < points_.size(); ++i)
-    if (failures_[i].empty() && !references_[points_[i].reference].failure.empty())
-      failures_[i] = "full space: " + references_[points_[i].reference].failure;
+  for (std::size_t k = 0; k < which.size(); ++k) plan_.references[which[k]].failure = failures[k].value_or("");
+  for (std::size_t i = 0; i < plan_.points.size(); ++i)
+    if (failures_[i].empty() && !plan_.references[plan_.points[i].reference].failure.empty())
+      failures_[i] = "full space: " + plan_.references[plan_.points[i].reference].failure;
 }
 
 void Study::run_points(int jobs, bool all_elements) {
   std::vector<Job> work;
   std::vector<std::size_t> which;
-  for (std::size_t i = 0; i < points_.size(); ++i) {
-    const bool now = (points_[i].settings.internal_force == kAllElements) == all_elements;
-    if (!now || !failures_[i].empty() || is_finished(points_[i])) continue;
-    const auto compared = points_[i].all_elements;
+  for (std::size_t i = 0; i < plan_.points.size(); ++i) {
+    const bool now = (plan_.points[i].settings.internal_force == kAllElements) == all_elements;
+    if (!now || !failures_[i].empty() || is_finished(plan_.points[i])) continue;
+    const auto compared = plan_.points[i].all_elements;
     if (compared && !failures_[*compared].empty()) failures_[i] = "all elements: " + failures_[*compared];
     if (!failures_[i].empty()) continue;
-    work.push_back({describe(points_[i].settings), [this, i] { run_point(points_[i]); }});
+    work.push_back({describe(plan_.points[i].settings), [this, i] { run_point(plan_.points[i]); }});
     which.push_back(i);
   }
   const auto failures = run_in_processes(all_elements ? "points with all elements" : "points", work, jobs);
@@ -381,7 +238,7 @@ void Study::run_points(int jobs, bool all_elements) {
 }
 
 PointResult Study::result_of(const PointPlan& plan) const {
-  const auto i = static_cast<std::size_t>(&plan - points_.data());
+  const auto i = static_cast<std::size_t>(&plan - plan_.points.data());
   PointResult failed;
   failed.settings = plan.settings;
   failed.key = plan.key;
@@ -398,7 +255,7 @@ ReferenceResult Study::result_of(const ReferencePlan& plan) const {
   result.key = plan.key;
   result.eigenfunctions = plan.eigenfunctions;
   result.time_step = plan.scene.time_step;
-  result.integrator = plan.scene.integrator;
+  result.integrator = name_of(plan.scene.integrator);
   result.material = plan.material;
   result.failure = plan.failure;
   const auto frames = read_frames(frames_file(plan.key));
@@ -417,15 +274,15 @@ void Study::collect() {
   result_.budget = options_.budget;
   result_.processor = processor_name();
   result_.instruction_set = runtime::kernels().name;
-  for (const PointPlan& point : points_) result_.points.push_back(result_of(point));
-  for (const ReferencePlan& reference : references_) result_.references.push_back(result_of(reference));
+  for (const PointPlan& point : plan_.points) result_.points.push_back(result_of(point));
+  for (const ReferencePlan& reference : plan_.references) result_.references.push_back(result_of(reference));
   const PointSettings own = own_settings(asset_, scene_);
-  const auto found = std::ranges::find(points_, own, &PointPlan::settings);
-  result_.own = found == points_.end() ? 0 : static_cast<std::size_t>(found - points_.begin());
+  const auto found = std::ranges::find(plan_.points, own, &PointPlan::settings);
+  result_.own = found == plan_.points.end() ? 0 : static_cast<std::size_t>(found - plan_.points.begin());
 }
 
 std::unique_ptr<FullSpaceRun> Study::baseline() {
-  const PointPlan& own = points_[result_.own];
+  const PointPlan& own = plan_.points[result_.own];
   if (!config_.baseline || !result_.points[result_.own].failure.empty()) return nullptr;
   try {
     const SceneConfig scene = scene_of(own, result_.points[result_.own].bundle);
@@ -439,14 +296,14 @@ std::unique_ptr<FullSpaceRun> Study::baseline() {
 
 void Study::measure_times(const std::vector<std::size_t>& sound, const std::filesystem::path& file) {
   std::vector<SceneConfig> scenes;
-  for (const std::size_t i : sound) scenes.push_back(scene_of(points_[i], result_.points[i].bundle));
+  for (const std::size_t i : sound) scenes.push_back(scene_of(plan_.points[i], result_.points[i].bundle));
   const auto body = baseline();
   const Timings timings = time_steps(scenes, config_.timing, body.get());
   Ordered json = Ordered::object();
   Ordered& points = json["points"] = Ordered::object();
   for (std::size_t k = 0; k < sound.size(); ++k) {
     result_.points[sound[k]].times = timings.points[k];
-    points[points_[sound[k]].key] = to_json(timings.points[k]);
+    points[plan_.points[sound[k]].key] = to_json(timings.points[k]);
   }
   if (body) result_.baseline = timings.baseline;
   if (body) json["baseline"] = to_json(timings.baseline);
@@ -460,17 +317,17 @@ void Study::measure_times() {
   Ordered identity{{"processor", result_.processor},  {"instructions", result_.instruction_set},
                    {"rounds", config_.timing.rounds}, {"steps", config_.timing.steps},
                    {"baseline", config_.baseline},    {"baseline_steps", config_.timing.baseline_steps}};
-  for (std::size_t i = 0; i < points_.size(); ++i) {
+  for (std::size_t i = 0; i < plan_.points.size(); ++i) {
     if (!result_.points[i].failure.empty()) continue;
     sound.push_back(i);
-    identity["points"].push_back(points_[i].key);
+    identity["points"].push_back(plan_.points[i].key);
   }
   if (sound.empty()) return;
-  const auto file = options_.folder / "timing" / (key_of(identity) + ".json");
+  const auto file = options_.folder / "timing" / (key_of(plan_, identity) + ".json");
   const auto measured = read_sealed(file);
   if (!measured) return measure_times(sound, file);
   for (const std::size_t i : sound)
-    result_.points[i].times = times_from_json(measured->at("points").at(points_[i].key));
+    result_.points[i].times = times_from_json(measured->at("points").at(plan_.points[i].key));
   if (measured->contains("baseline")) result_.baseline = times_from_json(measured->at("baseline"));
   result_.baseline_failure = measured->at("baseline_failure").get<std::string>();
 }
@@ -504,11 +361,11 @@ void Study::add_worst_frames() {
 }
 
 StudyResult Study::run() {
-  read_inputs();
-  plan();
+  plan_ = plan_study(config_, asset_, scene_, result_);
+  failures_.resize(plan_.points.size());
   for (const char* folder : {"bundles", "references", "points", "timing"}) make_folder(options_.folder / folder);
-  log::info(fmt::format("{}: {} points, {} bundles, {} full-space runs, {} frames", config_.name, points_.size(),
-                        bundles_.size(), references_.size(), result_.times.size()));
+  log::info(fmt::format("{}: {} points, {} bundles, {} full-space runs, {} frames", config_.name, plan_.points.size(),
+                        plan_.bundles.size(), plan_.references.size(), result_.times.size()));
   build_bundles(options_.jobs);
   run_references(options_.jobs);
   run_points(options_.jobs, true);

@@ -69,10 +69,6 @@ std::optional<Complaint> inverted_element(const ExampleData& example, const Eige
 
 }  // namespace
 
-EnergyReference energy_reference_from_name(std::string_view name) {
-  return name == "rest" ? EnergyReference::kRest : EnergyReference::kExample;
-}
-
 void TargetSolver::set_quadratic(const CubatureData& cubature, const Eigen::VectorXd& displacement_gradients) {
   const std::vector<LameParameters> lame = cubature_lame(cubature);
   AlignedArray& numbers = quadratics_.emplace_back(quadratic_size());

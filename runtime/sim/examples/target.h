@@ -14,15 +14,6 @@
 
 namespace exmat::runtime {
 
-/// The undeformed shape of an example's energy. docs/step_in_detail.md, "Target".
-enum class EnergyReference {
-  kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)
-  kRest,     ///< E_k(p) = sum_j w_j V_j Psi(I + B_j (p - p_k))
-};
-
-/// "rest", or else the example.
-EnergyReference energy_reference_from_name(std::string_view name);
-
 /// Target p*(w) = argmin_p sum_k w_k E_k(p) over p = Z y, Z [r x d] a basis of the range of T^+ in which the stiffness
 /// at rest is the identity, so that |y| is an energy norm. docs/step_in_detail.md, "Target". Immutable; no call of
 /// solve() allocates or throws.

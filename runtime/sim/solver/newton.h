@@ -9,6 +9,7 @@
 
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/elasticity/element_potential.h"
+#include "runtime/sim/solver/line_search.h"
 #include "runtime/sim/solver/profile.h"
 
 namespace exmat::runtime {
@@ -16,8 +17,10 @@ namespace exmat::runtime {
 struct NewtonSettings {
   int max_iterations = 200;
   double tolerance = 1e-6;  ///< |gradient| <= tolerance * scale of the evaluation
+};
 
-  // Faults that the stability suite is to find; newton_minimize() alone looks at them, no file sets them.
+/// Faults that a test plants, to see that it notices them; no file sets one.
+struct NewtonPolicy {
   bool line_search = true;  ///< false: every full step is taken
   bool projection = true;   ///< false: stagnates where the exact Hessian is not positive definite
 };
@@ -38,17 +41,16 @@ struct NewtonReport {
   double residual = 0;              ///< |gradient| at the end
 };
 
-/// A potential and the size of the terms that add up to it, by which rounding is judged.
-struct PotentialValue {
-  double value = 0;
-  double magnitude = 0;
-};
-
-/// At one point: the potential, and the force scale that the gradient is compared with.
-struct PotentialEvaluation {
-  PotentialValue potential;
-  double force_scale = 0;
-};
+/// Why a minimisation ends at an iterate; nothing where it goes on. `unchecked_from` is the residual before a step that
+/// no line search checked, else infinity.
+inline std::optional<NewtonStatus> reason_to_end(const NewtonReport& report, const NewtonSettings& settings,
+                                                 const PotentialEvaluation& here, double unchecked_from) {
+  if (!std::isfinite(report.residual) || !std::isfinite(here.potential.value)) return NewtonStatus::kNonFinite;
+  if (report.residual <= settings.tolerance * here.force_scale) return NewtonStatus::kConverged;
+  if (report.residual > 0.5 * unchecked_from) return NewtonStatus::kStagnated;
+  if (report.iterations == settings.max_iterations) return NewtonStatus::kIterationLimit;
+  return std::nullopt;
+}
 
 /// Of one size, allocated once.
 struct NewtonWorkspace {
@@ -65,18 +67,16 @@ struct NewtonWorkspace {
   AlignedArray factor;      ///< its Cholesky factor, see Kernels::cholesky
   AlignedArray direction;
   Profile* profile = nullptr;
+  NewtonPolicy policy;
   std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> lu;  ///< only for problems with a gyroscopic() part
 };
 
 namespace detail {
 
-inline constexpr double kArmijo = 1e-4;
-inline constexpr int kHalvings = 30;
 inline constexpr int kShifts = 12;
 inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
-inline constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();
-inline constexpr double kChordRate = 0.25;  // of the residual from one iteration to the next
-inline constexpr double kChordSteps = 4;    // that cost less than a new Hessian
+inline constexpr double kChordRate = 0.25;   // of the residual from one iteration to the next
+inline constexpr double kChordSteps = 4;     // that cost less than a new Hessian
 
 inline bool factorize(NewtonWorkspace& workspace, NewtonReport& report) {
   const Eigen::Index size = workspace.hessian.rows();
@@ -142,43 +142,6 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
   return workspace.gradient.dot(direction);
 }
 
-template <class Problem>
-inline constexpr bool kSeeksLowest = requires {
-  requires Problem::kSeeksLowest;
-};
-
-/// Armijo backtracking along workspace.direction from `x`; leaves the accepted point in workspace.trial, its gradient
-/// in workspace.trial_gradient and the rest in `there`.
-template <class Problem>
-bool line_search(Problem& problem, const Eigen::VectorXd& x, const PotentialValue& start, double slope,
-                 NewtonWorkspace& workspace, NewtonReport& report, PotentialEvaluation& there) {
-  const Eigen::Map<const Eigen::VectorXd> direction(workspace.direction.data(), x.size());
-  const auto low_enough = [&](double length, const PotentialValue& value) {
-    return value.value <= start.value + kArmijo * length * slope + kRounding * start.magnitude;
-  };
-  workspace.trial = x + direction;
-  there = problem.evaluate(workspace.trial, workspace.trial_gradient);
-  if (low_enough(1, there.potential)) return true;
-  // Forces without a potential may need what raises it.
-  if constexpr (requires { problem.gyroscopic(); })
-    if (workspace.trial_gradient.norm() <= 0.5 * workspace.gradient.norm()) return true;
-  double length = 1, lowest = 0;
-  bool found = false;
-  for (int halving = 0; halving < kHalvings && (!found || kSeeksLowest<Problem>); ++halving) {
-    workspace.trial = x + 0.5 * length * direction;
-    ++report.line_search_evaluations;
-    const PotentialValue value = problem.value(workspace.trial);
-    if (found && !(value.value < lowest)) break;
-    length *= 0.5;
-    lowest = value.value;
-    found = found || low_enough(length, value);
-  }
-  if (!found) return false;
-  workspace.trial = x + length * direction;
-  there = problem.evaluate(workspace.trial, workspace.trial_gradient);
-  return true;
-}
-
 /// Whether the factor at hand brings the residual to its limit for less than a new Hessian costs.
 inline bool factor_serves(double before, double now, double limit) {
   const double rate = now / before;
@@ -206,7 +169,7 @@ template <class Problem>
 NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
                              NewtonWorkspace& workspace) noexcept {
   NewtonReport report;
-  auto& [gradient, trial, trial_gradient, hessian, factor, direction, profile, lu] = workspace;
+  auto& [gradient, trial, trial_gradient, hessian, factor, direction, profile, policy, lu] = workspace;
   PotentialEvaluation here = problem.evaluate(x, gradient, hessian);
   enum class Hessian { kEvaluated, kFactorised, kStale } state = Hessian::kEvaluated;
   const auto finish = [&](NewtonStatus status) {
@@ -218,23 +181,18 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
       std::numeric_limits<double>::infinity();  // residual before a step that no line search checked
   report.residual = gradient.norm();
   for (;;) {
-    const double limit = settings.tolerance * here.force_scale;
     if (std::isfinite(unchecked_from) && !(report.residual <= unchecked_from)) {
       x.swap(trial);
       here = problem.evaluate(x, gradient);
       report.residual = gradient.norm();
       return finish(NewtonStatus::kStagnated);
     }
-    if (!std::isfinite(report.residual) || !std::isfinite(here.potential.value))
-      return finish(NewtonStatus::kNonFinite);
-    if (report.residual <= limit) return finish(NewtonStatus::kConverged);
-    if (report.residual > 0.5 * unchecked_from) return finish(NewtonStatus::kStagnated);
-    if (report.iterations == settings.max_iterations) return finish(NewtonStatus::kIterationLimit);
+    if (const auto reason = reason_to_end(report, settings, here, unchecked_from)) return finish(*reason);
 
     const bool fresh = state != Hessian::kFactorised;
     if (state == Hessian::kStale) problem.hessian(x, Tangent::kExact, hessian);
     if (fresh && !detail::factorize(workspace, report)) {
-      if (!settings.projection) return finish(NewtonStatus::kStagnated);
+      if (!policy.projection) return finish(NewtonStatus::kStagnated);
       ++report.projections;
       problem.hessian(x, Tangent::kPositiveSemidefinite, hessian);
       here = problem.evaluate(x, gradient);
@@ -249,14 +207,16 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
     }
     const double slope = detail::solve_direction(problem, workspace, gyroscopic);
     if (!std::isfinite(slope)) return finish(NewtonStatus::kNonFinite);
-    const bool below_rounding = std::abs(slope) <= detail::kRounding * here.potential.magnitude;
+    const Eigen::Map<const Eigen::VectorXd> step(direction.data(), x.size());
+    const SearchLine<Eigen::Map<const Eigen::VectorXd>> line{x, gradient, step, here.potential, slope};
+    const bool below_rounding = line.below_rounding();
     unchecked_from = below_rounding ? report.residual : std::numeric_limits<double>::infinity();
     PotentialEvaluation there;
-    if (below_rounding || !settings.line_search) {
+    if (below_rounding || !policy.line_search) {
       // The potential cannot tell the two points apart, yet the gradient can: go on for as long as it falls.
-      trial = x + Eigen::Map<const Eigen::VectorXd>(direction.data(), x.size());
+      trial = x + step;
       there = problem.evaluate(trial, trial_gradient);
-    } else if (!detail::line_search(problem, x, here.potential, slope, workspace, report, there)) {
+    } else if (!search_line(problem, line, {trial, trial_gradient, there}, report.line_search_evaluations)) {
       here = problem.evaluate(x, gradient);
       if (fresh) return finish(NewtonStatus::kStagnated);
       state = Hessian::kStale;

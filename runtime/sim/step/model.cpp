@@ -56,23 +56,19 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   if (!reduced.object) return {nullptr, missing_group("/object")};
   if (!reduced.modal) return {nullptr, missing_group("/modal")};
   if (!reduced.cubature) return {nullptr, missing_group("/cubature")};
-  const auto material = material_from_name(reduced.object->material);
-  if (!material) {
-    const std::string found = '"' + reduced.object->material + '"';
-    return {nullptr, {"", "/object: attribute material", material_names(), found, "use a newer exmat-runtime"}};
-  }
   auto model = std::make_unique<Model>();
   const CubatureData& cubature = *reduced.cubature;
   if (options.polynomial && !reduced.polynomial) return {nullptr, missing_group("/polynomial")};
   std::optional<ReducedPolynomial> polynomial;
   if (options.polynomial) polynomial.emplace(*reduced.polynomial);
-  model->internal_force = InternalForce(ReducedElasticity(*material, cubature), std::move(polynomial));
+  model->internal_force =
+      InternalForce(ReducedElasticity(reduced.object->materials.model, cubature), std::move(polynomial));
   model->gravity_load = reduced.modal->gravity_load;
   if (options.carried && !(reduced.rigid && reduced.rigid->spin_load.size() > 0))
     return {nullptr, missing_group("/rigid/spin_load")};
   model->frame = make_frame(reduced.rigid ? &*reduced.rigid : nullptr, options.carried, model->gravity_load);
   if (reduced.contact) model->contact.emplace(*reduced.contact, model->frame->origin());
-  const RestModel rest{*material, cubature};
+  const RestModel rest{reduced.object->materials.model, cubature};
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};
     const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets};

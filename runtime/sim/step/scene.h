@@ -5,14 +5,13 @@
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "common/model/choices.h"
 #include "runtime/sim/contact/obstacle.h"
 #include "runtime/sim/frame/world_loads.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
-
-enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 
 /// A linear example force, of the whole body or of a region. docs/step_in_detail.md, "The incremental potential".
 struct ExampleSettings {

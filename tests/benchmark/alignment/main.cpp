@@ -74,7 +74,8 @@ const std::vector<Body>& sizes() {
 
 struct Method {
   std::string name;
-  std::string method = "auto", frame = "shared";
+  AlignmentMethod method = AlignmentMethod::kAuto;
+  AlignmentFrame frame = AlignmentFrame::kShared;
   bool same_connectivity = false, landmarks = false, map = false, moved = false;
 };
 const std::vector<Method>& methods() {
@@ -82,13 +83,13 @@ const std::vector<Method>& methods() {
       {.name = "same connectivity", .same_connectivity = true},
       {.name = "auto, same frame"},
       {.name = "8 landmarks, unknown frame and scale",
-       .method = "landmarks",
-       .frame = "free",
+       .method = AlignmentMethod::kLandmarks,
+       .frame = AlignmentFrame::kFree,
        .landmarks = true,
        .moved = true},
-      {.name = "auto, unknown frame and scale", .frame = "free", .moved = true},
-      {.name = "dense map, same frame", .method = "map", .map = true},
-      {.name = "coupled bases, 8 landmarks, same frame", .method = "coupled", .landmarks = true}};
+      {.name = "auto, unknown frame and scale", .frame = AlignmentFrame::kFree, .moved = true},
+      {.name = "dense map, same frame", .method = AlignmentMethod::kMap, .map = true},
+      {.name = "coupled bases, 8 landmarks, same frame", .method = AlignmentMethod::kCoupled, .landmarks = true}};
   return all;
 }
 
@@ -167,7 +168,7 @@ class Case {
     precompute::StageCache no_cache;
     precompute::ExampleAligner aligner(asset_, basis, object_, input_, no_cache);
     const auto rest = aligner.align_rest();
-    if (aligned_.empty() || method_.method == "coupled") {
+    if (aligned_.empty() || method_.method == AlignmentMethod::kCoupled) {
       aligned_.clear();
       for (const PoseInput& pose : input_.poses) aligned_.push_back(aligner.align_pose(rest, pose));
     }

@@ -59,7 +59,7 @@ const Needs kLeastNeeds{.examples = false,
                         .contact = false,
                         .render = false,
                         .regions = std::vector<RegionNeeds>{},
-                        .internal_force = "cubature"};
+                        .internal_force = ForceMethod::kCubature};
 
 class BundleOfEachKind : public ::testing::TestWithParam<std::pair<bool, bool>> {};
 
@@ -108,7 +108,7 @@ TEST(Bundle, ForSteppingReadsOnlyWhatStepsNeed) {
                model.rigid || model.contact || model.render);
   EXPECT_EQ(model.object->mesh.vertices.rows(), 0);
   EXPECT_EQ(model.modal->basis.rows(), 0);
-  EXPECT_EQ(model.object->material, "stvk");
+  EXPECT_EQ(model.object->materials.model, MaterialModel::kCorotational);
 }
 
 TEST(Bundle, ForPositionsReadsMeshAndBasisToo) {
@@ -196,7 +196,7 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.asset_name, "small");
   EXPECT_EQ(summary.generator, "exmat test");
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
-  EXPECT_EQ(summary.format_version, 5);
+  EXPECT_EQ(summary.format_version, 6);
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
                                           "projection", "targets", "regions", "rigid", "contact", "render"));
@@ -205,7 +205,7 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.regions[0].name, "far right");
   EXPECT_EQ(summary.regions[0].examples, 2);
   EXPECT_FALSE(summary.regions[0].has_targets);
-  EXPECT_EQ(summary.regions[1].energy_reference, "rest");
+  EXPECT_EQ(summary.regions[1].energy_reference, EnergyReference::kRest);
   EXPECT_EQ(summary.vertices, 5);
   EXPECT_EQ(summary.tets, 2);
   EXPECT_EQ(summary.modes, 2);
@@ -213,22 +213,22 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.eigenfunctions, 2);
   EXPECT_EQ(summary.examples, 3);
   EXPECT_TRUE(summary.has_polynomial && summary.has_targets);
-  EXPECT_EQ(summary.internal_force, "polynomial");
-  EXPECT_EQ(summary.energy_reference, "rest");
+  EXPECT_EQ(summary.internal_force, ForceMethod::kPolynomial);
+  EXPECT_EQ(summary.energy_reference, EnergyReference::kRest);
 }
 
 TEST(FitNeeds, TakesTheBundlesInternalForceAndItsTargetsOfTheSameEnergy) {
   BundleSummary summary;
-  summary.internal_force = "polynomial";
-  summary.energy_reference = "rest";
+  summary.internal_force = ForceMethod::kPolynomial;
+  summary.energy_reference = EnergyReference::kRest;
   summary.has_targets = true;
-  EXPECT_EQ(fit_needs({}, summary).internal_force, "polynomial");
-  EXPECT_EQ(fit_needs({.internal_force = "cubature"}, summary).internal_force, "cubature");
-  EXPECT_FALSE(fit_needs({.energy_reference = "example"}, summary).targets);
-  EXPECT_TRUE(fit_needs({.energy_reference = "rest"}, summary).targets);
-  EXPECT_FALSE(fit_needs({.targets = false, .energy_reference = "rest"}, summary).targets);
+  EXPECT_EQ(fit_needs({}, summary).internal_force, ForceMethod::kPolynomial);
+  EXPECT_EQ(fit_needs({.internal_force = ForceMethod::kCubature}, summary).internal_force, ForceMethod::kCubature);
+  EXPECT_FALSE(fit_needs({.energy_reference = EnergyReference::kExample}, summary).targets);
+  EXPECT_TRUE(fit_needs({.energy_reference = EnergyReference::kRest}, summary).targets);
+  EXPECT_FALSE(fit_needs({.targets = false, .energy_reference = EnergyReference::kRest}, summary).targets);
   summary.has_targets = false;
-  EXPECT_FALSE(fit_needs({.energy_reference = "rest"}, summary).targets);
+  EXPECT_FALSE(fit_needs({.energy_reference = EnergyReference::kRest}, summary).targets);
 }
 
 TEST(Bundle, GivesSomeRowsOfTheBasis) {
@@ -317,8 +317,10 @@ const BadModel kBadModels[] = {
     {"ExampleNamedAsADataset", [](ReducedModel& model) { model.examples->examples[1].name = "gram"; },
      "/examples/gram"},
     {"ExampleTwice", [](ReducedModel& model) { model.examples->examples[1].name = "z rest"; }, "/examples/z rest"},
-    {"UnknownMaterial", [](ReducedModel& model) { model.object->material = "rubber"; },
-     "/object@material: expected \"stvk\" or \"stable_neo_hookean\" or \"corotational\", found \"rubber\""},
+    {"NoVolume", [](ReducedModel& model) { model.shape_space->volume = 0; },
+     "/shape_space@volume: expected a number > 0, found 0"},
+    {"AutoAsTheMethodOfABundle", [](ReducedModel& model) { model.cubature->internal_force = ForceMethod::kAuto; },
+     "/cubature@internal_force: expected \"cubature\" or \"polynomial\", found \"auto\""},
 };
 INSTANTIATE_TEST_SUITE_P(Each, UnsoundModel, ::testing::ValuesIn(kBadModels),
                          [](const auto& test) { return std::string(test.param.name); });

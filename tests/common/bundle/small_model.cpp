@@ -30,7 +30,7 @@ ObjectData small_object(bool constrained) {
   object.materials.density = numbers(kTets, 1, 1000);
   object.materials.youngs_modulus = numbers(kTets, 1, 1e5);
   object.materials.poisson_ratio = numbers(kTets, 1, 0.3);
-  object.material = "stvk";
+  object.materials.model = MaterialModel::kCorotational;
   return object;
 }
 
@@ -40,7 +40,7 @@ ShapeSpaceData small_shape_space() {
           .rest_descriptor = numbers(kEigenfunctions, 3, 0.25),
           .volume = 0.5,
           .centroid = {0.5, 0.25, 0.125},
-          .weighting = "eigenvalue",
+          .weighting = Weighting::kEigenvalue,
           .splits_cluster = 1};
 }
 
@@ -55,7 +55,7 @@ ExampleData small_example(const std::string& name, std::int64_t index) {
   example.alignment_residual = 0.01;
   example.inverted_fraction = 0.02;
   example.competing_maps = 3;
-  example.confidence = 0.25;
+  example.doubt = 0.25;
   example.shape_space_error = 0.125;
   example.basis_error = 0.0625;
   example.descriptor = numbers(kEigenfunctions, 3, static_cast<double>(index));
@@ -91,9 +91,9 @@ CubatureData small_cubature() {
   cubature.youngs_modulus = numbers(kElements, 1, 1e5);
   cubature.poisson_ratio = numbers(kElements, 1, 0.3);
   cubature.heldout_poses = numbers(4, kModes, -0.75);
-  cubature.internal_force = "polynomial";
+  cubature.internal_force = ForceMethod::kPolynomial;
   cubature.internal_force_reason = "faster";
-  cubature.method = "greedy";
+  cubature.method = CubatureMethod::kGreedy;
   cubature.training_error = 0.01;
   cubature.heldout_error = 0.02;
   cubature.heldout_energy_error = 0.03;
@@ -110,7 +110,7 @@ TargetTableData small_targets() {
   TargetTableData targets;
   targets.degree = 2;
   targets.error = 1e-5;
-  targets.energy_reference = "rest";
+  targets.energy_reference = EnergyReference::kRest;
   targets.exponents.resize(6, kExamples);
   targets.exponents << 2, 0, 0, 1, 1, 0, 1, 0, 1, 0, 2, 0, 0, 1, 1, 0, 0, 2;
   targets.control_points = numbers(6, kModes, 3);

@@ -25,15 +25,15 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.file, folder / "config.json");
   EXPECT_EQ(asset.name, "bar");
   EXPECT_EQ(asset.object_mesh, folder / "bar.veg");
-  EXPECT_EQ(asset.material.model, "stvk");
+  EXPECT_EQ(asset.material.model, MaterialModel::kStVenantKirchhoff);
   EXPECT_FALSE(asset.material.density || asset.fixed || asset.cubature_elements || asset.cubature_tolerance ||
                asset.needs || asset.render_mesh || asset.contact_vertices || asset.contact_count);
   EXPECT_TRUE(asset.examples.empty());
   EXPECT_EQ(asset.eigenfunctions, 20);
   EXPECT_EQ(asset.basis_size, 30);
-  EXPECT_EQ(asset.cubature_method, "greedy_swap");
+  EXPECT_EQ(asset.cubature_method, CubatureMethod::kGreedySwap);
   EXPECT_EQ(asset.target_tolerance, 1e-4);
-  EXPECT_EQ(asset.internal_force, "auto");
+  EXPECT_EQ(asset.internal_force, ForceMethod::kAuto);
   EXPECT_EQ(asset.seed, 1u);
 }
 
@@ -71,15 +71,15 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_EQ(std::get<SetSelection>(asset.material_regions.at(0).tets).name, "wheel 1");
   EXPECT_EQ(asset.render_mesh, folder / "draw/car.obj");
   EXPECT_EQ(asset.eigenfunctions, 6);
-  EXPECT_EQ(asset.weighting, "none");
+  EXPECT_EQ(asset.weighting, Weighting::kNone);
   ASSERT_EQ(asset.examples.size(), 2u);
   EXPECT_TRUE(asset.examples[0].rest);
   EXPECT_EQ(asset.examples[0].mesh, folder.path().parent_path() / "ex0.veg");
   EXPECT_EQ(asset.examples[1].name, "bend");
   EXPECT_EQ(asset.examples[1].mesh, folder / "sub/ex1.veg");
   EXPECT_TRUE(asset.examples[1].drop.unreferenced_vertices);
-  EXPECT_EQ(asset.alignment.method, "coupled");
-  EXPECT_EQ(asset.alignment.frame, "free");
+  EXPECT_EQ(asset.alignment.method, AlignmentMethod::kCoupled);
+  EXPECT_EQ(asset.alignment.frame, AlignmentFrame::kFree);
   EXPECT_EQ(asset.alignment.landmarks, folder / "marks.txt");
   EXPECT_TRUE(asset.alignment.accept);
   ASSERT_EQ(asset.alignment.maps.size(), 1U);
@@ -92,10 +92,10 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_EQ(asset.linear_modes, 12);
   EXPECT_FALSE(asset.example_fields);
   EXPECT_EQ(asset.cubature_elements, 23);
-  EXPECT_EQ(asset.cubature_method, "nn_htp");
+  EXPECT_EQ(asset.cubature_method, CubatureMethod::kNnHtp);
   EXPECT_EQ(asset.training_poses, 50);
   EXPECT_EQ(asset.target_tolerance, 1e-3);
-  EXPECT_EQ(asset.internal_force, "polynomial");
+  EXPECT_EQ(asset.internal_force, ForceMethod::kPolynomial);
   EXPECT_THAT(std::get<IdSelection>(*asset.contact_vertices).ids, ElementsAre(3, 4, 5));
   EXPECT_EQ(asset.contact_count, 2);
   EXPECT_THAT(*asset.needs, ElementsAre("rigid", "targets", "contact"));
@@ -120,11 +120,11 @@ TEST(LoadScene, FillsInDefaults) {
   EXPECT_EQ(scene.bundle, folder / "bar.h5");
   EXPECT_EQ(scene.time_step, 0.001);
   EXPECT_EQ(scene.steps, 1000);
-  EXPECT_EQ(scene.integrator, "bdf2");
+  EXPECT_EQ(scene.integrator, Integrator::kBdf2);
   EXPECT_EQ(scene.gravity, Eigen::Vector3d::Zero());
   EXPECT_FALSE(scene.examples || scene.trajectory || scene.render || needs_of(scene).render);
   EXPECT_EQ(scene.newton.max_iterations, 200);
-  EXPECT_EQ(scene.internal_force, "auto");
+  EXPECT_EQ(scene.internal_force, ForceMethod::kAuto);
   EXPECT_EQ(scene.instances, 1);
   EXPECT_EQ(scene.every, 10);
 }
@@ -144,7 +144,7 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.time_step, 0.01);
   EXPECT_EQ(scene.steps, 20);
   EXPECT_EQ(scene.gravity, Eigen::Vector3d(0, -0.98, 0));
-  EXPECT_EQ(scene.integrator, "newmark");
+  EXPECT_EQ(scene.integrator, Integrator::kNewmark);
   EXPECT_EQ(scene.mass_damping, 0.02);
   EXPECT_EQ(scene.stiffness_damping, 0.003);
   EXPECT_EQ(scene.newton.max_iterations, 5);
@@ -152,10 +152,10 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.examples->stiffness, 400);
   EXPECT_EQ(scene.examples->damping, 2);
   EXPECT_EQ(scene.examples->bias, 0.6);
-  EXPECT_EQ(scene.examples->target, "table");
+  EXPECT_EQ(scene.examples->target, TargetSource::kTable);
   EXPECT_EQ(scene.examples->target_iterations, 7);
-  EXPECT_EQ(scene.examples->energy_reference, "rest");
-  EXPECT_EQ(scene.internal_force, "polynomial");
+  EXPECT_EQ(scene.examples->energy_reference, EnergyReference::kRest);
+  EXPECT_EQ(scene.internal_force, ForceMethod::kPolynomial);
   EXPECT_EQ(scene.instances, 1000);
   ASSERT_EQ(scene.forces.size(), 2u);
   EXPECT_THAT(scene.forces[0].vertices, ElementsAre(10, 11));
@@ -238,15 +238,15 @@ TEST(NeedsOfAScene, AreExamplesWhereItHasAnExampleForce) {
   EXPECT_FALSE(needs_of(scene).examples);
   EXPECT_TRUE(needs_of(scene).rigid);
   EXPECT_FALSE(needs_of(scene).targets);
-  EXPECT_EQ(needs_of(scene).internal_force, "auto");
-  EXPECT_EQ(needs_of(scene).energy_reference, "example");
-  scene.internal_force = "cubature";
+  EXPECT_EQ(needs_of(scene).internal_force, ForceMethod::kAuto);
+  EXPECT_EQ(needs_of(scene).energy_reference, EnergyReference::kExample);
+  scene.internal_force = ForceMethod::kCubature;
   scene.examples.emplace();
-  scene.examples->energy_reference = "rest";
+  scene.examples->energy_reference = EnergyReference::kRest;
   EXPECT_TRUE(needs_of(scene).examples);
   EXPECT_TRUE(needs_of(scene).targets);
-  EXPECT_EQ(needs_of(scene).internal_force, "cubature");
-  EXPECT_EQ(needs_of(scene).energy_reference, "rest");
+  EXPECT_EQ(needs_of(scene).internal_force, ForceMethod::kCubature);
+  EXPECT_EQ(needs_of(scene).energy_reference, EnergyReference::kRest);
 }
 
 TEST(NeedsOfAScene, AreContactWhereItHasObstacles) {
@@ -266,22 +266,23 @@ TEST(NeedsOfAScene, AreExamplesWhereItStartsFromOne) {
 TEST(NeedsOfAScene, AreTheRegionsThatItNames) {
   SceneConfig scene;
   EXPECT_TRUE(needs_of(scene).regions.value().empty());
-  scene.regions = {{"left", {}}, {"right", {.target = "solve", .energy_reference = "rest"}}};
+  scene.regions = {{"left", {}},
+                   {"right", {.target = TargetSource::kSolve, .energy_reference = EnergyReference::kRest}}};
   const Needs needs = needs_of(scene);
   EXPECT_FALSE(needs.examples);
   ASSERT_EQ(needs.regions->size(), 2U);
   EXPECT_EQ(needs.regions->at(0).name, "left");
   EXPECT_TRUE(needs.regions->at(0).targets);
   EXPECT_FALSE(needs.regions->at(1).targets);
-  EXPECT_EQ(needs.regions->at(1).energy_reference, "rest");
+  EXPECT_EQ(needs.regions->at(1).energy_reference, EnergyReference::kRest);
 }
 
 TEST(NeedsOfAScene, AreNoTargetsWhereItSolvesForThem) {
   SceneConfig scene;
   scene.examples.emplace();
-  for (const char* target : {"auto", "table", "solve"}) {
+  for (const TargetSource target : {TargetSource::kAuto, TargetSource::kTable, TargetSource::kSolve}) {
     scene.examples->target = target;
-    EXPECT_EQ(needs_of(scene).targets, scene.examples->target != "solve");
+    EXPECT_EQ(needs_of(scene).targets, scene.examples->target != TargetSource::kSolve);
   }
 }
 
@@ -297,7 +298,7 @@ TEST(LoadAsset, MaterialsOfPartsComeInOrder) {
     "material": {"model": "stable_neo_hookean"},
     "materials": [{"tets": {"box": {"min": [0, 0, 0], "max": [1, 1, 1]}}, "youngs_modulus": 2e5},
                   {"tets": {"file": "hard.txt"}, "poisson_ratio": -0.2, "density": 7}]}})");
-  EXPECT_EQ(asset.material.model, "stable_neo_hookean");
+  EXPECT_EQ(asset.material.model, MaterialModel::kStableNeoHookean);
   ASSERT_EQ(asset.material_regions.size(), 2U);
   EXPECT_EQ(std::get<BoxSelection>(asset.material_regions[0].tets).max[0], 1);
   EXPECT_EQ(asset.material_regions[0].youngs_modulus, 2e5);

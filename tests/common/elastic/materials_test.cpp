@@ -284,13 +284,5 @@ TEST(StableNeoHookean, RestIsTheLowestStateDownToTheLeastPoissonRatio) {
   EXPECT_LT(lowest(least - 0.1), -1e-4);
 }
 
-TEST(MaterialNames, AreThoseOfTheAsset) {
-  for (const auto model :
-       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational})
-    EXPECT_EQ(material_from_name(name_of(model)), model);
-  EXPECT_FALSE(material_from_name("rubber"));
-  EXPECT_EQ(material_names(), "\"stvk\", \"stable_neo_hookean\" or \"corotational\"");
-}
-
 }  // namespace
 }  // namespace exmat

@@ -31,9 +31,9 @@ TEST(PlanGroups, SaysWhyThereAreNoTargets) {
 }
 
 TEST(PlanGroups, HasAPolynomialUnlessTheForceIsByCubature) {
-  for (const char* choice : {"auto", "cubature", "polynomial"}) {
+  for (const ForceMethod choice : {ForceMethod::kAuto, ForceMethod::kCubature, ForceMethod::kPolynomial}) {
     const auto ledger = plan_groups({.internal_force = choice}, false, 0);
-    EXPECT_EQ(includes(ledger, "polynomial"), std::string_view(choice) != "cubature") << choice;
+    EXPECT_EQ(includes(ledger, "polynomial"), choice != ForceMethod::kCubature) << name_of(choice);
     EXPECT_TRUE(includes(ledger, "cubature"));
   }
 }

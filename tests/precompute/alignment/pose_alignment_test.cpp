@@ -91,7 +91,7 @@ TEST(AlignPose, FindsPosesOnAnotherTessellation) {
                                     {test::s_bend(kLength, 0.8), 0.12}}) {
     const Result result = align(rest, test::posed(posed, pose), pose);
     EXPECT_LE(result.error, limit);
-    EXPECT_LE(result.alignment.confidence, 0.4);
+    EXPECT_LE(result.alignment.doubt, 0.4);
     EXPECT_FALSE(result.alignment.ambiguous);
     EXPECT_FALSE(result.alignment.mirrored);
     EXPECT_EQ(result.alignment.inverted_fraction, 0);
@@ -194,7 +194,7 @@ TEST(AlignPose, AMirrorImageOfABodyWithMirrorSymmetryIsAnotherPose) {
 
 TEST(AlignPose, AnotherBodyIsRefused) {
   const TetMesh cube = test::centred(test::shaken_box({6, 6, 6}, {1, 1, 1}, 3));
-  EXPECT_GT(align(bar({12, 4, 3}, 0.6, 1), cube, kMirror).alignment.confidence, 1.2);
+  EXPECT_GT(align(bar({12, 4, 3}, 0.6, 1), cube, kMirror).alignment.doubt, 1.2);
 }
 
 // Landmarks moved along the body's surface by a share of its RMS radius, each in a direction of its own.
@@ -217,14 +217,14 @@ TEST(AlignPose, InexactLandmarksCostLittleAndWrongOnesAreTold) {
   };
   const Result exact = with_landmarks(0), nearly = with_landmarks(0.01), far = with_landmarks(0.2);
   EXPECT_LE(exact.alignment.missed_landmarks, 0.01);
-  EXPECT_LE(exact.alignment.confidence, 0.35);
+  EXPECT_LE(exact.alignment.doubt, 0.35);
   EXPECT_LE(nearly.error, 1.1 * exact.error);
-  EXPECT_LE(nearly.alignment.confidence, exact.alignment.confidence + 0.02);  // twice the 1 % that they are off
-  // The surface puts right what the landmarks miss, so the confidence is what tells: 2 x 0.2, less what is projected
+  EXPECT_LE(nearly.alignment.doubt, exact.alignment.doubt + 0.02);  // twice the 1 % that they are off
+  // The surface puts right what the landmarks miss, so the doubt is what tells: 2 x 0.2, less what is projected
   // back onto the body.
   EXPECT_LE(far.error, 0.01);
   EXPECT_NEAR(far.alignment.missed_landmarks, 0.15, 0.03);
-  EXPECT_GT(far.alignment.confidence, nearly.alignment.confidence + 0.2);
+  EXPECT_GT(far.alignment.doubt, nearly.alignment.doubt + 0.2);
 }
 
 TEST(AlignPose, LandmarksThatAreInterchangedAreTold) {
@@ -234,7 +234,7 @@ TEST(AlignPose, LandmarksThatAreInterchangedAreTold) {
   std::swap(ids[0], ids[1]);  // at opposite ends
   const Correspondences wrong{at_vertices(test::box_corners(ours), ours), at_vertices(ids, theirs)};
   const Result result = align(bar(ours, 0.6, 1), test::posed(bar(theirs, 0.6, 2), pose), pose, {true, wrong, true});
-  EXPECT_GT(result.alignment.confidence, 1.2);
+  EXPECT_GT(result.alignment.doubt, 1.2);
 }
 
 TEST(RestSymmetry, OfBodiesWithKnownSymmetries) {

@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "common/core/error.h"
+#include "common/core/log.h"
 #include "precompute/examples/example_alignment.h"
+#include "precompute/fem/assembly.h"
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::precompute {

@@ -64,7 +64,8 @@ INSTANTIATE_TEST_SUITE_P(Materials, Cubature,
                          [](const auto& model) { return std::string(name_of(model.param)); });
 
 TEST_P(Cubature, OfAllElementsIsExact) {
-  const auto data = build_cubature(mesh_, materials_, source_, {std::nullopt, std::nullopt, kAllElementsMethod, 20, 3});
+  const auto data =
+      build_cubature(mesh_, materials_, source_, {std::nullopt, std::nullopt, CubatureMethod::kAllElements, 20, 3});
   ASSERT_EQ(data.elements, IndexVector::LinSpaced(mesh_.tet_count(), 0, static_cast<int>(mesh_.tet_count()) - 1));
   EXPECT_EQ(data.weights, Eigen::VectorXd::Ones(mesh_.tet_count()));
   EXPECT_LE(data.heldout_error, 1e-12);
@@ -76,12 +77,14 @@ TEST_P(Cubature, OfAllElementsIsExact) {
                                                   lame_parameters(data.youngs_modulus[j], data.poisson_ratio[j]));
   });
   EXPECT_NEAR(energy, independent(q, data.weights).second, 1e-12 * energy);
-  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {20, std::nullopt, kAllElementsMethod, 20, 3}), InputError);
-  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {std::nullopt, 0.1, kAllElementsMethod, 20, 3}), InputError);
+  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {20, std::nullopt, CubatureMethod::kAllElements, 20, 3}),
+               InputError);
+  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {std::nullopt, 0.1, CubatureMethod::kAllElements, 20, 3}),
+               InputError);
 }
 
 TEST_P(Cubature, HeldoutErrorsAreWhatAnIndependentEvaluationGets) {
-  const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, "greedy_swap", 60, 3});
+  const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, CubatureMethod::kGreedySwap, 60, 3});
   ASSERT_EQ(data.elements.size(), 20);
   EXPECT_GE(data.weights.minCoeff(), 0);
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(mesh_.tet_count());
@@ -101,7 +104,7 @@ TEST_P(Cubature, HeldoutErrorsAreWhatAnIndependentEvaluationGets) {
 }
 
 TEST_P(Cubature, StiffnessErrorIsThatOfTheForceDerivative) {
-  const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, "greedy_swap", 60, 3});
+  const auto data = build_cubature(mesh_, materials_, source_, {20, std::nullopt, CubatureMethod::kGreedySwap, 60, 3});
   Eigen::VectorXd weights = Eigen::VectorXd::Zero(mesh_.tet_count());
   for (Eigen::Index j = 0; j < data.elements.size(); ++j) weights[data.elements[j]] = data.weights[j];
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(mesh_.tet_count());
@@ -133,7 +136,7 @@ TEST_P(Cubature, AllElementsWithWeightOneHaveNoError) {
 
 TEST_P(Cubature, AFewCandidatesInEachPassCostLittle) {
   constexpr int kPoses = 60, kCandidates = 64;  // a third of the tets
-  CubatureOptions options{20, std::nullopt, "greedy_swap", kPoses, 3};
+  CubatureOptions options{20, std::nullopt, CubatureMethod::kGreedySwap, kPoses, 3};
   const auto from_all = build_cubature(mesh_, materials_, source_, options);
   options.training_entries = kCandidates * kPoses * (10 + 1);
   const auto from_few = build_cubature(mesh_, materials_, source_, options);
@@ -144,10 +147,12 @@ TEST_P(Cubature, AFewCandidatesInEachPassCostLittle) {
 }
 
 TEST_P(Cubature, ToleranceIsMetOrRefused) {
-  const auto data = build_cubature(mesh_, materials_, source_, {std::nullopt, 0.02, "greedy_swap", 60, 3});
+  const auto data =
+      build_cubature(mesh_, materials_, source_, {std::nullopt, 0.02, CubatureMethod::kGreedySwap, 60, 3});
   EXPECT_LE(data.heldout_error, 0.02);
   EXPECT_LT(data.elements.size(), mesh_.tet_count() / 2);
-  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {std::nullopt, 1e-9, "greedy_swap", 20, 3}), WorkError);
+  EXPECT_THROW(build_cubature(mesh_, materials_, source_, {std::nullopt, 1e-9, CubatureMethod::kGreedySwap, 20, 3}),
+               WorkError);
 }
 
 TEST_P(Cubature, PosesAreAsLargeAsTheRecipeSays) {

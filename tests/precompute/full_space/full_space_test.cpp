@@ -14,8 +14,6 @@
 namespace exmat::precompute {
 namespace {
 
-using runtime::Integrator;
-
 constexpr std::array kIntegrators{Integrator::kBdf2, Integrator::kBackwardEuler, Integrator::kNewmark};
 
 /// A free bar of a few tets that spins, flies and vibrates.

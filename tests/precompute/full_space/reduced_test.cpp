@@ -11,8 +11,6 @@
 namespace exmat::precompute {
 namespace {
 
-using runtime::Integrator;
-
 // Both methods solve to residuals of 1e-11 of the forces, and targets to 1e-10 of the examples' gradients.
 constexpr double kSame = 1e-10;
 

@@ -56,7 +56,7 @@ TEST(VertexMap, HasALineForEachVertexOfTheObject) {
 
 PoseAlignment good() {
   PoseAlignment alignment;
-  alignment.confidence = 0.2;
+  alignment.doubt = 0.2;
   alignment.displacement = 0.3;
   return alignment;
 }
@@ -64,7 +64,7 @@ PoseAlignment good() {
 AlignmentOutcome judged(const PoseAlignment& alignment, bool free_frame = false) {
   AlignmentOutcome outcome;
   outcome.name = "bend";
-  judge_pose(alignment, "auto", free_frame, outcome);
+  judge_pose(alignment, AlignmentFrame::kAuto, free_frame, outcome);
   return outcome;
 }
 
@@ -76,9 +76,9 @@ TEST(AlignmentVerdict, FollowsTheLimits) {
     change(alignment);
     return judged(alignment);
   };
-  EXPECT_EQ(with([](auto& a) { a.confidence = 0.49; }).verdict, AlignmentVerdict::kGood);
-  EXPECT_EQ(with([](auto& a) { a.confidence = 0.51; }).verdict, AlignmentVerdict::kDoubtful);
-  const auto refused = with([](auto& a) { a.confidence = 1.21; });
+  EXPECT_EQ(with([](auto& a) { a.doubt = 0.49; }).verdict, AlignmentVerdict::kGood);
+  EXPECT_EQ(with([](auto& a) { a.doubt = 0.51; }).verdict, AlignmentVerdict::kDoubtful);
+  const auto refused = with([](auto& a) { a.doubt = 1.21; });
   EXPECT_EQ(refused.verdict, AlignmentVerdict::kRefused);
   EXPECT_THAT(refused.message, HasSubstr("alignment.landmarks (8 vertices that do not lie in a plane)"));
   EXPECT_EQ(with([](auto& a) { a.inverted_fraction = 0.05; }).verdict, AlignmentVerdict::kRefused);

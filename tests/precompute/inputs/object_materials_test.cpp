@@ -18,7 +18,7 @@ class ObjectMaterials : public testing::Test {
   ObjectMaterials() {
     asset_.file = "a.json";
     asset_.object_mesh = "bar.veg";
-    asset_.material = {"stvk", 1e5, 0.3, 1000};
+    asset_.material = {MaterialModel::kStVenantKirchhoff, 1e5, 0.3, 1000};
     for (std::int32_t t = 0; t < mesh_.tet_count(); ++t) kept_.push_back(t);
   }
   TetMaterials materials(const std::optional<TetMaterials>& in_file = std::nullopt) {
@@ -36,7 +36,7 @@ class ObjectMaterials : public testing::Test {
 };
 
 TEST_F(ObjectMaterials, LaterPartsWinAndTheRestIsTheBase) {
-  asset_.material.model = "corotational";
+  asset_.material.model = MaterialModel::kCorotational;
   asset_.material_regions = {{BoxSelection{{1, 0, 0}, {2, 1, 1}}, 2e5, std::nullopt, 500},
                              {IdSelection{{0, 11}}, 3e5, 0.4, std::nullopt}};
   const TetMaterials found = materials();
@@ -50,7 +50,7 @@ TEST_F(ObjectMaterials, LaterPartsWinAndTheRestIsTheBase) {
 }
 
 TEST_F(ObjectMaterials, NumbersOfTheMeshFileServeWhereTheAssetHasNone) {
-  asset_.material = {"stable_neo_hookean", std::nullopt, 0.3, std::nullopt};
+  asset_.material = {MaterialModel::kStableNeoHookean, std::nullopt, 0.3, std::nullopt};
   asset_.material_regions = {{IdSelection{{3}}, 9.0, std::nullopt, std::nullopt}};
   const TetMaterials in_file{Eigen::VectorXd::LinSpaced(12, 1, 12), Eigen::VectorXd::LinSpaced(12, 10, 21),
                              Eigen::VectorXd::Constant(12, 0.1)};
@@ -131,11 +131,11 @@ TEST_F(ObjectMaterials, ANumberThatIsNowhereIsNamed) {
 
 TEST_F(ObjectMaterials, APoissonRatioBeyondTheModelIsNamedWithItsTet) {
   asset_.material_regions = {{IdSelection{{4}}, std::nullopt, -0.85, std::nullopt}};
-  for (const char* model : {"stvk", "corotational"}) {
+  for (const auto model : {MaterialModel::kStVenantKirchhoff, MaterialModel::kCorotational}) {
     asset_.material.model = model;
     EXPECT_NO_THROW(materials());
   }
-  asset_.material.model = "stable_neo_hookean";
+  asset_.material.model = MaterialModel::kStableNeoHookean;
   EXPECT_EQ(complaint().expected, "Poisson ratios above -0.8 and below 0.5 for stable_neo_hookean");
   EXPECT_EQ(complaint().found, "-0.85 in tet 4");
 }

@@ -17,7 +17,6 @@ ReducedModel model_of(Eigen::Index modes, Eigen::Index elements) {
   ObjectData& object = model.object.emplace();
   object.mesh = test::box_mesh({6, 4, 2}, {1.0, 0.7, 0.3});
   const Eigen::Index tets = object.mesh.tet_count();
-  object.material = "stvk";
   object.materials = {Eigen::VectorXd::Constant(tets, 1000), Eigen::VectorXd::Constant(tets, 1e6),
                       Eigen::VectorXd::Constant(tets, 0.3)};
   model.modal.emplace().basis = test::random_matrix(3 * object.mesh.vertex_count(), modes, 3);
@@ -48,46 +47,45 @@ TEST(TakesPolynomial, AsMeasuredWhereThatIsClearElseAsModelled) {
 // A hundredth of the arithmetic.
 TEST(ChooseInternalForce, TakesASmallPolynomialForMuchCubature) {
   ReducedModel model = model_of(6, 250);
-  choose_internal_force("auto", std::nullopt, model);
+  choose_internal_force(ForceMethod::kAuto, std::nullopt, model);
   EXPECT_TRUE(model.polynomial);
-  EXPECT_EQ(model.cubature->internal_force, "polynomial");
+  EXPECT_EQ(model.cubature->internal_force, ForceMethod::kPolynomial);
   EXPECT_EQ(model.cubature->internal_force_reason, "exact, and as fast as 250 cubature elements or faster at r = 6");
 }
 
 // A hundred times the arithmetic.
 TEST(ChooseInternalForce, TakesLittleCubatureForALargePolynomial) {
   ReducedModel model = model_of(40, 2);
-  choose_internal_force("auto", 0.05, model);
+  choose_internal_force(ForceMethod::kAuto, 0.05, model);
   EXPECT_FALSE(model.polynomial);
-  EXPECT_EQ(model.cubature->internal_force, "cubature");
+  EXPECT_EQ(model.cubature->internal_force, ForceMethod::kCubature);
   EXPECT_EQ(model.cubature->internal_force_reason,
             "2 cubature elements are as fast as the polynomial or faster at r = 40");
 }
 
 TEST(ChooseInternalForce, TakesThePolynomialWhereCubatureMissesItsTolerance) {
   ReducedModel model = model_of(40, 2);
-  choose_internal_force("auto", 0.01, model);
+  choose_internal_force(ForceMethod::kAuto, 0.01, model);
   EXPECT_TRUE(model.polynomial);
-  EXPECT_EQ(model.cubature->internal_force, "polynomial");
+  EXPECT_EQ(model.cubature->internal_force, ForceMethod::kPolynomial);
   EXPECT_EQ(model.cubature->internal_force_reason, "exact, where 2 cubature elements miss the tolerance");
 }
 
 TEST(ChooseInternalForce, TakesWhatIsAskedFor) {
   ReducedModel model = model_of(12, 2);
-  choose_internal_force("polynomial", std::nullopt, model);
+  choose_internal_force(ForceMethod::kPolynomial, std::nullopt, model);
   EXPECT_TRUE(model.polynomial);
-  EXPECT_EQ(model.cubature->internal_force, "polynomial");
-  choose_internal_force("cubature", 0.01, model);
+  EXPECT_EQ(model.cubature->internal_force, ForceMethod::kPolynomial);
+  choose_internal_force(ForceMethod::kCubature, 0.01, model);
   EXPECT_FALSE(model.polynomial);
-  EXPECT_EQ(model.cubature->internal_force, "cubature");
+  EXPECT_EQ(model.cubature->internal_force, ForceMethod::kCubature);
   EXPECT_EQ(model.cubature->internal_force_reason, "it is asked for");
 }
 
 // Sizes alone, no numbers.
 ReducedModel sizes_of(Eigen::Index modes, Eigen::Index elements, Eigen::Index tets) {
   ReducedModel model;
-  model.object.emplace().material = "stvk";
-  model.object->mesh.tets.resize(tets, 4);
+  model.object.emplace().mesh.tets.resize(tets, 4);
   CubatureData& cubature = model.cubature.emplace();
   cubature.elements.resize(elements);
   cubature.weights.setOnes(elements);
@@ -106,7 +104,7 @@ TEST(ReasonAgainstThePolynomial, IsItsSizeOrTheMaterial) {
   EXPECT_EQ(reason_against_polynomial(sizes_of(64, 2000, 10000), std::nullopt),
             "the polynomial takes too long to precompute");
   ReducedModel rubber = sizes_of(5, 10, 10);
-  rubber.object->material = "rubber";
+  rubber.object->materials.model = MaterialModel::kCorotational;
   EXPECT_EQ(reason_against_polynomial(rubber, std::nullopt), "the material has no polynomial");
 }
 
@@ -120,9 +118,9 @@ TEST(ReasonAgainstThePolynomial, IsCubatureThatIsFarFasterAndGoodEnough) {
 }
 
 TEST(RequirePolynomial, RefusesOtherMaterialsAndManyModes) {
-  EXPECT_NO_THROW(require_polynomial("stvk", 160));
-  EXPECT_THROW(require_polynomial("stvk", 161), InputError);
-  EXPECT_THROW(require_polynomial("rubber", 5), InputError);
+  EXPECT_NO_THROW(require_polynomial(MaterialModel::kStVenantKirchhoff, 160));
+  EXPECT_THROW(require_polynomial(MaterialModel::kStVenantKirchhoff, 161), InputError);
+  EXPECT_THROW(require_polynomial(MaterialModel::kStableNeoHookean, 5), InputError);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/surface_tree.h"
+#include "precompute/fem/assembly.h"
 #include "tests/support/posed_bodies.h"
 
 namespace exmat::precompute {

@@ -53,12 +53,12 @@ TEST(RestMap, OfTheSameBodyOnAnotherMeshIsCertain) {
   const auto& s = setting();
   EXPECT_LE(s.map.residual, 1e-12);
   EXPECT_TRUE(s.map.same_frame);
-  EXPECT_LE(s.map.confidence, 0.1);
+  EXPECT_LE(s.map.doubt, 0.1);
   const Eigen::MatrixXd gram = s.map.functional_map * s.map.functional_map.transpose();
   EXPECT_LE((gram - Eigen::MatrixXd::Identity(kM, kM)).norm(), 1e-12);
 }
 
-// A rest example that does not lie where the object does, or is another body, is told by its confidence.
+// A rest example that does not lie where the object does, or is another body, is told by its doubt.
 TEST(RestMap, OfABodyThatLiesElsewhereIsDoubtful) {
   const auto& s = setting();
   TetMesh turned = s.example_mesh;
@@ -66,7 +66,7 @@ TEST(RestMap, OfABodyThatLiesElsewhereIsDoubtful) {
   turned.tets.col(0).swap(turned.tets.col(1));
   const auto basis = laplace_basis(turned, s.example.eigenvalues.size(), "turned");
   const auto map = rest_map(s.object, turned, basis);
-  EXPECT_GT(map.confidence, 1.0);
+  EXPECT_GT(map.doubt, 1.0);
   EXPECT_FALSE(map.same_frame);
 }
 
@@ -153,7 +153,7 @@ TEST(DirectProjection, AgreesWithTheWayThroughFullSpace) {
   Eigen::VectorXd density = Eigen::VectorXd::LinSpaced(s.object_mesh.tet_count(), 500, 1500);
   const SparseMatrix mass = expand_to_vectors(scalar_mass(s.object_mesh, density));
   const RowMatrix U = RowMatrix::Random(3 * n, r);
-  for (const char* weighting : {"eigenvalue", "none"}) {
+  for (const Weighting weighting : {Weighting::kEigenvalue, Weighting::kNone}) {
     const auto weights = descriptor_weights(s.object, weighting);
     const auto projection = direct_projection(s.object, weights, mass, U);
     const Eigen::VectorXd q = Eigen::VectorXd::Random(r);

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "common/config/config.h"
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 #include "runtime/sim/examples/target.h"
 #include "runtime/sim/examples/target_table.h"
 #include "tests/support/synthetic_model.h"
@@ -17,7 +17,6 @@
 namespace exmat::precompute {
 namespace {
 
-using runtime::EnergyReference;
 using runtime::TargetSolver;
 using runtime::TargetTable;
 
@@ -29,11 +28,10 @@ ReducedModel small_model(int examples, double strength) {
   return bar.model;
 }
 
-TargetSolver solver_of(const ReducedModel& model, const std::string& reference) {
+TargetSolver solver_of(const ReducedModel& model, EnergyReference reference) {
   TargetSolver solver;
   const auto complaint = solver.build(MaterialModel::kStVenantKirchhoff, *model.cubature, model.examples->examples,
-                                      model.projection->target_basis,
-                                      reference == "rest" ? EnergyReference::kRest : EnergyReference::kExample);
+                                      model.projection->target_basis, reference);
   EXPECT_FALSE(complaint) << to_string(*complaint);
   return solver;
 }
@@ -90,11 +88,12 @@ bool identical(const TargetTableData& a, const TargetTableData& b) {
 
 struct Case {
   int examples;
-  const char* reference;
+  EnergyReference reference;
   double strength, tolerance;
 };
 void PrintTo(const Case& c, std::ostream* out) {
-  *out << "K " << c.examples << " " << c.reference << " strength " << c.strength << " tolerance " << c.tolerance;
+  *out << "K " << c.examples << " " << name_of(c.reference) << " strength " << c.strength << " tolerance "
+       << c.tolerance;
 }
 
 class TargetTablePrecompute : public ::testing::TestWithParam<Case> {
@@ -103,7 +102,7 @@ class TargetTablePrecompute : public ::testing::TestWithParam<Case> {
       : model_(small_model(GetParam().examples, GetParam().strength)), solver_(solver_of(model_, reference())) {}
 
   int examples() const { return GetParam().examples; }
-  std::string reference() const { return GetParam().reference; }
+  EnergyReference reference() const { return GetParam().reference; }
   double tolerance() const { return GetParam().tolerance; }
   TargetTableData build() {
     const auto data = build_target_table(model_, {.tolerance = tolerance(), .energy_reference = reference()}, report_);
@@ -116,14 +115,15 @@ class TargetTablePrecompute : public ::testing::TestWithParam<Case> {
   TargetTableReport report_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Cases, TargetTablePrecompute,
-                         ::testing::Values(Case{2, "example", 1, 1e-3}, Case{2, "example", 1, 1e-5},
-                                           Case{2, "example", 1, 1e-7}, Case{2, "rest", 1, 1e-3},
-                                           Case{2, "rest", 1, 1e-5}, Case{2, "rest", 1, 1e-7},
-                                           Case{3, "example", 1, 1e-3}, Case{3, "example", 1, 1e-4},
-                                           Case{3, "example", 0.5, 1e-7}, Case{3, "rest", 0.3, 1e-3},
-                                           Case{3, "rest", 0.2, 1e-5}, Case{4, "example", 0.7, 1e-3},
-                                           Case{4, "example", 0.5, 1e-5}, Case{4, "rest", 0.15, 1e-3}));
+INSTANTIATE_TEST_SUITE_P(
+    Cases, TargetTablePrecompute,
+    ::testing::Values(Case{2, EnergyReference::kExample, 1, 1e-3}, Case{2, EnergyReference::kExample, 1, 1e-5},
+                      Case{2, EnergyReference::kExample, 1, 1e-7}, Case{2, EnergyReference::kRest, 1, 1e-3},
+                      Case{2, EnergyReference::kRest, 1, 1e-5}, Case{2, EnergyReference::kRest, 1, 1e-7},
+                      Case{3, EnergyReference::kExample, 1, 1e-3}, Case{3, EnergyReference::kExample, 1, 1e-4},
+                      Case{3, EnergyReference::kExample, 0.5, 1e-7}, Case{3, EnergyReference::kRest, 0.3, 1e-3},
+                      Case{3, EnergyReference::kRest, 0.2, 1e-5}, Case{4, EnergyReference::kExample, 0.7, 1e-3},
+                      Case{4, EnergyReference::kExample, 0.5, 1e-5}, Case{4, EnergyReference::kRest, 0.15, 1e-3}));
 
 // The largest error over other weights: never above the tolerance, and no further from the recorded one than maxima
 // over different samples of a function that oscillates are.
@@ -234,7 +234,7 @@ Eigen::VectorXd lowest_minimum(const TargetSolver& solver, const Eigen::VectorXd
 
 TEST(TargetTableRefusal, WhereTheTargetJumps) {
   const ReducedModel model = stretched_model(1.6);
-  const TargetSolver solver = solver_of(model, "rest");
+  const TargetSolver solver = solver_of(model, EnergyReference::kRest);
   double largest_step = 0;
   Eigen::VectorXd y = solver.example(0);
   for (int i = 1; i <= 400; ++i) {
@@ -245,16 +245,17 @@ TEST(TargetTableRefusal, WhereTheTargetJumps) {
   ASSERT_GT(largest_step, 0.2 * solver.example(1).norm());
 
   TargetTableReport report;
-  EXPECT_FALSE(build_target_table(model, {.tolerance = 0.05, .energy_reference = "rest"}, report));
+  EXPECT_FALSE(build_target_table(model, {.tolerance = 0.05, .energy_reference = EnergyReference::kRest}, report));
   EXPECT_NE(report.message.find("more than one minimum"), std::string::npos) << report.message;
   EXPECT_GT(report.pieces, 1);
-  EXPECT_TRUE(build_target_table(stretched_model(0.5), {.tolerance = 0.05, .energy_reference = "rest"}, report));
+  EXPECT_TRUE(build_target_table(stretched_model(0.5), {.tolerance = 0.05, .energy_reference = EnergyReference::kRest},
+                                 report));
 }
 
 /// By the energy of the examples, a strong stretch bends p*(w) sharply: no polynomial of degree 40 follows.
 class SharpBend : public ::testing::TestWithParam<double> {
  protected:
-  SharpBend() : model_(stretched_model(0.9)), solver_(solver_of(model_, "example")) {}
+  SharpBend() : model_(stretched_model(0.9)), solver_(solver_of(model_, EnergyReference::kExample)) {}
 
   double tolerance() const { return GetParam(); }
   TargetTableData build(const TargetTableOptions& options) {
@@ -355,11 +356,11 @@ TEST_P(SharpBend, TheSameInEveryRunAndForAnyNumberOfThreads) {
 TEST(TargetTableOfTheTwistedBar, IsWithinTheDefaultTolerance) {
   const AssetConfig asset = load_asset(EXMAT_SOURCE_DIR "/examples/01_twisted_bar/asset.json");
   BuildReport report;
-  const ReducedModel model = build_model(asset, resolve_needs(asset, std::nullopt), report);
+  const ReducedModel model = build_reduced_model(asset, resolve_needs(asset, std::nullopt), report);
   ASSERT_TRUE(model.targets);
   EXPECT_GT(model.targets->knots.size(), 2);
   EXPECT_LE(model.targets->control_points.rows(), 100);
-  EXPECT_LE(largest_error(*model.targets, solver_of(model, "example"), 2, 300), asset.target_tolerance);
+  EXPECT_LE(largest_error(*model.targets, solver_of(model, EnergyReference::kExample), 2, 300), asset.target_tolerance);
 }
 
 TEST(TargetTableRefusal, WhereThePiecesAreNotEnough) {

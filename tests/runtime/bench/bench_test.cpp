@@ -22,7 +22,7 @@ class BenchTest : public ::testing::Test {
  protected:
   BenchTest() {
     test::Bar bar = full_bar({.cells = {3, 1, 1}, .linear_modes = 4, .eigenfunctions = 3, .examples = 3});
-    bar.model.cubature->internal_force = "cubature";
+    bar.model.cubature->internal_force = ForceMethod::kCubature;
     write_bundle(bar.model, folder_.path("bar.h5"));
   }
 

@@ -7,6 +7,8 @@
 #include "common/mesh/geometry.h"
 #include "precompute/full_space/step_potential.h"
 #include "precompute/solvers/minimiser.h"
+#include "precompute/study/baseline/surface_energy.h"
+#include "precompute/study/baseline/surface_targets.h"
 #include "tests/precompute/full_space/full_space_bar.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"
@@ -165,7 +167,7 @@ TEST(Baseline, ABodyTakesTheShapeOfTheTarget) {
     const Baseline baseline(free);
     FullSpaceScene scene;
     scene.time_step = 0.01;
-    scene.integrator = runtime::Integrator::kBackwardEuler;
+    scene.integrator = Integrator::kBackwardEuler;
     scene.mass_damping = 5;
     scene.examples = {{.bias = 0}};
     scene.example_elasticity = 50;
@@ -190,7 +192,7 @@ TEST(Baseline, StartsWithTheForceOfTheElasticEnergy) {
   const Baseline baseline;
   FullSpaceScene scene;
   scene.time_step = 1e-5;
-  scene.integrator = runtime::Integrator::kNewmark;
+  scene.integrator = Integrator::kNewmark;
   scene.examples = {{.bias = 0.5}};
   scene.example_elasticity = 0.3;
   FullSpaceState state = at_rest(baseline.model);

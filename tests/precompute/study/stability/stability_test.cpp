@@ -47,7 +47,7 @@ TEST_P(StabilityGroups, MeetEveryBoundOrEndAtAKnownLimit) {
   for (const StabilityRun& run : runs) {
     EXPECT_EQ(run.result.non_finite_steps, 0) << describe(run.test);
     // Only the search for a minimum may end early by default, and nothing but that.
-    if (run.test.integrator == runtime::Integrator::kNewmark) continue;
+    if (run.test.integrator == Integrator::kNewmark) continue;
     EXPECT_NE(run.result[Check::kBounded].verdict, Verdict::kKnownLimit) << describe(run.test);
     EXPECT_NE(run.result[Check::kRest].verdict, Verdict::kKnownLimit) << describe(run.test);
     EXPECT_NE(run.result[Check::kEnergy].verdict, Verdict::kKnownLimit) << describe(run.test);
@@ -57,8 +57,7 @@ TEST_P(StabilityGroups, MeetEveryBoundOrEndAtAKnownLimit) {
 TEST(Stability, SuiteReachesEveryExtreme) {
   const auto cases = short_stability_suite();
   const auto any = [&](auto matches) { return std::ranges::any_of(cases, matches); };
-  for (const auto integrator :
-       {runtime::Integrator::kBdf2, runtime::Integrator::kBackwardEuler, runtime::Integrator::kNewmark})
+  for (const auto integrator : {Integrator::kBdf2, Integrator::kBackwardEuler, Integrator::kNewmark})
     for (const auto material :
          {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational})
       for (const bool free : {false, true})
@@ -101,7 +100,7 @@ TEST(Stability, SliversAreSlivers) {
 
 TEST(Stability, StartsAreAsExtremeAsTheyAreCalled) {
   auto cases = cases_of({"starts"});
-  std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != runtime::Integrator::kBdf2; });
+  std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != Integrator::kBdf2; });
   for (const StabilityRun& run : run_stability(cases, {.most_steps = 1})) {
     const double inverted = run.result.start_inverted;
     switch (run.test.start) {
@@ -148,10 +147,10 @@ TEST(Stability, ResultsDoNotDependOnTheNumberOfJobs) {
 }
 
 // What the suite is for: without a safeguard of the step it has to fail. Of 132 runs each, 25 and 49 did.
-std::vector<StabilityRun> runs_with_fault(const PlantedFault& fault) {
+std::vector<StabilityRun> runs_with_fault(const runtime::NewtonPolicy& policy) {
   auto cases = cases_of({"loads", "starts"});
-  std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != runtime::Integrator::kBdf2; });
-  return run_stability(cases, {.most_steps = 200, .fault = fault});
+  std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != Integrator::kBdf2; });
+  return run_stability(cases, {.most_steps = 200, .policy = policy});
 }
 
 TEST(Stability, SeesThatTheLineSearchIsMissing) {

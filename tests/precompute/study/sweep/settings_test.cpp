@@ -19,7 +19,7 @@ class Settings : public testing::Test {
   Settings() {
     asset_.eigenfunctions = 10;
     asset_.basis_size = 20;
-    asset_.internal_force = "cubature";
+    asset_.internal_force = ForceMethod::kCubature;
     scene_.examples.emplace();
     study_.file = "study.json";
   }
@@ -90,20 +90,20 @@ TEST_F(Settings, AreAppliedToAssetAndScene) {
   EXPECT_EQ(asset.basis_size, 7);
   EXPECT_EQ(asset.cubature_elements, 11);
   EXPECT_FALSE(asset.cubature_tolerance) << "one of them alone";
-  EXPECT_EQ(asset.material.model, "corotational");
+  EXPECT_EQ(asset.material.model, MaterialModel::kCorotational);
   const SceneConfig scene = with_settings(scene_, point);
   EXPECT_EQ(scene.time_step, 0.002);
-  EXPECT_EQ(scene.integrator, "newmark");
-  EXPECT_EQ(scene.examples->target, "solve");
-  EXPECT_EQ(scene.regions[0].force.target, "solve");
+  EXPECT_EQ(scene.integrator, Integrator::kNewmark);
+  EXPECT_EQ(scene.examples->target, TargetSource::kSolve);
+  EXPECT_EQ(scene.regions[0].force.target, TargetSource::kSolve);
 
   PointSettings all = point;
   all.internal_force = kAllElements;
   all.cubature_elements.reset();
-  EXPECT_EQ(with_settings(asset_, all).cubature_method, "all_elements");
+  EXPECT_EQ(with_settings(asset_, all).cubature_method, CubatureMethod::kAllElements);
   EXPECT_FALSE(with_settings(asset_, all).cubature_elements || with_settings(asset_, all).cubature_tolerance);
-  EXPECT_EQ(with_settings(scene_, all).internal_force, "cubature");
-  EXPECT_EQ(with_settings(with_settings(asset_, all), point).cubature_method, "greedy_swap");
+  EXPECT_EQ(with_settings(scene_, all).internal_force, ForceMethod::kCubature);
+  EXPECT_EQ(with_settings(with_settings(asset_, all), point).cubature_method, CubatureMethod::kGreedySwap);
 }
 
 TEST_F(Settings, OfAToleranceStayWithoutANumberOfElements) {

@@ -101,7 +101,7 @@ ReducedModel single_tet(MaterialModel material) {
   object.mesh.vertices << 0, 0, 0, 1, 0, 0, 0, 1, 0, 0.2, 0.3, 1;
   object.mesh.tets.resize(1, 4);
   object.mesh.tets << 0, 1, 2, 3;
-  object.material = name_of(material);
+  object.materials.model = material;
   constexpr double kDensity = 1000, kVolume = 1.0 / 6, kMass = kDensity * kVolume / 10;
   ModalData& modal = model.modal.emplace();
   modal.basis = RowMatrix::Zero(12, 3);

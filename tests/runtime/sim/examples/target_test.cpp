@@ -50,8 +50,8 @@ double defined_energy(const ReducedModel& model, const Eigen::VectorXd& weights,
       const bool from_example = reference == EnergyReference::kExample;
       const Eigen::Matrix3d F =
           from_example ? Eigen::Matrix3d(gradient(p, j) * example_gradient.inverse()) : gradient(p - example, j);
-      const double density = test::energy_density(*material_from_name(model.object->material), F,
-                                                  cubature.youngs_modulus[j], cubature.poisson_ratio[j]);
+      const double density =
+          test::energy_density(model.object->materials.model, F, cubature.youngs_modulus[j], cubature.poisson_ratio[j]);
       const double volume = from_example ? example_gradient.determinant() : 1.0;
       sum += weights[k] * cubature.weights[j] * cubature.volumes[j] * volume * density;
     }

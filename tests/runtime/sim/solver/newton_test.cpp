@@ -54,10 +54,11 @@ struct Uphill : Function {
 };
 
 template <class Problem>
-NewtonReport minimise(Problem problem, double& at, const NewtonSettings& settings = {}) {
+NewtonReport minimise(Problem problem, double& at, const NewtonPolicy& policy = {}) {
   Eigen::VectorXd x = Eigen::VectorXd::Constant(1, at);
   NewtonWorkspace workspace(1);
-  const NewtonReport report = newton_minimize(problem, settings, x, workspace);
+  workspace.policy = policy;
+  const NewtonReport report = newton_minimize(problem, {}, x, workspace);
   at = x[0];
   return report;
 }

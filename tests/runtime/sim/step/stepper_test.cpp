@@ -397,13 +397,5 @@ TEST(ModelTest, AMissingGroupIsNamed) {
   EXPECT_EQ(build_model(bar.model, {}).complaint.place, "/cubature");
 }
 
-TEST(ModelTest, AnUnknownMaterialIsNamed) {
-  Bar bar = test::make_bar();
-  bar.model.object->material = "rubber";
-  const auto result = build_model(bar.model, {});
-  ASSERT_FALSE(result.model);
-  EXPECT_EQ(result.complaint.found, "\"rubber\"");
-}
-
 }  // namespace
 }  // namespace exmat::runtime

@@ -1,4 +1,4 @@
-#include "precompute/pipeline/build_model.h"
+#include "precompute/pipeline/build_reduced_model.h"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -95,11 +95,11 @@ Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
 std::string text_of(const Needs& needs) {
   std::string text = fmt::format(
       "examples {}\nrigid {} {}\ntargets {}\ncontact {}\nrender {}\ninternal_force {}\nenergy_reference {}\n",
-      needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render, needs.internal_force,
-      needs.energy_reference);
+      needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render,
+      name_of(needs.internal_force), name_of(needs.energy_reference));
   if (!needs.regions) return text;
   for (const auto& [name, targets, reference] : *needs.regions)
-    text += fmt::format("region {} {} {}\n", name, targets, reference);
+    text += fmt::format("region {} {} {}\n", name, targets, name_of(reference));
   return text + "no other regions\n";
 }
 
@@ -126,7 +126,7 @@ class Pipeline {
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
   void leave_out(const std::string& group, const std::string& reason);
   std::optional<TargetTableData> target_table(const ReducedModel& model, const ExampleSet& set,
-                                              const ProjectionData& projection, const std::string& energy_reference,
+                                              const ProjectionData& projection, EnergyReference energy_reference,
                                               std::string& message);
   void add_internal_force(ReducedModel& model);
   void add_targets(ReducedModel& model);
@@ -144,7 +144,7 @@ class Pipeline {
 };
 
 ObjectData Pipeline::object_data() const {
-  return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials, asset_.material.model};
+  return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials};
 }
 
 // One more than is asked for must be there, to see that none was missed.
@@ -189,24 +189,25 @@ void Pipeline::leave_out(const std::string& group, const std::string& reason) {
 }
 
 void Pipeline::add_internal_force(ReducedModel& model) {
-  if (!includes(report_.ledger, "polynomial")) return choose_internal_force("cubature", std::nullopt, model);
-  const std::string& asked = needs_.internal_force;
-  if (asked == "polynomial" || reason_against_polynomial(model, asset_.cubature_tolerance).empty())
+  if (!includes(report_.ledger, "polynomial"))
+    return choose_internal_force(ForceMethod::kCubature, std::nullopt, model);
+  const ForceMethod asked = needs_.internal_force;
+  if (asked == ForceMethod::kPolynomial || reason_against_polynomial(model, asset_.cubature_tolerance).empty())
     model.polynomial = timed("polynomial", [&] {
       return cache_.get(
           "polynomial", [&] { return reduced_polynomial(object_.mesh, object_.materials, model.modal->basis); },
           object_.mesh, object_.materials, model.modal->basis);
     });
   timed("internal force", [&] { choose_internal_force(asked, asset_.cubature_tolerance, model); });
-  log::info(
-      fmt::format("internal force: {}, {}", model.cubature->internal_force, model.cubature->internal_force_reason));
+  log::info(fmt::format("internal force: {}, {}", name_of(model.cubature->internal_force),
+                        model.cubature->internal_force_reason));
   if (!model.polynomial) leave_out("polynomial", model.cubature->internal_force_reason);
 }
 
 // `message`: what was made, or why nothing was.
 std::optional<TargetTableData> Pipeline::target_table(const ReducedModel& model, const ExampleSet& set,
                                                       const ProjectionData& projection,
-                                                      const std::string& energy_reference, std::string& message) {
+                                                      EnergyReference energy_reference, std::string& message) {
   auto [table, text] = cache_.get(
       "targets",
       [&] {
@@ -216,7 +217,8 @@ std::optional<TargetTableData> Pipeline::target_table(const ReducedModel& model,
                                {.tolerance = asset_.target_tolerance, .energy_reference = energy_reference}, report);
         return std::pair(std::move(made), report.message);
       },
-      model.object->material, *model.cubature, set, projection.target_basis, asset_.target_tolerance, energy_reference);
+      model.object->materials.model, *model.cubature, set, projection.target_basis, asset_.target_tolerance,
+      energy_reference);
   message = text;
   log::info(message);
   return std::move(table);
@@ -256,7 +258,7 @@ void Pipeline::add_contact(ReducedModel& model) {
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
 
 void Pipeline::read() {
-  if (needs_.internal_force == "polynomial") require_polynomial(asset_.material.model, asset_.basis_size);
+  if (needs_.internal_force == ForceMethod::kPolynomial) require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
   require_regions(asset_, needs_);
   report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions),
@@ -365,7 +367,7 @@ auto with_file_named(const AssetConfig& asset, Work work) {
 
 Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs) {
   Needs needs = scene_needs.value_or(Needs{});
-  if (needs.internal_force == "auto") needs.internal_force = asset.internal_force;
+  if (needs.internal_force == ForceMethod::kAuto) needs.internal_force = asset.internal_force;
   if (scene_needs || !asset.needs) return needs;
   const auto named = [&](const char* part) {
     return std::find(asset.needs->begin(), asset.needs->end(), part) != asset.needs->end();
@@ -379,8 +381,8 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   return needs;
 }
 
-ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
-                         const BuildFolders& folders) {
+ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
+                                 const BuildFolders& folders) {
   report.inputs.push_back(asset.file);
   return with_file_named(asset, [&] {
     Pipeline pipeline(asset, needs, report, folders);

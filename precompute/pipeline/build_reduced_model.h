@@ -24,15 +24,15 @@ struct BuildFolders {
 /// The offline stage from files to model. Logs each stage and its time. Takes stages from the cache that it has, and
 /// keeps those that it computes there. Throws InputError for bad input, WorkError for failures, alignments that are
 /// refused among them.
-ReducedModel build_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
-                         const BuildFolders& folders = {});
+ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
+                                 const BuildFolders& folders = {});
 
 /// Reads and checks what the bundle is computed from, and sets the report's inputs, ledger and input_sha256 as
-/// build_model does. Throws as it does.
+/// build_reduced_model does. Throws as it does.
 void read_inputs(const AssetConfig& asset, const Needs& needs, BuildReport& report);
 
 /// Reads and checks the inputs of an asset and aligns its examples, computes nothing more. Returns what came of the
-/// examples, refusals among them. Throws as build_model.
+/// examples, refusals among them. Throws as build_reduced_model.
 std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::filesystem::path& alignment_folder,
                                            BuildReport& report);
 

@@ -1,0 +1,52 @@
+#pragma once
+
+#include "common/core/names.h"
+
+namespace exmat {
+
+// What assets and scenes choose between, by the names in their files and in bundles (schemas/).
+
+enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<Integrator>{"bdf2", "backward_euler", "newmark"};
+
+/// How the internal force is computed; `auto` as the bundle says, or by measurement where the bundle is made.
+enum class ForceMethod { kAuto, kCubature, kPolynomial };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<ForceMethod>{"auto", "cubature", "polynomial"};
+
+/// Where targets come from; `auto` is the bundle's table if it has one.
+enum class TargetSource { kAuto, kTable, kSolve };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<TargetSource>{"auto", "table", "solve"};
+
+/// The undeformed shape of an example's energy. method.md, section 5.
+enum class EnergyReference {
+  kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)
+  kRest,     ///< E_k(p) = sum_j w_j V_j Psi(I + B_j (p - p_k))
+};
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<EnergyReference>{"example", "rest"};
+
+/// Lambda of the descriptors, method.md, section 1: the eigenvalues, or ones.
+enum class Weighting { kEigenvalue, kNone };
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<Weighting>{"eigenvalue", "none"};
+
+/// How poses are carried to the object. alignment.md.
+enum class AlignmentMethod { kAuto, kCoupled, kLandmarks, kMap };
+template <>
+inline constexpr std::array<std::string_view, 4> kNames<AlignmentMethod>{"auto", "coupled", "landmarks", "map"};
+
+/// Whether the examples stand in the object's frame; `auto` if the rest example does.
+enum class AlignmentFrame { kAuto, kShared, kFree };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<AlignmentFrame>{"auto", "shared", "free"};
+
+/// How cubature elements and their weights are chosen.
+enum class CubatureMethod { kGreedySwap, kGreedy, kNnHtp, kAllElements };
+template <>
+inline constexpr std::array<std::string_view, 4> kNames<CubatureMethod>{"greedy_swap", "greedy", "nn_htp",
+                                                                        "all_elements"};
+
+}  // namespace exmat

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <cstddef>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/config/asset_config.h"
+#include "common/config/scene_config.h"
+#include "common/model/needs.h"
+#include "precompute/study/sweep/settings.h"
+#include "precompute/study/sweep/study.h"
+
+namespace exmat::precompute {
+
+/// A bundle that some points share.
+struct BundlePlan {
+  std::string key;
+  AssetConfig asset;
+  Needs needs;
+  std::string failure;
+};
+
+/// A full-space run that some points share.
+struct ReferencePlan {
+  std::string key, bundle;
+  SceneConfig scene;
+  int eigenfunctions = 0;
+  std::string material, failure;
+};
+
+/// A point, which may share its bundle and its full-space run with others.
+struct PointPlan {
+  PointSettings settings;
+  std::string key;
+  std::size_t bundle = 0, reference = 0;
+  std::optional<std::size_t> all_elements;  ///< the point with all elements to compare with
+};
+
+/// What the points of a study need, each once. Keys name the files of its folder.
+struct StudyPlan {
+  std::string inputs;  ///< hash of all files and of what is the same for all points
+  std::vector<BundlePlan> bundles;
+  std::vector<ReferencePlan> references;
+  std::vector<PointPlan> points;
+};
+
+/// Name of what these settings make of the plan's inputs: hexadecimal digits.
+std::string key_of(const StudyPlan& plan, const nlohmann::ordered_json& settings);
+
+/// Reads the files of the asset and plans the points. Sets in `result` what they say of the body, and the times of the
+/// frames. Throws InputError for what is wrong with them.
+StudyPlan plan_study(const StudyConfig& config, const AssetConfig& asset, const SceneConfig& scene,
+                     StudyResult& result);
+
+}  // namespace exmat::precompute
