@@ -36,7 +36,8 @@ TetMaterials mixed_materials(Eigen::Index tets) {
 
 Eigen::MatrixXd fields(Eigen::Index rows) {
   Eigen::MatrixXd result(rows, 2);
-  for (Eigen::Index i = 0; i < rows; ++i) result.row(i) << std::sin(3.0 * static_cast<double>(i)), std::cos(1.0 + i);
+  for (Eigen::Index i = 0; i < rows; ++i)
+    result.row(i) << std::sin(3.0 * static_cast<double>(i)), std::cos(1.0 + static_cast<double>(i));
   return result;
 }
 

@@ -32,7 +32,8 @@ class StepPotentialTest : public testing::TestWithParam<bool> {
     state_ = at_rest(model_);
     state_.v = 0.3 * test::random_vector(model_.size(), 1);
     if (GetParam()) turn();
-    runtime::backward_euler_form(state_, scene_.time_step, terms_.form);
+    runtime::backward_euler_form({state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous}, scene_.time_step,
+                                 terms_.form);
     terms_.rate_centre = Deformation(model_, state_.q).u();
     terms_.external_force = 10 * test::random_vector(model_.size(), 2);
     for (std::size_t i = 0; i < 2; ++i) {
