@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The rules of the house: what may include what, what links to what, how sources look.
+"""The rules of the house: what may include what, what links to what, how sources look, what their words name.
 
 Usage: rules.py ROOT    prints each violation as "rule: file:line: what"; exit status 1 if there are any.
 """
@@ -8,8 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from references import references
+
 TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "tests", "examples", "docs", "README.md", "LICENSE",
-             "CHANGELOG.md", "CMakePresets.json", "install-dependencies"}
+             "CHANGELOG.md", "CONTRIBUTING.md", "CMakePresets.json", "install-dependencies"}
 # What may include what: from top to bottom, a folder sees itself and those below it.
 LAYERS = {
     "common": "bundle hdf5 console config model mesh elastic core",
@@ -165,7 +167,7 @@ def formatting(root):
 
 
 RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, length, mirrored_tests, top_level,
-                                        formatting)}
+                                        formatting, references)}
 
 
 def violations(root):

@@ -52,6 +52,23 @@ PLANTED = [
     ("mirrored_tests", "tests/runtime/sim/nowhere/x_test.cpp", "\n"),
     ("top_level", "scratch/x.txt", "\n"),
     ("formatting", "common/core/x.cpp", "int  f( ) {return 1 ;}\n"),
+    ("references", "common/core/x.h", "// docs/nowhere.md.\n"),
+    ("references", "common/core/x.h", "// As\n// nowhere.md says.\n"),
+    ("references", "docs/page.md", "# Page\n## 1. One\n\ndocs/page.md, section 2\n"),
+    ("references", "docs/page.md", "# Page\n## 1. One\n\ndocs/page.md, sections 1 and 2\n"),
+    ("references", "docs/page.md", '# Page\n## 1. One\n\ndocs/page.md, "Two"\n'),
+    ("references", "docs/page.md", "# Page\n1. One\n\ndocs/page.md, step 2\n"),
+    ("references", "common/core/x.h", "/* As common/core/nowhere.h does. */\n"),
+    ("references", "common/core/x.h", "// By nowhere.h.\n"),
+    ("references", "common/CMakeLists.txt", "# tests/nowhere lists them.\n"),
+    ("references", "tests/x.py", '"""As tests/nowhere does."""\n'),
+    ("references", "tests/x.sh", "#!/bin/sh\n# As tests/{x.sh,nowhere} do.\n"),
+    ("references", "docs/page.md", "[words](nowhere.md)\n"),
+    ("references", "docs/page.md", "# Page\n[words](page.md#two)\n"),
+    ("references", "docs/page.md", "# Page\n[words](#two)\n"),
+    ("references", "docs/page.md", "`exmat-runtime fly SCENE.json`\n"),
+    ("references", "docs/page.md", "Do\n\n    mpirun -n 2 exmat-precompute fly\n"),
+    ("references", "docs/page.md", "Do\n\n    exmat-precompute ASSET.json\n        [--fly]\n"),
 ]
 
 HARMLESS = [
@@ -63,6 +80,11 @@ HARMLESS = [
     ("runtime/include/exmat/x.h", "#include <stdint.h>\n"),
     ("runtime/include/exmat/x.hpp", '#include <vector>\n\n#include "exmat/exmat.h"\n'),
     ("common/core/x.cpp", "// line\n" * 500),
+    ("docs/page.md", '# Page\n## 1. One (`x`)\n1. First\n\ndocs/page.md, section 1, docs/page.md, "One", page.md, step 1; [a](page.md#1-one-x)\n'),
+    ("common/core/x.cpp", '// Writes DIR/stability.md, NAME.vtk and examples/NN_name/scene.json of SCENE.json, car.veg.\n'
+                          '// By common/core/x, common/{core,core/x} and core/x.cpp. /examples/NAME/pose of a bundle; https://x.org/docs/x.md\n'
+                          'const char* kFile = "docs/nowhere.md";  // any\n'),
+    ("tests/x.py", 'PAGE = """[here](nowhere.md)"""\n'),
 ]
 
 
