@@ -95,7 +95,7 @@ struct RegionConfig {
   std::vector<std::string> examples;                ///< names, not the rest pose's
 };
 
-/// ASSET.json after validation, paths resolved against its folder. interfaces.md, "ASSET.json".
+/// ASSET.json after validation, paths resolved against its folder. schemas/asset.json.
 struct AssetConfig {
   std::filesystem::path file;
   std::string name;

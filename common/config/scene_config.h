@@ -91,7 +91,7 @@ struct BodyConfig {
   std::vector<KeyframeConfig> motion;  ///< of the fixed vertices: x = position + orientation X, X the rest mesh
 };
 
-/// SCENE.json after validation, paths resolved against its folder. interfaces.md, "SCENE.json".
+/// SCENE.json after validation, paths resolved against its folder. schemas/scene.json.
 struct SceneConfig {
   std::filesystem::path file;
   std::filesystem::path bundle;

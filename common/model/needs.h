@@ -41,7 +41,7 @@ struct LedgerEntry {
 
 /// One entry per group of the bundle, in bundle order, bytes 0, of an asset with so many examples of the whole body,
 /// the rest pose among them, so many regions and perhaps a render mesh. Both stages decide by this list alone.
-/// method.md, section 7.
+/// docs/method.md, section 7.
 std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
                                      std::int64_t region_count = 0, bool render_mesh = false);
 

@@ -33,7 +33,8 @@ struct ShapeSpaceData {
   std::int64_t splits_cluster = 0;                     ///< 1 where the m-th and the next eigenvalue are (nearly) equal
 };
 
-/// One group /examples/NAME: an example in the object's frame and basis. method.md, section 1.
+/// One group /examples/NAME: an example in the object's frame and basis.
+/// docs/method.md, section 1.
 struct ExampleData {
   std::string name;
   std::int64_t index = 0;  ///< 0 is the rest pose
@@ -42,7 +43,7 @@ struct ExampleData {
   double scale = 1;                 ///< object's length unit over the example's: (V_object / V_example)^(1/3)
   std::string method;               ///< how it was mapped to the object
   double alignment_residual = 0;    ///< relative
-  double confidence = 0;            ///< J of alignment.md; 0 is certain, above 1.2 refused
+  double confidence = 0;            ///< J of docs/alignment.md; 0 is certain, above 1.2 refused
   double inverted_fraction = 0;     ///< share of the volume that the pose turns inside out
   std::int64_t competing_maps = 0;  ///< other poses that fit the example about as well
   double shape_space_error = 0;     ///< share of its displacement that the m functions lose, relative M-norm
@@ -52,7 +53,8 @@ struct ExampleData {
   Eigen::VectorXd pose;             ///< r, p_k: the same with the fixed vertices of a clamped body put back
 };
 
-/// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex. method.md, section 5.
+/// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex.
+/// docs/method.md, section 5.1.
 struct ExampleSet {
   std::vector<ExampleData> examples;  ///< K, in index order, the rest pose first
   RowMatrix gram;                     ///< K x K, G = E^T E
@@ -107,7 +109,7 @@ struct TargetTableData {
   std::string energy_reference;  ///< "example" or "rest"
 };
 
-/// Group /projection. method.md, section 4.
+/// Group /projection. docs/method.md, section 4.
 struct ProjectionData {
   RowMatrix shape_from_reduced;  ///< 3m x r, T, row 3i + axis
   RowMatrix reduced_from_shape;  ///< r x 3m, T^+
@@ -115,7 +117,7 @@ struct ProjectionData {
 };
 
 /// One group /regions/NAME: examples that act on some of the vertices alone, with weights, projection and targets of
-/// their own, in the groups' form above. method.md, section 5.
+/// their own, in the groups' form above. docs/method.md, section 5.5.
 struct RegionData {
   std::string name;
   std::int64_t index = 0;  ///< place in the asset
@@ -126,7 +128,7 @@ struct RegionData {
 };
 
 /// Group /rigid: moments about the centre of mass, X centred there, of a free body or of one whose fixed part is
-/// carried. method.md, section 6.
+/// carried. docs/method.md, section 6.
 struct RigidData {
   double mass = 0;                 ///< [kg]
   Eigen::Vector3d centre_of_mass;  ///< at rest, world [m]
@@ -137,7 +139,8 @@ struct RigidData {
   RowMatrix spin_load;             ///< 3 x r, sum m X x U: 0 but for rounding where the body is free
 };
 
-/// Group /contact: the surface vertices that may touch obstacles, none of them fixed. method.md, section 6.
+/// Group /contact: the surface vertices that may touch obstacles, none of them fixed.
+/// docs/method.md, section 6.1.
 struct ContactData {
   IndexVector vertices;   ///< k, distinct vertices of the object, ascending
   VertexArray positions;  ///< k x 3, at rest, world [m]
@@ -156,7 +159,7 @@ struct RenderData {
   double farthest = 0;       ///< distance of the farthest vertex from the body [m]
 };
 
-/// Everything a scene may need of one asset. Absent groups were left out (method.md, section 7).
+/// Everything a scene may need of one asset. Absent groups were left out (docs/method.md, section 7).
 struct ReducedModel {
   std::string asset_name;
   std::string generator;

@@ -34,7 +34,7 @@ class ZoomOut {
   std::vector<KdTree> trees_;  // of the rows of Phi_b, one for each size
 };
 
-/// The sizes of alignment.md, 20 to 40 in steps of 4, cut to `available` functions.
+/// The sizes of ZoomOut, 20 to 40 in steps of 4, cut to `available` functions.
 std::vector<Eigen::Index> zoom_out_sizes(Eigen::Index available);
 
 /// Map of `size` functions from values of b at points of a: Phi_a^T M_a (P Phi_b), P [n_a x n_b].
@@ -44,7 +44,7 @@ Eigen::MatrixXd map_of_points(const AlignedShape& a, const AlignedShape& b, cons
 /// |C^T C - I|_F / sqrt(k) over the first k = min(20, size) functions: how far from an isometry of function spaces.
 double orthogonality_defect(const Eigen::MatrixXd& map);
 
-/// Score of a functional map. alignment.md, "Default", step 4.
+/// Score of a functional map. docs/alignment.md, step 4.
 struct MapScore {
   double orthogonality = 0;  ///< orthogonality_defect
   double distortion = 0;     ///< mean |F - R|^2 of the low-pass pull-back

@@ -30,7 +30,7 @@ struct PoseAlignment {
   std::string start;                ///< what the registration began with
   double residual = 0;              ///< RMS distance of the two surfaces, over the RMS radius of the rest example
   double missed_landmarks = 0;      ///< RMS distance of the landmarks from where they belong, over the RMS radius
-  double confidence = 0;            ///< J of alignment.md + 2 missed_landmarks; 0 is certain
+  double confidence = 0;            ///< J of docs/alignment.md + 2 missed_landmarks; 0 is certain
   double inverted_fraction = 0;     ///< of the rest example's volume
   std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
   bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is
@@ -40,7 +40,7 @@ struct PoseAlignment {
   double turn = 0;                  ///< angle of the rotation that lays the rest example best over the pose [rad]
 };
 
-/// Step 4 of alignment.md. Both shapes normalised; `symmetry` is that of the rest example.
+/// Registers a pose: docs/alignment.md, steps 1 to 5. Both shapes normalised; `symmetry` is that of the rest example.
 PoseAlignment align_pose(const AlignedShape& rest, const Symmetry& symmetry, const AlignedShape& pose,
                          const AlignmentHints& hints);
 

@@ -26,14 +26,14 @@ struct Registered {
 
   /// How well the shapes fit: E_ARAP + 20 Chamfer^2 + 2 inverted.
   double misfit() const { return distortion + 20 * chamfer + 2 * inverted; }
-  /// F of alignment.md: that and 2 landmark RMS.
+  /// F of docs/alignment.md: that and 2 landmark RMS.
   double objective() const { return misfit() + 2 * landmark_rms; }
 };
 
 /// As-rigid-as-possible registration of one body's surface to another's, both of volume 1 at centroid 0. Each round
 /// pairs samples of both surfaces with the nearest points that face the same way, then takes local and global steps
 /// of E_ARAP + w (point-to-plane + a little point-to-point) + pairs given. The global step is solved by conjugate
-/// gradients, preconditioned by prefactored sparse Cholesky. alignment.md, "Default", step 4.
+/// gradients, preconditioned by prefactored sparse Cholesky. docs/alignment.md, step 4.
 class Registration {
  public:
   Registration(const TetMesh& moving, const TetMesh& fixed, PointPairs pairs = {});

@@ -18,7 +18,7 @@ std::vector<Eigen::MatrixXd> cluster_choices(Eigen::Index size);
 
 /// Functional maps [count x count] by a tree over the clusters of the first `count` functions, best first: at each
 /// cluster the choices that bring the embeddings phi_i / sqrt(lambda_i) of the two shapes nearest, both ways, are kept.
-/// Takes reflections for maps. alignment.md, "Default", step 4.
+/// Takes reflections for maps. docs/alignment.md, step 2.
 std::vector<Eigen::MatrixXd> spectral_maps(const AlignedShape& a, const AlignedShape& b, Eigen::Index count,
                                            std::size_t kept);
 

@@ -27,7 +27,7 @@ struct StopRule {
 
 /// Greedy: add the column of largest normalised residual correlation, non-negative least squares on the support, until
 /// `count` columns or the stop rule; then swaps while they help. Fewer columns come back only where no other can lower
-/// the residual. `start` (of an earlier pass) may be empty. design: reduction.md, "Cubature".
+/// the residual. `start` (of an earlier pass) may be empty. docs/method.md, section 3.2.
 Selection select_greedy_swap(const SelectionProblem& problem, std::size_t count, const std::vector<Eigen::Index>& start,
                              const StopRule* stop);
 

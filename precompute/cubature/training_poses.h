@@ -33,7 +33,7 @@ PoseSource pose_source(const ElasticSystem& system, const LinearModes& modes, co
 
 /// [count x r] poses: on the manifold of modes and modal derivatives, largest displacement uniform in (0.05, 1) 0.4 L;
 /// a quarter of them, where there are examples, on segments between two examples (the rest pose is one); all with noise
-/// of one percent of their linear energy. design: reduction.md, "Training poses".
+/// of one percent of their linear energy. docs/method.md, section 3.1.
 RowMatrix draw_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed);
 
 }  // namespace exmat::precompute

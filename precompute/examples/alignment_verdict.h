@@ -13,7 +13,7 @@ enum class AlignmentVerdict { kGood, kDoubtful, kRefused };
 /// "good", "doubtful" or "refused".
 const char* name_of(AlignmentVerdict verdict);
 
-/// What came of an example's alignment, for the bundle and the user. alignment.md, "What the user is told".
+/// What came of an example's alignment, for the bundle and the user. docs/alignment.md, "What the user is told".
 struct AlignmentOutcome {
   std::string name;
   std::string method;

@@ -43,7 +43,8 @@ void pass_members(Archive& archive, AlignedPose& value) {
   pass_all(archive, value.positions, value.carried, value.outcome);
 }
 
-/// Aligns the examples of an asset to the object's first m functions by its `alignment`. alignment.md.
+/// Aligns the examples of an asset to the object's first m functions by its `alignment`.
+/// docs/alignment.md.
 class ExampleAligner {
  public:
   /// All of these are kept by reference. `object` holds m functions.

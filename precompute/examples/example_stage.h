@@ -41,7 +41,8 @@ struct ShapeStage {
   bool has_regions() const { return !groups.empty() && !groups.back().region.empty(); }
 };
 
-/// Computes the object's shape space and brings every example into it. method.md, sections 1 and 5; alignment.md.
+/// Computes the object's shape space and brings every example into it. docs/method.md, sections 1 and 5.5;
+/// docs/alignment.md.
 /// Eigenfunctions and registered poses come from the cache where it has them. `warnings` receives what is also logged
 /// as such. Refused alignments are in the stage, for require_aligned. Throws InputError (no file named where it is the
 /// asset's) and WorkError.

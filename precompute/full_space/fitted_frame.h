@@ -9,7 +9,7 @@ namespace exmat::precompute {
 
 /// The frame that moves with a free body of n vertices: at its centre of mass c, turned by the rotation R that fits the
 /// rest shape best in the mass. In it the deformation u = R^T (x - c) - X, X about the centre of mass at rest, has no
-/// rigid part: sum m u = 0 and sum m X x u = 0, which are the conditions on a free body's modal basis. method.md,
+/// rigid part: sum m u = 0 and sum m X x u = 0, which are the conditions on a free body's modal basis. docs/method.md,
 /// sections 1 and 6.
 class FittedFrame {
  public:

@@ -28,10 +28,10 @@ ExamplePoses whole_body_example_poses(const ReducedModel& model, const ElasticSy
 std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const ElasticSystem& system,
                                                const std::vector<std::string>& regions);
 
-/// Example forces without a modal basis, of which those of method.md, section 5, are the Galerkin projection: with the
-/// m eigenfunctions Phi of the shape space, T u = Lambda Phi^T (M_s/V) u / V^(1/3), and the filter P u = M Phi Phi^T
-/// (M_s/V) u, U^T P U = T^+ T, and of a region D''^T P D''. f free degrees of freedom, K examples. All tets take part
-/// in the energies of the target.
+/// Example forces without a modal basis, of which those of docs/method.md, section 5, are the Galerkin projection: with
+/// the m eigenfunctions Phi of the shape space, T u = Lambda Phi^T (M_s/V) u / V^(1/3), and the filter P u = M Phi
+/// Phi^T (M_s/V) u, U^T P U = T^+ T, and of a region D''^T P D''. f free degrees of freedom, K examples. All tets take
+/// part in the energies of the target.
 class FullSpaceExamples {
  public:
   /// Of `poses` no more than the view is kept. Tets that an example turns inside out are left out of the energies of

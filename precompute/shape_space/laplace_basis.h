@@ -8,8 +8,8 @@
 
 namespace exmat::precompute {
 
-/// Laplace-Beltrami eigenfunctions of a mesh brought to centroid 0 and volume 1, the constant one dropped. method.md,
-/// section 1.
+/// Laplace-Beltrami eigenfunctions of a mesh brought to centroid 0 and volume 1, the constant one dropped.
+/// docs/method.md, section 1.
 struct LaplaceBasis {
   Eigen::VectorXd eigenvalues;                         ///< k, ascending, dimensionless
   Eigen::MatrixXd eigenfunctions;                      ///< n x k, phi^T mass phi = I

@@ -21,7 +21,7 @@ Eigen::MatrixXd carried_fields(const LaplaceBasis& object, const Eigen::VectorXd
 using PoseFields = std::function<Eigen::MatrixXd(const Eigen::MatrixXd& changes)>;
 
 /// Those of the whole body: carried_fields() with the fixed vertices of a clamped body put back, by a FieldClamp.
-/// method.md, sections 4 and 5. All are kept by reference.
+/// docs/method.md, sections 4 and 5. All are kept by reference.
 PoseFields whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
                             const FieldClamp& clamp);
 

@@ -5,23 +5,24 @@
 
 namespace exmat::precompute {
 
-/// Lambda of method.md, section 1: the eigenvalues, or ones with `weighting` "none".
+/// Lambda of docs/method.md, section 1: the eigenvalues, or ones with `weighting` "none".
 Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, const std::string& weighting);
 
 /// T and T^+; the range of the targets is left to range_basis(). `basis` is U, 3n x r; `mass` M, 3n x 3n; `object`
-/// holds the first m functions. method.md, section 4.
+/// holds the first m functions. docs/method.md, section 4.
 ProjectionData direct_projection(const LaplaceBasis& object, const Eigen::VectorXd& weights, const SparseMatrix& mass,
                                  const RowMatrix& basis);
 
 /// Orthonormal basis of the range of a matrix, directions of rounding left out.
 RowMatrix range_basis(const RowMatrix& matrix);
 
-/// [3n] displacement V^(1/3) Phi Lambda^-1 (delta e) of a change of descriptor [m x 3]. method.md, section 1.
+/// [3n] displacement V^(1/3) Phi Lambda^-1 (delta e) of a change of descriptor [m x 3].
+/// docs/method.md, section 1.
 Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen::VectorXd& weights,
                                          const Eigen::MatrixXd& descriptor_change);
 
 /// Gram matrix and linear terms of the weights problem from the descriptors, and the examples in reduced coordinates:
-/// `reduced` by T^+, `pose` by the pose map. method.md, section 5.
+/// `reduced` by T^+, `pose` by the pose map. docs/method.md, section 5.1.
 void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,
                           const RowMatrix& pose_map, ExampleSet& set);
 

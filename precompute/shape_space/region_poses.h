@@ -17,7 +17,7 @@ inline constexpr double kRegionStiffness = 100;
 /// kappa M_b |b w - c|^2 + w^T K w, where b w are the coefficients of what the view sees of it, c those of the change
 /// and M_b the mass of the body. That is where the body comes to rest, at small displacements, under an example force
 /// of stiffness kappa in the region: close to the example there, whatever elasticity makes of it outside, and torn
-/// nowhere. method.md, section 5.
+/// nowhere. docs/method.md, section 5.5.
 class RegionPoses {
  public:
   /// `weights` is Lambda [m]; `solver` is that of the system's stiffness; `stiffness` kappa > 0 [1/s^2]. 3m solves.

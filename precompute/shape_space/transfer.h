@@ -8,7 +8,7 @@
 
 namespace exmat::precompute {
 
-/// Where an example file's body stands to the object: alignment.md, "Default".
+/// Where an example file's body stands to the object: docs/method.md, section 1.
 struct RestMap {
   Eigen::MatrixXd functional_map;  ///< C_0, m x K_e, orthonormal rows
   SparseMatrix pull_back;          ///< n x n_e, values at the nearest point of the rest example for each object vertex
@@ -51,7 +51,7 @@ struct TransferredPose {
       0;  ///< |d - d_m|_M / |d|_M on the object: d the example's displacement, d_m what came over
 };
 
-/// What a pose is brought into once it is transferred. method.md, section 1, "Frame".
+/// What a pose is brought into once it is transferred: the frame of docs/method.md, section 1.
 struct PoseFrame {
   bool free_example = false;  ///< rotate the example to the rest example first (alignment.frame: free)
   /// n x n weights of the fit of the posed to the rest object: the mass of a free body; ones at the fixed vertices of a

@@ -28,7 +28,8 @@ struct PieceReport {
 /// each piece and at `checks` is within the tolerance. At its ends a piece has the values and slopes of p*(w), which
 /// makes the table C1: with the weights (1 - t, t), H dy/dt = grad E_0 - grad E_1, H the Hessian of the minimum. The
 /// other control points are fitted by least squares. Nothing beyond the most pieces, or where a piece shorter than
-/// 2^-20 is not enough, as at a jump. Of TargetTableData all but energy_reference. method.md, section 5.
+/// 2^-20 is not enough, as at a jump. Of TargetTableData all but energy_reference. docs/method.md,
+/// section 5.4.
 std::optional<TargetTableData> build_target_pieces(const runtime::TargetSolver& target,
                                                    const std::vector<ExampleData>& examples,
                                                    const TargetSamples& checks, const PieceOptions& options,

@@ -37,7 +37,8 @@ struct TargetTableReport {
 /// at the nodes of Isaac 2020 and fitted by least squares, by polynomials of growing degree until the error as the run
 /// time decodes it, also at further weights inside and on every edge and face of the simplex, is below the tolerance.
 /// Where no degree allowed gets there, K = 2 takes pieces (target_pieces.h); otherwise there is nothing, as where p*(w)
-/// jumps from one minimum to another. The same in every run and for every number of threads. method.md, section 5.
+/// jumps from one minimum to another. The same in every run and for every number of threads. docs/method.md,
+/// section 5.4.
 std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
                                                   TargetTableReport& report);
 

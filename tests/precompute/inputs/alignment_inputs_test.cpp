@@ -68,7 +68,7 @@ AlignmentOutcome judged(const PoseAlignment& alignment, bool free_frame = false)
   return outcome;
 }
 
-// The limits of alignment.md, each with what would help.
+// The limits of docs/alignment.md, each with what would help.
 TEST(AlignmentVerdict, FollowsTheLimits) {
   EXPECT_EQ(judged(good()).verdict, AlignmentVerdict::kGood);
   const auto with = [](auto change) {

@@ -283,7 +283,7 @@ INSTANTIATE_TEST_SUITE_P(All, ExtremeRuns,
                          ::testing::Combine(::testing::Values(1e6, 1e8, 1e11), ::testing::Values(0.4, 0.499),
                                             ::testing::Values(0.001, 1.0 / 60), ::testing::Values(0, 1, 2, 3)));
 
-/// Twenty times a load that already bends, stretches or compresses visibly, and a blow: bounded by 8 L. reduction.md.
+/// Twenty times a load that already bends, stretches or compresses visibly, and a blow: bounded by 8 L.
 TEST_P(ExtremeRuns, StayFiniteAndBounded) {
   const auto [youngs_modulus, poisson_ratio, time_step, load] = GetParam();
   const Bar bar = test::make_bar({.youngs_modulus = youngs_modulus, .poisson_ratio = poisson_ratio, .examples = 4});
