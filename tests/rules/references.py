@@ -18,6 +18,7 @@ HEADING = re.compile(r"^#+ +(.*?) *$", re.M)
 PAGE = re.compile(r'(?<![\w./#-])((?:[\w.-]+/)*[\w-]+\.md)\b(?:,?\s+sections?\s+([\d.]*\d(?:(?:,| and|,? or)\s+[\d.]*\d)*)|,\s+"([^"]+)"|,\s+step\s+(\d+))?')
 PATH = re.compile(r"(?<![\w./*}<-])((?:common|precompute|runtime|schemas|tests|examples|docs|\.ci|\.github)/[\w./*{},-]*[\w*}/])")
 SOURCE = re.compile(r"(?<![\w./*}<-])(?!sanitizer/)((?:\w+/)*[a-z]\w*\.(?:h|hpp|cpp|inl|py|sh))\b")
+RELATIVE = re.compile(r"(?<![\w./(\"$}])((?:\.\./)+[\w./-]*\w)")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 QUOTED = re.compile(r"`[^`\n]+`")
 CODE = re.compile(QUOTED.pattern + r"|^ {4}.*(?:\n +[\[-].*)*", re.M)  # of a page: with blocks, and lines that go on
@@ -130,6 +131,13 @@ def path_faults(root, text, names):
             yield match.start(), f"there is no source {match.group(1)}"
 
 
+def relative_faults(path, text):
+    """Of what a page says of the folders around its own."""
+    for match in RELATIVE.finditer(text):
+        if not (path.parent / match.group(1)).exists():
+            yield match.start(), f"there is no {match.group(1)}"
+
+
 def link_faults(path, text):
     for match in LINK.finditer(text):
         target, _, fragment = match.group(1).partition("#")
@@ -174,6 +182,6 @@ def references(root):
         page = path.suffix == ".md"
         outside_code = FENCE.sub(lambda m: blank(m.group()), text) if page else text
         found = [*page_faults(root, path.parent if page else None, outside_code), *path_faults(root, outside_code, names), *command_faults(root, text, CODE if page else QUOTED),
-                 *(link_faults(path, outside_code) if page else ())]
+                 *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ())]
         for position, what in sorted(found):
             yield f"{name}:{text.count(chr(10), 0, position) + 1}: {what}"

@@ -63,6 +63,7 @@ PLANTED = [
     ("references", "common/CMakeLists.txt", "# tests/nowhere lists them.\n"),
     ("references", "tests/x.py", '"""As tests/nowhere does."""\n'),
     ("references", "tests/x.sh", "#!/bin/sh\n# As tests/{x.sh,nowhere} do.\n"),
+    ("references", "docs/page.md", "Do\n\n    ../tools/nowhere.py\n"),
     ("references", "docs/page.md", "[words](nowhere.md)\n"),
     ("references", "docs/page.md", "# Page\n[words](page.md#two)\n"),
     ("references", "docs/page.md", "# Page\n[words](#two)\n"),
