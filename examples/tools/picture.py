@@ -3,6 +3,7 @@
 
   picture.py meshes PICTURE.png MESH.msh...                 Gmsh 2.2 ASCII meshes, side by side
   picture.py motion PICTURE.png SCENE.json...               a row for each scene that was run, some of its frames side by side
+  picture.py movie PICTURE.gif SCENE.json...                the same, one after the other, the scenes side by side
   picture.py eigenfunction PICTURE.png BUNDLE.h5 NUMBER     an eigenfunction on the surface and, cut open by a plane, inside
 """
 import argparse
@@ -104,18 +105,38 @@ class Run:
         return f"{self.label}  t = {self.times[k]:.2f} s".strip(), actors
 
 
-def draw_motion(a):
-    runs = [Run(path, a.times, a.frames) for path in a.scenes]
+def box_of(runs):
+    """What holds all that the runs show."""
     shown = np.concatenate([r.drawn.reshape(-1, 3) for r in runs])
     low, high = shown.min(0), shown.max(0)
     for obstacle in itertools.chain(*(r.obstacles() for r in runs)):
         bounds = np.reshape(sheet.obstacle_data(obstacle, low, high).GetBounds(), (3, 2))
         low, high = np.minimum(low, bounds[:, 0]), np.maximum(high, bounds[:, 1])
+    return low, high
+
+
+def panels_of(runs, low, high, ghost):
+    """Of each run the panels of its frames, in colours that mean the same in all."""
     table = sheet.colours(PALE_TO_RED, 0, max(r.displacement.max() for r in runs) or 1)
-    rows = [[r.panel(k, table, low, high, a.ghost) for k in range(len(r.times))] for r in runs]
+    return [[r.panel(k, table, low, high, ghost) for k in range(len(r.times))] for r in runs]
+
+
+def draw_motion(a):
+    runs = [Run(path, a.times, a.frames) for path in a.scenes]
+    low, high = box_of(runs)
+    rows = panels_of(runs, low, high, a.ghost)
     if a.columns:
         rows = [row[k : k + a.columns] for row in [sum(rows, [])] for k in range(0, len(row), a.columns)]
     sheet.Sheet(rows, a.view).save(a.picture, low, high)
+
+
+def draw_movie(a):
+    runs = [Run(path, None, a.frames) for path in a.scenes]
+    for run, title in zip(runs, a.titles):
+        run.label = title
+    low, high = box_of(runs)
+    images = [sheet.Sheet([row], a.view).image(low, high, a.pixels) for row in zip(*panels_of(runs, low, high, a.ghost))]
+    sheet.save_movie(a.picture, images, 1000 * a.slower * runs[0].times[-1] / len(images))
 
 
 def draw_eigenfunction(a):
@@ -152,6 +173,13 @@ def main():
     motion.add_argument("--times", type=vector, help="instead the frames at these times [s]: T,T,...")
     motion.add_argument("--columns", type=int, help="panels in a row, instead of a row for each scene")
     motion.add_argument("--ghost", action="store_true", help="the rest shape, faint, in each panel")
+    movie = command("movie", draw_movie)
+    movie.add_argument("scenes", nargs="+")
+    movie.add_argument("--frames", type=int, default=50, help="so many, spread evenly over the run")
+    movie.add_argument("--slower", type=float, default=1, help="so many times as long as the run")
+    movie.add_argument("--titles", type=lambda text: text.split(","), default=[], help="what stands above each scene: TITLE,TITLE,...")
+    movie.add_argument("--pixels", type=int, default=300, help="length of the longer side of a panel")
+    movie.add_argument("--ghost", action="store_true", help="the rest shape, faint, in each panel")
     eigenfunction = command("eigenfunction", draw_eigenfunction)
     eigenfunction.add_argument("bundle")
     eigenfunction.add_argument("number", type=int)

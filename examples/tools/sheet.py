@@ -1,5 +1,6 @@
 """Bodies, obstacles and marks as VTK draws them, and sheets of panels that show them, off-screen."""
 import itertools
+import pathlib
 
 import numpy as np
 import PIL.Image
@@ -154,15 +155,28 @@ def light(renderer):
         renderer.AddLight(lamp)
 
 
-def write_png(window, path):
-    """In few colours, which keeps the file small."""
+def image_of(window):
     window.Render()
     grab = vtk.vtkWindowToImageFilter()
     grab.SetInput(window)
     grab.Update()
     width, height = window.GetSize()
     pixels = vtk_to_numpy(grab.GetOutput().GetPointData().GetScalars()).reshape(height, width, 3)[::-1].copy()
-    PIL.Image.fromarray(pixels).reduce(FINER).quantize(96, dither=PIL.Image.Dither.NONE).save(path, optimize=True)
+    window.Finalize()
+    return PIL.Image.fromarray(pixels).reduce(FINER)
+
+
+def in_few_colours(image, colours=96, palette=None):
+    """Which keeps files small."""
+    return image.quantize(colours, palette=palette, dither=PIL.Image.Dither.NONE)
+
+
+def save_movie(path, images, milliseconds):
+    """A GIF that starts again at its end, each image for so long; all have the colours of the last."""
+    palette = in_few_colours(images[-1], 64)
+    first, *others = [in_few_colours(image, palette=palette) for image in images]
+    first.save(path, save_all=True, append_images=others, duration=milliseconds, loop=0, optimize=False)
+    print(f"{path}: {len(images)} images of {first.width} x {first.height}, {pathlib.Path(path).stat().st_size} bytes")
 
 
 class Sheet:
@@ -177,6 +191,10 @@ class Sheet:
 
     def save(self, path, low, high, pixels=300):
         """Draw what lies in the box low..high, so many pixels long."""
+        in_few_colours(self.image(low, high, pixels)).save(path, optimize=True)
+        print(f"{path}: {len(self.rows)} x {max(map(len, self.rows))} panels")
+
+    def image(self, low, high, pixels):
         corners = np.array(list(itertools.product(*zip(low, high))))
         flat = np.stack([corners @ self.right, corners @ self.up])
         middle, extent = (flat.max(1) + flat.min(1)) / 2, 1.04 * np.ptp(flat, axis=1)
@@ -199,8 +217,7 @@ class Sheet:
                 self.fill(renderer, *row[j], height)
                 self.look(renderer.GetActiveCamera(), middle, height / per_metre / 2, title / per_metre / 2)
                 renderer.ResetCameraClippingRange()
-        write_png(window, path)
-        print(f"{path}: {len(self.rows)} x {columns} panels")
+        return image_of(window)
 
     def fill(self, renderer, text, actors, height):
         caption = vtk.vtkTextActor()

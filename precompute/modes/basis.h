@@ -14,8 +14,8 @@ struct BasisInput {
 
 /// [f x r] mass-orthonormal basis, orthogonal to the rigid motions of a free body: the example fields (their principal
 /// components where they would take more than half of r), then the principal components of scaled modes and modal
-/// derivatives in their complement. Scaling: design in docs/method.md, after Barbic and James 2005, section 4.1. Throws
-/// InputError (without a file) where the snapshots span fewer than r dimensions.
+/// derivatives in their complement. Scaling: docs/method.md, section 2, after Barbic and James 2005, section 4.1.
+/// Throws InputError (without a file) where the snapshots span fewer than r dimensions.
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 
 }  // namespace exmat::precompute

@@ -1,5 +1,5 @@
 #!/usr/bin/python3
-"""The rules of the house: what may include what, what links to what, how sources look.
+"""The rules of the house: what may include what, what links to what, how sources look, what their words name.
 
 Usage: rules.py ROOT    prints each violation as "rule: file:line: what"; exit status 1 if there are any.
 """
