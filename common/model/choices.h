@@ -20,7 +20,7 @@ enum class TargetSource { kAuto, kTable, kSolve };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<TargetSource>{"auto", "table", "solve"};
 
-/// The undeformed shape of an example's energy. method.md, section 5.
+/// The undeformed shape of an example's energy. docs/method.md, "Target".
 enum class EnergyReference {
   kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)
   kRest,     ///< E_k(p) = sum_j w_j V_j Psi(I + B_j (p - p_k))
@@ -28,12 +28,12 @@ enum class EnergyReference {
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<EnergyReference>{"example", "rest"};
 
-/// Lambda of the descriptors, method.md, section 1: the eigenvalues, or ones.
+/// Lambda of the descriptors (docs/method.md, "Shape space"): the eigenvalues, or ones.
 enum class Weighting { kEigenvalue, kNone };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Weighting>{"eigenvalue", "none"};
 
-/// How poses are carried to the object. alignment.md.
+/// How poses are carried to the object. docs/alignment.md.
 enum class AlignmentMethod { kAuto, kCoupled, kLandmarks, kMap };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<AlignmentMethod>{"auto", "coupled", "landmarks", "map"};

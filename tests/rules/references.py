@@ -1,172 +1,187 @@
-"""Whether what comments and pages name is there: pages, their sections, files, folders, links and commands."""
-import glob
+"""Names in comments and pages: of pages, their sections, files of the repository, and commands. Each is of one that exists.
+
+What a user calls his own stands in capitals (SCENE.json, DIR/report.html, NN_name) and is no reference.
+"""
 import re
 import subprocess
+from functools import lru_cache
 
-TEXTS = (".h", ".hpp", ".c", ".cpp", ".inl", ".py", ".sh", ".cmake", ".txt", ".md")
-LEFT_OUT = ("tests/fuzz/corpus/", "docs/studies/")
-TOP = "common|precompute|runtime|schemas|tests|examples|docs"
-PAGE = re.compile(r'(?<![\w/.-])((?:\.\./)*(?:[\w.-]+/)*[\w-]+\.md)\b`?(?:,? (?:section (\d+)|"([^"]+)"))?')
-PATH = re.compile(rf"(?<![\w/.<-])((?:{TOP})(?:/[\w.{{}},*-]+)+)")
-FILE = re.compile(r"(?<![\w/.<*{-])([a-z][a-z0-9_]*\.(?:h|hpp|cpp|inl|py|sh))\b(?!\()")
+PROGRAMS = {"exmat-precompute": "precompute/app", "exmat-runtime": "runtime/app"}
+OUT_OF_SCOPE = re.compile(r"^(build[^/]*|\.git|tests/fuzz/corpus)/|\.html$")
+C_LIKE, HASHED = (".h", ".hpp", ".c", ".cpp", ".inl"), (".py", ".sh", ".cmake", ".txt", ".yml", "")
+SOURCE_ENDINGS = ("", ".h", ".cpp", ".hpp", ".inl", ".py", ".sh")
+
+C_COMMENT = re.compile(r'//[^\n]*|/\*.*?\*/|("(?:\\.|[^"\\\n])*")', re.S)
+HASH_COMMENT = re.compile(r'(?<![^\s])#[^\n]*|^[ \t]*"""(?:.*?)"""|(""".*?"""|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\')', re.S | re.M)
+FENCE = re.compile(r"^```.*?^```$", re.S | re.M)
+HEADING = re.compile(r"^#+ +(.*?) *$", re.M)
+PAGE = re.compile(r'(?<![\w./#-])((?:[\w.-]+/)*[\w-]+\.md)\b`?(?:,?\s+sections?\s+([\d.]*\d(?:(?:,| and|,? or)\s+[\d.]*\d)*)|,\s+"([^"]+)"|,\s+step\s+(\d+))?')
+PATH = re.compile(r"(?<![\w./*}<-])((?:common|precompute|runtime|schemas|tests|examples|docs|\.ci|\.github)/[\w./*{},-]*[\w*}/])")
+SOURCE = re.compile(r"(?<![\w./*}<-])(?!sanitizer/)((?:\w+/)*[a-z]\w*\.(?:h|hpp|cpp|inl|py|sh))\b")
+RELATIVE = re.compile(r"(?<![\w./(\"$}])((?:\.\./)+[\w./-]*\w)")
 LINK = re.compile(r"\]\(([^)\s]+)\)")
-COMMAND = re.compile(r"\bexmat-(precompute|runtime) ([^\n`]*)")
-COMMON_OPTIONS = {"help", "version", "threads", "log-level", "progress"}
-PLACEHOLDER = re.compile(r"(^|/)(NN_)?[A-Z][A-Z_]*[A-Z](\.|/|_|$)|NN_name|NAME")
+QUOTED = re.compile(r"`[^`\n]+`")
+CODE = re.compile(QUOTED.pattern + r"|^ {4}.*(?:\n +[\[-].*)*|^```.*?\n(?s:.*?)^```$", re.M)  # of a page: with blocks, and lines that go on
+PLACEHOLDER = re.compile(r"(^|/|_)(NN|[A-Z]{3,}|[A-Z]+_\w+|NAME)\b|NN_name|(^|/)x\.\w+$")
+OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
 
 
-def tracked(root):
-    listed = subprocess.run(["git", "-C", str(root), "ls-files"], capture_output=True, text=True).stdout.splitlines()
-    return listed or [path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file()]
+def blank(text):
+    """What no name reaches across; lines stay."""
+    return re.sub(r"[^\n]", "\0", text)
 
 
-def comment_blocks(name, text):
-    """(line, text) of comments, those of adjacent lines as one; of pages all of it, paragraph by paragraph."""
-    if name.endswith(".md"):
-        mark, drop = re.compile(r"(.*\S.*)$"), None
-    elif name.endswith((".h", ".hpp", ".c", ".cpp", ".inl")):
-        mark, drop = re.compile(r"^\s*(?:///?<?!?|/?\*+/?)(.*)$"), re.compile(r"//[/!]?<?\s?(.*)$")
-    else:
-        mark, drop = re.compile(r"^\s*#(.*)$"), re.compile(r"\s#\s(.*)$")
-    block, start = [], 0
-    for number, line in enumerate(text.splitlines(), 1):
-        match = mark.match(line)
-        if match:
-            start = start or number
-            block.append(match.group(1).strip())
-            continue
-        if block:
-            yield start, " ".join(block)
-        block, start = [], 0
-        trailing = drop.search(line) if drop else None
-        if trailing:
-            yield number, trailing.group(1)
-    if block:
-        yield start, " ".join(block)
+def comments(text, pattern):
+    """A source of which the comments alone are left, without what marks them."""
+    parts, end = [], 0
+    for match in pattern.finditer(text):
+        comment = match.group()
+        parts += [re.sub(r"[^\s]", "\0", text[end : match.start()]),
+                  blank(comment) if match.group(1) else re.sub(r'^\s*(///?<?|/\*+|\*/?|#!?|""")', " ", comment, flags=re.M)]
+        end = match.end()
+    return "".join(parts) + blank(text[end:])
 
 
-def docstrings(text):
-    for match in re.finditer(r'^\s*"""(.*?)"""', text, re.S | re.M):
-        yield text.count("\n", 0, match.start()) + 1, " ".join(match.group(1).split())
+def files_of(root):
+    listed = subprocess.run(["git", "-C", str(root), "ls-files", "--cached", "--others", "--exclude-standard"], capture_output=True, text=True)
+    names = listed.stdout.splitlines() if listed.returncode == 0 else [path.relative_to(root).as_posix() for path in root.rglob("*")]
+    return [name for name in sorted(names) if not OUT_OF_SCOPE.search(name) and (root / name).is_file()]
 
 
-def bare(heading):
-    """Without its number, what stands in brackets behind it, and marks."""
-    heading = re.sub(r"^\d+\.\s*", "", heading.strip())
-    return re.sub(r"\s*\(.*\)$", "", heading).replace("`", "").strip().lower()
-
-
-def slug(heading):
-    """As links have it."""
-    return re.sub(r"[^\w\- ]", "", heading.replace("`", "").lower()).strip().replace(" ", "-")
-
-
-class Repository:
-    def __init__(self, root):
-        self.root = root
-        self.files = tracked(root)
-        self.names = {name.rsplit("/", 1)[-1] for name in self.files}
-        self.headings = {}
-        self.commands = {program: self.words_of(f"{program}/app", r'add_subcommand\(\s*"(\w+)"') for program in ("precompute", "runtime")}
-        options = r'add_(?:option|flag)[\w<>:]*\(\s*"[^"]*--([a-z-]+)'
-        self.options = COMMON_OPTIONS | self.words_of("precompute/app", options) | self.words_of("runtime/app", options)
-
-    def words_of(self, folder, pattern):
-        return {word for path in (self.root / folder).glob("*.cpp") for word in re.findall(pattern, path.read_text())}
-
-    def headings_of(self, page):
-        if page not in self.headings:
-            text = re.sub(r"^```.*?^```", "", (self.root / page).read_text(), flags=re.S | re.M)
-            self.headings[page] = re.findall(r"^#+ (.*)$", text, re.M)
-        return self.headings[page]
-
-    def there(self, path):
-        """A file, a folder, a pattern of them, or a source named without its ending."""
-        path = path.rstrip(".,:")
-        choices = [path]
-        while any("{" in choice and "}" in choice for choice in choices):
-            choices = [choice[:match.start()] + word + choice[match.end():] for choice in choices
-                       for match in [re.search(r"\{([^{}]*)\}", choice)] if match for word in match.group(1).split(",")]
-        return all((self.root / choice).exists() or glob.glob(str(self.root / choice)) or glob.glob(f"{self.root / choice}.*") for choice in choices)
-
-    def resolve(self, page, target):
-        """A page's or comment's name of another page, from the top of the repository or beside the page."""
-        beside = (self.root / page).parent if page.endswith(".md") else self.root
-        for folder in (self.root, beside):
-            path = (folder / target).resolve()
-            if path.exists() and path.is_relative_to(self.root):
-                return path.relative_to(self.root).as_posix()
+def words_of(path):
+    """What of a file speaks to its reader; None of a file that does not."""
+    kind = "" if path.name == "CMakeLists.txt" else path.suffix
+    if kind not in (".md", ".json") + C_LIKE + HASHED or (kind == ".txt"):
         return None
+    text = path.read_text(errors="replace")
+    if kind == ".md":
+        return text
+    if kind == ".json":
+        return text if path.parent.name == "schemas" else None
+    if kind == "" and path.name != "CMakeLists.txt" and not text.startswith("#!"):
+        return None
+    return comments(text, C_COMMENT if kind in C_LIKE else HASH_COMMENT)
 
 
-def faults_of_text(repository, name, text):
-    """What a comment or a paragraph names and is not there."""
-    for target, section, heading in PAGE.findall(text):
-        page = repository.resolve(name, target)
+def plain(heading):
+    return re.sub(r"\[([^\]]*)\]\([^)]*\)", r"\1", heading).replace("`", "")
+
+
+def anchor(heading):
+    """As GitHub makes it."""
+    return re.sub(r"[^\w\- ]", "", plain(heading).lower()).replace(" ", "-")
+
+
+@lru_cache(maxsize=None)
+def headings(page):
+    return HEADING.findall(FENCE.sub("", page.read_text()))
+
+
+def has_section(page, number):
+    return any(re.match(rf"{re.escape(number)}\.?\s", heading) for heading in headings(page))
+
+
+def has_heading(page, name):
+    name = " ".join(name.split())
+    return any(re.sub(r"^[\d.]+ +", "", re.sub(r" \(`[^)]*`\)$", "", heading)).replace("`", "") == name or plain(heading) == name
+               for heading in headings(page))
+
+
+def is_placeholder(name):
+    return bool(PLACEHOLDER.search(name)) and not re.search(r"(^|/)(README|CHANGELOG|CONTRIBUTING|LICENSE|CMakeLists)\b", name)
+
+
+def expanded(name):
+    """{a,b} and {a,b}/c."""
+    match = re.search(r"\{([^{}]*)\}", name)
+    return [x for part in match.group(1).split(",") for x in expanded(name[: match.start()] + part + name[match.end() :])] if match else [name]
+
+
+def exists(root, name):
+    return any(True for ending in SOURCE_ENDINGS for _ in root.glob(name.rstrip("/") + ending)) if "*" in name else any(
+        (root / (name.rstrip("/") + ending)).exists() for ending in SOURCE_ENDINGS)
+
+
+def page_faults(root, folder, text):
+    for match in PAGE.finditer(text):
+        name, sections, heading, step = match.groups()
+        page = next((place / name for place in (root, folder) if place and (place / name).exists()), None)
+        if is_placeholder(name):
+            continue
         if page is None:
-            if not PLACEHOLDER.search(target):
-                yield f"no page {target}"
+            yield match.start(), f"there is no page {name}"
             continue
-        headings = repository.headings_of(page)
-        if section and not any(re.match(rf"{section}\.", found) for found in headings):
-            yield f"{target} has no section {section}"
-        if heading and bare(heading) not in {bare(found) for found in headings}:
-            yield f'{target} has no section "{heading}"'
-    for target in PATH.findall(text):
-        if not PLACEHOLDER.search(target) and not repository.there(target):
-            yield f"no file or folder {target}"
-    for target in FILE.findall(text):
-        if target not in repository.names:
-            yield f"no file {target}"
+        for number in re.findall(r"[\d.]*\d", sections or ""):
+            if not has_section(page, number):
+                yield match.start(), f"{name} has no section {number}"
+        if heading and not has_heading(page, heading):
+            yield match.start(), f'{name} has no section "{heading}"'
+        if step and not re.search(rf"^{step}\. ", page.read_text(), re.M):
+            yield match.start(), f"{name} has no step {step}"
 
 
-def faults_of_links(repository, page, text):
+def path_faults(root, text, names):
+    for match in PATH.finditer(text):
+        for name in expanded(match.group(1)):
+            if not is_placeholder(name) and not exists(root, name):
+                yield match.start(), f"there is no {name}"
+    for match in SOURCE.finditer(text):
+        if not is_placeholder(match.group(1)) and not PATH.match(match.group(1)) and not any(
+                name == match.group(1) or name.endswith("/" + match.group(1)) for name in names):
+            yield match.start(), f"there is no source {match.group(1)}"
+
+
+def relative_faults(path, text):
+    """Of what a page says of the folders around its own."""
+    for match in RELATIVE.finditer(text):
+        if not (path.parent / match.group(1)).exists():
+            yield match.start(), f"there is no {match.group(1)}"
+
+
+def link_faults(path, text):
     for match in LINK.finditer(text):
-        target, _, anchor = match.group(1).partition("#")
-        if re.match(r"\w+:", target):
+        target, _, fragment = match.group(1).partition("#")
+        if re.match(r"[a-z]+:", target):
             continue
-        path = ((repository.root / page).parent / target).resolve() if target else repository.root / page
-        if not path.exists():
-            yield text.count("\n", 0, match.start()) + 1, f"no {target}"
-        elif anchor and slug(anchor) not in {slug(found) for found in repository.headings_of(path.relative_to(repository.root).as_posix())}:
-            yield text.count("\n", 0, match.start()) + 1, f"{target or page} has no section #{anchor}"
+        page = path.parent / target if target else path
+        if not page.exists():
+            yield match.start(), f"the link to {target} is broken"
+        elif fragment and fragment not in map(anchor, headings(page)):
+            yield match.start(), f"{target or path.name} has no anchor #{fragment}"
 
 
-def code_of(text):
-    """(line, code) of a page: spans and blocks."""
-    for number, line in enumerate(text.splitlines(), 1):
-        if line.startswith("    "):
-            yield number, line
-        for span in re.findall(r"`([^`]+)`", line):
-            yield number, span
-    for match in re.finditer(r"^```.*?\n(.*?)^```", text, re.S | re.M):
-        for number, line in enumerate(match.group(1).splitlines(), text.count("\n", 0, match.start()) + 2):
-            yield number, line
+@lru_cache(maxsize=None)
+def command_line(root, program):
+    """Subcommands and long options of a program, as its sources name them."""
+    text = "".join(path.read_text() for folder in (PROGRAMS[program], "common/console") for path in sorted((root / folder).glob("*.cpp")))
+    literals = "".join(re.findall(r'"(?:\\.|[^"\\\n])*"', text))
+    return set(re.findall(r'add_subcommand\(\s*"([a-z]+)"', text)), set(OPTION.findall(literals.replace(",--", " --"))) | {"--help"}
 
 
-def faults_of_commands(repository, text):
-    for number, code in code_of(text):
-        for program, rest in COMMAND.findall(code):
-            words = rest.split()
-            if words and re.fullmatch(r"[a-z]+", words[0]) and words[0] not in repository.commands[program]:
-                yield number, f"exmat-{program} has no command {words[0]}"
-            for option in re.findall(r"(?<!\S)\[?--([a-z][a-z-]*[a-z])(?![A-Za-z-])", rest):
-                if option not in repository.options:
-                    yield number, f"exmat-{program} has no option --{option}"
+def command_faults(root, text, code_of):
+    for code in code_of.finditer(text):
+        calls = list(re.finditer(r"(?<![\w./=-])(?:[\w./-]+/)?(exmat-precompute|exmat-runtime)(?![\w-])(?:[ ]+([a-z]+)(?![\w./-]))?", code.group()))
+        for call, following in zip(calls, calls[1:] + [None]):
+            commands, options = command_line(root, call.group(1))
+            if call.group(2) and call.group(2) not in commands:
+                yield code.start() + call.start(), f"{call.group(1)} has no command {call.group(2)}"
+            rest = re.split(r" && | \| |;", code.group()[call.end() : following.start() if following else None])[0]
+            for option in OPTION.findall(rest):
+                if option not in options and not option.startswith(("--eps-", "--st-")):
+                    yield code.start() + call.start(), f"{call.group(1)} has no option {option}"
 
 
 def references(root):
-    """What comments and pages name is there."""
-    root = root.resolve()
-    repository = Repository(root)
-    for name in repository.files:
-        if not name.endswith(TEXTS) or name.startswith(LEFT_OUT) or not (root / name).is_file():
+    """Comments and pages name pages, sections, files and commands that exist."""
+    names = files_of(root)
+    for name in names:
+        path = root / name
+        text = words_of(path)
+        if text is None:
             continue
-        text = (root / name).read_text()
-        blocks = list(comment_blocks(name, text)) + (list(docstrings(text)) if name.endswith(".py") else [])
-        for number, block in blocks:
-            for fault in faults_of_text(repository, name, block):
-                yield f"{name}:{number}: {fault}"
-        if name.endswith(".md"):
-            for number, fault in [*faults_of_links(repository, name, text), *faults_of_commands(repository, text)]:
-                yield f"{name}:{number}: {fault}"
+        page = path.suffix == ".md"
+        outside_code = FENCE.sub(lambda m: blank(m.group()), text) if page else text
+        found = [*page_faults(root, path.parent if page else None, outside_code), *path_faults(root, outside_code, names), *command_faults(root, text, CODE if page else QUOTED),
+                 *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ())]
+        for position, what in sorted(found):
+            yield f"{name}:{text.count(chr(10), 0, position) + 1}: {what}"

@@ -152,7 +152,7 @@ inline bool factor_serves(double before, double now, double limit) {
 
 /// Minimises a potential from `x` by Newton's method: exact Hessian and Cholesky, positive semi-definite element
 /// tangents only where Cholesky fails, Armijo line search. An earlier factor serves for as long as it brings the
-/// residual down fast. reduction.md, "Integration". Problem offers, for x of the workspace's size,
+/// residual down fast. docs/step_in_detail.md, "Newton". Problem offers, for x of the workspace's size,
 ///   PotentialEvaluation evaluate(x, gradient, hessian)   at the first iterate, lower triangle
 ///   PotentialEvaluation evaluate(x, gradient)
 ///   PotentialValue value(x)
