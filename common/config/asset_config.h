@@ -19,7 +19,7 @@ struct BoxSelection {
 };
 /// Vertices inside a ball, its surface included [m].
 struct SphereSelection {
-  std::array<double, 3> center{};
+  std::array<double, 3> centre{};
   double radius = 0;
 };
 /// Vertex ids in a text file, 1-based as in .bou files: separated by commas, blanks or lines; '#' starts a comment.

@@ -55,11 +55,11 @@ struct PlaneConfig {
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();  ///< normal: unit, outward
 };
 struct SphereConfig {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 0;
 };
 struct BoxConfig {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero(), half_extents = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero(), half_extents = Eigen::Vector3d::Zero();
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
 };
 struct CapsuleConfig {

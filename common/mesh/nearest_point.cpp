@@ -59,7 +59,7 @@ Nearest nearest_in_tet(const Corners& corners, const Eigen::Vector3d& point) {
 }
 
 // For Eigen's BVMinimize over the tets.
-struct Minimizer {
+struct Minimiser {
   using Scalar = double;
   const TetMesh& mesh;
   Eigen::Vector3d point;
@@ -95,9 +95,9 @@ NearestPointSearch::Tree NearestPointSearch::tree_of(const TetMesh& mesh) {
 }
 
 NearestPoint NearestPointSearch::nearest(const Eigen::Vector3d& point) const {
-  Minimizer minimizer{mesh_, point};
-  Eigen::BVMinimize(tree_, minimizer);
-  return {minimizer.tet, minimizer.nearest.weights, std::sqrt(minimizer.nearest.squared_distance)};
+  Minimiser minimiser{mesh_, point};
+  Eigen::BVMinimize(tree_, minimiser);
+  return {minimiser.tet, minimiser.nearest.weights, std::sqrt(minimiser.nearest.squared_distance)};
 }
 
 Eigen::SparseMatrix<double, Eigen::RowMajor> BarycentricPoints::interpolation(const TetMesh& mesh) const {

@@ -7,7 +7,7 @@
 
 namespace exmat::precompute {
 
-/// Minimises the potential of a step from `d`, that of its start(), as runtime::newton_minimize() does with dense
+/// Minimises the potential of a step from `d`, that of its start(), as runtime::newton_minimise() does with dense
 /// matrices: exact Hessian, positive semi-definite element tangents only where it is not positive definite, Armijo line
 /// search. On return the last evaluate() was at d.
 runtime::NewtonReport minimise_step(StepPotential& potential, const runtime::NewtonSettings& settings,

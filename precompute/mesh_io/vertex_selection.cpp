@@ -51,9 +51,9 @@ class Selector {
   }
 
   std::vector<std::int32_t> operator()(const SphereSelection& sphere) const {
-    const Eigen::RowVector3d center(sphere.center.data());
-    auto ids = points_where(points_, [&](const Eigen::RowVector3d& x) { return (x - center).norm() <= sphere.radius; });
-    const auto place = fmt::format("the sphere about {} of radius {:.6g}", to_text(center), sphere.radius);
+    const Eigen::RowVector3d centre(sphere.centre.data());
+    auto ids = points_where(points_, [&](const Eigen::RowVector3d& x) { return (x - centre).norm() <= sphere.radius; });
+    const auto place = fmt::format("the sphere about {} of radius {:.6g}", to_text(centre), sphere.radius);
     return require_some(std::move(ids), asset_file_, place);
   }
 

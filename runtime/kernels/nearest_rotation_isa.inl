@@ -98,7 +98,7 @@ struct NearestRotation {
       largest = select(better, diagonal, largest);
       for (Index j = 0; j < 4; ++j) q[j] = select(better, adjugate[triangle_entry<4>(i, j)], q[j]);
     }
-    normalize(q);
+    normalise(q);
   }
 
   /// By the 2 x 2 minors of the first two and of the last two rows.
@@ -136,7 +136,7 @@ struct NearestRotation {
     for (Index i = 0; i < 10; ++i) X[i] = product[i];
   }
 
-  static void normalize(Vec* q) {
+  static void normalise(Vec* q) {
     const Vec factor = 1.0 / square_root(dot(q, q, 4));
     for (Index i = 0; i < 4; ++i) q[i] *= factor;
   }
@@ -180,7 +180,7 @@ struct NearestRotation {
     q[1] = x + w * turn[0] + y * turn[2] - z * turn[1];
     q[2] = y + w * turn[1] + z * turn[0] - x * turn[2];
     q[3] = z + w * turn[2] + x * turn[1] - y * turn[0];
-    normalize(q);
+    normalise(q);
     // Positive definite by the minors from the last: 1 x 1, 2 x 2 and 3 x 3.
     return (dot(turn, turn, 3) <= kLastTurn) & (2.0 + M[0] + M[4] > 0.0) & (inverse[0] > 0.0) & (determinant > 0.0);
   }

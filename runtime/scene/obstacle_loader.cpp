@@ -10,8 +10,8 @@ namespace exmat::runtime {
 namespace {
 
 Shape make_shape(const PlaneConfig& plane) { return Plane{plane.point, plane.normal}; }
-Shape make_shape(const SphereConfig& sphere) { return Sphere{sphere.center, sphere.radius}; }
-Shape make_shape(const BoxConfig& box) { return Box{box.center, box.half_extents, box.orientation.toRotationMatrix()}; }
+Shape make_shape(const SphereConfig& sphere) { return Sphere{sphere.centre, sphere.radius}; }
+Shape make_shape(const BoxConfig& box) { return Box{box.centre, box.half_extents, box.orientation.toRotationMatrix()}; }
 Shape make_shape(const CapsuleConfig& capsule) { return Capsule{capsule.start, capsule.end, capsule.radius}; }
 
 /// Of the whole body first, then of regions.

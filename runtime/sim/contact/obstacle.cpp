@@ -11,17 +11,17 @@ SurfacePoint nearest(const Plane& plane, const Eigen::Vector3d& point) {
   return {distance, plane.normal, point - distance * plane.normal};
 }
 
-/// On the ball about `center`; `fallback` is its normal at the center.
-SurfacePoint nearest_on_ball(const Eigen::Vector3d& center, double radius, const Eigen::Vector3d& fallback,
+/// On the ball about `centre`; `fallback` is its normal at the centre.
+SurfacePoint nearest_on_ball(const Eigen::Vector3d& centre, double radius, const Eigen::Vector3d& fallback,
                              const Eigen::Vector3d& point) {
-  const Eigen::Vector3d offset = point - center;
+  const Eigen::Vector3d offset = point - centre;
   const double length = offset.norm();
   const Eigen::Vector3d normal = length > 0 ? Eigen::Vector3d(offset / length) : fallback;
-  return {length - radius, normal, center + radius * normal};
+  return {length - radius, normal, centre + radius * normal};
 }
 
 SurfacePoint nearest(const Sphere& sphere, const Eigen::Vector3d& point) {
-  return nearest_on_ball(sphere.center, sphere.radius, Eigen::Vector3d::UnitZ(), point);
+  return nearest_on_ball(sphere.centre, sphere.radius, Eigen::Vector3d::UnitZ(), point);
 }
 
 SurfacePoint nearest(const Capsule& capsule, const Eigen::Vector3d& point) {
@@ -46,8 +46,8 @@ SurfacePoint nearest_in_axes(const Eigen::Vector3d& half_extents, const Eigen::V
 }
 
 SurfacePoint nearest(const Box& box, const Eigen::Vector3d& point) {
-  const SurfacePoint local = nearest_in_axes(box.half_extents, box.rotation.transpose() * (point - box.center));
-  return {local.distance, box.rotation * local.normal, box.center + box.rotation * local.point};
+  const SurfacePoint local = nearest_in_axes(box.half_extents, box.rotation.transpose() * (point - box.centre));
+  return {local.distance, box.rotation * local.normal, box.centre + box.rotation * local.point};
 }
 
 }  // namespace

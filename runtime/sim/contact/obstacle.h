@@ -14,11 +14,11 @@ struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, away from the solid half space
 };
 struct Sphere {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   double radius = 1;  ///< > 0
 };
 struct Box {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< > 0
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of its axes
 };

@@ -202,7 +202,7 @@ NewtonReport TargetSolver::solve(const Eigen::VectorXd& weights, Workspace& work
   double scale = 0;
   for (Eigen::Index k = 0; k < examples(); ++k) scale += weights[k] * centres_[k].squaredNorm();
   Problem problem(potential_, blended, scale, workspace);
-  return newton_minimize(problem, {max_iterations, force_tolerance_}, y, workspace.newton);
+  return newton_minimise(problem, {max_iterations, force_tolerance_}, y, workspace.newton);
 }
 
 double TargetSolver::energy(const Eigen::VectorXd& weights, const Eigen::VectorXd& y,

@@ -52,7 +52,7 @@ inline constexpr bool kSeeksLowest = requires {
 };
 
 /// Armijo backtracking: the full step, or else the first half, quarter, ... of it that is low enough. What it asks of
-/// a problem: see newton_minimize(). On success the last evaluate() was at the end; false where no length is low
+/// a problem: see newton_minimise(). On success the last evaluate() was at the end; false where no length is low
 /// enough, `end` then holds anything. Adds to `evaluations` the calls of value().
 template <class Problem, class Direction>
 bool search_line(Problem& problem, const SearchLine<Direction>& line, const SearchEnd& end, int& evaluations) {

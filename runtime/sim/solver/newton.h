@@ -78,7 +78,7 @@ inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
 inline constexpr double kChordRate = 0.25;   // of the residual from one iteration to the next
 inline constexpr double kChordSteps = 4;     // that cost less than a new Hessian
 
-inline bool factorize(NewtonWorkspace& workspace, NewtonReport& report) {
+inline bool factorise(NewtonWorkspace& workspace, NewtonReport& report) {
   const Eigen::Index size = workspace.hessian.rows();
   const StageTimer timer(workspace.profile, Stage::kSolve, static_cast<double>(size * size * size) / 3);
   ++report.factorisations;
@@ -86,12 +86,12 @@ inline bool factorize(NewtonWorkspace& workspace, NewtonReport& report) {
 }
 
 /// A Hessian that even projected tangents leave indefinite is shifted until it is not.
-inline bool factorize_shifted(NewtonWorkspace& workspace, NewtonReport& report) {
-  if (factorize(workspace, report)) return true;
+inline bool factorise_shifted(NewtonWorkspace& workspace, NewtonReport& report) {
+  if (factorise(workspace, report)) return true;
   double shift = kFirstShift * workspace.hessian.diagonal().cwiseAbs().maxCoeff();
   for (int attempt = 0; attempt < kShifts; ++attempt, shift *= 10) {
     workspace.hessian.diagonal().array() += shift;
-    if (factorize(workspace, report)) return true;
+    if (factorise(workspace, report)) return true;
   }
   return false;
 }
@@ -105,7 +105,7 @@ const Eigen::MatrixXd* gyroscopic_part(const Problem& problem) {
 }
 
 /// H + G, G antisymmetric: whatever G is, the direction of a positive definite H is one of descent.
-inline void factorize_gyroscopic(const Eigen::MatrixXd& gyroscopic, NewtonWorkspace& workspace) {
+inline void factorise_gyroscopic(const Eigen::MatrixXd& gyroscopic, NewtonWorkspace& workspace) {
   const Eigen::Index size = workspace.hessian.rows();
   const StageTimer timer(workspace.profile, Stage::kSolve, 2 * static_cast<double>(size * size * size) / 3);
   workspace.hessian.triangularView<Eigen::StrictlyUpper>() = workspace.hessian.transpose();
@@ -166,7 +166,7 @@ inline bool factor_serves(double before, double now, double limit) {
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
 /// On return the last evaluate() was at x.
 template <class Problem>
-NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
+NewtonReport newton_minimise(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
                              NewtonWorkspace& workspace) noexcept {
   NewtonReport report;
   auto& [gradient, trial, trial_gradient, hessian, factor, direction, profile, policy, lu] = workspace;
@@ -191,19 +191,19 @@ NewtonReport newton_minimize(Problem& problem, const NewtonSettings& settings, E
 
     const bool fresh = state != Hessian::kFactorised;
     if (state == Hessian::kStale) problem.hessian(x, Tangent::kExact, hessian);
-    if (fresh && !detail::factorize(workspace, report)) {
+    if (fresh && !detail::factorise(workspace, report)) {
       if (!policy.projection) return finish(NewtonStatus::kStagnated);
       ++report.projections;
       problem.hessian(x, Tangent::kPositiveSemidefinite, hessian);
       here = problem.evaluate(x, gradient);
       problem.accept(here);
       report.residual = gradient.norm();
-      if (!detail::factorize_shifted(workspace, report)) return finish(NewtonStatus::kNonFinite);
+      if (!detail::factorise_shifted(workspace, report)) return finish(NewtonStatus::kNonFinite);
     }
     if (fresh) {
       const Eigen::MatrixXd* part = detail::gyroscopic_part(problem);
       gyroscopic = part != nullptr;
-      if (gyroscopic) detail::factorize_gyroscopic(*part, workspace);
+      if (gyroscopic) detail::factorise_gyroscopic(*part, workspace);
     }
     const double slope = detail::solve_direction(problem, workspace, gyroscopic);
     if (!std::isfinite(slope)) return finish(NewtonStatus::kNonFinite);

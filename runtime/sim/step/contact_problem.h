@@ -13,7 +13,7 @@ namespace exmat::runtime {
 ///   y   q - q_n,
 /// d and t of a free body alone. docs/step_in_detail.md, "Contact": mass [[m I, 0, 0], [0, J, H], [0, H^T, I]], contact
 /// Jacobians [I, -[x - c]x, R U_i]. Momenta follow from the forces of the solution, so what the contacts take is
-/// exactly what the body loses. For newton_minimize.
+/// exactly what the body loses. For newton_minimise.
 class ContactProblem {
  public:
   /// Beyond the place where a contact begins the first length that is low enough may lie far up the other side.

@@ -49,7 +49,7 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
       workspace.q = state.q + near.x.tail(state.q.size());
       potential.start(workspace.q);
     }
-    add(newton_minimize(problem, scene.newton, near.x, near.newton), total);
+    add(newton_minimise(problem, scene.newton, near.x, near.newton), total);
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
   }

@@ -28,7 +28,7 @@ class IncrementalPotential {
   /// The quadratic form. After start(); with example forces, after prepare_example_forces().
   void prepare() noexcept;
 
-  // For newton_minimize; the first evaluation with a Hessian is of the first iterate.
+  // For newton_minimise; the first evaluation with a Hessian is of the first iterate.
   PotentialEvaluation evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
   PotentialEvaluation evaluate(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept;
   PotentialValue value(const Eigen::VectorXd& q) noexcept;

@@ -153,7 +153,7 @@ NewtonReport solve(const Model& model, const StepScene& scene, const State& stat
   }
   potential.prepare();
   const NewtonReport newton = near ? solve_with_contacts(model, scene, state, potential, workspace)
-                                   : newton_minimize(potential, scene.newton, workspace.q, workspace.newton);
+                                   : newton_minimise(potential, scene.newton, workspace.q, workspace.newton);
   elastic_energy = potential.elastic_energy();
   return newton;
 }

@@ -108,7 +108,7 @@ TEST(LoadAsset, ReadsTheOtherSelections) {
     return *load(folder, load_asset, R"({"name": "a", "object": {"mesh": "m", "fixed": )" + selection + "}}").fixed;
   };
   const auto sphere = std::get<SphereSelection>(fixed(R"({"sphere": {"center": [1, 2, 3], "radius": 0.5}})"));
-  EXPECT_THAT(sphere.center, ElementsAre(1, 2, 3));
+  EXPECT_THAT(sphere.centre, ElementsAre(1, 2, 3));
   EXPECT_EQ(sphere.radius, 0.5);
   EXPECT_EQ(std::get<FileSelection>(fixed(R"({"file": "a.bou"})")).file, folder / "a.bou");
   EXPECT_THAT(std::get<IdSelection>(fixed(R"({"ids": [5, 0]})")).ids, ElementsAre(5, 0));
@@ -185,7 +185,7 @@ TEST(LoadScene, ReadsObstacles) {
   EXPECT_EQ(scene.obstacles[0].damping, 30);
   EXPECT_EQ(scene.obstacles[0].friction, 0.5);
   const auto& sphere = std::get<SphereConfig>(scene.obstacles[1].shape);
-  EXPECT_EQ(sphere.center, Eigen::Vector3d::Zero());
+  EXPECT_EQ(sphere.centre, Eigen::Vector3d::Zero());
   EXPECT_EQ(sphere.radius, 0.5);
   EXPECT_EQ(scene.obstacles[1].stiffness, 1e6);
   EXPECT_EQ(scene.obstacles[1].friction, 0);

@@ -84,7 +84,7 @@ std::vector<Eigen::Vector3d> box_cloud(int count) {
           unit[axis] = side;
           unit[(axis + 1) % 3] = 2.0 * i / count - 1;
           unit[(axis + 2) % 3] = 2.0 * j / count - 1;
-          cloud.push_back(kBox.center + kTurn * kBox.half_extents.cwiseProduct(unit));
+          cloud.push_back(kBox.centre + kTurn * kBox.half_extents.cwiseProduct(unit));
         }
   return cloud;
 }
@@ -110,7 +110,7 @@ TEST(Obstacle, HasTheDistanceToItsNearestSurfacePointByBruteForce) {
     const Eigen::Vector3d point = random_point(i);
     EXPECT_NEAR(std::abs(signed_distance(kBox, point)), sampled_distance(box, point), 6e-3) << i;
     EXPECT_NEAR(std::abs(signed_distance(kCapsule, point)), sampled_distance(capsule, point), 6e-3) << i;
-    const Eigen::Vector3d local = kTurn.transpose() * (point - kBox.center);
+    const Eigen::Vector3d local = kTurn.transpose() * (point - kBox.centre);
     EXPECT_EQ(signed_distance(kBox, point) < 0, (local.cwiseAbs().array() < kBox.half_extents.array()).all());
   }
 }
@@ -118,8 +118,8 @@ TEST(Obstacle, HasTheDistanceToItsNearestSurfacePointByBruteForce) {
 TEST(Obstacle, HasClosedFormDistances) {
   EXPECT_NEAR(signed_distance(kPlane, kPlane.point - 0.4 * kPlane.normal + kPlane.normal.unitOrthogonal()), -0.4,
               1e-15);
-  EXPECT_NEAR(signed_distance(kSphere, kSphere.center), -0.6, 1e-15);
-  EXPECT_NEAR(signed_distance(kSphere, kSphere.center + Eigen::Vector3d(0, 2, 0)), 1.4, 1e-15);
+  EXPECT_NEAR(signed_distance(kSphere, kSphere.centre), -0.6, 1e-15);
+  EXPECT_NEAR(signed_distance(kSphere, kSphere.centre + Eigen::Vector3d(0, 2, 0)), 1.4, 1e-15);
   const Box cube{{0, 0, 0}, {1, 2, 3}, Eigen::Matrix3d::Identity()};
   EXPECT_NEAR(signed_distance(cube, {2, 4, 5}), 3, 1e-15);  // corner: (1, 2, 2)
   EXPECT_NEAR(signed_distance(cube, {0.75, 0, 0}), -0.25, 1e-15);
@@ -130,7 +130,7 @@ TEST(Obstacle, HasAUnitNormalWhereTheDistanceHasNoGradient) {
   const Box cube{{0, 0, 0}, {1, 1, 1}, Eigen::Matrix3d::Identity()};
   const Capsule point_like{{1, 1, 1}, {1, 1, 1}, 0.5};
   const std::pair<Shape, Eigen::Vector3d> cases[] = {
-      {kSphere, kSphere.center}, {kCapsule, kCapsule.start}, {kBox, kBox.center},    {cube, {0, 0, 0}},
+      {kSphere, kSphere.centre}, {kCapsule, kCapsule.start}, {kBox, kBox.centre},    {cube, {0, 0, 0}},
       {cube, {0.5, -0.5, 0}},    {cube, {1, 1, 1}},          {point_like, {1, 1, 1}}};
   for (const auto& [shape, point] : cases) {
     const SurfacePoint surface = nearest_surface_point(shape, point);

@@ -58,7 +58,7 @@ NewtonReport minimise(Problem problem, double& at, const NewtonPolicy& policy = 
   Eigen::VectorXd x = Eigen::VectorXd::Constant(1, at);
   NewtonWorkspace workspace(1);
   workspace.policy = policy;
-  const NewtonReport report = newton_minimize(problem, {}, x, workspace);
+  const NewtonReport report = newton_minimise(problem, {}, x, workspace);
   at = x[0];
   return report;
 }
