@@ -32,6 +32,7 @@ struct Start {
   std::string name;
   VertexArray positions;
   double J = 0;
+  double inverted = 0;  // share of the volume that it turns inside out
 };
 
 // A registered pose, and the displacement of the rest example to it in the frame of the rest.
@@ -69,6 +70,7 @@ class PoseAligner {
   }
 
   std::vector<Start> mapped_starts();
+  std::vector<Start> upright(std::vector<Start> starts) const;
   std::vector<Start> sure_starts() const;
   void add_map(const std::string& name, const Eigen::MatrixXd& map, std::vector<Start>& starts);
   Eigen::MatrixXd spatial_map(const VertexArray& rest_positions) const;
@@ -111,7 +113,7 @@ void PoseAligner::add_map(const std::string& name, const Eigen::MatrixXd& map, s
   const MapScore score = score_map(registration_.arap(), map, carried);
 #pragma omp critical(exmat_pose_starts)
   {
-    if (score.inverted <= kMostInverted) starts.push_back({name, carried, score.total()});
+    starts.push_back({name, carried, score.total(), score.inverted});
     if (score.inverted > 0.5 && score.orthogonality < reflected_score_) {
       reflected_score_ = score.orthogonality;
       reflected_start_ = carried;
@@ -152,6 +154,15 @@ std::vector<Start> PoseAligner::mapped_starts() {
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t k = 0; k < maps.size(); ++k) refined[k] = maps[k].zoom ? zoom_out_.refine(maps[k].map) : maps[k].map;
   for (std::size_t k = 0; k < maps.size(); ++k) add_map(maps[k].name, refined[k], starts);
+  return upright(std::move(starts));
+}
+
+// Those that turn little of the body inside out. Where there is nothing else to begin with, those that turn the least.
+std::vector<Start> PoseAligner::upright(std::vector<Start> starts) const {
+  double most = kMostInverted;
+  if (!starts.empty() && sure_starts().empty())
+    most = std::max(most, std::ranges::min_element(starts, {}, &Start::inverted)->inverted);
+  std::erase_if(starts, [&](const Start& start) { return start.inverted > most; });
   return starts;
 }
 

@@ -41,9 +41,9 @@ void print_ledger(const std::vector<LedgerEntry>& ledger) {
 }
 
 void print_examples(const std::string& title, const ExampleSet& set) {
-  fmt::print("\n{:<20}{:>14}{:>12}{:>16}{:>14}\n", title, "method", "doubt", "lost by m [%]", "by basis [%]");
+  fmt::print("\n{:<20}{:<18}{:>8}{:>16}{:>14}\n", title, "method", "doubt", "lost by m [%]", "by basis [%]");
   for (const auto& example : set.examples)
-    fmt::print("{:<20}{:>14.13}{:>12.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.doubt,
+    fmt::print("{:<20}{:<18}{:>8.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.doubt,
                100 * example.shape_space_error, 100 * example.basis_error);
 }
 

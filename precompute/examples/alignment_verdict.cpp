@@ -31,7 +31,8 @@ void judge_competitors(const PoseAlignment& alignment, bool free_frame, Alignmen
             free_frame ? fmt::format("{}, for the body is symmetric and the example's frame unknown; give {}, or "
                                      "alignment.frame \"shared\" if it stands as the object does, or {}",
                                      others, kLandmarks, kSameMesh)
-                       : fmt::format("{} and is no farther from rest; give {}, or {}", others, kLandmarks, kSameMesh));
+                       : fmt::format("{} and {} no farther from rest; give {}, or {}", others,
+                                     alignment.competing_maps == 1 ? "is" : "are", kLandmarks, kSameMesh));
 }
 
 void judge_revolution(const PoseAlignment& alignment, AlignmentOutcome& outcome) {

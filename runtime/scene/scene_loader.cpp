@@ -171,7 +171,11 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
 }
 
 std::string describe_target(const ExampleModel& examples, const ExampleSettings& settings) {
-  if (examples.table) return fmt::format("target: table, one polynomial of degree {}", examples.table->degree());
+  if (examples.table)
+    return fmt::format(
+        "target: table, {} of degree {}",
+        examples.table->pieces() == 1 ? "one polynomial" : fmt::format("{} pieces", examples.table->pieces()),
+        examples.table->degree());
   return fmt::format("target: Newton in d = {} coordinates, s = {} elements, at most {} iterations a step",
                      examples.target->dimension(), examples.target->elements(), settings.target_iterations);
 }
