@@ -4,7 +4,7 @@
 
 namespace exmat {
 
-/// Text as it may stand in HTML and SVG, in attributes too.
+/// Text as it may stand in HTML, SVG and other XML, in attributes too.
 std::string escaped(const std::string& text);
 
 }  // namespace exmat

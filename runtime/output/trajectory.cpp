@@ -7,6 +7,7 @@
 #include <span>
 
 #include "common/bundle/file_schemas.h"
+#include "common/core/markup.h"
 #include "common/mesh/geometry.h"
 #include "runtime/output/momentum.h"
 #include "runtime/sim/frame/world_vertices.h"
@@ -87,33 +88,13 @@ std::string xdmf_frame(const std::string& h5, const Drawn& drawn, std::int64_t f
       drawn.vertices_path);
 }
 
-std::string escape_xml(const std::string& text) {
-  std::string escaped;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
-
 std::string xdmf_text(const std::filesystem::path& trajectory, const std::string& name, const Drawn& drawn,
                       std::int64_t frames, const std::vector<double>& times) {
-  const std::string h5 = escape_xml(trajectory.filename().string());
+  const std::string h5 = escaped(trajectory.filename().string());
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
       "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
-      escape_xml(name));
+      escaped(name));
   for (std::size_t frame = 0; frame < times.size(); ++frame) text += xdmf_frame(h5, drawn, frames, frame, times[frame]);
   return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
 }

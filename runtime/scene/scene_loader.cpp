@@ -143,14 +143,15 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   const Eigen::Index modes = loaded.model->modes();
   State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
   prepare_contacts(*loaded.model, config.obstacles.size(), state);
-  Workspace workspace(*loaded.model, loaded.scene);
-  follow_frame(*loaded.model, loaded.scene, state, workspace);
+  const BodyFrame& frame = *loaded.model->frame;
+  FrameWorkspace workspace = frame.make_workspace();
+  frame.follow(loaded.scene, state.time, state.q, state.v, workspace, state.frame);
   FrameMotion motion;
   motion.position = config.body.position.value_or(motion.position);
   motion.orientation = config.body.orientation.value_or(motion.orientation);
   motion.linear_velocity = config.body.linear_velocity.value_or(motion.linear_velocity);
   motion.angular_velocity = config.body.angular_velocity.value_or(motion.angular_velocity);
-  set_motion(*loaded.model, motion, state);
+  frame.set_motion(motion, state.q, state.v, workspace, state.frame);
   return state;
 }
 
