@@ -26,6 +26,7 @@ RegionSummary summarise_region(BundleReader& reader, const std::string& name) {
   const std::string path = "/regions/" + name;
   summary.examples = std::ssize(reader.example_names(path + "/examples"));
   summary.has_targets = reader.file().has_group(path + "/targets");
+  summary.has_target_space = reader.file().has_group(path + "/target_space");
   if (summary.has_targets)
     reader.read_attribute("/regions/{region}/targets", path + "/targets", "energy_reference", summary.energy_reference);
   return summary;
@@ -56,6 +57,7 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   summary.examples = value_of(sizes, "K");
   summary.has_polynomial = includes(groups, "polynomial");
   summary.has_targets = includes(groups, "targets");
+  summary.has_target_space = includes(groups, "target_space");
   summary.internal_force = CubatureData{}.internal_force;
   if (includes(groups, "cubature"))
     reader.read_attribute("/cubature", "/cubature", "internal_force", summary.internal_force);
@@ -69,11 +71,14 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
 Needs fit_needs(Needs needs, const BundleSummary& summary) {
   if (needs.internal_force == ForceMethod::kAuto) needs.internal_force = summary.internal_force;
   needs.targets = needs.targets && serves(summary.has_targets, summary.energy_reference, needs.energy_reference);
+  needs.target_space = needs.target_space && !needs.targets && summary.has_target_space;
   if (!needs.regions) return needs;
   for (RegionNeeds& region : *needs.regions) {
     const auto found = std::ranges::find(summary.regions, region.name, &RegionSummary::name);
     region.targets = region.targets && found != summary.regions.end() &&
                      serves(found->has_targets, found->energy_reference, region.energy_reference);
+    region.target_space = region.target_space && !region.targets && found != summary.regions.end() &&
+                          found->has_target_space;
   }
   return needs;
 }

@@ -24,6 +24,7 @@ struct RegionSummary {
   std::string name;
   std::int64_t examples = 0;                                     ///< K
   bool has_targets = false;                                      ///< /regions/NAME/targets is there
+  bool has_target_space = false;                                 ///< /regions/NAME/target_space is there
   EnergyReference energy_reference = EnergyReference::kExample;  ///< of its targets, where they are there
 };
 
@@ -38,13 +39,15 @@ struct BundleSummary {
   EnergyReference energy_reference = EnergyReference::kExample;  ///< of /targets, where they are there
   bool has_polynomial = false;                                   ///< /polynomial is there
   bool has_targets = false;                                      ///< /targets is there
+  bool has_target_space = false;                                 ///< /target_space is there
   std::vector<RegionSummary> regions;
   std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
 };
 BundleSummary summarise_bundle(const std::filesystem::path& path);
 
-/// What of these needs the bundle serves: internal_force `auto` becomes its choice, and targets are not needed where it
-/// has none of that energy_reference. Of the regions likewise; all of them where the needs name none.
+/// What of these needs the bundle serves: internal_force `auto` becomes its choice, targets are not needed where it has
+/// none of that energy_reference, and the space of targets where it has none or the targets serve. Of the regions
+/// likewise; all of them where the needs name none.
 Needs fit_needs(Needs needs, const BundleSummary& summary);
 
 /// What was read from a bundle: dataset path and bytes, in order.

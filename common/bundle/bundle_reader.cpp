@@ -100,6 +100,7 @@ void BundleReader::add_regions(ReducedModel& model) const {
     region.name = needs.name;
     add_examples(path + "/examples", region.examples);
     if (needs.targets && file_.has_group(path + "/targets")) region.targets.emplace();
+    if (needs.target_space && file_.has_group(path + "/target_space")) region.target_space.emplace();
     model.regions.push_back(std::move(region));
   };
   if (request_.regions)

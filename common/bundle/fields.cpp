@@ -16,6 +16,7 @@ ReducedModel model_of_all_groups() {
   RegionData& region = model.regions.emplace_back();
   region.examples = *model.examples;
   region.targets.emplace();
+  region.target_space.emplace();
   return model;
 }
 
@@ -74,6 +75,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.projection.emplace();
   else if (group == "targets")
     model.targets.emplace();
+  else if (group == "target_space")
+    model.target_space.emplace();
   else if (group == "regions")
     return;
   else if (group == "rigid")

@@ -133,9 +133,26 @@ void visit_targets(const FieldPlace& place, Targets& targets, Visitor& visit) {
   visit.attribute("degree", targets.degree);
   visit.attribute("error", targets.error);
   visit.attribute("energy_reference", targets.energy_reference);
+  visit.attribute("is_pull", targets.is_pull);
   visit.dataset("exponents", targets.exponents);
   visit.dataset("control_points", targets.control_points);
   visit.dataset("knots", targets.knots);
+}
+
+template <typename Space, typename Visitor>
+void visit_target_space(const FieldPlace& place, Space& space, Visitor& visit) {
+  enter(place, "/target_space", visit);
+  visit.attribute("energy_reference", space.energy_reference);
+  visit.attribute("error", space.error);
+  visit.attribute("element_error", space.element_error);
+  visit.dataset("poses", space.poses);
+  visit.dataset("pull", space.pull);
+  visit.dataset("elements", space.elements);
+  visit.dataset("weights", space.weights);
+  visit.dataset("volumes", space.volumes);
+  visit.dataset("gradient", space.gradient);
+  visit.dataset("youngs_modulus", space.youngs_modulus);
+  visit.dataset("poisson_ratio", space.poisson_ratio);
 }
 
 template <typename Region, typename Visitor>
@@ -147,6 +164,7 @@ void visit_region(Region& region, Visitor& visit) {
   visit_examples(place, region.examples, visit);
   visit_projection(place, region.projection, visit);
   if (region.targets) visit_targets(place, *region.targets, visit);
+  if (region.target_space) visit_target_space(place, *region.target_space, visit);
 }
 
 template <typename Regions, typename Visitor>
@@ -202,6 +220,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.polynomial) visit_polynomial(*model.polynomial, visit);
   if (model.projection) visit_projection(kTopPlace, *model.projection, visit);
   if (model.targets) visit_targets(kTopPlace, *model.targets, visit);
+  if (model.target_space) visit_target_space(kTopPlace, *model.target_space, visit);
   if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);
   if (model.contact) visit_contact(*model.contact, visit);

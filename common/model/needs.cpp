@@ -14,6 +14,12 @@ LedgerEntry plan_targets(const Needs& needs, const LedgerEntry& examples, std::i
   return {"targets", true, 0, "an example force is asked for"};
 }
 
+LedgerEntry plan_target_space(const Needs& needs, const LedgerEntry& examples) {
+  if (!examples.included) return {"target_space", false, 0, examples.reason};
+  if (!needs.target_space) return {"target_space", false, 0, "no targets are solved for"};
+  return {"target_space", true, 0, "targets may be solved for"};
+}
+
 LedgerEntry plan_polynomial(const Needs& needs) {
   if (needs.internal_force == ForceMethod::kCubature)
     return {"polynomial", false, 0, "the internal force is by cubature"};
@@ -56,6 +62,7 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
       plan_polynomial(needs),
       {"projection", examples.included, 0, example_reason},
       plan_targets(needs, examples, example_count),
+      plan_target_space(needs, examples),
       regions,
       {"rigid", rigid, 0, rigid_reason},
       {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"},

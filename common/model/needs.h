@@ -18,6 +18,7 @@ struct RegionNeeds {
   std::string name;
   bool targets = true;  ///< its table of targets
   EnergyReference energy_reference = EnergyReference::kExample;
+  bool target_space = true;  ///< what targets are solved for in
 };
 
 /// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
@@ -26,6 +27,7 @@ struct Needs {
   bool rigid = true;                                  ///< /rigid, of a free body
   bool carried = false;                               ///< /rigid, of a body with fixed vertices that a motion carries
   bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
+  bool target_space = true;                           ///< /target_space
   bool contact = true;                                ///< /contact
   bool render = true;                                 ///< /render, of an asset that names a render mesh
   std::optional<std::vector<RegionNeeds>> regions{};  ///< /regions, those named; absent: all, with tables as `targets`

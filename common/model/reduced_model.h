@@ -106,6 +106,24 @@ struct TargetTableData {
   Eigen::VectorXd knots = Eigen::Vector2d(0, 1);  ///< P + 1, t_i: 0, ..., 1, each above the one before it
   double error = 0;  ///< largest found, in the energy norm at rest, relative to the largest example
   EnergyReference energy_reference = EnergyReference::kExample;
+  /// Control points are of the pull g(w) = U^T P p*(w), p* minimised over all tets and P the filter of the example
+  /// force; before format 7 of p*(w) minimised in the modal basis.
+  bool is_pull = false;
+};
+
+/// Group /target_space: the same targets to be solved for, in d displacements of their own that hold them all.
+struct TargetSpaceData {
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< that the space and its elements are made for
+  double error = 0;                ///< largest found of what the space loses of a target, as in TargetTableData
+  double element_error = 0;        ///< largest found of what the elements lose of it
+  RowMatrix poses;                 ///< K x d, the examples
+  RowMatrix pull;                  ///< r x d, U^T P Y, Y [3n x d] the displacements
+  IndexVector elements;            ///< s, distinct tets of the object
+  Eigen::VectorXd weights;         ///< s, >= 0
+  Eigen::VectorXd volumes;         ///< s [m^3]
+  RowMatrix gradient;              ///< 9s x d (dataset s 9 d): row 3a + b of element j is dF_ab/dy
+  Eigen::VectorXd youngs_modulus;  ///< s [Pa]
+  Eigen::VectorXd poisson_ratio;   ///< s
 };
 
 /// Group /projection. docs/method.md, "Direct projection".
@@ -124,6 +142,7 @@ struct RegionData {
   ExampleSet examples;     ///< K of its own; descriptors of the displacement inside the region, zero outside
   ProjectionData projection;
   std::optional<TargetTableData> targets;
+  std::optional<TargetSpaceData> target_space;
 };
 
 /// Group /rigid: moments about the centre of mass, X centred there, of a free body or of one whose fixed part is
@@ -170,6 +189,7 @@ struct ReducedModel {
   std::optional<PolynomialData> polynomial;
   std::optional<ProjectionData> projection;
   std::optional<TargetTableData> targets;
+  std::optional<TargetSpaceData> target_space;
   std::vector<RegionData> regions;  ///< in index order; none: no such group
   std::optional<RigidData> rigid;
   std::optional<ContactData> contact;

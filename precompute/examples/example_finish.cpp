@@ -47,12 +47,8 @@ class FunctionCounter {
 };
 
 // [3m x (K-1)] changes of descriptor from the rest pose to the others.
-Eigen::MatrixXd descriptor_changes(const ExampleSet& set) {
-  const RowMatrix& rest = set.examples.front().descriptor;
-  Eigen::MatrixXd changes(rest.size(), std::ssize(set.examples) - 1);
-  for (Eigen::Index k = 0; k < changes.cols(); ++k)
-    changes.col(k) = (set.examples[static_cast<std::size_t>(k + 1)].descriptor - rest).reshaped<Eigen::RowMajor>();
-  return changes;
+Eigen::MatrixXd changes_from_rest(const ExampleSet& set) {
+  return descriptor_changes(set.examples.front().descriptor, set).rightCols(std::ssize(set.examples) - 1);
 }
 
 // `needed` functions of the object would carry the pose; 0 where too many would be needed.
@@ -92,7 +88,8 @@ IndexVector flagged(const FlagVector& flags) {
 PoseFitter::PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
                        const SemidefiniteSolver* solver, double highest, ShapeStage& stage)
     : asset_(asset), object_(object), system_(system), stage_(stage), clamp_(system, highest, asset.name) {
-  for (const ExampleGroup& group : stage.groups) {
+  for (ExampleGroup& group : stage.groups) {
+    fill_gram(stage.data.rest_descriptor, group.examples);
     if (group.region.empty()) {
       poses_.push_back(whole_body_poses(stage.object, stage.weights, object.fixed, clamp_));
     } else {
@@ -100,7 +97,7 @@ PoseFitter::PoseFitter(const AssetConfig& asset, const ObjectInput& object, cons
                                                        kRegionStiffness * highest);
       poses_.emplace_back([poses](const Eigen::MatrixXd& changes) { return poses->displacements(changes); });
     }
-    fields_.push_back(poses_.back()(descriptor_changes(group.examples)));
+    fields_.push_back(poses_.back()(changes_from_rest(group.examples)));
   }
 }
 
@@ -111,6 +108,23 @@ Eigen::MatrixXd PoseFitter::fields() const {
     fields.rightCols(more.cols()) = more;
   }
   return fields;
+}
+
+PoseCoordinates PoseFitter::range(Eigen::Index index) const {
+  const auto group = static_cast<std::size_t>(index);
+  const Eigen::Index m = asset_.eigenfunctions;
+  Eigen::MatrixXd fields = poses_[group](Eigen::MatrixXd::Identity(3 * m, 3 * m));
+  fields -= system_.null_space * (system_.null_space.transpose() * (system_.mass * fields)).eval();
+  return pose_range(system_.mass, fields,
+                    descriptor_changes(stage_.data.rest_descriptor, stage_.groups[group].examples));
+}
+
+// The basis through the filter of the example force, then the space: U^T P Y = T^+ (T Y).
+Eigen::MatrixXd PoseFitter::pull(std::size_t index, const ProjectionData& projection, const TargetSpace& targets) const {
+  const ExampleGroup& group = stage_.groups[index];
+  RowMatrix displacements = system_.extend(targets.coordinates.basis);
+  if (group.view) displacements = group.view->see(displacements);
+  return projection.reduced_from_shape * shape_changes(stage_.object, stage_.weights, displacements);
 }
 
 PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedModel& model) {
@@ -125,7 +139,7 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   finished.projection.target_basis = range_basis(map);
   fill_weights_problem(stage_.data.rest_descriptor, finished.projection, map, finished.examples);
   const Eigen::MatrixXd fields =
-      whole ? carried_fields(stage_.object, stage_.weights, object_.fixed, descriptor_changes(finished.examples))
+      whole ? carried_fields(stage_.object, stage_.weights, object_.fixed, changes_from_rest(finished.examples))
             : system_.extend(fields_[index]);
   for (Eigen::Index k = 0; k < fields.cols(); ++k) {
     ExampleData& example = finished.examples.examples[static_cast<std::size_t>(k + 1)];
@@ -136,19 +150,23 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   return finished;
 }
 
-void PoseFitter::finish(ReducedModel& model, std::vector<std::string>& warnings) {
+void PoseFitter::finish(const std::vector<TargetSpace>& targets, ReducedModel& model,
+                        std::vector<std::string>& warnings) {
   FunctionCounter counter(model.object->mesh, asset_.name);
   for (std::size_t i = 0; i < stage_.groups.size(); ++i) {
     auto [examples, projection] = finish_group(i, model);
     const ExampleGroup& group = stage_.groups[i];
     log_losses(group, asset_, counter, examples, warnings);
+    const Eigen::MatrixXd pulled = pull(i, projection, targets[i]);
     if (group.region.empty()) {
+      finish_targets(targets[i], pulled, model.target_space, model.targets);
       model.projection = std::move(projection);
       model.examples = std::move(examples);
       continue;
     }
     RegionData& region = model.regions.emplace_back();
     region.name = group.region;
+    finish_targets(targets[i], pulled, region.target_space, region.targets);
     region.index = std::ssize(model.regions) - 1;
     region.vertices = flagged(group.view->inside());
     region.examples = std::move(examples);

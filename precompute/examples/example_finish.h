@@ -7,6 +7,7 @@
 #include "precompute/fem/elastic_system.h"
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/solvers/semidefinite_solver.h"
+#include "precompute/targets/target_space.h"
 
 namespace exmat::precompute {
 
@@ -21,9 +22,16 @@ class PoseFitter {
   /// [f x k] displacements of all poses, groups in order: what the basis is to hold.
   Eigen::MatrixXd fields() const;
 
-  /// Puts shape space, projections and examples into a model that has its modal basis; logs and records what of each
-  /// example is lost. The stage is used up.
-  void finish(ReducedModel& model, std::vector<std::string>& warnings);
+  Eigen::Index groups() const { return std::ssize(poses_); }
+  /// Empty: that of the whole body.
+  const std::string& region(Eigen::Index group) const { return stage_.groups[static_cast<std::size_t>(group)].region; }
+
+  /// All poses that descriptors of a group stand for; of a free body without their rigid part.
+  PoseCoordinates range(Eigen::Index group) const;
+
+  /// Puts shape space, projections, examples and their targets, one for each group, into a model that has its modal
+  /// basis; logs and records what of each example is lost. The stage is used up.
+  void finish(const std::vector<TargetSpace>& targets, ReducedModel& model, std::vector<std::string>& warnings);
 
  private:
   struct Finished {
@@ -31,6 +39,7 @@ class PoseFitter {
     ProjectionData projection;
   };
   Finished finish_group(std::size_t group, const ReducedModel& model);
+  Eigen::MatrixXd pull(std::size_t group, const ProjectionData& projection, const TargetSpace& targets) const;
 
   const AssetConfig& asset_;
   const ObjectInput& object_;

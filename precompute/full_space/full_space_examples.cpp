@@ -1,15 +1,11 @@
 #include "precompute/full_space/full_space_examples.h"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "common/core/error.h"
-#include "common/mesh/geometry.h"
-#include "precompute/cubature/element_samples.h"
 #include "precompute/modes/field_clamp.h"
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
@@ -19,8 +15,6 @@
 namespace exmat::precompute {
 namespace {
 
-// Directions of the poses this much weaker than the strongest, squared, are rounding.
-constexpr double kRank = 1e-12;
 // Relative difference of P and its transpose that is rounding.
 constexpr double kSymmetric = 1e-12;
 
@@ -49,11 +43,6 @@ FlagVector flags(const IndexVector& vertices, Eigen::Index count) {
   FlagVector flags = FlagVector::Zero(count);
   flags(vertices).setOnes();
   return flags;
-}
-
-bool inverts(const RowMatrix& gradient, const Eigen::VectorXd& pose) {
-  const Eigen::Matrix<double, 9, 1> H = gradient * pose;
-  return (Eigen::Matrix3d::Identity() + Eigen::Map<const RowMatrix3>(H.data())).determinant() <= 0;
 }
 
 }  // namespace
@@ -96,8 +85,7 @@ FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSys
                                      EnergyReference reference)
     : view_(poses.view), free_dofs_(system.free_dofs) {
   set_filter(model, *poses.examples);
-  set_poses(model, system, poses);
-  set_target(model, system, *poses.examples, reference);
+  set_target(model, system, poses, reference);
 }
 
 void FullSpaceExamples::set_filter(const ReducedModel& model, const ExampleSet& set) {
@@ -120,49 +108,15 @@ void FullSpaceExamples::set_filter(const ReducedModel& model, const ExampleSet& 
   weights_ = runtime::ExampleWeights(set.gram, set.h0, slopes);
 }
 
-void FullSpaceExamples::set_poses(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses) {
-  const Eigen::MatrixXd& fields = poses.fields;
-  const Eigen::MatrixXd mass_fields = system.mass * fields;
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(fields.transpose() * mass_fields);
-  const Eigen::VectorXd& values = gram.eigenvalues();
-  const Eigen::Index rank = (values.array() > kRank * values.tail(1)[0]).count();
-  const Eigen::VectorXd scales = values.tail(rank).cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd directions = gram.eigenvectors().rightCols(rank) * scales.asDiagonal();
-  pose_basis_ = fields * directions;
-  for (const ExampleData& example : poses.examples->examples) {
-    const Eigen::VectorXd change = flat(example.descriptor - model.shape_space->rest_descriptor);
-    poses_.push_back(directions.transpose() * (mass_fields.transpose() * (fields * change)));
-  }
-}
-
-void FullSpaceExamples::set_target(const ReducedModel& model, const ElasticSystem& system, const ExampleSet& set,
+void FullSpaceExamples::set_target(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                                    EnergyReference reference) {
-  const ObjectData& object = *model.object;
-  const RowMatrix basis = system.extend(pose_basis_);
-  const ElementSamples samples(object.mesh, object.materials, basis);
-  CubatureData all;
-  std::vector<Eigen::Index> kept;
-  all.gradient.resize(9 * samples.count(), basis.cols());
-  for (Eigen::Index t = 0; t < samples.count(); ++t) {
-    const RowMatrix gradient = samples.gradient(t);
-    const bool inverted = reference == EnergyReference::kExample &&
-                          std::ranges::any_of(poses_, [&](const auto& pose) { return inverts(gradient, pose); });
-    if (inverted) continue;
-    all.gradient.middleRows<9>(9 * std::ssize(kept)) = gradient;
-    kept.push_back(t);
-  }
-  left_out_ = samples.count() - std::ssize(kept);
-  all.gradient.conservativeResize(9 * std::ssize(kept), Eigen::NoChange);
-  all.weights = Eigen::VectorXd::Ones(std::ssize(kept));
-  all.volumes = tet_volumes(object.mesh)(kept);
-  all.youngs_modulus = object.materials.youngs_modulus(kept);
-  all.poisson_ratio = object.materials.poisson_ratio(kept);
-  std::vector<ExampleData> examples = set.examples;
-  for (std::size_t k = 0; k < examples.size(); ++k) examples[k].pose = poses_[k];
-  const auto complaint =
-      target_.build(object.materials.model, all, examples, RowMatrix::Identity(basis.cols(), basis.cols()), reference);
-  if (complaint) throw InputError(*complaint);
-  target_fields_ = pose_basis_ * target_.basis();
+  coordinates_ = poses.coordinates ? *poses.coordinates
+                                   : pose_range(system.mass, poses.fields,
+                                                descriptor_changes(model.shape_space->rest_descriptor, *poses.examples));
+  MeshTarget target = mesh_target(*model.object, system, coordinates_, reference);
+  left_out_ = target.left_out;
+  target_ = std::move(target.solver);
+  target_fields_ = coordinates_.basis * target_.basis();
 }
 
 // [m x 3] functions^T times what is seen of u.

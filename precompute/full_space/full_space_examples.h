@@ -8,6 +8,7 @@
 #include "common/model/reduced_model.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/shape_space/region_view.h"
+#include "precompute/targets/mesh_target.h"
 #include "runtime/sim/examples/example_weights.h"
 #include "runtime/sim/examples/target.h"
 
@@ -19,6 +20,7 @@ struct ExamplePoses {
   std::optional<RegionView> view;        ///< of a region
   Eigen::MatrixXd fields;  ///< [f x 3m], displacements that changes of descriptor stand for; of a free body without
                            ///< their rigid part
+  std::optional<PoseCoordinates> coordinates{};  ///< that hold all targets; absent: targets are sought in all fields
 };
 
 /// Poses by whole_body_poses(). Throws InputError where the model has no examples.
@@ -54,8 +56,8 @@ class FullSpaceExamples {
   bool symmetric() const { return symmetric_; }
 
   /// [f x d] mass-orthonormal basis of the poses that descriptors stand for, and [d] the examples in it.
-  const Eigen::MatrixXd& pose_basis() const { return pose_basis_; }
-  const Eigen::VectorXd& pose(Eigen::Index k) const { return poses_[static_cast<std::size_t>(k)]; }
+  const Eigen::MatrixXd& pose_basis() const { return coordinates_.basis; }
+  Eigen::VectorXd pose(Eigen::Index k) const { return coordinates_.poses.col(k); }
 
   /// Minimises the energies of the examples over the tets, in coordinates y [d]: the displacement is [f x d] fields y.
   const runtime::TargetSolver& target() const { return target_; }
@@ -63,8 +65,7 @@ class FullSpaceExamples {
 
  private:
   void set_filter(const ReducedModel& model, const ExampleSet& set);
-  void set_poses(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses);
-  void set_target(const ReducedModel& model, const ElasticSystem& system, const ExampleSet& set,
+  void set_target(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                   EnergyReference reference);
   Eigen::MatrixXd coefficients(const RowMatrix& functions, const Eigen::VectorXd& u) const;
   Eigen::VectorXd force(const RowMatrix& functions, const Eigen::MatrixXd& coefficients) const;
@@ -75,8 +76,8 @@ class FullSpaceExamples {
   RowMatrix synthesis_;                  // likewise, M Phi
   bool symmetric_ = true;
   runtime::ExampleWeights weights_;  // of Phi^T (M_s/V) u [3m]
-  Eigen::MatrixXd pose_basis_, target_fields_;
-  std::vector<Eigen::VectorXd> poses_;
+  PoseCoordinates coordinates_;
+  Eigen::MatrixXd target_fields_;
   runtime::TargetSolver target_;
   Eigen::Index left_out_ = 0;
 };

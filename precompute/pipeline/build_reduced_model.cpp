@@ -1,6 +1,5 @@
 #include "precompute/pipeline/build_reduced_model.h"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -23,7 +22,7 @@
 #include "precompute/modes/linear_modes.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
-#include "precompute/targets/target_table.h"
+#include "precompute/targets/target_space.h"
 
 namespace exmat::precompute {
 namespace {
@@ -70,19 +69,18 @@ void keep_needed(const Needs& needs, bool whole_body, ExampleInput& input) {
   });
 }
 
-// All example sets of a model, and where they are in the asset.
-std::vector<std::pair<std::string, const ExampleSet*>> example_sets(const ReducedModel& model) {
-  std::vector<std::pair<std::string, const ExampleSet*>> sets;
-  if (model.examples) sets.emplace_back("/examples, ", &*model.examples);
-  for (const RegionData& region : model.regions)
-    sets.emplace_back(fmt::format("/regions, {}, ", region.name), &region.examples);
+// Of the whole body, then of the regions.
+std::vector<const ExampleSet*> example_sets(const ReducedModel& model) {
+  std::vector<const ExampleSet*> sets;
+  if (model.examples) sets.push_back(&*model.examples);
+  for (const RegionData& region : model.regions) sets.push_back(&region.examples);
   return sets;
 }
 
 // [r x k] the poses of all sets but the rest.
 Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
   Eigen::MatrixXd poses(modes, 0);
-  for (const auto& [place, set] : example_sets(model))
+  for (const ExampleSet* set : example_sets(model))
     for (const ExampleData& example : set->examples) {
       if (example.is_rest) continue;
       poses.conservativeResize(Eigen::NoChange, poses.cols() + 1);
@@ -98,8 +96,8 @@ std::string text_of(const Needs& needs) {
       needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render,
       name_of(needs.internal_force), name_of(needs.energy_reference));
   if (!needs.regions) return text;
-  for (const auto& [name, targets, reference] : *needs.regions)
-    text += fmt::format("region {} {} {}\n", name, targets, name_of(reference));
+  for (const RegionNeeds& region : *needs.regions)
+    text += fmt::format("region {} {} {}\n", region.name, region.targets, name_of(region.energy_reference));
   return text + "no other regions\n";
 }
 
@@ -122,15 +120,11 @@ class Pipeline {
 
   ObjectData object_data() const;
   void require_modes(const ElasticSystem& system) const;
-  void require_upright(const ReducedModel& model, const std::string& place, const ExampleSet& set) const;
   ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
   void leave_out(const std::string& group, const std::string& reason);
-  std::optional<TargetTableData> target_table(const ReducedModel& model, const ExampleSet& set,
-                                              const ProjectionData& projection, EnergyReference energy_reference,
-                                              std::string& message);
+  TargetSpace target_space(const ElasticSystem& system, const PoseFitter& fitter, Eigen::Index group);
+  std::vector<TargetSpace> target_spaces(const ElasticSystem& system, const PoseFitter& fitter);
   void add_internal_force(ReducedModel& model);
-  void add_targets(ReducedModel& model);
-  void add_region_targets(ReducedModel& model);
   void add_contact(ReducedModel& model);
 
   const AssetConfig& asset_;
@@ -155,21 +149,6 @@ void Pipeline::require_modes(const ElasticSystem& system) const {
                     fmt::format("at most {} for a mesh of {} vertices, {} of them fixed", available - 1,
                                 object_.mesh.vertex_count(), object_.fixed.cast<int>().sum()),
                     std::to_string(asset_.linear_modes), "ask for fewer or refine the mesh"});
-}
-
-void Pipeline::require_upright(const ReducedModel& model, const std::string& place, const ExampleSet& set) const {
-  for (const auto& example : set.examples) {
-    const Eigen::VectorXd H = model.cubature->gradient * example.pose;
-    for (Eigen::Index j = 0; j < model.cubature->elements.size(); ++j) {
-      const RowMatrix3 F = Eigen::Map<const RowMatrix3>(H.data() + 9 * j) + RowMatrix3::Identity();
-      if (F.determinant() > 0) continue;
-      throw InputError({asset_.file.string(), place + example.name,
-                        "a pose that inverts no cubature element of the object",
-                        fmt::format("determinant {:.3g} of the deformation gradient in tet {}", F.determinant(),
-                                    model.cubature->elements[j]),
-                        "use a milder pose, more shape_space.eigenfunctions, or another seed"});
-    }
-  }
 }
 
 ModalData Pipeline::modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const {
@@ -204,44 +183,36 @@ void Pipeline::add_internal_force(ReducedModel& model) {
   if (!model.polynomial) leave_out("polynomial", model.cubature->internal_force_reason);
 }
 
-// `message`: what was made, or why nothing was.
-std::optional<TargetTableData> Pipeline::target_table(const ReducedModel& model, const ExampleSet& set,
-                                                      const ProjectionData& projection,
-                                                      EnergyReference energy_reference, std::string& message) {
-  auto [table, text] = cache_.get(
-      "targets",
-      [&] {
-        TargetTableReport report;
-        auto made =
-            build_target_table(model, set, projection,
-                               {.tolerance = asset_.target_tolerance, .energy_reference = energy_reference}, report);
-        return std::pair(std::move(made), report.message);
-      },
-      model.object->materials.model, *model.cubature, set, projection.target_basis, asset_.target_tolerance,
-      energy_reference);
-  message = text;
-  log::info(message);
-  return std::move(table);
-}
-
-void Pipeline::add_targets(ReducedModel& model) {
-  if (!includes(report_.ledger, "targets")) return;
-  std::string message;
-  model.targets = timed("targets", [&] {
-    return target_table(model, *model.examples, *model.projection, needs_.energy_reference, message);
+TargetSpace Pipeline::target_space(const ElasticSystem& system, const PoseFitter& fitter, Eigen::Index group) {
+  const std::string& region = fitter.region(group);
+  const std::optional<RegionNeeds> needs = region.empty() ? std::nullopt : needs_of_region(needs_, region);
+  const TargetSpaceOptions options{.energy_reference = needs ? needs->energy_reference : needs_.energy_reference,
+                                   .tolerance = asset_.target_tolerance,
+                                   .table = needs ? needs->targets : includes(report_.ledger, "targets"),
+                                   .seed = asset_.seed};
+  const ObjectData object = object_data();
+  const PoseCoordinates range = fitter.range(group);
+  return timed(region.empty() ? "targets" : fmt::format("targets of region {}", region), [&] {
+    TargetSpace space =
+        cache_.get("targets", [&] { return build_target_space(object, system, range, options); }, object_.mesh,
+                   object_.materials, system.free_dofs, range, options);
+    if (options.table) log::info(space.table_message);
+    if (space.left_out > 0)
+      warn(report_.warnings, fmt::format("{}the energies of targets leave out {} of {} tets, which a pose turns inside out",
+                                         region.empty() ? "" : fmt::format("region {}: ", region), space.left_out,
+                                         object_.mesh.tet_count()));
+    return space;
   });
-  if (!model.targets) leave_out("targets", message);
 }
 
-void Pipeline::add_region_targets(ReducedModel& model) {
-  for (RegionData& region : model.regions) {
-    const RegionNeeds needs = *needs_of_region(needs_, region.name);
-    if (!needs.targets) continue;
-    std::string message;
-    region.targets = timed(fmt::format("targets of region {}", region.name), [&] {
-      return target_table(model, region.examples, region.projection, needs.energy_reference, message);
-    });
+std::vector<TargetSpace> Pipeline::target_spaces(const ElasticSystem& system, const PoseFitter& fitter) {
+  std::vector<TargetSpace> spaces;
+  for (Eigen::Index group = 0; group < fitter.groups(); ++group) {
+    spaces.push_back(target_space(system, fitter, group));
+    if (fitter.region(group).empty() && includes(report_.ledger, "targets") && !spaces.back().table)
+      leave_out("targets", spaces.back().table_message);
   }
+  return spaces;
 }
 
 void Pipeline::add_contact(ReducedModel& model) {
@@ -320,13 +291,15 @@ ReducedModel Pipeline::run() {
       fitter.emplace(asset_, object_, system, solver.get(), modes.eigenvalues.tail(1)[0], *shape);
     });
   solver.reset();
+  std::vector<TargetSpace> targets;
+  if (fitter) targets = target_spaces(system, *fitter);
   const auto basis = timed("basis", [&] {
     Eigen::MatrixXd fields;
     if (shape && asset_.example_fields) fields = fitter->fields();
     return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) timed("weights of the examples", [&] { fitter->finish(model, report_.warnings); });
+  if (shape) timed("weights of the examples", [&] { fitter->finish(targets, model, report_.warnings); });
   fitter.reset();
 
   model.cubature = timed("cubature", [&] {
@@ -340,10 +313,7 @@ ReducedModel Pipeline::run() {
   log::info(fmt::format("cubature: {} elements, held-out errors: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %",
                         model.cubature->elements.size(), 100 * model.cubature->heldout_error,
                         100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error));
-  for (const auto& [place, set] : example_sets(model)) require_upright(model, place, *set);
   add_internal_force(model);
-  add_targets(model);
-  add_region_targets(model);
   if (includes(report_.ledger, "rigid"))
     model.rigid = timed("rigid moments",
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });

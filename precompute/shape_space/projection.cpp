@@ -19,21 +19,31 @@ Eigen::VectorXd descriptor_weights(const LaplaceBasis& object, Weighting weighti
   return Eigen::VectorXd::Ones(object.eigenvalues.size());
 }
 
+RowMatrix shape_changes(const LaplaceBasis& object, const Eigen::VectorXd& weights, const RowMatrix& displacements) {
+  const Eigen::Index n = object.vertices.rows(), m = weights.size();
+  const Eigen::MatrixXd forward =
+      object.mass * (object.eigenfunctions * weights.asDiagonal()) / std::cbrt(object.volume);
+  RowMatrix changes(3 * m, displacements.cols());
+  for (int axis = 0; axis < 3; ++axis) {
+    const RowMatrix rows = displacements(Eigen::seqN(axis, n, 3), Eigen::all);
+    changes(Eigen::seqN(axis, m, 3), Eigen::all) = forward.transpose() * rows;
+  }
+  return changes;
+}
+
 ProjectionData direct_projection(const LaplaceBasis& object, const Eigen::VectorXd& weights, const SparseMatrix& mass,
                                  const RowMatrix& basis) {
   const Eigen::Index n = object.vertices.rows(), m = weights.size(), r = basis.cols();
   const double unit = std::cbrt(object.volume);
-  const Eigen::MatrixXd forward = object.mass * (object.eigenfunctions * weights.asDiagonal()) / unit;
   const Eigen::MatrixXd backward = object.eigenfunctions * weights.cwiseInverse().asDiagonal() * unit;
   const RowMatrix mass_basis = mass * basis;
   ProjectionData projection;
-  projection.shape_from_reduced.resize(3 * m, r);
+  projection.shape_from_reduced = shape_changes(object, weights, basis);
   projection.reduced_from_shape.resize(r, 3 * m);
   for (int axis = 0; axis < 3; ++axis) {
     const auto rows = Eigen::seqN(axis, n, 3);
     const auto shape_rows = Eigen::seqN(axis, m, 3);
-    const RowMatrix basis_rows = basis(rows, Eigen::all), mass_basis_rows = mass_basis(rows, Eigen::all);
-    projection.shape_from_reduced(shape_rows, Eigen::all) = forward.transpose() * basis_rows;
+    const RowMatrix mass_basis_rows = mass_basis(rows, Eigen::all);
     projection.reduced_from_shape(Eigen::all, shape_rows) = mass_basis_rows.transpose() * backward;
   }
   return projection;
@@ -53,19 +63,32 @@ Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen
   return flatten(field);
 }
 
+namespace {
+
+// [3m x K] E.
+Eigen::MatrixXd descriptors(const ExampleSet& set) {
+  Eigen::MatrixXd E(set.examples.front().descriptor.size(), std::ssize(set.examples));
+  for (Eigen::Index k = 0; k < E.cols(); ++k) E.col(k) = flatten(set.examples[static_cast<std::size_t>(k)].descriptor);
+  return E;
+}
+
+}  // namespace
+
+void fill_gram(const Eigen::MatrixXd& rest_descriptor, ExampleSet& set) {
+  const Eigen::MatrixXd E = descriptors(set);
+  set.gram = E.transpose() * E;
+  set.h0 = E.transpose() * flatten(rest_descriptor);
+}
+
 void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,
                           const RowMatrix& pose_map, ExampleSet& set) {
-  const auto count = static_cast<Eigen::Index>(set.examples.size());
-  Eigen::MatrixXd E(rest_descriptor.size(), count);
-  for (Eigen::Index k = 0; k < count; ++k) E.col(k) = flatten(set.examples[static_cast<std::size_t>(k)].descriptor);
   for (auto& example : set.examples) {
     const Eigen::VectorXd change = flatten(example.descriptor) - flatten(rest_descriptor);
     example.reduced = projection.reduced_from_shape * change;
     example.pose = pose_map * change;
   }
-  set.gram = E.transpose() * E;
-  set.h0 = E.transpose() * flatten(rest_descriptor);
-  set.hq = E.transpose() * projection.shape_from_reduced;
+  fill_gram(rest_descriptor, set);
+  set.hq = descriptors(set).transpose() * projection.shape_from_reduced;
 }
 
 }  // namespace exmat::precompute

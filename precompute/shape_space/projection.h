@@ -21,6 +21,12 @@ RowMatrix range_basis(const RowMatrix& matrix);
 Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen::VectorXd& weights,
                                          const Eigen::MatrixXd& descriptor_change);
 
+/// What of the weights problem does not depend on a basis: Gram matrix and constant terms, from the descriptors.
+void fill_gram(const Eigen::MatrixXd& rest_descriptor, ExampleSet& set);
+
+/// [3m x d] changes of descriptor T B that displacements B [3n x d] make; of a region, those that it sees of them.
+RowMatrix shape_changes(const LaplaceBasis& object, const Eigen::VectorXd& weights, const RowMatrix& displacements);
+
 /// Gram matrix and linear terms of the weights problem from the descriptors, and the examples in reduced coordinates:
 /// `reduced` by T^+, `pose` by the pose map. docs/method.md, "Regions".
 void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,

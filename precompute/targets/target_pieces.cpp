@@ -48,7 +48,7 @@ Eigen::RowVector2d weights_at(double t) { return {1 - t, t}; }
 
 class PieceBuilder {
  public:
-  PieceBuilder(const TargetSolver& target, const std::vector<ExampleData>& examples, const TargetSamples& checks,
+  PieceBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses, const TargetSamples& checks,
                const PieceOptions& options, MinimumFinder& finder, PieceReport& report);
 
   std::optional<TargetTableData> run();
@@ -63,7 +63,7 @@ class PieceBuilder {
   bool may_halve(const std::vector<Piece>& pieces, const std::vector<bool>& which) const;
 
   const TargetSolver& target_;
-  const std::vector<ExampleData>& examples_;
+  const Eigen::MatrixXd& poses_;
   const PieceOptions& options_;
   MinimumFinder& finder_;
   PieceReport& report_;
@@ -75,11 +75,11 @@ class PieceBuilder {
   Eigen::HouseholderQR<Eigen::MatrixXd> inner_values_;  ///< of the control points that the ends leave free
 };
 
-PieceBuilder::PieceBuilder(const TargetSolver& target, const std::vector<ExampleData>& examples,
+PieceBuilder::PieceBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses,
                            const TargetSamples& checks, const PieceOptions& options, MinimumFinder& finder,
                            PieceReport& report)
     : target_(target),
-      examples_(examples),
+      poses_(poses),
       options_(options),
       finder_(finder),
       report_(report),
@@ -211,8 +211,8 @@ bool PieceBuilder::may_halve(const std::vector<Piece>& pieces, const std::vector
 
 std::optional<TargetTableData> PieceBuilder::run() {
   Piece whole{knot(0, target_.example(0)), knot(1, target_.example(1)), {}};
-  whole.begin.value = examples_[0].pose;
-  whole.end.value = examples_[1].pose;
+  whole.begin.value = poses_.col(0);
+  whole.end.value = poses_.col(1);
   for (std::vector<Piece> pieces{whole};;) {
     fit_new(pieces);
     report_.lost = is_lost(pieces);
@@ -235,11 +235,11 @@ std::optional<TargetTableData> PieceBuilder::run() {
 
 }  // namespace
 
-std::optional<TargetTableData> build_target_pieces(const TargetSolver& target, const std::vector<ExampleData>& examples,
+std::optional<TargetTableData> build_target_pieces(const TargetSolver& target, const Eigen::MatrixXd& poses,
                                                    const TargetSamples& checks, const PieceOptions& options,
                                                    MinimumFinder& finder, PieceReport& report) {
   report = {};
-  return PieceBuilder(target, examples, checks, options, finder, report).run();
+  return PieceBuilder(target, poses, checks, options, finder, report).run();
 }
 
 }  // namespace exmat::precompute

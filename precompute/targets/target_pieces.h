@@ -30,7 +30,7 @@ struct PieceReport {
 /// other control points are fitted by least squares. Nothing beyond the most pieces, or where a piece shorter than
 /// 2^-20 is not enough, as at a jump. Of TargetTableData all but energy_reference. docs/method.md, "Table of targets".
 std::optional<TargetTableData> build_target_pieces(const runtime::TargetSolver& target,
-                                                   const std::vector<ExampleData>& examples,
+                                                   const Eigen::MatrixXd& poses,
                                                    const TargetSamples& checks, const PieceOptions& options,
                                                    MinimumFinder& finder, PieceReport& report);
 

@@ -37,7 +37,7 @@ int most_degree(const TargetTableOptions& options, Eigen::Index examples) {
 
 class TableBuilder {
  public:
-  TableBuilder(const TargetSolver& target, const std::vector<ExampleData>& examples, const TargetTableOptions& options,
+  TableBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses, const TargetTableOptions& options,
                TargetTableReport& report);
 
   std::optional<TargetTableData> run();
@@ -54,7 +54,7 @@ class TableBuilder {
   std::string refusal_message() const;
 
   const TargetSolver& target_;
-  const std::vector<ExampleData>& example_data_;
+  const Eigen::MatrixXd& poses_;
   const TargetTableOptions& options_;
   TargetTableReport& report_;
   Eigen::Index examples_;  ///< K
@@ -65,13 +65,13 @@ class TableBuilder {
   bool lost_between_ = false;          ///< only in or between pieces
 };
 
-TableBuilder::TableBuilder(const TargetSolver& target, const std::vector<ExampleData>& examples,
-                           const TargetTableOptions& options, TargetTableReport& report)
+TableBuilder::TableBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses, const TargetTableOptions& options,
+                           TargetTableReport& report)
     : target_(target),
-      example_data_(examples),
+      poses_(poses),
       options_(options),
       report_(report),
-      examples_(static_cast<Eigen::Index>(examples.size())),
+      examples_(poses.cols()),
       error_(target, examples_),
       finder_(target, kSame * options.tolerance * error_.scale()) {}
 
@@ -102,7 +102,7 @@ TargetTableData TableBuilder::fit(int degree, const TargetSamples& nodes) const 
   data.degree = degree;
   data.energy_reference = options_.energy_reference;
   data.exponents = basis.exponents();
-  data.control_points.resize(basis.size(), example_data_.front().pose.size());
+  data.control_points.resize(basis.size(), poses_.rows());
   const Eigen::MatrixXd values = collocation(basis, nodes.weights);
   Eigen::MatrixXd rest = nodes.minima;
   std::vector<Eigen::Index> free;
@@ -112,7 +112,7 @@ TargetTableData TableBuilder::fit(int degree, const TargetSamples& nodes) const 
       free.push_back(n);
       continue;
     }
-    data.control_points.row(n) = example_data_[static_cast<std::size_t>(k)].pose.transpose();
+    data.control_points.row(n) = poses_.col(k).transpose();
     rest -= values.col(n) * target_.example(k).transpose();
   }
   const Eigen::HouseholderQR<Eigen::MatrixXd> solver(values(Eigen::all, free));
@@ -176,7 +176,7 @@ std::optional<TargetTableData> TableBuilder::one_polynomial(const TargetSamples&
 
 std::optional<TargetTableData> TableBuilder::pieces(const TargetSamples& checks) {
   PieceReport report;
-  auto data = build_target_pieces(target_, example_data_, checks, {kMargin * options_.tolerance, options_.most_pieces},
+  auto data = build_target_pieces(target_, poses_, checks, {kMargin * options_.tolerance, options_.most_pieces},
                                   finder_, report);
   lost_between_ = report.lost;
   if (report.pieces > 0) record({kPieceDegree, report.error, report.pieces});
@@ -197,32 +197,18 @@ std::optional<TargetTableData> TableBuilder::run() {
 
 }  // namespace
 
-std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
-                                                  TargetTableReport& report) {
-  return build_target_table(model, *model.examples, *model.projection, options, report);
-}
-
-std::optional<TargetTableData> build_target_table(const ReducedModel& model, const ExampleSet& set,
-                                                  const ProjectionData& projection, const TargetTableOptions& options,
-                                                  TargetTableReport& report) {
+std::optional<TargetTableData> build_target_table(const TargetSolver& target, const Eigen::MatrixXd& poses,
+                                                  const TargetTableOptions& options, TargetTableReport& report) {
   const Timer timer;
   report = {};
-  const std::vector<ExampleData>& examples = set.examples;
-  const auto count = static_cast<std::int64_t>(examples.size());
-  if (count < 2 || count > kMostTableExamples) {
+  if (const Eigen::Index count = poses.cols(); count < 2 || count > kMostTableExamples) {
     report.message =
         count < 2 ? "no table of targets: one example alone needs none"
                   : fmt::format("no table of targets: {} examples, at most {}; use \"target\": \"solve\" in the scene",
                                 count, kMostTableExamples);
     return std::nullopt;
   }
-  TargetSolver target;
-  if (const auto complaint = target.build(model.object->materials.model, *model.cubature, examples,
-                                          projection.target_basis, options.energy_reference)) {
-    report.message = "no table of targets: " + to_string(*complaint);
-    return std::nullopt;
-  }
-  auto data = TableBuilder(target, examples, options, report).run();
+  auto data = TableBuilder(target, poses, options, report).run();
   report.seconds = timer.seconds();
   return data;
 }

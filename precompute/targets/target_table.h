@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
+#include "runtime/sim/examples/target.h"
 
 namespace exmat::precompute {
 
@@ -33,18 +34,13 @@ struct TargetTableReport {
   double seconds = 0;
 };
 
-/// The table of targets of a model with cubature, projection and 2 <= K <= kMostTableExamples examples. p*(w) is solved
-/// at the nodes of Isaac 2020 and fitted by least squares, by polynomials of growing degree until the error as the run
-/// time decodes it, also at further weights inside and on every edge and face of the simplex, is below the tolerance.
-/// Where no degree allowed gets there, K = 2 takes pieces (target_pieces.h); otherwise there is nothing, as where p*(w)
-/// jumps from one minimum to another. The same in every run and for every number of threads. docs/method.md, "Table of
-/// targets".
-std::optional<TargetTableData> build_target_table(const ReducedModel& model, const TargetTableOptions& options,
-                                                  TargetTableReport& report);
-
-/// The same of other examples of that model: those of a region, with its projection.
-std::optional<TargetTableData> build_target_table(const ReducedModel& model, const ExampleSet& set,
-                                                  const ProjectionData& projection, const TargetTableOptions& options,
-                                                  TargetTableReport& report);
+/// The table of the targets of 2 <= K <= kMostTableExamples examples, whose poses [x x K] are those of the solver in
+/// the x coordinates that it was built in; control points are in these. p*(w) is solved at the nodes of Isaac 2020 and
+/// fitted by least squares, by polynomials of growing degree until the error as the run time decodes it, also at
+/// further weights inside and on every edge and face of the simplex, is below the tolerance. Where no degree allowed
+/// gets there, K = 2 takes pieces (target_pieces.h); otherwise there is nothing, as where p*(w) jumps from one minimum
+/// to another. The same in every run and for every number of threads. docs/method.md, "Table of targets".
+std::optional<TargetTableData> build_target_table(const runtime::TargetSolver& target, const Eigen::MatrixXd& poses,
+                                                  const TargetTableOptions& options, TargetTableReport& report);
 
 }  // namespace exmat::precompute

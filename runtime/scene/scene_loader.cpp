@@ -225,6 +225,7 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.data.projection.reset();
   loaded.data.polynomial.reset();
   loaded.data.targets.reset();
+  loaded.data.target_space.reset();
   loaded.data.contact.reset();
   loaded.data.regions.clear();
   return loaded;

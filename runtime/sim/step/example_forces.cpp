@@ -3,7 +3,7 @@
 namespace exmat::runtime {
 namespace {
 
-/// P_s p*, p* by Newton's method from the last target, into the workspace.
+/// The pull of p*, p* by Newton's method from the last target, into the workspace.
 void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
                   ExampleWorkspace& workspace, StepReport& report) noexcept {
   const TargetSolver& solver = *model.target;
@@ -18,7 +18,7 @@ void solve_target(const ExampleModel& model, int most_iterations, const ExampleS
     if (!workspace.target_converged) report.status |= kTargetNotConverged;
     if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
   }
-  workspace.target.noalias() = model.filtered_basis * y;
+  workspace.target.noalias() = model.target_pull * y;
 }
 
 }  // namespace

@@ -10,7 +10,7 @@ namespace exmat::runtime {
 
 /// What one step minimises:
 ///   c_a/2 |q - q_a|^2 + c_v/2 (q - q_v)^T D (q - q_v) + E(q) - f_ext . q
-///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa P_s p* . q,
+///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa g . q,
 /// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
 /// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
 /// the skew part of P_s and those of the frame (BodyFrame::force()): in values they are those of the

@@ -22,9 +22,40 @@ struct ExampleParts {
   const ExampleSet& set;
   const ProjectionData& projection;
   const std::optional<TargetTableData>& targets;
+  const std::optional<TargetSpaceData>& target_space;
 
   std::string group(const char* part) const { return (region.empty() ? "" : "/regions/" + region) + part; }
 };
+
+/// The elements of a space of targets, as those of a cubature.
+CubatureData elements_of(const TargetSpaceData& space) {
+  CubatureData elements;
+  elements.weights = space.weights;
+  elements.volumes = space.volumes;
+  elements.gradient = space.gradient;
+  elements.youngs_modulus = space.youngs_modulus;
+  elements.poisson_ratio = space.poisson_ratio;
+  return elements;
+}
+
+/// A solver in the space of targets; before format 7 in the modal basis.
+std::optional<Complaint> add_solver(const RestModel& rest, const ExampleParts& parts, EnergyReference reference,
+                                    ExampleModel& examples) {
+  TargetSolver& solver = examples.target.emplace();
+  if (!parts.target_space) {
+    auto complaint = solver.build(rest.material, rest.cubature, parts.set.examples, parts.projection.target_basis,
+                                  reference);
+    examples.target_pull = examples.filter.matrix() * solver.basis();
+    return complaint;
+  }
+  const TargetSpaceData& space = *parts.target_space;
+  std::vector<ExampleData> poses = parts.set.examples;
+  for (std::size_t k = 0; k < poses.size(); ++k) poses[k].pose = space.poses.row(static_cast<Eigen::Index>(k)).transpose();
+  const Eigen::Index d = space.poses.cols();
+  auto complaint = solver.build(rest.material, elements_of(space), poses, RowMatrix::Identity(d, d), reference);
+  examples.target_pull = space.pull * solver.basis();
+  return complaint;
+}
 
 std::optional<Complaint> add_examples(const RestModel& rest, const ExampleParts& parts, bool target_table,
                                       EnergyReference reference, Model& model) {
@@ -34,17 +65,12 @@ std::optional<Complaint> add_examples(const RestModel& rest, const ExampleParts&
   examples.filter = ShapeFilter(parts.projection);
   if (target_table) {
     if (!parts.targets) return missing_group(parts.group("/targets"));
-    TargetTableData filtered = *parts.targets;
-    filtered.control_points *= examples.filter.matrix().transpose();
-    examples.table.emplace(filtered);
-  } else {
-    auto complaint = examples.target.emplace().build(rest.material, rest.cubature, parts.set.examples,
-                                                     parts.projection.target_basis, reference);
-    if (complaint) {
-      complaint->place = parts.group("") + complaint->place;
-      return complaint;
-    }
-    examples.filtered_basis = examples.filter.matrix() * examples.target->basis();
+    TargetTableData pull = *parts.targets;
+    if (!pull.is_pull) pull.control_points *= examples.filter.matrix().transpose();
+    examples.table.emplace(pull);
+  } else if (auto complaint = add_solver(rest, parts, reference, examples)) {
+    complaint->place = parts.group("") + complaint->place;
+    return complaint;
   }
   model.examples.push_back(std::move(examples));
   return std::nullopt;
@@ -71,14 +97,15 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   const RestModel rest{reduced.object->materials.model, cubature};
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};
-    const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets};
+    const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets,
+                             reduced.target_space};
     if (auto complaint = add_examples(rest, parts, options.target_table, options.energy_reference, *model))
       return {nullptr, std::move(*complaint)};
   }
   for (const RegionOptions& region : options.regions) {
     const auto found = std::ranges::find(reduced.regions, region.region, &RegionData::name);
     if (found == reduced.regions.end()) return {nullptr, missing_group("/regions/" + region.region)};
-    const ExampleParts parts{found->name, found->examples, found->projection, found->targets};
+    const ExampleParts parts{found->name, found->examples, found->projection, found->targets, found->target_space};
     if (auto complaint = add_examples(rest, parts, region.target_table, region.energy_reference, *model))
       return {nullptr, std::move(*complaint)};
   }

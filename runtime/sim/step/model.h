@@ -23,9 +23,9 @@ namespace exmat::runtime {
 struct ExampleModel {
   std::string region;  ///< empty: the whole body
   ExampleWeights weights;
-  std::optional<TargetTable> table;    ///< of P_s p*, serves the targets if there is one
+  std::optional<TargetTable> table;    ///< of the pull U^T P p*, serves the targets if there is one
   std::optional<TargetSolver> target;  ///< otherwise
-  Eigen::MatrixXd filtered_basis;      ///< r x d, P_s Z, with `target`
+  Eigen::MatrixXd target_pull;         ///< r x d, with `target`: the pull of its coordinates y
   ShapeFilter filter;                  ///< P_s
 };
 

@@ -35,7 +35,7 @@ struct ExampleWorkspace {
   Eigen::VectorXd weights;        ///< K
   Eigen::VectorXd solved_target;  ///< d
   bool target_converged = false;  ///< of solved_target
-  Eigen::VectorXd target;         ///< r, P_s p*
+  Eigen::VectorXd target;         ///< r, its pull g
   ExampleForce force;
 };
 

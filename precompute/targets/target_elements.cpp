@@ -1,0 +1,244 @@
+#include "precompute/targets/target_elements.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "common/elastic/materials.h"
+#include "common/mesh/geometry.h"
+#include "common/model/needs.h"
+#include "precompute/cubature/element_samples.h"
+#include "precompute/cubature/selection.h"
+#include "precompute/targets/minimum_finder.h"
+#include "precompute/targets/simplex_points.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr double kNoise = 0.1;                 // of the largest example: how far from targets forces are sampled, too
+constexpr Eigen::Index kMostRows = 2000;       // of the selection problem
+constexpr Eigen::Index kMostCandidates = 6000;  // tets that it chooses from
+constexpr Eigen::Index kElementsPerDimension = 12, kLeastElements = 24;  // most of them: 12 d, at least 24
+constexpr double kNothing = 1e-6;              // of the largest force: one that says nothing of the elements
+
+// A force of one example's energy.
+struct Sample {
+  Eigen::VectorXd y;  ///< d, where
+  Eigen::Index example = 0;
+};
+
+// dE/dF of an example's energy density at displacement gradient H.
+template <typename Material>
+Eigen::Matrix3d stress(const Material& material, EnergyReference reference, const Eigen::Matrix3d& H,
+                       const Eigen::Matrix3d& H_example, const LameParameters& lame) {
+  if (reference == EnergyReference::kRest) return material.first_piola_kirchhoff(H - H_example, lame);
+  const Eigen::Matrix3d example = Eigen::Matrix3d::Identity() + H_example;
+  const Eigen::Matrix3d inverse = example.inverse();
+  const Eigen::Matrix3d relative = (H - H_example) * inverse;
+  return example.determinant() * material.first_piola_kirchhoff(relative, lame) * inverse.transpose();
+}
+
+class ElementChooser {
+ public:
+  ElementChooser(const ObjectData& object, const RowMatrix& basis, const PoseCoordinates& coordinates,
+                 const MeshTarget& target, const TargetElementOptions& options)
+      : object_(object),
+        coordinates_(coordinates),
+        target_(target),
+        options_(options),
+        samples_(object.mesh, object.materials, basis) {}
+
+  CubatureData choose();
+
+ private:
+  RowMatrix weights(int per_dimension) const;
+  std::vector<Sample> force_samples() const;
+  std::vector<Eigen::Index> candidates() const;
+  Eigen::MatrixXd forces(Eigen::Index tet, const std::vector<Sample>& samples) const;
+  SelectionProblem problem(const std::vector<Eigen::Index>& tets, const std::vector<Sample>& samples) const;
+  CubatureData cubature(const std::vector<Eigen::Index>& tets, const Selection& selection) const;
+  double error(const CubatureData& cubature) const;
+
+  const ObjectData& object_;
+  const PoseCoordinates& coordinates_;
+  const MeshTarget& target_;
+  const TargetElementOptions& options_;
+  ElementSamples samples_;
+  RowMatrix held_out_, exact_;  // weights [N x K], and the targets there in coordinates [N x d]
+};
+
+RowMatrix ElementChooser::weights(int per_dimension) const {
+  const Eigen::Index count = coordinates_.poses.cols();
+  if (count < 2) return RowMatrix::Ones(1, 1);
+  if (count <= kMostTableExamples) return spread_points(count, per_dimension);
+  std::mt19937_64 generator(options_.seed + static_cast<std::uint64_t>(per_dimension));
+  std::exponential_distribution<double> share;
+  RowMatrix weights(8 * per_dimension, count);
+  for (double& weight : weights.reshaped()) weight = share(generator);
+  for (auto row : weights.rowwise()) row /= row.sum();
+  return weights;
+}
+
+// At targets and beside them.
+std::vector<Sample> ElementChooser::force_samples() const {
+  const RowMatrix at = weights(3);
+  MinimumFinder finder(target_.solver, std::numeric_limits<double>::max());
+  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
+    return std::vector<Eigen::VectorXd>{blend(target_.solver, w)};
+  };
+  const RowMatrix minima = finder.find(at, from_blend, "targets that elements are chosen by");
+  double scale = 0;
+  for (Eigen::Index k = 0; k < coordinates_.poses.cols(); ++k)
+    scale = std::max(scale, target_.solver.example(k).norm());
+  if (scale == 0) scale = 1;
+  std::mt19937_64 generator(options_.seed);
+  std::normal_distribution<double> normal;
+  const Eigen::Index d = target_.solver.dimension(), count = coordinates_.poses.cols();
+  const Eigen::Index stride = std::max<Eigen::Index>(1, 2 * at.rows() * count * d / kMostRows);
+  std::vector<Sample> all;
+  Eigen::Index number = 0;
+  for (Eigen::Index i = 0; i < at.rows(); ++i)
+    for (const double noise : {0.0, kNoise * scale / std::sqrt(static_cast<double>(d))}) {
+      Eigen::VectorXd y = minima.row(i).allFinite() ? Eigen::VectorXd(minima.row(i).transpose())
+                                                    : blend(target_.solver, at.row(i).transpose());
+      for (double& entry : y) entry += noise * normal(generator);
+      for (Eigen::Index k = 0; k < count; ++k)
+        if (number++ % stride == 0) all.push_back({target_.solver.basis() * y, k});
+    }
+  return all;
+}
+
+// All that take part, or a systematic sample of them in their order.
+std::vector<Eigen::Index> ElementChooser::candidates() const {
+  const auto all = std::ssize(target_.tets);
+  if (all <= kMostCandidates) return target_.tets;
+  std::vector<Eigen::Index> chosen;
+  for (Eigen::Index i = 0; i < kMostCandidates; ++i)
+    chosen.push_back(target_.tets[static_cast<std::size_t>(i * all / kMostCandidates)]);
+  return chosen;
+}
+
+// [d x N] of one tet, in unit coordinates, times its volume.
+Eigen::MatrixXd ElementChooser::forces(Eigen::Index tet, const std::vector<Sample>& samples) const {
+  const RowMatrix B = samples_.gradient(tet);
+  const RowMatrix poses = B * coordinates_.poses;
+  const LameParameters lame =
+      lame_parameters(object_.materials.youngs_modulus[tet], object_.materials.poisson_ratio[tet]);
+  Eigen::MatrixXd stresses(9, std::ssize(samples));
+  with_material(object_.materials.model, [&](auto material) {
+    for (Eigen::Index i = 0; i < stresses.cols(); ++i) {
+      const Sample& sample = samples[static_cast<std::size_t>(i)];
+      const Eigen::Matrix<double, 9, 1> H = B * sample.y, H_example = poses.col(sample.example);
+      const Eigen::Matrix3d P =
+          stress(material, options_.energy_reference, Eigen::Map<const RowMatrix3>(H.data()),
+                 Eigen::Map<const RowMatrix3>(H_example.data()), lame);
+      stresses.col(i) = samples_.volume(tet) * P.reshaped<Eigen::RowMajor>();
+    }
+  });
+  return target_.solver.basis().transpose() * (B.transpose() * stresses);
+}
+
+SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
+                                         const std::vector<Sample>& samples) const {
+  const Eigen::Index d = target_.solver.dimension(), count = std::ssize(samples);
+  constexpr Eigen::Index kBlock = 256;  // sums do not depend on the number of threads
+  const Eigen::Index blocks = (std::ssize(target_.tets) + kBlock - 1) / kBlock;
+  std::vector<Eigen::MatrixXd> partial(static_cast<std::size_t>(blocks));
+#pragma omp parallel for schedule(dynamic)
+  for (Eigen::Index block = 0; block < blocks; ++block) {
+    Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(d, count);
+    const Eigen::Index end = std::min<Eigen::Index>(std::ssize(target_.tets), (block + 1) * kBlock);
+    for (Eigen::Index i = block * kBlock; i < end; ++i) sum += forces(target_.tets[static_cast<std::size_t>(i)], samples);
+    partial[static_cast<std::size_t>(block)] = std::move(sum);
+  }
+  Eigen::MatrixXd total = Eigen::MatrixXd::Zero(d, count);
+  for (const Eigen::MatrixXd& sum : partial) total += sum;
+  const Eigen::VectorXd norms = total.colwise().norm();
+  const Eigen::VectorXd scales =
+      (norms.array() > kNothing * norms.maxCoeff()).select(norms.cwiseInverse(), Eigen::VectorXd::Zero(count));
+  SelectionProblem problem;
+  problem.target = (total * scales.asDiagonal()).reshaped();
+  problem.columns.resize(problem.target.size(), std::ssize(tets));
+#pragma omp parallel for schedule(dynamic, 16)
+  for (std::size_t i = 0; i < tets.size(); ++i)
+    problem.columns.col(static_cast<Eigen::Index>(i)) = (forces(tets[i], samples) * scales.asDiagonal()).reshaped();
+  return problem;
+}
+
+CubatureData ElementChooser::cubature(const std::vector<Eigen::Index>& tets, const Selection& selection) const {
+  CubatureData data;
+  const auto s = static_cast<Eigen::Index>(selection.members.size());
+  data.elements.resize(s);
+  data.weights = selection.weights;
+  data.volumes.resize(s);
+  data.gradient.resize(9 * s, coordinates_.poses.rows());
+  data.youngs_modulus.resize(s);
+  data.poisson_ratio.resize(s);
+  for (Eigen::Index j = 0; j < s; ++j) {
+    const Eigen::Index tet = tets[static_cast<std::size_t>(selection.members[static_cast<std::size_t>(j)])];
+    data.elements[j] = static_cast<std::int32_t>(tet);
+    data.volumes[j] = samples_.volume(tet);
+    data.gradient.middleRows<9>(9 * j) = samples_.gradient(tet);
+    data.youngs_modulus[j] = object_.materials.youngs_modulus[tet];
+    data.poisson_ratio[j] = object_.materials.poisson_ratio[tet];
+  }
+  return data;
+}
+
+// Largest distance of the elements' targets from those of all tets, over the largest example.
+double ElementChooser::error(const CubatureData& cubature) const {
+  const Eigen::Index d = coordinates_.poses.rows();
+  runtime::TargetSolver solver;
+  if (solver.build(object_.materials.model, cubature, examples_at(coordinates_.poses), RowMatrix::Identity(d, d),
+                   options_.energy_reference))
+    return std::numeric_limits<double>::infinity();
+  auto workspace = solver.make_workspace();
+  const Eigen::MatrixXd to_unit = target_.solver.basis().inverse();
+  double largest = 0, scale = 0;
+  for (Eigen::Index k = 0; k < coordinates_.poses.cols(); ++k)
+    scale = std::max(scale, target_.solver.example(k).norm());
+  if (scale == 0) return 0;
+  for (Eigen::Index i = 0; i < held_out_.rows(); ++i) {
+    if (!exact_.row(i).allFinite()) continue;
+    Eigen::VectorXd y(d);
+    solver.start(held_out_.row(i).transpose(), y);
+    solver.solve(held_out_.row(i).transpose(), workspace, y);
+    const double distance = (to_unit * (solver.basis() * y) - exact_.row(i).transpose()).norm();
+    if (!std::isfinite(distance)) return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, distance / scale);
+  }
+  return largest;
+}
+
+CubatureData ElementChooser::choose() {
+  held_out_ = weights(5);
+  MinimumFinder finder(target_.solver, std::numeric_limits<double>::max());
+  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
+    return std::vector<Eigen::VectorXd>{blend(target_.solver, w)};
+  };
+  exact_ = finder.find(held_out_, from_blend, "targets that elements are checked by");
+  const std::vector<Sample> samples = force_samples();
+  const std::vector<Eigen::Index> tets = candidates();
+  const SelectionProblem all = problem(tets, samples);
+  const Eigen::Index d = coordinates_.poses.rows();
+  const auto most = static_cast<std::size_t>(
+      std::min<Eigen::Index>(std::ssize(tets), std::max(kLeastElements, kElementsPerDimension * d)));
+  const StopRule accurate{static_cast<std::size_t>(std::max<Eigen::Index>(1, d / 2)), [&](const Selection& selection) {
+                            return error(cubature(tets, selection)) <= options_.tolerance;
+                          }};
+  CubatureData chosen = cubature(tets, select_greedy_swap(all, most, {}, &accurate));
+  chosen.heldout_error = error(chosen);
+  return chosen;
+}
+
+}  // namespace
+
+CubatureData target_elements(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
+                             const MeshTarget& target, const TargetElementOptions& options) {
+  const RowMatrix basis = system.extend(coordinates.basis);
+  return ElementChooser(object, basis, coordinates, target, options).choose();
+}
+
+}  // namespace exmat::precompute

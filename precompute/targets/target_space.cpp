@@ -1,0 +1,229 @@
+#include "precompute/targets/target_space.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <fmt/format.h>
+#include <utility>
+
+#include "common/core/log.h"
+#include "common/model/needs.h"
+#include "precompute/targets/minimum_finder.h"
+#include "precompute/targets/simplex_points.h"
+#include "precompute/targets/target_elements.h"
+#include "precompute/targets/target_table.h"
+#include "runtime/sim/examples/bernstein_basis.h"
+
+namespace exmat::precompute {
+namespace {
+
+using runtime::TargetSolver;
+
+constexpr double kShare = 0.1;    // of the tolerance that the space may take
+constexpr int kRounds = 4;        // in which weights whose targets the space misses are added
+constexpr double kNothing = 1e-9;  // of the largest example: a direction of poses that is rounding
+constexpr double kSame = 0.1;     // of the tolerance: answers nearer to each other are one minimum
+
+// One, two or three examples at equal shares, then all of them.
+RowMatrix equal_shares(Eigen::Index examples) {
+  std::vector<Eigen::VectorXd> rows;
+  const auto add = [&](std::initializer_list<Eigen::Index> members) {
+    rows.emplace_back(Eigen::VectorXd::Zero(examples));
+    for (const Eigen::Index k : members) rows.back()[k] = 1.0 / static_cast<double>(members.size());
+  };
+  for (Eigen::Index i = 0; i < examples; ++i) {
+    add({i});
+    for (Eigen::Index j = 0; j < i; ++j) {
+      add({i, j});
+      for (Eigen::Index k = 0; k < j; ++k) add({i, j, k});
+    }
+  }
+  rows.emplace_back(Eigen::VectorXd::Constant(examples, 1.0 / static_cast<double>(examples)));
+  RowMatrix weights(std::ssize(rows), examples);
+  for (Eigen::Index i = 0; i < weights.rows(); ++i) weights.row(i) = rows[static_cast<std::size_t>(i)].transpose();
+  return weights;
+}
+
+// Where targets are solved first: corners, edges, faces and the inside of the simplex.
+RowMatrix first_weights(Eigen::Index examples) {
+  if (examples > kMostTableExamples) return equal_shares(examples);
+  const int degree = examples == 2 ? 8 : examples == 3 ? 5 : 4;
+  return interpolation_nodes(runtime::BernsteinBasis(degree, static_cast<int>(examples)).exponents());
+}
+
+// Other ones, to check by: `round` counts from 0.
+RowMatrix check_weights(Eigen::Index examples, int round) {
+  if (examples <= kMostTableExamples) {
+    const int count = examples == 2 ? 9 : 3;
+    const RowMatrix spread = spread_points(examples, count * (round + 1));
+    return spread;
+  }
+  const RowMatrix even = equal_shares(examples);  // uneven ones: three parts of one, one of the next
+  RowMatrix weights(even.rows(), examples);
+  for (Eigen::Index i = 0; i < even.rows(); ++i)
+    weights.row(i) = 0.75 * even.row(i) + 0.25 * even.row((i + round + 1) % even.rows());
+  return weights;
+}
+
+// Orthonormal columns; those of `vectors` [d x N] first that they do not hold yet.
+void append_independent(const Eigen::MatrixXd& vectors, double nothing, Eigen::MatrixXd& columns) {
+  for (Eigen::VectorXd rest : vectors.colwise()) {
+    for (int pass = 0; pass < 2; ++pass) rest -= columns * (columns.transpose() * rest);
+    if (rest.norm() <= nothing) continue;
+    columns.conservativeResize(vectors.rows(), columns.cols() + 1);
+    columns.rightCols<1>() = rest.normalized();
+  }
+}
+
+// The examples, then principal components of the samples, until none is farther than `distance` from its projection.
+Eigen::MatrixXd principal_space(const Eigen::MatrixXd& examples, const Eigen::MatrixXd& samples, double distance,
+                                double nothing) {
+  Eigen::MatrixXd columns(examples.rows(), 0);
+  append_independent(examples, nothing, columns);
+  Eigen::MatrixXd rest = samples - columns * (columns.transpose() * samples);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(rest * rest.transpose());
+  for (Eigen::Index i = gram.eigenvalues().size() - 1; i >= 0; --i) {
+    if (columns.cols() > 0 && (rest.cols() == 0 || rest.colwise().norm().maxCoeff() <= distance)) break;
+    append_independent(gram.eigenvectors().col(i), nothing, columns);
+    rest = samples - columns * (columns.transpose() * samples);
+  }
+  return columns;
+}
+
+class SpaceBuilder {
+ public:
+  SpaceBuilder(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& range,
+               const TargetSpaceOptions& options)
+      : object_(object),
+        system_(system),
+        range_(range),
+        options_(options),
+        whole_(mesh_target(object, system, range, options.energy_reference)),
+        count_(range.poses.cols()),
+        examples_(whole_.solver.dimension(), count_) {
+    for (Eigen::Index k = 0; k < count_; ++k) examples_.col(k) = whole_.solver.example(k);
+    scale_ = examples_.colwise().norm().maxCoeff();
+  }
+
+  TargetSpace build();
+
+ private:
+  Eigen::MatrixXd solve(const RowMatrix& weights, const MinimumFinder::Starts& starts);
+  PoseCoordinates coordinates() const;
+  double check(int round);
+
+  const ObjectData& object_;
+  const ElasticSystem& system_;
+  const PoseCoordinates& range_;
+  const TargetSpaceOptions& options_;
+  MeshTarget whole_;
+  Eigen::Index count_;
+  Eigen::MatrixXd examples_;  // d' x K, in unit coordinates of the range
+  double scale_ = 0;
+  Eigen::MatrixXd samples_;  // d' x N, targets
+  Eigen::MatrixXd columns_;  // d' x d, orthonormal
+  MeshTarget small_;         // in these
+};
+
+// [d' x N], those that were found.
+Eigen::MatrixXd SpaceBuilder::solve(const RowMatrix& weights, const MinimumFinder::Starts& starts) {
+  MinimumFinder finder(whole_.solver, kSame * options_.tolerance * scale_);
+  const RowMatrix minima = finder.find(weights, starts, "targets on the whole mesh");
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index i = 0; i < minima.rows(); ++i)
+    if (minima.row(i).allFinite()) found.push_back(i);
+  return minima(found, Eigen::all).transpose();
+}
+
+PoseCoordinates SpaceBuilder::coordinates() const {
+  return {range_.basis * (whole_.solver.basis() * columns_), columns_.transpose() * examples_};
+}
+
+// Targets of the space against those of the range, which start from them; these become samples. Largest distance over
+// the largest example.
+double SpaceBuilder::check(int round) {
+  const RowMatrix weights = check_weights(count_, round);
+  MinimumFinder finder(small_.solver, kSame * options_.tolerance * scale_);
+  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
+    return std::vector<Eigen::VectorXd>{blend(small_.solver, w)};
+  };
+  const RowMatrix inside = finder.find(weights, from_blend, "targets in their space");
+  const Eigen::MatrixXd guesses = columns_ * (small_.solver.basis() * inside.transpose());
+  const auto from_space = [&](const Eigen::VectorXd&, Eigen::Index row) {
+    return std::vector<Eigen::VectorXd>{guesses.col(row)};
+  };
+  MinimumFinder polish(whole_.solver, kSame * options_.tolerance * scale_);
+  const RowMatrix minima = polish.find(weights, from_space, "targets on the whole mesh");
+  double error = 0;
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index i = 0; i < weights.rows(); ++i) {
+    const double distance = (minima.row(i).transpose() - guesses.col(i)).norm();
+    if (!std::isfinite(distance)) continue;
+    found.push_back(i);
+    error = std::max(error, distance / scale_);
+  }
+  const Eigen::Index before = samples_.cols();
+  samples_.conservativeResize(Eigen::NoChange, before + std::ssize(found));
+  samples_.rightCols(std::ssize(found)) = minima(found, Eigen::all).transpose();
+  return error;
+}
+
+TargetSpace SpaceBuilder::build() {
+  const double distance = kShare * options_.tolerance * scale_;
+  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
+    return std::vector<Eigen::VectorXd>{blend(whole_.solver, w)};
+  };
+  samples_ = Eigen::MatrixXd(examples_.rows(), 0);
+  if (scale_ > 0 && count_ > 1) samples_ = solve(first_weights(count_), from_blend);
+  TargetSpace space;
+  space.energy_reference = options_.energy_reference;
+  for (int round = 0; round < kRounds; ++round) {
+    columns_ = principal_space(examples_, samples_, 0.5 * distance, kNothing * scale_);
+    space.coordinates = coordinates();
+    small_ = mesh_target(object_, system_, space.coordinates, options_.energy_reference);
+    if (scale_ == 0 || count_ < 2) break;
+    space.error = check(round);
+    if (space.error <= kShare * options_.tolerance) break;
+  }
+  space.left_out = whole_.left_out;
+  log::info(fmt::format("targets: {} displacements hold them, error {:.1e}", columns_.cols(), space.error));
+  if (options_.table) {
+    TargetTableReport report;
+    space.table = build_target_table(small_.solver, space.coordinates.poses,
+                                     {.tolerance = options_.tolerance, .energy_reference = options_.energy_reference},
+                                     report);
+    if (space.table) space.table->error += space.error;
+    space.table_message = report.message;
+  }
+  space.elements = target_elements(object_, system_, space.coordinates, small_,
+                                   {options_.energy_reference, options_.element_tolerance, options_.seed});
+  return space;
+}
+
+}  // namespace
+
+TargetSpace build_target_space(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& range,
+                               const TargetSpaceOptions& options) {
+  return SpaceBuilder(object, system, range, options).build();
+}
+
+void finish_targets(const TargetSpace& space, const Eigen::MatrixXd& pull,
+                    std::optional<TargetSpaceData>& data, std::optional<TargetTableData>& table) {
+  data.emplace();
+  data->energy_reference = space.energy_reference;
+  data->error = space.error;
+  data->element_error = space.elements.heldout_error;
+  data->poses = space.coordinates.poses.transpose();
+  data->pull = pull;
+  data->elements = space.elements.elements;
+  data->weights = space.elements.weights;
+  data->volumes = space.elements.volumes;
+  data->gradient = space.elements.gradient;
+  data->youngs_modulus = space.elements.youngs_modulus;
+  data->poisson_ratio = space.elements.poisson_ratio;
+  table = space.table;
+  if (!table) return;
+  table->is_pull = true;
+  table->control_points = space.table->control_points * pull.transpose();
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+
+#include "common/model/reduced_model.h"
+#include "precompute/fem/elastic_system.h"
+#include "precompute/targets/mesh_target.h"
+
+namespace exmat::precompute {
+
+struct TargetSpaceOptions {
+  EnergyReference energy_reference = EnergyReference::kExample;
+  double tolerance = 1e-4;         ///< of what the space and the table lose of the targets, as TargetTableData has it
+  double element_tolerance = 1e-3;  ///< of what the elements lose of them, beside that
+  bool table = true;               ///< make one, where 2 <= K <= kMostTableExamples
+  std::uint64_t seed = 1;          ///< of the poses that the elements are chosen by
+};
+
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, TargetSpaceOptions& value) {
+  pass_all(archive, value.energy_reference, value.tolerance, value.element_tolerance, value.table, value.seed);
+}
+
+/// The targets of a set of examples, minimised over all tets of the mesh in all poses that descriptors stand for:
+/// independent of any modal basis. docs/method.md, "Targets".
+struct TargetSpace {
+  PoseCoordinates coordinates;           ///< few displacements that hold all targets, and the examples in them
+  CubatureData elements;                 ///< that stand for all tets in the energies of targets, in these coordinates
+  double error = 0;                      ///< largest found of what the coordinates lose of a target
+  std::int64_t left_out = 0;             ///< tets that an example turns inside out
+  std::optional<TargetTableData> table;  ///< control points [P c x d]
+  EnergyReference energy_reference = EnergyReference::kExample;
+  std::string table_message;             ///< what was made, or why nothing was
+};
+
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, TargetSpace& value) {
+  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.table,
+           value.energy_reference, value.table_message);
+}
+
+/// `range` holds all poses, from pose_range(). Targets are solved there at weights all over the simplex; their
+/// principal components, the examples themselves among them, are the space, as many as the tolerance asks for at
+/// further weights. The same in every run and for every number of threads.
+TargetSpace build_target_space(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& range,
+                               const TargetSpaceOptions& options);
+
+/// Puts the targets into a model of the basis U: `pull` [r x d] is U^T P B, what each displacement of the space pulls
+/// the modes with, P the filter of the example force. The table only where there is one.
+void finish_targets(const TargetSpace& space, const Eigen::MatrixXd& pull,
+                    std::optional<TargetSpaceData>& data, std::optional<TargetTableData>& table);
+
+}  // namespace exmat::precompute
