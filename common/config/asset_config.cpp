@@ -206,10 +206,34 @@ class AssetReader {
              fmt::format("the method \"{}\"", name_of(alignment.method)));
   }
 
-  static void read_basis(const Json& json, AssetConfig& asset) {
+  void read_basis(const Json& json, AssetConfig& asset) const {
     asset.basis_size = json.value("size", asset.basis_size);
     asset.linear_modes = json.value("linear_modes", asset.linear_modes);
     asset.example_fields = json.value("example_fields", asset.example_fields);
+    TrainingConfig& training = asset.training;
+    training.from = choice_or(json, "training", training.from);
+    training.segments = json.value("training_segments", training.segments);
+    training.seconds = optional_member<double>(json, "training_seconds");
+    training.seed = optional_member<std::uint64_t>(json, "training_seed");
+    if (json.contains("loads")) training.loads = read_loads(json["loads"]);
+    if (training.from == Training::kLoads && !training.loads)
+      refuse("/basis/loads", "the loads that \"training\": \"loads\" asks for", "none");
+  }
+
+  LoadsConfig read_loads(const Json& json) const {
+    LoadsConfig loads;
+    const Json forces = member_or(json, "forces", Json::array());
+    for (std::size_t i = 0; i < forces.size(); ++i)
+      loads.forces.push_back({read_selection(forces[i]["vertices"], fmt::format("/basis/loads/forces/{}/vertices", i)),
+                              forces[i]["force"]});
+    const Json examples = member_or(json, "examples", Json::object());
+    loads.example_stiffness = optional_member<double>(examples, "stiffness");
+    loads.example_damping = optional_member<double>(examples, "damping");
+    loads.example_bias = optional_member<double>(examples, "bias");
+    if (json.contains("gravity")) 
+      for (std::size_t axis = 0; axis < 3; ++axis) loads.gravity[static_cast<Eigen::Index>(axis)] = json["gravity"][axis];
+    loads.speed = json.value("speed", loads.speed);
+    return loads;
   }
 
   void read_cubature(const Json& json, AssetConfig& asset) const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -98,6 +99,29 @@ struct RegionConfig {
   std::vector<std::string> examples;                ///< names, not the rest pose's
 };
 
+/// A push that a body will feel, in any direction.
+struct ForceLoadConfig {
+  VertexSelection vertices;
+  double force = 0;  ///< on each vertex [N]
+};
+
+/// What will act on a body, where no scene says so.
+struct LoadsConfig {
+  std::vector<ForceLoadConfig> forces;
+  std::optional<double> example_stiffness, example_damping, example_bias;  ///< as in a scene
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();                       ///< [m/s^2]
+  double speed = 0;  ///< at which a free body meets obstacles [m/s]; 0: it does not
+};
+
+/// The runs in full space that basis and cubature learn from.
+struct TrainingConfig {
+  Training from = Training::kAuto;
+  int segments = 8;
+  std::optional<double> seconds;      ///< of one segment, about; absent: 0.8 periods of the lowest mode
+  std::optional<std::uint64_t> seed;  ///< absent: the asset's
+  std::optional<LoadsConfig> loads;
+};
+
 /// ASSET.json after validation, paths resolved against its folder. schemas/asset.json.
 struct AssetConfig {
   std::filesystem::path file;
@@ -118,6 +142,7 @@ struct AssetConfig {
   int basis_size = 30;  ///< r
   int linear_modes = 15;
   bool example_fields = true;
+  TrainingConfig training;
 
   std::optional<int> cubature_elements;      ///< s; both absent: 2 r
   std::optional<double> cubature_tolerance;  ///< held-out relative force error

@@ -20,6 +20,12 @@ enum class TargetSource { kAuto, kTable, kSolve };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<TargetSource>{"auto", "table", "solve"};
 
+/// Where the loads of the runs come from that bases learn from; `auto` is the scene, else the asset's loads, else
+/// examples, gravity and pushes of all kinds where there are examples.
+enum class Training { kAuto, kNone, kScene, kLoads };
+template <>
+inline constexpr std::array<std::string_view, 4> kNames<Training>{"auto", "none", "scene", "loads"};
+
 /// The undeformed shape of an example's energy. docs/method.md, "Target".
 enum class EnergyReference {
   kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)

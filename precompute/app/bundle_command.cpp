@@ -73,9 +73,10 @@ void print_model(const std::string& bundle, const ReducedModel& model) {
 }
 
 // What the scene asks of the bundle; nothing without a scene.
-std::optional<Needs> scene_needs(const BundleOptions& options, const AssetConfig& asset) {
-  if (options.scene.empty()) return std::nullopt;
-  const Needs needs = needs_of(load_scene(options.scene));
+std::optional<Needs> scene_needs(const BundleOptions& options, const std::optional<SceneConfig>& scene,
+                                 const AssetConfig& asset) {
+  if (!scene) return std::nullopt;
+  const Needs needs = needs_of(*scene);
   if (needs.render && !asset.render_mesh)
     throw InputError({options.asset, "/object/render_mesh", "a surface, for output.render of the scene", "none",
                       "name one here or leave output.render out of the scene"});
@@ -83,9 +84,10 @@ std::optional<Needs> scene_needs(const BundleOptions& options, const AssetConfig
 }
 
 // Whether the bundle is there and was computed from these inputs, by this version.
-bool is_up_to_date(const BundleOptions& options, const AssetConfig& asset, const Needs& needs, BuildReport& report) {
+bool is_up_to_date(const BundleOptions& options, const AssetConfig& asset, const Needs& needs,
+                   const precompute::BuildOptions& build, BuildReport& report) {
   if (!std::filesystem::exists(options.bundle)) return false;
-  precompute::read_inputs(asset, needs, report);
+  precompute::read_inputs(asset, needs, report, build);
   try {
     const BundleSummary summary = summarise_bundle(options.bundle);
     return summary.input_sha256 == report.input_sha256 && summary.format_version == bundle_schema().format_version;
@@ -111,16 +113,20 @@ void require_writable(const BundleOptions& options) {
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
   const AssetConfig asset = load_asset(options.asset);
-  const Needs needs = precompute::resolve_needs(asset, scene_needs(options, asset));
+  std::optional<SceneConfig> scene;
+  if (!options.scene.empty()) scene = load_scene(options.scene);
+  const Needs needs = precompute::resolve_needs(asset, scene_needs(options, scene, asset));
+  const precompute::BuildOptions build{options.alignment_report, options.cache, scene ? &*scene : nullptr,
+                                       options.training_budget};
   require_writable(options);
-  if (options.if_changed && is_up_to_date(options, asset, needs, report.build)) {
+  if (options.if_changed && is_up_to_date(options, asset, needs, build, report.build)) {
     log::info(fmt::format("{}: its inputs have not changed, nothing to do", options.bundle));
     write_depfile(options, report.build);
     report.status = "unchanged";
     return;
   }
   report.build = {};
-  model = precompute::build_reduced_model(asset, needs, report.build, {options.alignment_report, options.cache});
+  model = precompute::build_reduced_model(asset, needs, report.build, build);
   precompute::timed_stage("writing the bundle", report.build, [&] { write_bundle(*model, options.bundle); });
   fill_bytes(*model, report.build.ledger);
   write_depfile(options, report.build);

@@ -10,6 +10,7 @@ struct BundleOptions {
   std::string alignment_report;  ///< folder; empty: none
   std::string depfile, report;   ///< files; empty: none
   std::string cache;             ///< folder of stages; empty: none
+  double training_budget = 0;    ///< [s]; 0: no limit
   bool if_changed = false;       ///< nothing is done where the bundle is of these inputs
 };
 

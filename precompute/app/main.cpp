@@ -62,6 +62,10 @@ int run(std::vector<char*> words) {
       "file to write stages, times, errors, warnings and hashes into, also of a failure (JSON)");
   bundle_command_line->add_option("--cache", options.cache,
                                   "folder to keep stages in, so that only what depends on a change is computed again");
+  bundle_command_line
+      ->add_option("--training-budget", options.training_budget,
+                   "seconds after which no run of training begins; the bundle then depends on the machine's speed")
+      ->check(CLI::PositiveNumber);
   bundle_command_line->add_flag("--if-changed", options.if_changed,
                                 "do nothing where the bundle was made of the same inputs by this version");
 

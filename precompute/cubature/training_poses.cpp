@@ -11,7 +11,9 @@ namespace {
 constexpr double kLargestDisplacement = 0.4;  // of L
 constexpr double kSmallestShare = 0.05;       // of that
 constexpr double kNoiseEnergy = 0.01;
+constexpr double kLeastMotion = 0.01;  // of the largest
 constexpr Eigen::Index kExampleStride = 4;  // every fourth pose is an example's
+constexpr Eigen::Index kMotionCycle = 8, kMotionsOfCycle = 6;  // poses of motions, where there are any
 
 class PoseGenerator {
  public:
@@ -30,6 +32,15 @@ class PoseGenerator {
     const double share = kSmallestShare + (1 - kSmallestShare) * uniform_(generator_);
     const double scale = scale_to(linear, quadratic, share * kLargestDisplacement * source_.body_size);
     return with_noise(scale * linear + scale * scale * quadratic);
+  }
+
+  // Not one at rest, whose forces say nothing.
+  Eigen::VectorXd of_motion(const Eigen::MatrixXd& motions) {
+    std::uniform_int_distribution<Eigen::Index> any(0, motions.cols() - 1);
+    const double least = kLeastMotion * motions.colwise().norm().maxCoeff();
+    Eigen::Index column = any(generator_);
+    while (motions.col(column).norm() < least) column = any(generator_);
+    return with_noise(motions.col(column));
   }
 
   Eigen::VectorXd on_segment() {
@@ -91,15 +102,28 @@ PoseSource pose_source(const ElasticSystem& system, const LinearModes& modes, co
           system.extend(free_basis),
           free_basis.transpose() * (system.stiffness * free_basis),
           body_size,
-          examples};
+          examples,
+          {},
+          {}};
 }
 
-RowMatrix draw_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed) {
+void set_motions(const Eigen::MatrixXd& motions, const Eigen::MatrixXd& others, const ElasticSystem& system,
+                 const Eigen::MatrixXd& free_basis, PoseSource& source) {
+  const Eigen::MatrixXd mass_basis = system.mass * free_basis;
+  source.motions = mass_basis.transpose() * motions;
+  source.other_motions = mass_basis.transpose() * others;
+}
+
+RowMatrix draw_poses(const PoseSource& source, const Eigen::MatrixXd& motions, Eigen::Index count, std::uint64_t seed) {
   PoseGenerator generator(source, seed);
   RowMatrix poses(count, source.rest_stiffness.rows());
+  const bool has_examples = source.examples.cols() > 0;
   for (Eigen::Index i = 0; i < count; ++i) {
-    const bool of_example = source.examples.cols() > 0 && i % kExampleStride == kExampleStride - 1;
-    poses.row(i) = of_example ? generator.on_segment() : generator.on_manifold();
+    if (motions.cols() > 0 && i % kMotionCycle < kMotionsOfCycle)
+      poses.row(i) = generator.of_motion(motions);
+    else
+      poses.row(i) =
+          has_examples && i % kExampleStride == kExampleStride - 1 ? generator.on_segment() : generator.on_manifold();
   }
   return poses;
 }

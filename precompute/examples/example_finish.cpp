@@ -150,6 +150,21 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   return finished;
 }
 
+void PoseFitter::preview(ReducedModel& model) const {
+  model.shape_space = stage_.data;
+  for (const ExampleGroup& group : stage_.groups) {
+    if (group.region.empty()) {
+      model.examples = group.examples;
+      continue;
+    }
+    RegionData& region = model.regions.emplace_back();
+    region.name = group.region;
+    region.index = std::ssize(model.regions) - 1;
+    region.vertices = flagged(group.view->inside());
+    region.examples = group.examples;
+  }
+}
+
 void PoseFitter::finish(const std::vector<TargetSpace>& targets, ReducedModel& model,
                         std::vector<std::string>& warnings) {
   FunctionCounter counter(model.object->mesh, asset_.name);

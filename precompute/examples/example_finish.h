@@ -29,6 +29,9 @@ class PoseFitter {
   /// All poses that descriptors of a group stand for; of a free body without their rigid part.
   PoseCoordinates range(Eigen::Index group) const;
 
+  /// Puts copies of the shape space and of the example sets, as far as they do without a basis, into a model.
+  void preview(ReducedModel& model) const;
+
   /// Puts shape space, projections, examples and their targets, one for each group, into a model that has its modal
   /// basis; logs and records what of each example is lost. The stage is used up.
   void finish(const std::vector<TargetSpace>& targets, ReducedModel& model, std::vector<std::string>& warnings);

@@ -81,6 +81,14 @@ std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const 
   return result;
 }
 
+ExamplePoses known_example_poses(const ReducedModel& model, const std::string& region, PoseCoordinates coordinates) {
+  if (region.empty()) return {&*model.examples, {}, {}, std::move(coordinates)};
+  const ObjectData& body = *model.object;
+  const auto found = std::ranges::find(model.regions, region, &RegionData::name);
+  const FlagVector inside = flags(found->vertices, body.mesh.vertex_count());
+  return {&found->examples, RegionView(body.mesh, inside, body.fixed), {}, std::move(coordinates)};
+}
+
 FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                                      EnergyReference reference)
     : view_(poses.view), free_dofs_(system.free_dofs) {

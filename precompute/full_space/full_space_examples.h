@@ -30,6 +30,9 @@ ExamplePoses whole_body_example_poses(const ReducedModel& model, const ElasticSy
 std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const ElasticSystem& system,
                                                const std::vector<std::string>& regions);
 
+/// Of a region or, where its name is empty, of the whole body, in displacements that hold all targets.
+ExamplePoses known_example_poses(const ReducedModel& model, const std::string& region, PoseCoordinates coordinates);
+
 /// Example forces without a modal basis, of which those of docs/step_in_detail.md, "Target", are the Galerkin
 /// projection: with the m eigenfunctions Phi of the shape space, T u = Lambda Phi^T (M_s/V) u / V^(1/3), and the filter
 /// P u = M Phi Phi^T (M_s/V) u, U^T P U = T^+ T, and of a region D''^T P D''. f free degrees of freedom, K examples.

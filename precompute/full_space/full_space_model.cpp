@@ -18,11 +18,18 @@ void add_examples(const ReducedModel& model, const FullSpaceOptions& options, Fu
       log::warning(owner + ": the energies of the target leave out " + std::to_string(left_out) + " of " +
                    std::to_string(model.object->mesh.tet_count()) + " tets, which an example turns inside out");
   };
-  if (options.whole_body) add(whole_body_example_poses(model, full.system), options.energy_reference, model.asset_name);
+  const bool known = !options.coordinates.empty();
+  if (options.whole_body)
+    add(known ? known_example_poses(model, "", options.coordinates.front())
+              : whole_body_example_poses(model, full.system),
+        options.energy_reference, model.asset_name);
   if (options.regions.empty()) return;
   std::vector<std::string> names;
   for (const auto& region : options.regions) names.push_back(region.name);
-  const std::vector<ExamplePoses> poses = region_example_poses(model, full.system, names);
+  std::vector<ExamplePoses> poses;
+  if (!known) poses = region_example_poses(model, full.system, names);
+  for (std::size_t i = 0; known && i < names.size(); ++i)
+    poses.push_back(known_example_poses(model, names[i], options.coordinates[i + (options.whole_body ? 1 : 0)]));
   for (std::size_t i = 0; i < poses.size(); ++i)
     add(poses[i], options.regions[i].energy_reference, model.asset_name + ", region " + names[i]);
 }

@@ -43,6 +43,9 @@ struct FullSpaceOptions {
     EnergyReference energy_reference = EnergyReference::kExample;
   };
   std::vector<Region> regions{};  ///< whose examples to have
+  /// Displacements that hold all their targets, of the whole body, if it is asked for, then of the regions; or none:
+  /// targets are sought among all poses that descriptors stand for.
+  std::vector<PoseCoordinates> coordinates{};
 };
 
 /// From /object; /contact if it is there; with examples also /examples or /regions, /shape_space and /modal. Throws

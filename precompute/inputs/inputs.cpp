@@ -69,6 +69,13 @@ FlagVector flag(const std::optional<VertexSelection>& selection, std::uint8_t ab
   return in_file(checked.report.kept_vertices);
 }
 
+std::vector<std::int64_t> ids_of(const FlagVector& flags) {
+  std::vector<std::int64_t> ids;
+  for (Eigen::Index v = 0; v < flags.size(); ++v)
+    if (flags[v] != 0) ids.push_back(v);
+  return ids;
+}
+
 // How the vertices of a mesh are numbered in its file.
 struct FileNumbers {
   std::vector<std::int32_t> kept;  // new index -> index in the file
@@ -284,6 +291,9 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files) {
                                       checked.report.kept_tets, files);
   object.fixed = flag(asset.fixed, 0, asset, checked, files);
   object.contact = flag(asset.contact_vertices, 1, asset, checked, files);
+  if (asset.training.loads)
+    for (const ForceLoadConfig& force : asset.training.loads->forces)
+      object.pushed.push_back(ids_of(flag(force.vertices, 0, asset, checked, files)));
   object.file_tets = checked.file_tets;
   object.kept_vertices = checked.report.kept_vertices;
   object.kept_tets = checked.report.kept_tets;

@@ -19,6 +19,7 @@ struct ObjectInput {
       file_tets;  ///< corner indices as in the file, 4 n_t of it: what "same connectivity" compares
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file
   VertexArray file_positions;                          ///< of all vertices in the file
+  std::vector<std::vector<std::int64_t>> pushed;       ///< vertices of each of the forces of basis.loads
 };
 
 /// One posed example, on the mesh of the rest example or another.

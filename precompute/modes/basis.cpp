@@ -52,6 +52,35 @@ void orthonormalise(const SparseMatrix& mass, Eigen::MatrixXd& columns) {
   gram.llt().matrixU().solveInPlace<Eigen::OnTheRight>(columns);
 }
 
+// The components that are asked for in the complement of the basis so far.
+void fill_up(const BasisInput& input, int size, Eigen::MatrixXd& basis) {
+  const auto& mass = input.system.mass;
+  Eigen::MatrixXd snapshots = scaled_snapshots(input);
+  remove_components(mass, basis, snapshots);
+  const Eigen::MatrixXd components = principal_components(mass, snapshots, size - basis.cols());
+  if (basis.cols() + components.cols() < size)
+    throw InputError(
+        {"", "/basis/size",
+         "at most " + std::to_string(basis.cols() + components.cols()) + ", the number of independent snapshots",
+         std::to_string(size), "ask for fewer, or for more basis.linear_modes"});
+  const Eigen::Index before = basis.cols();
+  basis.conservativeResize(Eigen::NoChange, size);
+  basis.rightCols(size - before) = components;
+}
+
+void finish(const BasisInput& input, Eigen::MatrixXd& basis) {
+  for (int pass = 0; pass < 2; ++pass) {
+    remove_components(input.system.mass, input.system.null_space, basis);
+    orthonormalise(input.system.mass, basis);
+  }
+  fix_signs(basis);
+}
+
+// All of the columns have unit norm together.
+Eigen::MatrixXd of_unit_norm(const SparseMatrix& norm, const Eigen::MatrixXd& columns) {
+  return columns / std::sqrt(columns.cwiseProduct(norm * columns).sum());
+}
+
 }  // namespace
 
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
@@ -63,22 +92,35 @@ Eigen::MatrixXd modal_basis(const BasisInput& input, int size) {
     for (auto field : fields.colwise()) field /= std::sqrt(field.dot(mass * field));
     basis = principal_components(mass, fields, std::max<Eigen::Index>(1, size / 2));
   }
-  Eigen::MatrixXd snapshots = scaled_snapshots(input);
-  remove_components(mass, basis, snapshots);
-  const Eigen::MatrixXd components = principal_components(mass, snapshots, size - basis.cols());
-  if (basis.cols() + components.cols() < size)
-    throw InputError(
-        {"", "/basis/size",
-         "at most " + std::to_string(basis.cols() + components.cols()) + ", the number of independent snapshots",
-         std::to_string(size), "ask for fewer, or for more basis.linear_modes"});
-  Eigen::MatrixXd result(mass.rows(), size);
-  result << basis, components;
-  for (int pass = 0; pass < 2; ++pass) {
-    remove_components(mass, input.system.null_space, result);
-    orthonormalise(mass, result);
+  fill_up(input, size, basis);
+  finish(input, basis);
+  return basis;
+}
+
+Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size) {
+  const ElasticSystem& system = input.system;
+  const Eigen::VectorXd& values = input.modes.eigenvalues;
+  const double decay = values[general ? 0 : std::min<Eigen::Index>(4, values.size() - 1)];
+  const SparseMatrix norm = system.mass + system.stiffness / decay;
+  Eigen::MatrixXd columns = snapshots;
+  if (general) {
+    Eigen::MatrixXd modal(snapshots.rows(), 0);
+    const auto add = [&](const Eigen::MatrixXd& more) {
+      modal.conservativeResize(Eigen::NoChange, modal.cols() + more.cols());
+      modal.rightCols(more.cols()) = more;
+    };
+    add(of_unit_norm(norm, scaled_snapshots(input)));
+    if (input.example_fields.cols() > 0) add(of_unit_norm(norm, input.example_fields));
+    columns.conservativeResize(Eigen::NoChange, snapshots.cols() + modal.cols());
+    columns.leftCols(snapshots.cols()) = of_unit_norm(norm, snapshots);
+    columns.rightCols(modal.cols()) = of_unit_norm(norm, modal);
   }
-  fix_signs(result);
-  return result;
+  remove_components(system.mass, system.null_space, columns);
+  Eigen::MatrixXd basis = principal_components(norm, columns, size);
+  orthonormalise(system.mass, basis);
+  if (basis.cols() < size) fill_up(input, size, basis);
+  finish(input, basis);
+  return basis;
 }
 
 }  // namespace exmat::precompute

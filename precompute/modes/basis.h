@@ -18,4 +18,10 @@ struct BasisInput {
 /// Throws InputError (without a file) where the snapshots span fewer than r dimensions.
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 
+/// The same of `snapshots` [f x N] of motions: their principal components in the norm M + K / omega_5^2, which weighs
+/// displacement and strain alike. With `general`, those of the snapshots and of what modal_basis() is made of, each of
+/// unit norm together, in M + K / omega_1^2: for loads that the snapshots do not know. Where all this spans fewer than
+/// r dimensions, modes and derivatives fill it up.
+Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size);
+
 }  // namespace exmat::precompute

@@ -23,6 +23,7 @@
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
 #include "precompute/targets/target_space.h"
+#include "precompute/training/training_stage.h"
 
 namespace exmat::precompute {
 namespace {
@@ -103,9 +104,9 @@ std::string text_of(const Needs& needs) {
 
 class Pipeline {
  public:
-  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildFolders& folders)
-      : asset_(asset), needs_(needs), report_(report), alignment_folder_(folders.alignment_report) {
-    if (!folders.cache.empty()) cache_ = StageCache(folders.cache);
+  Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildOptions& options)
+      : asset_(asset), needs_(needs), report_(report), options_(options) {
+    if (!options.cache.empty()) cache_ = StageCache(options.cache);
   }
 
   void read();
@@ -124,13 +125,20 @@ class Pipeline {
   void leave_out(const std::string& group, const std::string& reason);
   TargetSpace target_space(const ElasticSystem& system, const PoseFitter& fitter, Eigen::Index group);
   std::vector<TargetSpace> target_spaces(const ElasticSystem& system, const PoseFitter& fitter);
+  struct Motions : TrainingSet {
+    bool general = false;
+  };
+  std::optional<Motions> train(const ReducedModel& model, const ElasticSystem& system, const LinearModes& modes,
+                               const PoseFitter* fitter, const std::vector<TargetSpace>& targets);
+  std::string training_text() const;
+  void require_vertices(const TrainingLoads& loads) const;
   void add_internal_force(ReducedModel& model);
   void add_contact(ReducedModel& model);
 
   const AssetConfig& asset_;
   const Needs& needs_;
   BuildReport& report_;
-  const std::filesystem::path alignment_folder_;
+  const BuildOptions& options_;
   StageCache cache_;
   ObjectInput object_;
   std::optional<ExampleInput> examples_;
@@ -215,6 +223,58 @@ std::vector<TargetSpace> Pipeline::target_spaces(const ElasticSystem& system, co
   return spaces;
 }
 
+// A scene is an input where its loads are trained on.
+std::string Pipeline::training_text() const {
+  const bool of_scene = asset_.training.from == Training::kAuto || asset_.training.from == Training::kScene;
+  if (!of_scene || options_.scene == nullptr) return "";
+  TrainingBody body{.free = !object_.fixed.any(), .size = 1, .angular_frequency = 1, .groups = {""}};
+  for (const RegionConfig& region : asset_.regions) body.groups.push_back(region.name);
+  return text_of(scene_loads(*options_.scene, body));
+}
+
+void Pipeline::require_vertices(const TrainingLoads& loads) const {
+  for (std::size_t i = 0; i < loads.forces.size(); ++i)
+    for (const std::int64_t vertex : loads.forces[i].vertices)
+      if (vertex < 0 || vertex >= object_.mesh.vertex_count())
+        throw InputError({options_.scene->file.string(), fmt::format("/forces/{}/vertices", i),
+                          fmt::format("vertices of the object, 0 to {}", object_.mesh.vertex_count() - 1),
+                          std::to_string(vertex), ""});
+}
+
+std::optional<Pipeline::Motions> Pipeline::train(const ReducedModel& model, const ElasticSystem& system,
+                                                 const LinearModes& modes, const PoseFitter* fitter,
+                                                 const std::vector<TargetSpace>& targets) {
+  ReducedModel body;
+  body.asset_name = model.asset_name;
+  body.object = model.object;
+  if (fitter) fitter->preview(body);
+  const TrainingInput input{body, system, modes, targets};
+  const TrainingPlan plan = plan_training(asset_.training, options_.scene, object_.pushed, training_body(input));
+  log::info(fmt::format("training: {}", plan.reason));
+  if (!plan.loads.deforms(!system.constrained())) return std::nullopt;
+  require_vertices(plan.loads);
+  if (plan.loads.obstacle)
+    body.contact = contact_data(*body.object, RowMatrix::Zero(3 * object_.mesh.vertex_count(), 1), object_.contact,
+                                asset_.contact_count);
+  return timed("training", [&] {
+    const std::uint64_t seed = asset_.training.seed.value_or(asset_.seed);
+    const auto work = [&] { return run_training(input, plan.loads, asset_.training, seed, options_.training_budget); };
+    // What a budget cuts short is not what another run would find.
+    TrainingSet set = options_.training_budget > 0
+                          ? work()
+                          : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs, targets,
+                                       object_.contact, text_of(plan.loads), asset_.training.segments,
+                                       asset_.training.seconds, seed);
+    log::info(fmt::format("training: {} runs of {} steps in full space, {} snapshots", set.runs.segments,
+                          set.runs.steps, set.runs.snapshots.cols()));
+    if (set.runs.skipped > 0)
+      warn(report_.warnings, fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
+                                         "not stay finite; the bundle is not the same in every run",
+                                         set.runs.skipped, set.runs.skipped + set.runs.segments));
+    return std::optional<Motions>({std::move(set), plan.general});
+  });
+}
+
 void Pipeline::add_contact(ReducedModel& model) {
   if (!includes(report_.ledger, "contact")) return;
   model.contact = timed("contact", [&] {
@@ -241,7 +301,8 @@ void Pipeline::read() {
 
   if (includes(report_.ledger, "render"))
     render_ = timed("render mesh", [&] { return read_render_mesh(asset_, object_, report_.inputs, report_.warnings); });
-  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_));
+  report_.input_sha256 = hash_inputs(
+      report_.inputs, generator() + "\n" + text_of(needs_) + training_text());
 }
 
 ReducedModel Pipeline::run() {
@@ -257,7 +318,8 @@ ReducedModel Pipeline::run() {
   if (examples_)
     shape = timed("shape space and examples",
                   [&] { return build_shape_stage(asset_, object_, *examples_, cache_, report_.warnings); });
-  if (shape && !alignment_folder_.empty()) write_alignment_report(object_.mesh, *examples_, *shape, alignment_folder_);
+  if (shape && !options_.alignment_report.empty())
+    write_alignment_report(object_.mesh, *examples_, *shape, options_.alignment_report);
   if (shape) require_aligned(asset_, shape->alignments, report_.warnings);
 
   const auto system =
@@ -293,17 +355,21 @@ ReducedModel Pipeline::run() {
   solver.reset();
   std::vector<TargetSpace> targets;
   if (fitter) targets = target_spaces(system, *fitter);
+  const std::optional<Motions> training = train(model, system, modes, fitter ? &*fitter : nullptr, targets);
   const auto basis = timed("basis", [&] {
     Eigen::MatrixXd fields;
     if (shape && asset_.example_fields) fields = fitter->fields();
-    return modal_basis({system, modes, derivatives, size, fields}, asset_.basis_size);
+    const BasisInput input{system, modes, derivatives, size, fields};
+    return training ? trained_basis(input, training->runs.snapshots, training->general, asset_.basis_size)
+                    : modal_basis(input, asset_.basis_size);
   });
   model.modal = modal_data(system, modes, system.extend(basis));
   if (shape) timed("weights of the examples", [&] { fitter->finish(targets, model, report_.warnings); });
   fitter.reset();
 
   model.cubature = timed("cubature", [&] {
-    const auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
+    auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
+    if (training) set_motions(training->runs.snapshots, training->heldout.snapshots, system, basis, source);
     const CubatureOptions options{asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
                                   asset_.training_poses, asset_.seed};
     return cache_.get(
@@ -352,19 +418,19 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
 }
 
 ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
-                                 const BuildFolders& folders) {
+                                 const BuildOptions& options) {
   report.inputs.push_back(asset.file);
   return with_file_named(asset, [&] {
-    Pipeline pipeline(asset, needs, report, folders);
+    Pipeline pipeline(asset, needs, report, options);
     ReducedModel model = pipeline.run();
     report.cache = pipeline.cache().uses();
     return model;
   });
 }
 
-void read_inputs(const AssetConfig& asset, const Needs& needs, BuildReport& report) {
+void read_inputs(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildOptions& options) {
   report.inputs.push_back(asset.file);
-  with_file_named(asset, [&] { Pipeline(asset, needs, report, {}).read(); });
+  with_file_named(asset, [&] { Pipeline(asset, needs, report, options).read(); });
 }
 
 std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::filesystem::path& alignment_folder,

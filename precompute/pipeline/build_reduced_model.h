@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/config/asset_config.h"
+#include "common/config/scene_config.h"
 #include "common/model/needs.h"
 #include "common/model/reduced_model.h"
 #include "precompute/examples/alignment_verdict.h"
@@ -16,20 +17,22 @@ namespace exmat::precompute {
 /// What the bundle is to hold: of the scene if there is one, else of the asset's `needs`, else all that applies.
 Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs);
 
-/// Folders that a build writes into beside the bundle; empty: none.
-struct BuildFolders {
-  std::filesystem::path alignment_report{}, cache{};
+/// What a build may take beside the asset.
+struct BuildOptions {
+  std::filesystem::path alignment_report{}, cache{};  ///< folders that it writes into; empty: none
+  const SceneConfig* scene = nullptr;                 ///< whose loads basis and cubature may learn from
+  double training_budget = 0;                         ///< most time for training [s]; 0: no limit
 };
 
 /// The offline stage from files to model. Logs each stage and its time. Takes stages from the cache that it has, and
 /// keeps those that it computes there. Throws InputError for bad input, WorkError for failures, alignments that are
 /// refused among them.
 ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
-                                 const BuildFolders& folders = {});
+                                 const BuildOptions& options = {});
 
 /// Reads and checks what the bundle is computed from, and sets the report's inputs, ledger and input_sha256 as
 /// build_reduced_model does. Throws as it does.
-void read_inputs(const AssetConfig& asset, const Needs& needs, BuildReport& report);
+void read_inputs(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildOptions& options = {});
 
 /// Reads and checks the inputs of an asset and aligns its examples, computes nothing more. Returns what came of the
 /// examples, refusals among them. Throws as build_reduced_model.

@@ -1,0 +1,123 @@
+#include "precompute/training/training_runs.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "common/core/progress.h"
+#include "common/core/timer.h"
+#include "precompute/full_space/full_space_stepper.h"
+#include "precompute/full_space/step_potential.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr int kStepsPerSnapshot = 2;
+constexpr double kDamping = 0.03;  // of the stiffness, over omega_1
+
+struct ChainRun {
+  std::vector<Eigen::VectorXd> snapshots;
+  std::int64_t segments = 0, skipped = 0, steps = 0;
+};
+
+class ChainRunner {
+ public:
+  ChainRunner(const FullSpaceModel& model, const TrainingRunOptions& options, const Timer& timer)
+      : model_(model), options_(options), timer_(timer) {
+    scene_.time_step = 2 * std::numbers::pi / options.angular_frequency / kStepsPerPeriod;
+    scene_.stiffness_damping = kDamping / options.angular_frequency;
+    scene_.newton = {20, 1e-6};
+  }
+
+  template <typename Advance>
+  ChainRun run(const Chain& chain, Advance advance);
+
+ private:
+  void set_loads(const Segment& segment);
+  FullSpaceState begin(const Segment& segment) const;
+
+  const FullSpaceModel& model_;
+  const TrainingRunOptions& options_;
+  const Timer& timer_;
+  FullSpaceScene scene_;
+};
+
+void ChainRunner::set_loads(const Segment& segment) {
+  scene_.gravity = segment.gravity;
+  scene_.forces = segment.forces;
+  scene_.examples = segment.examples;
+  scene_.obstacles.clear();
+  if (segment.obstacle) scene_.obstacles.push_back(*segment.obstacle);
+}
+
+FullSpaceState ChainRunner::begin(const Segment& segment) const {
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(model_.rest.size());
+  if (!model_.frame) return make_full_space_state(model_, rest, rest);
+  return make_full_space_state(model_, rest, segment.motion);
+}
+
+template <typename Advance>
+ChainRun ChainRunner::run(const Chain& chain, Advance advance) {
+  ChainRun result;
+  FullSpaceWorkspace workspace(model_);
+  FullSpaceState state = begin(chain.front());
+  bool sound = true;
+  for (const Segment& segment : chain) {
+    const auto steps = std::max<std::int64_t>(1, std::llround(segment.duration / scene_.time_step));
+    const bool late = options_.budget > 0 && timer_.seconds() > options_.budget;
+    if (!sound || late) {
+      ++result.skipped;
+      advance(steps);
+      continue;
+    }
+    set_loads(segment);
+    state.begins_anew = true;
+    for (std::int64_t i = 0; i < steps && sound; ++i) {
+      sound = (step(model_, scene_, state, workspace).status & runtime::kStepNonFinite) == 0;
+      ++result.steps;
+      advance(1);
+      if (sound && (i + 1) % kStepsPerSnapshot == 0)
+        result.snapshots.push_back(Deformation(model_, state.q).u());
+    }
+    ++(sound ? result.segments : result.skipped);
+  }
+  return result;
+}
+
+std::int64_t step_count(const std::vector<Chain>& chains, double time_step) {
+  std::int64_t count = 0;
+  for (const Chain& chain : chains)
+    for (const Segment& segment : chain) count += std::max<std::int64_t>(1, std::llround(segment.duration / time_step));
+  return count;
+}
+
+}  // namespace
+
+TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>& chains,
+                          const TrainingRunOptions& options) {
+  const Timer timer;
+  const double time_step = 2 * std::numbers::pi / options.angular_frequency / kStepsPerPeriod;
+  Progress progress("training runs", step_count(chains, time_step));
+  std::vector<ChainRun> runs(chains.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t i = 0; i < chains.size(); ++i)
+    runs[i] = ChainRunner(model, options, timer).run(chains[i], [&](std::int64_t steps) {
+#pragma omp critical(training_progress)
+      progress.advance(steps);
+    });
+  TrainingRuns all;
+  Eigen::Index count = 0;
+  for (const ChainRun& run : runs) {
+    all.segments += run.segments;
+    all.skipped += run.skipped;
+    all.steps += run.steps;
+    count += std::ssize(run.snapshots);
+  }
+  all.snapshots.resize(model.size(), count);
+  Eigen::Index column = 0;
+  for (ChainRun& run : runs)
+    for (const Eigen::VectorXd& snapshot : run.snapshots) all.snapshots.col(column++) = snapshot;
+  return all;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "precompute/full_space/full_space_model.h"
+#include "precompute/training/training_segments.h"
+
+namespace exmat::precompute {
+
+struct TrainingRunOptions {
+  double angular_frequency = 0;  ///< omega_1 [rad/s]: the time step and the damping follow it
+  double budget = 0;             ///< [s]; no segment begins after it; 0: none
+};
+
+/// How the body deforms in runs with all its degrees of freedom.
+struct TrainingRuns {
+  Eigen::MatrixXd snapshots;  ///< f x N, of a free body in the frame that fits it best
+  std::int64_t segments = 0;  ///< that were run
+  std::int64_t skipped = 0;   ///< that the budget left no time for, or that did not stay finite
+  std::int64_t steps = 0;
+};
+
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, TrainingRuns& value) {
+  pass_all(archive, value.snapshots, value.segments, value.skipped, value.steps);
+}
+
+/// [1/s] time steps in a period of the lowest mode.
+constexpr int kStepsPerPeriod = 200;
+
+/// Runs chains of segments side by side. Without a budget the same in every run and for every number of threads.
+TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>& chains,
+                          const TrainingRunOptions& options);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/config/asset_config.h"
+#include "common/model/reduced_model.h"
+#include "precompute/modes/linear_modes.h"
+#include "precompute/targets/target_space.h"
+#include "precompute/training/training_loads.h"
+#include "precompute/training/training_runs.h"
+
+namespace exmat::precompute {
+
+/// The motions that basis and cubature learn from, and others that they are judged by.
+struct TrainingSet {
+  TrainingRuns runs, heldout;
+};
+
+/// What the stage cache keeps of it.
+template <typename Archive>
+void pass_members(Archive& archive, TrainingSet& value) {
+  pass_all(archive, value.runs, value.heldout);
+}
+
+/// A body that runs are made of, before it has a basis.
+struct TrainingInput {
+  const ReducedModel& model;  ///< /object, the shape space and example sets of `targets`, /contact where it is thrown
+  const ElasticSystem& system;
+  const LinearModes& modes;
+  const std::vector<TargetSpace>& targets;  ///< of the model's whole body, if it has examples, then of its regions
+};
+
+TrainingBody training_body(const TrainingInput& input);
+
+/// Runs the training's segments and two held-out ones, of loads drawn anew. `budget` [s], 0: none.
+TrainingSet run_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
+                         std::uint64_t seed, double budget);
+
+}  // namespace exmat::precompute
