@@ -77,6 +77,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.targets.emplace();
   else if (group == "target_space")
     model.target_space.emplace();
+  else if (group == "fidelity")
+    model.fidelity.emplace();
   else if (group == "regions")
     return;
   else if (group == "rigid")

@@ -155,6 +155,26 @@ void visit_target_space(const FieldPlace& place, Space& space, Visitor& visit) {
   visit.dataset("poisson_ratio", space.poisson_ratio);
 }
 
+template <typename Fidelity, typename Visitor>
+void visit_fidelity(Fidelity& fidelity, Visitor& visit) {
+  enter(kTopPlace, "/fidelity", visit);
+  visit.attribute("loads", fidelity.loads);
+  visit.attribute("basis", fidelity.basis);
+  visit.attribute("advice", fidelity.advice);
+  visit.attribute("training_runs", fidelity.training_runs);
+  visit.attribute("heldout_runs", fidelity.heldout_runs);
+  visit.attribute("position_error", fidelity.position_error);
+  visit.attribute("shape_error", fidelity.shape_error);
+  visit.attribute("end_error", fidelity.end_error);
+  visit.attribute("settled_error", fidelity.settled_error);
+  visit.attribute("all_elements_error", fidelity.all_elements_error);
+  visit.attribute("modal_error", fidelity.modal_error);
+  visit.attribute("captured_energy", fidelity.captured_energy);
+  visit.attribute("target_error", fidelity.target_error);
+  visit.attribute("worst_vertex", fidelity.worst_vertex);
+  visit.attribute("worst_distance", fidelity.worst_distance);
+}
+
 template <typename Region, typename Visitor>
 void visit_region(Region& region, Visitor& visit) {
   const FieldPlace place{"/regions/{region}", "/regions/" + region.name};
@@ -221,6 +241,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.projection) visit_projection(kTopPlace, *model.projection, visit);
   if (model.targets) visit_targets(kTopPlace, *model.targets, visit);
   if (model.target_space) visit_target_space(kTopPlace, *model.target_space, visit);
+  if (model.fidelity) visit_fidelity(*model.fidelity, visit);
   if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);
   if (model.contact) visit_contact(*model.contact, visit);

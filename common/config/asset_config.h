@@ -139,7 +139,8 @@ struct AssetConfig {
   Weighting weighting = Weighting::kEigenvalue;
   AlignmentConfig alignment;
 
-  int basis_size = 30;  ///< r
+  int basis_size = 30;                    ///< r
+  std::optional<double> basis_tolerance;  ///< of the error in held-out runs, instead of a size
   int linear_modes = 15;
   bool example_fields = true;
   TrainingConfig training;

@@ -63,6 +63,7 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
       {"projection", examples.included, 0, example_reason},
       plan_targets(needs, examples, example_count),
       plan_target_space(needs, examples),
+      {"fidelity", needs.fidelity, 0, needs.fidelity ? "runs in full space to compare with" : "nothing was trained on"},
       regions,
       {"rigid", rigid, 0, rigid_reason},
       {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"},

@@ -28,6 +28,7 @@ struct Needs {
   bool carried = false;                               ///< /rigid, of a body with fixed vertices that a motion carries
   bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
   bool target_space = true;                           ///< /target_space
+  bool fidelity = false;                              ///< /fidelity: of what came of training, of no use to a step
   bool contact = true;                                ///< /contact
   bool render = true;                                 ///< /render, of an asset that names a render mesh
   std::optional<std::vector<RegionNeeds>> regions{};  ///< /regions, those named; absent: all, with tables as `targets`

@@ -201,7 +201,7 @@ struct Choice {
   Eigen::VectorXd weights;
 };
 
-Choice all_elements(Eigen::Index tets) {
+Choice every_element(Eigen::Index tets) {
   Choice choice{std::vector<Eigen::Index>(static_cast<std::size_t>(tets)), Eigen::VectorXd::Ones(tets)};
   std::iota(choice.elements.begin(), choice.elements.end(), 0);
   return choice;
@@ -209,7 +209,7 @@ Choice all_elements(Eigen::Index tets) {
 
 Choice choose(const ElementSamples& samples, const PoseSource& source, const CubatureOptions& options,
               const ErrorMeter& training, const ErrorMeter& heldout) {
-  if (options.method == CubatureMethod::kAllElements) return all_elements(samples.count());
+  if (options.method == CubatureMethod::kAllElements) return every_element(samples.count());
   const RowMatrix& poses = training.poses();
   const Totals& totals = training.totals();
   const TrainingRows rows(source, totals.response);
@@ -240,6 +240,25 @@ Choice choose(const ElementSamples& samples, const PoseSource& source, const Cub
   return choice;
 }
 
+void set_elements(const ElementSamples& samples, const TetMaterials& materials, const Choice& choice,
+                  CubatureData& data) {
+  const auto s = static_cast<Eigen::Index>(choice.elements.size());
+  data.elements.resize(s);
+  data.weights = choice.weights;
+  data.volumes.resize(s);
+  data.gradient.resize(9 * s, samples.modes());
+  data.youngs_modulus.resize(s);
+  data.poisson_ratio.resize(s);
+  for (Eigen::Index j = 0; j < s; ++j) {
+    const Eigen::Index tet = choice.elements[static_cast<std::size_t>(j)];
+    data.elements[j] = static_cast<std::int32_t>(tet);
+    data.volumes[j] = samples.volume(tet);
+    data.gradient.middleRows(9 * j, 9) = samples.gradient(tet);
+    data.youngs_modulus[j] = materials.youngs_modulus[tet];
+    data.poisson_ratio[j] = materials.poisson_ratio[tet];
+  }
+}
+
 void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
   if (options.elements && *options.elements > tets)
     throw InputError({"", "/cubature/elements", "at most the number of tets, " + std::to_string(tets),
@@ -253,6 +272,14 @@ void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
 }
 
 }  // namespace
+
+CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis) {
+  const ElementSamples samples(mesh, materials, basis);
+  CubatureData data;
+  data.method = CubatureMethod::kAllElements;
+  set_elements(samples, materials, every_element(samples.count()), data);
+  return data;
+}
 
 CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                                const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
@@ -272,22 +299,8 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
   const ErrorMeter heldout(samples, source, data.heldout_poses);
   const auto choice = choose(samples, source, options, training, heldout);
 
-  const auto s = static_cast<Eigen::Index>(choice.elements.size());
   data.method = options.method;
-  data.elements.resize(s);
-  data.weights = choice.weights;
-  data.volumes.resize(s);
-  data.gradient.resize(9 * s, samples.modes());
-  data.youngs_modulus.resize(s);
-  data.poisson_ratio.resize(s);
-  for (Eigen::Index j = 0; j < s; ++j) {
-    const Eigen::Index tet = choice.elements[static_cast<std::size_t>(j)];
-    data.elements[j] = static_cast<std::int32_t>(tet);
-    data.volumes[j] = samples.volume(tet);
-    data.gradient.middleRows(9 * j, 9) = samples.gradient(tet);
-    data.youngs_modulus[j] = materials.youngs_modulus[tet];
-    data.poisson_ratio[j] = materials.poisson_ratio[tet];
-  }
+  set_elements(samples, materials, choice, data);
   data.training_error = training.force_error(choice.elements, choice.weights);
   const auto errors = heldout.all_errors(choice.elements, choice.weights);
   data.heldout_error = errors.force;
@@ -297,7 +310,7 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
     throw WorkError(
         fmt::format("cubature.tolerance: expected a held-out error of at most {:.3g}, found {:.3g} with {} elements; "
                     "raise it, or lower basis.size",
-                    *options.tolerance, data.heldout_error, s));
+                    *options.tolerance, data.heldout_error, data.elements.size()));
   return data;
 }
 

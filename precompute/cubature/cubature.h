@@ -36,6 +36,9 @@ CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& material
                                const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
                                const RowMatrix& poses);
 
+/// All tets with the weight 1, no errors measured.
+CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis);
+
 /// Chooses elements and weights on training poses and measures them on held-out ones. Throws InputError (without
 /// a file) where the options do not fit the mesh, WorkError where a tolerance cannot be met.
 CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,

@@ -61,7 +61,7 @@ std::string advice_on_loss(const ExampleData& example, Eigen::Index functions, E
   return fmt::format("the first {} do not carry it", kMostFunctions);
 }
 
-void log_losses(const ExampleGroup& group, const AssetConfig& asset, FunctionCounter& counter, const ExampleSet& set,
+void log_group(const ExampleGroup& group, const AssetConfig& asset, FunctionCounter& counter, const ExampleSet& set,
                 std::vector<std::string>& warnings) {
   const std::string where = group.region.empty() ? "" : fmt::format(" in region {}", group.region);
   for (Eigen::Index k = 0; k < group.fields.cols(); ++k) {
@@ -81,6 +81,16 @@ IndexVector flagged(const FlagVector& flags) {
   for (Eigen::Index v = 0; v < flags.size(); ++v)
     if (flags[v] != 0) vertices.push_back(static_cast<std::int32_t>(v));
   return Eigen::Map<const IndexVector>(vertices.data(), std::ssize(vertices));
+}
+
+// Without projection and targets.
+RegionData region_of(const ExampleGroup& group, std::int64_t index) {
+  RegionData region;
+  region.name = group.region;
+  region.index = index;
+  region.vertices = flagged(group.view->inside());
+  region.examples = group.examples;
+  return region;
 }
 
 }  // namespace
@@ -127,11 +137,11 @@ Eigen::MatrixXd PoseFitter::pull(std::size_t index, const ProjectionData& projec
   return projection.reduced_from_shape * shape_changes(stage_.object, stage_.weights, displacements);
 }
 
-PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedModel& model) {
-  ExampleGroup& group = stage_.groups[index];
+PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedModel& model) const {
+  const ExampleGroup& group = stage_.groups[index];
   const RowMatrix& basis = model.modal->basis;
   const bool whole = group.region.empty();
-  Finished finished{std::move(group.examples), direct_projection(stage_.object, stage_.weights, system_.full_mass,
+  Finished finished{group.examples, direct_projection(stage_.object, stage_.weights, system_.full_mass,
                                                                  whole ? basis : RowMatrix(group.view->see(basis)))};
   const RowMatrix map = whole && !system_.constrained()
                             ? finished.projection.reduced_from_shape
@@ -152,26 +162,18 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
 
 void PoseFitter::preview(ReducedModel& model) const {
   model.shape_space = stage_.data;
-  for (const ExampleGroup& group : stage_.groups) {
-    if (group.region.empty()) {
+  for (const ExampleGroup& group : stage_.groups)
+    if (group.region.empty())
       model.examples = group.examples;
-      continue;
-    }
-    RegionData& region = model.regions.emplace_back();
-    region.name = group.region;
-    region.index = std::ssize(model.regions) - 1;
-    region.vertices = flagged(group.view->inside());
-    region.examples = group.examples;
-  }
+    else
+      model.regions.push_back(region_of(group, std::ssize(model.regions)));
 }
 
-void PoseFitter::finish(const std::vector<TargetSpace>& targets, ReducedModel& model,
-                        std::vector<std::string>& warnings) {
-  FunctionCounter counter(model.object->mesh, asset_.name);
+void PoseFitter::put(const std::vector<TargetSpace>& targets, ReducedModel& model) const {
+  model.shape_space = stage_.data;
   for (std::size_t i = 0; i < stage_.groups.size(); ++i) {
     auto [examples, projection] = finish_group(i, model);
     const ExampleGroup& group = stage_.groups[i];
-    log_losses(group, asset_, counter, examples, warnings);
     const Eigen::MatrixXd pulled = pull(i, projection, targets[i]);
     if (group.region.empty()) {
       finish_targets(targets[i], pulled, model.target_space, model.targets);
@@ -179,15 +181,19 @@ void PoseFitter::finish(const std::vector<TargetSpace>& targets, ReducedModel& m
       model.examples = std::move(examples);
       continue;
     }
-    RegionData& region = model.regions.emplace_back();
-    region.name = group.region;
+    RegionData& region = model.regions.emplace_back(region_of(group, std::ssize(model.regions)));
     finish_targets(targets[i], pulled, region.target_space, region.targets);
-    region.index = std::ssize(model.regions) - 1;
-    region.vertices = flagged(group.view->inside());
     region.examples = std::move(examples);
     region.projection = std::move(projection);
   }
-  model.shape_space = std::move(stage_.data);
+}
+
+void PoseFitter::log_losses(const ReducedModel& model, std::vector<std::string>& warnings) const {
+  FunctionCounter counter(model.object->mesh, asset_.name);
+  auto region = model.regions.begin();
+  for (const ExampleGroup& group : stage_.groups)
+    log_group(group, asset_, counter, group.region.empty() ? *model.examples : (region++)->examples,
+                           warnings);
 }
 
 }  // namespace exmat::precompute

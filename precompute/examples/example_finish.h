@@ -33,21 +33,24 @@ class PoseFitter {
   void preview(ReducedModel& model) const;
 
   /// Puts shape space, projections, examples and their targets, one for each group, into a model that has its modal
-  /// basis; logs and records what of each example is lost. The stage is used up.
-  void finish(const std::vector<TargetSpace>& targets, ReducedModel& model, std::vector<std::string>& warnings);
+  /// basis.
+  void put(const std::vector<TargetSpace>& targets, ReducedModel& model) const;
+
+  /// Logs what of each example of a model is lost, and records what is worth a warning.
+  void log_losses(const ReducedModel& model, std::vector<std::string>& warnings) const;
 
  private:
   struct Finished {
     ExampleSet examples;
     ProjectionData projection;
   };
-  Finished finish_group(std::size_t group, const ReducedModel& model);
+  Finished finish_group(std::size_t group, const ReducedModel& model) const;
   Eigen::MatrixXd pull(std::size_t group, const ProjectionData& projection, const TargetSpace& targets) const;
 
   const AssetConfig& asset_;
   const ObjectInput& object_;
   const ElasticSystem& system_;
-  ShapeStage& stage_;
+  const ShapeStage& stage_;
   FieldClamp clamp_;
   std::vector<PoseFields> poses_;        // of the groups
   std::vector<Eigen::MatrixXd> fields_;  // f x (K-1), of the groups

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <memory>
-#include <numbers>
 #include <utility>
 
 #include "common/core/error.h"
@@ -18,12 +17,12 @@
 #include "precompute/examples/example_finish.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/fem/rigid_moments.h"
-#include "precompute/modes/basis.h"
 #include "precompute/modes/linear_modes.h"
+#include "precompute/pipeline/basis_stage.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
 #include "precompute/targets/target_space.h"
-#include "precompute/training/training_stage.h"
+#include "precompute/training/fidelity.h"
 
 namespace exmat::precompute {
 namespace {
@@ -121,19 +120,15 @@ class Pipeline {
 
   ObjectData object_data() const;
   void require_modes(const ElasticSystem& system) const;
-  ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const;
   void leave_out(const std::string& group, const std::string& reason);
   TargetSpace target_space(const ElasticSystem& system, const PoseFitter& fitter, Eigen::Index group);
   std::vector<TargetSpace> target_spaces(const ElasticSystem& system, const PoseFitter& fitter);
-  struct Motions : TrainingSet {
-    bool general = false;
-  };
-  std::optional<Motions> train(const ReducedModel& model, const ElasticSystem& system, const LinearModes& modes,
-                               const PoseFitter* fitter, const std::vector<TargetSpace>& targets);
+  std::optional<Motions> train(const BodyStages& stages, ReducedModel& body);
   std::string training_text() const;
   void require_vertices(const TrainingLoads& loads) const;
   void add_internal_force(ReducedModel& model);
   void add_contact(ReducedModel& model);
+  void add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice, ReducedModel& model);
 
   const AssetConfig& asset_;
   const Needs& needs_;
@@ -157,16 +152,6 @@ void Pipeline::require_modes(const ElasticSystem& system) const {
                     fmt::format("at most {} for a mesh of {} vertices, {} of them fixed", available - 1,
                                 object_.mesh.vertex_count(), object_.fixed.cast<int>().sum()),
                     std::to_string(asset_.linear_modes), "ask for fewer or refine the mesh"});
-}
-
-ModalData Pipeline::modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) const {
-  ModalData modal;
-  modal.frequencies = modes.eigenvalues.cwiseSqrt() / (2 * std::numbers::pi);
-  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(basis.rows(), 3);
-  for (int axis = 0; axis < 3; ++axis) directions(Eigen::seqN(axis, basis.rows() / 3, 3), axis).setOnes();
-  modal.gravity_load = (system.full_mass * directions).transpose() * basis;
-  modal.basis = std::move(basis);
-  return modal;
 }
 
 void Pipeline::leave_out(const std::string& group, const std::string& reason) {
@@ -241,14 +226,10 @@ void Pipeline::require_vertices(const TrainingLoads& loads) const {
                           std::to_string(vertex), ""});
 }
 
-std::optional<Pipeline::Motions> Pipeline::train(const ReducedModel& model, const ElasticSystem& system,
-                                                 const LinearModes& modes, const PoseFitter* fitter,
-                                                 const std::vector<TargetSpace>& targets) {
-  ReducedModel body;
-  body.asset_name = model.asset_name;
-  body.object = model.object;
-  if (fitter) fitter->preview(body);
-  const TrainingInput input{body, system, modes, targets};
+std::optional<Motions> Pipeline::train(const BodyStages& stages, ReducedModel& body) {
+  const ElasticSystem& system = stages.system;
+  if (stages.fitter != nullptr) stages.fitter->preview(body);
+  const TrainingInput input{body, system, stages.modes, stages.targets};
   const TrainingPlan plan = plan_training(asset_.training, options_.scene, object_.pushed, training_body(input));
   log::info(fmt::format("training: {}", plan.reason));
   if (!plan.loads.deforms(!system.constrained())) return std::nullopt;
@@ -258,20 +239,21 @@ std::optional<Pipeline::Motions> Pipeline::train(const ReducedModel& model, cons
                                 asset_.contact_count);
   return timed("training", [&] {
     const std::uint64_t seed = asset_.training.seed.value_or(asset_.seed);
-    const auto work = [&] { return run_training(input, plan.loads, asset_.training, seed, options_.training_budget); };
+    TrainingChains chains = draw_training(input, plan.loads, asset_.training, seed);
+    chains.options.budget = options_.training_budget;
+    const auto work = [&] { return run_training(input, chains); };
     // What a budget cuts short is not what another run would find.
     TrainingSet set = options_.training_budget > 0
                           ? work()
-                          : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs, targets,
-                                       object_.contact, text_of(plan.loads), asset_.training.segments,
+                          : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs,
+                                       stages.targets, object_.contact, text_of(plan.loads), asset_.training.segments,
                                        asset_.training.seconds, seed);
     log::info(fmt::format("training: {} runs of {} steps in full space, {} snapshots", set.runs.segments,
                           set.runs.steps, set.runs.snapshots.cols()));
     if (set.runs.skipped > 0)
       warn(report_.warnings, fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
-                                         "not stay finite; the bundle is not the same in every run",
-                                         set.runs.skipped, set.runs.skipped + set.runs.segments));
-    return std::optional<Motions>({std::move(set), plan.general});
+                                         "not stay finite", set.runs.skipped, set.runs.skipped + set.runs.segments));
+    return std::optional<Motions>({std::move(set), std::move(chains), plan.loads, plan.general, plan.reason});
   });
 }
 
@@ -284,6 +266,24 @@ void Pipeline::add_contact(ReducedModel& model) {
     throw InputError(
         {asset_.file.string(), "/contact/vertices", "vertices of the surface, some of them not fixed", "none", ""});
   log::info(fmt::format("contact: {} vertices", model.contact->areas.size()));
+}
+
+void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice,
+                            ReducedModel& model) {
+  model.fidelity = timed("fidelity", [&] {
+    ReducedModel whole = model;  // of a body that is thrown, even where the bundle is not to hold what that takes
+    if (!whole.rigid && !stages.system.constrained())
+      whole.rigid = rigid_moments(object_.mesh, object_.materials.density, model.modal->basis);
+    const RollOut run = final_roll_out(stages, whole, motions);
+    return fidelity_of({whole, run, choice.exact, choice.modal, motions.set.runs, motions.set.heldout, choice.trained,
+                        motions.reason});
+  });
+  auto& entry = *std::ranges::find(report_.ledger, "fidelity", &LedgerEntry::group);
+  entry.included = true;
+  entry.reason = "runs in full space to compare with";
+  const FidelityData& found = *model.fidelity;
+  log::info(fmt::format("fidelity: {:.2f} % from the full space in {} held-out runs, {:.2f} % of modes alone; {}",
+                        100 * found.shape_error, found.heldout_runs, 100 * found.modal_error, found.advice));
 }
 
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
@@ -355,21 +355,20 @@ ReducedModel Pipeline::run() {
   solver.reset();
   std::vector<TargetSpace> targets;
   if (fitter) targets = target_spaces(system, *fitter);
-  const std::optional<Motions> training = train(model, system, modes, fitter ? &*fitter : nullptr, targets);
-  const auto basis = timed("basis", [&] {
-    Eigen::MatrixXd fields;
-    if (shape && asset_.example_fields) fields = fitter->fields();
-    const BasisInput input{system, modes, derivatives, size, fields};
-    return training ? trained_basis(input, training->runs.snapshots, training->general, asset_.basis_size)
-                    : modal_basis(input, asset_.basis_size);
-  });
-  model.modal = modal_data(system, modes, system.extend(basis));
-  if (shape) timed("weights of the examples", [&] { fitter->finish(targets, model, report_.warnings); });
-  fitter.reset();
+  const BodyStages stages{asset_, object_, system, modes, derivatives, fitter ? &*fitter : nullptr, targets};
+  ReducedModel body;
+  body.asset_name = model.asset_name;
+  body.object = model.object;
+  const std::optional<Motions> motions = train(stages, body);
+  const BasisChoice choice =
+      timed("basis", [&] { return choose_basis(stages, body, motions ? &*motions : nullptr); });
+  const Eigen::MatrixXd& basis = choice.basis;
+  put_basis(stages, basis, model);
+  if (fitter) fitter->log_losses(model, report_.warnings);
 
   model.cubature = timed("cubature", [&] {
     auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
-    if (training) set_motions(training->runs.snapshots, training->heldout.snapshots, system, basis, source);
+    if (motions) set_motions(motions->set.runs.snapshots, motions->set.heldout.snapshots, system, basis, source);
     const CubatureOptions options{asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
                                   asset_.training_poses, asset_.seed};
     return cache_.get(
@@ -384,6 +383,7 @@ ReducedModel Pipeline::run() {
     model.rigid = timed("rigid moments",
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
   add_contact(model);
+  if (motions) add_fidelity(stages, *motions, choice, model);
   return model;
 }
 

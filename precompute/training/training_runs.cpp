@@ -12,11 +12,11 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr int kStepsPerSnapshot = 2;
+constexpr int kStepsPerPeriod = 200;  // of the lowest mode
 constexpr double kDamping = 0.03;  // of the stiffness, over omega_1
 
 struct ChainRun {
-  std::vector<Eigen::VectorXd> snapshots;
+  std::vector<Eigen::VectorXd> snapshots, displacements;
   std::int64_t segments = 0, skipped = 0, steps = 0;
 };
 
@@ -24,8 +24,8 @@ class ChainRunner {
  public:
   ChainRunner(const FullSpaceModel& model, const TrainingRunOptions& options, const Timer& timer)
       : model_(model), options_(options), timer_(timer) {
-    scene_.time_step = 2 * std::numbers::pi / options.angular_frequency / kStepsPerPeriod;
-    scene_.stiffness_damping = kDamping / options.angular_frequency;
+    scene_.time_step = time_step_of(options);
+    scene_.stiffness_damping = stiffness_damping_of(options);
     scene_.newton = {20, 1e-6};
   }
 
@@ -63,7 +63,7 @@ ChainRun ChainRunner::run(const Chain& chain, Advance advance) {
   FullSpaceState state = begin(chain.front());
   bool sound = true;
   for (const Segment& segment : chain) {
-    const auto steps = std::max<std::int64_t>(1, std::llround(segment.duration / scene_.time_step));
+    const std::int64_t steps = steps_of(segment, options_);
     const bool late = options_.budget > 0 && timer_.seconds() > options_.budget;
     if (!sound || late) {
       ++result.skipped;
@@ -76,28 +76,50 @@ ChainRun ChainRunner::run(const Chain& chain, Advance advance) {
       sound = (step(model_, scene_, state, workspace).status & runtime::kStepNonFinite) == 0;
       ++result.steps;
       advance(1);
-      if (sound && (i + 1) % kStepsPerSnapshot == 0)
-        result.snapshots.push_back(Deformation(model_, state.q).u());
+      if (!sound || (i + 1) % kStepsPerSnapshot != 0) continue;
+      result.snapshots.push_back(Deformation(model_, state.q).u());
+      if (options_.positions) result.displacements.push_back(state.q);
     }
     ++(sound ? result.segments : result.skipped);
   }
   return result;
 }
 
-std::int64_t step_count(const std::vector<Chain>& chains, double time_step) {
+std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptions& options) {
   std::int64_t count = 0;
   for (const Chain& chain : chains)
-    for (const Segment& segment : chain) count += std::max<std::int64_t>(1, std::llround(segment.duration / time_step));
+    for (const Segment& segment : chain) count += steps_of(segment, options);
   return count;
+}
+
+// [rows x N] of all runs.
+Eigen::MatrixXd collect(const std::vector<ChainRun>& runs, std::vector<Eigen::VectorXd> ChainRun::* member,
+                        Eigen::Index rows) {
+  Eigen::Index count = 0;
+  for (const ChainRun& run : runs) count += std::ssize(run.*member);
+  Eigen::MatrixXd all(rows, count);
+  Eigen::Index column = 0;
+  for (const ChainRun& run : runs)
+    for (const Eigen::VectorXd& one : run.*member) all.col(column++) = one;
+  return all;
 }
 
 }  // namespace
 
+double time_step_of(const TrainingRunOptions& options) {
+  return 2 * std::numbers::pi / options.angular_frequency / kStepsPerPeriod;
+}
+
+double stiffness_damping_of(const TrainingRunOptions& options) { return kDamping / options.angular_frequency; }
+
+std::int64_t steps_of(const Segment& segment, const TrainingRunOptions& options) {
+  return std::max<std::int64_t>(1, std::llround(segment.duration / time_step_of(options)));
+}
+
 TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>& chains,
                           const TrainingRunOptions& options) {
   const Timer timer;
-  const double time_step = 2 * std::numbers::pi / options.angular_frequency / kStepsPerPeriod;
-  Progress progress("training runs", step_count(chains, time_step));
+  Progress progress("training runs", step_count(chains, options));
   std::vector<ChainRun> runs(chains.size());
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t i = 0; i < chains.size(); ++i)
@@ -106,17 +128,17 @@ TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>&
       progress.advance(steps);
     });
   TrainingRuns all;
-  Eigen::Index count = 0;
   for (const ChainRun& run : runs) {
     all.segments += run.segments;
     all.skipped += run.skipped;
     all.steps += run.steps;
-    count += std::ssize(run.snapshots);
+    const std::int64_t before = all.chain_ends.empty() ? 0 : all.chain_ends.back();
+    all.chain_ends.push_back(before + std::ssize(run.snapshots));
   }
-  all.snapshots.resize(model.size(), count);
-  Eigen::Index column = 0;
-  for (ChainRun& run : runs)
-    for (const Eigen::VectorXd& snapshot : run.snapshots) all.snapshots.col(column++) = snapshot;
+  all.snapshots = collect(runs, &ChainRun::snapshots, model.size());
+  if (!options.positions) return all;
+  all.deformations = model.system.extend(all.snapshots);
+  all.displacements = model.system.extend(collect(runs, &ChainRun::displacements, model.size()));
   return all;
 }
 

@@ -55,24 +55,27 @@ TrainingBody training_body(const TrainingInput& input) {
   return body;
 }
 
-TrainingSet run_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
-                         std::uint64_t seed, double budget) {
+TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
+                             std::uint64_t seed) {
   const ObjectData& object = *input.model.object;
   const TrainingBody body = training_body(input);
   const double soft = compliance(input);
   const MassProperties mass = mass_properties(object.mesh, input.system.full_mass);
-  if (loads.any_gravity && body.free == false)
+  if (loads.any_gravity && !body.free)
     loads.gravity *= std::min(1.0, kMostSag * body.size / (loads.gravity.norm() * mass.mass * soft));
   const SegmentBody drawn{object.mesh.vertices, mass.centre.transpose(), free_surface(object), body.size,
                           kPatchDisplacement * body.size / soft};
   const double duration = config.seconds.value_or(kPeriods * 2 * std::numbers::pi / body.angular_frequency);
+  return {draw_segments(loads, drawn, {config.segments, duration, seed}),
+          draw_segments(loads, drawn, {kHeldoutSegments, duration, seed + kHeldoutSeed}),
+          {.angular_frequency = body.angular_frequency}};
+}
+
+TrainingSet run_training(const TrainingInput& input, const TrainingChains& chains) {
   const FullSpaceModel model = full_space_of(input);
-  const TrainingRunOptions options{body.angular_frequency, budget};
-  TrainingSet set;
-  set.runs = run_segments(model, draw_segments(loads, drawn, {config.segments, duration, seed}), options);
-  set.heldout =
-      run_segments(model, draw_segments(loads, drawn, {kHeldoutSegments, duration, seed + kHeldoutSeed}), options);
-  return set;
+  TrainingRunOptions whole = chains.options;
+  whole.positions = true;
+  return {run_segments(model, chains.runs, chains.options), run_segments(model, chains.heldout, whole)};
 }
 
 }  // namespace exmat::precompute

@@ -12,9 +12,15 @@
 
 namespace exmat::precompute {
 
-/// The motions that basis and cubature learn from, and others that they are judged by.
+/// The motions that basis and cubature learn from, and others, of loads drawn anew, that they are judged by.
 struct TrainingSet {
   TrainingRuns runs, heldout;
+};
+
+/// Chains of the two.
+struct TrainingChains {
+  std::vector<Chain> runs, heldout;
+  TrainingRunOptions options;
 };
 
 /// What the stage cache keeps of it.
@@ -33,8 +39,11 @@ struct TrainingInput {
 
 TrainingBody training_body(const TrainingInput& input);
 
-/// Runs the training's segments and two held-out ones, of loads drawn anew. `budget` [s], 0: none.
-TrainingSet run_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
-                         std::uint64_t seed, double budget);
+/// Draws the training's segments and two held-out ones.
+TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
+                             std::uint64_t seed);
+
+/// Runs them in full space.
+TrainingSet run_training(const TrainingInput& input, const TrainingChains& chains);
 
 }  // namespace exmat::precompute

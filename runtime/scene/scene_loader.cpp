@@ -99,22 +99,17 @@ RowMatrix basis_rows(const SceneConfig& config, const VertexForceConfig& force, 
   return rows;
 }
 
-ScriptedForce scripted_force(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
+ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
   const RowMatrix rows = basis_rows(config, force, loaded);
-  ScriptedForce scripted;
+  VertexArray positions;
+  if (loaded.model->frame->moves()) {
+    positions.resize(std::ssize(force.vertices), 3);
+    for (std::size_t i = 0; i < force.vertices.size(); ++i)
+      positions.row(static_cast<Eigen::Index>(i)) = loaded.data.object->mesh.vertices.row(force.vertices[i]);
+  }
+  ScriptedForce scripted = runtime::scripted_force(*loaded.model, rows, positions, force.force);
   scripted.start = force.start;
   scripted.end = force.end;
-  scripted.force = vertex_force(rows, force.force);
-  const BodyFrame& frame = *loaded.model->frame;
-  if (!frame.moves()) return scripted;
-  const auto count = static_cast<double>(force.vertices.size());
-  scripted.total = count * force.force;
-  scripted.mean_basis.setZero(3, rows.cols());
-  scripted.lever = -frame.centre_of_mass();
-  for (std::size_t i = 0; i < force.vertices.size(); ++i) {
-    scripted.lever += loaded.data.object->mesh.vertices.row(force.vertices[i]).transpose() / count;
-    scripted.mean_basis += rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) / count;
-  }
   return scripted;
 }
 
@@ -133,7 +128,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
-  for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force(config, force, loaded));
+  for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force_of(config, force, loaded));
   if (config.examples) scene.examples.push_back(example_settings(*config.examples));
   for (const RegionForceConfig& region : config.regions) scene.examples.push_back(example_settings(region.force));
   return scene;

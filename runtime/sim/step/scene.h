@@ -49,4 +49,9 @@ Eigen::VectorXd gravity_force(const Model& model, const Eigen::Vector3d& gravity
 /// [r] generalised force of the same world-space force [N] on each of k vertices, `basis_rows` [3k x r].
 Eigen::VectorXd vertex_force(const RowMatrix& basis_rows, const Eigen::Vector3d& force);
 
+/// The same world-space force [N] on each of k vertices, `basis_rows` [3k x r], at rest at `positions` [k x 3], for all
+/// times. `positions` are asked of a body that moves alone.
+ScriptedForce scripted_force(const Model& model, const RowMatrix& basis_rows, const VertexArray& positions,
+                             const Eigen::Vector3d& force);
+
 }  // namespace exmat::runtime

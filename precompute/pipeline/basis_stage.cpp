@@ -1,0 +1,123 @@
+#include "precompute/pipeline/basis_stage.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <numbers>
+#include <utility>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/mesh/geometry.h"
+#include "precompute/contact/contact_vertices.h"
+#include "precompute/cubature/cubature.h"
+#include "precompute/fem/rigid_moments.h"
+#include "precompute/modes/basis.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr int kSizes[] = {6, 10, 15, 20, 30, 42, 60, 85, 120};  // that basis.tolerance tries
+
+ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) {
+  ModalData modal;
+  modal.frequencies = modes.eigenvalues.cwiseSqrt() / (2 * std::numbers::pi);
+  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(basis.rows(), 3);
+  for (int axis = 0; axis < 3; ++axis) directions(Eigen::seqN(axis, basis.rows() / 3, 3), axis).setOnes();
+  modal.gravity_load = (system.full_mass * directions).transpose() * basis;
+  modal.basis = std::move(basis);
+  return modal;
+}
+
+EnergyReference reference_of(const BodyStages& stages) {
+  return stages.targets.empty() ? EnergyReference::kExample : stages.targets.front().energy_reference;
+}
+
+class BasisChooser {
+ public:
+  BasisChooser(const BodyStages& stages, const ReducedModel& body, const Motions* motions)
+      : stages_(stages), body_(body), motions_(motions) {
+    if (stages.fitter != nullptr && stages.asset.example_fields) fields_ = stages.fitter->fields();
+  }
+
+  BasisChoice choose() const;
+
+ private:
+  BasisChoice choose(int size) const;
+  RollOut run(const Eigen::MatrixXd& basis) const;
+
+  const BodyStages& stages_;
+  const ReducedModel& body_;
+  const Motions* motions_;
+  Eigen::MatrixXd fields_;
+};
+
+// Of a body with all elements.
+RollOut BasisChooser::run(const Eigen::MatrixXd& basis) const {
+  ReducedModel model;
+  model.asset_name = body_.asset_name;
+  model.object = body_.object;
+  put_basis(stages_, basis, model);
+  const ObjectData& object = *model.object;
+  model.cubature = all_elements(object.mesh, object.materials, model.modal->basis);
+  if (!stages_.system.constrained())
+    model.rigid = rigid_moments(object.mesh, object.materials.density, model.modal->basis);
+  if (body_.contact)
+    model.contact =
+        contact_data(object, model.modal->basis, stages_.object.contact, stages_.asset.contact_count);
+  return final_roll_out(stages_, model, *motions_);
+}
+
+BasisChoice BasisChooser::choose(int size) const {
+  const double body_size = bounding_box_diagonal(stages_.object.mesh.vertices);
+  const BasisInput input{stages_.system, stages_.modes, stages_.derivatives, body_size, fields_};
+  BasisChoice choice;
+  choice.basis = modal_basis(input, size);
+  if (motions_ == nullptr) return choice;
+  Eigen::MatrixXd trained = trained_basis(input, motions_->set.runs.snapshots, motions_->general, size);
+  choice.modal = run(choice.basis);
+  choice.exact = run(trained);
+  choice.trained = choice.exact.shape <= choice.modal.shape;
+  log::info(fmt::format("basis of {}: error in held-out runs {:.2f} % trained, {:.2f} % of modes", size,
+                        100 * choice.exact.shape, 100 * choice.modal.shape));
+  if (choice.trained)
+    choice.basis = std::move(trained);
+  else
+    choice.exact = choice.modal;
+  return choice;
+}
+
+BasisChoice BasisChooser::choose() const {
+  const auto& tolerance = stages_.asset.basis_tolerance;
+  if (!tolerance) return choose(stages_.asset.basis_size);
+  if (motions_ == nullptr)
+    throw InputError({"", "/basis/tolerance", "loads to train on, which the error is measured by", "none",
+                      "name a scene by --scene or loads by basis.loads, or give basis.size"});
+  double best = 1;
+  for (const int size : kSizes) {
+    BasisChoice choice = choose(size);
+    if (choice.exact.shape <= *tolerance) return choice;
+    best = std::min(best, choice.exact.shape);
+  }
+  throw WorkError(fmt::format("basis.tolerance: expected an error of at most {:.3g} in held-out runs, found {:.3g} with "
+                              "up to {} modes; raise it, or ask for more basis.training_segments",
+                              *tolerance, best, *std::ranges::max_element(kSizes)));
+}
+
+}  // namespace
+
+BasisChoice choose_basis(const BodyStages& stages, const ReducedModel& body, const Motions* motions) {
+  return BasisChooser(stages, body, motions).choose();
+}
+
+void put_basis(const BodyStages& stages, const Eigen::MatrixXd& basis, ReducedModel& model) {
+  model.modal = modal_data(stages.system, stages.modes, stages.system.extend(basis));
+  if (stages.fitter != nullptr) stages.fitter->put(stages.targets, model);
+}
+
+RollOut final_roll_out(const BodyStages& stages, const ReducedModel& model, const Motions& motions) {
+  const SparseMatrix& mass = stages.system.full_mass;
+  return roll_out(model, reference_of(stages), motions.chains.heldout, motions.set.heldout, mass,
+                  motions.chains.options);
+}
+
+}  // namespace exmat::precompute
