@@ -178,5 +178,42 @@ class Studies(unittest.TestCase):
             self.assertEqual([study["paper"][k] for k in ("zhu_interp_ms", "zhu_total_ms", "interp_ms", "total_ms")], [*zhu, *paper])
 
 
+class Figures(unittest.TestCase):
+    """Scenes and assets that examples/tools/figures.py makes of those of the examples."""
+
+    def setUp(self):
+        self.figures = tool("figures")
+
+    def test_regions_act_apart_and_are_otherwise_the_examples(self):
+        whole = self.figures.read(EXAMPLES / "06_cross/scene_recommended.json")
+        names = lambda scene: [region["name"] for region in scene["regions"]]
+        apart = [self.figures.of_regions(whole, regions) for regions in (["left", "right"], ["middle"])]
+        self.assertEqual([names(scene) for scene in apart], [["left", "right"], ["middle"]])
+        for scene in apart:
+            self.assertEqual(scene | {"regions": whole["regions"]}, whole)
+        self.assertEqual(names(whole), ["left", "right", "middle"])
+
+    def test_names_are_those_of_bundle_and_trajectory(self):
+        scene = self.figures.named(self.figures.read(EXAMPLES / "04_bar_cuboid/scene_none.json"), "x")
+        self.assertEqual((scene["bundle"], scene["output"]), ("x.h5", {"trajectory": "x_run.h5", "every": 10}))
+
+    def test_the_falling_bar_begins_above_the_floor_and_tilted(self):
+        points, _ = pose.read(self.figures.BAR / "object.msh")
+        body = self.figures.falling_scene()["body"]
+        w, x, y, z = body["orientation"]
+        self.assertAlmostEqual(w * w + x * x + y * y + z * z, 1, places=4)
+        centre = (points.min(0) + points.max(0)) / 2
+        np.testing.assert_allclose(centre + body["position"], [0, 0, 2.5], atol=1e-9)
+        turn = np.array([[1 - 2 * y * y, 0, 2 * w * y], [0, 1, 0], [-2 * w * y, 0, 1 - 2 * y * y]])
+        placed = (points - centre) @ turn.T + centre + body["position"]
+        self.assertGreater(placed[:, 2].min(), 0.5)
+        self.assertGreater(np.ptp(placed[:, 0]), 3, "it lies")
+
+    def test_the_falling_bar_is_free(self):
+        asset = self.figures.falling_asset("a", "rest.msh", "posed.msh")
+        self.assertNotIn("fixed", asset["object"])
+        self.assertEqual([example["mesh"] for example in asset["examples"]], ["rest.msh", "posed.msh"])
+
+
 if __name__ == "__main__":
     unittest.main()
