@@ -112,6 +112,17 @@ TEST_F(FullSpaceProgram, RefusesWhatItCannotRun) {
   refused({{"body", {{"motion", {{{"time", 0}}, {{"time", 1}, {"position", {1, 0, 0}}}}}}}}, {}, "/body/motion");
   refused(Json::object(), {"--steps", "0"}, "--steps");
   refused(Json::object(), {"--every", "x"}, "--every");
+  const std::string bundle = read_file(folder_.path("bundle.h5"));
+  const auto to = [&](const char* name) {
+    return exmat_precompute({"full-space", folder_.path("scene.json"), "-o", folder_.path(name)});
+  };
+  write_scene(folder_, Json::object());
+  EXPECT_EQ(to("bundle.h5").status, 2);
+  EXPECT_THAT(to("bundle.h5").errors, HasSubstr("bundle.h5: expected another file than the bundle"));
+  EXPECT_EQ(read_file(folder_.path("bundle.h5")), bundle);
+  EXPECT_EQ(to("full.xdmf").status, 2);
+  EXPECT_THAT(to("full.xdmf").errors, HasSubstr("give it the extension .h5"));
+  EXPECT_FALSE(std::filesystem::exists(folder_.path("full.xdmf")));
   EXPECT_EQ(exmat_precompute({"full-space", folder_.path("scene.json")}).status, 2) << "no output";
   EXPECT_EQ(exmat_precompute({"full-space", folder_.path("none.json"), "-o", folder_.path("full.h5")}).status, 2);
 }

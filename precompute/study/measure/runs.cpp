@@ -69,6 +69,7 @@ BodyFrames run(double time_step, const std::vector<double>& times, Take take, Re
   BodyFrames frames;
   frames.times = times;
   Meter meter(std::llround(times.back() / time_step), kReboundPause * times.back(), frames);
+  if (centre) meter.add_centre({}, 0, centre());
   for (const double time : times) {
     const std::int64_t until = std::llround(time / time_step);
     while (frames.steps < until) {

@@ -7,26 +7,36 @@
 namespace exmat::precompute {
 namespace {
 
-// Steps of a second each, 'x' with contact; the velocity of the centre is the number of the step.
+// The start and steps of a second each, 'x' with contact, each of which adds 1 m/s along z; so does '+' without one.
 std::optional<Rebound> find(const std::string& steps, double pause) {
   ReboundFinder finder(pause);
+  Eigen::Vector3d velocity(0, 0, -3);
+  finder.add(0, false, velocity);
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    const auto time = static_cast<double>(i + 1);
-    finder.add(time, steps[i] == 'x', {0, 0, time});
+    if (steps[i] != '.') velocity.z() += 1;
+    finder.add(static_cast<double>(i + 1), steps[i] == 'x', velocity);
   }
   return finder.found();
 }
 
 TEST(Rebound, IsTheFirstStepAfterContact) {
-  const auto found = find("..xx......", 3);
+  const auto found = find("..xxxx......", 3);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->time, 5);
-  EXPECT_EQ(found->velocity.z(), 5);
+  EXPECT_EQ(found->time, 7);
+  EXPECT_EQ(found->velocity.z(), 1);
+  EXPECT_EQ(find("xx......", 3).value().velocity.z(), -1) << "from the first step on";
+  EXPECT_EQ(find("..xxxx++++++", 3).value().velocity.z(), 2) << "not what acts later";
 }
 
 TEST(Rebound, WaitsUntilContactDoesNotComeBack) {
   EXPECT_EQ(find("..xx..x....", 3).value().time, 8) << "the same landing";
-  EXPECT_EQ(find("..xx....x....", 3).value().time, 5) << "another landing";
+  EXPECT_EQ(find("..xx...x....", 3).value().time, 9) << "the last step of the pause";
+}
+
+TEST(Rebound, IsThatOfTheStrongestContact) {
+  EXPECT_EQ(find("..xx....x....", 3).value().time, 5) << "and a touch";
+  EXPECT_EQ(find("..x....xx....", 3).value().time, 10) << "a touch, and";
+  EXPECT_EQ(find("..xx....xx....", 3).value().time, 5) << "the first of equal ones";
 }
 
 TEST(Rebound, IsNoneWithoutContactOrWithoutItsEnd) {
@@ -34,6 +44,8 @@ TEST(Rebound, IsNoneWithoutContactOrWithoutItsEnd) {
   EXPECT_FALSE(find("..xxxxxx", 3));
   EXPECT_FALSE(find("..xxxx..", 3)) << "it may come back";
   EXPECT_TRUE(find("..xxxx....", 3));
+  EXPECT_FALSE(find("..xx.....xxx", 3)) << "the strongest lasts";
+  EXPECT_EQ(find("..xx.....x", 3).value().time, 5) << "what lasts is a touch";
 }
 
 TEST(Rebound, IsComparedWhereBothBounced) {

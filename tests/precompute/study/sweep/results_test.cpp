@@ -53,7 +53,8 @@ StudyResult some_result() {
   failed.key = "f";
   failed.failure = "went \"wrong\", badly\nindeed";
   result.points.push_back(failed);
-  result.references = {{.key = "f", .time_step = 0.001, .integrator = "bdf2", .material = "stvk", .failure = ""}};
+  result.references = {
+      {.key = "f", .time_step = 0.001, .integrator = "bdf2", .material = "stvk", .failure = "", .inverted = {}}};
   result.front = pareto_front(outcomes(result.points));
   return result;
 }
