@@ -80,24 +80,25 @@ TEST_F(NearestPhase, OfASteadyMotionIsWhatIsBeyondReach) {
   }
 }
 
-// Late by 0.02 s, a quarter of a radian: a shape error of 2 sin(omega delay / 2) at the same time. At the nearest phase
-// what is left is of the first four frames, which are before those of the reference, and of the chords from frame to
-// frame, 1 - cos(omega / 2F) at the turning points. Early likewise of the last four.
+// Late by four and a half frames, a quarter of a radian: a shape error of 2 sin(omega delay / 2) at the same time. At
+// the nearest phase what is left is of the first five frames, which are before those of the reference, and of the
+// chords from frame to frame, 1 - cos(omega / 2F) at the turning points. Early likewise of the last five. The reference
+// turns by 1.5 radians from frame to frame.
 TEST_F(NearestPhase, TellsADelayFromAnotherShape) {
-  constexpr double kDelay = 0.02, kFrame = 1.0 / kFrames;
+  constexpr double kDelay = 0.0225, kFrame = 1.0 / kFrames, kSpin = 300;
   const double chords = 1 - std::cos(kOmega * kFrame / 2);
   double before = 0, after = 0;
-  for (int i = 1; i <= 4; ++i) {
+  for (int i = 1; i <= 5; ++i) {
     before += std::pow(std::sin(kOmega * (i * kFrame - kDelay)) - std::sin(kOmega * kFrame), 2);
     after += std::pow(std::sin(kOmega * (kDelay - (i - 1) * kFrame)), 2);
   }
   const double size = kFrames / 2.0;  // of sin^2
-  const TrajectoryErrors late = errors(swinging(1, kDelay, 7), swinging(1, 0, 2), true);
+  const TrajectoryErrors late = errors(swinging(1, kDelay, 7), swinging(1, 0, kSpin), true);
   EXPECT_NEAR(late.shape.value().mean, 2 * std::sin(kOmega * kDelay / 2), 0.01);
   EXPECT_GT(late.position.mean, 0.5) << "it turns and flies otherwise";
   EXPECT_NEAR(late.nearest_phase.mean, std::sqrt(before / size), chords);
   EXPECT_LE(late.nearest_phase.settled, chords);
-  const TrajectoryErrors early = errors(swinging(1, -kDelay, 7), swinging(1, 0, 2), true);
+  const TrajectoryErrors early = errors(swinging(1, -kDelay, 7), swinging(1, 0, kSpin), true);
   EXPECT_NEAR(early.nearest_phase.mean, std::sqrt(after / size), chords);
 }
 
@@ -119,6 +120,27 @@ TEST_F(NearestPhase, LeavesAnotherShapeAsItIs) {
   EXPECT_GT(expected, 0.1);
   EXPECT_NEAR(larger.shape.value().mean, kLarger - 1, 0.003);
   EXPECT_NEAR(larger.nearest_phase.mean, expected, 0.003);
+}
+
+// Later by 8 % of the duration of a steady motion: 3 % are beyond reach, relative to the root mean square of the way.
+TEST_F(NearestPhase, ReachesFivePercentOfTheDuration) {
+  double square = 0;
+  for (int i = 1; i <= kFrames; ++i) square += std::pow(static_cast<double>(i) / kFrames, 2);
+  const TrajectoryErrors late = errors(moving(0.08), moving(0), false);
+  EXPECT_NEAR(late.position.end, 0.08 / std::sqrt(square / kFrames), 1e-7);
+  EXPECT_NEAR(late.nearest_phase.end, 0.03 / std::sqrt(square / kFrames), 1e-6);
+}
+
+// A mirrored body is another shape: it is turned, never reflected.
+TEST_F(NearestPhase, TurnsBodiesAndDoesNotReflectThem) {
+  const VertexArray shape = mesh_.vertices + field_;
+  VertexArray mirrored = shape;
+  mirrored.col(0) *= -1;
+  const auto found = nearest_distances(motion([&](double) { return mirrored; }), motion([&](double) { return shape; }),
+                                       mass_, kReach, true);
+  const double expected = mass_norm(mass_, fitted(mass_, mirrored, shape) - shape);
+  EXPECT_GT(expected, 0.01 * unit_) << "it is the same shape";
+  for (const double distance : found) EXPECT_NEAR(distance, expected, 1e-6 * expected);
 }
 
 TEST_F(NearestPhase, IsNeverMoreThanAtTheSameTime) {
