@@ -23,6 +23,7 @@ import sheet
 PALE_TO_RED = [(0.95, 0.93, 0.82), (0.99, 0.80, 0.42), (0.95, 0.50, 0.22), (0.78, 0.15, 0.16), (0.45, 0.02, 0.20)]
 COOL_WARM = [(0.23, 0.30, 0.75), (0.87, 0.87, 0.87), (0.71, 0.02, 0.15)]
 OTHER_HALF = (0.55, 0.66, 0.75)
+FULL_SPACE = "full space"
 
 
 def surface_of(tets):
@@ -54,16 +55,19 @@ def frames_of(times, wanted, count):
 class Run:
     """Chosen frames of a scene that was run."""
 
-    def __init__(self, path, wanted, count):
+    def __init__(self, path, wanted, count, kind=""):
         path = pathlib.Path(path)
         self.scene = json.loads(path.read_text())
-        self.label = path.stem.removeprefix("scene").removeprefix("_").replace("_", " ")
+        self.label = path.stem.removeprefix("scene").removeprefix("_").replace("_", " ") + (kind and f", {kind}")
+        trajectory = path.parent / self.scene["output"]["trajectory"]
+        if kind == FULL_SPACE:
+            trajectory = trajectory.with_stem(trajectory.stem + "_full")
         with h5py.File(path.parent / self.scene["bundle"]) as f:
             self.rest, self.surface = f["/object/vertices"][:], f["/object/surface"][:]
             drawn_rest = f["/render/vertices"][:] if "render" in f else self.rest
             self.fixed = np.flatnonzero(f["/object/fixed"][:]) if "/object/fixed" in f else []
             centre = f["/rigid/centre_of_mass"][:] if "rigid" in f else None
-        with h5py.File(path.parent / self.scene["output"]["trajectory"]) as f:
+        with h5py.File(trajectory) as f:
             frames = frames_of(f["/time"][:], wanted, count)
             pick = lambda name: np.array([f[name][k] for k in frames])
             self.times, self.positions = pick("/time"), pick("/vertices").astype(float)
@@ -122,7 +126,8 @@ def panels_of(runs, low, high, ghost):
 
 
 def draw_motion(a):
-    runs = [Run(path, a.times, a.frames) for path in a.scenes]
+    kinds = [FULL_SPACE, "reduced"] if a.full_space else [""]
+    runs = [Run(path, a.times, a.frames, kind) for kind in kinds for path in a.scenes]
     low, high = box_of(runs)
     rows = panels_of(runs, low, high, a.ghost)
     if a.columns:
@@ -173,6 +178,8 @@ def main():
     motion.add_argument("--times", type=vector, help="instead the frames at these times [s]: T,T,...")
     motion.add_argument("--columns", type=int, help="panels in a row, instead of a row for each scene")
     motion.add_argument("--ghost", action="store_true", help="the rest shape, faint, in each panel")
+    motion.add_argument("--full-space", action="store_true", help="before the scenes, the same by exmat-precompute full-space, which wrote "
+                        "NAME_full.h5 beside each trajectory NAME.h5")
     movie = command("movie", draw_movie)
     movie.add_argument("scenes", nargs="+")
     movie.add_argument("--frames", type=int, default=50, help="so many, spread evenly over the run")

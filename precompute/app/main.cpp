@@ -7,6 +7,7 @@
 #include "common/core/version.h"
 #include "common/hdf5/library_versions.h"
 #include "precompute/app/bundle_command.h"
+#include "precompute/app/full_space_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
 #include "precompute/pipeline/build_reduced_model.h"
@@ -102,14 +103,30 @@ int run(std::vector<char*> words) {
                    "recommend the most accurate point of at most so many us a step")
       ->check(CLI::PositiveNumber);
   study_command_line
-      ->add_option("--max-error", study_options.max_error,
-                   "recommend the fastest point of at most so many percent of error")
+      ->add_option(
+          "--max-error", study_options.max_error,
+          "recommend the fastest point of at most so many percent of error: of shape of a free body, else of position")
       ->check(CLI::PositiveNumber);
   study_command_line
       ->add_option("--jobs", study_options.jobs,
                    "processes that run points; times are measured by one. Of --stability runs at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
+
+  FullSpaceCommandOptions full_space_options;
+  auto* full_space_command_line = app.add_subcommand(
+      "full-space", "step a scene with all degrees of freedom of its mesh, without a basis, and write the trajectory");
+  full_space_command_line->add_option("SCENE", full_space_options.scene, "scene file (JSON), with its bundle")
+      ->required();
+  full_space_command_line
+      ->add_option("-o,--output", full_space_options.trajectory, "trajectory to write (HDF5), and an .xdmf beside it")
+      ->required();
+  const CLI::Range count_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
+  full_space_command_line->add_option("--steps", full_space_options.steps, "so many steps instead of the scene's")
+      ->check(count_range);
+  full_space_command_line
+      ->add_option("--every", full_space_options.every, "write a frame every so many steps instead of the scene's")
+      ->check(count_range);
 
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     if (study_options.stability && common.log_level == "info")
@@ -119,6 +136,7 @@ int run(std::vector<char*> words) {
     if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
+    if (full_space_command_line->parsed()) full_space_command(full_space_options);
     if (study_command_line->parsed())
       study_options.stability ? stability_command(study_options) : study_command(study_options);
   });

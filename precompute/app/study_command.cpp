@@ -2,8 +2,10 @@
 
 #include <filesystem>
 #include <fmt/format.h>
+#include <string>
 
 #include "common/core/error.h"
+#include "common/core/log.h"
 #include "precompute/study/stability/stability_report.h"
 #include "precompute/study/sweep/report.h"
 #include "precompute/study/sweep/study.h"
@@ -12,10 +14,11 @@ namespace exmat {
 namespace {
 
 void print_front(const precompute::StudyResult& result) {
-  fmt::print("\n{:>5}{:>12}{:>12}{:>12}  {}\n", "point", "error [%]", "step [us]", "p95 [us]", "front");
+  fmt::print("\n{:>5}{:>14}{:>12}{:>12}  {}\n", "point", result.headline() + std::string(" [%]"), "step [us]",
+             "p95 [us]", "front");
   for (const std::size_t i : result.front) {
     const precompute::PointResult& point = result.points[i];
-    fmt::print("{:>5}{:>12.3f}{:>12.2f}{:>12.2f}  {}\n", i + 1, 100 * point.errors.position.mean,
+    fmt::print("{:>5}{:>14.3f}{:>12.2f}{:>12.2f}  {}\n", i + 1, 100 * point.errors.headline().mean,
                1e6 * point.times->median, 1e6 * point.times->p95, precompute::describe(point.settings));
   }
 }
@@ -30,6 +33,7 @@ void study_command(const StudyCommandOptions& options) {
   fmt::print("{}: {} points; {}\n", result.config.name, result.points.size(),
              (std::filesystem::path(options.folder) / "report.html").string());
   print_front(result);
+  if (const std::string warning = result.truth_warning(); !warning.empty()) log::warning(warning);
   const std::string recommendation = precompute::recommendation_text(result);
   if (result.recommended) fmt::print("\n{}\n", recommendation);
   if (const std::size_t failed = result.failures(); failed > 0)

@@ -7,7 +7,7 @@
 #include <span>
 
 #include "common/bundle/file_schemas.h"
-#include "common/core/markup.h"
+#include "common/hdf5/xdmf.h"
 #include "common/mesh/geometry.h"
 #include "runtime/output/momentum.h"
 #include "runtime/sim/frame/world_vertices.h"
@@ -59,44 +59,6 @@ std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.d
 void append_drawn(const VertexArray& positions, RowWriter& dataset) {
   const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
   dataset.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
-}
-
-/// The cells that an .xdmf shows, and the datasets that hold them and the frames of their vertices.
-struct Drawn {
-  std::string_view cell, cells_path, vertices_path;
-  Eigen::Index corners = 0, cells = 0, vertices = 0;
-};
-
-/// One grid of the temporal collection: a hyperslab of the vertices on the shared cells.
-std::string xdmf_frame(const std::string& h5, const Drawn& drawn, std::int64_t frames, std::size_t frame, double time) {
-  return fmt::format(
-      "      <Grid Name=\"frame {0}\">\n"
-      "        <Time Value=\"{1}\"/>\n"
-      "        <Topology TopologyType=\"{6}\" NumberOfElements=\"{2}\">\n"
-      "          <DataItem Dimensions=\"{2} {7}\" NumberType=\"Int\" Precision=\"4\" "
-      "Format=\"HDF\">{3}:{8}</DataItem>\n"
-      "        </Topology>\n"
-      "        <Geometry GeometryType=\"XYZ\">\n"
-      "          <DataItem ItemType=\"HyperSlab\" Dimensions=\"1 {4} 3\">\n"
-      "            <DataItem Dimensions=\"3 3\" NumberType=\"Int\" Format=\"XML\">{0} 0 0 1 1 1 1 {4} 3</DataItem>\n"
-      "            <DataItem Dimensions=\"{5} {4} 3\" NumberType=\"Float\" Precision=\"4\" Format=\"HDF\">{3}:{9}"
-      "</DataItem>\n"
-      "          </DataItem>\n"
-      "        </Geometry>\n"
-      "      </Grid>\n",
-      frame, time, drawn.cells, h5, drawn.vertices, frames, drawn.cell, drawn.corners, drawn.cells_path,
-      drawn.vertices_path);
-}
-
-std::string xdmf_text(const std::filesystem::path& trajectory, const std::string& name, const Drawn& drawn,
-                      std::int64_t frames, const std::vector<double>& times) {
-  const std::string h5 = escaped(trajectory.filename().string());
-  std::string text = fmt::format(
-      "<?xml version=\"1.0\"?>\n<Xdmf Version=\"3.0\">\n  <Domain>\n"
-      "    <Grid Name=\"{}\" GridType=\"Collection\" CollectionType=\"Temporal\">\n",
-      escaped(name));
-  for (std::size_t frame = 0; frame < times.size(); ++frame) text += xdmf_frame(h5, drawn, frames, frame, times[frame]);
-  return text + "    </Grid>\n  </Domain>\n</Xdmf>\n";
 }
 
 }  // namespace
@@ -223,18 +185,18 @@ void TrajectoryWriter::finish() {
   output_.commit();
   const std::filesystem::path& target = output_.target();
   const TetMesh& mesh = model_.object->mesh;
-  const Drawn body{"Tetrahedron", "/tets", "/vertices", 4, mesh.tet_count(), mesh.vertex_count()};
+  const XdmfCells body{"Tetrahedron", "/tets", "/vertices", 4, mesh.tet_count(), mesh.vertex_count()};
   write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
-                        xdmf_text(target, model_.asset_name, body, info_.frames, times_));
+                        xdmf_text(target, model_.asset_name, body, times_));
   if (!model_.render) return;
-  const Drawn surface{"Triangle",
-                      "/render/triangles",
-                      "/render/vertices",
-                      3,
-                      model_.render->triangles.rows(),
-                      model_.render->tets.size()};
+  const XdmfCells surface{"Triangle",
+                          "/render/triangles",
+                          "/render/vertices",
+                          3,
+                          model_.render->triangles.rows(),
+                          model_.render->tets.size()};
   write_file_atomically(target.parent_path() / (target.stem().string() + "_render.xdmf"),
-                        xdmf_text(target, model_.asset_name, surface, info_.frames, times_));
+                        xdmf_text(target, model_.asset_name, surface, times_));
 }
 
 }  // namespace exmat::runtime

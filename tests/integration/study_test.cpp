@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <map>
@@ -66,7 +67,7 @@ TEST_F(StudyProgram, MeasuresAndAnswersABudget) {
     EXPECT_EQ(point["steps"], 40);
     EXPECT_EQ(point["elements"], all ? 96 : 12);
     EXPECT_GT(point["times"]["median_us"], 0);
-    EXPECT_EQ(point["errors"]["position_from_all_elements"].is_null(), all);
+    EXPECT_EQ(point["errors"]["from_all_elements"].is_null(), all);
   }
   EXPECT_LT((mean[{12, true}]), (mean[{8, true}])) << "more modes";
   EXPECT_EQ(json["references"].size(), 1U);
@@ -111,6 +112,89 @@ TEST_F(StudyProgram, ResumesWithoutDoingAgainWhatIsFinished) {
         file == damaged || file == reference || file.starts_with(damaged.substr(0, damaged.size() - 5));
     EXPECT_EQ(after.at(file) == time, !renewed) << file;
   }
+}
+
+// One run of the full space for all points, at the same times; what a long step loses is an error then.
+TEST_F(StudyProgram, MeasuresByAReferenceOfAnotherTimeStep) {
+  const Json sweeps =
+      R"([ { "basis_size": [12], "time_step": [0.02, 0.01], "internal_force": ["all_elements"] } ])"_json;
+  write_scene(folder_, R"({ "time_step": 0.01, "steps": 40, "gravity": [0, -2, 1] })"_json);
+  const auto means = [&](const std::string& output) {
+    EXPECT_EQ(study(output).status, 0);
+    std::map<double, double> found;
+    const Json json = results(output);
+    for (const Json& point : json["points"])
+      found[point["settings"]["time_step"]] = point["errors"]["position"]["mean"];
+    return found;
+  };
+  write_study({{"sweeps", sweeps}});
+  auto own = means("own");
+  EXPECT_EQ(results("own")["references"].size(), 2U) << "each point's own time step";
+  write_study({{"sweeps", sweeps}, {"reference", {{"time_step", 0.0025}}}});
+  auto fine = means("fine");
+  const Json json = results("fine");
+  ASSERT_EQ(json["references"].size(), 1U);
+  EXPECT_EQ(json["references"][0]["time_step"], 0.0025);
+  EXPECT_EQ(json["references"][0]["steps"], 160);
+  EXPECT_EQ(json["points"][0]["steps"], 20);
+  EXPECT_EQ(json["points"][1]["steps"], 40);
+  EXPECT_GT(fine[0.02], 1.2 * own[0.02]) << "the time step's error is among it";
+  EXPECT_LT(fine[0.01], fine[0.02]);
+  write_study({{"reference", {{"time_step", 0.0137}}}});
+  const Outcome refused = study("none");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.errors, HasSubstr("study.json: /sweeps: expected time steps with a common multiple"));
+}
+
+// The front is that of the errors of shape, by its definition.
+TEST_F(StudyProgram, ChoosesFreeBodiesByTheirShape) {
+  write_small_bar(folder_, R"({ "object": { "fixed": null } })"_json);
+  write_scene(folder_, R"({
+    "time_step": 0.01, "steps": 100, "gravity": [0, 0, -10], "body": { "linear_velocity": [0, 0, -3] },
+    "obstacles": [ { "plane": { "point": [0, 0, -0.1], "normal": [0, 0, 1] }, "stiffness": 1e6 } ] })"_json);
+  write_study(
+      R"({"sweeps": [ { "basis_size": [6, 8, 12], "linear_modes": [4, 6], "internal_force": ["all_elements"] } ]})"_json);
+  const Outcome outcome = study("out", {"--max-error", "1000"});
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  EXPECT_THAT(outcome.output, HasSubstr("shape [%]"));
+  const Json json = results("out");
+  EXPECT_EQ(json["headline"], "shape");
+  const Json& points = json["points"];
+  ASSERT_EQ(points.size(), 6U);
+  const auto beaten = [&](const Json& point) {
+    return std::any_of(points.begin(), points.end(), [&](const Json& other) {
+      return other["errors"]["shape"]["mean"] < point["errors"]["shape"]["mean"] &&
+             other["times"]["median_us"] < point["times"]["median_us"];
+    });
+  };
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const bool on_front = std::find(json["front"].begin(), json["front"].end(), i) != json["front"].end();
+    EXPECT_EQ(on_front, !beaten(points[i])) << i;
+    const Json& errors = points[i]["errors"];
+    EXPECT_NE(errors["shape"]["mean"], errors["position"]["mean"]);
+    EXPECT_LE(errors["nearest_phase"]["mean"], errors["shape"]["mean"]);
+    EXPECT_GT(errors["rebound"], 0) << "it bounces";
+  }
+  EXPECT_EQ(json["no_truth"], "");
+}
+
+// So heavy that the material turns inside out.
+TEST_F(StudyProgram, MarksAReferenceThatIsNoTruth) {
+  write_scene(folder_, R"({ "time_step": 0.01, "steps": 20, "gravity": [-600, 0, 0], "damping": { "mass": 5 } })"_json);
+  write_study(R"({"sweeps": [ { "internal_force": ["all_elements"] } ]})"_json);
+  const Outcome outcome = exmat_precompute({"study", folder_.path("study.json"), "-o", folder_.path("out")});
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  EXPECT_THAT(outcome.errors, HasSubstr("use the material stable_neo_hookean"));
+  const Json json = results("out");
+  EXPECT_EQ(json["references"][0]["no_truth"], true);
+  EXPECT_GT(json["references"][0]["inverted_tets"]["most"], 0);
+  EXPECT_THAT(read_file(folder_.path("out/report.html")), HasSubstr("(no truth)"));
+  // By the frames of the full space themselves.
+  const Outcome full = exmat_precompute({"bundle", folder_.path("asset.json"), "-o", folder_.path("bundle.h5")});
+  ASSERT_EQ(full.status, 0) << full.errors;
+  const Outcome run = exmat_precompute({"full-space", folder_.path("scene.json"), "-o", folder_.path("full.h5")});
+  EXPECT_EQ(run.status, 0);
+  EXPECT_THAT(run.errors, HasSubstr("inverted"));
 }
 
 TEST_F(StudyProgram, GivesTheSameErrorsWithMoreJobs) {

@@ -9,9 +9,10 @@
 namespace exmat::precompute {
 
 /// Distances of two motions over the root mean square of a size, in the norm |x|_M = sqrt(sum x^T M x): root mean
-/// square, largest and last of all frames. 0 where both vanish, infinite where the size alone does.
+/// square, largest and last of all frames, and root mean square of those of the last tenth of the time. 0 where both
+/// vanish, infinite where the size alone does.
 struct RelativeError {
-  double mean = 0, max = 0, end = 0;
+  double mean = 0, max = 0, end = 0, settled = 0;
 };
 
 /// docs/error_metrics.md.
@@ -20,7 +21,12 @@ struct TrajectoryErrors {
   RelativeError velocity;  ///< over the velocity, world
   double energy = 0;       ///< largest difference of the total energy over the largest kinetic + elastic one
   std::optional<RelativeError> shape;  ///< of a free body: both without their rigid motion, over the deformation
-  std::size_t worst_frame = 0;         ///< where the positions are farthest apart
+  RelativeError nearest_phase;         ///< of the headline, by nearest_distances(): without what is a little late
+  std::optional<double> rebound;       ///< of the velocity of the centre of mass after contact, where both had one
+  std::size_t worst_frame = 0;         ///< where the distances of the headline are largest
+
+  /// What is chosen by: shape, where it is there, else position.
+  const RelativeError& headline() const { return shape ? *shape : position; }
 };
 
 /// Of `frames` against those of the reference at the same times. `rest` [n x 3]; `mass` [n x n], weighted by density.

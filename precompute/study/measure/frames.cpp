@@ -32,7 +32,7 @@ std::optional<double> common_multiple(const std::vector<double>& time_steps, dou
   return std::nullopt;
 }
 
-constexpr std::string_view kMagic = "exmat frames 1\n";
+constexpr std::string_view kMagic = "exmat frames 2\n";
 
 template <typename T>
 void put(std::string& bytes, const T* values, std::size_t count) {
@@ -58,10 +58,24 @@ constexpr auto kMeans = std::to_array<double BodyFrames::*>(
 constexpr auto kFields =
     std::to_array<std::vector<VertexArray> BodyFrames::*>({&BodyFrames::positions, &BodyFrames::velocities});
 
+// A rebound is a flag, its time and its velocity.
+using ReboundNumbers = std::array<double, 5>;
+
+ReboundNumbers to_numbers(const std::optional<Rebound>& rebound) {
+  if (!rebound) return {};
+  const Eigen::Vector3d& v = rebound->velocity;
+  return {1, rebound->time, v.x(), v.y(), v.z()};
+}
+
+std::optional<Rebound> from_numbers(const ReboundNumbers& numbers) {
+  if (numbers[0] == 0) return std::nullopt;
+  return Rebound{numbers[1], {numbers[2], numbers[3], numbers[4]}};
+}
+
 // What `sizes` = F, n asks for, in bytes.
 double expected_size(const std::array<std::uint64_t, 2>& sizes) {
   const auto F = static_cast<double>(sizes[0]), n = static_cast<double>(sizes[1]);
-  return 8 * (kCounts.size() + kMeans.size() + F * (kSeries.size() + 3 * n * kFields.size()));
+  return 8 * (kCounts.size() + kMeans.size() + ReboundNumbers().size() + F * (kSeries.size() + 3 * n * kFields.size()));
 }
 
 std::optional<BodyFrames> parse(std::string_view bytes) {
@@ -71,6 +85,9 @@ std::optional<BodyFrames> parse(std::string_view bytes) {
   bool whole = true;
   for (const auto member : kCounts) whole = take(bytes, &(frames.*member), 1) && whole;
   for (const auto member : kMeans) whole = take(bytes, &(frames.*member), 1) && whole;
+  ReboundNumbers rebound{};
+  whole = take(bytes, rebound.data(), rebound.size()) && whole;
+  frames.rebound = from_numbers(rebound);
   for (const auto member : kSeries) {
     (frames.*member).resize(sizes[0]);
     whole = take(bytes, (frames.*member).data(), sizes[0]) && whole;
@@ -108,6 +125,8 @@ void write_frames(const std::filesystem::path& file, const BodyFrames& frames) {
   put(bytes, sizes, 2);
   for (const auto member : kCounts) put(bytes, &(frames.*member), 1);
   for (const auto member : kMeans) put(bytes, &(frames.*member), 1);
+  const ReboundNumbers rebound = to_numbers(frames.rebound);
+  put(bytes, rebound.data(), rebound.size());
   for (const auto member : kSeries) put(bytes, (frames.*member).data(), (frames.*member).size());
   for (const auto member : kFields)
     for (const VertexArray& field : frames.*member) put(bytes, field.data(), static_cast<std::size_t>(field.size()));

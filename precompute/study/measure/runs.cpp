@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fmt/format.h>
+#include <functional>
 #include <utility>
 
 #include "common/bundle/bundle.h"
@@ -22,6 +23,8 @@ VertexArray field(const ReducedModel& data, const Eigen::VectorXd& v) {
   return (data.modal->basis * v).reshaped<Eigen::RowMajor>(data.object->mesh.vertex_count(), 3);
 }
 
+constexpr double kReboundPause = 0.05;  // of the duration
+
 [[noreturn]] void fail_non_finite(std::int64_t step, double time) {
   throw WorkError(
       fmt::format("step {} (time {:g} s): a number that is not finite; try a smaller time step", step, time));
@@ -30,7 +33,8 @@ VertexArray field(const ReducedModel& data, const Eigen::VectorXd& v) {
 // What a run counts on its way.
 class Meter {
  public:
-  Meter(std::int64_t steps, BodyFrames& frames) : frames_(frames), seconds_(steps) {}
+  /// `pause`: how long no contact may come back for a rebound [s].
+  Meter(std::int64_t steps, double pause, BodyFrames& frames) : frames_(frames), seconds_(steps), rebound_(pause) {}
 
   void add(const runtime::StepReport& report, double seconds) {
     ++frames_.steps;
@@ -39,7 +43,11 @@ class Meter {
     frames_.factorisations += report.factorisations;
     seconds_.add(seconds);
   }
+  void add_centre(const runtime::StepReport& report, double time, const Eigen::Vector3d& velocity) {
+    rebound_.add(time, report.contacts > 0, velocity);
+  }
   void finish() {
+    frames_.rebound = rebound_.found();
     frames_.newton_iterations /= static_cast<double>(frames_.steps);
     frames_.factorisations /= static_cast<double>(frames_.steps);
     frames_.step_seconds = seconds_.quantile(0.5);
@@ -48,14 +56,20 @@ class Meter {
  private:
   BodyFrames& frames_;
   runtime::Samples seconds_;
+  ReboundFinder rebound_;
 };
+
+// Velocity of the centre of mass [m/s]; empty where nothing asks for it.
+using CentreVelocity = std::function<Eigen::Vector3d()>;
 
 // Takes steps and records frames; `take` makes one step, `record` adds the positions and velocities of a frame.
 template <typename Take, typename Record, typename Energy>
-BodyFrames run(double time_step, const std::vector<double>& times, Take take, Record record, Energy energy) {
+BodyFrames run(double time_step, const std::vector<double>& times, Take take, Record record, Energy energy,
+               const CentreVelocity& centre) {
   BodyFrames frames;
   frames.times = times;
-  Meter meter(std::llround(times.back() / time_step), frames);
+  Meter meter(std::llround(times.back() / time_step), kReboundPause * times.back(), frames);
+  if (centre) meter.add_centre({}, 0, centre());
   for (const double time : times) {
     const std::int64_t until = std::llround(time / time_step);
     while (frames.steps < until) {
@@ -63,6 +77,7 @@ BodyFrames run(double time_step, const std::vector<double>& times, Take take, Re
       const runtime::StepReport report = take();
       meter.add(report, timer.seconds());
       if (report.status & runtime::kStepNonFinite) fail_non_finite(frames.steps, time);
+      if (centre) meter.add_centre(report, static_cast<double>(frames.steps) * time_step, centre());
     }
     record(frames);
     const runtime::Energies now = energy();
@@ -78,6 +93,12 @@ FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data, boo
   FullSpaceModel model = build_full_space_model(data, full_space_options(config));
   if (baseline) use_surface_targets(*data.object, model);
   return model;
+}
+
+// [n] shares of the mass in the motion of the centre [kg].
+Eigen::VectorXd vertex_masses(const ReducedModel& data) {
+  const SparseMatrix mass = scalar_mass(data.object->mesh, data.object->materials.density);
+  return mass * Eigen::VectorXd::Ones(mass.cols());
 }
 
 // [3n] deformation.
@@ -106,6 +127,9 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
   const runtime::LoadedScene loaded = runtime::load_run(config);
   runtime::State state = loaded.start;
   runtime::Workspace workspace(*loaded.model, loaded.scene);
+  CentreVelocity centre;
+  if (!config.obstacles.empty() && loaded.model->frame->momenta(state.frame))
+    centre = [&] { return loaded.model->frame->motion(state.frame).linear_velocity; };
   ReducedRun result;
   result.modes = static_cast<std::size_t>(loaded.model->modes());
   result.elements = static_cast<std::size_t>(loaded.summary.cubature_elements);
@@ -118,7 +142,7 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
         frames.positions.push_back(std::move(now.positions));
         frames.velocities.push_back(std::move(now.velocities));
       },
-      [&] { return runtime::energies(*loaded.model, loaded.scene, state); });
+      [&] { return runtime::energies(*loaded.model, loaded.scene, state); }, centre);
   return result;
 }
 
@@ -138,13 +162,18 @@ FullSpaceReport FullSpaceRun::sound_step() {
 
 BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times) {
   FullSpaceRun body(config, data, false);
+  CentreVelocity centre;
+  if (!config.obstacles.empty() && body.model.frame)
+    centre = [&, weights = vertex_masses(data)]() -> Eigen::Vector3d {
+      return world_velocities(body.model, body.state).transpose() * weights / weights.sum();
+    };
   return run(
       config.time_step, times, [&] { return step(body.model, body.scene, body.state, body.workspace); },
       [&](BodyFrames& frames) {
         frames.positions.push_back(world_positions(body.model, body.state));
         frames.velocities.push_back(world_velocities(body.model, body.state));
       },
-      [&] { return energies(body.model, body.scene, body.state); });
+      [&] { return energies(body.model, body.scene, body.state); }, centre);
 }
 
 }  // namespace exmat::precompute

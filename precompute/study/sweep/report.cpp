@@ -65,9 +65,11 @@ bool is_measured(const PointResult& point) { return point.failure.empty() && poi
 bool all_elements(const PointResult& point) { return point.settings.internal_force == kAllElements; }
 
 std::string label_of(std::size_t index, const PointResult& point) {
-  return fmt::format("{}: {}: {} %, {} us", index + 1, describe(point.settings), percent(point.errors.position.mean),
+  return fmt::format("{}: {}: {} %, {} us", index + 1, describe(point.settings), percent(point.errors.headline().mean),
                      point.times ? microseconds(point.times->median) : "-");
 }
+
+std::string error_label(const StudyResult& result) { return fmt::format("error of {}, mean [%]", result.headline()); }
 
 // Values that occur, in order, and the place of each.
 template <typename Value>
@@ -100,13 +102,13 @@ std::string time_plot(const StudyResult& result) {
     series.name = fmt::format("{}, r {}", name_of_elements(point), point.modes);
     series.colour = colours.at(point.elements);
     series.shape = shapes.at(point.modes);
-    series.points.push_back({1e6 * point.times->median, 100 * point.errors.position.mean, label_of(i, point)});
+    series.points.push_back({1e6 * point.times->median, 100 * point.errors.headline().mean, label_of(i, point)});
   }
   for (const std::size_t i : result.front)
-    front.points.push_back({1e6 * result.points[i].times->median, 100 * result.points[i].errors.position.mean, ""});
+    front.points.push_back({1e6 * result.points[i].times->median, 100 * result.points[i].errors.headline().mean, ""});
   Plot plot{.title = "Error against run time",
             .x_label = "step, median [us]",
-            .y_label = "error of positions, mean [%]",
+            .y_label = error_label(result),
             .log_x = true,
             .series = {std::move(front)}};
   for (auto& [group, series] : groups) plot.series.push_back(std::move(series));
@@ -139,7 +141,8 @@ struct Varying {
             fmt::format("{:g} ms", 1e3 * s.time_step),
             s.integrator,
             s.internal_force == kAllElements ? "cubature" : s.internal_force,
-            s.target};
+            s.target,
+            fmt::format("{} linear modes", s.linear_modes)};
   }
   std::vector<std::set<std::string>> values_;
 };
@@ -156,10 +159,10 @@ std::string line_plot(const StudyResult& result, const std::string& title, const
     const PointResult& point = result.points[i];
     if (!point.failure.empty() || (with_levels && all_elements(point))) continue;
     PlotSeries& line = lines[rest(point)];
-    line.points.push_back({x(point), 100 * point.errors.position.mean, label_of(i, point)});
+    line.points.push_back({x(point), 100 * point.errors.headline().mean, label_of(i, point)});
   }
   std::erase_if(lines, [](const auto& entry) { return entry.second.points.size() < 2; });
-  Plot plot{.title = title, .x_label = x_label, .y_label = "error of positions, mean [%]", .series = {}};
+  Plot plot{.title = title, .x_label = x_label, .y_label = error_label(result), .series = {}};
   for (auto& [name, line] : lines) {
     std::ranges::stable_sort(line.points, {}, &PlotPoint::x);
     for (const PlotPoint& point : line.points) range.insert(point.x);
@@ -171,7 +174,7 @@ std::string line_plot(const StudyResult& result, const std::string& title, const
   if (range.size() < 2) return "";
   for (const PointResult& point : result.points) {
     if (!with_levels || !all_elements(point) || !point.failure.empty()) continue;
-    const double error = 100 * point.errors.position.mean;
+    const double error = 100 * point.errors.headline().mean;
     plot.series.push_back({.name = fmt::format("all elements, r {}", point.modes),
                            .points = {{*range.begin(), error, ""}, {*range.rbegin(), error, ""}},
                            .colour = static_cast<int>(plot.series.size()),
@@ -205,12 +208,40 @@ std::string plots(const StudyResult& result) {
   return html;
 }
 
+bool rebounds(const StudyResult& result) {
+  return std::ranges::any_of(result.points, [](const PointResult& p) { return p.errors.rebound.has_value(); });
+}
+
+std::vector<std::string> error_names(const StudyResult& result) {
+  std::vector<std::string> names;
+  for (const char* part : {"mean", "max", "end", "settled", "nearest<br>phase"})
+    names.push_back(fmt::format("{},<br>{} [%]", result.headline(), part));
+  if (result.free_body) names.emplace_back("position<br>[%]");
+  if (rebounds(result)) names.emplace_back("rebound<br>[%]");
+  for (const char* name : {"velocity<br>[%]", "energy<br>[%]", "from all<br>elements [%]"}) names.emplace_back(name);
+  return names;
+}
+
+// In the order of error_names().
+std::string error_cells(const StudyResult& result, const PointResult& point) {
+  const TrajectoryErrors& e = point.errors;
+  const RelativeError& chosen = e.headline();
+  std::string html = cell(percent(chosen.mean)) + cell(percent(chosen.max)) + cell(percent(chosen.end)) +
+                     cell(percent(chosen.settled)) + cell(percent(e.nearest_phase.mean));
+  if (result.free_body) html += cell(percent(e.position.mean));
+  if (rebounds(result)) html += cell(e.rebound ? percent(*e.rebound) : "-");
+  html += cell(percent(e.velocity.mean)) + cell(percent(e.energy));
+  return html + cell(point.from_all_elements ? percent(point.from_all_elements->mean) : "-");
+}
+
 std::string point_row(const StudyResult& result, std::size_t i) {
   const PointResult& point = result.points[i];
   const PointSettings& s = point.settings;
   const bool front = std::ranges::find(result.front, i) != result.front.end();
   std::string html = fmt::format("<tr class=\"{}{}\">", front ? "front " : "", result.recommended == i ? "chosen" : "");
-  html += cell(std::to_string(i + 1)) + cell(std::to_string(s.eigenfunctions)) + cell(std::to_string(s.basis_size));
+  const char* mark = point.failure.empty() && !result.has_truth(point) ? " (no truth)" : "";
+  html += cell(std::to_string(i + 1) + mark) + cell(std::to_string(s.eigenfunctions)) +
+          cell(std::to_string(s.basis_size)) + cell(std::to_string(s.linear_modes));
   html += cell(point.failure.empty() ? std::to_string(point.elements) : "-") + cell(s.material, " class=\"l\"");
   html += cell(fmt::format("{:g}", 1e3 * s.time_step)) + cell(s.integrator, " class=\"l\"");
   const auto as_run = [](const std::string& asked, const std::string& taken) {
@@ -219,12 +250,8 @@ std::string point_row(const StudyResult& result, std::size_t i) {
   html += cell(as_run(s.internal_force, point.internal_force), " class=\"l\"") +
           cell(as_run(s.target, point.target), " class=\"l\"");
   if (!point.failure.empty())
-    return html + fmt::format("<td class=\"l bad\" colspan=\"16\">{}</td></tr>\n", escaped(point.failure));
-  const TrajectoryErrors& e = point.errors;
-  html += cell(percent(e.position.mean)) + cell(percent(e.position.max)) + cell(percent(e.position.end));
-  html += cell(percent(e.velocity.mean)) + cell(percent(e.energy));
-  if (result.free_body) html += cell(e.shape ? percent(e.shape->mean) : "-");
-  html += cell(point.from_all_elements ? percent(point.from_all_elements->mean) : "-");
+    return html + fmt::format("<td class=\"l bad\" colspan=\"19\">{}</td></tr>\n", escaped(point.failure));
+  html += error_cells(result, point);
   html += cell(all_elements(point) ? "-" : percent(point.heldout_error));
   if (point.times)
     html += cell(microseconds(point.times->median)) + cell(microseconds(point.times->p95)) +
@@ -234,27 +261,18 @@ std::string point_row(const StudyResult& result, std::size_t i) {
 }
 
 std::string points_table(const StudyResult& result) {
-  std::vector<std::string> names{"#",
-                                 "m",
-                                 "r",
-                                 "s",
-                                 "material",
-                                 "dt<br>[ms]",
-                                 "integrator",
-                                 "internal force",
-                                 "target",
-                                 "mean<br>[%]",
-                                 "max<br>[%]",
-                                 "end<br>[%]",
-                                 "velocity<br>[%]",
-                                 "energy<br>[%]"};
-  if (result.free_body) names.emplace_back("shape<br>[%]");
-  for (const char* name : {"from all<br>elements [%]", "held-out<br>[%]", "step<br>[us]", "p95<br>[us]",
-                           "interp<br>[us]", "precompute<br>[s]", "Newton", "above<br>tolerance"})
+  std::vector<std::string> names{"#",        "m",          "r",          "linear<br>modes", "s",
+                                 "material", "dt<br>[ms]", "integrator", "internal force",  "target"};
+  for (std::string& name : error_names(result)) names.push_back(std::move(name));
+  for (const char* name : {"held-out<br>[%]", "step<br>[us]", "p95<br>[us]", "interp<br>[us]", "precompute<br>[s]",
+                           "Newton", "above<br>tolerance"})
     names.emplace_back(name);
   std::string html =
-      "<h2>Points</h2>\n<p class=\"note\">mean, max, end: error of positions; bold: on the front. Held-out: "
-      "error of the cubature's force. Newton: iterations a step; the last column counts steps.</p>\n"
+      "<h2>Points</h2>\n<p class=\"note\">Bold: on the front. Settled: mean of the last tenth of the time. Nearest "
+      "phase: mean, against the full space up to 5 % of the duration earlier or later; where it is much below the "
+      "mean, "
+      "the body moves as it should, but too early or too late. Held-out: error of the cubature's force. Newton: "
+      "iterations a step; the last column counts steps.</p>\n"
       "<div class=\"wide\"><table>\n" +
       header(names);
   for (std::size_t i = 0; i < result.points.size(); ++i) html += point_row(result, i);
@@ -264,18 +282,21 @@ std::string points_table(const StudyResult& result) {
 std::string references_table(const StudyResult& result) {
   std::string html = "<h2>Full space</h2>\n<div class=\"wide\"><table>\n" +
                      header({"m", "material", "dt [ms]", "integrator", "steps", "step, median [ms]", "Newton",
-                             "factorisations", "above tolerance"});
+                             "factorisations", "above tolerance", "inverted tets, most", "at the end"});
   for (const ReferenceResult& r : result.references) {
     html += "<tr>" + cell(r.eigenfunctions > 0 ? std::to_string(r.eigenfunctions) : "-") +
             cell(r.material, " class=\"l\"") + cell(fmt::format("{:g}", 1e3 * r.time_step)) +
             cell(r.integrator, " class=\"l\"");
     if (!r.failure.empty()) {
-      html += fmt::format("<td class=\"l bad\" colspan=\"5\">{}</td></tr>\n", escaped(r.failure));
+      html += fmt::format("<td class=\"l bad\" colspan=\"7\">{}</td></tr>\n", escaped(r.failure));
       continue;
     }
     html += cell(std::to_string(r.steps)) + cell(fmt::format("{:.3f}", 1e3 * r.step_seconds)) +
             cell(fmt::format("{:.2f}", r.newton_iterations)) + cell(fmt::format("{:.3f}", r.factorisations)) +
-            cell(std::to_string(r.unconverged_steps)) + "</tr>\n";
+            cell(std::to_string(r.unconverged_steps));
+    const char* attributes = r.inverted.any() ? " class=\"bad\"" : "";
+    html += cell(std::to_string(r.inverted.most), attributes) + cell(std::to_string(r.inverted.last), attributes) +
+            "</tr>\n";
   }
   return html +
          "</table></div>\n<p class=\"note\">Times of the full space are of one run, beside whatever else ran.</p>\n";
@@ -329,13 +350,15 @@ std::string baseline_table(const StudyResult& result) {
 
 std::string pictures(const StudyResult& result) {
   if (result.worst_frames.empty()) return "";
-  std::string html =
-      "<h2>Worst frames</h2>\n<p class=\"note\">Full space, reduced, and both on one another, where the "
-      "positions are farthest apart.</p>\n";
+  std::string html = fmt::format(
+      "<h2>Worst frames</h2>\n<p class=\"note\">Full space, reduced{}, and both on one another, where the "
+      "error of {} is largest.</p>\n",
+      result.free_body ? " (turned and shifted onto it)" : "", result.headline());
   for (const WorstFrame& frame : result.worst_frames) {
     const PointResult& point = result.points[frame.point];
-    html += fmt::format("<p>Point {} ({}) at {:.4g} s: {} % of the RMS displacement</p>\n", frame.point + 1,
-                        escaped(describe(point.settings)), point.worst_time, percent(point.errors.position.max));
+    html += fmt::format("<p>Point {} ({}) at {:.4g} s: {} % of the RMS {}</p>\n", frame.point + 1,
+                        escaped(describe(point.settings)), point.worst_time, percent(point.errors.headline().max),
+                        result.free_body ? "deformation" : "displacement");
     html += bodies_svg(result.surface, frame.full, frame.reduced, result.up, fmt::format("p{}", frame.point + 1));
   }
   return html;
@@ -359,6 +382,8 @@ std::string summary(const StudyResult& result) {
       result.config.timing.rounds);
   if (const std::size_t failed = result.failures(); failed > 0)
     html += fmt::format("<p class=\"bad\">{} failed, see below.</p>\n", failed);
+  if (const std::string text = result.truth_warning(); !text.empty())
+    html += fmt::format("<p class=\"bad\">{}</p>\n", escaped(text));
   if (const std::string text = recommendation_text(result); !text.empty())
     html += fmt::format("<p><strong>{}</strong></p>\n", escaped(text));
   return html;
@@ -378,7 +403,7 @@ std::string recommendation_text(const StudyResult& result) {
   const auto named = [&](std::size_t i) {
     const PointResult& point = result.points[i];
     return fmt::format("point {} ({}): {} %, {} us a step", i + 1, describe(point.settings),
-                       percent(point.errors.position.mean), microseconds(point.times->median));
+                       percent(point.errors.headline().mean), microseconds(point.times->median));
   };
   if (result.recommended) return fmt::format("{}: {}", budget_text(result.budget), named(*result.recommended));
   if (result.nearest)

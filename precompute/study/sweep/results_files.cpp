@@ -26,17 +26,21 @@ std::string quoted(const std::string& text) {
 std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "inf"; }
 
 struct Column {
-  const char* name;
+  std::string name;
   std::function<std::string(const PointResult&)> text;
   bool of_failed = false;  // is there without a result
 };
 
-// The three numbers of an error.
-void add_error(std::vector<Column>& columns, const std::array<const char*, 3>& names,
+// The numbers of an error.
+void add_error(std::vector<Column>& columns, const std::string& name,
                std::function<const RelativeError*(const PointResult&)> error) {
-  constexpr std::array kMembers{&RelativeError::mean, &RelativeError::max, &RelativeError::end};
-  for (std::size_t i = 0; i < 3; ++i)
-    columns.push_back({names[i], [error, member = kMembers[i]](const PointResult& point) {
+  constexpr std::array<std::pair<const char*, double RelativeError::*>, 4> kMembers{
+      {{"_mean", &RelativeError::mean},
+       {"_max", &RelativeError::max},
+       {"_end", &RelativeError::end},
+       {"_settled", &RelativeError::settled}}};
+  for (const auto& [suffix, member] : kMembers)
+    columns.push_back({name + suffix, [error, member = member](const PointResult& point) {
                          const RelativeError* found = error(point);
                          return found == nullptr ? "" : number(found->*member);
                        }});
@@ -47,11 +51,20 @@ void add_time(std::vector<Column>& columns, const char* name, double StepTimes::
       {name, [member](const PointResult& p) { return p.times ? number(1e6 * ((*p.times).*member)) : ""; }});
 }
 
+void add_inverted(std::vector<Column>& columns, const char* name, Eigen::Index InvertedTets::*member,
+                  const StudyResult& result) {
+  columns.push_back({name, [&result, member](const PointResult& point) {
+                       const ReferenceResult* reference = result.reference_of(point);
+                       return reference == nullptr ? "" : std::to_string(reference->inverted.*member);
+                     }});
+}
+
 std::vector<Column> settings_columns() {
   return {
       {"key", [](const PointResult& p) { return p.key; }, true},
       {"eigenfunctions", [](const PointResult& p) { return std::to_string(p.settings.eigenfunctions); }, true},
       {"basis_size", [](const PointResult& p) { return std::to_string(p.settings.basis_size); }, true},
+      {"linear_modes", [](const PointResult& p) { return std::to_string(p.settings.linear_modes); }, true},
       {"cubature_elements", [](const PointResult& p) { return std::to_string(p.elements); }},
       {"material", [](const PointResult& p) { return p.settings.material; }, true},
       {"time_step_s", [](const PointResult& p) { return number(p.settings.time_step); }, true},
@@ -61,16 +74,16 @@ std::vector<Column> settings_columns() {
   };
 }
 
-std::vector<Column> columns() {
+std::vector<Column> columns(const StudyResult& result) {
   std::vector<Column> columns = settings_columns();
-  add_error(columns, {"position_error_mean", "position_error_max", "position_error_end"},
-            [](const PointResult& p) { return &p.errors.position; });
-  add_error(columns, {"velocity_error_mean", "velocity_error_max", "velocity_error_end"},
-            [](const PointResult& p) { return &p.errors.velocity; });
+  add_error(columns, "position_error", [](const PointResult& p) { return &p.errors.position; });
+  add_error(columns, "velocity_error", [](const PointResult& p) { return &p.errors.velocity; });
   columns.push_back({"energy_error_max", [](const PointResult& p) { return number(p.errors.energy); }});
-  add_error(columns, {"shape_error_mean", "shape_error_max", "shape_error_end"},
-            [](const PointResult& p) { return p.errors.shape ? &*p.errors.shape : nullptr; });
-  add_error(columns, {"from_all_elements_error_mean", "from_all_elements_error_max", "from_all_elements_error_end"},
+  add_error(columns, "shape_error", [](const PointResult& p) { return p.errors.shape ? &*p.errors.shape : nullptr; });
+  add_error(columns, "nearest_phase_error", [](const PointResult& p) { return &p.errors.nearest_phase; });
+  columns.push_back(
+      {"rebound_error", [](const PointResult& p) { return p.errors.rebound ? number(*p.errors.rebound) : ""; }});
+  add_error(columns, "from_all_elements_error",
             [](const PointResult& p) { return p.from_all_elements ? &*p.from_all_elements : nullptr; });
   columns.push_back({"cubature_heldout_error", [](const PointResult& p) { return number(p.heldout_error); }});
   add_time(columns, "step_median_us", &StepTimes::median);
@@ -81,6 +94,9 @@ std::vector<Column> columns() {
   columns.push_back({"factorisations_mean", [](const PointResult& p) { return number(p.factorisations); }});
   columns.push_back({"steps", [](const PointResult& p) { return std::to_string(p.steps); }});
   columns.push_back({"unconverged_steps", [](const PointResult& p) { return std::to_string(p.unconverged_steps); }});
+  add_inverted(columns, "reference_inverted_tets_most", &InvertedTets::most, result);
+  add_inverted(columns, "reference_inverted_tets_last", &InvertedTets::last, result);
+  columns.push_back({"no_truth", [&](const PointResult& p) { return result.has_truth(p) ? "0" : "1"; }});
   columns.push_back({"failure", [](const PointResult& p) { return p.failure; }, true});
   return columns;
 }
@@ -96,6 +112,8 @@ Ordered to_json(const ReferenceResult& reference) {
           {"unconverged_steps", reference.unconverged_steps},
           {"newton_iterations", reference.newton_iterations},
           {"factorisations", reference.factorisations},
+          {"inverted_tets", {{"most", reference.inverted.most}, {"last", reference.inverted.last}}},
+          {"no_truth", reference.inverted.any()},
           {"step_median_ms", 1e3 * reference.step_seconds}};
 }
 
@@ -110,9 +128,9 @@ void write_or_remove(const std::filesystem::path& file, const std::optional<Orde
 }  // namespace
 
 std::string results_csv(const StudyResult& result) {
-  const auto all = columns();
+  const auto all = columns(result);
   std::string text;
-  for (const Column& column : all) text += std::string(column.name) + ",";
+  for (const Column& column : all) text += column.name + ",";
   text += "on_front\n";
   for (std::size_t i = 0; i < result.points.size(); ++i) {
     const PointResult& point = result.points[i];
@@ -133,6 +151,8 @@ Ordered results_json(const StudyResult& result) {
                {"instruction_set", result.instruction_set}};
   json["frames"] = result.times.size();
   json["duration"] = result.times.back();
+  json["headline"] = result.headline();
+  json["no_truth"] = result.truth_warning();
   json["points"] = Ordered::array();
   for (const PointResult& point : result.points) json["points"].push_back(to_json(point));
   json["references"] = Ordered::array();
@@ -157,7 +177,7 @@ Ordered asset_fragment(const StudyResult& result, const PointResult& point) {
   const bool all = point.settings.internal_force == kAllElements;
   Ordered json = Ordered::object();
   if (result.has_examples) json["shape_space"] = {{"eigenfunctions", point.settings.eigenfunctions}};
-  json["basis"] = {{"size", point.settings.basis_size}};
+  json["basis"] = {{"size", point.settings.basis_size}, {"linear_modes", point.settings.linear_modes}};
   json["cubature"] = all ? Ordered{{"method", kAllElements}} : Ordered{{"elements", point.elements}};
   json["internal_force"] = point.internal_force;
   const auto differs = [&](const PointResult& other) { return other.settings.material != point.settings.material; };

@@ -49,6 +49,7 @@ std::vector<PointSettings> product(const SweepConfig& sweep, const PointSettings
   std::vector<PointSettings> points{own};
   multiply(points, sweep.eigenfunctions, &PointSettings::eigenfunctions);
   multiply(points, sweep.basis_size, &PointSettings::basis_size);
+  multiply(points, sweep.linear_modes, &PointSettings::linear_modes);
   multiply(points, sweep.cubature_elements, &PointSettings::cubature_elements);
   multiply(points, sweep.material, &PointSettings::material);
   multiply(points, sweep.time_step, &PointSettings::time_step);
@@ -75,6 +76,7 @@ PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
   PointSettings own;
   own.eigenfunctions = asset.eigenfunctions;
   own.basis_size = asset.basis_size;
+  own.linear_modes = asset.linear_modes;
   own.cubature_elements = asset.cubature_elements;
   own.material = name_of(asset.material.model);
   own.time_step = scene.time_step;
@@ -105,6 +107,7 @@ std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& a
 AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
   asset.eigenfunctions = settings.eigenfunctions;
   asset.basis_size = settings.basis_size;
+  asset.linear_modes = settings.linear_modes;
   asset.material.model = from_name<MaterialModel>(settings.material).value();
   if (settings.cubature_elements || settings.internal_force == kAllElements) asset.cubature_tolerance.reset();
   if (settings.internal_force == kAllElements)
@@ -131,7 +134,9 @@ SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
 }
 
 nlohmann::ordered_json to_json(const PointSettings& settings) {
-  nlohmann::ordered_json json{{"eigenfunctions", settings.eigenfunctions}, {"basis_size", settings.basis_size}};
+  nlohmann::ordered_json json{{"eigenfunctions", settings.eigenfunctions},
+                              {"basis_size", settings.basis_size},
+                              {"linear_modes", settings.linear_modes}};
   json["cubature_elements"] = nullptr;
   if (settings.cubature_elements) json["cubature_elements"] = *settings.cubature_elements;
   json["material"] = settings.material;
@@ -146,6 +151,7 @@ PointSettings settings_from_json(const nlohmann::ordered_json& json) {
   PointSettings settings;
   settings.eigenfunctions = json.at("eigenfunctions").get<int>();
   settings.basis_size = json.at("basis_size").get<int>();
+  settings.linear_modes = json.at("linear_modes").get<int>();
   if (!json.at("cubature_elements").is_null()) settings.cubature_elements = json.at("cubature_elements").get<int>();
   settings.material = json.at("material").get<std::string>();
   settings.time_step = json.at("time_step").get<double>();
@@ -156,7 +162,8 @@ PointSettings settings_from_json(const nlohmann::ordered_json& json) {
 }
 
 std::string describe(const PointSettings& settings) {
-  std::string text = fmt::format("m {}, r {}, ", settings.eigenfunctions, settings.basis_size);
+  std::string text = fmt::format("m {}, r {} of {} linear modes, ", settings.eigenfunctions, settings.basis_size,
+                                 settings.linear_modes);
   if (settings.cubature_elements) text += fmt::format("s {}, ", *settings.cubature_elements);
   return text + fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
                             settings.integrator, settings.internal_force, settings.target);

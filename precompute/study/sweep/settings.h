@@ -19,6 +19,7 @@ inline constexpr const char* kNoTarget = "none";
 struct PointSettings {
   int eigenfunctions = 0;                ///< m
   int basis_size = 0;                    ///< r
+  int linear_modes = 0;                  ///< whose derivatives are added
   std::optional<int> cubature_elements;  ///< s; absent: by the asset's tolerance, or all of them
   std::string material;
   double time_step = 0;  ///< [s]
@@ -43,7 +44,7 @@ SceneConfig with_settings(SceneConfig scene, const PointSettings& settings);
 nlohmann::ordered_json to_json(const PointSettings& settings);
 PointSettings settings_from_json(const nlohmann::ordered_json& json);
 
-/// "m 20, r 30, s 60, stvk, 1 ms, bdf2, cubature, table".
+/// "m 20, r 30 of 15 linear modes, s 60, stvk, 1 ms, bdf2, cubature, table".
 std::string describe(const PointSettings& settings);
 
 }  // namespace exmat::precompute

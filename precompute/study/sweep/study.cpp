@@ -155,14 +155,14 @@ void Study::run_point(const PointPlan& plan) const {
   result.key = plan.key;
   result.bundle = plan_.bundles[plan.bundle].key;
   result.reference = plan_.references[plan.reference].key;
-  result.errors =
-      trajectory_errors(run.frames, read_or_fail(frames_file(result.reference)), rest, mass, result_.free_body);
+  const BodyFrames full = read_or_fail(frames_file(result.reference));
+  result.errors = trajectory_errors(run.frames, full, rest, mass, result_.free_body);
   result.worst_time = result_.times[result.errors.worst_frame];
   if (plan.all_elements)
     result.from_all_elements =
         trajectory_errors(run.frames, read_or_fail(frames_file(plan_.points[*plan.all_elements].key)), rest, mass,
-                          false)
-            .position;
+                          result_.free_body)
+            .headline();
   result.modes = run.modes;
   result.elements = run.elements;
   result.internal_force = run.internal_force;
@@ -177,7 +177,10 @@ void Study::run_point(const PointPlan& plan) const {
   result.precompute_seconds = stages->at("seconds").get<double>();
   result.warnings = stages->at("warnings").get<std::vector<std::string>>();
   if (plan.settings.internal_force == kAllElements) write_frames(frames_file(plan.key), run.frames);
-  write_frames(worst_file(plan.key), only(run.frames, result.errors.worst_frame));
+  BodyFrames worst = only(run.frames, result.errors.worst_frame);
+  if (result_.free_body)
+    worst.positions[0] = fitted(mass, worst.positions[0], full.positions[result.errors.worst_frame]);
+  write_frames(worst_file(plan.key), worst);
   write_point(point_file(plan.key), result);
 }
 
@@ -265,6 +268,7 @@ ReferenceResult Study::result_of(const ReferencePlan& plan) const {
   result.newton_iterations = frames->newton_iterations;
   result.factorisations = frames->factorisations;
   result.step_seconds = frames->step_seconds;
+  result.inverted = inverted_tets(plan_.mesh, frames->positions);
   return result;
 }
 
@@ -384,11 +388,32 @@ std::size_t StudyResult::failures() const {
   return static_cast<std::size_t>(std::ranges::count_if(points, failed) + !baseline_failure.empty());
 }
 
+const ReferenceResult* StudyResult::reference_of(const PointResult& point) const {
+  const auto found = std::ranges::find(references, point.reference, &ReferenceResult::key);
+  return found == references.end() ? nullptr : &*found;
+}
+
+bool StudyResult::has_truth(const PointResult& point) const {
+  const ReferenceResult* reference = reference_of(point);
+  return reference == nullptr || !reference->inverted.any();
+}
+
+std::string StudyResult::truth_warning() const {
+  const auto worst = std::ranges::max_element(references, {}, [](const auto& r) { return r.inverted.most; });
+  if (worst == references.end() || !worst->inverted.any()) return "";
+  const bool resists = worst->material == name_of(MaterialModel::kStableNeoHookean);
+  return fmt::format(
+      "No truth: the full space ({}) has up to {} inverted tets in a frame, so that errors against it "
+      "say nothing; {}",
+      worst->material, worst->inverted.most,
+      resists ? "use smaller loads or a finer mesh." : "use the material stable_neo_hookean.");
+}
+
 std::vector<Outcome> outcomes(const std::vector<PointResult>& points) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   std::vector<Outcome> result;
   for (const PointResult& point : points)
-    result.push_back(point.times ? Outcome{point.errors.position.mean, point.times->median} : Outcome{kNone, kNone});
+    result.push_back(point.times ? Outcome{point.errors.headline().mean, point.times->median} : Outcome{kNone, kNone});
   return result;
 }
 

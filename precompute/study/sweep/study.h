@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "precompute/study/measure/inverted_tets.h"
 #include "precompute/study/sweep/pareto.h"
 #include "precompute/study/sweep/point_result.h"
 #include "precompute/study/sweep/study_config.h"
@@ -25,9 +26,11 @@ struct ReferenceResult {
   std::string integrator, material, failure;
   std::int64_t steps = 0, unconverged_steps = 0;
   double newton_iterations = 0, factorisations = 0, step_seconds = 0;  ///< means; median, of one run
+  InvertedTets inverted;  ///< of its frames: where there are any, its errors are of no true motion
 };
 
-/// A point's worst frame: positions [n x 3], reduced and in full space.
+/// A point's worst frame: positions [n x 3], reduced (of a free body turned and shifted onto the other) and in full
+/// space.
 struct WorstFrame {
   std::size_t point = 0;
   VertexArray reduced, full;
@@ -55,9 +58,18 @@ struct StudyResult {
   std::string processor, instruction_set;
 
   std::size_t failures() const;  ///< points, references and baselines
+
+  /// What points are chosen by, TrajectoryErrors::headline(): "shape" or "position".
+  const char* headline() const { return free_body ? "shape" : "position"; }
+  /// Null where it is not among the references.
+  const ReferenceResult* reference_of(const PointResult& point) const;
+  /// Whether the full space that a point is measured against is free of inverted tets.
+  bool has_truth(const PointResult& point) const;
+  /// One sentence of what is wrong with the references and what to do; empty where nothing is.
+  std::string truth_warning() const;
 };
 
-/// Error and time of a step of each point; those of failed ones are not finite.
+/// Error, TrajectoryErrors::headline(), and time of a step of each point; those of failed ones are not finite.
 std::vector<Outcome> outcomes(const std::vector<PointResult>& points);
 
 /// Runs what is not finished in the folder, times all points, and writes report.html, results.csv, results.json and,

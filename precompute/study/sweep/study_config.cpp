@@ -14,6 +14,7 @@ std::vector<T> list(const Json& json, const char* name) {
 SweepConfig read_sweep(const Json& json) {
   return {.eigenfunctions = list<int>(json, "eigenfunctions"),
           .basis_size = list<int>(json, "basis_size"),
+          .linear_modes = list<int>(json, "linear_modes"),
           .cubature_elements = list<int>(json, "cubature_elements"),
           .material = list<std::string>(json, "material"),
           .time_step = list<double>(json, "time_step"),

@@ -48,6 +48,7 @@ void Planner::read_inputs() {
   result_.tets = object.mesh.tet_count();
   result_.free_body = !object.fixed.any();
   result_.surface = surface_triangles(object.mesh.tets);
+  plan_.mesh = object.mesh;
   if (!scene_.gravity.isZero()) result_.up = -scene_.gravity.normalized();
   result_.has_examples = scene_.examples || !scene_.regions.empty();
   for (const RegionForceConfig& region : scene_.regions) result_.regions.push_back(region.name);

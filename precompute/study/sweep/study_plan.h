@@ -41,6 +41,7 @@ struct PointPlan {
 /// What the points of a study need, each once. Keys name the files of its folder.
 struct StudyPlan {
   std::string inputs;  ///< hash of all files and of what is the same for all points
+  TetMesh mesh;        ///< of the object
   std::vector<BundlePlan> bundles;
   std::vector<ReferencePlan> references;
   std::vector<PointPlan> points;

@@ -139,9 +139,9 @@ class Studies(unittest.TestCase):
 
     @staticmethod
     def point(s, internal_force, target, mean, from_all, interp, total):
-        settings = {"eigenfunctions": 5, "basis_size": 20, "cubature_elements": s, "material": "stvk", "time_step": 0.001,
+        settings = {"eigenfunctions": 5, "basis_size": 20, "linear_modes": 15, "cubature_elements": s, "material": "stvk", "time_step": 0.001,
                     "integrator": "bdf2", "internal_force": internal_force, "target": target}
-        errors = {"position": {"mean": mean}, "position_from_all_elements": from_all and {"mean": from_all}}
+        errors = {"position": {"mean": 10 * mean}, "shape": {"mean": mean}, "from_all_elements": from_all and {"mean": from_all}}
         return {"settings": settings, "elements": s or 99, "target": target, "failure": "", "errors": errors,
                 "times": {"interp_us": interp, "median_us": total}}
 
@@ -150,7 +150,7 @@ class Studies(unittest.TestCase):
         points = [self.point(30, "cubature", "table", 0.05, 0.03, 0.5, 10), self.point(30, "cubature", "solve", 0.05, 0.03, 20, 40),
                   self.point(60, "cubature", "table", 0.045, 0.01, 0.5, 15), self.point(None, "all_elements", "table", 0.04, None, 0.5, 100)]
         self.result = {"points": points, "own": 0, "baseline": {"interp_us": 10000, "median_us": 40000}, "baseline_failure": "",
-                       "processor": "X", "paper": {"interp_ms": 4, "total_ms": 10, "zhu_interp_ms": 8, "zhu_total_ms": 50}}
+                       "headline": "shape", "no_truth": "", "processor": "X", "paper": {"interp_ms": 4, "total_ms": 10, "zhu_interp_ms": 8, "zhu_total_ms": 50}}
 
     def test_times_stand_beside_the_baselines_and_the_papers(self):
         self.assertEqual(self.studies.time_row("bar", self.result),
@@ -158,6 +158,11 @@ class Studies(unittest.TestCase):
 
     def test_errors_stand_by_elements(self):
         self.assertIn("| bar | 5 | 20 | 4 % | 5 % (3 %) | 4.5 % (1 %) |\n", self.studies.error_table({"bar": self.result}))
+
+    def test_a_reference_that_is_no_truth_is_told(self):
+        self.assertNotIn("inverted", self.studies.error_table({"bar": self.result}))
+        self.result["no_truth"] = "No truth: 7 inverted tets."
+        self.assertIn("\nbar: No truth: 7 inverted tets.\n\n|", self.studies.error_table({"bar": self.result}))
 
     def test_failures_are_told(self):
         self.assertEqual(self.studies.failures({"bar": self.result}), "")
@@ -171,6 +176,43 @@ class Studies(unittest.TestCase):
             self.assertEqual(self.studies.STUDIES[name], f"{folder}/study.json")
             self.assertEqual(study["name"], name)
             self.assertEqual([study["paper"][k] for k in ("zhu_interp_ms", "zhu_total_ms", "interp_ms", "total_ms")], [*zhu, *paper])
+
+
+class Figures(unittest.TestCase):
+    """Scenes and assets that examples/tools/figures.py makes of those of the examples."""
+
+    def setUp(self):
+        self.figures = tool("figures")
+
+    def test_regions_act_apart_and_are_otherwise_the_examples(self):
+        whole = self.figures.read(EXAMPLES / "06_cross/scene_recommended.json")
+        names = lambda scene: [region["name"] for region in scene["regions"]]
+        apart = [self.figures.of_regions(whole, regions) for regions in (["left", "right"], ["middle"])]
+        self.assertEqual([names(scene) for scene in apart], [["left", "right"], ["middle"]])
+        for scene in apart:
+            self.assertEqual(scene | {"regions": whole["regions"]}, whole)
+        self.assertEqual(names(whole), ["left", "right", "middle"])
+
+    def test_names_are_those_of_bundle_and_trajectory(self):
+        scene = self.figures.named(self.figures.read(EXAMPLES / "04_bar_cuboid/scene_none.json"), "x")
+        self.assertEqual((scene["bundle"], scene["output"]), ("x.h5", {"trajectory": "x_run.h5", "every": 10}))
+
+    def test_the_falling_bar_begins_above_the_floor_and_tilted(self):
+        points, _ = pose.read(self.figures.BAR / "object.msh")
+        body = self.figures.falling_scene()["body"]
+        w, x, y, z = body["orientation"]
+        self.assertAlmostEqual(w * w + x * x + y * y + z * z, 1, places=4)
+        centre = (points.min(0) + points.max(0)) / 2
+        np.testing.assert_allclose(centre + body["position"], [0, 0, 2.5], atol=1e-9)
+        turn = np.array([[1 - 2 * y * y, 0, 2 * w * y], [0, 1, 0], [-2 * w * y, 0, 1 - 2 * y * y]])
+        placed = (points - centre) @ turn.T + centre + body["position"]
+        self.assertGreater(placed[:, 2].min(), 0.5)
+        self.assertGreater(np.ptp(placed[:, 0]), 3, "it lies")
+
+    def test_the_falling_bar_is_free(self):
+        asset = self.figures.falling_asset("a", "rest.msh", "posed.msh")
+        self.assertNotIn("fixed", asset["object"])
+        self.assertEqual([example["mesh"] for example in asset["examples"]], ["rest.msh", "posed.msh"])
 
 
 if __name__ == "__main__":

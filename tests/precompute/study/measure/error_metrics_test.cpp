@@ -89,6 +89,50 @@ TEST_F(ErrorMetrics, UseTheConsistentMass) {
   EXPECT_NEAR(mass_norm(mass_, field), std::sqrt(square), 1e-12 * std::sqrt(square));
 }
 
+// At 20 times the last tenth are those from 18 on; the size is that of all.
+TEST_F(ErrorMetrics, OfTheSettledBodyAreThoseOfTheLastTenth) {
+  BodyFrames reference, other;
+  for (int i = 1; i <= 20; ++i) {
+    const double difference = i < 18 ? 0.5 : 0.01 * i;
+    for (const auto& [frames, shift] : {std::pair(&reference, 2.0), std::pair(&other, 2 + difference)}) {
+      frames->times.push_back(0.1 * i);
+      frames->positions.emplace_back(mesh_.vertices);
+      frames->positions.back().col(2).array() += shift;
+      frames->velocities.push_back(VertexArray::Constant(mesh_.vertex_count(), 3, shift));
+      for (auto* energy : {&frames->kinetic, &frames->elastic, &frames->potential}) energy->push_back(0);
+    }
+  }
+  const TrajectoryErrors errors = compare(other, reference);
+  const double expected = std::sqrt((0.18 * 0.18 + 0.19 * 0.19 + 0.2 * 0.2) / 3) / 2;
+  EXPECT_NEAR(errors.position.settled, expected, 1e-12);
+  EXPECT_NEAR(errors.velocity.settled, expected, 1e-12);
+  EXPECT_NEAR(errors.position.max, 0.25, 1e-12);
+  EXPECT_NEAR(compare(shifted({1.1, 2.4, 1.8}, {}), shifted({1, 2, 2}, {})).position.settled,
+              0.2 / std::sqrt((1.0 + 4 + 4) / 3), 1e-12)
+      << "of few frames the last alone";
+}
+
+TEST_F(ErrorMetrics, HaveAHeadline) {
+  BodyFrames reference = still(), other = still();
+  for (std::size_t i = 0; i < 3; ++i) reference.positions[i] += random_field(0.05);
+  other.positions[0].col(0).array() += 5;  // farthest in position, by a shift
+  other.positions[2] += random_field(0.5);
+  const TrajectoryErrors clamped = compare(other, reference), free = compare(other, reference, true);
+  EXPECT_EQ(clamped.headline().mean, clamped.position.mean);
+  EXPECT_EQ(clamped.worst_frame, 0U);
+  EXPECT_EQ(free.headline().mean, free.shape.value().mean);
+  EXPECT_NE(free.headline().mean, free.position.mean);
+  EXPECT_EQ(free.worst_frame, 2U);
+}
+
+TEST_F(ErrorMetrics, OfReboundsAreThoseOfTheirVelocities) {
+  BodyFrames reference = still(), other = still();
+  reference.rebound = Rebound{1, {0, 0, 4}};
+  EXPECT_FALSE(compare(other, reference).rebound);
+  other.rebound = Rebound{2, {3, 0, 4}};
+  EXPECT_EQ(compare(other, reference).rebound, 0.75);
+}
+
 TEST_F(ErrorMetrics, OfTheSameMotionVanish) {
   BodyFrames frames = shifted({1, 2, 3}, {1, 1, 1});
   for (VertexArray& x : frames.positions) x += random_field(0.1);
@@ -97,6 +141,7 @@ TEST_F(ErrorMetrics, OfTheSameMotionVanish) {
   EXPECT_EQ(errors.velocity.max, 0);
   EXPECT_EQ(errors.energy, 0);
   EXPECT_LE(errors.shape.value().max, 1e-12);
+  EXPECT_LE(errors.nearest_phase.max, 1e-12);
 }
 
 TEST_F(ErrorMetrics, OfNothingAreNothingOrInfinite) {

@@ -23,6 +23,7 @@ BodyFrames some_frames() {
   frames.unconverged = 2;
   frames.newton_iterations = 2.5;
   frames.step_seconds = 1e-3;
+  frames.rebound = Rebound{0.17, {0.1, -2, 1.0 / 3}};
   return frames;
 }
 
@@ -72,6 +73,8 @@ TEST(FramesFile, KeepsEveryBit) {
   EXPECT_EQ(read->unconverged, 2);
   EXPECT_EQ(read->newton_iterations, 2.5);
   EXPECT_EQ(read->step_seconds, 1e-3);
+  EXPECT_EQ(read->rebound.value().time, 0.17);
+  EXPECT_EQ(read->rebound->velocity, Eigen::Vector3d(0.1, -2, 1.0 / 3));
 }
 
 TEST(FramesFile, MayBeOfNoFrames) {
@@ -83,6 +86,7 @@ TEST(FramesFile, MayBeOfNoFrames) {
   ASSERT_TRUE(read);
   EXPECT_EQ(read->steps, 7);
   EXPECT_TRUE(read->times.empty());
+  EXPECT_FALSE(read->rebound);
 }
 
 TEST(FramesFile, IsNotTakenWhereItIsDamaged) {

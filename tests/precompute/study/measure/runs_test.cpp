@@ -16,8 +16,9 @@ namespace {
 // A bundle with all modes, and scenes on it.
 class Runs : public testing::Test {
  protected:
-  void make(const test::BarOptions& options) {
+  void make(const test::BarOptions& options, bool contact = false) {
     bar_ = complete_bar(options);
+    if (contact) bar_.model.contact = test::surface_contact(bar_.model);
     write_bundle(bar_.model, folder_ / "bar.h5");
   }
   SceneConfig scene() const {
@@ -83,6 +84,60 @@ TEST_F(Runs, OfAFreeBodyComeNearerToTheFullSpaceWithTheTimeStep) {
   EXPECT_LE(found[1].velocity.max, kSecondOrder * found[0].velocity.max);
   EXPECT_LE(found[1].shape.value().max, kSecondOrder * found[0].shape->max);
   EXPECT_LE(found[1].position.max, 1e-5);
+}
+
+// Frames are at the same times whatever the steps; with shorter ones the motion comes to that of the shortest, to the
+// second order of BDF2.
+TEST_F(Runs, OfTheFullSpaceMayTakeOtherSteps) {
+  make({.cells = {2, 1, 1}});
+  const std::vector<double> times{0.04, 0.08, 0.2};
+  std::vector<BodyFrames> runs;
+  for (const double step : {0.002, 0.001, 0.000125}) {
+    SceneConfig config = scene();
+    config.time_step = step;
+    runs.push_back(run_full_space(config, bar_.model, times));
+    EXPECT_EQ(runs.back().times, times);
+    EXPECT_EQ(runs.back().steps, std::llround(0.2 / step));
+  }
+  const SparseMatrix mass = scalar_mass(bar_.model.object->mesh, bar_.model.object->materials.density);
+  const auto error = [&](const BodyFrames& frames) {
+    return trajectory_errors(frames, runs.back(), bar_.model.object->mesh.vertices, mass, false).position.mean;
+  };
+  EXPECT_GT(error(runs[0]), 1e-6) << "nothing to come nearer to";
+  // Of second order (1 - 1/256) / (1/4 - 1/256) = 4.05; steps that are not endlessly small a little less.
+  EXPECT_GT(error(runs[0]) / error(runs[1]), 3.5);
+  EXPECT_LT(error(runs[0]) / error(runs[1]), 4.5);
+}
+
+// Dropped on a floor. After contact nothing but gravity acts on the centre of mass: its velocity at a later frame, and
+// its way between two of them, give the velocity of the rebound.
+TEST_F(Runs, FindTheReboundOfAFreeBody) {
+  make({.cells = {2, 1, 1}, .free = true}, true);
+  SceneConfig config = scene();
+  config.time_step = 0.001;
+  config.gravity = {0, 0, -10};
+  config.body.linear_velocity = Eigen::Vector3d(0.3, 0, -1);
+  ObstacleConfig floor;
+  floor.shape = PlaneConfig{.point = {0, 0, -0.05}, .normal = {0, 0, 1}};
+  floor.stiffness = 1e6;
+  config.obstacles = {floor};
+  const std::vector<double> times{0.12, 0.14, 0.16, 0.3};
+  errors(config, times);
+  const SparseMatrix mass = scalar_mass(bar_.model.object->mesh, bar_.model.object->materials.density);
+  const Eigen::VectorXd weights = mass * Eigen::VectorXd::Ones(mass.cols());
+  for (const BodyFrames* frames : {&full_, &reduced_.frames}) {
+    ASSERT_TRUE(frames->rebound);
+    const Rebound& rebound = *frames->rebound;
+    const auto centre = [&](const VertexArray& field) -> Eigen::Vector3d {
+      return field.transpose() * weights / weights.sum();
+    };
+    ASSERT_LT(rebound.time, 0.14) << "frames after it";
+    const Eigen::Vector3d way = centre(frames->positions[2]) - centre(frames->positions[1]);
+    const Eigen::Vector3d expected = way / 0.02 - config.gravity * (0.15 - rebound.time);
+    // Of one step of gravity, for the steps of backward Euler next to contact.
+    EXPECT_LE((rebound.velocity - expected).norm(), 10 * config.time_step) << rebound.velocity.transpose();
+    EXPECT_GT(rebound.velocity.z(), 0.1) << "it bounces";
+  }
 }
 
 // Positions a little later and earlier give the velocities.

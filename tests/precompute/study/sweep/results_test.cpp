@@ -20,13 +20,14 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 PointResult some_point(int r, int s, double error, double seconds) {
   PointResult point;
-  point.settings = {10, r, s, "stvk", 0.001, "bdf2", "cubature", "table"};
+  point.settings = {10, r, 15, s, "stvk", 0.001, "bdf2", "cubature", "table"};
   point.key = "k" + std::to_string(r) + std::to_string(s);
   point.bundle = "b";
   point.reference = "f";
-  point.errors.position = {error, 2 * error, 3 * error};
-  point.errors.velocity = {1.0 / 3, kInfinity, 0};
-  point.errors.shape = RelativeError{0.5, 0.6, 0.7};
+  point.errors.position = {1 - error, 0.6, 0.7, 0.8};  // ranks the other way round
+  point.errors.velocity = {1.0 / 3, kInfinity, 0, 0};
+  point.errors.shape = RelativeError{error, 2 * error, 3 * error, 4 * error};
+  point.errors.nearest_phase = {error / 2, error, error, error};
   point.errors.worst_frame = 1;
   point.modes = static_cast<std::size_t>(r);
   point.elements = static_cast<std::size_t>(s);
@@ -52,9 +53,19 @@ StudyResult some_result() {
   failed.key = "f";
   failed.failure = "went \"wrong\", badly\nindeed";
   result.points.push_back(failed);
-  result.references = {{.key = "f", .time_step = 0.001, .integrator = "bdf2", .material = "stvk", .failure = ""}};
+  result.references = {
+      {.key = "f", .time_step = 0.001, .integrator = "bdf2", .material = "stvk", .failure = "", .inverted = {}}};
   result.front = pareto_front(outcomes(result.points));
   return result;
+}
+
+// Returns its key.
+std::string add_untrue_reference(StudyResult& result) {
+  ReferenceResult reference = result.references[0];
+  reference.key = "u";
+  reference.inverted = {7, 3};
+  result.references.push_back(reference);
+  return "u";
 }
 
 // Lines of fields, by RFC 4180.
@@ -82,13 +93,16 @@ TEST(PointFile, KeepsEveryNumber) {
   const test::TemporaryFolder folder;
   PointResult point = some_point(10, 20, 0.1, 1);
   point.times.reset();
-  point.from_all_elements = RelativeError{0.1 + 0.2, 1e-300, kInfinity};
+  point.from_all_elements = RelativeError{0.1 + 0.2, 1e-300, kInfinity, 1e300};
+  point.errors.rebound = kInfinity;
   write_point(folder / "p.json", point);
   const auto read = read_point(folder / "p.json");
   ASSERT_TRUE(read);
   EXPECT_EQ(to_json(*read).dump(), to_json(point).dump());
   EXPECT_EQ(read->from_all_elements->mean, 0.1 + 0.2);
   EXPECT_EQ(read->errors.velocity.max, kInfinity);
+  EXPECT_EQ(read->from_all_elements->settled, 1e300);
+  EXPECT_EQ(read->errors.rebound, kInfinity);
   EXPECT_EQ(read->settings, point.settings);
 }
 
@@ -108,7 +122,9 @@ TEST(PointFile, IsNotTakenWhereItIsDamaged) {
 }
 
 TEST(ResultsCsv, HasALineOfAllFieldsForEachPoint) {
-  const StudyResult result = some_result();
+  StudyResult result = some_result();
+  result.points[1].errors.rebound = 0.25;
+  result.points[1].reference = add_untrue_reference(result);
   const auto lines = parse_csv(results_csv(result));
   ASSERT_EQ(lines.size(), 5U);
   for (const auto& line : lines) EXPECT_EQ(line.size(), lines[0].size());
@@ -118,10 +134,16 @@ TEST(ResultsCsv, HasALineOfAllFieldsForEachPoint) {
     return lines.at(line).at(static_cast<std::size_t>(found - lines[0].begin()));
   };
   EXPECT_EQ(field(2, "basis_size"), "20");
-  EXPECT_EQ(std::stod(field(2, "position_error_end")), 0.06);
+  EXPECT_EQ(std::stod(field(2, "shape_error_end")), 0.06);
+  EXPECT_EQ(std::stod(field(2, "shape_error_settled")), 0.08);
+  EXPECT_EQ(std::stod(field(2, "nearest_phase_error_mean")), 0.01);
+  EXPECT_EQ(field(2, "linear_modes"), "15");
   EXPECT_EQ(field(2, "velocity_error_max"), "inf");
   EXPECT_EQ(std::stod(field(2, "step_median_us")), 30);
-  EXPECT_EQ(std::stod(field(2, "shape_error_max")), 0.6);
+  EXPECT_EQ(std::stod(field(2, "position_error_max")), 0.6);
+  EXPECT_EQ(field(1, "rebound_error") + field(2, "rebound_error"), "0.25") << "where there was one";
+  EXPECT_EQ(field(1, "no_truth") + field(2, "no_truth"), "01");
+  EXPECT_EQ(field(2, "reference_inverted_tets_most") + field(2, "reference_inverted_tets_last"), "73");
   EXPECT_EQ(field(2, "from_all_elements_error_mean"), "");
   EXPECT_EQ(field(1, "on_front") + field(2, "on_front") + field(3, "on_front") + field(4, "on_front"), "1100");
   EXPECT_EQ(field(4, "failure"), "went \"wrong\", badly\nindeed");
@@ -129,19 +151,51 @@ TEST(ResultsCsv, HasALineOfAllFieldsForEachPoint) {
 }
 
 TEST(ResultsJson, HoldsAll) {
-  const auto json = nlohmann::json::parse(results_json(some_result()).dump());
+  StudyResult result = some_result();
+  auto json = nlohmann::json::parse(results_json(result).dump());
   EXPECT_EQ(json["points"].size(), 4U);
-  EXPECT_EQ(json["points"][1]["errors"]["position"]["mean"], 0.02);
+  EXPECT_EQ(json["headline"], "shape");
+  EXPECT_EQ(json["points"][1]["errors"]["shape"]["mean"], 0.02);
+  EXPECT_EQ(json["points"][1]["errors"]["shape"]["settled"], 0.08);
+  EXPECT_EQ(json["points"][1]["errors"]["nearest_phase"]["mean"], 0.01);
+  EXPECT_FALSE(json["points"][1]["errors"].contains("rebound"));
   EXPECT_TRUE(json["points"][1]["errors"]["velocity"]["max"].is_null());
   EXPECT_EQ(json["points"][1]["times"]["median_us"], 30);
   EXPECT_EQ(json["front"], nlohmann::json::parse("[0, 1]"));
   EXPECT_TRUE(json["recommended"].is_null());
+  EXPECT_EQ(json["no_truth"], "");
+  EXPECT_EQ(json["references"][0]["no_truth"], false);
+
+  add_untrue_reference(result);
+  json = nlohmann::json::parse(results_json(result).dump());
+  EXPECT_THAT(json["no_truth"].get<std::string>(), HasSubstr("use the material stable_neo_hookean"));
+  EXPECT_EQ(json["references"][1]["no_truth"], true);
+  EXPECT_EQ(json["references"][1]["inverted_tets"].dump(), R"({"last":3,"most":7})");
+  result.free_body = false;
+  EXPECT_EQ(nlohmann::json::parse(results_json(result).dump())["headline"], "position");
+}
+
+TEST(Results, OfAMaterialThatResistsInversionGiveOtherAdvice) {
+  StudyResult result = some_result();
+  add_untrue_reference(result);
+  result.references[1].material = "stable_neo_hookean";
+  EXPECT_THAT(result.truth_warning(), HasSubstr("use smaller loads or a finer mesh"));
+}
+
+// Of the same numbers: a free body by its shape, any other by its position.
+TEST(Results, AreChosenByTheHeadline) {
+  StudyResult result = some_result();
+  EXPECT_EQ(outcomes(result.points)[0].error, 0.1);
+  for (PointResult& point : result.points) point.errors.shape.reset();
+  EXPECT_EQ(outcomes(result.points)[0].error, 0.9);
+  EXPECT_EQ(pareto_front(outcomes(result.points)), (std::vector<std::size_t>{0, 2}))
+      << "by position the second point is beaten";
 }
 
 TEST(Recommendation, IsAFragmentOfTheFiles) {
   StudyResult result = some_result();
   EXPECT_EQ(asset_fragment(result, result.points[1]).dump(),
-            R"({"shape_space":{"eigenfunctions":10},"basis":{"size":20},"cubature":{"elements":40},)"
+            R"({"shape_space":{"eigenfunctions":10},"basis":{"size":20,"linear_modes":15},"cubature":{"elements":40},)"
             R"("internal_force":"cubature","object":{"material":{"model":"stvk"}}})");
   EXPECT_EQ(scene_fragment(result, result.points[1]).dump(),
             R"({"time_step":0.001,"integrator":"bdf2","examples":{"target":"table"}})");
@@ -162,9 +216,9 @@ TEST(Recommendation, IsPutInWords) {
   EXPECT_EQ(recommendation_text(result), "");
   result.budget.seconds = 35e-6;
   result.recommended = 1;
-  EXPECT_EQ(
-      recommendation_text(result),
-      "at most 35 us: point 2 (m 10, r 20, s 40, stvk, 1 ms, bdf2, cubature, target table): 2.00 %, 30.0 us a step");
+  EXPECT_EQ(recommendation_text(result),
+            "at most 35 us: point 2 (m 10, r 20 of 15 linear modes, s 40, stvk, 1 ms, bdf2, cubature, target table): "
+            "2.00 %, 30.0 us a step");
   result.recommended.reset();
   result.nearest = 0;
   EXPECT_THAT(recommendation_text(result), HasSubstr("no point; the nearest is point 1"));
@@ -185,8 +239,43 @@ TEST(Report, IsOnePageInItself) {
   EXPECT_THAT(html, HasSubstr("Error against the number of modes"));
   EXPECT_THAT(html, HasSubstr("Error against the number of cubature elements"));
   EXPECT_THAT(html, HasSubstr("Worst frames"));
+  EXPECT_THAT(html, HasSubstr("error of shape, mean [%]"));
+  EXPECT_THAT(html, HasSubstr("shape,<br>settled [%]"));
+  EXPECT_THAT(html, HasSubstr("nearest<br>phase [%]"));
+  EXPECT_THAT(html, Not(HasSubstr("rebound<br>"))) << "nothing bounced";
+  EXPECT_THAT(html, Not(HasSubstr("no truth")));
   for (const char* outside : {"<script", "src=", "@import", "url("}) EXPECT_THAT(html, Not(HasSubstr(outside)));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
+}
+
+TEST(Report, MarksWhatIsNoTruth) {
+  StudyResult result = some_result();
+  result.points[1].reference = add_untrue_reference(result);
+  result.points[1].errors.rebound = 0.25;
+  const std::string html = report_html(result);
+  EXPECT_THAT(html, HasSubstr("use the material stable_neo_hookean"));
+  EXPECT_THAT(html, HasSubstr("<td>2 (no truth)</td>"));
+  EXPECT_THAT(html, Not(HasSubstr("<td>1 (no truth)</td>")));
+  EXPECT_THAT(html, HasSubstr("<td class=\"bad\">7</td>"));
+  EXPECT_THAT(html, HasSubstr("rebound<br>"));
+  EXPECT_THAT(html, HasSubstr("<td>25.0</td>"));
+}
+
+// Each row of points has a cell below every name.
+TEST(Report, HasAsManyCellsAsNames) {
+  StudyResult result = some_result();
+  result.points[1].errors.rebound = 0.25;
+  for (const bool free_body : {true, false}) {
+    result.free_body = free_body;
+    const std::string html = report_html(result), table = html.substr(html.find("<h2>Points</h2>"));
+    const auto count = [](const std::string& text, const std::string& what) {
+      std::size_t found = 0;
+      for (std::size_t at = text.find(what); at != std::string::npos; at = text.find(what, at + 1)) ++found;
+      return found;
+    };
+    const std::string row = table.substr(table.find("<tr class"));
+    EXPECT_EQ(count(row.substr(0, row.find("</tr>")), "<td"), count(table.substr(0, table.find("</tr>")), "<th>"));
+  }
 }
 
 TEST(Report, OfPointsThatAllFailedIsThere) {

@@ -36,12 +36,13 @@ TEST_F(Settings, OfAnEmptySweepAreTheFilesOwn) {
   ASSERT_EQ(points.size(), 1U);
   EXPECT_EQ(points[0], own_settings(asset_, scene_));
   EXPECT_EQ(points[0].cubature_elements, 40) << "2 r";
-  EXPECT_EQ(describe(points[0]), "m 10, r 20, s 40, stvk, 1 ms, bdf2, cubature, target auto");
+  EXPECT_EQ(describe(points[0]), "m 10, r 20 of 15 linear modes, s 40, stvk, 1 ms, bdf2, cubature, target auto");
 }
 
 TEST_F(Settings, AreTheProductOfAllLists) {
   study_.sweeps = {{.eigenfunctions = {5, 6},
                     .basis_size = {7, 8, 9},
+                    .linear_modes = {3, 4},
                     .cubature_elements = {11, 12},
                     .material = {"stvk", "corotational"},
                     .time_step = {0.001, 0.002},
@@ -51,14 +52,14 @@ TEST_F(Settings, AreTheProductOfAllLists) {
   const auto points = expanded();
   std::set<PointSettings> expected;
   for (const int m : {5, 6})
-    for (const int r : {7, 8, 9})
+    for (const auto& [r, l] : {std::pair(7, 3), {7, 4}, {8, 3}, {8, 4}, {9, 3}, {9, 4}})
       for (const int s : {11, 12})
         for (const char* material : {"stvk", "corotational"})
           for (const double step : {0.001, 0.002})
             for (const char* integrator : {"bdf2", "newmark"})
               for (const char* target : {"table", "solve"})
-                expected.insert({m, r, s, material, step, integrator, "cubature", target});
-  EXPECT_EQ(points.size(), 2U * 3 * 2 * 2 * 2 * 2 * 2);
+                expected.insert({m, r, l, s, material, step, integrator, "cubature", target});
+  EXPECT_EQ(points.size(), 2U * 3 * 2 * 2 * 2 * 2 * 2 * 2);
   EXPECT_EQ(std::set<PointSettings>(points.begin(), points.end()), expected);
 }
 
@@ -84,10 +85,11 @@ TEST_F(Settings, WithoutEffectMakeNoPoints) {
 TEST_F(Settings, AreAppliedToAssetAndScene) {
   asset_.cubature_tolerance = 0.01;
   scene_.regions.push_back({"left", {}});
-  const PointSettings point{5, 7, 11, "corotational", 0.002, "newmark", "cubature", "solve"};
+  const PointSettings point{5, 7, 9, 11, "corotational", 0.002, "newmark", "cubature", "solve"};
   const AssetConfig asset = with_settings(asset_, point);
   EXPECT_EQ(asset.eigenfunctions, 5);
   EXPECT_EQ(asset.basis_size, 7);
+  EXPECT_EQ(asset.linear_modes, 9);
   EXPECT_EQ(asset.cubature_elements, 11);
   EXPECT_FALSE(asset.cubature_tolerance) << "one of them alone";
   EXPECT_EQ(asset.material.model, MaterialModel::kCorotational);
@@ -116,7 +118,7 @@ TEST_F(Settings, OfAToleranceStayWithoutANumberOfElements) {
 }
 
 TEST_F(Settings, SurviveJson) {
-  study_.sweeps = {{.time_step = {1.0 / 3}, .internal_force = {"cubature", "all_elements"}}};
+  study_.sweeps = {{.linear_modes = {7}, .time_step = {1.0 / 3}, .internal_force = {"cubature", "all_elements"}}};
   for (const PointSettings& point : expanded())
     EXPECT_EQ(settings_from_json(nlohmann::ordered_json::parse(to_json(point).dump())), point);
 }

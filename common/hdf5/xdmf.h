@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace exmat {
+
+/// The cells that an .xdmf shows, and the datasets of its HDF5 file that hold them and the frames of their vertices.
+struct XdmfCells {
+  std::string_view cell, cells_path, vertices_path;  ///< such as "Tetrahedron", "/tets", "/vertices"
+  std::int64_t corners = 0, cells = 0, vertices = 0;
+};
+
+/// Text of the .xdmf beside `trajectory`, in its folder: one grid for each time [s], whose vertices are float32
+/// [times x vertices x 3].
+std::string xdmf_text(const std::filesystem::path& trajectory, const std::string& name, const XdmfCells& drawn,
+                      const std::vector<double>& times);
+
+}  // namespace exmat
