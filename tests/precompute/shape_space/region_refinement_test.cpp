@@ -122,7 +122,7 @@ TEST_F(RefinedRegion, MovesTheOutsideAlike) {
 
 // The work of the felt forces along fields of a plain bar under tension, bending and torsion, which by Betti is the
 // motion of its ends, against integrals over the bar with the window of the definition: chi = 3 t^2 - 2 t^3 with
-// t = s / w, s = 1 - |x - 2| from the border, w = 1/4, as the mean of s is 1/2.
+// t = s / l, s = 1 - |x - 2| from the border, l = 1/4, as the mean of s is 1/2.
 TEST_F(RefinedRegion, WorksAsTheIntegralsSay) {
   constexpr int kPoints = 4000;  // of the midpoint rule: errors of 1e-7
   double stretch = 0, bend = 0, twist = 0, weight = 0, sag = 0, load = 0;
