@@ -140,11 +140,10 @@ void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignmentOutcome&
   group.examples.examples.push_back(std::move(example));
 }
 
-// 0 to 1 at each vertex of the object: how much of what a pose does there belongs to the region.
+// 0 to 1 at each vertex of the object: how much of what a pose does there the region's example takes over.
 Eigen::VectorXd ShapeStageBuilder::share_of_region(const AlignedRest& rest, const RegionInput& input) const {
-  const Eigen::VectorXd inside = input.inside.cast<double>();
-  if (input.inside_example.size() == 0) return inside;
-  return inside.cwiseProduct(rest.map.pull_back * input.inside_example.cast<double>());
+  if (input.inside_example.size() == 0) return Eigen::VectorXd::Ones(input.inside.size());
+  return rest.map.pull_back * input.inside_example.cast<double>();
 }
 
 // A pose is placed by the vertices that its region is seen from.
@@ -153,11 +152,13 @@ PoseFrame ShapeStageBuilder::region_frame(const AlignedRest& rest, const RegionV
   return {rest.free_poses, SparseMatrix(view.frame().asDiagonal()), true};
 }
 
-// Leaves what the view sees of a pose that region_frame() placed.
+// Leaves what the view sees of a pose that region_frame() placed, as it will see the body.
 void ShapeStageBuilder::cut(const RegionView& view, const Eigen::VectorXd& share, TransferredPose& pose) const {
   const double weight = view.frame().sum();
   if (weight > 0) pose.displacement.rowwise() -= view.frame().transpose() * pose.displacement / weight;
-  pose.displacement = share.asDiagonal() * pose.displacement;
+  const Eigen::VectorXd moved = pose.displacement.reshaped<Eigen::RowMajor>();
+  const VertexArray seen = view.see(moved).reshaped<Eigen::RowMajor>(share.size(), 3);
+  pose.displacement = share.asDiagonal() * seen;
   const Eigen::MatrixXd change = coefficients(stage_.object, pose.displacement);
   pose.coefficients = stage_.rest_coefficients + change;
   pose.shape_space_error = lost_share(stage_.object.mass, pose.displacement, stage_.object.eigenfunctions * change);

@@ -7,18 +7,19 @@
 
 namespace exmat::precompute {
 
-/// What an example force sees of a region, linear in displacements: D'' u = D (u - R u_b), D the region's indicator and
-/// R u_b the rigid motion that its border makes. So it acts inside alone, and without net force or torque: all that the
-/// rest of the body feels is that the region bends. The border is the region's vertices beside others; a region that
-/// holds fixed vertices, or all there are, is seen as it moves, D u.
+/// What an example force sees of a region, linear in displacements: D'' u = D (u - R u_b), D the region's window, which
+/// rises smoothly from 0 at its border, and R u_b the rigid motion that the band along the border makes. So it acts
+/// inside alone, and without net force or torque: all that the rest of the body feels is that the region bends. A
+/// region that holds fixed vertices, or all there are, is seen as it moves, D u.
 class RegionView {
  public:
   /// `inside`, `fixed` [n] flag vertices of `mesh`.
   RegionView(const TetMesh& mesh, const FlagVector& inside, const FlagVector& fixed);
 
-  const FlagVector& inside() const { return inside_; }  ///< n
-  /// [n] lumped volumes of the vertices whose motion the region is seen from: its border, or its fixed ones; zeros
-  /// where there are neither.
+  const FlagVector& inside() const { return inside_; }       ///< n
+  const Eigen::VectorXd& window() const { return window_; }  ///< n, diagonal of D, 0 to 1
+  /// [n] weights of the vertices whose motion the region is seen from: those of its band, or the lumped volumes of its
+  /// fixed ones; zeros where there are neither.
   const Eigen::VectorXd& frame() const { return frame_; }
 
   /// D'' applied to displacements [3n x k].
@@ -28,9 +29,9 @@ class RegionView {
 
  private:
   FlagVector inside_;
-  Eigen::VectorXd frame_;
-  Eigen::MatrixXd rigid_;   // 3n x 6, motions of the region's vertices, or no columns
-  Eigen::MatrixXd border_;  // 3n x 6: border^T u are their amounts
+  Eigen::VectorXd window_, frame_;
+  Eigen::MatrixXd rigid_;  // 3n x 6, rigid motions as the window shows them, or no columns
+  Eigen::MatrixXd band_;   // 3n x 6: band^T u are their amounts
 };
 
 }  // namespace exmat::precompute

@@ -1,4 +1,5 @@
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -6,6 +7,8 @@
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/hdf5/hdf5_file.h"
+#include "precompute/shape_space/laplace_basis.h"
+#include "precompute/shape_space/region_view.h"
 #include "runtime/scene/scene_run.h"
 #include "tests/integration/support.h"
 
@@ -146,6 +149,27 @@ TEST_F(Regions, ActBesideTheWholeBody) {
   const test::Built without = test::build(folder_.path("asset.json"), needs_of(SceneConfig{}));
   EXPECT_TRUE(without.model.regions.empty());
   EXPECT_FALSE(without.model.shape_space);
+}
+
+// An example's descriptor is that of the body when it has the example's shape: both are seen through one window. The
+// pose is of the object's own mesh, brought back by the rotation and the scale that the bundle names.
+TEST_F(Regions, SeeTheirExamplesAsTheySeeTheBody) {
+  bar_.example_cells = bar_.cells;
+  const ReducedModel model = build_bar();
+  const RegionData& region = model.regions.front();
+  const TetMesh& mesh = model.object->mesh;
+  FlagVector inside = FlagVector::Zero(mesh.vertex_count());
+  inside(region.vertices).setOnes();
+  const precompute::RegionView view(mesh, inside, model.object->fixed);
+  const ExampleData& twist = region.examples.examples[1];
+  const VertexArray pose =
+      twist.scale * test::twisted(mesh.vertices, bar_) * twist.rotation.transpose() - mesh.vertices;
+  const precompute::LaplaceBasis object = precompute::laplace_basis_of(model);
+  const Eigen::VectorXd moved = pose.reshaped<Eigen::RowMajor>() / std::cbrt(object.volume);
+  const VertexArray seen = view.see(moved).reshaped<Eigen::RowMajor>(pose.rows(), 3);
+  const RowMatrix expected = object.eigenvalues.asDiagonal() * precompute::coefficients(object, seen);
+  const RowMatrix found = twist.descriptor - model.shape_space->rest_descriptor;
+  EXPECT_LE((found - expected).norm(), 1e-9 * expected.norm());  // digits of the mesh files
 }
 
 // Vertices of the example that are not named keep still: of the twist only the tip's part comes over.
