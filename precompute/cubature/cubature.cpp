@@ -292,10 +292,10 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
                             const CubatureOptions& options) {
   require_sound_options(options, mesh.tet_count());
   const ElementSamples samples(mesh, materials, source.basis);
-  const RowMatrix training_poses = draw_poses(source, source.motions, options.training_poses, options.seed);
+  const RowMatrix training_poses = draw_poses(source, options.training_poses, options.seed);
   const ErrorMeter training(samples, source, training_poses);
   CubatureData data;
-  data.heldout_poses = draw_poses(source, source.other_motions, kHeldoutPoses, options.seed + 1'000'003);
+  data.heldout_poses = draw_heldout_poses(source, kHeldoutPoses, options.seed + 1'000'003);
   const ErrorMeter heldout(samples, source, data.heldout_poses);
   const auto choice = choose(samples, source, options, training, heldout);
 

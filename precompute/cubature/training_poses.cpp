@@ -35,9 +35,10 @@ class PoseGenerator {
   }
 
   // Not one at rest, whose forces say nothing.
-  Eigen::VectorXd of_motion(const Eigen::MatrixXd& motions) {
-    std::uniform_int_distribution<Eigen::Index> any(0, motions.cols() - 1);
-    const double least = kLeastMotion * motions.colwise().norm().maxCoeff();
+  Eigen::VectorXd of_motion(const Eigen::MatrixXd& motions, Eigen::Index own) {
+    const Eigen::Index count = own > 0 && uniform_(generator_) < 0.5 ? own : motions.cols();
+    std::uniform_int_distribution<Eigen::Index> any(0, count - 1);
+    const double least = kLeastMotion * motions.leftCols(count).colwise().norm().maxCoeff();
     Eigen::Index column = any(generator_);
     while (motions.col(column).norm() < least) column = any(generator_);
     return with_noise(motions.col(column));
@@ -107,25 +108,39 @@ PoseSource pose_source(const ElasticSystem& system, const LinearModes& modes, co
           {}};
 }
 
-void set_motions(const Eigen::MatrixXd& motions, const Eigen::MatrixXd& others, const ElasticSystem& system,
-                 const Eigen::MatrixXd& free_basis, PoseSource& source) {
+void set_motions(const Eigen::MatrixXd& motions, Eigen::Index own, const Eigen::MatrixXd& others,
+                 const ElasticSystem& system, const Eigen::MatrixXd& free_basis, PoseSource& source) {
+  source.own_motions = own;
   const Eigen::MatrixXd mass_basis = system.mass * free_basis;
   source.motions = mass_basis.transpose() * motions;
   source.other_motions = mass_basis.transpose() * others;
 }
 
-RowMatrix draw_poses(const PoseSource& source, const Eigen::MatrixXd& motions, Eigen::Index count, std::uint64_t seed) {
+namespace {
+
+RowMatrix draw(const PoseSource& source, const Eigen::MatrixXd& motions, Eigen::Index own, Eigen::Index count,
+               std::uint64_t seed) {
   PoseGenerator generator(source, seed);
   RowMatrix poses(count, source.rest_stiffness.rows());
   const bool has_examples = source.examples.cols() > 0;
   for (Eigen::Index i = 0; i < count; ++i) {
     if (motions.cols() > 0 && i % kMotionCycle < kMotionsOfCycle)
-      poses.row(i) = generator.of_motion(motions);
+      poses.row(i) = generator.of_motion(motions, own);
     else
       poses.row(i) =
           has_examples && i % kExampleStride == kExampleStride - 1 ? generator.on_segment() : generator.on_manifold();
   }
   return poses;
+}
+
+}  // namespace
+
+RowMatrix draw_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed) {
+  return draw(source, source.motions, source.own_motions, count, seed);
+}
+
+RowMatrix draw_heldout_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed) {
+  return draw(source, source.other_motions, 0, count, seed);
 }
 
 }  // namespace exmat::precompute

@@ -1,6 +1,7 @@
 #include "precompute/pipeline/basis_stage.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fmt/format.h>
 #include <numbers>
 #include <utility>
@@ -30,6 +31,18 @@ ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowM
 
 EnergyReference reference_of(const BodyStages& stages) {
   return stages.targets.empty() ? EnergyReference::kExample : stages.targets.front().energy_reference;
+}
+
+// The run of the scene's own loads, which comes first, counts as much as all others together.
+Eigen::MatrixXd balanced_snapshots(const BodyStages& stages, const Motions& motions) {
+  Eigen::MatrixXd snapshots = motions.set.runs.snapshots;
+  const Eigen::Index own = motions.own_columns(), others = snapshots.cols() - own;
+  const auto size = [&](const auto& columns) {
+    return columns.cwiseProduct(stages.system.mass * columns).sum();
+  };
+  const double own_size = size(snapshots.leftCols(own)), other_size = size(snapshots.rightCols(others));
+  if (own_size > 0 && other_size > 0) snapshots.leftCols(own) *= std::sqrt(other_size / own_size);
+  return snapshots;
 }
 
 class BasisChooser {
@@ -73,7 +86,7 @@ BasisChoice BasisChooser::choose(int size) const {
   BasisChoice choice;
   choice.basis = modal_basis(input, size);
   if (motions_ == nullptr) return choice;
-  Eigen::MatrixXd trained = trained_basis(input, motions_->set.runs.snapshots, motions_->general, size);
+  Eigen::MatrixXd trained = trained_basis(input, balanced_snapshots(stages_, *motions_), motions_->general, size);
   choice.modal = run(choice.basis);
   choice.exact = run(trained);
   choice.trained = choice.exact.shape <= choice.modal.shape;

@@ -30,6 +30,9 @@ struct Motions {
   TrainingLoads loads;
   bool general = false;  ///< the basis is to serve other loads, too
   std::string reason;    ///< whose loads they are
+
+  /// Of the snapshots, those of the run of the very loads, which comes first.
+  Eigen::Index own_columns() const { return loads.duration > 0 ? set.runs.chain_ends.front() : 0; }
 };
 
 /// A basis, and how far bodies of it and of the modal basis with all elements are from the full space.

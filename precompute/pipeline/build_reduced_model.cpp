@@ -368,7 +368,8 @@ ReducedModel Pipeline::run() {
 
   model.cubature = timed("cubature", [&] {
     auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
-    if (motions) set_motions(motions->set.runs.snapshots, motions->set.heldout.snapshots, system, basis, source);
+    if (motions) set_motions(motions->set.runs.snapshots, motions->own_columns(), motions->set.heldout.snapshots, system, basis,
+                             source);
     const CubatureOptions options{asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
                                   asset_.training_poses, asset_.seed};
     return cache_.get(

@@ -55,6 +55,7 @@ class ReducedRunner {
 StepScene ReducedRunner::scene_of(const Segment& segment) const {
   StepScene scene;
   scene.time_step = time_step_of(options_);
+  scene.mass_damping = options_.mass_damping.value_or(0);
   scene.stiffness_damping = stiffness_damping_of(options_);
   scene.gravity = segment.gravity;
   scene.gravity_force = runtime::gravity_force(*model_, segment.gravity);

@@ -57,6 +57,9 @@ TrainingLoads scene_loads(const SceneConfig& scene, const TrainingBody& body) {
     loads.velocity = velocity_at_contact(scene, body);
     loads.patches = !body.free;
   }
+  loads.mass_damping = scene.mass_damping;
+  loads.stiffness_damping = scene.stiffness_damping;
+  loads.duration = scene.time_step * static_cast<double>(scene.steps);
   if (!body.free) return loads;
   loads.spin = scene.body.angular_velocity.value_or(loads.spin);
   loads.orientation = scene.body.orientation.value_or(loads.orientation);
@@ -126,8 +129,10 @@ std::string text_of(const TrainingLoads& loads) {
   if (loads.obstacle)
     text += fmt::format("obstacle {} {} {}\n", loads.obstacle->stiffness, loads.obstacle->damping,
                         loads.obstacle->friction);
-  return text + fmt::format("velocity {} spin {} orientation {} {}\n", text_of(loads.velocity), text_of(loads.spin),
-                            loads.orientation.w(), text_of(loads.orientation.vec()));
+  return text + fmt::format("velocity {} spin {} orientation {} {}\ndamping {} {} duration {}\n",
+                            text_of(loads.velocity), text_of(loads.spin), loads.orientation.w(),
+                            text_of(loads.orientation.vec()), loads.mass_damping.value_or(-1),
+                            loads.stiffness_damping.value_or(-1), loads.duration);
 }
 
 }  // namespace exmat::precompute

@@ -31,6 +31,8 @@ struct TrainingLoads {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the throw; its speed may come of a fall
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  std::optional<double> mass_damping, stiffness_damping;  ///< alpha [1/s], beta [s], where they are known
+  double duration = 0;  ///< [s] for which one run has these very loads, forces from their start to their end; 0: none
 
   /// Whether any of it deforms a body: gravity does not where it is free.
   bool deforms(bool free) const;

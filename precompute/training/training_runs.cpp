@@ -25,6 +25,7 @@ class ChainRunner {
   ChainRunner(const FullSpaceModel& model, const TrainingRunOptions& options, const Timer& timer)
       : model_(model), options_(options), timer_(timer) {
     scene_.time_step = time_step_of(options);
+    scene_.mass_damping = options.mass_damping.value_or(0);
     scene_.stiffness_damping = stiffness_damping_of(options);
     scene_.newton = {20, 1e-6};
   }
@@ -110,7 +111,9 @@ double time_step_of(const TrainingRunOptions& options) {
   return 2 * std::numbers::pi / options.angular_frequency / kStepsPerPeriod;
 }
 
-double stiffness_damping_of(const TrainingRunOptions& options) { return kDamping / options.angular_frequency; }
+double stiffness_damping_of(const TrainingRunOptions& options) {
+  return options.stiffness_damping.value_or(kDamping / options.angular_frequency);
+}
 
 std::int64_t steps_of(const Segment& segment, const TrainingRunOptions& options) {
   return std::max<std::int64_t>(1, std::llround(segment.duration / time_step_of(options)));

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "precompute/full_space/full_space_model.h"
@@ -11,6 +12,7 @@ namespace exmat::precompute {
 
 struct TrainingRunOptions {
   double angular_frequency = 0;  ///< omega_1 [rad/s]: the time step and the damping follow it
+  std::optional<double> mass_damping{}, stiffness_damping{};  ///< absent: none, and 0.03 / omega_1
   double budget = 0;             ///< [s]; no segment begins after it; 0: none
   bool positions = false;        ///< keep deformations and positions of all vertices, to compare with
 };

@@ -11,6 +11,7 @@ namespace {
 constexpr double kAtRest = 0.6;        // share of the segments that begin at rest
 constexpr double kCeased = 0.3;        // share in which a force that ends has done so
 constexpr double kPatchRadius = 0.12;  // of L
+constexpr double kOwnDurations = 3;    // durations of a segment that the very loads are run for, at most
 constexpr double kGap = 0.01;          // of L, between a thrown body and its obstacle
 constexpr double kAttitude = 0.25;     // [rad] about each axis, of throws near the attitude given
 
@@ -38,8 +39,12 @@ class SegmentDrawer {
     return Eigen::Quaterniond(Eigen::AngleAxisd(axis.norm(), axis.normalized()));
   }
   Segment segment();
+  Segment own_segment(double begin, double end) const;
+  Chain own_chain();
   void add_patch(Segment& segment);
-  void throw_at_obstacle(bool any_attitude, Segment& segment);
+  enum class Throw { kOwn, kLikeIt, kAnyAttitude };
+  bool is_thrown() const { return loads_.obstacle && loads_.velocity.norm() > 0; }
+  void throw_at_obstacle(Throw how, Segment& segment);
 
   const TrainingLoads& loads_;
   const SegmentBody& body_;
@@ -61,15 +66,21 @@ void SegmentDrawer::add_patch(Segment& segment) {
 }
 
 // A plane beside the body, across its way.
-void SegmentDrawer::throw_at_obstacle(bool any_attitude, Segment& segment) {
+void SegmentDrawer::throw_at_obstacle(Throw how, Segment& segment) {
   const double speed = loads_.velocity.norm();
   const Eigen::Vector3d along = loads_.velocity / speed;
-  segment.motion.orientation = any_attitude ? Eigen::Quaterniond(Eigen::AngleAxisd(
-                                                  uniform(0, 2 * std::numbers::pi), normal().normalized()))
-                                            : loads_.orientation * turn(kAttitude);
-  segment.motion.linear_velocity = uniform(0.5, 1.3) * loads_.velocity + 0.1 * speed * normal();
-  segment.motion.angular_velocity = uniform(0.5, 1.3) * loads_.spin + 0.2 * speed / body_.size * normal();
-  const Eigen::Matrix3d rotation = segment.motion.orientation.toRotationMatrix();
+  runtime::FrameMotion& motion = segment.motion;
+  motion.orientation = loads_.orientation;
+  motion.linear_velocity = loads_.velocity;
+  motion.angular_velocity = loads_.spin;
+  if (how == Throw::kLikeIt) motion.orientation = loads_.orientation * turn(kAttitude);
+  if (how == Throw::kAnyAttitude)
+    motion.orientation = Eigen::AngleAxisd(uniform(0, 2 * std::numbers::pi), normal().normalized());
+  if (how != Throw::kOwn) {
+    motion.linear_velocity = uniform(0.5, 1.3) * loads_.velocity + 0.1 * speed * normal();
+    motion.angular_velocity = uniform(0.5, 1.3) * loads_.spin + 0.2 * speed / body_.size * normal();
+  }
+  const Eigen::Matrix3d rotation = motion.orientation.toRotationMatrix();
   double farthest = 0;
   for (const auto& vertex : body_.vertices.rowwise())
     farthest = std::max(farthest, along.dot(rotation * (vertex - body_.centre).transpose()));
@@ -100,15 +111,45 @@ Segment SegmentDrawer::segment() {
   return segment;
 }
 
+// The loads as they are between two times, none of which begins or ends there.
+Segment SegmentDrawer::own_segment(double begin, double end) const {
+  Segment segment;
+  segment.duration = end - begin;
+  segment.gravity = loads_.gravity;
+  segment.examples = loads_.examples;
+  const double middle = 0.5 * (begin + end);
+  for (const VertexForceConfig& force : loads_.forces)
+    if (force.start <= middle && middle < force.end) segment.forces.push_back({force.vertices, force.force});
+  return segment;
+}
+
+Chain SegmentDrawer::own_chain() {
+  const double duration = std::min(loads_.duration, kOwnDurations * options_.duration);
+  std::vector<double> times{0, duration};
+  for (const VertexForceConfig& force : loads_.forces)
+    for (const double time : {force.start, force.end})
+      if (time > 0 && time < duration) times.push_back(time);
+  std::ranges::sort(times);
+  Chain chain;
+  for (std::size_t i = 0; i + 1 < times.size(); ++i)
+    if (times[i] < times[i + 1]) chain.push_back(own_segment(times[i], times[i + 1]));
+  return chain;
+}
+
 std::vector<Chain> SegmentDrawer::chains() {
-  const bool thrown = loads_.obstacle && loads_.velocity.norm() > 0;
+  const bool thrown = is_thrown();
   std::vector<Chain> chains;
+  if (options_.own_loads && loads_.duration > 0) {
+    chains.push_back(own_chain());
+    if (thrown) throw_at_obstacle(Throw::kOwn, chains.back().front());
+  }
+  const auto own = chains.size();
   const int count = thrown ? options_.segments * 3 / 2 : options_.segments;
   for (int i = 0; i < count; ++i) {
     Segment next = segment();
     const bool at_rest = uniform(0, 1) < kAtRest;
-    if (thrown) throw_at_obstacle(i % 2 == 1, next);
-    if (chains.empty() || thrown || at_rest) chains.emplace_back();
+    if (thrown) throw_at_obstacle(i % 2 == 1 ? Throw::kAnyAttitude : Throw::kLikeIt, next);
+    if (chains.size() == own || thrown || at_rest) chains.emplace_back();
     chains.back().push_back(std::move(next));
   }
   return chains;

@@ -29,6 +29,7 @@ struct SegmentOptions {
   int segments = 8;
   double duration = 0;  ///< of one, about [s]
   std::uint64_t seed = 1;
+  bool own_loads = true;  ///< begin with a chain of the very loads
 };
 
 /// What forces on patches act on: all that is drawn of a body.
@@ -41,7 +42,8 @@ struct SegmentBody {
 };
 
 /// Chains of segments in all, each with loads of its own: about those given, in size and direction, or in any direction
-/// where the loads say so. Six in ten begin at rest. Those of a body that is thrown begin beside the obstacle, half of
+/// where the loads say so. The first chain is one of the very loads, if they say for how long. Six in ten begin at
+/// rest. Those of a body that is thrown begin beside the obstacle, half of
 /// them about the attitude given, half in any; they are half as many again. The same of the same seed.
 std::vector<Chain> draw_segments(const TrainingLoads& loads, const SegmentBody& body, const SegmentOptions& options);
 

@@ -67,8 +67,10 @@ TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, co
                           kPatchDisplacement * body.size / soft};
   const double duration = config.seconds.value_or(kPeriods * 2 * std::numbers::pi / body.angular_frequency);
   return {draw_segments(loads, drawn, {config.segments, duration, seed}),
-          draw_segments(loads, drawn, {kHeldoutSegments, duration, seed + kHeldoutSeed}),
-          {.angular_frequency = body.angular_frequency}};
+          draw_segments(loads, drawn, {kHeldoutSegments, duration, seed + kHeldoutSeed, false}),
+          {.angular_frequency = body.angular_frequency,
+           .mass_damping = loads.mass_damping,
+           .stiffness_damping = loads.stiffness_damping}};
 }
 
 TrainingSet run_training(const TrainingInput& input, const TrainingChains& chains) {

@@ -169,5 +169,24 @@ TEST_P(Cubature, PosesAreAsLargeAsTheRecipeSays) {
   EXPECT_NEAR(large / 150.0, 0.53, 0.12);  // uniform in (0.05, 1); three standard deviations
 }
 
+// Six of eight poses are a motion but for the noise, whose energy is a hundredth of the pose's; none is at rest.
+TEST_P(Cubature, PosesOfMotionsAreTheirs) {
+  const Eigen::Index r = source_.rest_stiffness.rows();
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Random(r, 20);
+  motions.col(3).setZero();
+  PoseSource source = source_;
+  source.motions = motions;
+  const RowMatrix poses = draw_poses(source, 80, 5);
+  const auto energy = [&](const Eigen::VectorXd& q) { return q.dot(source_.rest_stiffness * q); };
+  int of_motions = 0;
+  for (Eigen::Index p = 0; p < poses.rows(); ++p)
+    for (const auto& motion : motions.colwise()) {
+      if (motion.isZero(0)) continue;
+      const double share = energy(poses.row(p).transpose() - motion) / energy(motion);
+      if (std::abs(share - 0.01) < 1e-9) ++of_motions;
+    }
+  EXPECT_EQ(of_motions, 60);
+}
+
 }  // namespace
 }  // namespace exmat::precompute

@@ -157,6 +157,50 @@ TEST_P(Basis, ClampedFieldsAreInEquilibriumWithTheirClamp) {
   }
 }
 
+// Principal components are the best there are: what they lose of the snapshots, in the norm that they are taken in, is
+// the tail of the singular values, which a plain SVD of the factored columns gives.
+TEST_P(Basis, OfMotionsLosesNoMoreThanTheSingularValuesSay) {
+  const Eigen::Index count = 12, size = 5;
+  Eigen::MatrixXd motions = modes_.modes * Eigen::MatrixXd::Random(6, count);
+  motions += 1e-2 * Eigen::MatrixXd::Random(motions.rows(), count);
+  if (system_.null_space.cols() > 0)
+    motions -= system_.null_space * (system_.null_space.transpose() * (system_.mass * motions));
+  const BasisInput input{system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), {}};
+  const Eigen::MatrixXd U = trained_basis(input, motions, false, size);
+  EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(size, size)).cwiseAbs().maxCoeff(), 1e-12);
+  const Eigen::MatrixXd norm = Eigen::MatrixXd(system_.mass) + Eigen::MatrixXd(system_.stiffness) / modes_.eigenvalues[4];
+  const Eigen::MatrixXd factor = norm.llt().matrixU();
+  const Eigen::VectorXd sigma = Eigen::MatrixXd(factor * motions).bdcSvd().singularValues();
+  const Eigen::MatrixXd inside = factor * U;
+  const Eigen::MatrixXd projected = inside * inside.householderQr().solve(factor * motions);
+  EXPECT_NEAR((factor * motions - projected).squaredNorm(), sigma.tail(count - size).squaredNorm(),
+              1e-9 * sigma.squaredNorm());
+}
+
+TEST_P(Basis, OfFewMotionsIsFilledUpWithModes) {
+  Eigen::MatrixXd motions = modes_.modes.leftCols(2);
+  const BasisInput input{system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), {}};
+  const Eigen::MatrixXd U = trained_basis(input, motions, false, 10);
+  ASSERT_EQ(U.cols(), 10);
+  EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(10, 10)).cwiseAbs().maxCoeff(), 1e-12);
+  EXPECT_LE((motions - U * (U.transpose() * (system_.mass * motions))).norm(), 1e-9);
+}
+
+// The mix holds a motion that modes do not, and modes that no motion has shown.
+TEST_P(Basis, OfTheMixHoldsMotionsAndModes) {
+  Eigen::MatrixXd motion = Eigen::MatrixXd::Random(system_.mass.rows(), 1);
+  if (system_.null_space.cols() > 0)
+    motion -= system_.null_space * (system_.null_space.transpose() * (system_.mass * motion));
+  const BasisInput input{system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), {}};
+  const Eigen::MatrixXd U = trained_basis(input, motion, true, 12);
+  const auto lost = [&](const Eigen::MatrixXd& u) {
+    const Eigen::MatrixXd rest = u - U * (U.transpose() * (system_.mass * u));
+    return std::sqrt(rest.cwiseProduct(system_.mass * rest).sum() / u.cwiseProduct(system_.mass * u).sum());
+  };
+  EXPECT_LE(lost(motion), 0.05);
+  EXPECT_LE(lost(modes_.modes.leftCols(1)), 0.05);
+}
+
 TEST_P(Basis, MoreModesThanSnapshotsAreRefused) {
   try {
     basis(28);
