@@ -105,6 +105,7 @@ PoseSource pose_source(const ElasticSystem& system, const LinearModes& modes, co
           body_size,
           examples,
           {},
+          0,
           {}};
 }
 

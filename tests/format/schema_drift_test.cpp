@@ -119,6 +119,7 @@ TEST(Choices, AreThoseOfTheAsset) {
   expect_names<AlignmentFrame>("asset", "/properties/alignment/properties/frame/enum");
   expect_names<CubatureMethod>("asset", "/properties/cubature/properties/method/enum");
   expect_names<ForceMethod>("asset", "/properties/internal_force/enum");
+  expect_names<Training>("asset", "/properties/basis/properties/training/enum");
 }
 
 TEST(Choices, AreThoseOfTheScene) {
@@ -158,7 +159,8 @@ TEST(Choices, AreThoseOfTheBundle) {
   ChoiceCheck check;
   const ReducedModel model = test::small_model(false);
   visit_fields(model, check);
-  EXPECT_EQ(check.choices, 6);  // material, weighting, internal force, method, targets of the body and of a region
+  // Material, weighting, internal force, method, targets of the body and of a region, spaces of targets of the three.
+  EXPECT_EQ(check.choices, 9);
 }
 
 class FileSchemaOf : public ::testing::TestWithParam<const char*> {

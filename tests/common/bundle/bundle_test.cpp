@@ -196,10 +196,11 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.asset_name, "small");
   EXPECT_EQ(summary.generator, "exmat test");
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
-  EXPECT_EQ(summary.format_version, 6);
+  EXPECT_EQ(summary.format_version, 7);
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
-                                          "projection", "targets", "regions", "rigid", "contact", "render"));
+                                          "projection", "targets", "target_space", "fidelity", "regions", "rigid", "contact",
+                                          "render"));
   EXPECT_EQ(summary.render_vertices, 3);
   ASSERT_EQ(summary.regions.size(), 2U);
   EXPECT_EQ(summary.regions[0].name, "far right");
@@ -229,6 +230,17 @@ TEST(FitNeeds, TakesTheBundlesInternalForceAndItsTargetsOfTheSameEnergy) {
   EXPECT_FALSE(fit_needs({.targets = false, .energy_reference = EnergyReference::kRest}, summary).targets);
   summary.has_targets = false;
   EXPECT_FALSE(fit_needs({.energy_reference = EnergyReference::kRest}, summary).targets);
+}
+
+TEST(FitNeeds, TakesTheSpaceOfTargetsWhereNoTableServes) {
+  BundleSummary summary;
+  summary.energy_reference = EnergyReference::kRest;
+  summary.has_targets = summary.has_target_space = true;
+  EXPECT_FALSE(fit_needs({.energy_reference = EnergyReference::kRest}, summary).target_space);
+  EXPECT_TRUE(fit_needs({.energy_reference = EnergyReference::kExample}, summary).target_space);
+  EXPECT_TRUE(fit_needs({.targets = false, .energy_reference = EnergyReference::kRest}, summary).target_space);
+  summary.has_target_space = false;  // of formats before 7
+  EXPECT_FALSE(fit_needs({.targets = false, .energy_reference = EnergyReference::kRest}, summary).target_space);
 }
 
 TEST(Bundle, GivesSomeRowsOfTheBasis) {

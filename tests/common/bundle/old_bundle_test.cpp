@@ -22,10 +22,15 @@ void name_doubt_as_before(Spoiler& spoiler, const std::string& folder, const Exa
 
 // small_model(false) as version 5 wrote it.
 void write_version_5(const std::filesystem::path& path) {
-  const ReducedModel model = small_model(false);
+  ReducedModel model = small_model(false);
+  model.fidelity.reset();
+  model.target_space.reset();
+  for (RegionData& region : model.regions) region.target_space.reset();
   write_bundle(model, path);
   Spoiler spoiler(path);
   spoiler.set_integer("/", "format_version", 5);
+  spoiler.remove_attribute("/targets", "is_pull");
+  spoiler.remove_attribute("/regions/left/targets", "is_pull");
   name_doubt_as_before(spoiler, "/examples", *model.examples);
   for (const RegionData& region : model.regions)
     name_doubt_as_before(spoiler, "/regions/" + region.name + "/examples", region.examples);
@@ -38,6 +43,7 @@ TEST(BundleOfVersion5, HasTheDoubtUnderItsFormerName) {
   for (const ExampleData& example : model.examples->examples) EXPECT_EQ(example.doubt, 0.25);
   ASSERT_EQ(model.regions.size(), 2U);
   EXPECT_EQ(model.regions.back().examples.examples.back().doubt, 0.25);
+  EXPECT_FALSE(model.targets->is_pull || model.regions.front().targets->is_pull);
   EXPECT_THAT(validate_bundle(folder / "a.h5"), ::testing::IsEmpty());
 }
 
@@ -61,6 +67,8 @@ void write_version_1(const std::filesystem::path& path) {
   ReducedModel model = small_model();
   model.polynomial.reset();
   model.targets.reset();
+  model.target_space.reset();
+  model.fidelity.reset();
   model.contact.reset();
   model.regions.clear();
   model.render.reset();

@@ -117,6 +117,35 @@ TargetTableData small_targets() {
   return targets;
 }
 
+TargetSpaceData small_target_space(Eigen::Index examples) {
+  TargetSpaceData space;
+  space.energy_reference = EnergyReference::kRest;
+  space.error = 1e-6;
+  space.element_error = 1e-3;
+  space.poses = numbers(examples, 1, 2);
+  space.pull = numbers(kModes, 1, 4);
+  space.elements = IndexVector{{0, 1}};
+  space.weights = Eigen::Vector2d(0.5, 1.5);
+  space.volumes = Eigen::Vector2d(0.25, 0.75);
+  space.gradient = numbers(18, 1, 3);
+  space.youngs_modulus = Eigen::Vector2d(1e5, 2e5);
+  space.poisson_ratio = Eigen::Vector2d(0.3, 0.4);
+  return space;
+}
+
+FidelityData small_fidelity() {
+  FidelityData fidelity;
+  fidelity.loads = "the loads of the scene";
+  fidelity.basis = "trained";
+  fidelity.advice = "none";
+  fidelity.training_runs = 8;
+  fidelity.heldout_runs = 2;
+  fidelity.position_error = fidelity.shape_error = 0.01;
+  fidelity.captured_energy = 0.99;
+  fidelity.worst_vertex = 3;
+  return fidelity;
+}
+
 RigidData small_rigid() {
   const RowMatrix3 factor = numbers(3, 3, 0.5);
   return {.mass = 125,
@@ -158,8 +187,10 @@ RenderData small_render() {
 // The second with an example less and no targets.
 std::vector<RegionData> small_regions(const ReducedModel& model) {
   std::vector<RegionData> regions(2);
-  regions[0] = {"left", 0, IndexVector{{0, 2}}, *model.examples, *model.projection, model.targets};
-  regions[1] = {"far right", 1, IndexVector{{1}}, *model.examples, *model.projection, std::nullopt};
+  regions[0] = {"left", 0, IndexVector{{0, 2}}, *model.examples, *model.projection, model.targets,
+                model.target_space};
+  regions[1] = {"far right", 1, IndexVector{{1}}, *model.examples, *model.projection, std::nullopt,
+                small_target_space(2)};
   ExampleSet& fewer = regions[1].examples;
   fewer.examples.pop_back();
   fewer.gram = RowMatrix(fewer.gram.topLeftCorner(2, 2));
@@ -185,8 +216,10 @@ ReducedModel small_model(bool constrained, bool with_examples) {
     model.projection = ProjectionData{numbers(3 * kEigenfunctions, kModes, 6), numbers(kModes, 3 * kEigenfunctions, 7),
                                       numbers(kModes, 1, 8)};
     model.targets = small_targets();
+    model.target_space = small_target_space(kExamples);
     model.regions = small_regions(model);
   }
+  model.fidelity = small_fidelity();
   if (!constrained) model.rigid = small_rigid();
   model.contact = small_contact(model);
   model.render = small_render();

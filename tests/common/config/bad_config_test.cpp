@@ -81,8 +81,13 @@ const BadConfig kBadAssets[] = {
     {"UnknownRootMember", asset(R"("shapespace": {})"),
      "a.json: /shapespace; unknown member \"shapespace\"; did you mean \"shape_space\"?"},
     {"UnlikeAnyMember", asset(R"("basis": {"zzzzzzzz": 1})"),
-     "a.json: /basis/zzzzzzzz; unknown member \"zzzzzzzz\"; members here are \"example_fields\", \"linear_modes\" and "
-     "\"size\""},
+     "a.json: /basis/zzzzzzzz; unknown member \"zzzzzzzz\"; members here are \"example_fields\", "
+     "\"linear_modes\", \"loads\", \"size\", \"tolerance\", \"training\", \"training_seconds\", \"training_seed\" and "
+     "\"training_segments\""},
+    {"SizeAndToleranceOfTheBasis", asset(R"("basis": {"size": 20, "tolerance": 0.02})"),
+     "a.json: /basis: expected size or tolerance, found both"},
+    {"LoadsThatAreNotThere", asset(R"("basis": {"training": "loads"})"),
+     "a.json: /basis/loads: expected the loads that \"training\": \"loads\" asks for, found none"},
     {"WrongType", asset(R"("basis": {"size": "20"})"),
      "a.json: /basis/size: expected an integer >= 1 and <= 10000, found \"20\""},
     {"Fraction", asset(R"("basis": {"size": 2.5})"),

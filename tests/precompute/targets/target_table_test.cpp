@@ -9,6 +9,7 @@
 #include <random>
 
 #include "common/config/config.h"
+#include "precompute/full_space/full_space_examples.h"
 #include "precompute/pipeline/build_reduced_model.h"
 #include "runtime/sim/examples/target.h"
 #include "runtime/sim/examples/target_table.h"
@@ -46,7 +47,7 @@ std::optional<TargetTableData> table_of(const ReducedModel& model, const TargetT
     return std::nullopt;
   }
   Eigen::MatrixXd poses(model.modal->basis.cols(), std::ssize(model.examples->examples));
-  for (const ExampleData& example : model.examples->examples) poses.col(example.index) = example.pose;
+  for (Eigen::Index k = 0; k < poses.cols(); ++k) poses.col(k) = model.examples->examples[static_cast<std::size_t>(k)].pose;
   return build_target_table(solver, poses, options, report);
 }
 
@@ -366,15 +367,34 @@ TEST_P(SharpBend, TheSameInEveryRunAndForAnyNumberOfThreads) {
   omp_set_num_threads(before);
 }
 
-// Its twist sets in all at once, at a weight of about 0.05.
+// Its twist sets in all at once, at a weight of about 0.05. The pull of the bundle's table against that of targets on
+// the whole mesh, filtered there: the tolerance is of targets in the energy norm, in which their rigid turns weigh
+// nothing and their stretch most, so that pulls are allowed ten times as much.
 TEST(TargetTableOfTheTwistedBar, IsWithinTheDefaultTolerance) {
-  const AssetConfig asset = load_asset(EXMAT_SOURCE_DIR "/examples/01_twisted_bar/asset.json");
+  AssetConfig asset = load_asset(EXMAT_SOURCE_DIR "/examples/01_twisted_bar/asset.json");
+  asset.training.from = Training::kNone;
   BuildReport report;
   const ReducedModel model = build_reduced_model(asset, resolve_needs(asset, std::nullopt), report);
   ASSERT_TRUE(model.targets);
-  EXPECT_GT(model.targets->knots.size(), 2);
+  EXPECT_TRUE(model.targets->is_pull);
   EXPECT_LE(model.targets->control_points.rows(), 100);
-  EXPECT_LE(largest_error(*model.targets, solver_of(model, EnergyReference::kExample), 2, 300), asset.target_tolerance);
+  EXPECT_LE(model.targets->error, asset.target_tolerance);
+  const ObjectData& object = *model.object;
+  const ElasticSystem system = build_elastic_system(object.mesh, object.materials, object.fixed);
+  const FullSpaceExamples full(model, system, whole_body_example_poses(model, system), EnergyReference::kExample);
+  const Eigen::MatrixXd basis = system.restrict(model.modal->basis);
+  const TargetTable table(*model.targets);
+  auto scratch = table.make_workspace();
+  Eigen::VectorXd pull(table.modes());
+  double largest = 0, difference = 0;
+  for (const Eigen::VectorXd& w : random_weights(2, 40)) {
+    const Eigen::VectorXd y = solve(full.target(), w);
+    const Eigen::VectorXd exact = basis.transpose() * full.filter(full.target_fields() * y);
+    table.evaluate(w, scratch, pull);
+    largest = std::max(largest, exact.norm());
+    difference = std::max(difference, (pull - exact).norm());
+  }
+  EXPECT_LE(difference, 10 * asset.target_tolerance * largest);
 }
 
 TEST(TargetTableRefusal, WhereThePiecesAreNotEnough) {

@@ -14,7 +14,8 @@ struct Box {
 
   Box() : vertices(8, 3) {
     for (Eigen::Index v = 0; v < 8; ++v) {
-      vertices.row(v) << 2.0 * (v & 1), v >> 1 & 1, v >> 2 & 1;
+      const auto bit = [v](int i) { return static_cast<double>(v >> i & 1); };
+      vertices.row(v) = Eigen::RowVector3d(2 * bit(0), bit(1), bit(2));
       surface.push_back(v);
     }
   }
