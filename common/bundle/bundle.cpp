@@ -77,8 +77,8 @@ Needs fit_needs(Needs needs, const BundleSummary& summary) {
     const auto found = std::ranges::find(summary.regions, region.name, &RegionSummary::name);
     region.targets = region.targets && found != summary.regions.end() &&
                      serves(found->has_targets, found->energy_reference, region.energy_reference);
-    region.target_space = region.target_space && !region.targets && found != summary.regions.end() &&
-                          found->has_target_space;
+    region.target_space =
+        region.target_space && !region.targets && found != summary.regions.end() && found->has_target_space;
   }
   return needs;
 }

@@ -232,8 +232,9 @@ class AssetReader {
     loads.example_stiffness = optional_member<double>(examples, "stiffness");
     loads.example_damping = optional_member<double>(examples, "damping");
     loads.example_bias = optional_member<double>(examples, "bias");
-    if (json.contains("gravity")) 
-      for (std::size_t axis = 0; axis < 3; ++axis) loads.gravity[static_cast<Eigen::Index>(axis)] = json["gravity"][axis];
+    if (json.contains("gravity"))
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        loads.gravity[static_cast<Eigen::Index>(axis)] = json["gravity"][axis];
     loads.speed = json.value("speed", loads.speed);
     return loads;
   }

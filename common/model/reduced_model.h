@@ -148,21 +148,21 @@ struct RegionData {
 /// Group /fidelity: how far the reduced body is from the full space in runs that its basis has not learned from.
 /// Errors are relative, docs/error_metrics.md. Of no use to a step.
 struct FidelityData {
-  std::string loads;                 ///< whose loads the runs are of
-  std::string basis;                 ///< "trained", "modal": which of the two was better and is taken
-  std::string advice;                ///< one sentence
-  std::int64_t training_runs = 0;    ///< that the basis has learned from
-  std::int64_t heldout_runs = 0;     ///< that these errors are of
-  double position_error = 0;         ///< mean
-  double shape_error = 0;            ///< mean, without the rigid motion; of a clamped body as the position
-  double end_error = 0;              ///< of the position (a free body: of the shape) in the last frame of each run
-  double settled_error = 0;          ///< likewise, over the last tenth of each run
-  double all_elements_error = 0;     ///< of the shape, of the basis with all elements: what cubature has no share in
-  double modal_error = 0;            ///< likewise, of the basis of modes and their derivatives alone
-  double captured_energy = 0;        ///< share of |u|_M^2 of the full motion that the basis can hold
-  double target_error = 0;           ///< largest of a table or space of targets
-  std::int64_t worst_vertex = 0;     ///< whose distance is largest
-  double worst_distance = 0;         ///< its distance, over the diagonal of the object's bounding box
+  std::string loads;               ///< whose loads the runs are of
+  std::string basis;               ///< "trained", "modal": which of the two was better and is taken
+  std::string advice;              ///< one sentence
+  std::int64_t training_runs = 0;  ///< that the basis has learned from
+  std::int64_t heldout_runs = 0;   ///< that these errors are of
+  double position_error = 0;       ///< mean
+  double shape_error = 0;          ///< mean, without the rigid motion; of a clamped body as the position
+  double end_error = 0;            ///< of the position (a free body: of the shape) in the last frame of each run
+  double settled_error = 0;        ///< likewise, over the last tenth of each run
+  double all_elements_error = 0;   ///< of the shape, of the basis with all elements: what cubature has no share in
+  double modal_error = 0;          ///< likewise, of the basis of modes and their derivatives alone
+  double captured_energy = 0;      ///< share of |u|_M^2 of the full motion that the basis can hold
+  double target_error = 0;         ///< largest of a table or space of targets
+  std::int64_t worst_vertex = 0;   ///< whose distance is largest
+  double worst_distance = 0;       ///< its distance, over the diagonal of the object's bounding box
 };
 
 /// Group /rigid: moments about the centre of mass, X centred there, of a free body or of one whose fixed part is

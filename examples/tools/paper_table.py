@@ -68,7 +68,7 @@ def measure(name, variant, programs):
     bundle = folder / json.loads(scene.read_text())["bundle"]
     if not bundle.exists() or bundle.stat().st_mtime < asset.stat().st_mtime:
         print(f"paper_table: {bundle.name}", file=sys.stderr)
-        run(programs / "exmat-precompute", "bundle", asset, "-o", bundle)
+        run(programs / "exmat-precompute", "bundle", asset, "--scene", scene, "-o", bundle)
     return sizes_of(bundle, asset), bench(scene, folder, "solve", programs), bench(scene, folder, "auto", programs)
 
 

@@ -15,6 +15,6 @@ member() { sed -n "s/.*\"$1\": *\"\([^\"]*\)\".*/\1/p" "$source"; }
 
 mkdir -p "$output"
 cp "$source" "$output/scene$variant.json"
-"$programs/exmat-precompute" bundle "$folder/asset$variant.json" -o "$output/$(member bundle)"
+"$programs/exmat-precompute" bundle "$folder/asset$variant.json" --scene "$source" -o "$output/$(member bundle)"
 "$programs/exmat-runtime" run "$output/scene$variant.json"
 "$here/expect.py" "$folder/expected$variant.json" "$output/$(member trajectory)"

@@ -67,6 +67,11 @@ void print_model(const std::string& bundle, const ReducedModel& model) {
       "frequencies {:.4g} to {:.4g} Hz; held-out cubature error: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %\n",
       model.modal->frequencies.minCoeff(), model.modal->frequencies.maxCoeff(), 100 * model.cubature->heldout_error,
       100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error);
+  if (model.fidelity)
+    fmt::print(
+        "fidelity: {:.2f} % from the full space under {}, {:.2f} % with all elements, {:.2f} % of modes alone; {}\n",
+        100 * model.fidelity->shape_error, model.fidelity->loads, 100 * model.fidelity->all_elements_error,
+        100 * model.fidelity->modal_error, model.fidelity->advice);
   if (model.render) print_render_mesh(model);
   if (model.examples) print_examples("example", *model.examples);
   for (const RegionData& region : model.regions) print_examples("region " + region.name, region.examples);

@@ -11,8 +11,8 @@ namespace {
 constexpr double kLargestDisplacement = 0.4;  // of L
 constexpr double kSmallestShare = 0.05;       // of that
 constexpr double kNoiseEnergy = 0.01;
-constexpr double kLeastMotion = 0.01;  // of the largest
-constexpr Eigen::Index kExampleStride = 4;  // every fourth pose is an example's
+constexpr double kLeastMotion = 0.01;                          // of the largest
+constexpr Eigen::Index kExampleStride = 4;                     // every fourth pose is an example's
 constexpr Eigen::Index kMotionCycle = 8, kMotionsOfCycle = 6;  // poses of motions, where there are any
 
 class PoseGenerator {

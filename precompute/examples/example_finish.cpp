@@ -62,7 +62,7 @@ std::string advice_on_loss(const ExampleData& example, Eigen::Index functions, E
 }
 
 void log_group(const ExampleGroup& group, const AssetConfig& asset, FunctionCounter& counter, const ExampleSet& set,
-                std::vector<std::string>& warnings) {
+               std::vector<std::string>& warnings) {
   const std::string where = group.region.empty() ? "" : fmt::format(" in region {}", group.region);
   for (Eigen::Index k = 0; k < group.fields.cols(); ++k) {
     const ExampleData& example = set.examples[static_cast<std::size_t>(k + 1)];
@@ -130,7 +130,8 @@ PoseCoordinates PoseFitter::range(Eigen::Index index) const {
 }
 
 // The basis through the filter of the example force, then the space: U^T P Y = T^+ (T Y).
-Eigen::MatrixXd PoseFitter::pull(std::size_t index, const ProjectionData& projection, const TargetSpace& targets) const {
+Eigen::MatrixXd PoseFitter::pull(std::size_t index, const ProjectionData& projection,
+                                 const TargetSpace& targets) const {
   const ExampleGroup& group = stage_.groups[index];
   RowMatrix displacements = system_.extend(targets.coordinates.basis);
   if (group.view) displacements = group.view->see(displacements);
@@ -142,7 +143,7 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   const RowMatrix& basis = model.modal->basis;
   const bool whole = group.region.empty();
   Finished finished{group.examples, direct_projection(stage_.object, stage_.weights, system_.full_mass,
-                                                                 whole ? basis : RowMatrix(group.view->see(basis)))};
+                                                      whole ? basis : RowMatrix(group.view->see(basis)))};
   const RowMatrix map = whole && !system_.constrained()
                             ? finished.projection.reduced_from_shape
                             : pose_map(poses_[index], asset_.eigenfunctions, system_, basis);
@@ -192,8 +193,7 @@ void PoseFitter::log_losses(const ReducedModel& model, std::vector<std::string>&
   FunctionCounter counter(model.object->mesh, asset_.name);
   auto region = model.regions.begin();
   for (const ExampleGroup& group : stage_.groups)
-    log_group(group, asset_, counter, group.region.empty() ? *model.examples : (region++)->examples,
-                           warnings);
+    log_group(group, asset_, counter, group.region.empty() ? *model.examples : (region++)->examples, warnings);
 }
 
 }  // namespace exmat::precompute

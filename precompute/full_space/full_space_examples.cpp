@@ -118,9 +118,10 @@ void FullSpaceExamples::set_filter(const ReducedModel& model, const ExampleSet& 
 
 void FullSpaceExamples::set_target(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                                    EnergyReference reference) {
-  coordinates_ = poses.coordinates ? *poses.coordinates
-                                   : pose_range(system.mass, poses.fields,
-                                                descriptor_changes(model.shape_space->rest_descriptor, *poses.examples));
+  coordinates_ = poses.coordinates
+                     ? *poses.coordinates
+                     : pose_range(system.mass, poses.fields,
+                                  descriptor_changes(model.shape_space->rest_descriptor, *poses.examples));
   MeshTarget target = mesh_target(*model.object, system, coordinates_, reference);
   left_out_ = target.left_out;
   target_ = std::move(target.solver);

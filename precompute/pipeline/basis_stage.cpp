@@ -37,9 +37,7 @@ EnergyReference reference_of(const BodyStages& stages) {
 Eigen::MatrixXd balanced_snapshots(const BodyStages& stages, const Motions& motions) {
   Eigen::MatrixXd snapshots = motions.set.runs.snapshots;
   const Eigen::Index own = motions.own_columns(), others = snapshots.cols() - own;
-  const auto size = [&](const auto& columns) {
-    return columns.cwiseProduct(stages.system.mass * columns).sum();
-  };
+  const auto size = [&](const auto& columns) { return columns.cwiseProduct(stages.system.mass * columns).sum(); };
   const double own_size = size(snapshots.leftCols(own)), other_size = size(snapshots.rightCols(others));
   if (own_size > 0 && other_size > 0) snapshots.leftCols(own) *= std::sqrt(other_size / own_size);
   return snapshots;
@@ -75,8 +73,7 @@ RollOut BasisChooser::run(const Eigen::MatrixXd& basis) const {
   if (!stages_.system.constrained())
     model.rigid = rigid_moments(object.mesh, object.materials.density, model.modal->basis);
   if (body_.contact)
-    model.contact =
-        contact_data(object, model.modal->basis, stages_.object.contact, stages_.asset.contact_count);
+    model.contact = contact_data(object, model.modal->basis, stages_.object.contact, stages_.asset.contact_count);
   return final_roll_out(stages_, model, *motions_);
 }
 
@@ -111,9 +108,10 @@ BasisChoice BasisChooser::choose() const {
     if (choice.exact.shape <= *tolerance) return choice;
     best = std::min(best, choice.exact.shape);
   }
-  throw WorkError(fmt::format("basis.tolerance: expected an error of at most {:.3g} in held-out runs, found {:.3g} with "
-                              "up to {} modes; raise it, or ask for more basis.training_segments",
-                              *tolerance, best, *std::ranges::max_element(kSizes)));
+  throw WorkError(
+      fmt::format("basis.tolerance: expected an error of at most {:.3g} in held-out runs, found {:.3g} with "
+                  "up to {} modes; raise it, or ask for more basis.training_segments",
+                  *tolerance, best, *std::ranges::max_element(kSizes)));
 }
 
 }  // namespace

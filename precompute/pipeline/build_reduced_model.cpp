@@ -186,14 +186,15 @@ TargetSpace Pipeline::target_space(const ElasticSystem& system, const PoseFitter
   const ObjectData object = object_data();
   const PoseCoordinates range = fitter.range(group);
   return timed(region.empty() ? "targets" : fmt::format("targets of region {}", region), [&] {
-    TargetSpace space =
-        cache_.get("targets", [&] { return build_target_space(object, system, range, options); }, object_.mesh,
-                   object_.materials, system.free_dofs, range, options);
+    TargetSpace space = cache_.get(
+        "targets", [&] { return build_target_space(object, system, range, options); }, object_.mesh, object_.materials,
+        system.free_dofs, range, options);
     if (options.table) log::info(space.table_message);
     if (space.left_out > 0)
-      warn(report_.warnings, fmt::format("{}the energies of targets leave out {} of {} tets, which a pose turns inside out",
-                                         region.empty() ? "" : fmt::format("region {}: ", region), space.left_out,
-                                         object_.mesh.tet_count()));
+      warn(report_.warnings,
+           fmt::format("{}the energies of targets leave out {} of {} tets, which a pose turns inside out",
+                       region.empty() ? "" : fmt::format("region {}: ", region), space.left_out,
+                       object_.mesh.tet_count()));
     return space;
   });
 }
@@ -243,16 +244,19 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, ReducedModel& b
     chains.options.budget = options_.training_budget;
     const auto work = [&] { return run_training(input, chains); };
     // What a budget cuts short is not what another run would find.
-    TrainingSet set = options_.training_budget > 0
-                          ? work()
-                          : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs,
-                                       stages.targets, object_.contact, text_of(plan.loads), asset_.training.segments,
-                                       asset_.training.seconds, seed);
+    TrainingSet set =
+        options_.training_budget > 0
+            ? work()
+            : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
+                         object_.contact, text_of(plan.loads), asset_.training.segments, asset_.training.seconds, seed);
     log::info(fmt::format("training: {} runs of {} steps in full space, {} snapshots", set.runs.segments,
                           set.runs.steps, set.runs.snapshots.cols()));
     if (set.runs.skipped > 0)
-      warn(report_.warnings, fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
-                                         "not stay finite", set.runs.skipped, set.runs.skipped + set.runs.segments));
+      warn(report_.warnings,
+           fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
+                       "not stay finite",
+                       set.runs.skipped, set.runs.skipped + set.runs.segments));
+    if (set.runs.snapshots.cols() == 0) return std::optional<Motions>();
     return std::optional<Motions>({std::move(set), std::move(chains), plan.loads, plan.general, plan.reason});
   });
 }
@@ -301,8 +305,7 @@ void Pipeline::read() {
 
   if (includes(report_.ledger, "render"))
     render_ = timed("render mesh", [&] { return read_render_mesh(asset_, object_, report_.inputs, report_.warnings); });
-  report_.input_sha256 = hash_inputs(
-      report_.inputs, generator() + "\n" + text_of(needs_) + training_text());
+  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_) + training_text());
 }
 
 ReducedModel Pipeline::run() {
@@ -360,16 +363,16 @@ ReducedModel Pipeline::run() {
   body.asset_name = model.asset_name;
   body.object = model.object;
   const std::optional<Motions> motions = train(stages, body);
-  const BasisChoice choice =
-      timed("basis", [&] { return choose_basis(stages, body, motions ? &*motions : nullptr); });
+  const BasisChoice choice = timed("basis", [&] { return choose_basis(stages, body, motions ? &*motions : nullptr); });
   const Eigen::MatrixXd& basis = choice.basis;
   put_basis(stages, basis, model);
   if (fitter) fitter->log_losses(model, report_.warnings);
 
   model.cubature = timed("cubature", [&] {
     auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
-    if (motions) set_motions(motions->set.runs.snapshots, motions->own_columns(), motions->set.heldout.snapshots, system, basis,
-                             source);
+    if (motions)
+      set_motions(motions->set.runs.snapshots, motions->own_columns(), motions->set.heldout.snapshots, system, basis,
+                  source);
     const CubatureOptions options{asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
                                   asset_.training_poses, asset_.seed};
     return cache_.get(

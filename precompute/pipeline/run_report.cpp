@@ -107,6 +107,17 @@ void add_model(const ReducedModel& model, Json& json) {
                       {"heldout_energy_error", model.cubature->heldout_energy_error},
                       {"heldout_stiffness_error", model.cubature->heldout_stiffness_error}};
   json["targets"] = targets_of(model);
+  if (model.fidelity)
+    json["fidelity"] = {{"loads", model.fidelity->loads},
+                        {"basis", model.fidelity->basis},
+                        {"position_error", model.fidelity->position_error},
+                        {"shape_error", model.fidelity->shape_error},
+                        {"end_error", model.fidelity->end_error},
+                        {"settled_error", model.fidelity->settled_error},
+                        {"all_elements_error", model.fidelity->all_elements_error},
+                        {"modal_error", model.fidelity->modal_error},
+                        {"captured_energy", model.fidelity->captured_energy},
+                        {"advice", model.fidelity->advice}};
   if (model.render)
     json["render"] = {{"vertices", model.render->vertices.rows()},
                       {"triangles", model.render->triangles.rows()},

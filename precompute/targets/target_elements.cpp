@@ -17,11 +17,11 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kNoise = 0.1;                 // of the largest example: how far from targets forces are sampled, too
-constexpr Eigen::Index kMostRows = 2000;       // of the selection problem
+constexpr double kNoise = 0.1;                  // of the largest example: how far from targets forces are sampled, too
+constexpr Eigen::Index kMostRows = 2000;        // of the selection problem
 constexpr Eigen::Index kMostCandidates = 6000;  // tets that it chooses from
 constexpr Eigen::Index kElementsPerDimension = 12, kLeastElements = 24;  // most of them: 12 d, at least 24
-constexpr double kNothing = 1e-6;              // of the largest force: one that says nothing of the elements
+constexpr double kNothing = 1e-6;  // of the largest force: one that says nothing of the elements
 
 // A force of one example's energy.
 struct Sample {
@@ -131,9 +131,8 @@ Eigen::MatrixXd ElementChooser::forces(Eigen::Index tet, const std::vector<Sampl
     for (Eigen::Index i = 0; i < stresses.cols(); ++i) {
       const Sample& sample = samples[static_cast<std::size_t>(i)];
       const Eigen::Matrix<double, 9, 1> H = B * sample.y, H_example = poses.col(sample.example);
-      const Eigen::Matrix3d P =
-          stress(material, options_.energy_reference, Eigen::Map<const RowMatrix3>(H.data()),
-                 Eigen::Map<const RowMatrix3>(H_example.data()), lame);
+      const Eigen::Matrix3d P = stress(material, options_.energy_reference, Eigen::Map<const RowMatrix3>(H.data()),
+                                       Eigen::Map<const RowMatrix3>(H_example.data()), lame);
       stresses.col(i) = samples_.volume(tet) * P.reshaped<Eigen::RowMajor>();
     }
   });
@@ -150,7 +149,8 @@ SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
   for (Eigen::Index block = 0; block < blocks; ++block) {
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(d, count);
     const Eigen::Index end = std::min<Eigen::Index>(std::ssize(target_.tets), (block + 1) * kBlock);
-    for (Eigen::Index i = block * kBlock; i < end; ++i) sum += forces(target_.tets[static_cast<std::size_t>(i)], samples);
+    for (Eigen::Index i = block * kBlock; i < end; ++i)
+      sum += forces(target_.tets[static_cast<std::size_t>(i)], samples);
     partial[static_cast<std::size_t>(block)] = std::move(sum);
   }
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(d, count);

@@ -75,9 +75,8 @@ class PieceBuilder {
   Eigen::HouseholderQR<Eigen::MatrixXd> inner_values_;  ///< of the control points that the ends leave free
 };
 
-PieceBuilder::PieceBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses,
-                           const TargetSamples& checks, const PieceOptions& options, MinimumFinder& finder,
-                           PieceReport& report)
+PieceBuilder::PieceBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses, const TargetSamples& checks,
+                           const PieceOptions& options, MinimumFinder& finder, PieceReport& report)
     : target_(target),
       poses_(poses),
       options_(options),

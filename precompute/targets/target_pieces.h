@@ -29,8 +29,7 @@ struct PieceReport {
 /// makes the table C1: with the weights (1 - t, t), H dy/dt = grad E_0 - grad E_1, H the Hessian of the minimum. The
 /// other control points are fitted by least squares. Nothing beyond the most pieces, or where a piece shorter than
 /// 2^-20 is not enough, as at a jump. Of TargetTableData all but energy_reference. docs/method.md, "Table of targets".
-std::optional<TargetTableData> build_target_pieces(const runtime::TargetSolver& target,
-                                                   const Eigen::MatrixXd& poses,
+std::optional<TargetTableData> build_target_pieces(const runtime::TargetSolver& target, const Eigen::MatrixXd& poses,
                                                    const TargetSamples& checks, const PieceOptions& options,
                                                    MinimumFinder& finder, PieceReport& report);
 

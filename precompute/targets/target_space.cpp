@@ -18,10 +18,10 @@ namespace {
 
 using runtime::TargetSolver;
 
-constexpr double kShare = 0.1;    // of the tolerance that the space may take
-constexpr int kRounds = 4;        // in which weights whose targets the space misses are added
+constexpr double kShare = 0.1;     // of the tolerance that the space may take
+constexpr int kRounds = 4;         // in which weights whose targets the space misses are added
 constexpr double kNothing = 1e-9;  // of the largest example: a direction of poses that is rounding
-constexpr double kSame = 0.1;     // of the tolerance: answers nearer to each other are one minimum
+constexpr double kSame = 0.1;      // of the tolerance: answers nearer to each other are one minimum
 
 // One, two or three examples at equal shares, then all of them.
 RowMatrix equal_shares(Eigen::Index examples) {
@@ -188,9 +188,9 @@ TargetSpace SpaceBuilder::build() {
   log::info(fmt::format("targets: {} displacements hold them, error {:.1e}", columns_.cols(), space.error));
   if (options_.table) {
     TargetTableReport report;
-    space.table = build_target_table(small_.solver, space.coordinates.poses,
-                                     {.tolerance = options_.tolerance, .energy_reference = options_.energy_reference},
-                                     report);
+    space.table =
+        build_target_table(small_.solver, space.coordinates.poses,
+                           {.tolerance = options_.tolerance, .energy_reference = options_.energy_reference}, report);
     if (space.table) space.table->error += space.error;
     space.table_message = report.message;
   }
@@ -206,8 +206,8 @@ TargetSpace build_target_space(const ObjectData& object, const ElasticSystem& sy
   return SpaceBuilder(object, system, range, options).build();
 }
 
-void finish_targets(const TargetSpace& space, const Eigen::MatrixXd& pull,
-                    std::optional<TargetSpaceData>& data, std::optional<TargetTableData>& table) {
+void finish_targets(const TargetSpace& space, const Eigen::MatrixXd& pull, std::optional<TargetSpaceData>& data,
+                    std::optional<TargetTableData>& table) {
   data.emplace();
   data->energy_reference = space.energy_reference;
   data->error = space.error;

@@ -12,10 +12,10 @@ namespace exmat::precompute {
 
 struct TargetSpaceOptions {
   EnergyReference energy_reference = EnergyReference::kExample;
-  double tolerance = 1e-4;         ///< of what the space and the table lose of the targets, as TargetTableData has it
+  double tolerance = 1e-4;          ///< of what the space and the table lose of the targets, as TargetTableData has it
   double element_tolerance = 1e-3;  ///< of what the elements lose of them, beside that
-  bool table = true;               ///< make one, where 2 <= K <= kMostTableExamples
-  std::uint64_t seed = 1;          ///< of the poses that the elements are chosen by
+  bool table = true;                ///< make one, where 2 <= K <= kMostTableExamples
+  std::uint64_t seed = 1;           ///< of the poses that the elements are chosen by
 };
 
 /// What the stage cache keeps of it.
@@ -33,14 +33,14 @@ struct TargetSpace {
   std::int64_t left_out = 0;             ///< tets that an example turns inside out
   std::optional<TargetTableData> table;  ///< control points [P c x d]
   EnergyReference energy_reference = EnergyReference::kExample;
-  std::string table_message;             ///< what was made, or why nothing was
+  std::string table_message;  ///< what was made, or why nothing was
 };
 
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpace& value) {
-  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.table,
-           value.energy_reference, value.table_message);
+  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.table, value.energy_reference,
+           value.table_message);
 }
 
 /// `range` holds all poses, from pose_range(). Targets are solved there at weights all over the simplex; their
@@ -51,7 +51,7 @@ TargetSpace build_target_space(const ObjectData& object, const ElasticSystem& sy
 
 /// Puts the targets into a model of the basis U: `pull` [r x d] is U^T P B, what each displacement of the space pulls
 /// the modes with, P the filter of the example force. The table only where there is one.
-void finish_targets(const TargetSpace& space, const Eigen::MatrixXd& pull,
-                    std::optional<TargetSpaceData>& data, std::optional<TargetTableData>& table);
+void finish_targets(const TargetSpace& space, const Eigen::MatrixXd& pull, std::optional<TargetSpaceData>& data,
+                    std::optional<TargetTableData>& table);
 
 }  // namespace exmat::precompute

@@ -10,11 +10,11 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGood = 0.02;         // shape error that needs no advice
-constexpr double kShare = 1.5;         // of the error with all elements: more than that is cubature's
-constexpr double kLost = 0.25;         // of a pose: more eigenfunctions are worth while
-constexpr double kUnlearned = 3;       // times what the basis loses of its own training: others would teach it more
-constexpr double kNotFinite = 1e9;     // stands for errors of runs that did not stay finite
+constexpr double kGood = 0.02;      // shape error that needs no advice
+constexpr double kShare = 1.5;      // of the error with all elements: more than that is cubature's
+constexpr double kLost = 0.25;      // of a pose: more eigenfunctions are worth while
+constexpr double kUnlearned = 3;    // times what the basis loses of its own training: others would teach it more
+constexpr double kNotFinite = 1e9;  // stands for errors of runs that did not stay finite
 
 double finite(double error) { return std::isfinite(error) ? error : kNotFinite; }
 
@@ -65,18 +65,19 @@ std::string advice(const FidelityInput& input, const FidelityData& fidelity, con
     return fmt::format("a larger basis.size than {}", r);
   }
   if (const double lost = largest_loss(input.model); lost > kLost)
-    return fmt::format("near the full space; more shape_space.eigenfunctions would bring it nearer to the poses, of "
-                       "which they lose {:.0f} %",
-                       100 * lost);
-  return "near the full space under these loads; train on others (basis.loads, or another scene) if it is to serve them";
+    return fmt::format(
+        "near the full space; more shape_space.eigenfunctions would bring it nearer to the poses, of "
+        "which they lose {:.0f} %",
+        100 * lost);
+  return "near the full space under these loads; train on others (basis.loads, or another scene) if it is to serve "
+         "them";
 }
 
 }  // namespace
 
 FidelityData fidelity_of(const FidelityInput& input) {
   const ReducedModel& model = input.model;
-  const SparseMatrix mass =
-      expand_to_vectors(scalar_mass(model.object->mesh, model.object->materials.density));
+  const SparseMatrix mass = expand_to_vectors(scalar_mass(model.object->mesh, model.object->materials.density));
   FidelityData fidelity;
   fidelity.loads = input.loads;
   fidelity.basis = input.trained ? "trained" : "modal";

@@ -8,8 +8,8 @@
 
 namespace exmat::precompute {
 
-/// How far a reduced body is from the full space in the same runs: distances in the norm |x|_M over the root mean square
-/// of the size, as docs/error_metrics.md has them. Infinite where the reduced run does not stay finite.
+/// How far a reduced body is from the full space in the same runs: distances in the norm |x|_M over the root mean
+/// square of the size, as docs/error_metrics.md has them. Infinite where the reduced run does not stay finite.
 struct RollOut {
   double position = 0;  ///< root mean square of world positions, over displacements from rest
   double shape = 0;     ///< likewise of deformations

@@ -20,14 +20,14 @@ struct TrainingObstacle {
 /// What acts on a body in the runs that its basis and cubature learn from: of a scene, of the asset, or of neither.
 /// Runs vary all of it (training_segments.h).
 struct TrainingLoads {
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]
-  bool any_gravity = false;                           ///< it may point anywhere
-  std::vector<VertexForceConfig> forces;              ///< of vertices of the object; those with an end may cease
-  bool any_direction = false;                         ///< forces may point anywhere
-  bool patches = false;                               ///< forces on patches of the surface chosen at random, too
-  std::vector<runtime::ExampleSettings> examples;     ///< of the model's example forces
-  bool any_stiffness = false;                         ///< examples may be much weaker or stronger than these
-  std::optional<TrainingObstacle> obstacle;           ///< a free body is thrown at it
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   ///< [m/s^2]
+  bool any_gravity = false;                            ///< it may point anywhere
+  std::vector<VertexForceConfig> forces;               ///< of vertices of the object; those with an end may cease
+  bool any_direction = false;                          ///< forces may point anywhere
+  bool patches = false;                                ///< forces on patches of the surface chosen at random, too
+  std::vector<runtime::ExampleSettings> examples;      ///< of the model's example forces
+  bool any_stiffness = false;                          ///< examples may be much weaker or stronger than these
+  std::optional<TrainingObstacle> obstacle;            ///< a free body is thrown at it
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the throw; its speed may come of a fall
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();

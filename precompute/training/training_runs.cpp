@@ -13,7 +13,7 @@ namespace exmat::precompute {
 namespace {
 
 constexpr int kStepsPerPeriod = 200;  // of the lowest mode
-constexpr double kDamping = 0.03;  // of the stiffness, over omega_1
+constexpr double kDamping = 0.03;     // of the stiffness, over omega_1
 
 struct ChainRun {
   std::vector<Eigen::VectorXd> snapshots, displacements;
@@ -94,7 +94,7 @@ std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptio
 }
 
 // [rows x N] of all runs.
-Eigen::MatrixXd collect(const std::vector<ChainRun>& runs, std::vector<Eigen::VectorXd> ChainRun::* member,
+Eigen::MatrixXd collect(const std::vector<ChainRun>& runs, std::vector<Eigen::VectorXd> ChainRun::*member,
                         Eigen::Index rows) {
   Eigen::Index count = 0;
   for (const ChainRun& run : runs) count += std::ssize(run.*member);

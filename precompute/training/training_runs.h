@@ -13,8 +13,8 @@ namespace exmat::precompute {
 struct TrainingRunOptions {
   double angular_frequency = 0;  ///< omega_1 [rad/s]: the time step and the damping follow it
   std::optional<double> mass_damping{}, stiffness_damping{};  ///< absent: none, and 0.03 / omega_1
-  double budget = 0;             ///< [s]; no segment begins after it; 0: none
-  bool positions = false;        ///< keep deformations and positions of all vertices, to compare with
+  double budget = 0;                                          ///< [s]; no segment begins after it; 0: none
+  bool positions = false;  ///< keep deformations and positions of all vertices, to compare with
 };
 
 /// How the body deforms in runs with all its degrees of freedom.

@@ -85,8 +85,11 @@ void SegmentDrawer::throw_at_obstacle(Throw how, Segment& segment) {
   for (const auto& vertex : body_.vertices.rowwise())
     farthest = std::max(farthest, along.dot(rotation * (vertex - body_.centre).transpose()));
   const Eigen::Vector3d point = body_.centre.transpose() + (farthest + kGap * body_.size) * along;
-  segment.obstacle = runtime::Obstacle{runtime::Plane{point, -along}, {}, loads_.obstacle->stiffness,
-                                       loads_.obstacle->damping, loads_.obstacle->friction};
+  segment.obstacle = runtime::Obstacle{runtime::Plane{point, -along},
+                                       {},
+                                       loads_.obstacle->stiffness,
+                                       loads_.obstacle->damping,
+                                       loads_.obstacle->friction};
 }
 
 Segment SegmentDrawer::segment() {

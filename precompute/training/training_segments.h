@@ -18,7 +18,7 @@ struct Segment {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();
   std::vector<VertexForceConfig> forces;
   std::vector<runtime::ExampleSettings> examples;
-  runtime::FrameMotion motion;                 ///< that a free body begins with
+  runtime::FrameMotion motion;                ///< that a free body begins with
   std::optional<runtime::Obstacle> obstacle;  ///< that it is thrown at
 };
 

@@ -42,6 +42,14 @@ void info_command(const std::filesystem::path& bundle) {
   if (model.cubature)
     fmt::print("held-out error force {:.3g}, energy {:.3g}, stiffness {:.3g}\n", model.cubature->heldout_error,
                model.cubature->heldout_energy_error, model.cubature->heldout_stiffness_error);
+  if (model.fidelity)
+    fmt::print(
+        "fidelity       {:.2g} % from the full space under {} ({} runs), {:.2g} % at the end of the runs, {:.2g} % of "
+        "modes "
+        "alone; basis {}; {}\n",
+        100 * model.fidelity->shape_error, model.fidelity->loads, model.fidelity->heldout_runs,
+        100 * model.fidelity->settled_error, 100 * model.fidelity->modal_error, model.fidelity->basis,
+        model.fidelity->advice);
   if (model.render)
     fmt::print("render mesh    {} vertices, {} triangles; {} outside the body, by up to {:.3g} m\n",
                model.render->vertices.rows(), model.render->triangles.rows(), model.render->outside,

@@ -21,10 +21,10 @@ using Groups = std::vector<std::string>;
 // The small bar's polynomial is several times faster than its cubature.
 const Groups kPlain{"object", "modal", "cubature", "polynomial"};
 const Groups kPlainAndRigid{"object", "modal", "cubature", "polynomial", "rigid"};
-const Groups kWithExamples{"object",   "shape_space", "examples",   "modal",
-                           "cubature", "polynomial",  "projection", "targets"};
-const Groups kAll{"object",     "shape_space", "examples", "modal", "cubature",
-                  "polynomial", "projection",  "targets",  "rigid", "contact"};
+const Groups kWithExamples{"object",     "shape_space", "examples", "modal",       "cubature",
+                           "polynomial", "projection",  "targets",  "target_space"};
+const Groups kAll{"object",     "shape_space", "examples",     "modal", "cubature", "polynomial",
+                  "projection", "targets",     "target_space", "rigid", "contact"};
 
 Groups without_group(Groups groups, const char* group) {
   std::erase(groups, group);
@@ -75,7 +75,8 @@ class LeavingOut : public testing::Test {
       if (entry.included) included.push_back(entry.group);
     }
     EXPECT_EQ(included, groups);
-    EXPECT_EQ(built.report.ledger.size(), kAll.size() + 2);  // and regions and render, which the asset has none of
+    EXPECT_EQ(built.report.ledger.size(),
+              kAll.size() + 3);  // and fidelity, regions and render, which there is nothing for
   }
 
   /// What the run time reads of bundle.h5 for a scene.

@@ -30,7 +30,7 @@ const Json kBarAsset = Json::parse(R"({
   },
   "shape_space": { "eigenfunctions": 20 },
   "examples": [ { "name": "rest", "mesh": "rest.msh", "rest": true }, { "name": "twist", "mesh": "twist.msh" } ],
-  "basis": { "size": 30, "linear_modes": 15 },
+  "basis": { "size": 30, "linear_modes": 15, "training": "none" },
   "cubature": { "elements": 60 }
 })");
 

@@ -43,14 +43,15 @@ std::optional<Complaint> add_solver(const RestModel& rest, const ExampleParts& p
                                     ExampleModel& examples) {
   TargetSolver& solver = examples.target.emplace();
   if (!parts.target_space) {
-    auto complaint = solver.build(rest.material, rest.cubature, parts.set.examples, parts.projection.target_basis,
-                                  reference);
+    auto complaint =
+        solver.build(rest.material, rest.cubature, parts.set.examples, parts.projection.target_basis, reference);
     examples.target_pull = examples.filter.matrix() * solver.basis();
     return complaint;
   }
   const TargetSpaceData& space = *parts.target_space;
   std::vector<ExampleData> poses = parts.set.examples;
-  for (std::size_t k = 0; k < poses.size(); ++k) poses[k].pose = space.poses.row(static_cast<Eigen::Index>(k)).transpose();
+  for (std::size_t k = 0; k < poses.size(); ++k)
+    poses[k].pose = space.poses.row(static_cast<Eigen::Index>(k)).transpose();
   const Eigen::Index d = space.poses.cols();
   auto complaint = solver.build(rest.material, elements_of(space), poses, RowMatrix::Identity(d, d), reference);
   examples.target_pull = space.pull * solver.basis();
@@ -97,8 +98,7 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   const RestModel rest{reduced.object->materials.model, cubature};
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};
-    const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets,
-                             reduced.target_space};
+    const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets, reduced.target_space};
     if (auto complaint = add_examples(rest, parts, options.target_table, options.energy_reference, *model))
       return {nullptr, std::move(*complaint)};
   }

@@ -187,9 +187,8 @@ RenderData small_render() {
 // The second with an example less and no targets.
 std::vector<RegionData> small_regions(const ReducedModel& model) {
   std::vector<RegionData> regions(2);
-  regions[0] = {"left", 0, IndexVector{{0, 2}}, *model.examples, *model.projection, model.targets,
-                model.target_space};
-  regions[1] = {"far right", 1, IndexVector{{1}}, *model.examples, *model.projection, std::nullopt,
+  regions[0] = {"left", 0, IndexVector{{0, 2}}, *model.examples, *model.projection, model.targets, model.target_space};
+  regions[1] = {"far right",          1, IndexVector{{1}}, *model.examples, *model.projection, std::nullopt,
                 small_target_space(2)};
   ExampleSet& fewer = regions[1].examples;
   fewer.examples.pop_back();

@@ -168,7 +168,8 @@ TEST_P(Basis, OfMotionsLosesNoMoreThanTheSingularValuesSay) {
   const BasisInput input{system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), {}};
   const Eigen::MatrixXd U = trained_basis(input, motions, false, size);
   EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(size, size)).cwiseAbs().maxCoeff(), 1e-12);
-  const Eigen::MatrixXd norm = Eigen::MatrixXd(system_.mass) + Eigen::MatrixXd(system_.stiffness) / modes_.eigenvalues[4];
+  const Eigen::MatrixXd norm =
+      Eigen::MatrixXd(system_.mass) + Eigen::MatrixXd(system_.stiffness) / modes_.eigenvalues[4];
   const Eigen::MatrixXd factor = norm.llt().matrixU();
   const Eigen::VectorXd sigma = Eigen::MatrixXd(factor * motions).bdcSvd().singularValues();
   const Eigen::MatrixXd inside = factor * U;

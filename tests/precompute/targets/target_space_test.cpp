@@ -106,8 +106,8 @@ INSTANTIATE_TEST_SUITE_P(
                       Case{2, EnergyReference::kExample, MaterialModel::kStableNeoHookean},
                       Case{2, EnergyReference::kExample, MaterialModel::kStVenantKirchhoff, true}));
 
-// The table is as near as it says, for the targets of the whole mesh; the tolerance is the asset's default. The kinds of
-// random weights are many more than the checks', so that a little more may turn up between these: a tenth.
+// The table is as near as it says, for the targets of the whole mesh; the tolerance is the asset's default. The kinds
+// of random weights are many more than the checks', so that a little more may turn up between these: a tenth.
 TEST_P(TargetSpaceOf, TableIsNearTheTargetsOfTheWholeMesh) {
   const double tolerance = 1e-4;
   const TargetSpace space = body_.build(tolerance);
@@ -166,9 +166,8 @@ TEST_P(TargetSpaceOf, PullIsTheFilteredTarget) {
   const ReducedModel& model = body_.bar_.model;
   const LaplaceBasis object = laplace_basis_of(model);
   const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting);
-  const Eigen::MatrixXd pull =
-      model.projection->reduced_from_shape *
-      shape_changes(object, weights, RowMatrix(body_.system_.extend(space.coordinates.basis)));
+  const Eigen::MatrixXd pull = model.projection->reduced_from_shape *
+                               shape_changes(object, weights, RowMatrix(body_.system_.extend(space.coordinates.basis)));
   const FullSpaceExamples full(model, body_.system_, body_.poses_, options.reference);
   const Eigen::MatrixXd basis = body_.system_.restrict(model.modal->basis);
   for (const Eigen::VectorXd& w : random_weights(options.examples, 5)) {

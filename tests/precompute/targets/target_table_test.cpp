@@ -47,7 +47,8 @@ std::optional<TargetTableData> table_of(const ReducedModel& model, const TargetT
     return std::nullopt;
   }
   Eigen::MatrixXd poses(model.modal->basis.cols(), std::ssize(model.examples->examples));
-  for (Eigen::Index k = 0; k < poses.cols(); ++k) poses.col(k) = model.examples->examples[static_cast<std::size_t>(k)].pose;
+  for (Eigen::Index k = 0; k < poses.cols(); ++k)
+    poses.col(k) = model.examples->examples[static_cast<std::size_t>(k)].pose;
   return build_target_table(solver, poses, options, report);
 }
 
@@ -263,8 +264,7 @@ TEST(TargetTableRefusal, WhereTheTargetJumps) {
   EXPECT_FALSE(table_of(model, {.tolerance = 0.05, .energy_reference = EnergyReference::kRest}, report));
   EXPECT_NE(report.message.find("more than one minimum"), std::string::npos) << report.message;
   EXPECT_GT(report.pieces, 1);
-  EXPECT_TRUE(table_of(stretched_model(0.5), {.tolerance = 0.05, .energy_reference = EnergyReference::kRest},
-                                 report));
+  EXPECT_TRUE(table_of(stretched_model(0.5), {.tolerance = 0.05, .energy_reference = EnergyReference::kRest}, report));
 }
 
 /// By the energy of the examples, a strong stretch bends p*(w) sharply: no polynomial of degree 40 follows.

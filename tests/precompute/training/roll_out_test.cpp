@@ -39,8 +39,7 @@ TEST_P(RollOutOf, ACompleteBasisIsTheFullSpace) {
   const std::vector<Chain> chains{chain(bar.model, 2 * std::numbers::pi / options.angular_frequency)};
   const TrainingRuns runs = run_segments(full, chains, options);
   ASSERT_EQ(runs.segments, 1);
-  const RollOut error =
-      roll_out(bar.model, EnergyReference::kExample, chains, runs, full.system.full_mass, options);
+  const RollOut error = roll_out(bar.model, EnergyReference::kExample, chains, runs, full.system.full_mass, options);
   const double limit = is_free() ? 1e-2 : 1e-4;
   EXPECT_LE(error.shape, limit);
   EXPECT_LE(error.position, limit);
@@ -61,8 +60,7 @@ TEST(RollOut, MeasuresWhatABasisLeavesOut) {
   segment.gravity = {5, 0, 0};
   const std::vector<Chain> chains{{segment}};
   const TrainingRuns runs = run_segments(full, chains, options);
-  const RollOut error =
-      roll_out(bar.model, EnergyReference::kExample, chains, runs, full.system.full_mass, options);
+  const RollOut error = roll_out(bar.model, EnergyReference::kExample, chains, runs, full.system.full_mass, options);
   EXPECT_NEAR(error.shape, 1, 0.05);
   EXPECT_EQ(error.shape, error.position);
   double farthest = 0;

@@ -1,0 +1,105 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/bundle/bundle.h"
+#include "tests/integration/support.h"
+
+// Training as its users meet it: by the command line, the asset and the bundle.
+
+namespace exmat::test {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+class Training : public testing::Test {
+ protected:
+  Outcome bundle(const char* basis, std::vector<std::string> options = {}) {
+    Json changes{{"basis", Json::parse(basis)}};
+    const auto asset = write_small_bar(folder_, changes);
+    options.insert(options.begin(), {"bundle", asset, "-o", bundle_});
+    return exmat_precompute(options);
+  }
+  std::filesystem::path scene(const char* members = R"({ "gravity": [0, 0, -1], "examples": { "stiffness": 50 } })") {
+    return write_scene(folder_, Json::parse(members));
+  }
+
+  TemporaryFolder folder_;
+  std::filesystem::path bundle_ = folder_.path("bundle.h5");
+};
+
+TEST_F(Training, OfASceneIsSaidInLogSummaryBundleAndInfo) {
+  const Outcome made = bundle(R"({ "training": "auto", "training_segments": 3 })", {"--scene", scene()});
+  ASSERT_EQ(made.status, 0) << made.errors;
+  EXPECT_THAT(made.errors, HasSubstr("training: the loads of the scene"));
+  EXPECT_THAT(made.output, HasSubstr("fidelity: "));
+  const ReducedModel model = read_bundle(bundle_);
+  ASSERT_TRUE(model.fidelity);
+  EXPECT_EQ(model.fidelity->training_runs, 4);  // and the scene's own
+  EXPECT_EQ(model.fidelity->heldout_runs, 2);
+  EXPECT_LE(model.fidelity->all_elements_error, model.fidelity->modal_error);
+  EXPECT_GT(model.fidelity->captured_energy, 0.9);
+  const Outcome info = exmat_runtime({"info", bundle_});
+  EXPECT_THAT(info.output, HasSubstr("from the full space under the loads of the scene"));
+  EXPECT_THAT(info.output, HasSubstr(model.fidelity->advice));
+}
+
+TEST_F(Training, OfDeclaredLoadsNeedsNoScene) {
+  const Outcome made = bundle(R"({ "training": "loads", "training_segments": 2,
+      "loads": { "forces": [ { "vertices": { "ids": [0, 20] }, "force": 3 } ], "gravity": [0, 0, -2] } })");
+  ASSERT_EQ(made.status, 0) << made.errors;
+  EXPECT_THAT(made.errors, HasSubstr("training: the loads of the asset"));
+  EXPECT_EQ(read_bundle(bundle_).fidelity->loads, "the loads of the asset");
+}
+
+TEST_F(Training, IsLeftOutWhereTheAssetSaysSo) {
+  const Outcome made = bundle(R"({ "training": "none" })", {"--scene", scene()});
+  ASSERT_EQ(made.status, 0) << made.errors;
+  EXPECT_THAT(made.output, Not(HasSubstr("fidelity: ")));
+  EXPECT_FALSE(read_bundle(bundle_).fidelity);
+}
+
+TEST_F(Training, OfASceneThatIsNotThereIsRefused) {
+  const Outcome refused = bundle(R"({ "training": "scene" })");
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.errors,
+              HasSubstr("/basis/training: expected a scene, for its loads, found none; name one by --scene"));
+  EXPECT_FALSE(std::filesystem::exists(bundle_));
+}
+
+TEST_F(Training, OfAVertexThatIsNotThereIsRefused) {
+  const Outcome refused =
+      bundle(R"({ "training": "scene" })",
+             {"--scene", scene(R"({ "forces": [ { "vertices": { "ids": [99999] }, "force": [0, 0, 1] } ] })")});
+  EXPECT_EQ(refused.status, 2);
+  EXPECT_THAT(refused.errors, HasSubstr("/forces/0/vertices"));
+  EXPECT_THAT(refused.errors, HasSubstr("99999"));
+}
+
+TEST_F(Training, EndsWithItsBudgetAndSaysSo) {
+  const Outcome made = bundle(R"({ "training": "auto" })", {"--scene", scene(), "--training-budget", "0.000001"});
+  EXPECT_EQ(made.status, 0) << made.errors;
+  EXPECT_THAT(made.errors, HasSubstr("9 of 9 runs were left out"));
+}
+
+TEST_F(Training, FindsTheSizeOfTheBasisByItsError) {
+  const Outcome made = bundle(R"({ "training": "auto", "training_segments": 4, "size": null, "tolerance": 0.05 })",
+                              {"--scene", scene()});
+  ASSERT_EQ(made.status, 0) << made.errors;
+  const ReducedModel model = read_bundle(bundle_);
+  EXPECT_LE(model.fidelity->all_elements_error, 0.05);
+}
+
+TEST_F(Training, MakesTheSameBundleForEveryNumberOfThreads) {
+  std::string first;
+  for (const char* threads : {"1", "3"}) {
+    const Outcome made =
+        bundle(R"({ "training": "auto", "training_segments": 3 })", {"--scene", scene(), "--threads", threads});
+    ASSERT_EQ(made.status, 0) << made.errors;
+    if (first.empty()) first = read_file(bundle_);
+    EXPECT_TRUE(read_file(bundle_) == first) << threads;
+  }
+}
+
+}  // namespace
+}  // namespace exmat::test
