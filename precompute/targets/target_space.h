@@ -25,7 +25,7 @@ void pass_members(Archive& archive, TargetSpaceOptions& value) {
 }
 
 /// The targets of a set of examples, minimised over all tets of the mesh in all poses that descriptors stand for:
-/// independent of any modal basis. docs/method.md, "Targets".
+/// independent of any modal basis. docs/method.md, "Table of targets".
 struct TargetSpace {
   PoseCoordinates coordinates;           ///< few displacements that hold all targets, and the examples in them
   CubatureData elements;                 ///< that stand for all tets in the energies of targets, in these coordinates
