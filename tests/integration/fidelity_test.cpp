@@ -63,9 +63,9 @@ class FidelityOf : public ::testing::TestWithParam<Case> {
 
 INSTANTIATE_TEST_SUITE_P(
     Scenes, FidelityOf,
-    ::testing::Values(Case{"04_bar_cuboid", MaterialModel::kStVenantKirchhoff, 0.004, 500, 0.03, 0.08},
-                      Case{"07_teddy_global", MaterialModel::kStVenantKirchhoff, 0.004, 375, 0.03, 0.38},
-                      Case{"06_cross", MaterialModel::kStableNeoHookean, 0.005, 200, 0.05, 0.38}),
+    ::testing::Values(Case{"04_bar_cuboid", MaterialModel::kStVenantKirchhoff, 0.004, 500, 0.03, 0.073},
+                      Case{"07_teddy_global", MaterialModel::kStVenantKirchhoff, 0.004, 375, 0.03, 0.381},
+                      Case{"06_cross", MaterialModel::kStableNeoHookean, 0.005, 120, 0.05, 0.483}),
     [](const auto& scene) { return std::string(scene.param.folder).substr(3); });
 
 TEST_P(FidelityOf, AScenesExamplesIsThatOfTheFullSpace) {
@@ -87,6 +87,7 @@ TEST_P(FidelityOf, AScenesExamplesIsThatOfTheFullSpace) {
   }
   const double before = error(former, reference);
   EXPECT_GT(before, GetParam().most) << "the test would not notice";
+  EXPECT_NEAR(before, GetParam().former, 0.1 * GetParam().former);  // another choice of elements changes it
   RecordProperty("former_error", fmt::format("{:.4f}", before));
   fmt::print("{}: {:.2f} %, formerly {:.2f} %\n", GetParam().folder, 100 * found, 100 * before);
 }
