@@ -41,8 +41,8 @@ void set_motions(const Eigen::MatrixXd& motions, Eigen::Index own, const Eigen::
 
 /// [count x r] poses: on the manifold of modes and modal derivatives, largest displacement uniform in (0.05, 1) 0.4 L;
 /// a quarter of them, where there are examples, on segments between two examples (the rest pose is one); all with noise
-/// of one percent of their linear energy. Where there are motions, six of eight poses are theirs, one is on the
-/// manifold, one on a segment or, of several example forces, a sum of poses. docs/method.md, "Cubature".
+/// of one percent of their linear energy. Where there are motions, six of eight poses are theirs, half of these
+/// of the scene's own run; the other two are on the manifold and on a segment. docs/method.md, "Cubature".
 RowMatrix draw_poses(const PoseSource& source, Eigen::Index count, std::uint64_t seed);
 
 /// The same of the other motions.
