@@ -77,6 +77,12 @@ std::vector<const ExampleSet*> example_sets(const ReducedModel& model) {
   return sets;
 }
 
+std::vector<ExampleSet> copies_of(const std::vector<const ExampleSet*>& sets) {
+  std::vector<ExampleSet> copies;
+  for (const ExampleSet* set : sets) copies.push_back(*set);
+  return copies;
+}
+
 // [r x k] the poses of all sets but the rest.
 Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
   Eigen::MatrixXd poses(modes, 0);
@@ -248,7 +254,8 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, ReducedModel& b
         options_.training_budget > 0
             ? work()
             : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
-                         object_.contact, text_of(plan.loads), asset_.training.segments, asset_.training.seconds, seed);
+                         copies_of(example_sets(body)), object_.contact, asset_.contact_count, text_of(plan.loads),
+                         asset_.training.segments, asset_.training.seconds, seed);
     log::info(fmt::format("training: {} runs of {} steps in full space, {} snapshots", set.runs.segments,
                           set.runs.steps, set.runs.snapshots.cols()));
     if (set.runs.skipped > 0)

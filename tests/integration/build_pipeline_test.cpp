@@ -254,6 +254,8 @@ TEST_F(BuildPipeline, TheCacheServesWhatDidNotChange) {
   EXPECT_EQ(computed(changed("{}")), all);
   EXPECT_EQ(computed(changed("{}")), Stages{});
   EXPECT_EQ(computed(changed(R"({ "cubature": { "elements": 7 } })")), Stages{"cubature"});
+  // Other weights, of the same poses: the runs differ.
+  EXPECT_TRUE(computed(changed(R"({ "shape_space": { "weighting": "none" } })")).contains("training"));
   // Another example, whose field is in the basis: on a mesh of its own, which is aligned.
   TetMesh bent = box_mesh({7, 3, 2}, BarFiles{}.lengths);
   bent.vertices = twisted(bent.vertices, {.twist = 0, .bend = 0.5});
