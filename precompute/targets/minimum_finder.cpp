@@ -59,6 +59,12 @@ Eigen::VectorXd blend(const runtime::TargetSolver& target, const Eigen::VectorXd
   return y;
 }
 
+MinimumFinder::Starts from_blend(const runtime::TargetSolver& target) {
+  return [&target](const Eigen::VectorXd& weights, Eigen::Index) {
+    return std::vector<Eigen::VectorXd>{blend(target, weights)};
+  };
+}
+
 std::vector<Eigen::VectorXd> blend_and_examples(const runtime::TargetSolver& target, const Eigen::VectorXd& weights) {
   std::vector<Eigen::VectorXd> all{blend(target, weights)};
   for (Eigen::Index k = 0; k < weights.size(); ++k)

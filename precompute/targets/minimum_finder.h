@@ -42,6 +42,9 @@ class MinimumFinder {
 /// sum_k w_k y_k.
 Eigen::VectorXd blend(const runtime::TargetSolver& target, const Eigen::VectorXd& weights);
 
+/// Starts from the blend alone. `target` must outlive them.
+MinimumFinder::Starts from_blend(const runtime::TargetSolver& target);
+
 /// The blend, then y_k of every example with a share in the weights.
 std::vector<Eigen::VectorXd> blend_and_examples(const runtime::TargetSolver& target, const Eigen::VectorXd& weights);
 

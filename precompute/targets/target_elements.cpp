@@ -85,10 +85,7 @@ RowMatrix ElementChooser::weights(int per_dimension) const {
 std::vector<Sample> ElementChooser::force_samples() const {
   const RowMatrix at = weights(3);
   MinimumFinder finder(target_.solver, std::numeric_limits<double>::max());
-  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
-    return std::vector<Eigen::VectorXd>{blend(target_.solver, w)};
-  };
-  const RowMatrix minima = finder.find(at, from_blend, "targets that elements are chosen by");
+  const RowMatrix minima = finder.find(at, from_blend(target_.solver), "targets that elements are chosen by");
   double scale = 0;
   for (Eigen::Index k = 0; k < coordinates_.poses.cols(); ++k)
     scale = std::max(scale, target_.solver.example(k).norm());
@@ -215,10 +212,7 @@ double ElementChooser::error(const CubatureData& cubature) const {
 CubatureData ElementChooser::choose() {
   held_out_ = weights(5);
   MinimumFinder finder(target_.solver, std::numeric_limits<double>::max());
-  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
-    return std::vector<Eigen::VectorXd>{blend(target_.solver, w)};
-  };
-  exact_ = finder.find(held_out_, from_blend, "targets that elements are checked by");
+  exact_ = finder.find(held_out_, from_blend(target_.solver), "targets that elements are checked by");
   const std::vector<Sample> samples = force_samples();
   const std::vector<Eigen::Index> tets = candidates();
   const SelectionProblem all = problem(tets, samples);

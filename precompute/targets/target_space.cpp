@@ -143,10 +143,7 @@ PoseCoordinates SpaceBuilder::coordinates() const {
 double SpaceBuilder::check(int round) {
   const RowMatrix weights = check_weights(count_, round);
   MinimumFinder finder(small_.solver, kSame * options_.tolerance * scale_);
-  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
-    return std::vector<Eigen::VectorXd>{blend(small_.solver, w)};
-  };
-  const RowMatrix inside = finder.find(weights, from_blend, "targets in their space");
+  const RowMatrix inside = finder.find(weights, from_blend(small_.solver), "targets in their space");
   const Eigen::MatrixXd guesses = columns_ * (small_.solver.basis() * inside.transpose());
   const auto from_space = [&](const Eigen::VectorXd&, Eigen::Index row) {
     return std::vector<Eigen::VectorXd>{guesses.col(row)};
@@ -169,11 +166,8 @@ double SpaceBuilder::check(int round) {
 
 TargetSpace SpaceBuilder::build() {
   const double distance = kShare * options_.tolerance * scale_;
-  const auto from_blend = [&](const Eigen::VectorXd& w, Eigen::Index) {
-    return std::vector<Eigen::VectorXd>{blend(whole_.solver, w)};
-  };
   samples_ = Eigen::MatrixXd(examples_.rows(), 0);
-  if (scale_ > 0 && count_ > 1) samples_ = solve(first_weights(count_), from_blend);
+  if (scale_ > 0 && count_ > 1) samples_ = solve(first_weights(count_), from_blend(whole_.solver));
   TargetSpace space;
   space.energy_reference = options_.energy_reference;
   for (int round = 0; round < kRounds; ++round) {

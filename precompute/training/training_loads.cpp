@@ -98,7 +98,6 @@ TrainingLoads declared_loads(const LoadsConfig& declared, const std::vector<std:
   if (declared.speed > 0 && body.free) {
     loads.obstacle = TrainingObstacle{ObstacleConfig{}.stiffness, 0, 0.5};
     loads.velocity = declared.speed * Eigen::Vector3d::UnitX();
-    loads.any_direction = true;
   }
   return loads;
 }
