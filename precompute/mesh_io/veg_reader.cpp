@@ -12,7 +12,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr std::string_view kAllElements = "allElements";
+constexpr std::string_view kWholeMesh = "allElements";
 
 struct VegMaterial {
   double density, youngs_modulus, poisson_ratio;
@@ -120,7 +120,7 @@ void VegReader::read_material(std::string_view name) {
 void VegReader::read_set(std::string_view name) {
   if (name.empty()) lines_.fail("*SET and a name");
   if (tables_.tet_count() == 0) lines_.fail("the elements before a *SET of them");
-  if (name == kAllElements || sets_.contains(std::string(name)))
+  if (name == kWholeMesh || sets_.contains(std::string(name)))
     lines_.fail("a name for each set", quote(name) + " is taken");
   auto& tets = sets_[std::string(name)];
   lines_.advance();
@@ -148,7 +148,7 @@ void VegReader::read_region() {
 void VegReader::fill_region(const VegRegion& region, std::vector<const VegMaterial*>& material_of_tet) const {
   const auto material = materials_.find(region.material);
   if (material == materials_.end()) fail_at(region.line, "a *MATERIAL of this file", quote(region.material));
-  if (region.set == kAllElements) {
+  if (region.set == kWholeMesh) {
     std::fill(material_of_tet.begin(), material_of_tet.end(), &material->second);
     return;
   }

@@ -3,8 +3,9 @@
 
 Usage: naming.py ROOT BUILD_FOLDER    prints each violation; exit status 1 if there are any.
 
-Most of the time of clang-tidy goes into the headers of Eigen and the library, once for each source. So sources of the same flags
-are read together, as many in one unit as have no local names in common; a unit that does not compile is split in two.
+Most of the time of clang-tidy goes into the headers of Eigen and the library, once for each source. So sources are read together,
+as many in one unit as have no local names in common, with the include folders and definitions of all of them. Of a unit that does
+not compile, the sources with errors are read again apart from the others.
 """
 import json
 import os
@@ -21,37 +22,43 @@ CHECKS = "-*,readability-identifier-naming"
 LARGEST_UNIT = 32
 LOCAL_SCOPE = re.compile(r"^namespace \{$(.*?)^\}  // namespace$", re.S | re.M)
 LOCAL_NAME = re.compile(r"^(?!\s|//).*?\b(\w+)\s*(?:\(|=|\{|;|\[)", re.M)
+LOCAL_CONSTANT = re.compile(r", (k[A-Z]\w*) =")
+MAIN = re.compile(r"^int main\(", re.M)
 
 
 def local_names(path):
-    """Names that a source keeps to itself, roughly."""
-    return {name for scope in LOCAL_SCOPE.findall(path.read_text()) for name in LOCAL_NAME.findall(scope)}
+    """Names that a source keeps to itself, roughly, and the name of a program's main function."""
+    text = path.read_text()
+    return {name for scope in LOCAL_SCOPE.findall(text) for kind in (LOCAL_NAME, LOCAL_CONSTANT) for name in kind.findall(scope)} | set(MAIN.findall(text))
 
 
 def flags_of(entry):
-    """Without the file, where it is compiled to, and the precompiled headers, which are the compiler's own."""
+    """What a source is read with (include folders, definitions, the standard) and the machine that it is compiled for."""
     words = shlex.split(entry["command"])
-    return tuple(word for i, word in enumerate(words[1:], 1)
-                 if not (word in ("-o", "-c", "-include", "-Winvalid-pch", entry["file"]) or words[i - 1] in ("-o", "-include")))
+    read = {word for word in words if word.startswith(("-I", "-D", "-std="))}
+    read |= {"-isystem" + word for before, word in zip(words, words[1:]) if before == "-isystem"}
+    return read, tuple(word for word in words if word.startswith("-m"))
 
 
 def units(root, build):
     """(flags, sources) of the units that sources are read in."""
-    result = []
+    result, read = [], set()
     for entry in json.loads((build / "compile_commands.json").read_text()):
         path = Path(entry["file"])
         if not any(path.is_relative_to(root / folder) for folder in FOLDERS):
             continue
-        flags, names = flags_of(entry), local_names(path)
+        names = local_names(path)
+        flags, machine = flags_of(entry)
+        read |= flags
         for unit in result:
-            if unit["flags"] == flags and len(unit["sources"]) < LARGEST_UNIT and not unit["names"] & names:
+            if unit["machine"] == machine and len(unit["sources"]) < LARGEST_UNIT and not unit["names"] & names:
                 break
         else:
-            unit = {"flags": flags, "sources": [], "names": set()}
+            unit = {"machine": machine, "sources": [], "names": set()}
             result.append(unit)
         unit["sources"].append(path)
         unit["names"] |= names
-    return [(unit["flags"], unit["sources"]) for unit in result]
+    return [((*sorted(read), *unit["machine"]), unit["sources"]) for unit in result]
 
 
 def check(root, flags, sources):
@@ -63,8 +70,10 @@ def check(root, flags, sources):
         result = subprocess.run(["clang-tidy", "-quiet", f"--checks={CHECKS}", f"--header-filter=^{root}/({'|'.join(FOLDERS)})/.*[.](h|hpp|cpp)$", str(unit),
                                  "--", *flags], capture_output=True, text=True)
     if "[clang-diagnostic-error]" in result.stdout and len(sources) > 1:
-        middle = len(sources) // 2
-        return check(root, flags, sources[:middle]) | check(root, flags, sources[middle:])
+        apart = [source for source in sources if re.search(rf"^{re.escape(str(source))}:.*\[clang-diagnostic-error\]$", result.stdout, re.M)]
+        if len(apart) in (0, len(sources)):
+            apart = sources[:len(sources) // 2]
+        return check(root, flags, apart) | check(root, flags, [source for source in sources if source not in apart])
     found = {line for line in result.stdout.splitlines() if re.search(r"\b(error|warning):", line)}
     return found if found or result.returncode == 0 else {f"{sources[0]}: clang-tidy: {result.stderr[-1000:]}"}
 

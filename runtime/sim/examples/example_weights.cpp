@@ -8,7 +8,7 @@ namespace {
 
 enum ExampleState : int { kOut, kIn, kRefused };
 
-constexpr double kRounding = 64 * std::numeric_limits<double>::epsilon();
+constexpr double kWeightRounding = 64 * std::numeric_limits<double>::epsilon();
 constexpr double kDependent = 1e-14;  // squared distance from the corral's affine hull, relative
 
 }  // namespace
@@ -41,7 +41,7 @@ void ExampleWeights::solve(const Eigen::VectorXd& q, Workspace& workspace, Eigen
   corral[0] = static_cast<int>(start);
   int count = 1;
 
-  const double rounding = kRounding * (gram_.cwiseAbs().maxCoeff() + load.cwiseAbs().maxCoeff());
+  const double rounding = kWeightRounding * (gram_.cwiseAbs().maxCoeff() + load.cwiseAbs().maxCoeff());
   const auto limit = 10 * examples() + 10;  // the objective falls at every turn; the limit is for rounding and NaN
   for (Eigen::Index turn = 0; turn < limit; ++turn) {
     slopes.noalias() = gram_ * weights;
