@@ -127,8 +127,9 @@ TEST_P(FreeFlights, KeepMomentaAndEnergy) {
   const auto first = body.totals(state);
   const double energy = total(body, scene, state);
   double highest = energy, before = energy;
-  constexpr int kSteps = 100000;
-  for (int i = 0; i < kSteps; ++i) {
+  // Targets are solved for in each step, which takes long: all of the steps at one length of them.
+  const int steps = examples && time_step != 1e-3 ? 20000 : 100000;
+  for (int i = 0; i < steps; ++i) {
     const StepReport report = step(*body.model, scene, state, workspace);
     ASSERT_EQ(report.status & (kStepNonFinite | kStepIterationLimit), 0U) << i;
     const double now = total(body, scene, state);
@@ -148,7 +149,7 @@ TEST_P(FreeFlights, KeepMomentaAndEnergy) {
   const auto last = body.totals(state);
   EXPECT_LE((last.linear - first.linear).norm(), 1e-12 * momentum);
   EXPECT_LE((last.angular - first.angular).norm(), 1e-12 * momentum * body.bar.length);
-  const Eigen::Vector3d way = kSteps * time_step * first.linear / body.bar.model.rigid->mass;
+  const Eigen::Vector3d way = steps * time_step * first.linear / body.bar.model.rigid->mass;
   EXPECT_LE((last.centre - first.centre - way).norm(), 1e-11 * way.norm());
 }
 
