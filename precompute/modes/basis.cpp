@@ -14,6 +14,8 @@ namespace {
 constexpr double kSnapshotAmplitude = 0.25;
 // Principal components below this, relative to the largest singular value, are rounding.
 constexpr double kRankTolerance = 1e-9;
+// Of modes beside the motions of a scene, in norm.
+constexpr double kUnseenShare = 0.03;
 
 Eigen::MatrixXd scaled_snapshots(const BasisInput& input) {
   const auto& lambda = input.modes.eigenvalues;
@@ -52,17 +54,19 @@ void orthonormalise(const SparseMatrix& mass, Eigen::MatrixXd& columns) {
   gram.llt().matrixU().solveInPlace<Eigen::OnTheRight>(columns);
 }
 
+void require_modes(Eigen::Index found, int size) {
+  if (found >= size) return;
+  throw InputError({"", "/basis/size", "at most " + std::to_string(found) + ", the number of independent snapshots",
+                    std::to_string(size), "ask for fewer, or for more basis.linear_modes"});
+}
+
 // The components that are asked for in the complement of the basis so far.
 void fill_up(const BasisInput& input, int size, Eigen::MatrixXd& basis) {
   const auto& mass = input.system.mass;
   Eigen::MatrixXd snapshots = scaled_snapshots(input);
   remove_components(mass, basis, snapshots);
   const Eigen::MatrixXd components = principal_components(mass, snapshots, size - basis.cols());
-  if (basis.cols() + components.cols() < size)
-    throw InputError(
-        {"", "/basis/size",
-         "at most " + std::to_string(basis.cols() + components.cols()) + ", the number of independent snapshots",
-         std::to_string(size), "ask for fewer, or for more basis.linear_modes"});
+  require_modes(basis.cols() + components.cols(), size);
   const Eigen::Index before = basis.cols();
   basis.conservativeResize(Eigen::NoChange, size);
   basis.rightCols(size - before) = components;
@@ -102,23 +106,18 @@ Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& sn
   const Eigen::VectorXd& values = input.modes.eigenvalues;
   const double decay = values[general ? 0 : std::min<Eigen::Index>(4, values.size() - 1)];
   const SparseMatrix norm = system.mass + system.stiffness / decay;
-  Eigen::MatrixXd columns = snapshots;
-  if (general) {
-    Eigen::MatrixXd modal(snapshots.rows(), 0);
-    const auto add = [&](const Eigen::MatrixXd& more) {
-      modal.conservativeResize(Eigen::NoChange, modal.cols() + more.cols());
-      modal.rightCols(more.cols()) = more;
-    };
-    add(of_unit_norm(norm, scaled_snapshots(input)));
-    if (input.example_fields.cols() > 0) add(of_unit_norm(norm, input.example_fields));
-    columns.conservativeResize(Eigen::NoChange, snapshots.cols() + modal.cols());
-    columns.leftCols(snapshots.cols()) = of_unit_norm(norm, snapshots);
-    columns.rightCols(modal.cols()) = of_unit_norm(norm, modal);
+  Eigen::MatrixXd modal = of_unit_norm(norm, scaled_snapshots(input));
+  if (const Eigen::Index fields = input.example_fields.cols(); fields > 0) {
+    modal.conservativeResize(Eigen::NoChange, modal.cols() + fields);
+    modal.rightCols(fields) = of_unit_norm(norm, input.example_fields);
+    modal = of_unit_norm(norm, modal);
   }
+  Eigen::MatrixXd columns(snapshots.rows(), snapshots.cols() + modal.cols());
+  columns << of_unit_norm(norm, snapshots), (general ? 1 : kUnseenShare) * modal;
   remove_components(system.mass, system.null_space, columns);
   Eigen::MatrixXd basis = principal_components(norm, columns, size);
+  require_modes(basis.cols(), size);
   orthonormalise(system.mass, basis);
-  if (basis.cols() < size) fill_up(input, size, basis);
   finish(input, basis);
   return basis;
 }

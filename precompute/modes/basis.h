@@ -19,9 +19,9 @@ struct BasisInput {
 Eigen::MatrixXd modal_basis(const BasisInput& input, int size);
 
 /// The same of `snapshots` [f x N] of motions: their principal components in the norm M + K / omega_5^2, which weighs
-/// displacement and strain alike. With `general`, those of the snapshots and of what modal_basis() is made of, each of
-/// unit norm together, in M + K / omega_1^2: for loads that the snapshots do not know. Where all this spans fewer than
-/// r dimensions, modes and derivatives fill it up.
+/// displacement and strain alike. What modal_basis() is made of is mixed in with 3 % of their norm, so that loads which
+/// no run had find the lowest modes. With `general` both have the same norm, in M + K / omega_1^2: for loads that the
+/// snapshots do not know. Throws as modal_basis() does, of all this.
 Eigen::MatrixXd trained_basis(const BasisInput& input, const Eigen::MatrixXd& snapshots, bool general, int size);
 
 }  // namespace exmat::precompute

@@ -157,8 +157,9 @@ TEST_P(Basis, ClampedFieldsAreInEquilibriumWithTheirClamp) {
   }
 }
 
-// Principal components are the best there are: what they lose of the snapshots, in the norm that they are taken in, is
-// the tail of the singular values, which a plain SVD of the factored columns gives.
+// Principal components are the best there are. What they lose of the snapshots, in the norm that they are taken in, is
+// at least the tail of the singular values, which a plain SVD of the factored columns gives, and at most that and all
+// that is mixed in: 3 % of the norm.
 TEST_P(Basis, OfMotionsLosesNoMoreThanTheSingularValuesSay) {
   const Eigen::Index count = 12, size = 5;
   Eigen::MatrixXd motions = modes_.modes * Eigen::MatrixXd::Random(6, count);
@@ -174,17 +175,23 @@ TEST_P(Basis, OfMotionsLosesNoMoreThanTheSingularValuesSay) {
   const Eigen::VectorXd sigma = Eigen::MatrixXd(factor * motions).bdcSvd().singularValues();
   const Eigen::MatrixXd inside = factor * U;
   const Eigen::MatrixXd projected = inside * inside.householderQr().solve(factor * motions);
-  EXPECT_NEAR((factor * motions - projected).squaredNorm(), sigma.tail(count - size).squaredNorm(),
-              1e-9 * sigma.squaredNorm());
+  const double lost = (factor * motions - projected).squaredNorm(), least = sigma.tail(count - size).squaredNorm();
+  EXPECT_GE(lost, least - 1e-9 * sigma.squaredNorm());
+  EXPECT_LE(lost, least + 0.03 * 0.03 * sigma.squaredNorm());
 }
 
-TEST_P(Basis, OfFewMotionsIsFilledUpWithModes) {
+TEST_P(Basis, OfFewMotionsHoldsModesToo) {
   Eigen::MatrixXd motions = modes_.modes.leftCols(2);
   const BasisInput input{system_, modes_, derivatives_, bounding_box_diagonal(mesh_.vertices), {}};
   const Eigen::MatrixXd U = trained_basis(input, motions, false, 10);
   ASSERT_EQ(U.cols(), 10);
   EXPECT_LE((U.transpose() * (system_.mass * U) - Eigen::MatrixXd::Identity(10, 10)).cwiseAbs().maxCoeff(), 1e-12);
-  EXPECT_LE((motions - U * (U.transpose() * (system_.mass * motions))).norm(), 1e-9);
+  const auto lost = [&](const Eigen::MatrixXd& u) {
+    const Eigen::MatrixXd rest = u - U * (U.transpose() * (system_.mass * u));
+    return std::sqrt(rest.cwiseProduct(system_.mass * rest).sum() / u.cwiseProduct(system_.mass * u).sum());
+  };
+  EXPECT_LE(lost(motions), 0.001);
+  EXPECT_LE(lost(modes_.modes.col(2)), 0.05);  // no motion has shown it
 }
 
 // The mix holds a motion that modes do not, and modes that no motion has shown.
