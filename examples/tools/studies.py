@@ -62,7 +62,7 @@ def error_rows(name, result):
     """A line for each m, r: all elements against the full space, each s against all elements."""
     sound = [point for point in result["points"] if not point["failure"]]
     for all_elements in (p for p in sound if p["settings"]["internal_force"] == "all_elements"):
-        own = {k: all_elements["settings"][k] for k in ("eigenfunctions", "basis_size", "linear_modes", "material", "time_step", "integrator")}
+        own = {k: all_elements["settings"][k] for k in ("eigenfunctions", "basis_size", "linear_modes", "training", "material", "time_step", "integrator")}
         by_elements = {}
         for point in sound:
             from_all = point["errors"]["from_all_elements"]

@@ -142,7 +142,8 @@ struct Varying {
             s.integrator,
             s.internal_force == kAllElements ? "cubature" : s.internal_force,
             s.target,
-            fmt::format("{} linear modes", s.linear_modes)};
+            fmt::format("{} linear modes", s.linear_modes),
+            "training " + s.training};
   }
   std::vector<std::set<std::string>> values_;
 };
@@ -241,7 +242,7 @@ std::string point_row(const StudyResult& result, std::size_t i) {
   std::string html = fmt::format("<tr class=\"{}{}\">", front ? "front " : "", result.recommended == i ? "chosen" : "");
   const char* mark = point.failure.empty() && !result.has_truth(point) ? " (no truth)" : "";
   html += cell(std::to_string(i + 1) + mark) + cell(std::to_string(s.eigenfunctions)) +
-          cell(std::to_string(s.basis_size)) + cell(std::to_string(s.linear_modes));
+          cell(std::to_string(s.basis_size)) + cell(std::to_string(s.linear_modes)) + cell(s.training, " class=\"l\"");
   html += cell(point.failure.empty() ? std::to_string(point.elements) : "-") + cell(s.material, " class=\"l\"");
   html += cell(fmt::format("{:g}", 1e3 * s.time_step)) + cell(s.integrator, " class=\"l\"");
   const auto as_run = [](const std::string& asked, const std::string& taken) {
@@ -261,7 +262,7 @@ std::string point_row(const StudyResult& result, std::size_t i) {
 }
 
 std::string points_table(const StudyResult& result) {
-  std::vector<std::string> names{"#",        "m",          "r",          "linear<br>modes", "s",
+  std::vector<std::string> names{"#",        "m",          "r",          "linear<br>modes", "training", "s",
                                  "material", "dt<br>[ms]", "integrator", "internal force",  "target"};
   for (std::string& name : error_names(result)) names.push_back(std::move(name));
   for (const char* name : {"held-out<br>[%]", "step<br>[us]", "p95<br>[us]", "interp<br>[us]", "precompute<br>[s]",

@@ -65,6 +65,7 @@ std::vector<Column> settings_columns() {
       {"eigenfunctions", [](const PointResult& p) { return std::to_string(p.settings.eigenfunctions); }, true},
       {"basis_size", [](const PointResult& p) { return std::to_string(p.settings.basis_size); }, true},
       {"linear_modes", [](const PointResult& p) { return std::to_string(p.settings.linear_modes); }, true},
+      {"training", [](const PointResult& p) { return p.settings.training; }, true},
       {"cubature_elements", [](const PointResult& p) { return std::to_string(p.elements); }},
       {"material", [](const PointResult& p) { return p.settings.material; }, true},
       {"time_step_s", [](const PointResult& p) { return number(p.settings.time_step); }, true},
@@ -177,7 +178,9 @@ Ordered asset_fragment(const StudyResult& result, const PointResult& point) {
   const bool all = point.settings.internal_force == kAllElements;
   Ordered json = Ordered::object();
   if (result.has_examples) json["shape_space"] = {{"eigenfunctions", point.settings.eigenfunctions}};
-  json["basis"] = {{"size", point.settings.basis_size}, {"linear_modes", point.settings.linear_modes}};
+  json["basis"] = {{"size", point.settings.basis_size},
+                   {"linear_modes", point.settings.linear_modes},
+                   {"training", point.settings.training}};
   json["cubature"] = all ? Ordered{{"method", kAllElements}} : Ordered{{"elements", point.elements}};
   json["internal_force"] = point.internal_force;
   const auto differs = [&](const PointResult& other) { return other.settings.material != point.settings.material; };

@@ -20,6 +20,7 @@ struct PointSettings {
   int eigenfunctions = 0;                ///< m
   int basis_size = 0;                    ///< r
   int linear_modes = 0;                  ///< whose derivatives are added
+  std::string training;                  ///< "auto", "none", "scene" or "loads": what the basis learns from
   std::optional<int> cubature_elements;  ///< s; absent: by the asset's tolerance, or all of them
   std::string material;
   double time_step = 0;  ///< [s]

@@ -15,6 +15,7 @@ struct SweepConfig {
   std::vector<int> eigenfunctions{};          ///< m
   std::vector<int> basis_size{};              ///< r
   std::vector<int> linear_modes{};            ///< whose derivatives are added
+  std::vector<std::string> training{};        ///< names of Training
   std::vector<int> cubature_elements{};       ///< s
   std::vector<std::string> material{};        ///< names of MaterialModel
   std::vector<double> time_step{};            ///< [s]
