@@ -135,6 +135,9 @@ struct Varying {
 
  private:
   static constexpr std::size_t kTimeStep = 2;
+  static std::string force_of(const PointSettings& s) {
+    return s.elastic_stiffness ? fmt::format("elastic force of {:g}", *s.elastic_stiffness) : "force of the scene";
+  }
   static std::vector<std::string> texts(const PointSettings& s) {
     return {fmt::format("m {}", s.eigenfunctions),
             s.material,
@@ -143,7 +146,8 @@ struct Varying {
             s.internal_force == kAllElements ? "cubature" : s.internal_force,
             s.target,
             fmt::format("{} linear modes", s.linear_modes),
-            "training " + s.training};
+            "training " + s.training,
+            force_of(s)};
   }
   std::vector<std::set<std::string>> values_;
 };
@@ -249,7 +253,8 @@ std::string point_row(const StudyResult& result, std::size_t i) {
     return asked == "auto" && !taken.empty() ? "auto: " + taken : asked;
   };
   html += cell(as_run(s.internal_force, point.internal_force), " class=\"l\"") +
-          cell(as_run(s.target, point.target), " class=\"l\"");
+          cell(as_run(s.target, point.target), " class=\"l\"") +
+          cell(s.elastic_stiffness ? fmt::format("{:g}", *s.elastic_stiffness) : "-");
   if (!point.failure.empty())
     return html + fmt::format("<td class=\"l bad\" colspan=\"19\">{}</td></tr>\n", escaped(point.failure));
   html += error_cells(result, point);
@@ -262,8 +267,9 @@ std::string point_row(const StudyResult& result, std::size_t i) {
 }
 
 std::string points_table(const StudyResult& result) {
-  std::vector<std::string> names{"#",        "m",          "r",          "linear<br>modes", "training", "s",
-                                 "material", "dt<br>[ms]", "integrator", "internal force",  "target"};
+  std::vector<std::string> names{
+      "#",        "m",          "r",          "linear<br>modes", "training", "s",
+      "material", "dt<br>[ms]", "integrator", "internal force",  "target",   "elastic<br>force"};
   for (std::string& name : error_names(result)) names.push_back(std::move(name));
   for (const char* name : {"held-out<br>[%]", "step<br>[us]", "p95<br>[us]", "interp<br>[us]", "precompute<br>[s]",
                            "Newton", "above<br>tolerance"})

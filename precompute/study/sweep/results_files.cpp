@@ -72,6 +72,9 @@ std::vector<Column> settings_columns() {
       {"integrator", [](const PointResult& p) { return p.settings.integrator; }, true},
       {"internal_force", [](const PointResult& p) { return p.settings.internal_force; }, true},
       {"target", [](const PointResult& p) { return p.settings.target; }, true},
+      {"elastic_stiffness",
+       [](const PointResult& p) { return p.settings.elastic_stiffness ? number(*p.settings.elastic_stiffness) : ""; },
+       true},
   };
 }
 
@@ -192,9 +195,14 @@ Ordered asset_fragment(const StudyResult& result, const PointResult& point) {
 Ordered scene_fragment(const StudyResult& result, const PointResult& point) {
   Ordered json{{"time_step", point.settings.time_step}, {"integrator", point.settings.integrator}};
   if (point.target == kNoTarget) return json;
-  for (const std::string& region : result.regions)
-    json["regions"].push_back({{"name", region}, {"target", point.target}});
-  if (result.regions.empty()) json["examples"] = {{"target", point.target}};
+  Ordered force{{"target", point.target}};
+  if (const auto& stiffness = point.settings.elastic_stiffness)
+    force.update({{"force", "elastic"}, {"stiffness", *stiffness}});
+  for (const std::string& region : result.regions) {
+    json["regions"].push_back({{"name", region}});
+    json["regions"].back().update(force);
+  }
+  if (result.regions.empty()) json["examples"] = force;
   return json;
 }
 

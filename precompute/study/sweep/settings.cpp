@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "common/core/error.h"
 #include "precompute/cubature/cubature.h"
@@ -48,6 +49,7 @@ PointSettings normalised(PointSettings point, const PointSettings& own, const As
   if (learns_from_scene(point) && learns_from_scene(own)) point.training = own.training;
   if (!examples) point.eigenfunctions = own.eigenfunctions;
   if (!examples) point.target = kNoTarget;
+  if (!examples) point.elastic_stiffness.reset();
   return point;
 }
 
@@ -63,6 +65,7 @@ std::vector<PointSettings> product(const SweepConfig& sweep, const PointSettings
   multiply(points, sweep.integrator, &PointSettings::integrator);
   multiply(points, sweep.internal_force, &PointSettings::internal_force);
   multiply(points, sweep.target, &PointSettings::target);
+  multiply(points, sweep.elastic_stiffness, &PointSettings::elastic_stiffness);
   return points;
 }
 
@@ -132,7 +135,19 @@ AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
   return asset;
 }
 
+SceneConfig with_force(SceneConfig scene, const PointSettings& settings) {
+  if (!settings.elastic_stiffness) return scene;
+  const auto make_elastic = [&](ExampleForceConfig& force) {
+    force.law = ExampleForceLaw::kElastic;
+    force.stiffness = *settings.elastic_stiffness;
+  };
+  if (scene.examples) make_elastic(*scene.examples);
+  for (RegionForceConfig& region : scene.regions) make_elastic(region.force);
+  return scene;
+}
+
 SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
+  scene = with_force(std::move(scene), settings);
   scene.time_step = settings.time_step;
   scene.integrator = from_name<Integrator>(settings.integrator).value();
   scene.internal_force = settings.internal_force == kAllElements
@@ -159,6 +174,8 @@ nlohmann::ordered_json to_json(const PointSettings& settings) {
   json["integrator"] = settings.integrator;
   json["internal_force"] = settings.internal_force;
   json["target"] = settings.target;
+  json["elastic_stiffness"] = nullptr;
+  if (settings.elastic_stiffness) json["elastic_stiffness"] = *settings.elastic_stiffness;
   return json;
 }
 
@@ -174,6 +191,7 @@ PointSettings settings_from_json(const nlohmann::ordered_json& json) {
   settings.integrator = json.at("integrator").get<std::string>();
   settings.internal_force = json.at("internal_force").get<std::string>();
   settings.target = json.at("target").get<std::string>();
+  if (!json.at("elastic_stiffness").is_null()) settings.elastic_stiffness = json.at("elastic_stiffness").get<double>();
   return settings;
 }
 
@@ -181,8 +199,10 @@ std::string describe(const PointSettings& settings) {
   std::string text = fmt::format("m {}, r {} of {} linear modes, training {}, ", settings.eigenfunctions,
                                  settings.basis_size, settings.linear_modes, settings.training);
   if (settings.cubature_elements) text += fmt::format("s {}, ", *settings.cubature_elements);
-  return text + fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
-                            settings.integrator, settings.internal_force, settings.target);
+  text += fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
+                      settings.integrator, settings.internal_force, settings.target);
+  if (settings.elastic_stiffness) text += fmt::format(", elastic force of {:g}", *settings.elastic_stiffness);
+  return text;
 }
 
 }  // namespace exmat::precompute

@@ -21,7 +21,8 @@ SweepConfig read_sweep(const Json& json) {
           .time_step = list<double>(json, "time_step"),
           .integrator = list<std::string>(json, "integrator"),
           .internal_force = list<std::string>(json, "internal_force"),
-          .target = list<std::string>(json, "target")};
+          .target = list<std::string>(json, "target"),
+          .elastic_stiffness = list<double>(json, "elastic_stiffness")};
 }
 
 }  // namespace

@@ -89,6 +89,24 @@ TEST_F(Settings, WithoutEffectMakeNoPoints) {
   EXPECT_EQ(expanded()[0].target, kNoTarget);
 }
 
+TEST_F(Settings, CompareElasticForcesWithThoseOfTheScene) {
+  study_.sweeps = {{}, {.elastic_stiffness = {0.5, 2}}};
+  const auto points = expanded();
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_EQ(with_settings(scene_, points[0]).examples->law, ExampleForceLaw::kLinear);
+  EXPECT_EQ(with_settings(scene_, points[0]).examples->stiffness, scene_.examples->stiffness);
+  for (const std::size_t i : {1U, 2U}) {
+    const SceneConfig scene = with_settings(scene_, points[i]);
+    EXPECT_EQ(scene.examples->law, ExampleForceLaw::kElastic);
+    EXPECT_EQ(scene.examples->stiffness, points[i].elastic_stiffness);
+    EXPECT_EQ(scene.examples->damping, scene_.examples->damping);
+    EXPECT_EQ(settings_from_json(to_json(points[i])), points[i]);
+  }
+  EXPECT_THAT(describe(points[2]), HasSubstr("target auto, elastic force of 2"));
+  scene_.examples.reset();
+  EXPECT_EQ(expanded().size(), 1U) << "no examples";
+}
+
 TEST_F(Settings, AreAppliedToAssetAndScene) {
   asset_.cubature_tolerance = 0.01;
   scene_.regions.push_back({"left", {}});
