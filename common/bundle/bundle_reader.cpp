@@ -23,7 +23,8 @@ const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attrib
 std::string asset_member(std::string_view group) {
   if (group == "polynomial") return "\"polynomial\" as internal_force";
   if (group == "render") return "object.render_mesh";
-  const bool is_need = group == "targets" || group == "rigid" || group == "contact" || group == "regions";
+  const bool is_need = group == "targets" || group == "target_elasticity" || group == "rigid" || group == "contact" ||
+                       group == "regions";
   return fmt::format("\"{}\" among the needs", is_need ? group : "examples");
 }
 
@@ -101,12 +102,13 @@ void BundleReader::add_regions(ReducedModel& model) const {
     add_examples(path + "/examples", region.examples);
     if (needs.targets && file_.has_group(path + "/targets")) region.targets.emplace();
     if (needs.target_space && file_.has_group(path + "/target_space")) region.target_space.emplace();
+    if (needs.target_elasticity && file_.has_group(path + "/target_elasticity")) region.target_elasticity.emplace();
     model.regions.push_back(std::move(region));
   };
   if (request_.regions)
     std::ranges::for_each(*request_.regions, add);
   else
-    for (const std::string& name : names) add({name});
+    for (const std::string& name : names) add({.name = name, .target_elasticity = true});
 }
 
 ReducedModel BundleReader::read(const BundleRequest& request) {

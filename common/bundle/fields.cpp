@@ -17,6 +17,7 @@ ReducedModel model_of_all_groups() {
   region.examples = *model.examples;
   region.targets.emplace();
   region.target_space.emplace();
+  region.target_elasticity.emplace();
   return model;
 }
 
@@ -77,6 +78,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.targets.emplace();
   else if (group == "target_space")
     model.target_space.emplace();
+  else if (group == "target_elasticity")
+    model.target_elasticity.emplace();
   else if (group == "fidelity")
     model.fidelity.emplace();
   else if (group == "regions")

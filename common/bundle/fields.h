@@ -155,6 +155,20 @@ void visit_target_space(const FieldPlace& place, Space& space, Visitor& visit) {
   visit.dataset("poisson_ratio", space.poisson_ratio);
 }
 
+template <typename Elasticity, typename Visitor>
+void visit_target_elasticity(const FieldPlace& place, Elasticity& elasticity, Visitor& visit) {
+  enter(place, "/target_elasticity", visit);
+  visit.attribute("heldout_error", elasticity.heldout_error);
+  visit.dataset("elements", elasticity.elements);
+  visit.dataset("weights", elasticity.weights);
+  visit.dataset("volumes", elasticity.volumes);
+  visit.dataset("gradient", elasticity.gradient);
+  visit.dataset("target_gradient", elasticity.target_gradient);
+  visit.dataset("youngs_modulus", elasticity.youngs_modulus);
+  visit.dataset("poisson_ratio", elasticity.poisson_ratio);
+  visit.dataset("control_points", elasticity.control_points);
+}
+
 template <typename Fidelity, typename Visitor>
 void visit_fidelity(Fidelity& fidelity, Visitor& visit) {
   enter(kTopPlace, "/fidelity", visit);
@@ -185,6 +199,7 @@ void visit_region(Region& region, Visitor& visit) {
   visit_projection(place, region.projection, visit);
   if (region.targets) visit_targets(place, *region.targets, visit);
   if (region.target_space) visit_target_space(place, *region.target_space, visit);
+  if (region.target_elasticity) visit_target_elasticity(place, *region.target_elasticity, visit);
 }
 
 template <typename Regions, typename Visitor>
@@ -241,6 +256,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.projection) visit_projection(kTopPlace, *model.projection, visit);
   if (model.targets) visit_targets(kTopPlace, *model.targets, visit);
   if (model.target_space) visit_target_space(kTopPlace, *model.target_space, visit);
+  if (model.target_elasticity) visit_target_elasticity(kTopPlace, *model.target_elasticity, visit);
   if (model.fidelity) visit_fidelity(*model.fidelity, visit);
   if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);

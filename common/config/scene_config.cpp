@@ -16,6 +16,7 @@ namespace {
 
 ExampleForceConfig read_example_force(const Json& json) {
   ExampleForceConfig config;
+  config.law = choice_or(json, "force", config.law);
   config.stiffness = json["stiffness"];
   config.damping = json.value("damping", config.damping);
   config.bias = json.value("bias", config.bias);
@@ -114,13 +115,17 @@ Needs needs_of(const SceneConfig& scene) {
   Needs needs{.examples = scene.examples || scene.body.pose,
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
+              .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
               .contact = !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};
   if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
   std::vector<RegionNeeds>& regions = needs.regions.emplace();
   for (const auto& [name, force] : scene.regions)
-    regions.push_back({name, force.target != TargetSource::kSolve, force.energy_reference});
+    regions.push_back({.name = name,
+                       .targets = force.target != TargetSource::kSolve,
+                       .energy_reference = force.energy_reference,
+                       .target_elasticity = force.law == ExampleForceLaw::kElastic});
   return needs;
 }
 

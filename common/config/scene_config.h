@@ -23,7 +23,8 @@ struct VertexForceConfig {
 };
 
 struct ExampleForceConfig {
-  double stiffness = 0;  ///< kappa >= 0 [1/s^2]
+  ExampleForceLaw law = ExampleForceLaw::kLinear;
+  double stiffness = 0;  ///< kappa >= 0 [1/s^2]; of an elastic force its factor e >= 0
   double damping = 0;    ///< c_kappa >= 0 [1/s]
   double bias = 1;       ///< in [0, 1]
   TargetSource target = TargetSource::kAuto;

@@ -34,6 +34,12 @@ enum class EnergyReference {
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<EnergyReference>{"example", "rest"};
 
+/// What an example force is the slope of: a spring to the target, or the elastic energy with the target as the
+/// undeformed shape. docs/method.md, "Force".
+enum class ExampleForceLaw { kLinear, kElastic };
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<ExampleForceLaw>{"linear", "elastic"};
+
 /// Lambda of the descriptors (docs/method.md, "Shape space"): the eigenvalues, or ones.
 enum class Weighting { kEigenvalue, kNone };
 template <>

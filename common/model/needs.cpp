@@ -20,6 +20,12 @@ LedgerEntry plan_target_space(const Needs& needs, const LedgerEntry& examples) {
   return {"target_space", true, 0, "targets may be solved for"};
 }
 
+LedgerEntry plan_target_elasticity(const Needs& needs, const LedgerEntry& examples) {
+  if (!examples.included) return {"target_elasticity", false, 0, examples.reason};
+  if (!needs.target_elasticity) return {"target_elasticity", false, 0, "no elastic example force is asked for"};
+  return {"target_elasticity", true, 0, "an elastic example force is asked for"};
+}
+
 LedgerEntry plan_polynomial(const Needs& needs) {
   if (needs.internal_force == ForceMethod::kCubature)
     return {"polynomial", false, 0, "the internal force is by cubature"};
@@ -63,6 +69,7 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
       {"projection", examples.included, 0, example_reason},
       plan_targets(needs, examples, example_count),
       plan_target_space(needs, examples),
+      plan_target_elasticity(needs, examples),
       {"fidelity", needs.fidelity, 0, needs.fidelity ? "runs in full space to compare with" : "nothing was trained on"},
       regions,
       {"rigid", rigid, 0, rigid_reason},

@@ -18,7 +18,8 @@ struct RegionNeeds {
   std::string name;
   bool targets = true;  ///< its table of targets
   EnergyReference energy_reference = EnergyReference::kExample;
-  bool target_space = true;  ///< what targets are solved for in
+  bool target_space = true;        ///< what targets are solved for in
+  bool target_elasticity = false;  ///< what an elastic example force takes
 };
 
 /// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
@@ -28,6 +29,7 @@ struct Needs {
   bool carried = false;                               ///< /rigid, of a body with fixed vertices that a motion carries
   bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
   bool target_space = true;                           ///< /target_space
+  bool target_elasticity = false;                     ///< /target_elasticity, of an elastic example force
   bool fidelity = false;                              ///< /fidelity: of what came of training, of no use to a step
   bool contact = true;                                ///< /contact
   bool render = true;                                 ///< /render, of an asset that names a render mesh

@@ -126,6 +126,21 @@ struct TargetSpaceData {
   Eigen::VectorXd poisson_ratio;   ///< s
 };
 
+/// Group /target_elasticity: what the elastic example force takes beside the targets. Its elements are its own, chosen
+/// for that force; the target Y y has the deformation gradient I + G_j y in element j, Y [3n x d] the displacements of
+/// /target_space. docs/method.md, "Force".
+struct TargetElasticityData {
+  double heldout_error = 0;        ///< relative, of the force by these elements, as in CubatureData
+  IndexVector elements;            ///< s, distinct tets of the object, ascending
+  Eigen::VectorXd weights;         ///< s, >= 0; of a region times the tet's share in it
+  Eigen::VectorXd volumes;         ///< s [m^3]
+  RowMatrix gradient;              ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
+  RowMatrix target_gradient;       ///< 9s x d (dataset s 9 d): G_j, likewise dF*_ab/dy
+  Eigen::VectorXd youngs_modulus;  ///< s [Pa]
+  Eigen::VectorXd poisson_ratio;   ///< s
+  RowMatrix control_points;        ///< P c x d, those of /targets in coordinates y; without a table K x d, the examples
+};
+
 /// Group /projection. docs/method.md, "Direct projection".
 struct ProjectionData {
   RowMatrix shape_from_reduced;  ///< 3m x r, T, row 3i + axis
@@ -143,6 +158,7 @@ struct RegionData {
   ProjectionData projection;
   std::optional<TargetTableData> targets;
   std::optional<TargetSpaceData> target_space;
+  std::optional<TargetElasticityData> target_elasticity;
 };
 
 /// Group /fidelity: how far the reduced body is from the full space in runs that its basis has not learned from.
@@ -210,6 +226,7 @@ struct ReducedModel {
   std::optional<ProjectionData> projection;
   std::optional<TargetTableData> targets;
   std::optional<TargetSpaceData> target_space;
+  std::optional<TargetElasticityData> target_elasticity;
   std::optional<FidelityData> fidelity;
   std::vector<RegionData> regions;  ///< in index order; none: no such group
   std::optional<RigidData> rigid;

@@ -62,11 +62,11 @@ def error_rows(name, result):
     """A line for each m, r: all elements against the full space, each s against all elements."""
     sound = [point for point in result["points"] if not point["failure"]]
     for all_elements in (p for p in sound if p["settings"]["internal_force"] == "all_elements"):
-        own = {k: all_elements["settings"][k] for k in ("eigenfunctions", "basis_size", "linear_modes", "material", "time_step", "integrator")}
+        own = {k: all_elements["settings"].get(k) for k in ("eigenfunctions", "basis_size", "linear_modes", "training", "material", "time_step", "integrator", "elastic_stiffness")}
         by_elements = {}
         for point in sound:
             from_all = point["errors"]["from_all_elements"]
-            if from_all and all(point["settings"][k] == own[k] for k in own):
+            if from_all and all(point["settings"].get(k) == own[k] for k in own):
                 by_elements[point["elements"]] = (point["errors"][result["headline"]]["mean"], from_all["mean"])
         yield [name, own["eigenfunctions"], own["basis_size"], all_elements["errors"][result["headline"]]["mean"]], by_elements
 

@@ -35,9 +35,9 @@ void print_stages(const BuildReport& report) {
 }
 
 void print_ledger(const std::vector<LedgerEntry>& ledger) {
-  fmt::print("\n{:<14}{:>12}  {:<5}{}\n", "group", "bytes", "in", "why");
+  fmt::print("\n{:<18}{:>12}  {:<5}{}\n", "group", "bytes", "in", "why");
   for (const auto& entry : ledger)
-    fmt::print("{:<14}{:>12}  {:<5}{}\n", entry.group, entry.bytes, entry.included ? "yes" : "no", entry.reason);
+    fmt::print("{:<18}{:>12}  {:<5}{}\n", entry.group, entry.bytes, entry.included ? "yes" : "no", entry.reason);
 }
 
 void print_examples(const std::string& title, const ExampleSet& set) {

@@ -127,6 +127,10 @@ int run(std::vector<char*> words) {
   full_space_command_line
       ->add_option("--every", full_space_options.every, "write a frame every so many steps instead of the scene's")
       ->check(count_range);
+  full_space_command_line->add_flag(
+      "--baseline", full_space_options.baseline,
+      "the method that the paper compares with: targets by the energy of the surface, and "
+      "elastic example forces");
 
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     if (study_options.stability && common.log_level == "info")

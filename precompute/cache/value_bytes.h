@@ -125,6 +125,12 @@ void pass_members(Archive& archive, CubatureData& value) {
 }
 
 template <typename Archive>
+void pass_members(Archive& archive, TargetElasticityData& value) {
+  pass_all(archive, value.heldout_error, value.elements, value.weights, value.volumes, value.gradient,
+           value.target_gradient, value.youngs_modulus, value.poisson_ratio, value.control_points);
+}
+
+template <typename Archive>
 void pass_members(Archive& archive, PolynomialData& value) {
   FieldPasser<Archive> fields{archive};
   visit_polynomial(value, fields);

@@ -10,6 +10,7 @@
 #include "common/core/log.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/region_poses.h"
+#include "precompute/shape_space/region_window.h"
 #include "precompute/solvers/eigenpairs.h"
 
 namespace exmat::precompute {
@@ -127,6 +128,12 @@ PoseCoordinates PoseFitter::range(Eigen::Index index) const {
   fields -= system_.null_space * (system_.null_space.transpose() * (system_.mass * fields)).eval();
   return pose_range(system_.mass, fields,
                     descriptor_changes(stage_.data.rest_descriptor, stage_.groups[group].examples));
+}
+
+Eigen::VectorXd PoseFitter::tet_shares(Eigen::Index index) const {
+  const auto& view = stage_.groups[static_cast<std::size_t>(index)].view;
+  if (!view) return Eigen::VectorXd::Ones(object_.mesh.tet_count());
+  return region_tet_shares(object_.mesh, view->inside(), view->window());
 }
 
 // The basis through the filter of the example force, then the space: U^T P Y = T^+ (T Y).

@@ -29,6 +29,9 @@ class PoseFitter {
   /// All poses that descriptors of a group stand for; of a free body without their rigid part.
   PoseCoordinates range(Eigen::Index group) const;
 
+  /// [n_t] shares of the tets in an elastic force of a group: 1 of the whole body.
+  Eigen::VectorXd tet_shares(Eigen::Index group) const;
+
   /// Puts copies of the shape space and of the example sets, as far as they do without a basis, into a model.
   void preview(ReducedModel& model) const;
 

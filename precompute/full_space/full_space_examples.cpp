@@ -10,6 +10,7 @@
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/region_poses.h"
+#include "precompute/shape_space/region_window.h"
 #include "precompute/solvers/semidefinite_solver.h"
 
 namespace exmat::precompute {
@@ -92,6 +93,7 @@ ExamplePoses known_example_poses(const ReducedModel& model, const std::string& r
 FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                                      EnergyReference reference)
     : view_(poses.view), free_dofs_(system.free_dofs) {
+  if (view_) tet_shares_ = region_tet_shares(model.object->mesh, view_->inside(), view_->window());
   set_filter(model, *poses.examples);
   set_target(model, system, poses, reference);
 }

@@ -47,8 +47,8 @@ class FullSpaceExamples {
   Eigen::Index count() const { return weights_.examples(); }
   Eigen::Index left_out_tets() const { return left_out_; }
 
-  /// n, 1 where the force acts; none of the whole body.
-  std::optional<FlagVector> inside() const { return view_ ? std::optional(view_->inside()) : std::nullopt; }
+  /// [n_t] shares of the tets in an elastic force; none of the whole body, where all have 1.
+  const std::optional<Eigen::VectorXd>& tet_shares() const { return tet_shares_; }
 
   /// [K] weights of the deformation u [f], before the bias.
   Eigen::VectorXd weights(const Eigen::VectorXd& u) const;
@@ -74,6 +74,7 @@ class FullSpaceExamples {
   Eigen::VectorXd force(const RowMatrix& functions, const Eigen::MatrixXd& coefficients) const;
 
   std::optional<RegionView> view_;
+  std::optional<Eigen::VectorXd> tet_shares_;
   std::vector<std::int32_t> free_dofs_;  // of a region
   RowMatrix analysis_;                   // vertices x m, (M_s/V) Phi; free vertices, of a region all
   RowMatrix synthesis_;                  // likewise, M Phi

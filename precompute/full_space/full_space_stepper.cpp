@@ -121,11 +121,11 @@ Eigen::VectorXd Stepper::start_acceleration() {
     if (term.elasticity != nullptr) {
       Eigen::VectorXd pull;
       term.elasticity->force(state_.q - term.target, pull);
-      internal += scene_.example_elasticity * pull;
-    } else {
-      deforming +=
-          term.examples->filter(term.settings->stiffness * (start.u() - term.target) + term.settings->damping * rate);
+      internal += term.settings->stiffness * pull;
     }
+    if (runtime::is_filtered(*term.settings))
+      deforming += term.examples->filter(runtime::linear_stiffness(*term.settings) * (start.u() - term.target) +
+                                         term.settings->damping * rate);
   }
   if (!workspace_.mass) {
     LowerTriangle mass = model_.elasticity.pattern();
@@ -136,7 +136,7 @@ Eigen::VectorXd Stepper::start_acceleration() {
 }
 
 bool Stepper::acts(std::size_t group) const {
-  return group < scene_.examples.size() && (runtime::acts(scene_.examples[group]) || scene_.example_elasticity > 0);
+  return group < scene_.examples.size() && runtime::acts(scene_.examples[group]);
 }
 
 void Stepper::update_targets(const Eigen::VectorXd& q) {
@@ -155,7 +155,7 @@ void Stepper::update_targets(const Eigen::VectorXd& q) {
     term.settings = &scene_.examples[group];
     const bool of_method = !model_.target_methods.empty();
     term.target = (of_method ? examples.pose_basis() : examples.target_fields()) * examples_[group].target;
-    if (scene_.example_elasticity > 0) term.elasticity = undeformed(group, term.target);
+    if (runtime::elastic_factor(scene_.examples[group]) > 0) term.elasticity = undeformed(group, term.target);
   }
   report_.target_seconds += timer.seconds();
 }
@@ -209,7 +209,7 @@ const MeshElasticity* Stepper::undeformed(std::size_t group, const Eigen::Vector
   auto& elasticity = workspace_.examples[group].elasticity;
   if (!elasticity) {
     elasticity = model_.elasticity;
-    if (const auto inside = model_.examples[group].inside()) elasticity->restrict_to(*inside);
+    if (const auto shares = model_.examples[group].tet_shares()) elasticity->set_shares(*shares);
   }
   const Eigen::VectorXd displacement = model_.system.extend(target);
   const VertexArray shape = model_.rest + displacement.reshaped<Eigen::RowMajor>(model_.rest.rows(), 3);

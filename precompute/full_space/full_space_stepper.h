@@ -25,9 +25,6 @@ struct FullSpaceScene {
   std::vector<VertexForceConfig> forces;              ///< vertices of the object
   std::vector<runtime::Obstacle> obstacles;
   std::vector<runtime::ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, forces
-  /// If above 0, example forces are not the linear ones but those of the elastic energy with the target as the
-  /// undeformed shape, of this share of the material's own stiffness; of a region that of its own tets.
-  double example_elasticity = 0;
 };
 
 /// Scratch of the steps of one body: factors that the next step may use again, nothing else.

@@ -55,14 +55,13 @@ Eigen::Index MeshElasticity::set_undeformed(const VertexArray& positions) {
     else
       ++left_out;
   }
-  volumes_(excluded_).setZero();
+  if (shares_.size() > 0) volumes_ = volumes_.cwiseProduct(shares_);
   return left_out;
 }
 
-void MeshElasticity::restrict_to(const FlagVector& vertices) {
-  for (Eigen::Index t = 0; t < tets_.rows(); ++t)
-    if (!vertices(tets_.row(t).transpose()).all()) excluded_.push_back(t);
-  volumes_(excluded_).setZero();
+void MeshElasticity::set_shares(const Eigen::VectorXd& shares) {
+  shares_ = shares;
+  volumes_ = volumes_.cwiseProduct(shares_);
 }
 
 Eigen::Matrix3d MeshElasticity::displacement_gradient(Eigen::Index tet, const Eigen::VectorXd& u) const {

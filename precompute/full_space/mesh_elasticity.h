@@ -32,8 +32,8 @@ class MeshElasticity {
   /// inside out are left out of all sums; returns their number.
   Eigen::Index set_undeformed(const VertexArray& positions);
 
-  /// Leaves tets that have a vertex outside of the flagged ones [n] out of all sums, for good.
-  void restrict_to(const FlagVector& vertices);
+  /// Counts each tet by its share [n_t] >= 0 in all sums, for good; 0 leaves it out.
+  void set_shares(const Eigen::VectorXd& shares);
 
   /// [J].
   double energy(const Eigen::VectorXd& u) const;
@@ -63,10 +63,10 @@ class MeshElasticity {
   Eigen::Index size_ = 0;
   MaterialModel material_ = MaterialModel::kStVenantKirchhoff;
   TetArray tets_;
-  std::vector<Eigen::Index> excluded_;  // tets
+  Eigen::VectorXd shares_;  // none: all 1
   std::vector<LameParameters> lame_;
   std::vector<Gradients> gradients_;  // of the shape functions
-  Eigen::VectorXd volumes_;           // 0 where a tet is left out
+  Eigen::VectorXd volumes_;           // times the share; 0 where a tet is left out
   std::vector<Corners> dofs_;         // of each tet; -1 where fixed
   std::vector<Slots> slots_;          // places of a tet's stiffness among the values; -1 where there is none
   LowerTriangle pattern_;

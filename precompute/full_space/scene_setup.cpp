@@ -42,7 +42,10 @@ FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::
   scene.forces = config.forces;
   scene.obstacles = std::move(obstacles);
   const auto add = [&](const ExampleForceConfig& force) {
-    scene.examples.push_back({force.stiffness, force.damping, force.bias});
+    scene.examples.push_back({.stiffness = force.stiffness,
+                              .damping = force.damping,
+                              .bias = force.bias,
+                              .elastic = force.law == ExampleForceLaw::kElastic});
   };
   if (config.examples) add(*config.examples);
   for (const RegionForceConfig& region : config.regions) add(region.force);

@@ -24,18 +24,17 @@ StepPotential::StepPotential(const FullSpaceModel& model, const FullSpaceScene& 
       damped_(scene.mass_damping > 0 || scene.stiffness_damping > 0),
       reach_(model.rest.cwiseAbs().maxCoeff() + state.q.lpNorm<Eigen::Infinity>()) {}
 
-bool StepPotential::linear_examples() const {
-  return std::ranges::any_of(scene_.examples, runtime::acts) && scene_.example_elasticity == 0;
-}
+bool StepPotential::filters() const { return std::ranges::any_of(scene_.examples, runtime::is_filtered); }
 
 bool StepPotential::skew() const {
-  return linear_examples() &&
-         std::ranges::any_of(terms_.examples, [](const ExampleTerm& term) { return !term.examples->symmetric(); });
+  return std::ranges::any_of(terms_.examples, [](const ExampleTerm& term) {
+    return runtime::is_filtered(*term.settings) && !term.examples->symmetric();
+  });
 }
 
-// k = kappa + c_kappa c_v.
+// k = kappa + c_kappa c_v; kappa is 0 of an elastic force.
 double StepPotential::filter_stiffness(const ExampleTerm& term) const {
-  return term.settings->stiffness + term.settings->damping * terms_.form.velocity_factor;
+  return runtime::linear_stiffness(*term.settings) + term.settings->damping * terms_.form.velocity_factor;
 }
 
 double StepPotential::inertia_and_load(const Eigen::VectorXd& d) const {
@@ -70,11 +69,12 @@ void StepPotential::prepare() {
     damping_.coeffs() += scene_.mass_damping * model_.mass_values.array();
     deformation_linear_ += damping_product(rate);
   }
-  if (!linear_examples()) return;
   // k (u_n - u_c) = kappa u_n + c_kappa u'.
   for (const ExampleTerm& term : terms_.examples)
-    deformation_linear_ += term.examples->filter(term.settings->stiffness * (start_deformation_ - term.target) +
-                                                 term.settings->damping * rate);
+    if (runtime::is_filtered(*term.settings))
+      deformation_linear_ +=
+          term.examples->filter(runtime::linear_stiffness(*term.settings) * (start_deformation_ - term.target) +
+                                term.settings->damping * rate);
 }
 
 Eigen::VectorXd StepPotential::damping_product(const Eigen::VectorXd& u) const {
@@ -84,7 +84,8 @@ Eigen::VectorXd StepPotential::damping_product(const Eigen::VectorXd& u) const {
 // sum k P u.
 Eigen::VectorXd StepPotential::filtered(const Eigen::VectorXd& u) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(u.size());
-  for (const ExampleTerm& term : terms_.examples) sum += filter_stiffness(term) * term.examples->filter(u);
+  for (const ExampleTerm& term : terms_.examples)
+    if (runtime::is_filtered(*term.settings)) sum += filter_stiffness(term) * term.examples->filter(u);
   return sum;
 }
 
@@ -92,7 +93,8 @@ Eigen::VectorXd StepPotential::filtered(const Eigen::VectorXd& u) const {
 Eigen::VectorXd StepPotential::skew_filtered(const Eigen::VectorXd& u) const {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(u.size());
   for (const ExampleTerm& term : terms_.examples)
-    sum += 0.5 * filter_stiffness(term) * (term.examples->filter(u) - term.examples->transposed_filter(u));
+    if (runtime::is_filtered(*term.settings))
+      sum += 0.5 * filter_stiffness(term) * (term.examples->filter(u) - term.examples->transposed_filter(u));
   return sum;
 }
 
@@ -100,7 +102,7 @@ Eigen::VectorXd StepPotential::skew_filtered(const Eigen::VectorXd& u) const {
 Eigen::VectorXd StepPotential::deformation_product(const Eigen::VectorXd& u) const {
   Eigen::VectorXd product = Eigen::VectorXd::Zero(u.size());
   if (damped_) product += terms_.form.velocity_factor * damping_product(u);
-  if (linear_examples()) product += filtered(u);
+  if (filters()) product += filtered(u);
   return product;
 }
 
@@ -111,7 +113,7 @@ PotentialValue StepPotential::sum(double elastic, double contact, const Eigen::V
   // Positions are rounded, and forces do work on that.
   total.magnitude += reach_ * internal_force_.lpNorm<1>();
   if (terms_.contacts != nullptr) total.magnitude += reach_ * terms_.contacts->force.lpNorm<1>();
-  if (scene_.example_elasticity > 0) total.magnitude += reach_ * scene_.example_elasticity * example_force_.lpNorm<1>();
+  total.magnitude += reach_ * example_force_.lpNorm<1>();
   if (!deforms()) return total;
   const Eigen::VectorXd product = deformation_product(change), linear = deformation_linear_ + frozen_;
   total.value += 0.5 * change.dot(product) + linear.dot(change);
@@ -131,21 +133,22 @@ PotentialValue StepPotential::value(const Eigen::VectorXd& d) const {
 double StepPotential::elastic_example_energy(const Eigen::VectorXd& q) const {
   double energy = 0;
   for (const ExampleTerm& term : terms_.examples)
-    if (term.elasticity != nullptr) energy += term.elasticity->energy(q - term.target);
-  return scene_.example_elasticity * energy;
+    if (term.elasticity != nullptr) energy += term.settings->stiffness * term.elasticity->energy(q - term.target);
+  return energy;
 }
 
-// Into example_force_, before the share; returns the energy.
+// Into example_force_; returns the energy.
 double StepPotential::elastic_example_force(const Eigen::VectorXd& q) {
   double energy = 0;
-  example_force_.setZero(q.size());
+  const bool any = std::ranges::any_of(terms_.examples, [](const auto& term) { return term.elasticity != nullptr; });
+  if (any) example_force_.setZero(q.size());
   for (const ExampleTerm& term : terms_.examples) {
     if (term.elasticity == nullptr) continue;
     Eigen::VectorXd force;
-    energy += term.elasticity->force(q - term.target, force);
-    example_force_ += force;
+    energy += term.settings->stiffness * term.elasticity->force(q - term.target, force);
+    example_force_ += term.settings->stiffness * force;
   }
-  return scene_.example_elasticity * energy;
+  return energy;
 }
 
 PotentialEvaluation StepPotential::evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) {
@@ -167,7 +170,7 @@ PotentialEvaluation StepPotential::evaluate_first(const Eigen::VectorXd& d, Eige
     if (skew()) next_frozen_ = skew_filtered(change);
   }
   const double example_energy = elastic_example_force(q);
-  if (scene_.example_elasticity > 0) gradient += scene_.example_elasticity * example_force_;
+  if (example_force_.size() > 0) gradient += example_force_;
   PotentialEvaluation evaluation;
   evaluation.force_scale =
       terms_.external_force.norm() + internal_force_.norm() + (linear_ + inertia + terms_.external_force).norm();
@@ -203,14 +206,14 @@ void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent)
     LowerTriangle stiffness;
     Eigen::VectorXd unused;
     term.elasticity->force_and_stiffness(state_.q + d - term.target, tangent, unused, stiffness);
-    hessian_.coeffs() += scene_.example_elasticity * stiffness.coeffs();
+    hessian_.coeffs() += term.settings->stiffness * stiffness.coeffs();
   }
   if (terms_.contacts != nullptr) model_.contacts->add_stiffness(*terms_.contacts, hessian_);
 }
 
 Eigen::VectorXd StepPotential::product(const Eigen::VectorXd& x) const {
   Eigen::VectorXd result = hessian_.selfadjointView<Eigen::Lower>() * x;
-  if (!linear_examples()) return result;
+  if (!filters()) return result;
   const Eigen::VectorXd change = here_->rate(x);
   Eigen::VectorXd force = filtered(change);
   if (skew()) force -= skew_filtered(change);

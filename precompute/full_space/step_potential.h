@@ -37,7 +37,7 @@ struct ExampleTerm {
   const FullSpaceExamples* examples = nullptr;
   const runtime::ExampleSettings* settings = nullptr;
   Eigen::VectorXd target;                      ///< u* [f]
-  const MeshElasticity* elasticity = nullptr;  ///< of displacements from u*, instead of the linear force
+  const MeshElasticity* elasticity = nullptr;  ///< of displacements from u*, of an elastic force
 };
 
 /// What one step knows before its Newton iterations.
@@ -52,9 +52,9 @@ struct StepTerms {
 /// What one step minimises, in d = q - q_n, which keeps the digits that c_a and a body far from its rest would take:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
 ///     + sum k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
-/// the terms of runtime::IncrementalPotential in full space, summed over the example forces; with elastic ones,
-/// s E*(q - u*) instead of these two, of the share s. The skew part of P has no potential: in values its force is that
-/// of the iterate last accepted. Hessians leave out how the frame of a free body turns.
+/// the terms of runtime::IncrementalPotential in full space, summed over the example forces; an elastic one
+/// has e E*(q - u*) and of the filter the damping alone, k = c_kappa c_v. The skew part of P has no potential: in
+/// values its force is that of the iterate last accepted. Hessians leave out how the frame of a free body turns.
 class StepPotential {
  public:
   StepPotential(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
@@ -84,8 +84,8 @@ class StepPotential {
   double elastic_energy() const { return elastic_energy_; }
 
  private:
-  bool deforms() const { return damped_ || linear_examples(); }
-  bool linear_examples() const;
+  bool deforms() const { return damped_ || filters(); }
+  bool filters() const;
   bool skew() const;
   double filter_stiffness(const ExampleTerm& term) const;
   double elastic_example_energy(const Eigen::VectorXd& q) const;
@@ -108,7 +108,7 @@ class StepPotential {
 
   double elastic_energy_ = 0;
   Eigen::VectorXd internal_force_;
-  Eigen::VectorXd example_force_;                // derivative of an elastic example energy
+  Eigen::VectorXd example_force_;                // derivative of the elastic example energies, or empty
   LowerTriangle stiffness_, hessian_, damping_;  // damping: D, components of the world at the first iterate
   std::optional<Deformation> first_, here_;      // at the first iterate, at the last evaluate()
   Eigen::VectorXd start_deformation_;            // u_n

@@ -13,6 +13,7 @@
 #include "precompute/cubature/cubature.h"
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/basis.h"
+#include "precompute/pipeline/target_elasticity_stage.h"
 
 namespace exmat::precompute {
 namespace {
@@ -70,6 +71,7 @@ RollOut BasisChooser::run(const Eigen::MatrixXd& basis) const {
   put_basis(stages_, basis, model);
   const ObjectData& object = *model.object;
   model.cubature = all_elements(object.mesh, object.materials, model.modal->basis);
+  put_target_elasticity(stages_, all_target_elements, model);
   if (!stages_.system.constrained())
     model.rigid = rigid_moments(object.mesh, object.materials.density, model.modal->basis);
   if (body_.contact)

@@ -21,6 +21,7 @@ struct BodyStages {
   const Eigen::MatrixXd& derivatives;
   const PoseFitter* fitter;  ///< null without examples
   const std::vector<TargetSpace>& targets;
+  std::vector<bool> elastic;  ///< of the targets: whether the force may be elastic
 };
 
 /// The runs of training, and what they were made of.

@@ -19,6 +19,7 @@
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/linear_modes.h"
 #include "precompute/pipeline/basis_stage.h"
+#include "precompute/pipeline/target_elasticity_stage.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
 #include "precompute/targets/target_space.h"
@@ -44,7 +45,11 @@ std::int64_t example_count(const AssetConfig& asset) {
 
 // What a scene asks of a region; nothing where it does not name it.
 std::optional<RegionNeeds> needs_of_region(const Needs& needs, const std::string& name) {
-  if (!needs.regions) return RegionNeeds{name, needs.targets, needs.energy_reference};
+  if (!needs.regions)
+    return RegionNeeds{.name = name,
+                       .targets = needs.targets,
+                       .energy_reference = needs.energy_reference,
+                       .target_elasticity = needs.target_elasticity};
   const auto found = std::ranges::find(*needs.regions, name, &RegionNeeds::name);
   return found == needs.regions->end() ? std::nullopt : std::optional(*found);
 }
@@ -101,9 +106,11 @@ std::string text_of(const Needs& needs) {
       "examples {}\nrigid {} {}\ntargets {}\ncontact {}\nrender {}\ninternal_force {}\nenergy_reference {}\n",
       needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render,
       name_of(needs.internal_force), name_of(needs.energy_reference));
+  if (needs.target_elasticity) text += "target_elasticity\n";
   if (!needs.regions) return text;
   for (const RegionNeeds& region : *needs.regions)
-    text += fmt::format("region {} {} {}\n", region.name, region.targets, name_of(region.energy_reference));
+    text += fmt::format("region {} {} {}{}\n", region.name, region.targets, name_of(region.energy_reference),
+                        region.target_elasticity ? " target_elasticity" : "");
   return text + "no other regions\n";
 }
 
@@ -133,6 +140,12 @@ class Pipeline {
   std::string training_text() const;
   void require_vertices(const TrainingLoads& loads) const;
   void add_internal_force(ReducedModel& model);
+  std::vector<bool> elastic_groups(const PoseFitter& fitter) const;
+  void add_target_elasticity(const BodyStages& stages, const PoseSource& source, ReducedModel& model);
+  CubatureOptions cubature_options() const {
+    return {asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method, asset_.training_poses,
+            asset_.seed};
+  }
   void add_contact(ReducedModel& model);
   void add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice, ReducedModel& model);
 
@@ -213,6 +226,25 @@ std::vector<TargetSpace> Pipeline::target_spaces(const ElasticSystem& system, co
       leave_out("targets", spaces.back().table_message);
   }
   return spaces;
+}
+
+std::vector<bool> Pipeline::elastic_groups(const PoseFitter& fitter) const {
+  std::vector<bool> elastic;
+  for (Eigen::Index group = 0; group < fitter.groups(); ++group) {
+    const std::string& region = fitter.region(group);
+    elastic.push_back(region.empty() ? includes(report_.ledger, "target_elasticity")
+                                     : needs_of_region(needs_, region)->target_elasticity);
+  }
+  return elastic;
+}
+
+void Pipeline::add_target_elasticity(const BodyStages& stages, const PoseSource& source, ReducedModel& model) {
+  const auto choose = [&](const TargetElasticityInput& input) {
+    return timed("elastic example force", [&] {
+      return choose_target_elements(input, source, cubature_options(), *model.cubature, cache_, report_.warnings);
+    });
+  };
+  put_target_elasticity(stages, choose, model);
 }
 
 // A scene is an input where its loads are trained on.
@@ -365,7 +397,10 @@ ReducedModel Pipeline::run() {
   solver.reset();
   std::vector<TargetSpace> targets;
   if (fitter) targets = target_spaces(system, *fitter);
-  const BodyStages stages{asset_, object_, system, modes, derivatives, fitter ? &*fitter : nullptr, targets};
+  const BodyStages stages{asset_,      object_,
+                          system,      modes,
+                          derivatives, fitter ? &*fitter : nullptr,
+                          targets,     fitter ? elastic_groups(*fitter) : std::vector<bool>()};
   ReducedModel body;
   body.asset_name = model.asset_name;
   body.object = model.object;
@@ -375,13 +410,12 @@ ReducedModel Pipeline::run() {
   put_basis(stages, basis, model);
   if (fitter) fitter->log_losses(model, report_.warnings);
 
+  auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
+  if (motions)
+    set_motions(motions->set.runs.snapshots, motions->own_columns(), motions->set.heldout.snapshots, system, basis,
+                source);
   model.cubature = timed("cubature", [&] {
-    auto source = pose_source(system, modes, derivatives, basis, size, example_poses(model, basis.cols()));
-    if (motions)
-      set_motions(motions->set.runs.snapshots, motions->own_columns(), motions->set.heldout.snapshots, system, basis,
-                  source);
-    const CubatureOptions options{asset_.cubature_elements, asset_.cubature_tolerance, asset_.cubature_method,
-                                  asset_.training_poses, asset_.seed};
+    const CubatureOptions options = cubature_options();
     return cache_.get(
         "cubature", [&] { return build_cubature(object_.mesh, object_.materials, source, options); }, object_.mesh,
         object_.materials, source, options);
@@ -389,6 +423,7 @@ ReducedModel Pipeline::run() {
   log::info(fmt::format("cubature: {} elements, held-out errors: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %",
                         model.cubature->elements.size(), 100 * model.cubature->heldout_error,
                         100 * model.cubature->heldout_energy_error, 100 * model.cubature->heldout_stiffness_error));
+  add_target_elasticity(stages, source, model);
   add_internal_force(model);
   if (includes(report_.ledger, "rigid"))
     model.rigid = timed("rigid moments",
@@ -421,6 +456,7 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   };
   needs.examples = named("examples");
   needs.targets = named("targets");
+  needs.target_elasticity = named("target_elasticity");
   needs.rigid = needs.carried = named("rigid");
   needs.contact = named("contact");
   needs.render = named("render");

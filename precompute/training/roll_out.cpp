@@ -15,15 +15,20 @@ namespace {
 
 using runtime::StepScene;
 
-std::unique_ptr<const runtime::Model> prepare(const ReducedModel& data, EnergyReference reference) {
+// The forces of all segments are elastic, or none's.
+std::unique_ptr<const runtime::Model> prepare(const ReducedModel& data, EnergyReference reference,
+                                              const std::vector<runtime::ExampleSettings>& examples) {
   runtime::ModelOptions options;
   options.examples = data.examples.has_value();
   options.target_table = data.targets.has_value();
   options.energy_reference = reference;
+  auto own = examples.begin();
+  const auto is_elastic = [&] { return own != examples.end() && (own++)->elastic; };
+  if (options.examples) options.elastic = is_elastic();
   options.polynomial = data.polynomial && data.cubature->internal_force == ForceMethod::kPolynomial;
   for (const RegionData& region : data.regions)
     options.regions.push_back(
-        {region.name, region.targets.has_value(),
+        {region.name, region.targets.has_value(), is_elastic(),
          region.target_space ? region.target_space->energy_reference : EnergyReference::kExample});
   auto [model, complaint] = runtime::build_model(data, options);
   if (!model) throw InputError(complaint);
@@ -38,8 +43,9 @@ struct ReducedFrames {
 
 class ReducedRunner {
  public:
-  ReducedRunner(const ReducedModel& data, EnergyReference reference, const TrainingRunOptions& options)
-      : data_(data), model_(prepare(data, reference)), options_(options) {}
+  ReducedRunner(const ReducedModel& data, EnergyReference reference,
+                const std::vector<runtime::ExampleSettings>& examples, const TrainingRunOptions& options)
+      : data_(data), model_(prepare(data, reference, examples)), options_(options) {}
 
   ReducedFrames run(const Chain& chain) const;
 
@@ -145,7 +151,8 @@ RollOut not_finite() {
 RollOut roll_out(const ReducedModel& model, EnergyReference reference, const std::vector<Chain>& chains,
                  const TrainingRuns& full, const SparseMatrix& mass, const TrainingRunOptions& options) {
   std::vector<ReducedFrames> runs(chains.size());
-  const ReducedRunner runner(model, reference, options);
+  if (chains.empty()) return {};
+  const ReducedRunner runner(model, reference, chains.front().front().examples, options);
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t i = 0; i < chains.size(); ++i) runs[i] = runner.run(chains[i]);
 

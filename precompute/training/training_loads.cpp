@@ -15,7 +15,10 @@ constexpr double kDampingShare = 0.5;     // of the root of the stiffness, where
 constexpr double kMostFall = 2;           // body sizes that a body falls before it touches
 
 runtime::ExampleSettings settings_of(const ExampleForceConfig& force) {
-  return {force.stiffness, force.damping, force.bias};
+  return {.stiffness = force.stiffness,
+          .damping = force.damping,
+          .bias = force.bias,
+          .elastic = force.law == ExampleForceLaw::kElastic};
 }
 
 // None of a scene that does not name the group.
@@ -124,7 +127,8 @@ std::string text_of(const TrainingLoads& loads) {
   for (const VertexForceConfig& force : loads.forces)
     text += fmt::format("force {} of {}, {} to {}\n", text_of(force.force), force.vertices, force.start, force.end);
   for (const runtime::ExampleSettings& examples : loads.examples)
-    text += fmt::format("examples {} {} {}\n", examples.stiffness, examples.damping, examples.bias);
+    text += fmt::format("examples {} {} {}{}\n", examples.stiffness, examples.damping, examples.bias,
+                        examples.elastic ? " elastic" : "");
   if (loads.obstacle)
     text += fmt::format("obstacle {} {} {}\n", loads.obstacle->stiffness, loads.obstacle->damping,
                         loads.obstacle->friction);

@@ -11,9 +11,9 @@ void print_groups(const ReducedModel& model, const BundleSummary& summary) {
   std::vector<LedgerEntry> ledger =
       plan_groups({}, summary.constrained, summary.examples, std::ssize(summary.regions), summary.render_vertices > 0);
   fill_bytes(model, ledger);
-  fmt::print("\n{:<14} {:>14}\n", "group", "bytes");
+  fmt::print("\n{:<18} {:>14}\n", "group", "bytes");
   for (const LedgerEntry& entry : ledger)
-    if (entry.bytes > 0) fmt::print("{:<14} {:>14}\n", entry.group, entry.bytes);
+    if (entry.bytes > 0) fmt::print("{:<18} {:>14}\n", entry.group, entry.bytes);
 }
 
 void print_examples(const ExampleSet& set) {

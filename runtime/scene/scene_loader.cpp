@@ -114,7 +114,8 @@ ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConf
 }
 
 ExampleSettings example_settings(const ExampleForceConfig& config) {
-  return {config.stiffness, config.damping, config.bias, config.target_iterations};
+  return {config.stiffness, config.damping, config.bias, config.target_iterations,
+          config.law == ExampleForceLaw::kElastic};
 }
 
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
@@ -157,9 +158,10 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   options.polynomial = data.polynomial.has_value();
   options.carried = !config.body.motion.empty();
   if (config.examples) options.energy_reference = config.examples->energy_reference;
+  options.elastic = config.examples && config.examples->law == ExampleForceLaw::kElastic;
   for (const auto& [name, force] : config.regions)
-    options.regions.push_back(
-        {name, std::ranges::find(data.regions, name, &RegionData::name)->targets.has_value(), force.energy_reference});
+    options.regions.push_back({name, std::ranges::find(data.regions, name, &RegionData::name)->targets.has_value(),
+                               force.law == ExampleForceLaw::kElastic, force.energy_reference});
   ModelResult result = build_model(data, options);
   if (result.model) return std::move(result.model);
   result.complaint.file = config.bundle.string();
@@ -186,7 +188,11 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
   plan.push_back(owner +
                  fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias));
   plan.push_back(owner + describe_target(examples, settings));
-  plan.push_back(owner + fmt::format("example_force: linear, {} filter of {} x {}",
+  if (settings.elastic)
+    plan.push_back(owner + fmt::format("example_force: elastic, s = {} elements", examples.elasticity->elements()));
+  if (!is_filtered(settings)) return;
+  plan.push_back(owner + fmt::format("{}: linear, {} filter of {} x {}",
+                                     settings.elastic ? "damping of the example_force" : "example_force",
                                      examples.filter.is_symmetric() ? "symmetric" : "unsymmetric", modes, modes));
 }
 
@@ -221,6 +227,7 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.data.polynomial.reset();
   loaded.data.targets.reset();
   loaded.data.target_space.reset();
+  loaded.data.target_elasticity.reset();
   loaded.data.contact.reset();
   loaded.data.regions.clear();
   return loaded;

@@ -76,7 +76,7 @@ class LeavingOut : public testing::Test {
     }
     EXPECT_EQ(included, groups);
     EXPECT_EQ(built.report.ledger.size(),
-              kAll.size() + 3);  // and fidelity, regions and render, which there is nothing for
+              kAll.size() + 4);  // and fidelity, regions and render, which there is nothing for, and target_elasticity
   }
 
   /// What the run time reads of bundle.h5 for a scene.

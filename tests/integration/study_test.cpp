@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <map>
 
+#include "common/bundle/bundle.h"
 #include "tests/integration/support.h"
 
 namespace exmat::test {
@@ -195,6 +196,25 @@ TEST_F(StudyProgram, MarksAReferenceThatIsNoTruth) {
   const Outcome run = exmat_precompute({"full-space", folder_.path("scene.json"), "-o", folder_.path("full.h5")});
   EXPECT_EQ(run.status, 0);
   EXPECT_THAT(run.errors, HasSubstr("inverted"));
+}
+
+// Whose basis is nearer is for fidelity_test.cpp to say; here they must be two.
+TEST_F(StudyProgram, SweepsWhatBasesLearnFrom) {
+  write_study(
+      R"({"sweeps": [ { "training": ["none", "scene"], "internal_force": ["all_elements"], "target": ["solve"] } ]})"_json);
+  const Outcome outcome = study("out");
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  const Json points = results("out")["points"];
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_NE(points[0]["bundle"], points[1]["bundle"]);
+  EXPECT_EQ(points[0]["reference"], points[1]["reference"]) << "the full space has no basis";
+  const auto basis = [&](const Json& point) {
+    return read_bundle(folder_.path("out/bundles/" + point["bundle"].get<std::string>() + ".h5")).modal->basis;
+  };
+  EXPECT_GT((basis(points[0]) - basis(points[1])).norm(), 0.1 * basis(points[0]).norm());
+  // What it does not sweep is the asset's own, which is "none".
+  const ReducedModel alone = build(folder_.path("asset.json"), std::nullopt).model;
+  EXPECT_LE((basis(points[0]) - alone.modal->basis).norm(), 1e-9 * alone.modal->basis.norm());
 }
 
 TEST_F(StudyProgram, GivesTheSameErrorsWithMoreJobs) {

@@ -151,7 +151,9 @@ FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data, 
       scene(full_space_scene(config, runtime::make_obstacles(config), model)),
       state(full_space_start(config, model, start_of(config, data, baseline))),
       workspace(model) {
-  if (baseline) scene.example_elasticity = 1;
+  if (!baseline) return;
+  for (runtime::ExampleSettings& examples : scene.examples)
+    if (!examples.elastic) examples = {.stiffness = 1, .bias = examples.bias, .elastic = true};
 }
 
 FullSpaceReport FullSpaceRun::sound_step() {

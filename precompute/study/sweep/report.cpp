@@ -135,6 +135,9 @@ struct Varying {
 
  private:
   static constexpr std::size_t kTimeStep = 2;
+  static std::string force_of(const PointSettings& s) {
+    return s.elastic_stiffness ? fmt::format("elastic force of {:g}", *s.elastic_stiffness) : "force of the scene";
+  }
   static std::vector<std::string> texts(const PointSettings& s) {
     return {fmt::format("m {}", s.eigenfunctions),
             s.material,
@@ -142,7 +145,9 @@ struct Varying {
             s.integrator,
             s.internal_force == kAllElements ? "cubature" : s.internal_force,
             s.target,
-            fmt::format("{} linear modes", s.linear_modes)};
+            fmt::format("{} linear modes", s.linear_modes),
+            "training " + s.training,
+            force_of(s)};
   }
   std::vector<std::set<std::string>> values_;
 };
@@ -241,14 +246,15 @@ std::string point_row(const StudyResult& result, std::size_t i) {
   std::string html = fmt::format("<tr class=\"{}{}\">", front ? "front " : "", result.recommended == i ? "chosen" : "");
   const char* mark = point.failure.empty() && !result.has_truth(point) ? " (no truth)" : "";
   html += cell(std::to_string(i + 1) + mark) + cell(std::to_string(s.eigenfunctions)) +
-          cell(std::to_string(s.basis_size)) + cell(std::to_string(s.linear_modes));
+          cell(std::to_string(s.basis_size)) + cell(std::to_string(s.linear_modes)) + cell(s.training, " class=\"l\"");
   html += cell(point.failure.empty() ? std::to_string(point.elements) : "-") + cell(s.material, " class=\"l\"");
   html += cell(fmt::format("{:g}", 1e3 * s.time_step)) + cell(s.integrator, " class=\"l\"");
   const auto as_run = [](const std::string& asked, const std::string& taken) {
     return asked == "auto" && !taken.empty() ? "auto: " + taken : asked;
   };
   html += cell(as_run(s.internal_force, point.internal_force), " class=\"l\"") +
-          cell(as_run(s.target, point.target), " class=\"l\"");
+          cell(as_run(s.target, point.target), " class=\"l\"") +
+          cell(s.elastic_stiffness ? fmt::format("{:g}", *s.elastic_stiffness) : "-");
   if (!point.failure.empty())
     return html + fmt::format("<td class=\"l bad\" colspan=\"19\">{}</td></tr>\n", escaped(point.failure));
   html += error_cells(result, point);
@@ -261,8 +267,9 @@ std::string point_row(const StudyResult& result, std::size_t i) {
 }
 
 std::string points_table(const StudyResult& result) {
-  std::vector<std::string> names{"#",        "m",          "r",          "linear<br>modes", "s",
-                                 "material", "dt<br>[ms]", "integrator", "internal force",  "target"};
+  std::vector<std::string> names{
+      "#",        "m",          "r",          "linear<br>modes", "training", "s",
+      "material", "dt<br>[ms]", "integrator", "internal force",  "target",   "elastic<br>force"};
   for (std::string& name : error_names(result)) names.push_back(std::move(name));
   for (const char* name : {"held-out<br>[%]", "step<br>[us]", "p95<br>[us]", "interp<br>[us]", "precompute<br>[s]",
                            "Newton", "above<br>tolerance"})

@@ -65,12 +65,16 @@ std::vector<Column> settings_columns() {
       {"eigenfunctions", [](const PointResult& p) { return std::to_string(p.settings.eigenfunctions); }, true},
       {"basis_size", [](const PointResult& p) { return std::to_string(p.settings.basis_size); }, true},
       {"linear_modes", [](const PointResult& p) { return std::to_string(p.settings.linear_modes); }, true},
+      {"training", [](const PointResult& p) { return p.settings.training; }, true},
       {"cubature_elements", [](const PointResult& p) { return std::to_string(p.elements); }},
       {"material", [](const PointResult& p) { return p.settings.material; }, true},
       {"time_step_s", [](const PointResult& p) { return number(p.settings.time_step); }, true},
       {"integrator", [](const PointResult& p) { return p.settings.integrator; }, true},
       {"internal_force", [](const PointResult& p) { return p.settings.internal_force; }, true},
       {"target", [](const PointResult& p) { return p.settings.target; }, true},
+      {"elastic_stiffness",
+       [](const PointResult& p) { return p.settings.elastic_stiffness ? number(*p.settings.elastic_stiffness) : ""; },
+       true},
   };
 }
 
@@ -177,7 +181,9 @@ Ordered asset_fragment(const StudyResult& result, const PointResult& point) {
   const bool all = point.settings.internal_force == kAllElements;
   Ordered json = Ordered::object();
   if (result.has_examples) json["shape_space"] = {{"eigenfunctions", point.settings.eigenfunctions}};
-  json["basis"] = {{"size", point.settings.basis_size}, {"linear_modes", point.settings.linear_modes}};
+  json["basis"] = {{"size", point.settings.basis_size},
+                   {"linear_modes", point.settings.linear_modes},
+                   {"training", point.settings.training}};
   json["cubature"] = all ? Ordered{{"method", kAllElements}} : Ordered{{"elements", point.elements}};
   json["internal_force"] = point.internal_force;
   const auto differs = [&](const PointResult& other) { return other.settings.material != point.settings.material; };
@@ -189,9 +195,14 @@ Ordered asset_fragment(const StudyResult& result, const PointResult& point) {
 Ordered scene_fragment(const StudyResult& result, const PointResult& point) {
   Ordered json{{"time_step", point.settings.time_step}, {"integrator", point.settings.integrator}};
   if (point.target == kNoTarget) return json;
-  for (const std::string& region : result.regions)
-    json["regions"].push_back({{"name", region}, {"target", point.target}});
-  if (result.regions.empty()) json["examples"] = {{"target", point.target}};
+  Ordered force{{"target", point.target}};
+  if (const auto& stiffness = point.settings.elastic_stiffness)
+    force.update({{"force", "elastic"}, {"stiffness", *stiffness}});
+  for (const std::string& region : result.regions) {
+    json["regions"].push_back({{"name", region}});
+    json["regions"].back().update(force);
+  }
+  if (result.regions.empty()) json["examples"] = force;
   return json;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "common/core/error.h"
 #include "precompute/cubature/cubature.h"
@@ -34,14 +35,21 @@ void multiply(std::vector<PointSettings>& points, const std::vector<Value>& valu
   points = std::move(product);
 }
 
+// There always is a scene.
+bool learns_from_scene(const PointSettings& point) {
+  return point.training == name_of(Training::kAuto) || point.training == name_of(Training::kScene);
+}
+
 // What has no effect is left as it is in the files, so that equal points are seen to be equal.
 PointSettings normalised(PointSettings point, const PointSettings& own, const AssetConfig& asset, bool examples) {
   if (point.internal_force == kAllElements)
     point.cubature_elements.reset();
   else if (!point.cubature_elements && !asset.cubature_tolerance)
     point.cubature_elements = 2 * point.basis_size;
+  if (learns_from_scene(point) && learns_from_scene(own)) point.training = own.training;
   if (!examples) point.eigenfunctions = own.eigenfunctions;
   if (!examples) point.target = kNoTarget;
+  if (!examples) point.elastic_stiffness.reset();
   return point;
 }
 
@@ -50,16 +58,23 @@ std::vector<PointSettings> product(const SweepConfig& sweep, const PointSettings
   multiply(points, sweep.eigenfunctions, &PointSettings::eigenfunctions);
   multiply(points, sweep.basis_size, &PointSettings::basis_size);
   multiply(points, sweep.linear_modes, &PointSettings::linear_modes);
+  multiply(points, sweep.training, &PointSettings::training);
   multiply(points, sweep.cubature_elements, &PointSettings::cubature_elements);
   multiply(points, sweep.material, &PointSettings::material);
   multiply(points, sweep.time_step, &PointSettings::time_step);
   multiply(points, sweep.integrator, &PointSettings::integrator);
   multiply(points, sweep.internal_force, &PointSettings::internal_force);
   multiply(points, sweep.target, &PointSettings::target);
+  multiply(points, sweep.elastic_stiffness, &PointSettings::elastic_stiffness);
   return points;
 }
 
-void require_possible(const PointSettings& point, const StudyConfig& study, std::size_t sweep) {
+void require_possible(const PointSettings& point, const AssetConfig& asset, const StudyConfig& study,
+                      std::size_t sweep) {
+  if (point.training == name_of(Training::kLoads) && !asset.training.loads)
+    throw InputError({study.file.string(), fmt::format("/sweeps/{}/training", sweep),
+                      "\"auto\", \"none\" or \"scene\", since the asset declares no loads", "\"loads\"",
+                      "declare them in the asset's basis.loads, or leave it out"});
   if (point.internal_force != "polynomial") return;
   try {
     require_polynomial(from_name<MaterialModel>(point.material).value(), point.basis_size);
@@ -77,6 +92,7 @@ PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
   own.eigenfunctions = asset.eigenfunctions;
   own.basis_size = asset.basis_size;
   own.linear_modes = asset.linear_modes;
+  own.training = name_of(asset.training.from);
   own.cubature_elements = asset.cubature_elements;
   own.material = name_of(asset.material.model);
   own.time_step = scene.time_step;
@@ -96,7 +112,7 @@ std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& a
   for (std::size_t i = 0; i < study.sweeps.size(); ++i)
     for (const PointSettings& raw : product(study.sweeps[i], own)) {
       const PointSettings point = normalised(raw, normal, asset, has_examples(scene));
-      require_possible(point, study, i);
+      require_possible(point, asset, study, i);
       if (std::ranges::find(points, point) == points.end()) points.push_back(point);
       if (points.size() > kMostPoints)
         throw InputError({study.file.string(), "/sweeps", fmt::format("at most {} points", kMostPoints), "more", ""});
@@ -108,6 +124,7 @@ AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
   asset.eigenfunctions = settings.eigenfunctions;
   asset.basis_size = settings.basis_size;
   asset.linear_modes = settings.linear_modes;
+  asset.training.from = from_name<Training>(settings.training).value();
   asset.material.model = from_name<MaterialModel>(settings.material).value();
   if (settings.cubature_elements || settings.internal_force == kAllElements) asset.cubature_tolerance.reset();
   if (settings.internal_force == kAllElements)
@@ -118,7 +135,19 @@ AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
   return asset;
 }
 
+SceneConfig with_force(SceneConfig scene, const PointSettings& settings) {
+  if (!settings.elastic_stiffness) return scene;
+  const auto make_elastic = [&](ExampleForceConfig& force) {
+    force.law = ExampleForceLaw::kElastic;
+    force.stiffness = *settings.elastic_stiffness;
+  };
+  if (scene.examples) make_elastic(*scene.examples);
+  for (RegionForceConfig& region : scene.regions) make_elastic(region.force);
+  return scene;
+}
+
 SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
+  scene = with_force(std::move(scene), settings);
   scene.time_step = settings.time_step;
   scene.integrator = from_name<Integrator>(settings.integrator).value();
   scene.internal_force = settings.internal_force == kAllElements
@@ -136,7 +165,8 @@ SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
 nlohmann::ordered_json to_json(const PointSettings& settings) {
   nlohmann::ordered_json json{{"eigenfunctions", settings.eigenfunctions},
                               {"basis_size", settings.basis_size},
-                              {"linear_modes", settings.linear_modes}};
+                              {"linear_modes", settings.linear_modes},
+                              {"training", settings.training}};
   json["cubature_elements"] = nullptr;
   if (settings.cubature_elements) json["cubature_elements"] = *settings.cubature_elements;
   json["material"] = settings.material;
@@ -144,6 +174,8 @@ nlohmann::ordered_json to_json(const PointSettings& settings) {
   json["integrator"] = settings.integrator;
   json["internal_force"] = settings.internal_force;
   json["target"] = settings.target;
+  json["elastic_stiffness"] = nullptr;
+  if (settings.elastic_stiffness) json["elastic_stiffness"] = *settings.elastic_stiffness;
   return json;
 }
 
@@ -152,21 +184,25 @@ PointSettings settings_from_json(const nlohmann::ordered_json& json) {
   settings.eigenfunctions = json.at("eigenfunctions").get<int>();
   settings.basis_size = json.at("basis_size").get<int>();
   settings.linear_modes = json.at("linear_modes").get<int>();
+  settings.training = json.at("training").get<std::string>();
   if (!json.at("cubature_elements").is_null()) settings.cubature_elements = json.at("cubature_elements").get<int>();
   settings.material = json.at("material").get<std::string>();
   settings.time_step = json.at("time_step").get<double>();
   settings.integrator = json.at("integrator").get<std::string>();
   settings.internal_force = json.at("internal_force").get<std::string>();
   settings.target = json.at("target").get<std::string>();
+  if (!json.at("elastic_stiffness").is_null()) settings.elastic_stiffness = json.at("elastic_stiffness").get<double>();
   return settings;
 }
 
 std::string describe(const PointSettings& settings) {
-  std::string text = fmt::format("m {}, r {} of {} linear modes, ", settings.eigenfunctions, settings.basis_size,
-                                 settings.linear_modes);
+  std::string text = fmt::format("m {}, r {} of {} linear modes, training {}, ", settings.eigenfunctions,
+                                 settings.basis_size, settings.linear_modes, settings.training);
   if (settings.cubature_elements) text += fmt::format("s {}, ", *settings.cubature_elements);
-  return text + fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
-                            settings.integrator, settings.internal_force, settings.target);
+  text += fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
+                      settings.integrator, settings.internal_force, settings.target);
+  if (settings.elastic_stiffness) text += fmt::format(", elastic force of {:g}", *settings.elastic_stiffness);
+  return text;
 }
 
 }  // namespace exmat::precompute

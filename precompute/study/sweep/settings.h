@@ -20,12 +20,14 @@ struct PointSettings {
   int eigenfunctions = 0;                ///< m
   int basis_size = 0;                    ///< r
   int linear_modes = 0;                  ///< whose derivatives are added
+  std::string training;                  ///< "auto", "none", "scene" or "loads": what the basis learns from
   std::optional<int> cubature_elements;  ///< s; absent: by the asset's tolerance, or all of them
   std::string material;
   double time_step = 0;  ///< [s]
   std::string integrator;
-  std::string internal_force;  ///< "auto", "cubature", "polynomial" or "all_elements"
-  std::string target;          ///< "auto", "table" or "solve"; "none" without examples
+  std::string internal_force;                 ///< "auto", "cubature", "polynomial" or "all_elements"
+  std::string target;                         ///< "auto", "table" or "solve"; "none" without examples
+  std::optional<double> elastic_stiffness{};  ///< e of elastic example forces; absent: forces as the scene has them
 
   auto operator<=>(const PointSettings&) const = default;
 };
@@ -40,6 +42,9 @@ std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& a
 /// The files' own with the settings of a point; the scene writes positions and nothing else.
 AssetConfig with_settings(AssetConfig asset, const PointSettings& settings);
 SceneConfig with_settings(SceneConfig scene, const PointSettings& settings);
+
+/// The scene with the example forces of a point: what its basis learns from.
+SceneConfig with_force(SceneConfig scene, const PointSettings& settings);
 
 nlohmann::ordered_json to_json(const PointSettings& settings);
 PointSettings settings_from_json(const nlohmann::ordered_json& json);

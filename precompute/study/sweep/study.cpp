@@ -106,7 +106,7 @@ bool Study::is_finished(const PointPlan& point) const {
 
 void Study::build_bundle(const BundlePlan& plan) const {
   BuildReport report;
-  const ReducedModel model = build_reduced_model(plan.asset, plan.needs, report, {.scene = &scene_});
+  const ReducedModel model = build_reduced_model(plan.asset, plan.needs, report, {.scene = &plan.scene});
   Ordered stages = Ordered::object();
   double total = 0;
   for (const StageTime& stage : report.stages) {

@@ -15,12 +15,14 @@ SweepConfig read_sweep(const Json& json) {
   return {.eigenfunctions = list<int>(json, "eigenfunctions"),
           .basis_size = list<int>(json, "basis_size"),
           .linear_modes = list<int>(json, "linear_modes"),
+          .training = list<std::string>(json, "training"),
           .cubature_elements = list<int>(json, "cubature_elements"),
           .material = list<std::string>(json, "material"),
           .time_step = list<double>(json, "time_step"),
           .integrator = list<std::string>(json, "integrator"),
           .internal_force = list<std::string>(json, "internal_force"),
-          .target = list<std::string>(json, "target")};
+          .target = list<std::string>(json, "target"),
+          .elastic_stiffness = list<double>(json, "elastic_stiffness")};
 }
 
 }  // namespace

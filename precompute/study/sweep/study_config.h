@@ -15,12 +15,14 @@ struct SweepConfig {
   std::vector<int> eigenfunctions{};          ///< m
   std::vector<int> basis_size{};              ///< r
   std::vector<int> linear_modes{};            ///< whose derivatives are added
+  std::vector<std::string> training{};        ///< names of Training
   std::vector<int> cubature_elements{};       ///< s
   std::vector<std::string> material{};        ///< names of MaterialModel
   std::vector<double> time_step{};            ///< [s]
   std::vector<std::string> integrator{};      ///< "bdf2", "backward_euler", "newmark"
   std::vector<std::string> internal_force{};  ///< "cubature", "polynomial", "all_elements"
   std::vector<std::string> target{};          ///< "table", "solve"
+  std::vector<double> elastic_stiffness{};    ///< e, of elastic example forces
 };
 
 /// How the full space is integrated; absent: as the point.

@@ -85,6 +85,7 @@ std::size_t Planner::plan_bundle(const PointSettings& settings, const std::vecto
   const auto found = std::ranges::find(plan_.bundles, plan.key, &BundlePlan::key);
   if (found != plan_.bundles.end()) return static_cast<std::size_t>(found - plan_.bundles.begin());
   plan.asset = with_settings(asset_, settings);
+  plan.scene = with_force(scene_, settings);
   plan.needs = needs;
   plan_.bundles.push_back(std::move(plan));
   return plan_.bundles.size() - 1;
@@ -96,6 +97,7 @@ std::size_t Planner::plan_reference(const PointSettings& settings, std::size_t b
   own.integrator = config_.reference.integrator.value_or(settings.integrator);
   Ordered identity{{"reference", own.material}, {"time_step", own.time_step}, {"integrator", own.integrator}};
   if (result_.has_examples) identity["eigenfunctions"] = own.eigenfunctions;
+  if (own.elastic_stiffness) identity["elastic_stiffness"] = *own.elastic_stiffness;
   // A start in reduced coordinates is another one in each basis.
   if (scene_.body.reduced || scene_.body.pose) identity["bundle"] = plan_.bundles[bundle].key;
   identity["times"] = result_.times;

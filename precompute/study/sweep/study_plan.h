@@ -18,6 +18,7 @@ namespace exmat::precompute {
 struct BundlePlan {
   std::string key;
   AssetConfig asset;
+  SceneConfig scene;  ///< whose loads its basis learns from
   Needs needs;
   std::string failure;
 };

@@ -3,7 +3,7 @@
 namespace exmat::runtime {
 namespace {
 
-/// The pull of p*, p* by Newton's method from the last target, into the workspace.
+/// p* by Newton's method from the last target, in its coordinates, into the workspace.
 void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
                   ExampleWorkspace& workspace, StepReport& report) noexcept {
   const TargetSolver& solver = *model.target;
@@ -18,7 +18,21 @@ void solve_target(const ExampleModel& model, int most_iterations, const ExampleS
     if (!workspace.target_converged) report.status |= kTargetNotConverged;
     if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
   }
-  workspace.target.noalias() = model.target_pull * y;
+}
+
+/// What the force of the target is made of: its pull, or the elasticity from it.
+void find_target(const ExampleModel& model, const ExampleSettings& settings, const ExampleState& state,
+                 ExampleWorkspace& workspace, StepReport& report) noexcept {
+  const bool elastic = settings.elastic;
+  if (model.table)
+    model.table->evaluate(workspace.weights, workspace.target_table,
+                          elastic ? workspace.solved_target : workspace.target);
+  else
+    solve_target(model, settings.target_iterations, state, workspace, report);
+  if (elastic)
+    model.elasticity->set_target(workspace.solved_target, settings.stiffness, *workspace.elasticity);
+  else if (!model.table)
+    workspace.target.noalias() = model.target_pull * workspace.solved_target;
 }
 
 }  // namespace
@@ -39,26 +53,20 @@ void update_targets(const Model& model, const StepScene& scene, const State& sta
   evaluate_weights(model, scene, q, workspace);
   const StageTimer timer(workspace.profile, Stage::kTarget);
   for (std::size_t i = 0; i < scene.examples.size(); ++i) {
-    const ExampleSettings& settings = scene.examples[i];
-    const ExampleModel& examples = model.examples[i];
-    ExampleWorkspace& scratch = workspace.examples[i];
-    if (!acts(settings)) continue;
-    if (examples.table)
-      examples.table->evaluate(scratch.weights, scratch.target_table, scratch.target);
-    else
-      solve_target(examples, settings.target_iterations, state.examples[i], scratch, report);
+    if (acts(scene.examples[i]))
+      find_target(model.examples[i], scene.examples[i], state.examples[i], workspace.examples[i], report);
   }
 }
 
 void prepare_example_forces(const StepScene& scene, Workspace& workspace) noexcept {
   for (std::size_t i = 0; i < scene.examples.size(); ++i) {
     const ExampleSettings& settings = scene.examples[i];
-    if (!acts(settings)) continue;
+    if (!is_filtered(settings)) continue;
     ExampleForce& force = workspace.examples[i].force;
     const double damping = settings.damping * workspace.form.velocity_factor;
-    force.stiffness = settings.stiffness + damping;
+    force.stiffness = linear_stiffness(settings) + damping;
     force.centre = damping / force.stiffness * workspace.form.velocity_centre;
-    force.pull = settings.stiffness * workspace.examples[i].target;
+    force.pull = linear_stiffness(settings) * workspace.examples[i].target;
   }
 }
 
@@ -66,11 +74,39 @@ void add_example_forces(const Model& model, const StepScene& scene, const State&
                         Eigen::VectorXd& force) noexcept {
   for (std::size_t i = 0; i < scene.examples.size(); ++i) {
     const ExampleSettings& settings = scene.examples[i];
-    if (!acts(settings)) continue;
-    workspace.offset = settings.stiffness * state.q + settings.damping * state.v;
+    if (!is_filtered(settings)) continue;
+    workspace.offset = linear_stiffness(settings) * state.q + settings.damping * state.v;
     force.noalias() -= model.examples[i].filter.matrix() * workspace.offset;
-    force += settings.stiffness * workspace.examples[i].target;
+    force += linear_stiffness(settings) * workspace.examples[i].target;
   }
+  workspace.offset.setZero();
+  add_elastic_example_forces(model, scene, state.q, workspace, workspace.offset);
+  force -= workspace.offset;
+}
+
+double elastic_example_energy(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
+                              const Workspace& workspace) noexcept {
+  double energy = 0;
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (elastic_factor(scene.examples[i]) > 0)
+      energy += model.examples[i].elasticity->energy(q, *workspace.examples[i].elasticity);
+  return energy;
+}
+
+double add_elastic_example_forces(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
+                                  Workspace& workspace, Eigen::VectorXd& gradient) noexcept {
+  double energy = 0;
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (elastic_factor(scene.examples[i]) > 0)
+      energy += model.examples[i].elasticity->add_force(q, *workspace.examples[i].elasticity, gradient);
+  return energy;
+}
+
+void add_elastic_example_stiffness(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
+                                   Tangent tangent, Workspace& workspace, Eigen::MatrixXd& hessian) noexcept {
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (elastic_factor(scene.examples[i]) > 0)
+      model.examples[i].elasticity->add_stiffness(q, tangent, *workspace.examples[i].elasticity, hessian);
 }
 
 void commit_weights(const StepScene& scene, const Workspace& workspace, State& state) noexcept {

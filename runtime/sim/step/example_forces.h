@@ -21,9 +21,19 @@ void update_targets(const Model& model, const StepScene& scene, const State& sta
 /// The terms of the forces that stay the same during the step, after update_targets().
 void prepare_example_forces(const StepScene& scene, Workspace& workspace) noexcept;
 
-/// The forces -kappa P_s (q - p*) - c_kappa P_s qdot of the state, added to `force` [r]; after update_targets().
+/// The forces of the state, -kappa P_s (q - p*) or the elastic one and -c_kappa P_s qdot, added to `force` [r]; after
+/// update_targets().
 void add_example_forces(const Model& model, const StepScene& scene, const State& state, Workspace& workspace,
                         Eigen::VectorXd& force) noexcept;
+
+/// The energies of the elastic forces at q [r] and their first and second derivatives, added to `gradient` [r] and to
+/// the lower triangle of `hessian` [r x r]; after update_targets(). Nothing where all forces are linear.
+double elastic_example_energy(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
+                              const Workspace& workspace) noexcept;
+double add_elastic_example_forces(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
+                                  Workspace& workspace, Eigen::VectorXd& gradient) noexcept;
+void add_elastic_example_stiffness(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
+                                   Tangent tangent, Workspace& workspace, Eigen::MatrixXd& hessian) noexcept;
 
 /// Weights, and targets where those of the step are solved, from the workspace into the state.
 void commit_weights(const StepScene& scene, const Workspace& workspace, State& state) noexcept;

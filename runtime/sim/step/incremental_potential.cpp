@@ -3,6 +3,8 @@
 #include <cmath>
 #include <limits>
 
+#include "runtime/sim/step/example_forces.h"
+
 namespace exmat::runtime {
 namespace {
 
@@ -12,7 +14,7 @@ constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();  /
 
 bool has_skew_forces(const Model& model, const StepScene& scene) noexcept {
   for (std::size_t i = 0; i < scene.examples.size(); ++i)
-    if (acts(scene.examples[i]) && !model.examples[i].filter.is_symmetric()) return true;
+    if (is_filtered(scene.examples[i]) && !model.examples[i].filter.is_symmetric()) return true;
   return false;
 }
 
@@ -25,10 +27,18 @@ IncrementalPotential::IncrementalPotential(const Model& model, const StepScene& 
       state_(state),
       workspace_(workspace),
       skew_(has_skew_forces(model, scene)),
-      frame_forces_(model.frame->exerts_forces()) {}
+      frame_forces_(model.frame->exerts_forces()) {
+  for (const ExampleSettings& examples : scene.examples) elastic_examples_ += elastic_factor(examples);
+}
 
 double IncrementalPotential::internal_flops(bool stiffness) const noexcept {
-  return model_.internal_force.force_flops() + (stiffness ? model_.internal_force.stiffness_flops() : 0);
+  double flops = model_.internal_force.force_flops() + (stiffness ? model_.internal_force.stiffness_flops() : 0);
+  for (std::size_t i = 0; elastic_examples_ > 0 && i < scene_.examples.size(); ++i) {
+    if (elastic_factor(scene_.examples[i]) == 0) continue;
+    const ElementPotential& elements = model_.examples[i].elasticity->potential();
+    flops += elements.force_flops() + (stiffness ? elements.stiffness_flops() : 0);
+  }
+  return flops;
 }
 
 double IncrementalPotential::inertia_and_load(const Eigen::VectorXd& q) const noexcept {
@@ -41,7 +51,8 @@ double IncrementalPotential::start(const Eigen::VectorXd& first_iterate) noexcep
   const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(true));
   elastic_energy_ = model_.internal_force.force_and_stiffness(first_iterate, workspace_.elasticity,
                                                               workspace_.internal_force, workspace_.newton.hessian);
-  force_rounding_ = kForceRounding * workspace_.newton.hessian.diagonal().cwiseAbs().sum();
+  // An elastic example is as stiff as the material, but for its factor.
+  force_rounding_ = kForceRounding * (1 + elastic_examples_) * workspace_.newton.hessian.diagonal().cwiseAbs().sum();
   return elastic_energy_ + inertia_and_load(first_iterate);
 }
 
@@ -79,7 +90,7 @@ void IncrementalPotential::add_example_forces() noexcept {
   auto used = workspace_.quadratic.topRows(model_.modes());
   Eigen::VectorXd& g = workspace_.linear;
   for (std::size_t i = 0; i < scene_.examples.size(); ++i) {
-    if (!acts(scene_.examples[i])) continue;
+    if (!is_filtered(scene_.examples[i])) continue;
     const ExampleForce& example = workspace_.examples[i].force;
     const ShapeFilter& filter = model_.examples[i].filter;
     used += example.stiffness * filter.symmetric_part();
@@ -94,6 +105,7 @@ PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eig
   PotentialEvaluation evaluation = assemble(q, gradient);
   accept(evaluation);
   add_quadratic(hessian);
+  if (elastic_examples_ > 0) add_elastic_example_stiffness(model_, scene_, q, Tangent::kExact, workspace_, hessian);
   return evaluation;
 }
 
@@ -107,7 +119,9 @@ PotentialEvaluation IncrementalPotential::evaluate(const Eigen::VectorXd& q, Eig
 PotentialValue IncrementalPotential::value(const Eigen::VectorXd& q) noexcept {
   const StageTimer timer(workspace_.profile, Stage::kInternalForce, internal_flops(false));
   set_offset(q);
-  return quadratic(model_.internal_force.energy(q, workspace_.elasticity));
+  double energy = model_.internal_force.energy(q, workspace_.elasticity);
+  if (elastic_examples_ > 0) energy += elastic_example_energy(model_, scene_, q, workspace_);
+  return quadratic(energy);
 }
 
 void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
@@ -116,6 +130,7 @@ void IncrementalPotential::hessian(const Eigen::VectorXd& q, Tangent tangent, Ei
   // Damping by a stiffness that had to be projected would feed energy in.
   if (at_first_iterate_ && scene_.stiffness_damping > 0) prepare();
   add_quadratic(hessian);
+  if (elastic_examples_ > 0) add_elastic_example_stiffness(model_, scene_, q, tangent, workspace_, hessian);
 }
 
 void IncrementalPotential::accept(PotentialEvaluation& evaluation) noexcept {
@@ -138,11 +153,13 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
   const StepForm& form = workspace_.form;
   set_offset(q);
   gradient = workspace_.internal_force + workspace_.linear + workspace_.product.head(q.size());
+  double energy = elastic_energy_;
+  if (elastic_examples_ > 0) energy += add_elastic_example_forces(model_, scene_, q, workspace_, gradient);
   const double inertia = form.acceleration_factor * (q - form.acceleration_centre).norm();
   // Elements deformed without stress, as those that StVK reflects, cancel to rounding: no residual comes below it.
   const double rounding = force_rounding_ * q.norm() / scene_.newton.tolerance;
-  PotentialEvaluation evaluation{quadratic(elastic_energy_), workspace_.external_force.norm() +
-                                                                 workspace_.internal_force.norm() + inertia + rounding};
+  PotentialEvaluation evaluation{
+      quadratic(energy), workspace_.external_force.norm() + workspace_.internal_force.norm() + inertia + rounding};
   if (has_frozen_force()) {
     if (!update_frozen_force(q)) evaluation.potential.value = std::numeric_limits<double>::infinity();
     gradient += workspace_.next_frozen_force;
@@ -154,7 +171,7 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
 bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
   workspace_.next_frozen_force.setZero();
   for (std::size_t i = 0; skew_ && i < scene_.examples.size(); ++i)
-    if (acts(scene_.examples[i]))
+    if (is_filtered(scene_.examples[i]))
       workspace_.next_frozen_force.noalias() +=
           workspace_.examples[i].force.stiffness * (model_.examples[i].filter.skew_part() * workspace_.offset);
   if (!frame_forces_) return true;

@@ -10,10 +10,11 @@ namespace exmat::runtime {
 
 /// What one step minimises:
 ///   c_a/2 |q - q_a|^2 + c_v/2 (q - q_v)^T D (q - q_v) + E(q) - f_ext . q
-///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa g . q,
-/// D = alpha I + beta K(first iterate), up to a constant. All but E is one quadratic form of the step's displacement
-/// q - q_n, prepared once: an evaluation costs E and one product with a matrix. Two forces have no potential, that of
-/// the skew part of P_s and those of the frame (BodyFrame::force()): in values they are those of the
+///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa g . q, or of k/2 ... + W(q) with k =
+///   c_kappa c_v where they are elastic,
+/// D = alpha I + beta K(first iterate), up to a constant. All but E and W is one quadratic form of the step's
+/// displacement q - q_n, prepared once: an evaluation costs these and one product with a matrix. Two forces have no
+/// potential, that of the skew part of P_s and those of the frame (BodyFrame::force()): in values they are those of the
 /// iterate last accepted, so that the gradient is exact. docs/step_in_detail.md, "The incremental potential";
 /// ExampleForce. Reads form and external_force of the workspace.
 class IncrementalPotential {
@@ -58,6 +59,7 @@ class IncrementalPotential {
   Workspace& workspace_;
   bool skew_;
   bool frame_forces_;
+  double elastic_examples_ = 0;  // sum of their factors
   bool at_first_iterate_ = true;
   double elastic_energy_ = 0;
   double force_rounding_ = 0;  // of internal forces over |q|

@@ -23,6 +23,7 @@ struct ExampleParts {
   const ProjectionData& projection;
   const std::optional<TargetTableData>& targets;
   const std::optional<TargetSpaceData>& target_space;
+  const std::optional<TargetElasticityData>& target_elasticity;
 
   std::string group(const char* part) const { return (region.empty() ? "" : "/regions/" + region) + part; }
 };
@@ -58,21 +59,43 @@ std::optional<Complaint> add_solver(const RestModel& rest, const ExampleParts& p
   return complaint;
 }
 
-std::optional<Complaint> add_examples(const RestModel& rest, const ExampleParts& parts, bool target_table,
-                                      EnergyReference reference, Model& model) {
+/// The elastic energy from the target, in place of its pull.
+std::optional<Complaint> add_elasticity(const RestModel& rest, const ExampleParts& parts, ExampleModel& examples) {
+  if (!parts.target_elasticity) return missing_group(parts.group("/target_elasticity"));
+  const TargetElasticityData& data = *parts.target_elasticity;
+  if (examples.table) {
+    TargetTableData table = *parts.targets;
+    if (data.control_points.rows() != table.control_points.rows())
+      return Complaint{"", parts.group("/target_elasticity/control_points"),
+                       std::to_string(table.control_points.rows()) + " control points, as the table of targets",
+                       std::to_string(data.control_points.rows()), "precompute the bundle again"};
+    table.control_points = data.control_points;
+    examples.table.emplace(table);
+  }
+  const Eigen::Index d = data.target_gradient.cols();
+  if (examples.target && examples.target->basis().rows() != d) return missing_group(parts.group("/target_space"));
+  examples.elasticity.emplace(rest.material, data,
+                              examples.table ? RowMatrix(RowMatrix::Identity(d, d)) : examples.target->basis());
+  return std::nullopt;
+}
+
+std::optional<Complaint> add_examples(const RestModel& rest, const ExampleParts& parts, const RegionOptions& options,
+                                      Model& model) {
   ExampleModel examples;
   examples.region = parts.region;
   examples.weights = ExampleWeights(parts.set.gram, parts.set.h0, parts.set.hq);
   examples.filter = ShapeFilter(parts.projection);
-  if (target_table) {
+  if (options.target_table) {
     if (!parts.targets) return missing_group(parts.group("/targets"));
     TargetTableData pull = *parts.targets;
     if (!pull.is_pull) pull.control_points *= examples.filter.matrix().transpose();
     examples.table.emplace(pull);
-  } else if (auto complaint = add_solver(rest, parts, reference, examples)) {
+  } else if (auto complaint = add_solver(rest, parts, options.energy_reference, examples)) {
     complaint->place = parts.group("") + complaint->place;
     return complaint;
   }
+  if (options.elastic)
+    if (auto complaint = add_elasticity(rest, parts, examples)) return complaint;
   model.examples.push_back(std::move(examples));
   return std::nullopt;
 }
@@ -98,16 +121,17 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   const RestModel rest{reduced.object->materials.model, cubature};
   if (options.examples && reduced.examples) {
     if (!reduced.projection) return {nullptr, missing_group("/projection")};
-    const ExampleParts parts{"", *reduced.examples, *reduced.projection, reduced.targets, reduced.target_space};
-    if (auto complaint = add_examples(rest, parts, options.target_table, options.energy_reference, *model))
-      return {nullptr, std::move(*complaint)};
+    const ExampleParts parts{
+        "", *reduced.examples, *reduced.projection, reduced.targets, reduced.target_space, reduced.target_elasticity};
+    const RegionOptions whole{"", options.target_table, options.elastic, options.energy_reference};
+    if (auto complaint = add_examples(rest, parts, whole, *model)) return {nullptr, std::move(*complaint)};
   }
   for (const RegionOptions& region : options.regions) {
     const auto found = std::ranges::find(reduced.regions, region.region, &RegionData::name);
     if (found == reduced.regions.end()) return {nullptr, missing_group("/regions/" + region.region)};
-    const ExampleParts parts{found->name, found->examples, found->projection, found->targets, found->target_space};
-    if (auto complaint = add_examples(rest, parts, region.target_table, region.energy_reference, *model))
-      return {nullptr, std::move(*complaint)};
+    const ExampleParts parts{found->name,    found->examples,     found->projection,
+                             found->targets, found->target_space, found->target_elasticity};
+    if (auto complaint = add_examples(rest, parts, region, *model)) return {nullptr, std::move(*complaint)};
   }
   return {std::move(model), {}};
 }

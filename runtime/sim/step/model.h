@@ -14,6 +14,7 @@
 #include "runtime/sim/examples/example_weights.h"
 #include "runtime/sim/examples/shape_filter.h"
 #include "runtime/sim/examples/target.h"
+#include "runtime/sim/examples/target_elasticity.h"
 #include "runtime/sim/examples/target_table.h"
 #include "runtime/sim/frame/body_frame.h"
 
@@ -23,10 +24,12 @@ namespace exmat::runtime {
 struct ExampleModel {
   std::string region;  ///< empty: the whole body
   ExampleWeights weights;
-  std::optional<TargetTable> table;    ///< of the pull U^T P p*, serves the targets if there is one
-  std::optional<TargetSolver> target;  ///< otherwise
-  Eigen::MatrixXd target_pull;         ///< r x d, with `target`: the pull of its coordinates y
-  ShapeFilter filter;                  ///< P_s
+  /// Of the pull U^T P p*, with `elasticity` of coordinates y; serves the targets if there is one.
+  std::optional<TargetTable> table;
+  std::optional<TargetSolver> target;          ///< otherwise
+  Eigen::MatrixXd target_pull;                 ///< r x d, with `target`: the pull of its coordinates y
+  std::optional<TargetElasticity> elasticity;  ///< of an elastic force
+  ShapeFilter filter;                          ///< P_s
 };
 
 /// A reduced body prepared for stepping: immutable, shared by any number of States.
@@ -55,12 +58,14 @@ struct Model {
 struct RegionOptions {
   std::string region;
   bool target_table = false;
+  bool elastic = false;
   EnergyReference energy_reference = EnergyReference::kExample;
 };
 
 struct ModelOptions {
   bool examples = true;       ///< prepare the whole body's example force, if the bundle has examples
   bool target_table = false;  ///< take targets from /targets; false: solve for them
+  bool elastic = false;       ///< prepare an elastic example force: /target_elasticity
   bool carried = false;       ///< a motion carries the body's fixed part: /rigid
   bool polynomial = false;    ///< internal force by /polynomial; false: by cubature
   EnergyReference energy_reference = EnergyReference::kExample;

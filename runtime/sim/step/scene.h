@@ -13,12 +13,15 @@
 
 namespace exmat::runtime {
 
-/// A linear example force, of the whole body or of a region. docs/step_in_detail.md, "The incremental potential".
+/// An example force, of the whole body or of a region. docs/step_in_detail.md, "The incremental potential".
 struct ExampleSettings {
-  double stiffness = 0;                                  ///< kappa >= 0 [1/s^2]
+  double stiffness = 0;                                  ///< kappa >= 0 [1/s^2]; of an elastic one its factor e >= 0
   double damping = 0;                                    ///< c_kappa >= 0 [1/s]
   double bias = 1;                                       ///< in [0, 1]
   int target_iterations = TargetSolver::kMaxIterations;  ///< most in one step; the next one carries on
+  /// The force is that of the elastic energy with the target as the undeformed shape, times the stiffness, in place of
+  /// the linear one; the model has to have what that takes.
+  bool elastic = false;
 };
 
 /// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.
@@ -35,7 +38,20 @@ struct StepScene : WorldLoads {
 /// Whether these examples exert a force; weights and targets of those that do not are left out.
 inline bool acts(const ExampleSettings& examples) noexcept { return examples.stiffness > 0 || examples.damping > 0; }
 
-/// Whether any examples do.
+/// kappa of a linear force, and the factor e of an elastic one; 0 of the other.
+inline double linear_stiffness(const ExampleSettings& examples) noexcept {
+  return examples.elastic ? 0 : examples.stiffness;
+}
+inline double elastic_factor(const ExampleSettings& examples) noexcept {
+  return examples.elastic ? examples.stiffness : 0;
+}
+
+/// Whether the force has a part that the shape filter takes: a spring to the target, or damping.
+inline bool is_filtered(const ExampleSettings& examples) noexcept {
+  return linear_stiffness(examples) > 0 || examples.damping > 0;
+}
+
+/// Whether any examples exert a force.
 inline bool runs_examples(const StepScene& scene) noexcept { return std::ranges::any_of(scene.examples, acts); }
 
 /// Whether steps look for contacts.

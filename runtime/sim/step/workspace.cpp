@@ -16,6 +16,10 @@ ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(m
     target_solver = model.target->make_workspace();
     solved_target.setZero(model.target->dimension());
   }
+  if (model.elasticity) {
+    elasticity.emplace(model.elasticity->make_workspace());
+    solved_target.setZero(model.elasticity->dimension());
+  }
   weights.setZero(model.weights.examples());
   target.setZero(model.filter.matrix().rows());
   force.centre = force.pull = target;

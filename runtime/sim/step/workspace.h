@@ -33,9 +33,10 @@ struct ExampleWorkspace {
   TargetTable::Workspace target_table;
   TargetSolver::Workspace target_solver;
   Eigen::VectorXd weights;        ///< K
-  Eigen::VectorXd solved_target;  ///< d
+  Eigen::VectorXd solved_target;  ///< d, its coordinates, where it is solved for or the force is elastic
   bool target_converged = false;  ///< of solved_target
-  Eigen::VectorXd target;         ///< r, its pull g
+  Eigen::VectorXd target;         ///< r, its pull g, of a linear force
+  std::optional<TargetElasticity::Workspace> elasticity;  ///< of an elastic one
   ExampleForce force;
 };
 

@@ -25,7 +25,11 @@ void write_version_5(const std::filesystem::path& path) {
   ReducedModel model = small_model(false);
   model.fidelity.reset();
   model.target_space.reset();
-  for (RegionData& region : model.regions) region.target_space.reset();
+  model.target_elasticity.reset();
+  for (RegionData& region : model.regions) {
+    region.target_space.reset();
+    region.target_elasticity.reset();
+  }
   write_bundle(model, path);
   Spoiler spoiler(path);
   spoiler.set_integer("/", "format_version", 5);
@@ -68,6 +72,7 @@ void write_version_1(const std::filesystem::path& path) {
   model.polynomial.reset();
   model.targets.reset();
   model.target_space.reset();
+  model.target_elasticity.reset();
   model.fidelity.reset();
   model.contact.reset();
   model.regions.clear();

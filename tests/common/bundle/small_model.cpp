@@ -133,6 +133,20 @@ TargetSpaceData small_target_space(Eigen::Index examples) {
   return space;
 }
 
+TargetElasticityData small_target_elasticity(Eigen::Index control_points) {
+  TargetElasticityData elasticity;
+  elasticity.heldout_error = 0.02;
+  elasticity.elements = IndexVector{{0, 1}};
+  elasticity.weights = Eigen::Vector2d(0.75, 1.25);
+  elasticity.volumes = Eigen::Vector2d(0.25, 0.75);
+  elasticity.gradient = numbers(18, kModes, 5);
+  elasticity.target_gradient = numbers(18, 1, 6);
+  elasticity.youngs_modulus = Eigen::Vector2d(1e5, 2e5);
+  elasticity.poisson_ratio = Eigen::Vector2d(0.3, 0.4);
+  elasticity.control_points = numbers(control_points, 1, 7);
+  return elasticity;
+}
+
 FidelityData small_fidelity() {
   FidelityData fidelity;
   fidelity.loads = "the loads of the scene";
@@ -187,9 +201,18 @@ RenderData small_render() {
 // The second with an example less and no targets.
 std::vector<RegionData> small_regions(const ReducedModel& model) {
   std::vector<RegionData> regions(2);
-  regions[0] = {"left", 0, IndexVector{{0, 2}}, *model.examples, *model.projection, model.targets, model.target_space};
-  regions[1] = {"far right",          1, IndexVector{{1}}, *model.examples, *model.projection, std::nullopt,
-                small_target_space(2)};
+  regions[0] = {"left",
+                0,
+                IndexVector{{0, 2}},
+                *model.examples,
+                *model.projection,
+                model.targets,
+                model.target_space,
+                model.target_elasticity};
+  regions[1] = {"far right",           1,
+                IndexVector{{1}},      *model.examples,
+                *model.projection,     std::nullopt,
+                small_target_space(2), small_target_elasticity(2)};
   ExampleSet& fewer = regions[1].examples;
   fewer.examples.pop_back();
   fewer.gram = RowMatrix(fewer.gram.topLeftCorner(2, 2));
@@ -216,6 +239,7 @@ ReducedModel small_model(bool constrained, bool with_examples) {
                                       numbers(kModes, 1, 8)};
     model.targets = small_targets();
     model.target_space = small_target_space(kExamples);
+    model.target_elasticity = small_target_elasticity(6);
     model.regions = small_regions(model);
   }
   model.fidelity = small_fidelity();

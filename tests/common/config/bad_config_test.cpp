@@ -137,8 +137,8 @@ const BadConfig kBadAssets[] = {
     {"TwoRestExamples", examples(R"({"name": "b", "mesh": "m", "rest": true})"),
      "a.json: /examples/1/rest: expected at most one rest example"},
     {"UnknownNeed", asset(R"("needs": ["sound"])"),
-     "a.json: /needs/0: expected \"examples\", \"targets\", \"rigid\", \"contact\", \"regions\" or \"render\", found "
-     "\"sound\""},
+     "a.json: /needs/0: expected \"examples\", \"targets\", \"rigid\", \"contact\", \"regions\", \"render\" or "
+     "\"target_elasticity\", found \"sound\""},
     {"UnknownInternalForce", asset(R"("internal_force": "exact")"),
      "a.json: /internal_force: expected \"auto\", \"cubature\" or \"polynomial\", found \"exact\""},
     {"NoContactVertices", asset(R"("contact": {"count": 0})"), "a.json: /contact/count: expected an integer >= 1"},
@@ -196,7 +196,7 @@ const BadConfig kBadScenes[] = {
     {"NewtonTolerance", scene(R"("newton": {"tolerance": 1})"),
      "a.json: /newton/tolerance: expected a number > 0 and < 1"},
     {"NoStiffness", scene(R"("examples": {})"),
-     "a.json: /examples/stiffness: expected a number >= 0 (kappa [1/s^2]), found no such"},
+     "a.json: /examples/stiffness: expected a number >= 0 (kappa [1/s^2]; of an elastic force "},
     {"BiasTooLarge", scene(R"("examples": {"stiffness": 1, "bias": 1.5})"),
      "a.json: /examples/bias: expected a number >= 0 and <= 1"},
     {"EndBeforeStart", force(R"({"ids": [1]})", R"(, "start": 2, "end": 1)"),
@@ -254,8 +254,8 @@ const BadConfig kBadScenes[] = {
      "a.json: /examples/target: expected \"auto\", \"table\" or \"solve\", found \"guess\""},
     {"NoTargetIterations", scene(R"("examples": {"stiffness": 1, "target_iterations": 0})"),
      "a.json: /examples/target_iterations: expected an integer >= 1 and <= 1000, found 0"},
-    {"LaterElastic", scene(R"("examples": {"stiffness": 1, "force": "elastic"})"),
-     "a.json: /examples/force: found \"elastic\"; this version"},
+    {"UnknownForce", scene(R"("examples": {"stiffness": 1, "force": "plastic"})"),
+     "a.json: /examples/force: expected \"linear\" or \"elastic\", found \"plastic\""},
     {"LaterBox", force(R"({"box": {}})"),
      "a.json: /forces/0/vertices/box: found \"box\"; this version does not support it yet"},
 };

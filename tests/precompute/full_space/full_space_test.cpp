@@ -257,14 +257,16 @@ TEST(FullSpace, ExamplesAndDampingTakeNoMomentum) {
   FullSpaceScene scene = scene_of(Integrator::kNewmark, 5e-4);
   scene.mass_damping = 5;
   scene.stiffness_damping = 1e-3;
-  scene.examples = {{3000, 10, 0.3}};
-  const FullSpaceState start = body.moving(2), end = body.after(scene, 2, 200);
-  const Eigen::Vector3d p = body.linear_momentum(start), L = body.angular_momentum(start);
-  EXPECT_LE((body.linear_momentum(end) - p).norm(), 1e-8 * p.norm());
-  // The integrator's own error, see KeepsLinearMomentumAndAngularMomentumToItsOrder: 1e-6 (spin dt)^2 and the faster
-  // vibrations; a force that turned the body would change it by tenths.
-  EXPECT_LE((body.angular_momentum(end) - L).norm(), 1e-3 * L.norm());
-  EXPECT_LT(end.examples.front().weights[0], 0.9);
+  for (const bool elastic : {false, true}) {
+    scene.examples = {{.stiffness = elastic ? 2.0 : 3000.0, .damping = 10, .bias = 0.3, .elastic = elastic}};
+    const FullSpaceState start = body.moving(2), end = body.after(scene, 2, 200);
+    const Eigen::Vector3d p = body.linear_momentum(start), L = body.angular_momentum(start);
+    EXPECT_LE((body.linear_momentum(end) - p).norm(), 1e-8 * p.norm());
+    // The integrator's own error, see KeepsLinearMomentumAndAngularMomentumToItsOrder: 1e-6 (spin dt)^2 and the faster
+    // vibrations; a force that turned the body would change it by tenths.
+    EXPECT_LE((body.angular_momentum(end) - L).norm(), 1e-3 * L.norm());
+    EXPECT_LT(end.examples.front().weights[0], 0.9);
+  }
 }
 
 /// A free block and a floor through the origin.

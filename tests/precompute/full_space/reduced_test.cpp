@@ -3,6 +3,7 @@
 #include <tuple>
 
 #include "common/core/error.h"
+#include "precompute/shape_space/region_window.h"
 #include "tests/precompute/full_space/full_space_bar.h"
 
 // With all modes in its basis the reduced model is the full space in other coordinates: a clamped body's trajectories
@@ -19,7 +20,7 @@ struct Case {
   Integrator integrator = Integrator::kBdf2;
   int examples = 0;
   double density_gradient = 0, damping = 0;
-  bool floor = false, region = false;
+  bool floor = false, region = false, elastic = false;
 };
 
 class ReducedTwin {
@@ -39,6 +40,7 @@ class ReducedTwin {
       reduced_options.regions = {{"outer"}};
       full_options.regions = {{"outer"}};
     }
+    if (options.elastic) make_elastic(reduced_options);
     auto built = runtime::build_model(bar_.model, reduced_options);
     if (!built.model) throw InputError(built.complaint);
     reduced_ = std::move(built.model);
@@ -50,6 +52,11 @@ class ReducedTwin {
     reduced_scene_.stiffness_damping = full_scene_.stiffness_damping = 0.01 * options.damping;
     if (options.examples > 0) reduced_scene_.examples = {{400, 2, 0.5}};
     if (options.region) reduced_scene_.examples.push_back({2000, 1, 0.2});
+    if (options.elastic)
+      for (runtime::ExampleSettings& examples : reduced_scene_.examples) {
+        examples.stiffness = examples.stiffness / 500;  // 0.8 and 4 times the material
+        examples.elastic = true;
+      }
     full_scene_.examples = reduced_scene_.examples;
     if (options.floor) reduced_scene_.obstacles = {{runtime::Plane{{0, -0.05, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     full_scene_.obstacles = reduced_scene_.obstacles;
@@ -84,6 +91,32 @@ class ReducedTwin {
   int contacts() const { return contacts_; }
 
  private:
+  /// Of all tets; targets in reduced coordinates.
+  void make_elastic(runtime::ModelOptions& options) {
+    const CubatureData& all = *bar_.model.cubature;
+    TargetElasticityData data;
+    data.weights = all.weights;
+    data.volumes = all.volumes;
+    data.gradient = data.target_gradient = all.gradient;
+    data.youngs_modulus = all.youngs_modulus;
+    data.poisson_ratio = all.poisson_ratio;
+    bar_.model.target_elasticity = data;
+    options.elastic = true;
+    for (std::size_t i = 0; i < options.regions.size(); ++i) {
+      RegionData& region = bar_.model.regions[i];
+      const ObjectData& body = *bar_.model.object;
+      FlagVector inside = FlagVector::Zero(body.mesh.vertex_count());
+      inside(region.vertices).setOnes();
+      const Eigen::VectorXd window = region_window(body.mesh, inside).values;
+      region.target_elasticity = data;
+      for (Eigen::Index j = 0; j < all.elements.size(); ++j) {
+        const auto corners = body.mesh.tets.row(all.elements[j]).transpose();
+        region.target_elasticity->weights[j] *= inside(corners).all() ? window(corners).mean() : 0;
+      }
+      options.regions[i].elastic = true;
+    }
+  }
+
   ContactData movable_contact() const {
     const ContactData all = test::surface_contact(bar_.model);
     std::vector<Eigen::Index> ids;
@@ -146,6 +179,24 @@ TEST(ReducedOfAllModesAndARegion, IsTheFullSpace) {
     EXPECT_LE(twin.weights_off(), kSame) << density_gradient;
     EXPECT_GE(twin.size(), 0.1) << "the motion is too small to tell";
   }
+}
+
+TEST_P(ReducedOfAllModes, IsTheFullSpaceWithAnElasticExampleForce) {
+  ReducedTwin twin({.material = std::get<0>(GetParam()),
+                    .integrator = std::get<1>(GetParam()),
+                    .examples = 3,
+                    .damping = 0.5,
+                    .elastic = true});
+  EXPECT_LE(twin.difference(40), kSame);
+  EXPECT_LE(twin.weights_off(), kSame);
+  EXPECT_GE(twin.size(), 0.05) << "the motion is too small to tell";
+}
+
+TEST(ReducedOfAllModesAndARegion, IsTheFullSpaceWithElasticExampleForces) {
+  ReducedTwin twin({.examples = 3, .density_gradient = 3, .damping = 0.5, .region = true, .elastic = true});
+  EXPECT_LE(twin.difference(40), kSame);
+  EXPECT_LE(twin.weights_off(), kSame);
+  EXPECT_GE(twin.size(), 0.05) << "the motion is too small to tell";
 }
 
 // P_s is not symmetric then.

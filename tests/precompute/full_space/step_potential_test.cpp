@@ -1,7 +1,9 @@
 #include "precompute/full_space/step_potential.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <gtest/gtest.h>
+#include <tuple>
 
 #include "tests/precompute/full_space/full_space_bar.h"
 #include "tests/support/random.h"
@@ -10,16 +12,19 @@ namespace exmat::precompute {
 namespace {
 
 /// A step of a bar with damping, examples and a floor under it, far from its minimum.
-class StepPotentialTest : public testing::TestWithParam<bool> {
+class StepPotentialTest : public testing::TestWithParam<std::tuple<bool, bool>> {
  protected:
+  static bool is_free() { return std::get<0>(GetParam()); }
+  static bool is_elastic() { return std::get<1>(GetParam()); }
+
   void prepare(double density_gradient) {
     bar_ = test::make_bar({.cells = {2, 1, 1},
                            .density_gradient = density_gradient,
-                           .free = GetParam(),
+                           .free = is_free(),
                            .eigenfunctions = 4,
                            .examples = 2});
     bar_.model.contact = test::surface_contact(bar_.model);
-    if (!GetParam()) drop_fixed(*bar_.model.contact);
+    if (!is_free()) drop_fixed(*bar_.model.contact);
     FlagVector half = FlagVector::Zero(bar_.model.object->mesh.vertex_count());
     half.tail(2 * half.size() / 3).setOnes();
     add_region(bar_.model, "half", half);
@@ -28,10 +33,13 @@ class StepPotentialTest : public testing::TestWithParam<bool> {
     scene_.mass_damping = 3;
     scene_.stiffness_damping = 0.01;
     scene_.examples = {{300, 20, 0.5}, {200, 0, 1}};
+    if (is_elastic())
+      scene_.examples = {{.stiffness = 0.7, .damping = 20, .bias = 0.5, .elastic = true},
+                         {.stiffness = 2, .elastic = true}};
     scene_.obstacles = {{runtime::Plane{{0, 0.02, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     state_ = at_rest(model_);
     state_.v = 0.3 * test::random_vector(model_.size(), 1);
-    if (GetParam()) turn();
+    if (is_free()) turn();
     runtime::backward_euler_form({state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous}, scene_.time_step,
                                  terms_.form);
     terms_.rate_centre = Deformation(model_, state_.q).u();
@@ -39,6 +47,12 @@ class StepPotentialTest : public testing::TestWithParam<bool> {
     for (std::size_t i = 0; i < 2; ++i) {
       const FullSpaceExamples& examples = model_.examples[i];
       terms_.examples.push_back({&examples, &scene_.examples[i], examples.pose_basis() * examples.pose(1)});
+      if (!is_elastic()) continue;
+      MeshElasticity& own = elasticities_[i] = model_.elasticity;
+      if (const auto& shares = examples.tet_shares()) own.set_shares(*shares);
+      const Eigen::VectorXd target = model_.system.extend(terms_.examples.back().target);
+      own.set_undeformed(model_.rest + target.reshaped<Eigen::RowMajor>(model_.rest.rows(), 3));
+      terms_.examples.back().elasticity = &own;
     }
     contacts_ =
         model_.contacts->begin(scene_.obstacles, scene_.time_step, scene_.time_step, state_.q, state_.v, 0.1, {});
@@ -69,6 +83,7 @@ class StepPotentialTest : public testing::TestWithParam<bool> {
   FullSpaceState state_;
   StepTerms terms_;
   VertexContacts::Step contacts_;
+  std::array<MeshElasticity, 2> elasticities_;
 };
 
 // The skew part of the filter counts as it was where it was last accepted: there, and only there, the gradient is the
@@ -110,10 +125,11 @@ TEST_P(StepPotentialTest, ProductIsThatOfTheSecondDerivative) {
   const Eigen::VectorXd expected = (ahead - behind) / (2 * kStep);
   const double error = (potential.product(direction) - expected).norm() / expected.norm();
   RecordProperty("error", std::to_string(error));
-  EXPECT_LE(error, GetParam() ? 0.02 : 1e-6);  // 1e-6: of differences over 1e-8
+  EXPECT_LE(error, is_free() ? 0.02 : 1e-6);  // 1e-6: of differences over 1e-8
 }
 
-INSTANTIATE_TEST_SUITE_P(ClampedAndFree, StepPotentialTest, testing::Bool());
+// Of linear example forces, and of elastic ones.
+INSTANTIATE_TEST_SUITE_P(ClampedAndFree, StepPotentialTest, testing::Combine(testing::Bool(), testing::Bool()));
 
 }  // namespace
 }  // namespace exmat::precompute

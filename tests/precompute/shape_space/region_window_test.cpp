@@ -99,5 +99,25 @@ TEST(RegionWindow, IsTheIndicatorWhereThereIsNoRoomOrNoBorder) {
   EXPECT_TRUE(all.band.isZero(0));
 }
 
+// The mean of the window over a tet inside; nothing of one that reaches out, even where the window does not.
+TEST(RegionWindow, OfATetIsItsMean) {
+  const TetMesh mesh = shaken_bar({8, 2, 2});
+  const FlagVector inside = flags_where(mesh, [](const auto& x) { return x[0] > 0.9; });
+  const Eigen::VectorXd window = region_window(mesh, inside).values;
+  const Eigen::VectorXd shares = region_tet_shares(mesh, inside, window);
+  const Eigen::VectorXd whole = region_tet_shares(mesh, inside, Eigen::VectorXd::Ones(window.size()));
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+    double sum = 0;
+    bool within = true;
+    for (const int v : mesh.tets.row(t)) {
+      sum += window[v];
+      within = within && inside[v] != 0;
+    }
+    EXPECT_NEAR(shares[t], within ? sum / 4 : 0, kRounding);
+    EXPECT_EQ(whole[t], within ? 1 : 0);
+  }
+  EXPECT_GT(shares.maxCoeff(), 0.9);
+}
+
 }  // namespace
 }  // namespace exmat::precompute

@@ -169,8 +169,7 @@ TEST(Baseline, ABodyTakesTheShapeOfTheTarget) {
     scene.time_step = 0.01;
     scene.integrator = Integrator::kBackwardEuler;
     scene.mass_damping = 5;
-    scene.examples = {{.bias = 0}};
-    scene.example_elasticity = 50;
+    scene.examples = {{.stiffness = 50, .bias = 0, .elastic = true}};
     FullSpaceState state = at_rest(baseline.model);
     FullSpaceWorkspace workspace(baseline.model);
     FullSpaceReport report;
@@ -193,8 +192,7 @@ TEST(Baseline, StartsWithTheForceOfTheElasticEnergy) {
   FullSpaceScene scene;
   scene.time_step = 1e-5;
   scene.integrator = Integrator::kNewmark;
-  scene.examples = {{.bias = 0.5}};
-  scene.example_elasticity = 0.3;
+  scene.examples = {{.stiffness = 0.3, .bias = 0.5, .elastic = true}};
   FullSpaceState state = at_rest(baseline.model);
   run(baseline.model, scene, state, 1);
   MeshElasticity elasticity = baseline.model.elasticity;

@@ -20,7 +20,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 PointResult some_point(int r, int s, double error, double seconds) {
   PointResult point;
-  point.settings = {10, r, 15, s, "stvk", 0.001, "bdf2", "cubature", "table"};
+  point.settings = {10, r, 15, "auto", s, "stvk", 0.001, "bdf2", "cubature", "table"};
   point.key = "k" + std::to_string(r) + std::to_string(s);
   point.bundle = "b";
   point.reference = "f";
@@ -194,9 +194,10 @@ TEST(Results, AreChosenByTheHeadline) {
 
 TEST(Recommendation, IsAFragmentOfTheFiles) {
   StudyResult result = some_result();
-  EXPECT_EQ(asset_fragment(result, result.points[1]).dump(),
-            R"({"shape_space":{"eigenfunctions":10},"basis":{"size":20,"linear_modes":15},"cubature":{"elements":40},)"
-            R"("internal_force":"cubature","object":{"material":{"model":"stvk"}}})");
+  EXPECT_EQ(
+      asset_fragment(result, result.points[1]).dump(),
+      R"({"shape_space":{"eigenfunctions":10},"basis":{"size":20,"linear_modes":15,"training":"auto"},"cubature":{"elements":40},)"
+      R"("internal_force":"cubature","object":{"material":{"model":"stvk"}}})");
   EXPECT_EQ(scene_fragment(result, result.points[1]).dump(),
             R"({"time_step":0.001,"integrator":"bdf2","examples":{"target":"table"}})");
   result.regions = {"left"};

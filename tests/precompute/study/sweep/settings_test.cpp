@@ -36,13 +36,15 @@ TEST_F(Settings, OfAnEmptySweepAreTheFilesOwn) {
   ASSERT_EQ(points.size(), 1U);
   EXPECT_EQ(points[0], own_settings(asset_, scene_));
   EXPECT_EQ(points[0].cubature_elements, 40) << "2 r";
-  EXPECT_EQ(describe(points[0]), "m 10, r 20 of 15 linear modes, s 40, stvk, 1 ms, bdf2, cubature, target auto");
+  EXPECT_EQ(describe(points[0]),
+            "m 10, r 20 of 15 linear modes, training auto, s 40, stvk, 1 ms, bdf2, cubature, target auto");
 }
 
 TEST_F(Settings, AreTheProductOfAllLists) {
   study_.sweeps = {{.eigenfunctions = {5, 6},
                     .basis_size = {7, 8, 9},
                     .linear_modes = {3, 4},
+                    .training = {"none", "scene"},
                     .cubature_elements = {11, 12},
                     .material = {"stvk", "corotational"},
                     .time_step = {0.001, 0.002},
@@ -53,13 +55,13 @@ TEST_F(Settings, AreTheProductOfAllLists) {
   std::set<PointSettings> expected;
   for (const int m : {5, 6})
     for (const auto& [r, l] : {std::pair(7, 3), {7, 4}, {8, 3}, {8, 4}, {9, 3}, {9, 4}})
-      for (const int s : {11, 12})
+      for (const auto& [training, s] : {std::pair("none", 11), {"none", 12}, {"auto", 11}, {"auto", 12}})
         for (const char* material : {"stvk", "corotational"})
           for (const double step : {0.001, 0.002})
             for (const char* integrator : {"bdf2", "newmark"})
               for (const char* target : {"table", "solve"})
-                expected.insert({m, r, l, s, material, step, integrator, "cubature", target});
-  EXPECT_EQ(points.size(), 2U * 3 * 2 * 2 * 2 * 2 * 2 * 2);
+                expected.insert({m, r, l, training, s, material, step, integrator, "cubature", target});
+  EXPECT_EQ(points.size(), 2U * 3 * 2 * 2 * 2 * 2 * 2 * 2 * 2);
   EXPECT_EQ(std::set<PointSettings>(points.begin(), points.end()), expected);
 }
 
@@ -76,20 +78,44 @@ TEST_F(Settings, OfSeveralSweepsAreThereOnce) {
 TEST_F(Settings, WithoutEffectMakeNoPoints) {
   study_.sweeps = {{.cubature_elements = {10, 20, 30}, .internal_force = {"all_elements"}}};
   EXPECT_EQ(expanded().size(), 1U) << "all elements are all there are";
+  study_.sweeps = {{.training = {"scene", "auto", "none"}}};
+  const auto points = expanded();
+  ASSERT_EQ(points.size(), 2U) << "a study always has a scene to learn from";
+  EXPECT_EQ(points[0], own_settings(asset_, scene_));
+  EXPECT_EQ(points[1].training, "none");
   scene_.examples.reset();
   study_.sweeps = {{.eigenfunctions = {5, 6}, .target = {"table", "solve"}}};
   ASSERT_EQ(expanded().size(), 1U) << "no examples";
   EXPECT_EQ(expanded()[0].target, kNoTarget);
 }
 
+TEST_F(Settings, CompareElasticForcesWithThoseOfTheScene) {
+  study_.sweeps = {{}, {.elastic_stiffness = {0.5, 2}}};
+  const auto points = expanded();
+  ASSERT_EQ(points.size(), 3U);
+  EXPECT_EQ(with_settings(scene_, points[0]).examples->law, ExampleForceLaw::kLinear);
+  EXPECT_EQ(with_settings(scene_, points[0]).examples->stiffness, scene_.examples->stiffness);
+  for (const std::size_t i : {1U, 2U}) {
+    const SceneConfig scene = with_settings(scene_, points[i]);
+    EXPECT_EQ(scene.examples->law, ExampleForceLaw::kElastic);
+    EXPECT_EQ(scene.examples->stiffness, points[i].elastic_stiffness);
+    EXPECT_EQ(scene.examples->damping, scene_.examples->damping);
+    EXPECT_EQ(settings_from_json(to_json(points[i])), points[i]);
+  }
+  EXPECT_THAT(describe(points[2]), HasSubstr("target auto, elastic force of 2"));
+  scene_.examples.reset();
+  EXPECT_EQ(expanded().size(), 1U) << "no examples";
+}
+
 TEST_F(Settings, AreAppliedToAssetAndScene) {
   asset_.cubature_tolerance = 0.01;
   scene_.regions.push_back({"left", {}});
-  const PointSettings point{5, 7, 9, 11, "corotational", 0.002, "newmark", "cubature", "solve"};
+  const PointSettings point{5, 7, 9, "none", 11, "corotational", 0.002, "newmark", "cubature", "solve"};
   const AssetConfig asset = with_settings(asset_, point);
   EXPECT_EQ(asset.eigenfunctions, 5);
   EXPECT_EQ(asset.basis_size, 7);
   EXPECT_EQ(asset.linear_modes, 9);
+  EXPECT_EQ(asset.training.from, Training::kNone);
   EXPECT_EQ(asset.cubature_elements, 11);
   EXPECT_FALSE(asset.cubature_tolerance) << "one of them alone";
   EXPECT_EQ(asset.material.model, MaterialModel::kCorotational);
@@ -132,6 +158,19 @@ TEST_F(Settings, RefusesAPolynomialThatAMaterialHasNot) {
     EXPECT_THAT(error.what(), HasSubstr("study.json: /sweeps/1/internal_force"));
     EXPECT_THAT(error.what(), HasSubstr("corotational"));
   }
+}
+
+TEST_F(Settings, RefusesLoadsThatTheAssetDoesNotDeclare) {
+  study_.sweeps = {{.training = {"none", "loads"}}};
+  try {
+    expanded();
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("study.json: /sweeps/0/training: expected"));
+    EXPECT_THAT(error.what(), HasSubstr("basis.loads"));
+  }
+  asset_.training.loads.emplace();
+  EXPECT_EQ(expanded().size(), 2U);
 }
 
 TEST_F(Settings, RefusesTooManyPoints) {

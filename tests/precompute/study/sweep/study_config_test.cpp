@@ -28,14 +28,17 @@ TEST(StudyFile, ReadsEveryMember) {
   const test::TemporaryFolder folder;
   const StudyConfig study = load_study(folder.write("study.json", R"({
     "name": "s", "asset": "a.json", "scene": "b.json", "steps": 7, "frames": 3, "baseline": true,
-    "sweeps": [ {"eigenfunctions": [1, 2], "basis_size": [3], "linear_modes": [6, 7], "cubature_elements": [4, 5], "material": ["corotational"],
-                 "time_step": [0.01], "integrator": ["newmark"], "internal_force": ["all_elements"], "target": ["solve"]} ],
+    "sweeps": [ {"eigenfunctions": [1, 2], "basis_size": [3], "linear_modes": [6, 7], "training": ["none", "scene"],
+                 "cubature_elements": [4, 5], "material": ["corotational"],
+                 "time_step": [0.01], "integrator": ["newmark"], "internal_force": ["all_elements"], "target": ["solve"], "elastic_stiffness": [0.5, 2]} ],
     "reference": {"time_step": 0.002, "integrator": "bdf2"},
     "timing": {"rounds": 2, "steps": 8, "baseline_steps": 9},
     "paper": {"interp_ms": 1, "total_ms": 2, "zhu_interp_ms": 3, "zhu_total_ms": 4} })"));
   const SweepConfig& sweep = study.sweeps.at(0);
   EXPECT_EQ(sweep.eigenfunctions, (std::vector<int>{1, 2}));
   EXPECT_EQ(sweep.linear_modes, (std::vector<int>{6, 7}));
+  EXPECT_EQ(sweep.elastic_stiffness, (std::vector<double>{0.5, 2}));
+  EXPECT_EQ(sweep.training, (std::vector<std::string>{"none", "scene"}));
   EXPECT_EQ(sweep.cubature_elements, (std::vector<int>{4, 5}));
   EXPECT_EQ(sweep.material, std::vector<std::string>{"corotational"});
   EXPECT_EQ(sweep.time_step, std::vector<double>{0.01});
@@ -60,6 +63,7 @@ TEST(StudyFile, IsRefusedWithThePlaceAndWhatToDo) {
       {head + R"("sweeps": [{"basis_size": 3}]})", "/sweeps/0/basis_size: expected an array"},
       {head + R"("sweeps": [{"basis_size": [0]}]})", "/sweeps/0/basis_size/0: expected an integer >= 1"},
       {head + R"("sweeps": [{"linear_modes": [0]}]})", "/sweeps/0/linear_modes/0: expected an integer >= 1"},
+      {head + R"("sweeps": [{"training": ["some"]}]})", "/sweeps/0/training/0: expected"},
       {head + R"("reference": {"time_step": 0}})", "/reference/time_step: expected a number > 0"},
       {head + R"("sweeps": [{"basis_size": [3, 3]}]})", "each element once"},
       {head + R"("sweeps": [{"internal_force": ["auto"]}]})", "\"all_elements\""},
