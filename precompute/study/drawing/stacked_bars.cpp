@@ -106,7 +106,7 @@ std::string legend(const StackedBars& picture, double top) {
 std::string stacked_svg(const StackedBars& picture) {
   const double longest = longest_bar(picture), scale = (kWidth - kLeft - kRight) / longest;
   const double bottom = kTop + kStep * static_cast<double>(picture.bars.size()) - (kStep - kBar) + 12;
-  const double height = bottom + 66 + kRow * static_cast<double>(picture.parts.size() + 1);
+  const double height = bottom + 56 + kRow * static_cast<double>(picture.parts.size() + 1);
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1:.0f}\" width=\"{0}\" "
       "font-family=\"system-ui, sans-serif\" font-size=\"12\" fill=\"currentColor\">\n",

@@ -9,8 +9,8 @@
 
 namespace exmat::precompute {
 
-/// What the full problem is replaced by on the way to a reduced motion, step by step. docs/error_metrics.md, "Errors by
-/// source".
+/// What the full problem is replaced by on the way to a reduced motion, step by step.
+/// docs/error_metrics.md, "Errors by source".
 enum class ErrorSource { kTimeStep, kEigenfunctions, kAlignment, kTargets, kBasis, kCubature, kTable };
 
 /// Whether a part is known.

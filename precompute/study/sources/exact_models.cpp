@@ -118,13 +118,17 @@ ElasticSystem system_of(const ReducedModel& model) {
 
 }  // namespace
 
+void require_same_object(const AssetConfig& asset, const ObjectInput& object, const TetMesh& mesh) {
+  if (is_mesh_of(object.mesh, mesh)) return;
+  throw InputError({asset.file.string(), "/object/mesh", "the object of the study's asset", "another mesh",
+                    "name the same object, with other examples alone"});
+}
+
 ReducedModel with_examples_of(const AssetConfig& asset, ReducedModel model, StageCache& cache) {
   InputFiles files;
   std::vector<std::string> warnings;
   const ObjectInput object = read_object(asset, files);
-  if (!is_mesh_of(object.mesh, model.object->mesh))
-    throw InputError({asset.file.string(), "/object/mesh", "the object of the study's asset", "another mesh",
-                      "name the same object, with other examples alone"});
+  require_same_object(asset, object, model.object->mesh);
   const ExampleInput input = read_examples(asset, object, files);
   ShapeStage stage = build_shape_stage(asset, object, input, cache, warnings);
   require_aligned(asset, stage.alignments, warnings);

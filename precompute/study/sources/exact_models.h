@@ -16,6 +16,9 @@ namespace exmat::precompute {
 // What the motions between the full problem and a reduced one are made of: models in which some of the approximations
 // are exact. Models are whole bundles.
 
+/// Throws InputError where the object of an asset has another mesh.
+void require_same_object(const AssetConfig& asset, const ObjectInput& object, const TetMesh& mesh);
+
 /// The body of a model with the examples of an asset of the same object, seen through asset.eigenfunctions functions:
 /// enough for the full space, and no more. Throws InputError where the objects differ.
 ReducedModel with_examples_of(const AssetConfig& asset, ReducedModel model, StageCache& cache);

@@ -20,7 +20,7 @@ nlohmann::ordered_json asset_fragment(const StudyResult& result, const PointResu
 nlohmann::ordered_json scene_fragment(const StudyResult& result, const PointResult& point);
 
 /// report.html, results.csv, results.json; recommended_asset.json and recommended_scene.json, which go where nothing is
-/// recommended; sources.md, sources.csv and sources.svg, which go where errors are not split.
+/// recommended; the three files sources.*, which go where errors are not split.
 void write_results(const StudyResult& result, const std::filesystem::path& folder);
 
 }  // namespace exmat::precompute

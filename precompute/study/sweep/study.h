@@ -75,7 +75,7 @@ struct StudyResult {
 std::vector<Outcome> outcomes(const std::vector<PointResult>& points);
 
 /// Runs what is not finished in the folder, times all points, and writes report.html, results.csv, results.json, where
-/// errors are split sources.md, sources.csv, sources.svg, and, where a budget is met, recommended_asset.json and
+/// errors are split the three files sources.*, and, where a budget is met, recommended_asset.json and
 /// recommended_scene.json. A point that fails is told in the result and the study goes on. Throws InputError for what
 /// is wrong with the files.
 StudyResult run_study(const StudyConfig& config, const StudyOptions& options);

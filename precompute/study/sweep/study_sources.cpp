@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -167,7 +168,10 @@ BodyFrames Split::run_variant(const std::filesystem::path& bundle, bool all, boo
   }
   write_bundle(model, bundle);
   scene.bundle = bundle;
-  return run_reduced(scene, input_.result.times).frames;
+  BodyFrames frames = run_reduced(scene, input_.result.times).frames;
+  std::error_code ignored;
+  std::filesystem::remove(bundle, ignored);
+  return frames;
 }
 
 void Split::add_full_space(std::optional<ErrorSource> source, const std::string& note, const Sight& sight,
@@ -356,6 +360,7 @@ void require_sources(const SourcesInput& input) {
                       fmt::format("an asset of the same examples: {}", fmt::join(names(input.asset), ", ")),
                       fmt::format("{}", fmt::join(names(exact), ", ")), "give its examples the same names and order"});
   InputFiles files;
+  require_same_object(exact, read_object(exact, files), input.plan.mesh);
   if (const std::string doubt = doubt_of(exact, files); !doubt.empty())
     throw InputError({file, "/sources/exact_examples", "an asset whose poses correspond exactly to the object", doubt,
                       "pose the object's own mesh, or give alignment.map"});
