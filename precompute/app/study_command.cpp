@@ -23,6 +23,18 @@ void print_front(const precompute::StudyResult& result) {
   }
 }
 
+void print_sources(const precompute::ErrorSplit& split, const std::string& headline) {
+  fmt::print("\n{:<16}{:>14}{:>14}\n", "source", headline + " [%]", "settled [%]");
+  for (const precompute::ErrorPart& part : split.parts) {
+    if (part.added)
+      fmt::print("{:<16}{:>14.3f}{:>14.3f}\n", name_of(part.source), 100 * part.added->mean, 100 * part.added->settled);
+    else
+      fmt::print("{:<16}{:>14}{:>14}\n", name_of(part.source), name_of(part.status), "");
+  }
+  fmt::print("{:<16}{:>14.3f}{:>14.3f}\n{}\n", "total", 100 * split.total.mean, 100 * split.total.settled,
+             split.advice);
+}
+
 }  // namespace
 
 void study_command(const StudyCommandOptions& options) {
@@ -36,9 +48,10 @@ void study_command(const StudyCommandOptions& options) {
   if (const std::string warning = result.truth_warning(); !warning.empty()) log::warning(warning);
   const std::string recommendation = precompute::recommendation_text(result);
   if (result.recommended) fmt::print("\n{}\n", recommendation);
+  if (result.sources && result.sources->failure.empty()) print_sources(*result.sources, result.headline());
   if (const std::size_t failed = result.failures(); failed > 0)
-    throw WorkError(fmt::format("{}: {} of {} points or their baseline failed; see the report", options.study, failed,
-                                result.points.size()));
+    throw WorkError(fmt::format("{}: {} of {} points, their baseline or the sources of errors failed; see the report",
+                                options.study, failed, result.points.size()));
   if (!recommendation.empty() && !result.recommended) throw WorkError(recommendation);
 }
 

@@ -2,7 +2,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <initializer_list>
@@ -10,20 +9,13 @@
 #include <utility>
 
 #include "common/core/markup.h"
+#include "precompute/study/drawing/svg_parts.h"
 
 namespace exmat::precompute {
 namespace {
 
-// Readable on light and dark pages.
-constexpr std::array<const char*, 8> kPalette{"#4477aa", "#ee6677", "#228833", "#c0a020",
-                                              "#33aacc", "#aa3377", "#888888", "#ee8833"};
-
 // Of a plot [px].
 constexpr double kWidth = 860, kHeight = 380, kLeft = 66, kRight = 300, kTop = 30, kBottom = 46;
-
-const char* colour_of(int colour) {
-  return colour < 0 ? "currentColor" : kPalette[static_cast<std::size_t>(colour) % kPalette.size()];
-}
 
 constexpr double kFewDecades = 0.7;  // on an axis: evenly spaced numbers say more than 1, 2, 5
 
@@ -98,11 +90,6 @@ std::string mark(int shape, double x, double y, const char* colour) {
 }
 
 const char* closing(int shape) { return shape % 6 == 0 ? "</circle>" : "</path>"; }
-
-std::string text_at(double x, double y, const char* anchor, const std::string& text, const char* more = "") {
-  return fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"{}\"{}>{}</text>\n", x, y, anchor, more,
-                     escaped(text));
-}
 
 std::string axes(const Plot& plot, const Axis& x, const Axis& y) {
   const double right = kWidth - kRight, bottom = kHeight - kBottom;

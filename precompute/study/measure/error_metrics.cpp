@@ -110,6 +110,14 @@ Distances at_nearest_phase(const Distances& apart, const BodyFrames& frames, con
 
 }  // namespace
 
+RelativeError headline_distance(const BodyFrames& frames, const BodyFrames& other, const BodyFrames& sized_by,
+                                const VertexArray& rest, const SparseMatrix& mass, bool free_body) {
+  const auto apart = free_body ? shapes_apart : positions_apart;
+  Distances distances = apart(frames, other, rest, mass);
+  distances.sizes = apart(sized_by, sized_by, rest, mass).sizes;
+  return distances.relative_error(kNothing * mass_norm(mass, rest.rowwise() - centre(mass, rest)), other.times);
+}
+
 double mass_norm(const SparseMatrix& mass, const VertexArray& field) {
   const VertexArray product = mass * field;
   return std::sqrt(std::max(0.0, product.cwiseProduct(field).sum()));

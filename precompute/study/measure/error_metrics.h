@@ -33,6 +33,11 @@ struct TrajectoryErrors {
 TrajectoryErrors trajectory_errors(const BodyFrames& frames, const BodyFrames& reference, const VertexArray& rest,
                                    const SparseMatrix& mass, bool free_body);
 
+/// Distance of two motions by the headline, over its size for a third: what parts of an error add up in. The distance
+/// of A and C is at most that of A and B plus that of B and C.
+RelativeError headline_distance(const BodyFrames& frames, const BodyFrames& other, const BodyFrames& sized_by,
+                                const VertexArray& rest, const SparseMatrix& mass, bool free_body);
+
 /// |x|_M of [n x 3] rows.
 double mass_norm(const SparseMatrix& mass, const VertexArray& field);
 

@@ -89,8 +89,11 @@ BodyFrames run(double time_step, const std::vector<double>& times, Take take, Re
   return frames;
 }
 
-FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data, bool baseline) {
-  FullSpaceModel model = build_full_space_model(data, full_space_options(config));
+FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data, bool baseline,
+                        const std::vector<PoseCoordinates>& coordinates) {
+  FullSpaceOptions options = full_space_options(config);
+  options.coordinates = coordinates;
+  FullSpaceModel model = build_full_space_model(data, options);
   if (baseline) use_surface_targets(*data.object, model);
   return model;
 }
@@ -146,8 +149,9 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
   return result;
 }
 
-FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline)
-    : model(model_of(config, data, baseline)),
+FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline,
+                           const std::vector<PoseCoordinates>& coordinates)
+    : model(model_of(config, data, baseline, coordinates)),
       scene(full_space_scene(config, runtime::make_obstacles(config), model)),
       state(full_space_start(config, model, start_of(config, data, baseline))),
       workspace(model) {
@@ -162,8 +166,9 @@ FullSpaceReport FullSpaceRun::sound_step() {
   return report;
 }
 
-BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times) {
-  FullSpaceRun body(config, data, false);
+BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times,
+                          const std::vector<PoseCoordinates>& coordinates) {
+  FullSpaceRun body(config, data, false, coordinates);
   CentreVelocity centre;
   if (!config.obstacles.empty() && body.model.frame)
     centre = [&, weights = vertex_masses(data)]() -> Eigen::Vector3d {

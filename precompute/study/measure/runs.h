@@ -35,13 +35,16 @@ std::string target_of(const runtime::LoadedScene& loaded);
 ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times);
 
 /// The same in full space, of the body of a whole bundle, from the deformation that the reduced scene begins at.
-BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times);
+/// `coordinates`, as FullSpaceOptions has them, hold all targets; none: all poses that descriptors stand for.
+BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times,
+                          const std::vector<PoseCoordinates>& coordinates = {});
 
 /// A body in full space, ready to step.
 struct FullSpaceRun {
   /// As run_full_space() steps it, or the baseline of the paper's Table 2: that of surface targets, from rest. Its
   /// example forces are elastic, as the scene has them; in place of linear ones, with the factor 1 and no damping.
-  FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline);
+  FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline,
+               const std::vector<PoseCoordinates>& coordinates = {});
 
   /// Throws WorkError at a number that is not finite.
   FullSpaceReport sound_step();

@@ -3,45 +3,24 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
-#include <limits>
 #include <nlohmann/json.hpp>
 
 #include "common/core/atomic_file.h"
 #include "precompute/inputs/inputs.h"
+#include "precompute/study/measure/error_json.h"
 
 namespace exmat::precompute {
 namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-Ordered number(double value) { return std::isfinite(value) ? Ordered(value) : Ordered(nullptr); }
-
-double number_from(const Ordered& json) {
-  return json.is_null() ? std::numeric_limits<double>::infinity() : json.get<double>();
-}
-
-Ordered to_json(const RelativeError& error) {
-  return {{"mean", number(error.mean)},
-          {"max", number(error.max)},
-          {"end", number(error.end)},
-          {"settled", number(error.settled)}};
-}
-
-Ordered to_json(const std::optional<RelativeError>& error) { return error ? to_json(*error) : Ordered(nullptr); }
-
-std::optional<RelativeError> relative_from(const Ordered& json) {
-  if (json.is_null()) return std::nullopt;
-  return RelativeError{number_from(json.at("mean")), number_from(json.at("max")), number_from(json.at("end")),
-                       number_from(json.at("settled"))};
-}
-
 TrajectoryErrors errors_from(const Ordered& json) {
   TrajectoryErrors errors;
-  errors.position = relative_from(json.at("position")).value();
-  errors.velocity = relative_from(json.at("velocity")).value();
+  errors.position = relative_error_from(json.at("position")).value();
+  errors.velocity = relative_error_from(json.at("velocity")).value();
   errors.energy = number_from(json.at("energy"));
-  errors.shape = relative_from(json.at("shape"));
-  errors.nearest_phase = relative_from(json.at("nearest_phase")).value();
+  errors.shape = relative_error_from(json.at("shape"));
+  errors.nearest_phase = relative_error_from(json.at("nearest_phase")).value();
   if (json.contains("rebound")) errors.rebound = number_from(json.at("rebound"));
   errors.worst_frame = json.at("worst_frame").get<std::size_t>();
   return errors;
@@ -56,7 +35,7 @@ PointResult point_from(const Ordered& json) {
   json.at("failure").get_to(result.failure);
   result.errors = errors_from(json.at("errors"));
   json.at("errors").at("worst_time").get_to(result.worst_time);
-  result.from_all_elements = relative_from(json.at("errors").at("from_all_elements"));
+  result.from_all_elements = relative_error_from(json.at("errors").at("from_all_elements"));
   json.at("modes").get_to(result.modes);
   json.at("elements").get_to(result.elements);
   json.at("internal_force").get_to(result.internal_force);
@@ -112,13 +91,13 @@ Ordered to_json(const PointResult& result) {
                {"failure", result.failure}};
   json["errors"] = {{"position", to_json(errors.position)},
                     {"velocity", to_json(errors.velocity)},
-                    {"energy", number(errors.energy)},
+                    {"energy", json_number(errors.energy)},
                     {"shape", to_json(errors.shape)},
                     {"nearest_phase", to_json(errors.nearest_phase)},
                     {"from_all_elements", to_json(result.from_all_elements)},
                     {"worst_frame", errors.worst_frame},
                     {"worst_time", result.worst_time}};
-  if (errors.rebound) json["errors"]["rebound"] = number(*errors.rebound);  // else there was none
+  if (errors.rebound) json["errors"]["rebound"] = json_number(*errors.rebound);  // else there was none
   json["modes"] = result.modes;
   json["elements"] = result.elements;
   json["internal_force"] = result.internal_force;

@@ -10,6 +10,7 @@
 
 #include "common/core/markup.h"
 #include "precompute/study/drawing/svg.h"
+#include "precompute/study/sources/split_text.h"
 
 namespace exmat::precompute {
 namespace {
@@ -418,14 +419,21 @@ std::string recommendation_text(const StudyResult& result) {
   return fmt::format("{}: no point", budget_text(result.budget));
 }
 
+std::string sources_point(const StudyResult& result) {
+  const std::size_t i = result.sources->point;
+  return fmt::format("point {} ({})", i + 1, describe(result.points[i].settings));
+}
+
 std::string report_html(const StudyResult& result) {
   return fmt::format(
              "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta "
              "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}{2}{3}"
              "</style>\n</head>\n<body>\n<h1>{0}</h1>\n",
              escaped(result.config.name), kStyle, shades("full", 212), shades("reduced", 24)) +
-         summary(result) + plots(result) + baseline_table(result) + pictures(result) + points_table(result) +
-         references_table(result) + warnings(result) + "</body>\n</html>\n";
+         summary(result) + plots(result) +
+         (result.sources ? split_html(*result.sources, sources_point(result), result.headline()) : "") +
+         baseline_table(result) + pictures(result) + points_table(result) + references_table(result) +
+         warnings(result) + "</body>\n</html>\n";
 }
 
 }  // namespace exmat::precompute

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/atomic_file.h"
+#include "precompute/study/sources/split_text.h"
 #include "precompute/study/sweep/report.h"
 
 namespace exmat::precompute {
@@ -123,8 +124,8 @@ Ordered to_json(const ReferenceResult& reference) {
 
 Ordered limit(std::optional<double> value) { return value ? Ordered(*value) : Ordered(nullptr); }
 
-void write_or_remove(const std::filesystem::path& file, const std::optional<Ordered>& content) {
-  if (content) return write_file_atomically(file, content->dump(2) + "\n");
+void write_or_remove(const std::filesystem::path& file, const std::optional<std::string>& content) {
+  if (content) return write_file_atomically(file, *content);
   std::error_code ignored;
   std::filesystem::remove(file, ignored);
 }
@@ -172,6 +173,7 @@ Ordered results_json(const StudyResult& result) {
                      {"zhu_interp_ms", paper->zhu_interp},
                      {"zhu_total_ms", paper->zhu_total}};
   json["budget"] = {{"seconds", limit(result.budget.seconds)}, {"error", limit(result.budget.error)}};
+  json["sources"] = result.sources ? to_json(*result.sources) : Ordered(nullptr);
   json["recommended"] = result.recommended ? Ordered(*result.recommended) : Ordered(nullptr);
   json["nearest"] = result.nearest ? Ordered(*result.nearest) : Ordered(nullptr);
   return json;
@@ -210,11 +212,19 @@ void write_results(const StudyResult& result, const std::filesystem::path& folde
   write_file_atomically(folder / "results.csv", results_csv(result));
   write_file_atomically(folder / "results.json", results_json(result).dump(2) + "\n");
   write_file_atomically(folder / "report.html", report_html(result));
-  std::optional<Ordered> asset, scene;
+  std::optional<std::string> asset, scene, markdown, csv, svg;
   if (result.recommended) {
-    asset = asset_fragment(result, result.points[*result.recommended]);
-    scene = scene_fragment(result, result.points[*result.recommended]);
+    asset = asset_fragment(result, result.points[*result.recommended]).dump(2) + "\n";
+    scene = scene_fragment(result, result.points[*result.recommended]).dump(2) + "\n";
   }
+  if (const auto& sources = result.sources) {
+    markdown = split_markdown(*sources, result.config.name, sources_point(result), result.headline());
+    csv = split_csv(*sources);
+    if (sources->failure.empty()) svg = split_svg(*sources, result.headline());
+  }
+  write_or_remove(folder / "sources.md", markdown);
+  write_or_remove(folder / "sources.csv", csv);
+  write_or_remove(folder / "sources.svg", svg);
   write_or_remove(folder / "recommended_asset.json", asset);
   write_or_remove(folder / "recommended_scene.json", scene);
 }

@@ -19,8 +19,8 @@ nlohmann::ordered_json results_json(const StudyResult& result);
 nlohmann::ordered_json asset_fragment(const StudyResult& result, const PointResult& point);
 nlohmann::ordered_json scene_fragment(const StudyResult& result, const PointResult& point);
 
-/// report.html, results.csv, results.json and recommended_asset.json, recommended_scene.json; the last two go where
-/// nothing is recommended.
+/// report.html, results.csv, results.json; recommended_asset.json and recommended_scene.json, which go where nothing is
+/// recommended; the three files sources.*, which go where errors are not split.
 void write_results(const StudyResult& result, const std::filesystem::path& folder);
 
 }  // namespace exmat::precompute

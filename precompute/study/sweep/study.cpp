@@ -18,6 +18,7 @@
 #include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/study/sweep/results_files.h"
 #include "precompute/study/sweep/study_plan.h"
+#include "precompute/study/sweep/study_sources.h"
 #include "precompute/study/sweep/workers.h"
 #include "runtime/kernels/kernels.h"
 
@@ -68,6 +69,9 @@ class Study {
   void add_worst_frame(std::size_t point);
   void add_worst_frames();
 
+  SourcesInput sources_input() const {
+    return {config_, asset_, scene_, plan_, result_, options_.folder, options_.jobs};
+  }
   SceneConfig scene_of(const PointPlan& point, const std::string& bundle) const {
     SceneConfig scene = with_settings(scene_, point.settings);
     scene.bundle = bundle_file(bundle);
@@ -367,7 +371,10 @@ void Study::add_worst_frames() {
 StudyResult Study::run() {
   plan_ = plan_study(config_, asset_, scene_, result_);
   failures_.resize(plan_.points.size());
-  for (const char* folder : {"bundles", "references", "points", "timing"}) make_folder(options_.folder / folder);
+  if (config_.sources) require_sources(sources_input());
+  std::vector<const char*> folders{"bundles", "references", "points", "timing"};
+  if (config_.sources) folders.push_back("sources");
+  for (const char* folder : folders) make_folder(options_.folder / folder);
   log::info(fmt::format("{}: {} points, {} bundles, {} full-space runs, {} frames", config_.name, plan_.points.size(),
                         plan_.bundles.size(), plan_.references.size(), result_.times.size()));
   build_bundles(options_.jobs);
@@ -377,6 +384,7 @@ StudyResult Study::run() {
   collect();
   measure_times();
   decide();
+  if (config_.sources) result_.sources = measure_sources(sources_input(), result_.recommended.value_or(result_.own));
   add_worst_frames();
   return std::move(result_);
 }
@@ -385,7 +393,8 @@ StudyResult Study::run() {
 
 std::size_t StudyResult::failures() const {
   const auto failed = [](const auto& item) { return !item.failure.empty(); };
-  return static_cast<std::size_t>(std::ranges::count_if(points, failed) + !baseline_failure.empty());
+  return static_cast<std::size_t>(std::ranges::count_if(points, failed) + !baseline_failure.empty() +
+                                  (sources && !sources->failure.empty()));
 }
 
 const ReferenceResult* StudyResult::reference_of(const PointResult& point) const {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "precompute/study/measure/inverted_tets.h"
+#include "precompute/study/sources/error_split.h"
 #include "precompute/study/sweep/pareto.h"
 #include "precompute/study/sweep/point_result.h"
 #include "precompute/study/sweep/study_config.h"
@@ -52,12 +53,13 @@ struct StudyResult {
   std::string baseline_failure;       ///< empty: none
   Budget budget;
   std::optional<std::size_t> recommended, nearest;
+  std::optional<ErrorSplit> sources;     ///< of the recommended point, else of `own`
   std::vector<WorstFrame> worst_frames;  ///< of the least accurate point, the files' own and the recommended one
   TriangleArray surface;                 ///< n_f x 3
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity
   std::string processor, instruction_set;
 
-  std::size_t failures() const;  ///< points, references and baselines
+  std::size_t failures() const;  ///< points, baseline and sources of errors
 
   /// What points are chosen by, TrajectoryErrors::headline(): "shape" or "position".
   const char* headline() const { return free_body ? "shape" : "position"; }
@@ -72,9 +74,10 @@ struct StudyResult {
 /// Error, TrajectoryErrors::headline(), and time of a step of each point; those of failed ones are not finite.
 std::vector<Outcome> outcomes(const std::vector<PointResult>& points);
 
-/// Runs what is not finished in the folder, times all points, and writes report.html, results.csv, results.json and,
-/// where a budget is met, recommended_asset.json and recommended_scene.json. A point that fails is told in the result
-/// and the study goes on. Throws InputError for what is wrong with the files.
+/// Runs what is not finished in the folder, times all points, and writes report.html, results.csv, results.json, where
+/// errors are split the three files sources.*, and, where a budget is met, recommended_asset.json and
+/// recommended_scene.json. A point that fails is told in the result and the study goes on. Throws InputError for what
+/// is wrong with the files.
 StudyResult run_study(const StudyConfig& config, const StudyOptions& options);
 
 }  // namespace exmat::precompute

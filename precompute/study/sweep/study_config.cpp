@@ -42,6 +42,14 @@ StudyConfig load_study(const std::filesystem::path& file) {
   const Json reference = member_or(json, "reference", Json::object());
   study.reference = {optional_member<double>(reference, "time_step"),
                      optional_member<std::string>(reference, "integrator")};
+  if (json.contains("sources")) {
+    const Json& sources = json["sources"];
+    study.sources.emplace();
+    study.sources->eigenfunctions = optional_member<int>(sources, "eigenfunctions");
+    study.sources->time_steps = sources.value("time_steps", study.sources->time_steps);
+    if (sources.contains("exact_examples"))
+      study.sources->exact_examples = resolve_path(file, sources["exact_examples"]);
+  }
   const Json timing = member_or(json, "timing", Json::object());
   study.timing.rounds = timing.value("rounds", study.timing.rounds);
   study.timing.steps = timing.value("steps", study.timing.steps);

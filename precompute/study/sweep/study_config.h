@@ -31,6 +31,13 @@ struct ReferenceConfig {
   std::optional<std::string> integrator;
 };
 
+/// How the error of one point is split by its sources.
+struct SourcesConfig {
+  std::optional<int> eigenfunctions;  ///< m of the full problem; absent: twice the point's, or the largest of the study
+  int time_steps = 2;                 ///< of the full problem, for one of the point's; 1: that source is left out
+  std::optional<std::filesystem::path> exact_examples;  ///< asset file whose poses correspond exactly to the object
+};
+
 /// Times of the paper's Table 2 [ms].
 struct PaperTimes {
   double interp = 0, total = 0, zhu_interp = 0, zhu_total = 0;
@@ -44,6 +51,7 @@ struct StudyConfig {
   int frames = 200;
   std::vector<SweepConfig> sweeps;
   ReferenceConfig reference;
+  std::optional<SourcesConfig> sources;
   TimingConfig timing;
   bool baseline = false;
   std::optional<PaperTimes> paper;

@@ -75,6 +75,42 @@ TEST_F(ErrorMetrics, OfTranslationsAreKnown) {
   EXPECT_FALSE(errors.shape);
 }
 
+// All are over one size, whichever two are apart.
+TEST_F(ErrorMetrics, BetweenTwoMotionsAreOverTheSizeOfAThird) {
+  const BodyFrames full = shifted({1, 2, 2}, {}), a = shifted({1.1, 2.4, 1.8}, {}), b = shifted({0, 2.4, 1}, {});
+  const RelativeError error = headline_distance(a, b, full, mesh_.vertices, mass_, false);
+  const double size = std::sqrt((1.0 + 4 + 4) / 3);
+  EXPECT_NEAR(error.mean, std::sqrt((1.21 + 0 + 0.64) / 3) / size, 1e-12);
+  EXPECT_NEAR(error.max, 1.1 / size, 1e-12);
+  EXPECT_NEAR(error.end, 0.8 / size, 1e-12);
+  EXPECT_NEAR(error.settled, 0.8 / size, 1e-12);
+}
+
+TEST_F(ErrorMetrics, OfShapesObeyTheTriangleInequality) {
+  const auto turned = [&](double size) {
+    BodyFrames frames = still();
+    for (VertexArray& x : frames.positions) {
+      const Eigen::Quaterniond turn =
+          Eigen::Quaterniond(Eigen::Vector4d(random_field(1).topRows<1>().sum(), 1, -1, 0.5)).normalized();
+      x = (x + random_field(size)) * turn.toRotationMatrix().transpose();
+      x.rowwise() += random_field(3).row(0);
+    }
+    return frames;
+  };
+  const BodyFrames full = turned(0.1), a = turned(0.1), b = turned(0.05);
+  const auto apart = [&](const BodyFrames& one, const BodyFrames& other) {
+    return headline_distance(one, other, full, mesh_.vertices, mass_, true);
+  };
+  const RelativeError direct = apart(a, full), first = apart(b, full), second = apart(a, b);
+  for (const auto member : {&RelativeError::mean, &RelativeError::max, &RelativeError::end, &RelativeError::settled}) {
+    EXPECT_GT(direct.*member, 0.1);
+    EXPECT_LE(direct.*member, first.*member + second.*member);
+  }
+  const TrajectoryErrors errors = compare(a, full, true);
+  EXPECT_NEAR(direct.mean, errors.shape.value().mean, 1e-12);
+  EXPECT_NEAR(direct.settled, errors.shape->settled, 1e-12);
+}
+
 // Norms against the integral over each tet of the interpolated field, by its closed form.
 TEST_F(ErrorMetrics, UseTheConsistentMass) {
   const Eigen::VectorXd density = Eigen::VectorXd::LinSpaced(mesh_.tet_count(), 500, 1500);

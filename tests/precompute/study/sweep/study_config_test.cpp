@@ -17,6 +17,9 @@ TEST(StudyFile, FillsInDefaultsAndResolvesPaths) {
   const StudyConfig study = load_study(file);
   EXPECT_EQ(study.asset, folder.path("a/asset.json"));
   EXPECT_EQ(study.scene.lexically_normal(), folder.path("scene.json"));
+  EXPECT_FALSE(study.sources) << "which takes as long as the study";
+  const auto asked = folder.write("b.json", R"({"name": "s", "asset": "a", "scene": "b", "sources": {}})");
+  EXPECT_EQ(load_study(asked).sources.value().time_steps, 2);
   EXPECT_FALSE(study.steps || study.paper || study.baseline || study.reference.time_step);
   EXPECT_EQ(study.frames, 200);
   ASSERT_EQ(study.sweeps.size(), 1U) << "the files' own settings";
@@ -32,6 +35,7 @@ TEST(StudyFile, ReadsEveryMember) {
                  "cubature_elements": [4, 5], "material": ["corotational"],
                  "time_step": [0.01], "integrator": ["newmark"], "internal_force": ["all_elements"], "target": ["solve"], "elastic_stiffness": [0.5, 2]} ],
     "reference": {"time_step": 0.002, "integrator": "bdf2"},
+    "sources": {"eigenfunctions": 40, "time_steps": 4, "exact_examples": "c.json"},
     "timing": {"rounds": 2, "steps": 8, "baseline_steps": 9},
     "paper": {"interp_ms": 1, "total_ms": 2, "zhu_interp_ms": 3, "zhu_total_ms": 4} })"));
   const SweepConfig& sweep = study.sweeps.at(0);
@@ -46,6 +50,9 @@ TEST(StudyFile, ReadsEveryMember) {
   EXPECT_EQ(study.steps, 7);
   EXPECT_EQ(study.reference.time_step, 0.002);
   EXPECT_EQ(study.reference.integrator, "bdf2");
+  EXPECT_EQ(study.sources.value().eigenfunctions, 40);
+  EXPECT_EQ(study.sources->time_steps, 4);
+  EXPECT_EQ(study.sources->exact_examples, folder.path("c.json"));
   EXPECT_EQ(study.timing.baseline_steps, 9);
   EXPECT_TRUE(study.baseline);
   EXPECT_EQ(study.paper.value().zhu_total, 4);
@@ -65,6 +72,8 @@ TEST(StudyFile, IsRefusedWithThePlaceAndWhatToDo) {
       {head + R"("sweeps": [{"linear_modes": [0]}]})", "/sweeps/0/linear_modes/0: expected an integer >= 1"},
       {head + R"("sweeps": [{"training": ["some"]}]})", "/sweeps/0/training/0: expected"},
       {head + R"("reference": {"time_step": 0}})", "/reference/time_step: expected a number > 0"},
+      {head + R"("sources": {"eigenfunctions": 1}})", "/sources/eigenfunctions: expected an integer >= 2"},
+      {head + R"("sources": {"exact_example": "a.json"}})", "did you mean \"exact_examples\"?"},
       {head + R"("sweeps": [{"basis_size": [3, 3]}]})", "each element once"},
       {head + R"("sweeps": [{"internal_force": ["auto"]}]})", "\"all_elements\""},
       {head + R"("timing": {"rounds": 0}})", "/timing/rounds"},
