@@ -223,6 +223,16 @@ TEST_F(Sources, OfFreeBodiesWithoutExamplesAreOfTheirShape) {
   EXPECT_THAT(read_file(folder_.path("out/sources.md")), HasSubstr("Error of shape against full space"));
 }
 
+// All motions begin at the same deformation, whatever the full problem makes of the pose: in 0.1 ms none has gone far.
+TEST_F(Sources, OfABodyThatBeginsInAPose) {
+  write_scene(folder_, R"({ "time_step": 1e-5, "steps": 10, "body": { "pose": { "example": "twist", "weight": 0.5 } },
+    "examples": { "stiffness": 300, "bias": 0.7 } })"_json);
+  const Json found = split({{"time_steps", 1}}, R"({"sweeps": [ { "internal_force": ["all_elements"] } ]})"_json);
+  ASSERT_EQ(found["failure"], "");
+  EXPECT_LE(found["sum"]["max"], 1e-3) << found.dump(1);
+  EXPECT_GT(found["total"]["mean"], 0);
+}
+
 TEST_F(Sources, AreNotRunWhereTheStudyDoesNotAskForThem) {
   write_study(nullptr);
   EXPECT_EQ(run("out").status, 0);

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <functional>
 
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGood = 0.01;  // total error that needs no advice
+constexpr double kGood = 0.01;      // total error that needs no advice
+constexpr double kAlsoLarge = 0.5;  // of the largest part: worth a word
 
 void add(RelativeError& sum, const RelativeError& part) {
   sum.mean += part.mean;
@@ -85,13 +87,14 @@ ErrorSplit split_error(const std::vector<ChainMotion>& chain, const std::vector<
 }
 
 std::string advice_on(const ErrorSplit& split, const PointKnobs& knobs) {
-  const ErrorPart* largest = nullptr;
-  bool all_known = true;
-  for (const ErrorPart& part : split.parts) {
-    all_known = all_known && part.status != PartStatus::kNotKnown;
-    if (part.added && (largest == nullptr || part.added->mean > largest->added->mean)) largest = &part;
-  }
-  if (largest == nullptr) return "Nothing is approximated.";
+  std::vector<const ErrorPart*> known;
+  for (const ErrorPart& part : split.parts)
+    if (part.added) known.push_back(&part);
+  if (known.empty()) return "Nothing is approximated.";
+  std::ranges::stable_sort(known, std::greater(), [](const ErrorPart* part) { return part->added->mean; });
+  const ErrorPart* largest = known.front();
+  const bool all_known =
+      std::ranges::none_of(split.parts, [](const ErrorPart& part) { return part.status == PartStatus::kNotKnown; });
   const std::string name(name_of(largest->source));
   std::string text = split.total.mean <= kGood
                          ? fmt::format("Near the full problem ({}); the most of it is {} of {}: to come nearer, {}",
@@ -99,6 +102,8 @@ std::string advice_on(const ErrorSplit& split, const PointKnobs& knobs) {
                                        what_to_turn(largest->source, knobs))
                          : fmt::format("The most of the error of {} is {} of {}: {}", percent(split.total.mean),
                                        percent(largest->added->mean), name, what_to_turn(largest->source, knobs));
+  if (known.size() > 1 && known[1]->added->mean >= kAlsoLarge * largest->added->mean)
+    text += fmt::format("; next is {} with {}", name_of(known[1]->source), percent(known[1]->added->mean));
   return text + (all_known ? "." : "; what is not known below is not among it.");
 }
 

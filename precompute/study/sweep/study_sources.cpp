@@ -264,11 +264,11 @@ void Split::plan_sight() {
 void Split::plan() {
   plan_sight();
   add_reduced(ErrorSource::kBasis, fmt::format("r = {} with all tets against full space", point_.modes), true, true);
-  const bool all_tets = point_.internal_force == "polynomial" || settings_.internal_force == kAllElements;
-  add_reduced(ErrorSource::kCubature,
-              all_tets ? fmt::format("{} against all tets one by one", point_.internal_force)
-                       : fmt::format("s = {} elements against all tets", point_.elements),
-              false, true);
+  const std::string elements = settings_.internal_force == kAllElements ? "all tets against themselves"
+                               : point_.internal_force == "polynomial"
+                                   ? "the polynomial against all tets"
+                                   : fmt::format("s = {} elements against all tets", point_.elements);
+  add_reduced(ErrorSource::kCubature, elements, false, true);
   if (examples())
     add_reduced(
         ErrorSource::kTable,

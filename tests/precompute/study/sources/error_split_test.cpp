@@ -62,7 +62,8 @@ TEST_F(Split, IsThatOfSuccessiveMotionsOverTheSizeOfTheFirst) {
 TEST_F(Split, AdvisesByTheLargestPart) {
   PointKnobs knobs{20, 30, 60, 0.001, true, "table"};
   ErrorSplit found = split();
-  EXPECT_THAT(advice_on(found, knobs), HasSubstr("ask for more cubature.elements than 60; what is not known"));
+  EXPECT_THAT(advice_on(found, knobs),
+              HasSubstr("ask for more cubature.elements than 60; next is basis with 40 %; what is not known"));
   const auto advice = [&](ErrorSource source) {
     ErrorSplit alone;
     alone.total.mean = 0.2;
