@@ -70,13 +70,7 @@ RollOut BasisChooser::run(const Eigen::MatrixXd& basis) const {
   model.object = body_.object;
   put_basis(stages_, basis, model);
   const ObjectData& object = *model.object;
-  model.cubature = all_elements(object.mesh, object.materials, model.modal->basis);
-  put_target_elasticity(stages_, all_target_elements, model);
-  if (!stages_.system.constrained())
-    model.rigid = rigid_moments(object.mesh, object.materials.density, model.modal->basis);
-  if (body_.contact)
-    model.contact = contact_data(object, model.modal->basis, stages_.object.contact, stages_.asset.contact_count);
-  return final_roll_out(stages_, model, *motions_);
+  return cubature_roll_out(stages_, model, all_elements(object.mesh, object.materials, model.modal->basis), *motions_);
 }
 
 BasisChoice BasisChooser::choose(int size) const {
@@ -125,6 +119,20 @@ BasisChoice choose_basis(const BodyStages& stages, const ReducedModel& body, con
 void put_basis(const BodyStages& stages, const Eigen::MatrixXd& basis, ReducedModel& model) {
   model.modal = modal_data(stages.system, stages.modes, stages.system.extend(basis));
   if (stages.fitter != nullptr) stages.fitter->put(stages.targets, model);
+}
+
+RollOut cubature_roll_out(const BodyStages& stages, const ReducedModel& model, const CubatureData& cubature,
+                          const Motions& motions) {
+  ReducedModel body = model;
+  const ObjectData& object = *body.object;
+  body.cubature = cubature;
+  body.cubature->internal_force = ForceMethod::kCubature;
+  put_target_elasticity(stages, all_target_elements, body);
+  if (!stages.system.constrained())
+    body.rigid = rigid_moments(object.mesh, object.materials.density, body.modal->basis);
+  if (motions.loads.obstacle)
+    body.contact = contact_data(object, body.modal->basis, stages.object.contact, stages.asset.contact_count);
+  return final_roll_out(stages, body, motions);
 }
 
 RollOut final_roll_out(const BodyStages& stages, const ReducedModel& model, const Motions& motions) {

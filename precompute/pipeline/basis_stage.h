@@ -51,6 +51,11 @@ BasisChoice choose_basis(const BodyStages& stages, const ReducedModel& body, con
 /// Puts the basis into a model that has /object, with shape space, examples and targets in it.
 void put_basis(const BodyStages& stages, const Eigen::MatrixXd& basis, ReducedModel& model);
 
+/// How far the body of this cubature is from the full space in the held-out runs, with forces by its elements alone;
+/// `model` has the basis.
+RollOut cubature_roll_out(const BodyStages& stages, const ReducedModel& model, const CubatureData& cubature,
+                          const Motions& motions);
+
 /// How far the finished model is from the full space in the held-out runs.
 RollOut final_roll_out(const BodyStages& stages, const ReducedModel& model, const Motions& motions);
 

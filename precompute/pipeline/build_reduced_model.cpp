@@ -19,6 +19,7 @@
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/modes/linear_modes.h"
 #include "precompute/pipeline/basis_stage.h"
+#include "precompute/pipeline/cubature_stage.h"
 #include "precompute/pipeline/target_elasticity_stage.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
@@ -415,10 +416,8 @@ ReducedModel Pipeline::run() {
     set_motions(motions->set.runs.snapshots, motions->own_columns(), motions->set.heldout.snapshots, system, basis,
                 source);
   model.cubature = timed("cubature", [&] {
-    const CubatureOptions options = cubature_options();
-    return cache_.get(
-        "cubature", [&] { return build_cubature(object_.mesh, object_.materials, source, options); }, object_.mesh,
-        object_.materials, source, options);
+    const bool judged = motions && needs_.internal_force != ForceMethod::kPolynomial;
+    return choose_cubature(stages, source, cubature_options(), model, judged ? &*motions : nullptr, cache_);
   });
   log::info(fmt::format("cubature: {} elements, held-out errors: force {:.2f} %, energy {:.2f} %, stiffness {:.2f} %",
                         model.cubature->elements.size(), 100 * model.cubature->heldout_error,

@@ -295,6 +295,12 @@ TEST_F(Sources, AreRefusedBeforeAnythingIsRun) {
   refused({{"eigenfunctions", 60}}, "study.json: /sources/eigenfunctions: expected at most 51");
   refused({{"exact_examples", "none.json"}}, "none.json");
   refused({{"exact_examples", "asset.json"}}, "study.json: /sources/exact_examples: expected an asset whose poses");
+  Json scene = Json::parse(read_file(folder_.path("scene.json")));
+  const Json linear = scene;
+  scene["examples"]["force"] = "elastic";
+  folder_.write("scene.json", scene.dump());
+  refused(Json::object(), "study.json: /sources: expected a study of linear example forces");
+  folder_.write("scene.json", linear.dump());
   write_exact_asset();
   Json other = Json::parse(read_file(folder_.path("exact.json")));
   other["examples"][0]["name"] = "bend";

@@ -1,5 +1,9 @@
+#include <algorithm>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sstream>
+#include <string>
+#include <vector>
 
 #include "common/bundle/bundle.h"
 #include "tests/integration/support.h"
@@ -42,6 +46,24 @@ TEST_F(Training, OfASceneIsSaidInLogSummaryBundleAndInfo) {
   const Outcome info = exmat_runtime({"info", bundle_});
   EXPECT_THAT(info.output, HasSubstr("from the full space under the loads of the scene"));
   EXPECT_THAT(info.output, HasSubstr(model.fidelity->advice));
+}
+
+// Of the selections of elements that the log tells of, the bundle has the one that is nearest in the held-out runs.
+TEST_F(Training, JudgesCubatureByRuns) {
+  const Outcome made = bundle(R"({ "training": "auto", "training_segments": 3 })",
+                              {"--scene", scene(R"({ "gravity": [0, 0, -1], "examples": { "stiffness": 50 },
+                                                     "internal_force": "cubature" })")});
+  ASSERT_EQ(made.status, 0) << made.errors;
+  const std::string before = "error in held-out runs of 4 selections ";
+  const auto at = made.errors.find(before);
+  ASSERT_NE(at, std::string::npos) << made.errors;
+  std::istringstream said(made.errors.substr(at + before.size()));
+  std::vector<double> errors(4);
+  std::string percent;
+  for (double& error : errors) said >> error >> percent;
+  ASSERT_TRUE(said) << made.errors;
+  EXPECT_GT(std::ranges::max(errors), std::ranges::min(errors)) << "the test would not notice";
+  EXPECT_NEAR(100 * read_bundle(bundle_).fidelity->shape_error, std::ranges::min(errors), 0.005);  // as printed
 }
 
 TEST_F(Training, OfDeclaredLoadsNeedsNoScene) {

@@ -331,12 +331,23 @@ ErrorSplit Split::measure() {
   return split;
 }
 
+// Whether any example force of the point is elastic.
+bool has_elastic_force(const SceneConfig& scene) {
+  const Needs needs = needs_of(scene);
+  return needs.target_elasticity ||
+         (needs.regions && std::ranges::any_of(*needs.regions, &RegionNeeds::target_elasticity));
+}
+
 }  // namespace
 
 void require_sources(const SourcesInput& input) {
   const SourcesConfig& sources = *input.config.sources;
   const std::string file = input.config.file.string();
   if (!input.result.has_examples) return;
+  for (const PointPlan& point : input.plan.points)
+    if (has_elastic_force(with_settings(input.scene, point.settings)))
+      throw InputError({file, "/sources", "a study of linear example forces", "an elastic one",
+                        "leave /sources out, or study the linear force alone"});
   if (sources.eigenfunctions) {
     const int least = largest_of_points(input.plan) + 1, most = most_functions(input.plan);
     if (*sources.eigenfunctions < least)

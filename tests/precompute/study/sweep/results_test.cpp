@@ -218,8 +218,8 @@ TEST(Recommendation, IsPutInWords) {
   result.budget.seconds = 35e-6;
   result.recommended = 1;
   EXPECT_EQ(recommendation_text(result),
-            "at most 35 us: point 2 (m 10, r 20 of 15 linear modes, s 40, stvk, 1 ms, bdf2, cubature, target table): "
-            "2.00 %, 30.0 us a step");
+            "at most 35 us: point 2 (m 10, r 20 of 15 linear modes, training auto, s 40, stvk, 1 ms, bdf2, "
+            "cubature, target table): 2.00 %, 30.0 us a step");
   result.recommended.reset();
   result.nearest = 0;
   EXPECT_THAT(recommendation_text(result), HasSubstr("no point; the nearest is point 1"));
