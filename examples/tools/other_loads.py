@@ -97,14 +97,19 @@ def declared(scene):
     return {"forces": pushes, "gravity": scene.get("gravity", [0, 0, 0]), "examples": {"stiffness": force["stiffness"]}}
 
 
-def trained_asset(asset, source, training, scene):
+def absolute(asset, source):
+    """An asset that may lie elsewhere, without its render mesh."""
     asset = json.loads(json.dumps(asset))
-    asset["object"]["mesh"] = str((source / asset["object"]["mesh"]).resolve())
-    for example in asset["examples"]:
-        example["mesh"] = str((source / example["mesh"]).resolve())
+    asset["object"].pop("render_mesh", None)
+    for part in (asset["object"], *asset["examples"]):
+        part["mesh"] = str((source / part["mesh"]).resolve())
+    return asset
+
+
+def trained_asset(asset, source, training, scene):
+    asset = absolute(asset, source)
     # References that stay inverted are no truth: this material does not.
     asset["object"]["material"]["model"] = "stable_neo_hookean"
-    asset["object"].pop("render_mesh", None)
     asset |= {"internal_force": "cubature", "cubature": {"elements": ELEMENTS}}
     asset["basis"] |= {"size": MODES, "training": {"nothing": "none", "the scene": "scene", "declared loads": "loads", "all kinds": "auto"}[training]}
     if training == "declared loads":
@@ -184,6 +189,10 @@ def page(tables):
              "space, mean over 1.5 to 2 s (the cross 0.6 s), of the position, on the free cross of the shape ([definitions](../error_metrics.md)).",
              "Columns are what the basis and the cubature of a bundle have learned from, rows what the bundle is then run with.", ""]
     lines += [f"- {name}: {text}." for name, text in TRAININGS.items()]
+    lines += ["", "So make the bundle for the scene that it is to run (`--scene`), and make it again when the loads change: their sizes may differ by a factor of four,",
+              "their directions and vertices may not. Where loads are only known when the scene runs, declare what is known of them (`basis.loads`), take a larger",
+              "`basis.size`, and look at `/fidelity`, which says how far loads of that kind are from the full space. Where no example acts and a body",
+              "is stiff, `basis.training`: `none` is as good and takes no time. Strong pushes that may come anywhere on a soft body are beyond 30 modes of any kind."]
     for body, rows in tables.items():
         lines += ["", f"## {body.capitalize()}", "", "| run with | " + " | ".join(TRAININGS) + " |", "| --- |" + " ---: |" * len(TRAININGS)]
         lines += [f"| {test} | " + " | ".join(f"{100 * e:.2g} %" for e in errors) + " |" for test, errors in rows.items()]
