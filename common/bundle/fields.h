@@ -173,6 +173,7 @@ template <typename Fidelity, typename Visitor>
 void visit_fidelity(Fidelity& fidelity, Visitor& visit) {
   enter(kTopPlace, "/fidelity", visit);
   visit.attribute("loads", fidelity.loads);
+  visit.attribute("reference", fidelity.reference);
   visit.attribute("basis", fidelity.basis);
   visit.attribute("advice", fidelity.advice);
   visit.attribute("training_runs", fidelity.training_runs);

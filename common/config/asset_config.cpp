@@ -214,6 +214,7 @@ class AssetReader {
     asset.example_fields = json.value("example_fields", asset.example_fields);
     TrainingConfig& training = asset.training;
     training.from = choice_or(json, "training", training.from);
+    training.space = choice_or(json, "training_space", training.space);
     training.segments = json.value("training_segments", training.segments);
     training.seconds = optional_member<double>(json, "training_seconds");
     training.seed = optional_member<std::uint64_t>(json, "training_seed");

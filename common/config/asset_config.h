@@ -116,6 +116,7 @@ struct LoadsConfig {
 /// The runs in full space that basis and cubature learn from.
 struct TrainingConfig {
   Training from = Training::kAuto;
+  TrainingSpace space = TrainingSpace::kAuto;
   int segments = 8;
   std::optional<double> seconds;      ///< of one segment, about; absent: 0.8 periods of the lowest mode
   std::optional<std::uint64_t> seed;  ///< absent: the asset's

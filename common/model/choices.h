@@ -26,6 +26,11 @@ enum class Training { kAuto, kNone, kScene, kLoads };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<Training>{"auto", "none", "scene", "loads"};
 
+/// What runs of training have: all degrees of freedom, or those of many modes.
+enum class TrainingSpace { kAuto, kFullSpace, kModes };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<TrainingSpace>{"auto", "full_space", "modes"};
+
 /// The undeformed shape of an example's energy. docs/method.md, "Target".
 enum class EnergyReference {
   kExample,  ///< E_k(p) = sum_j w_j V_j det F_jk Psi(F_j(p) F_jk^-1)

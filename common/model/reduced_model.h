@@ -161,10 +161,12 @@ struct RegionData {
   std::optional<TargetElasticityData> target_elasticity;
 };
 
-/// Group /fidelity: how far the reduced body is from the full space in runs that its basis has not learned from.
+/// Group /fidelity: how far the reduced body is from the full space, or one of many modes in its place, in runs that
+/// its basis has not learned from.
 /// Errors are relative, docs/error_metrics.md. Of no use to a step.
 struct FidelityData {
   std::string loads;               ///< whose loads the runs are of
+  std::string reference;           ///< what ran them: "full_space", "modes"
   std::string basis;               ///< "trained", "modal": which of the two was better and is taken
   std::string advice;              ///< one sentence
   std::int64_t training_runs = 0;  ///< that the basis has learned from

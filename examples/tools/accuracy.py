@@ -1,10 +1,11 @@
 #!/usr/bin/python3
 """Measure how far the paper's six scenes are from the full space with their recommended assets, and with other sizes of the basis.
 
-Usage: accuracy.py [--write] [--programs build/release/bin] [SCENE ...]    (bar-cuboid; all where none is named; Debian: python3-h5py)
+Usage: accuracy.py [--split] [--write] [--programs build/release/bin] [SCENE ...]    (bar-cuboid; all where none is named; Debian: python3-h5py)
 
-Everything goes to build/accuracy, where motions in full space are found again. --write also renews docs/studies/accuracy.md, where all scenes were run.
-A quarter of an hour; on a machine that does nothing else, or the times mean little.
+Everything goes to build/accuracy, where motions in full space are found again. --split also tells what each approximation adds to the error. --write
+renews docs/studies/accuracy.md from all that has been measured. Ten minutes, twice as much for the split; on a machine that does nothing else, or the
+times mean little.
 """
 import argparse
 import json
@@ -35,11 +36,26 @@ in their full space. A step and a bundle are timed on this machine, the bundle w
 
 | scene | m | r | s | internal force | error | step [us] | bundle [s] |
 | --- | ---: | ---: | ---: | --- | ---: | ---: | ---: |
+{rows}
+## What each approximation adds
+
+[Errors by source](../error_metrics.md#errors-by-source) of the recommended assets. The full problem has twice the eigenfunctions and half the time step of
+the scene, so the total is not the error above: that one is against the full space with the scene's own. The alignment is not known: poses are on the rest
+example's mesh, not the object's. "Settled" is the total in the last tenth of the time.
+
+| scene | {sources} | total | settled |
+| --- | {rules} |
+{split}
+Not known is the part of the eigenfunctions where the mesh has no more of them. The part says how far the motion moves with twice as many, and is no
+distance from a limit: functions finer than a few edges follow the tessellation more than the pose.
+
+![The bar's error by its sources](bar-cuboid-sources.svg)
 """
+SOURCES = {"time_step": "time step", "eigenfunctions": "eigenfunctions", "targets": "targets", "basis": "basis", "cubature": "cubature", "table": "table"}
 
 
 def measure(name, size, programs, output):
-    """One row of the table."""
+    """Bundle, run, full space: what a row of the table holds."""
     folder_name, variant, material = SCENES[name]
     source, folder = ROOT / "examples" / folder_name, output / name
     folder.mkdir(parents=True, exist_ok=True)
@@ -66,24 +82,70 @@ def measure(name, size, programs, output):
     bench = json.loads(subprocess.run([programs / "exmat-runtime", "bench", files["scene"], "--json", "--progress", "none"], cwd=folder,
                                       check=True, capture_output=True, text=True).stdout)
     away = error(frames_of(folder / "run.h5")[1:], frames_of(folder / "full.h5")[1:], mesh_of(folder / scene["bundle"]))
-    cells = (name if size == "recommended" else "", asset["shape_space"]["eigenfunctions"], asset["basis"]["size"], asset["cubature"]["elements"],
-             asset["internal_force"], f"{100 * away:.2g} %", f"{bench['step']['median_us']:.1f}", "" if SIZES[size] else f"{seconds:.0f}")
-    row = "| " + " | ".join(str(cell) for cell in cells) + " |"
-    print(row, flush=True)
-    return row
+    result = {"m": asset["shape_space"]["eigenfunctions"], "r": asset["basis"]["size"], "s": asset["cubature"]["elements"],
+              "internal_force": asset["internal_force"], "error": away, "step_us": bench["step"]["median_us"], "bundle_s": seconds}
+    (folder / f"result_{size}.json").write_text(json.dumps(result, indent=1) + "\n")
+
+
+def split(name, programs, output):
+    """The error of the recommended asset by its sources, from the files that `measure` has written."""
+    folder = output / name
+    study = {"name": name, "asset": "asset_recommended.json", "scene": "scene_recommended.json", "timing": {"rounds": 1, "steps": 200}, "sources": {}}
+    (folder / "study.json").write_text(json.dumps(study, indent=1) + "\n")
+    shutil.rmtree(folder / "study", ignore_errors=True)
+    run(folder, programs / "exmat-precompute", "study", "study.json", "-o", "study")
+
+
+def read(file):
+    return json.loads(file.read_text()) if file.exists() else None
+
+
+def percent(share):
+    return f"{100 * share:.2g} %"
+
+
+def size_row(name, size, result):
+    cells = (name if size == "recommended" else "", result["m"], result["r"], result["s"], result["internal_force"], percent(result["error"]),
+             f"{result['step_us']:.1f}", f"{result['bundle_s']:.0f}" if size == "recommended" else "")
+    return "| " + " | ".join(str(cell) for cell in cells) + " |\n"
+
+
+def split_row(name, sources):
+    parts = {part["source"]: percent(part["added"]["mean"]) if part["added"] else part["status"].replace("_", " ") for part in sources["parts"]}
+    cells = [name] + [parts[source] for source in SOURCES] + [percent(sources["total"][kind]) for kind in ("mean", "settled")]
+    return "| " + " | ".join(cells) + " |\n"
+
+
+def page(output):
+    """What has been measured, as docs/studies/accuracy.md."""
+    results = [(name, size, read(output / name / f"result_{size}.json")) for name in SCENES for size in SIZES]
+    studies = [(name, read(output / name / "study/results.json")) for name in SCENES]
+    processor = next(line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name"))
+    return HEAD.format(processor=processor, rows="".join(size_row(*row) for row in results if row[2]),
+                       sources=" | ".join(SOURCES.values()), rules=" | ".join(["---:"] * (len(SOURCES) + 2)),
+                       split="".join(split_row(name, study["sources"]) for name, study in studies if study))
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", metavar="SCENE", choices=[[], *SCENES])
     parser.add_argument("--programs", type=pathlib.Path, default=ROOT / "build/release/bin")
+    parser.add_argument("--split", action="store_true")
     parser.add_argument("--write", action="store_true")
     options = parser.parse_args()
-    names = options.scenes or list(SCENES)
-    rows = [measure(name, size, options.programs.resolve(), ROOT / "build/accuracy") for name in names for size in SIZES]
-    if options.write and len(names) == len(SCENES):
-        processor = next(line.split(":")[1].strip() for line in open("/proc/cpuinfo") if line.startswith("model name"))
-        (ROOT / "docs/studies/accuracy.md").write_text(HEAD.format(processor=processor) + "\n".join(rows) + "\n")
+    programs, output = options.programs.resolve(), ROOT / "build/accuracy"
+    for name in options.scenes or SCENES:
+        for size in SIZES:
+            measure(name, size, programs, output)
+            print(size_row(name, size, read(output / name / f"result_{size}.json")), end="", flush=True)
+        if options.split:
+            split(name, programs, output)
+            print(split_row(name, read(output / name / "study/results.json")["sources"]), end="", flush=True)
+    if options.write:
+        (ROOT / "docs/studies/accuracy.md").write_text(page(output))
+        picture = output / "bar-cuboid/study/sources.svg"
+        if picture.exists():
+            shutil.copy(picture, ROOT / "docs/studies/bar-cuboid-sources.svg")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ Usage: other_loads.py [--write] [--programs build/release/bin] [BODY ...]    (ba
 
 For each body there are bundles whose bases learned from nothing, from the scene, from declared loads, and from loads of all kinds. Each is run
 under the scene's loads and under others. Everything goes to build/other_loads, where runs in full space are found again. --write also renews
-docs/studies/other_loads.md, where all bodies were run. Half an hour.
+docs/studies/other_loads.md, where all bodies were run. Ten minutes.
 """
 import argparse
 import json

@@ -31,7 +31,7 @@ HEAD = """# Studies
 Written by `examples/tools/studies.py`, by `exmat-precompute study` for each scene: error against run time, against the full space
 ([definitions](../error_metrics.md)). Pages to open in a browser: {pages}.
 
-[The six scenes beside their full space](accuracy.md) has the recommended assets, and [loads that training has not seen](other_loads.md) what
+[The six scenes beside their full space](accuracy.md) has the recommended assets, with what each approximation adds to their errors, and [loads that training has not seen](other_loads.md) what
 bases are worth elsewhere. The tables below are of the paper's assets.
 """
 

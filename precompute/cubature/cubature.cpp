@@ -208,7 +208,7 @@ Choice every_element(Eigen::Index tets) {
 }
 
 Choice choose(const ElementSamples& samples, const PoseSource& source, const CubatureOptions& options,
-              const ErrorMeter& training, const ErrorMeter& heldout) {
+              const ErrorMeter& training, const ErrorMeter* heldout) {
   if (options.method == CubatureMethod::kAllElements) return every_element(samples.count());
   const RowMatrix& poses = training.poses();
   const Totals& totals = training.totals();
@@ -227,15 +227,15 @@ Choice choose(const ElementSamples& samples, const PoseSource& source, const Cub
                                               options.seed + 1000 + static_cast<unsigned>(pass));
     const auto problem = build_problem(samples, poses, rows, totals.response, candidates);
     const StopRule tolerance_met{std::max<std::size_t>(1, r / 4), [&](const Selection& selection) {
-                                   return heldout.force_error(to_tets(candidates, selection.members),
-                                                              selection.weights) <= *options.tolerance;
+                                   return heldout->force_error(to_tets(candidates, selection.members),
+                                                               selection.weights) <= *options.tolerance;
                                  }};
     const std::size_t count = target * static_cast<std::size_t>(pass + 1) / static_cast<std::size_t>(passes);
     const auto selection =
         select(problem, options, count, to_members(candidates, choice.elements), open_ended ? &tolerance_met : nullptr);
     choice = {to_tets(candidates, selection.members), selection.weights};
     progress.advance();
-    if (open_ended && heldout.force_error(choice.elements, choice.weights) <= *options.tolerance) break;
+    if (open_ended && heldout->force_error(choice.elements, choice.weights) <= *options.tolerance) break;
   }
   return choice;
 }
@@ -281,6 +281,17 @@ CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, co
   return data;
 }
 
+CubatureData with_basis(const CubatureData& other, const TetMesh& mesh, const TetMaterials& materials,
+                        const RowMatrix& basis) {
+  Choice choice;
+  choice.elements.assign(other.elements.begin(), other.elements.end());
+  choice.weights = other.weights;
+  CubatureData data;
+  data.method = other.method;
+  set_elements(ElementSamples(mesh, materials, basis), materials, choice, data);
+  return data;
+}
+
 CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                                const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
                                const RowMatrix& poses) {
@@ -295,11 +306,15 @@ CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, 
   const RowMatrix training_poses = draw_poses(source, options.training_poses, options.seed);
   const ErrorMeter training(samples, source, training_poses);
   CubatureData data;
+  data.method = options.method;
+  if (!options.measured && !options.tolerance) {
+    set_elements(samples, materials, choose(samples, source, options, training, nullptr), data);
+    return data;
+  }
   data.heldout_poses = draw_heldout_poses(source, kHeldoutPoses, options.seed + 1'000'003);
   const ErrorMeter heldout(samples, source, data.heldout_poses);
-  const auto choice = choose(samples, source, options, training, heldout);
+  const auto choice = choose(samples, source, options, training, &heldout);
 
-  data.method = options.method;
   set_elements(samples, materials, choice, data);
   data.training_error = training.force_error(choice.elements, choice.weights);
   const auto errors = heldout.all_errors(choice.elements, choice.weights);

@@ -8,8 +8,8 @@
 namespace exmat::precompute {
 
 struct CubatureOptions {
-  std::optional<int> elements;                          ///< s
-  std::optional<double> tolerance;                      ///< held-out force error; both absent: 2 r elements
+  std::optional<int> elements{};                        ///< s
+  std::optional<double> tolerance{};                    ///< held-out force error; both absent: 2 r elements
   CubatureMethod method = CubatureMethod::kGreedySwap;  ///< all elements have neither of these
   int training_poses = 200;
   std::uint64_t seed = 1;
@@ -17,13 +17,14 @@ struct CubatureOptions {
   /// of four passes chooses from as many as fit, a systematic sample over the order of their energies, beside those
   /// that it has.
   std::int64_t training_entries = 50'000'000;
+  bool measured = true;  ///< on held-out poses, which takes as long as the rest where tets are many; else errors of 0
 };
 
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, CubatureOptions& value) {
   pass_all(archive, value.elements, value.tolerance, value.method, value.training_poses, value.seed,
-           value.training_entries);
+           value.training_entries, value.measured);
 }
 
 /// Relative errors of a weighted element subset against all elements, root mean square over poses: forces in the norm
@@ -38,6 +39,10 @@ CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& material
 
 /// All tets with the weight 1, no errors measured.
 CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis);
+
+/// The elements and weights of `other` for another basis, no errors measured.
+CubatureData with_basis(const CubatureData& other, const TetMesh& mesh, const TetMaterials& materials,
+                        const RowMatrix& basis);
 
 /// Chooses elements and weights on training poses and measures them on held-out ones. Throws InputError (without
 /// a file) where the options do not fit the mesh, WorkError where a tolerance cannot be met.

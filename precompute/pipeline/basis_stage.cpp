@@ -30,10 +30,6 @@ ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowM
   return modal;
 }
 
-EnergyReference reference_of(const BodyStages& stages) {
-  return stages.targets.empty() ? EnergyReference::kExample : stages.targets.front().energy_reference;
-}
-
 // The run of the scene's own loads, which comes first, counts as much as all others together.
 Eigen::MatrixXd balanced_snapshots(const BodyStages& stages, const Motions& motions) {
   Eigen::MatrixXd snapshots = motions.set.runs.snapshots;
@@ -63,14 +59,18 @@ class BasisChooser {
   Eigen::MatrixXd fields_;
 };
 
-// Of a body with all elements.
+// Of a body with all elements that the motions had.
 RollOut BasisChooser::run(const Eigen::MatrixXd& basis) const {
   ReducedModel model;
   model.asset_name = body_.asset_name;
   model.object = body_.object;
   put_basis(stages_, basis, model);
   const ObjectData& object = *model.object;
-  return cubature_roll_out(stages_, model, all_elements(object.mesh, object.materials, model.modal->basis), *motions_);
+  const RowMatrix& rows = model.modal->basis;
+  return cubature_roll_out(stages_, model,
+                           motions_->elements ? with_basis(*motions_->elements, object.mesh, object.materials, rows)
+                                              : all_elements(object.mesh, object.materials, rows),
+                           *motions_);
 }
 
 BasisChoice BasisChooser::choose(int size) const {
@@ -111,6 +111,10 @@ BasisChoice BasisChooser::choose() const {
 }
 
 }  // namespace
+
+EnergyReference reference_of(const BodyStages& stages) {
+  return stages.targets.empty() ? EnergyReference::kExample : stages.targets.front().energy_reference;
+}
 
 BasisChoice choose_basis(const BodyStages& stages, const ReducedModel& body, const Motions* motions) {
   return BasisChooser(stages, body, motions).choose();

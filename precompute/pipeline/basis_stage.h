@@ -24,19 +24,24 @@ struct BodyStages {
   std::vector<bool> elastic;  ///< of the targets: whether the force may be elastic
 };
 
+/// The energy reference of all targets.
+EnergyReference reference_of(const BodyStages& stages);
+
 /// The runs of training, and what they were made of.
 struct Motions {
   TrainingSet set;
   TrainingChains chains;
   TrainingLoads loads;
-  bool general = false;  ///< the basis is to serve other loads, too
-  std::string reason;    ///< whose loads they are
+  bool general = false;                  ///< the basis is to serve other loads, too
+  std::string reason;                    ///< whose loads they are
+  std::optional<CubatureData> elements;  ///< of the body of many modes that ran them in place of the full space
 
   /// Of the snapshots, those of the run of the very loads, which comes first.
   Eigen::Index own_columns() const { return loads.duration > 0 ? set.runs.chain_ends.front() : 0; }
 };
 
-/// A basis, and how far bodies of it and of the modal basis with all elements are from the full space.
+/// A basis, and how far bodies of it and of the modal basis with all elements (those of the body that ran the motions)
+/// are from the full space.
 struct BasisChoice {
   Eigen::MatrixXd basis;  ///< f x r
   bool trained = false;

@@ -20,6 +20,7 @@
 #include "precompute/modes/linear_modes.h"
 #include "precompute/pipeline/basis_stage.h"
 #include "precompute/pipeline/cubature_stage.h"
+#include "precompute/pipeline/modal_training.h"
 #include "precompute/pipeline/target_elasticity_stage.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
@@ -42,37 +43,6 @@ std::int64_t example_count(const AssetConfig& asset) {
       asset.examples, [&](const ExampleConfig& example) { return !example.rest && in_whole_body(asset, example); });
   if (asset.examples.empty() || (poses == 0 && !asset.regions.empty())) return 0;
   return 1 + poses;
-}
-
-// What a scene asks of a region; nothing where it does not name it.
-std::optional<RegionNeeds> needs_of_region(const Needs& needs, const std::string& name) {
-  if (!needs.regions)
-    return RegionNeeds{.name = name,
-                       .targets = needs.targets,
-                       .energy_reference = needs.energy_reference,
-                       .target_elasticity = needs.target_elasticity};
-  const auto found = std::ranges::find(*needs.regions, name, &RegionNeeds::name);
-  return found == needs.regions->end() ? std::nullopt : std::optional(*found);
-}
-
-// Every region that the needs name is one of the asset's.
-void require_regions(const AssetConfig& asset, const Needs& needs) {
-  for (const RegionNeeds& region : needs.regions.value_or(std::vector<RegionNeeds>{}))
-    if (std::ranges::find(asset.regions, region.name, &RegionConfig::name) == asset.regions.end())
-      throw InputError({asset.file.string(), "/regions", fmt::format("the region \"{}\" of the scene", region.name),
-                        asset.regions.empty() ? "no regions" : "others", "name it here or leave it out of the scene"});
-}
-
-// Leaves out the groups that are not needed, and the poses of no other.
-void keep_needed(const Needs& needs, bool whole_body, ExampleInput& input) {
-  input.whole_body = input.whole_body && whole_body;
-  std::erase_if(input.regions, [&](const RegionInput& region) { return !needs_of_region(needs, region.name); });
-  std::erase_if(input.poses, [&](const PoseInput& pose) {
-    const bool local = std::ranges::any_of(input.regions, [&](const RegionInput& region) {
-      return std::ranges::find(region.examples, pose.name) != region.examples.end();
-    });
-    return !local && !(input.whole_body && pose.in_whole_body);
-  });
 }
 
 // Of the whole body, then of the regions.
@@ -101,20 +71,6 @@ Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
   return poses;
 }
 
-// Part of the hash of the inputs.
-std::string text_of(const Needs& needs) {
-  std::string text = fmt::format(
-      "examples {}\nrigid {} {}\ntargets {}\ncontact {}\nrender {}\ninternal_force {}\nenergy_reference {}\n",
-      needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render,
-      name_of(needs.internal_force), name_of(needs.energy_reference));
-  if (needs.target_elasticity) text += "target_elasticity\n";
-  if (!needs.regions) return text;
-  for (const RegionNeeds& region : *needs.regions)
-    text += fmt::format("region {} {} {}{}\n", region.name, region.targets, name_of(region.energy_reference),
-                        region.target_elasticity ? " target_elasticity" : "");
-  return text + "no other regions\n";
-}
-
 class Pipeline {
  public:
   Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildOptions& options)
@@ -137,7 +93,7 @@ class Pipeline {
   void leave_out(const std::string& group, const std::string& reason);
   TargetSpace target_space(const ElasticSystem& system, const PoseFitter& fitter, Eigen::Index group);
   std::vector<TargetSpace> target_spaces(const ElasticSystem& system, const PoseFitter& fitter);
-  std::optional<Motions> train(const BodyStages& stages, ReducedModel& body);
+  std::optional<Motions> train(const BodyStages& stages, const SemidefiniteSolver* solver, ReducedModel& body);
   std::string training_text() const;
   void require_vertices(const TrainingLoads& loads) const;
   void add_internal_force(ReducedModel& model);
@@ -266,7 +222,7 @@ void Pipeline::require_vertices(const TrainingLoads& loads) const {
                           std::to_string(vertex), ""});
 }
 
-std::optional<Motions> Pipeline::train(const BodyStages& stages, ReducedModel& body) {
+std::optional<Motions> Pipeline::train(const BodyStages& stages, const SemidefiniteSolver* solver, ReducedModel& body) {
   const ElasticSystem& system = stages.system;
   if (stages.fitter != nullptr) stages.fitter->preview(body);
   const TrainingInput input{body, system, stages.modes, stages.targets};
@@ -279,25 +235,40 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, ReducedModel& b
                                 asset_.contact_count);
   return timed("training", [&] {
     const std::uint64_t seed = asset_.training.seed.value_or(asset_.seed);
-    TrainingChains chains = draw_training(input, plan.loads, asset_.training, seed);
-    chains.options.budget = options_.training_budget;
-    const auto work = [&] { return run_training(input, chains); };
-    // What a budget cuts short is not what another run would find.
-    TrainingSet set =
-        options_.training_budget > 0
-            ? work()
-            : cache_.get("training", work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
-                         copies_of(example_sets(body)), object_.contact, asset_.contact_count, text_of(plan.loads),
-                         asset_.training.segments, asset_.training.seconds, seed);
-    log::info(fmt::format("training: {} runs of {} steps in full space, {} snapshots", set.runs.segments,
-                          set.runs.steps, set.runs.snapshots.cols()));
-    if (set.runs.skipped > 0)
+    std::optional<Motions> result(std::in_place);
+    Motions& motions = *result;
+    motions.chains = draw_training(input, plan.loads, asset_.training, seed);
+    motions.loads = plan.loads;
+    motions.general = plan.general;
+    motions.reason = plan.reason;
+    motions.chains.options.budget = options_.training_budget;
+    const auto cached = [&](const char* stage, const auto& work) {
+      // What a budget cuts short is not what another run would find.
+      if (options_.training_budget > 0) return work();
+      return cache_.get(stage, work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
+                        copies_of(example_sets(body)), object_.contact, asset_.contact_count, text_of(plan.loads),
+                        asset_.training.segments, asset_.training.seconds, seed, asset_.linear_modes);
+    };
+    if (solver != nullptr)
+      std::tie(motions.set, motions.elements) = cached("training in modes", [&] {
+        const ManyModes modes =
+            many_modes(stages, body, *solver, motions.chains, plan.loads.obstacle.has_value(), asset_.seed);
+        return std::pair(run_training(modes, system, motions.chains), *modes.model.cubature);
+      });
+    else
+      motions.set = cached("training", [&] { return run_training(input, motions.chains); });
+    const TrainingRuns& runs = motions.set.runs;
+    log::info(fmt::format(
+        "training: {} runs of {} steps in {}, {} snapshots", runs.segments, runs.steps,
+        motions.elements ? fmt::format("many modes, {} elements", motions.elements->elements.size()) : "full space",
+        runs.snapshots.cols()));
+    if (runs.skipped > 0)
       warn(report_.warnings,
            fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
                        "not stay finite",
-                       set.runs.skipped, set.runs.skipped + set.runs.segments));
-    if (set.runs.snapshots.cols() == 0) return std::optional<Motions>();
-    return std::optional<Motions>({std::move(set), std::move(chains), plan.loads, plan.general, plan.reason});
+                       runs.skipped, runs.skipped + runs.segments));
+    if (runs.snapshots.cols() == 0) result.reset();
+    return result;
   });
 }
 
@@ -320,14 +291,15 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
       whole.rigid = rigid_moments(object_.mesh, object_.materials.density, model.modal->basis);
     const RollOut run = final_roll_out(stages, whole, motions);
     return fidelity_of({whole, run, choice.exact, choice.modal, motions.set.runs, motions.set.heldout, choice.trained,
-                        motions.reason});
+                        motions.reason, motions.elements ? TrainingSpace::kModes : TrainingSpace::kFullSpace});
   });
   auto& entry = *std::ranges::find(report_.ledger, "fidelity", &LedgerEntry::group);
   entry.included = true;
-  entry.reason = "runs in full space to compare with";
+  entry.reason = "runs to compare with";
   const FidelityData& found = *model.fidelity;
-  log::info(fmt::format("fidelity: {:.2f} % from the full space in {} held-out runs, {:.2f} % of modes alone; {}",
-                        100 * found.shape_error, found.heldout_runs, 100 * found.modal_error, found.advice));
+  log::info(fmt::format("fidelity: {:.2f} % from {} in {} held-out runs, {:.2f} % of modes alone; {}",
+                        100 * found.shape_error, motions.elements ? "a body of many modes" : "the full space",
+                        found.heldout_runs, 100 * found.modal_error, found.advice));
 }
 
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
@@ -388,14 +360,15 @@ ReducedModel Pipeline::run() {
 
   const double size = bounding_box_diagonal(object_.mesh.vertices);
   // Factors are the most of the memory: none longer than needed.
-  if (!shape || !shape->has_regions()) solver.reset();
+  const bool in_modes = trains_in_modes(asset_.training.space, system);
+  if (!in_modes && (!shape || !shape->has_regions())) solver.reset();
   std::optional<PoseFitter> fitter;
   if (shape)
     timed("poses of the examples", [&] {
       // As fine as the linear modes resolve.
       fitter.emplace(asset_, object_, system, solver.get(), modes.eigenvalues.tail(1)[0], *shape);
     });
-  solver.reset();
+  if (!in_modes) solver.reset();
   std::vector<TargetSpace> targets;
   if (fitter) targets = target_spaces(system, *fitter);
   const BodyStages stages{asset_,      object_,
@@ -405,7 +378,8 @@ ReducedModel Pipeline::run() {
   ReducedModel body;
   body.asset_name = model.asset_name;
   body.object = model.object;
-  const std::optional<Motions> motions = train(stages, body);
+  const std::optional<Motions> motions = train(stages, in_modes ? solver.get() : nullptr, body);
+  solver.reset();
   const BasisChoice choice = timed("basis", [&] { return choose_basis(stages, body, motions ? &*motions : nullptr); });
   const Eigen::MatrixXd& basis = choice.basis;
   put_basis(stages, basis, model);
@@ -445,23 +419,6 @@ auto with_file_named(const AssetConfig& asset, Work work) {
 }
 
 }  // namespace
-
-Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs) {
-  Needs needs = scene_needs.value_or(Needs{});
-  if (needs.internal_force == ForceMethod::kAuto) needs.internal_force = asset.internal_force;
-  if (scene_needs || !asset.needs) return needs;
-  const auto named = [&](const char* part) {
-    return std::find(asset.needs->begin(), asset.needs->end(), part) != asset.needs->end();
-  };
-  needs.examples = named("examples");
-  needs.targets = named("targets");
-  needs.target_elasticity = named("target_elasticity");
-  needs.rigid = needs.carried = named("rigid");
-  needs.contact = named("contact");
-  needs.render = named("render");
-  if (!named("regions")) needs.regions.emplace();
-  return needs;
-}
 
 ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
                                  const BuildOptions& options) {

@@ -10,12 +10,10 @@
 #include "common/model/needs.h"
 #include "common/model/reduced_model.h"
 #include "precompute/examples/alignment_verdict.h"
+#include "precompute/pipeline/asset_needs.h"
 #include "precompute/pipeline/build_report.h"
 
 namespace exmat::precompute {
-
-/// What the bundle is to hold: of the scene if there is one, else of the asset's `needs`, else all that applies.
-Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs);
 
 /// What a build may take beside the asset.
 struct BuildOptions {

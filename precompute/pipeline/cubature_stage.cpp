@@ -22,7 +22,8 @@ CubatureData choose_cubature(const BodyStages& stages, const PoseSource& source,
         "cubature", [&] { return build_cubature(stages.object.mesh, stages.object.materials, source, own); },
         stages.object.mesh, stages.object.materials, source, own);
   };
-  if (motions == nullptr || options.tolerance || options.method == CubatureMethod::kAllElements) return select(options);
+  const bool one = motions == nullptr || motions->elements;  // where tets are many each takes its time
+  if (one || options.tolerance || options.method == CubatureMethod::kAllElements) return select(options);
   CubatureData best;
   double least = std::numeric_limits<double>::infinity();
   std::vector<double> errors;

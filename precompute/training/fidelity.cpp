@@ -80,6 +80,7 @@ FidelityData fidelity_of(const FidelityInput& input) {
   const SparseMatrix mass = expand_to_vectors(scalar_mass(model.object->mesh, model.object->materials.density));
   FidelityData fidelity;
   fidelity.loads = input.loads;
+  fidelity.reference = name_of(input.space);
   fidelity.basis = input.trained ? "trained" : "modal";
   fidelity.training_runs = input.training.segments;
   fidelity.heldout_runs = input.heldout.segments;

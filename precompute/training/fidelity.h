@@ -15,8 +15,9 @@ struct FidelityInput {
   const RollOut& modal_run;   ///< of the basis of modes with all elements
   const TrainingRuns& training;
   const TrainingRuns& heldout;
-  bool trained = false;  ///< which basis it has
-  std::string loads;     ///< whose loads these are
+  bool trained = false;                             ///< which basis it has
+  std::string loads;                                ///< whose loads these are
+  TrainingSpace space = TrainingSpace::kFullSpace;  ///< what the runs had
 };
 
 /// /fidelity, with one sentence of advice: what of basis, cubature, eigenfunctions and training has most of the error.

@@ -86,13 +86,6 @@ ChainRun ChainRunner::run(const Chain& chain, Advance advance) {
   return result;
 }
 
-std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptions& options) {
-  std::int64_t count = 0;
-  for (const Chain& chain : chains)
-    for (const Segment& segment : chain) count += steps_of(segment, options);
-  return count;
-}
-
 // [rows x N] of all runs.
 Eigen::MatrixXd collect(const std::vector<ChainRun>& runs, std::vector<Eigen::VectorXd> ChainRun::*member,
                         Eigen::Index rows) {
@@ -117,6 +110,13 @@ double stiffness_damping_of(const TrainingRunOptions& options) {
 
 std::int64_t steps_of(const Segment& segment, const TrainingRunOptions& options) {
   return std::max<std::int64_t>(1, std::llround(segment.duration / time_step_of(options)));
+}
+
+std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptions& options) {
+  std::int64_t count = 0;
+  for (const Chain& chain : chains)
+    for (const Segment& segment : chain) count += steps_of(segment, options);
+  return count;
 }
 
 TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>& chains,

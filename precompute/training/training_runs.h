@@ -40,6 +40,7 @@ constexpr int kStepsPerSnapshot = 2;
 double time_step_of(const TrainingRunOptions& options);          ///< [s]
 double stiffness_damping_of(const TrainingRunOptions& options);  ///< beta [s]
 std::int64_t steps_of(const Segment& segment, const TrainingRunOptions& options);
+std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptions& options);  ///< of all segments
 
 /// Runs chains of segments side by side. Without a budget the same in every run and for every number of threads.
 TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>& chains,

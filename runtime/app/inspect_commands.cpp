@@ -44,10 +44,10 @@ void info_command(const std::filesystem::path& bundle) {
                model.cubature->heldout_energy_error, model.cubature->heldout_stiffness_error);
   if (model.fidelity)
     fmt::print(
-        "fidelity       {:.2g} % from the full space under {} ({} runs), {:.2g} % at the end of the runs, {:.2g} % of "
-        "modes "
-        "alone; basis {}; {}\n",
-        100 * model.fidelity->shape_error, model.fidelity->loads, model.fidelity->heldout_runs,
+        "fidelity       {:.2g} % from {} under {} ({} runs), {:.2g} % at the end of the runs, {:.2g} % of modes alone; "
+        "basis {}; {}\n",
+        100 * model.fidelity->shape_error,
+        model.fidelity->reference == "modes" ? "a body of many modes" : "the full space", model.fidelity->loads, model.fidelity->heldout_runs,
         100 * model.fidelity->settled_error, 100 * model.fidelity->modal_error, model.fidelity->basis,
         model.fidelity->advice);
   if (model.render)

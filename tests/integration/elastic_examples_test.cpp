@@ -1,11 +1,8 @@
-#include <cmath>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/bundle/bundle.h"
-#include "common/config/config.h"
-#include "precompute/study/measure/runs.h"
 #include "tests/integration/support.h"
 
 // Elastic example forces from the asset to the motion: precompute, the run time, the full space.
@@ -29,26 +26,9 @@ class ElasticExamples : public testing::Test {
     return exmat_precompute(arguments);
   }
 
-  /// Root mean square distance of the reduced motion from that of the full space, over the size of the latter.
-  double error(const Json& scene) {
-    SceneConfig config = load_scene(write_scene(folder_, scene));
-    config.trajectory = "positions";  // that the run loads, and never writes
-    const ReducedModel data = read_bundle(config.bundle);
-    std::vector<double> times;
-    for (int i = 1; i <= 15; ++i) times.push_back(4 * i * config.time_step);
-    const auto reduced = precompute::run_reduced(config, times).frames;
-    const auto full = precompute::run_full_space(config, data, times);
-    double distance = 0, size = 0;
-    for (std::size_t i = 0; i < times.size(); ++i) {
-      distance += (reduced.positions[i] - full.positions[i]).squaredNorm();
-      size += (full.positions[i] - data.object->mesh.vertices).squaredNorm();
-    }
-    size_ = std::sqrt(size / static_cast<double>(times.size() * data.object->mesh.vertex_count()));
-    return std::sqrt(distance / size);
-  }
+  MotionError error(const Json& scene) { return error_against_full_space(write_scene(folder_, scene), 15, 4); }
 
   TemporaryFolder folder_;
-  double size_ = 0;  // root mean square displacement [m]
 };
 
 // Of 144 degrees of freedom 30 are left, which have learned from the scene: with all tets, then with the elements
@@ -63,14 +43,14 @@ TEST_F(ElasticExamples, ReducedMotionIsNearTheFullSpace) {
     Json scene = kElastic;
     scene["examples"]["target"] = target;
     ASSERT_EQ(bundle(scene, all).status, 0);
-    const double exact = error(scene);
-    fmt::print("{}: error {:.4f} with all tets\n", target, exact);
-    EXPECT_LE(exact, 0.05) << target;
-    EXPECT_GT(size_, 0.05) << "it does not move";
+    const MotionError exact = error(scene);
+    fmt::print("{}: error {:.4f} with all tets\n", target, exact.error);
+    EXPECT_LE(exact.error, 0.05) << target;
+    EXPECT_GT(exact.size, 0.05) << "it does not move";
     ASSERT_EQ(bundle(scene, chosen).status, 0);
-    const double found = error(scene);
+    const double found = error(scene).error;
     fmt::print("{}: error {:.4f} with 64 elements\n", target, found);
-    EXPECT_LE(found, exact + 0.03) << target;
+    EXPECT_LE(found, exact.error + 0.03) << target;
   }
 }
 
@@ -86,10 +66,10 @@ TEST_F(ElasticExamples, OfARegionAreNearTheFullSpace) {
   scene["regions"] = R"([ { "name": "end", "force": "elastic", "stiffness": 3, "damping": 2, "bias": 0 } ])"_json;
   const Outcome made = bundle(scene, asset);
   ASSERT_EQ(made.status, 0) << made.errors;
-  const double found = error(scene);
-  fmt::print("error {:.4f}\n", found);
-  EXPECT_LE(found, 0.04);
-  EXPECT_GT(size_, 0.01) << "it does not move";
+  const MotionError found = error(scene);
+  fmt::print("error {:.4f}\n", found.error);
+  EXPECT_LE(found.error, 0.04);
+  EXPECT_GT(found.size, 0.01) << "it does not move";
 }
 
 // What of a bundle a scene does not ask for is not there, and a scene that asks for it says what to do.

@@ -14,6 +14,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/mesh/geometry.h"
+#include "precompute/study/measure/runs.h"
 #include "tests/support/box_mesh.h"
 
 namespace exmat::test {
@@ -148,6 +149,22 @@ std::filesystem::path write_scene(const TemporaryFolder& folder, const Json& mem
   Json scene = {{"bundle", "bundle.h5"}};
   scene.merge_patch(members);
   return folder.write("scene.json", scene.dump(2));
+}
+
+MotionError error_against_full_space(const std::filesystem::path& scene, int frames, int every) {
+  SceneConfig config = load_scene(scene);
+  config.trajectory = "positions";  // that the run loads, and never writes
+  const ReducedModel data = read_bundle(config.bundle);
+  std::vector<double> times;
+  for (int i = 1; i <= frames; ++i) times.push_back(every * i * config.time_step);
+  const auto reduced = precompute::run_reduced(config, times).frames;
+  const auto full = precompute::run_full_space(config, data, times);
+  double distance = 0, size = 0;
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    distance += (reduced.positions[i] - full.positions[i]).squaredNorm();
+    size += (full.positions[i] - data.object->mesh.vertices).squaredNorm();
+  }
+  return {std::sqrt(distance / size), std::sqrt(size / static_cast<double>(frames * data.object->mesh.vertex_count()))};
 }
 
 double mass_product(const TetMesh& mesh, const Eigen::VectorXd& density, const Eigen::VectorXd& a,

@@ -74,6 +74,14 @@ ReducedModel through_bundle(const ReducedModel& model, const std::filesystem::pa
 /// Writes scene.json on bundle.h5 with the members merged in. Returns the scene file.
 std::filesystem::path write_scene(const TemporaryFolder& folder, const Json& members = Json::object());
 
+/// How far the motion of a scene is from that of the full space, root mean squares over frames and vertices.
+struct MotionError {
+  double error = 0;  ///< distance over the size
+  double size = 0;   ///< of the displacement in full space [m]
+};
+/// Of `frames` frames, `every` so many steps.
+MotionError error_against_full_space(const std::filesystem::path& scene, int frames, int every);
+
 /// Inner product of two fields [3n] in the consistent mass of the density [n_t], summed tet by tet.
 double mass_product(const TetMesh& mesh, const Eigen::VectorXd& density, const Eigen::VectorXd& a,
                     const Eigen::VectorXd& b);

@@ -1,6 +1,8 @@
 #include <algorithm>
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <map>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -102,6 +104,28 @@ TEST_F(Training, EndsWithItsBudgetAndSaysSo) {
   const Outcome made = bundle(R"({ "training": "auto" })", {"--scene", scene(), "--training-budget", "0.000001"});
   EXPECT_EQ(made.status, 0) << made.errors;
   EXPECT_THAT(made.errors, HasSubstr("9 of 9 runs were left out"));
+}
+
+// Runs in many modes stand for those in full space: what a basis learns from them brings it nearer to the full space,
+// which such a basis has never seen.
+TEST_F(Training, InModesBringsTheBasisNearerToTheFullSpace) {
+  const auto with_loads = scene(R"({ "gravity": [0, 0, -1], "examples": { "stiffness": 50, "damping": 1 },
+                                     "forces": [ { "vertices": { "ids": [20] }, "force": [0, 2, 0] } ] })");
+  std::map<std::string, double> errors;
+  for (const std::string basis : {R"("training": "none")", R"("training": "scene", "training_space": "modes")"}) {
+    const Outcome made = bundle(fmt::format(R"({{ "size": 10, {} }})", basis).c_str(), {"--scene", with_loads});
+    ASSERT_EQ(made.status, 0) << made.errors;
+    const ReducedModel model = read_bundle(bundle_);
+    errors[basis] = error_against_full_space(with_loads, 20, 5).error;
+    if (!model.fidelity) continue;
+    EXPECT_THAT(made.errors, HasSubstr("in many modes"));
+    EXPECT_EQ(model.fidelity->reference, "modes");
+    EXPECT_EQ(model.fidelity->basis, "trained");
+    EXPECT_THAT(exmat_runtime({"info", bundle_}).output, HasSubstr("from a body of many modes under the loads"));
+  }
+  ASSERT_EQ(errors.size(), 2U);
+  for (const auto& [basis, error] : errors) fmt::print("{}: {:.2f} %\n", basis, 100 * error);
+  EXPECT_LE(errors.rbegin()->second, 0.5 * errors.begin()->second);
 }
 
 TEST_F(Training, FindsTheSizeOfTheBasisByItsError) {

@@ -150,6 +150,7 @@ TargetElasticityData small_target_elasticity(Eigen::Index control_points) {
 FidelityData small_fidelity() {
   FidelityData fidelity;
   fidelity.loads = "the loads of the scene";
+  fidelity.reference = "full_space";
   fidelity.basis = "trained";
   fidelity.advice = "none";
   fidelity.training_runs = 8;

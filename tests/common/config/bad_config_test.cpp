@@ -82,8 +82,8 @@ const BadConfig kBadAssets[] = {
      "a.json: /shapespace; unknown member \"shapespace\"; did you mean \"shape_space\"?"},
     {"UnlikeAnyMember", asset(R"("basis": {"zzzzzzzz": 1})"),
      "a.json: /basis/zzzzzzzz; unknown member \"zzzzzzzz\"; members here are \"example_fields\", "
-     "\"linear_modes\", \"loads\", \"size\", \"tolerance\", \"training\", \"training_seconds\", \"training_seed\" and "
-     "\"training_segments\""},
+     "\"linear_modes\", \"loads\", \"size\", \"tolerance\", \"training\", \"training_seconds\", \"training_seed\", "
+     "\"training_segments\" and \"training_space\""},
     {"SizeAndToleranceOfTheBasis", asset(R"("basis": {"size": 20, "tolerance": 0.02})"),
      "a.json: /basis: expected size or tolerance, found both"},
     {"LoadsThatAreNotThere", asset(R"("basis": {"training": "loads"})"),
