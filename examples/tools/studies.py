@@ -71,7 +71,8 @@ def error_rows(name, result):
             from_all = point["errors"]["from_all_elements"]
             if from_all and all(point["settings"].get(k) == own[k] for k in own):
                 by_elements[point["elements"]] = (point["errors"][result["headline"]]["mean"], from_all["mean"])
-        yield [name, own["eigenfunctions"], own["basis_size"], all_elements["errors"][result["headline"]]["mean"]], by_elements
+        label = f"{name}, training {own['training']}" if name.startswith("reduction") else name
+        yield [label, own["eigenfunctions"], own["basis_size"], all_elements["errors"][result["headline"]]["mean"]], by_elements
 
 
 def error_table(results):

@@ -13,6 +13,7 @@
 #include "common/core/log.h"
 #include "common/core/markup.h"
 #include "common/mesh/geometry.h"
+#include "precompute/examples/alignment_page.h"
 
 namespace exmat::precompute {
 namespace {
@@ -86,11 +87,12 @@ std::string svg_text(const TetMesh& left, const TetMesh& right, const std::strin
   return text + "</svg>\n";
 }
 
-void write_alignment_report(const TetMesh& object, const ExampleInput& input, const ShapeStage& stage,
-                            const std::filesystem::path& folder) {
+void write_alignment_report(const std::string& asset, const TetMesh& object, const ExampleInput& input,
+                            const ShapeStage& stage, const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
   if (error) throw WorkError(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
+  std::vector<ReportedPose> page;
   for (std::size_t k = 0; k < input.poses.size(); ++k) {
     const PoseInput& pose = input.poses[k];
     const auto& [rotation, displacement] = stage.poses[k];
@@ -107,8 +109,11 @@ void write_alignment_report(const TetMesh& object, const ExampleInput& input, co
     write_file_atomically(folder / (base + ".vtk"), vtk_text(transferred, displacement, pose.name + ", transferred"));
     write_file_atomically(folder / (base + "_example.vtk"), vtk_text(beside, {}, pose.name + ", the example"));
     write_file_atomically(folder / (base + ".svg"), svg_text(transferred, original, title));
+    const auto outcome = std::ranges::find(stage.alignments, pose.name, &AlignmentOutcome::name);
+    if (outcome != stage.alignments.end()) page.push_back({*outcome, transferred, original});
   }
-  log::info(fmt::format("alignment report: {} poses in {}", input.poses.size(), folder.string()));
+  write_file_atomically(folder / "index.html", alignment_page(asset, object, page));
+  log::info(fmt::format("alignment report: {} poses in {}", input.poses.size(), (folder / "index.html").string()));
 }
 
 }  // namespace exmat::precompute

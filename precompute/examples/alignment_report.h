@@ -9,9 +9,10 @@ namespace exmat::precompute {
 
 /// Writes for every pose NAME.vtk (the object in the transferred pose, with the displacement as point data),
 /// NAME_example.vtk (the example, scaled and turned into the object's frame beside it) and NAME.svg (both surfaces from
-/// three sides). Makes the folder; each file appears whole or not at all. Throws WorkError.
-void write_alignment_report(const TetMesh& object, const ExampleInput& input, const ShapeStage& stage,
-                            const std::filesystem::path& folder);
+/// three sides), and index.html with all of them, what to change and where they differ. Makes the folder; each file
+/// appears whole or not at all. Throws WorkError.
+void write_alignment_report(const std::string& asset, const TetMesh& object, const ExampleInput& input,
+                            const ShapeStage& stage, const std::filesystem::path& folder);
 
 /// Legacy VTK text of a tet mesh, with a vector field at its vertices [n x 3] where it has rows.
 std::string vtk_text(const TetMesh& mesh, const VertexArray& displacement, const std::string& title);

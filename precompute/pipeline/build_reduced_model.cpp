@@ -334,7 +334,7 @@ ReducedModel Pipeline::run() {
     shape = timed("shape space and examples",
                   [&] { return build_shape_stage(asset_, object_, *examples_, cache_, report_.warnings); });
   if (shape && !options_.alignment_report.empty())
-    write_alignment_report(object_.mesh, *examples_, *shape, options_.alignment_report);
+    write_alignment_report(asset_.name, object_.mesh, *examples_, *shape, options_.alignment_report);
   if (shape) require_aligned(asset_, shape->alignments, report_.warnings);
 
   const auto system =
@@ -446,7 +446,7 @@ std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::
   StageCache no_cache;
   const ShapeStage stage =
       with_file_named(asset, [&] { return build_shape_stage(asset, object, input, no_cache, report.warnings); });
-  if (!alignment_folder.empty()) write_alignment_report(object.mesh, input, stage, alignment_folder);
+  if (!alignment_folder.empty()) write_alignment_report(asset.name, object.mesh, input, stage, alignment_folder);
   return stage.alignments;
 }
 

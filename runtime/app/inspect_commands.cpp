@@ -47,9 +47,9 @@ void info_command(const std::filesystem::path& bundle) {
         "fidelity       {:.2g} % from {} under {} ({} runs), {:.2g} % at the end of the runs, {:.2g} % of modes alone; "
         "basis {}; {}\n",
         100 * model.fidelity->shape_error,
-        model.fidelity->reference == "modes" ? "a body of many modes" : "the full space", model.fidelity->loads, model.fidelity->heldout_runs,
-        100 * model.fidelity->settled_error, 100 * model.fidelity->modal_error, model.fidelity->basis,
-        model.fidelity->advice);
+        model.fidelity->reference == "modes" ? "a body of many modes" : "the full space", model.fidelity->loads,
+        model.fidelity->heldout_runs, 100 * model.fidelity->settled_error, 100 * model.fidelity->modal_error,
+        model.fidelity->basis, model.fidelity->advice);
   if (model.render)
     fmt::print("render mesh    {} vertices, {} triangles; {} outside the body, by up to {:.3g} m\n",
                model.render->vertices.rows(), model.render->triangles.rows(), model.render->outside,

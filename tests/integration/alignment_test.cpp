@@ -72,6 +72,8 @@ TEST_F(Alignment, CheckReportsWithoutTheRestOfTheWork) {
   EXPECT_THAT(read_file(report / "twist.vtk"), HasSubstr("VECTORS displacement double"));
   EXPECT_THAT(read_file(report / "twist_example.vtk"), HasSubstr("DATASET UNSTRUCTURED_GRID"));
   EXPECT_THAT(read_file(report / "twist.svg"), testing::EndsWith("</svg>\n"));
+  const std::string page = read_file(report / "index.html");
+  EXPECT_THAT(page, testing::AllOf(HasSubstr("<h2>twist <span>good</span></h2>"), testing::EndsWith("</html>\n")));
 }
 
 // m = 3 carries no twist. The number named is put to the proof.
