@@ -310,7 +310,7 @@ void Pipeline::add_contact(ReducedModel& model) {
   if (model.contact->areas.size() == 0)
     throw InputError(
         {asset_.file.string(), "/contact/vertices", "vertices of the surface, some of them not fixed", "none", ""});
-  log::info(fmt::format("contact: {} vertices", model.contact->areas.size()));
+  log::info(contact_summary(*model.object, object_.contact, *model.contact));
 }
 
 void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice,
