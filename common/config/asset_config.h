@@ -156,7 +156,7 @@ struct AssetConfig {
   ForceMethod internal_force = ForceMethod::kAuto;
 
   std::optional<VertexSelection> contact_vertices;  ///< absent: all of the surface
-  std::optional<int> contact_count;                 ///< sampled from these; absent: all of them
+  std::optional<int> contact_count;                 ///< sampled from these; absent: at most 1000
 
   std::optional<std::vector<std::string>> needs;  ///< optional parts to write ("examples", "targets", "rigid",
                                                   ///< "contact", "regions", "render"); absent: all that apply

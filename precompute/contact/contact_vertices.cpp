@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <fmt/format.h>
 
 #include "common/mesh/farthest_points.h"
 
@@ -50,7 +51,7 @@ ContactData contact_data(const ObjectData& object, const RowMatrix& basis, const
   const std::vector<Eigen::Index> ids = candidates(object, areas, may_touch);
   const VertexArray points = object.mesh.vertices(ids, Eigen::all);
   const Eigen::VectorXd own_areas = areas(ids);
-  std::vector<Eigen::Index> chosen = farthest_points(points, count.value_or(static_cast<int>(ids.size())));
+  std::vector<Eigen::Index> chosen = farthest_points(points, count.value_or(kContactVertices));
   std::ranges::sort(chosen);
 
   ContactData contact;
@@ -65,6 +66,14 @@ ContactData contact_data(const ObjectData& object, const RowMatrix& basis, const
     contact.basis.middleRows<3>(3 * i) = basis.middleRows<3>(3 * vertex);
   }
   return contact;
+}
+
+std::string contact_summary(const ObjectData& object, const FlagVector& may_touch, const ContactData& contact) {
+  const auto all = std::ssize(candidates(object, vertex_areas(object), may_touch));
+  const Eigen::Index taken = contact.areas.size();
+  if (taken == all) return fmt::format("contact: all {} surface vertices", all);
+  return fmt::format("contact: a sample of {} of {} surface vertices; \"contact\": {{ \"count\": {} }} takes all",
+                     taken, all, all);
 }
 
 }  // namespace exmat::precompute

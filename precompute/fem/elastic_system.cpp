@@ -9,8 +9,8 @@
 namespace exmat::precompute {
 namespace {
 
-// A clamp that resists a rigid motion this little, relative to the others, does not resist it.
-constexpr double kClampRank = 1e-8;
+// Fixed vertices are on one line where they are as wide as this, relative to their length.
+constexpr double kClampRank = 1e-6;
 
 // [3n x 6] translations and rotations about `centre`.
 Eigen::MatrixXd raw_rigid_motions(const TetMesh& mesh, const Eigen::Vector3d& centre) {
@@ -25,16 +25,15 @@ Eigen::MatrixXd raw_rigid_motions(const TetMesh& mesh, const Eigen::Vector3d& ce
   return motions;
 }
 
+// Whatever the rest of the body is like: a clamp may be small beside it.
 void require_clamped(const TetMesh& mesh, const FlagVector& fixed) {
-  const Eigen::MatrixXd motions = raw_rigid_motions(mesh, mesh.vertices.colwise().mean().transpose());
-  Eigen::Matrix<double, 6, 6> gram = Eigen::Matrix<double, 6, 6>::Zero();
-  const Eigen::VectorXd scales = motions.colwise().norm().cwiseInverse();
-  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
-    const Eigen::Matrix<double, 3, 6> rows = motions.middleRows<3>(3 * v) * scales.asDiagonal();
-    if (fixed[v] != 0) gram += rows.transpose() * rows;
-  }
-  const Eigen::JacobiSVD<Eigen::Matrix<double, 6, 6>> svd(gram);
-  if (svd.singularValues()[5] > kClampRank * svd.singularValues()[0]) return;
+  Eigen::MatrixX3d points(fixed.cast<Eigen::Index>().sum(), 3);
+  for (Eigen::Index v = 0, row = 0; v < mesh.vertex_count(); ++v)
+    if (fixed[v] != 0) points.row(row++) = mesh.vertices.row(v);
+  points.rowwise() -= points.colwise().mean().eval();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(points.transpose() * points);
+  const auto& squares = svd.singularValues();
+  if (points.rows() >= 3 && squares[1] > kClampRank * kClampRank * squares[0]) return;
   throw InputError({"", "/object/fixed", "at least three fixed vertices that are not on one line",
                     std::to_string(fixed.cast<int>().sum()) + " that leave the body free to move rigidly",
                     "fix more of them"});

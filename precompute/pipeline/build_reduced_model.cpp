@@ -24,6 +24,7 @@
 #include "precompute/pipeline/target_elasticity_stage.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
+#include "precompute/solvers/mesh_blame.h"
 #include "precompute/targets/target_space.h"
 #include "precompute/training/fidelity.h"
 
@@ -280,7 +281,7 @@ void Pipeline::add_contact(ReducedModel& model) {
   if (model.contact->areas.size() == 0)
     throw InputError(
         {asset_.file.string(), "/contact/vertices", "vertices of the surface, some of them not fixed", "none", ""});
-  log::info(fmt::format("contact: {} vertices", model.contact->areas.size()));
+  log::info(contact_summary(*model.object, object_.contact, *model.contact));
 }
 
 void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice,
@@ -340,16 +341,19 @@ ReducedModel Pipeline::run() {
   const auto system =
       timed("assembly", [&] { return build_elastic_system(object_.mesh, object_.materials, object_.fixed); });
   require_modes(system);
+  const auto blamed = [&](auto work) { return with_mesh_blamed(object_.mesh, asset_.name, work); };
   auto solver = timed("factorisation", [&] {
-    return std::make_unique<SemidefiniteSolver>(system.stiffness, system.mass * system.null_space,
-                                                asset_.name + ": elastic stiffness", system.rigid);
+    return blamed([&] {
+      return std::make_unique<SemidefiniteSolver>(system.stiffness, system.mass * system.null_space,
+                                                  asset_.name + ": elastic stiffness", system.rigid);
+    });
   });
   log::info(system.constrained() ? fmt::format("constrained body: {} fixed vertices", object_.fixed.cast<int>().sum())
                                  : "free body: six rigid modes found and excluded");
   const auto modes = timed("linear modes", [&] {
     return cache_.get(
-        "linear modes", [&] { return linear_modes(system, *solver, asset_.linear_modes); }, system.mass,
-        system.stiffness, system.null_space, asset_.linear_modes);
+        "linear modes", [&] { return blamed([&] { return linear_modes(system, *solver, asset_.linear_modes); }); },
+        system.mass, system.stiffness, system.null_space, asset_.linear_modes);
   });
   const auto derivatives = timed("modal derivatives", [&] {
     return cache_.get(

@@ -5,6 +5,7 @@
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
 #include "precompute/solvers/eigenpairs.h"
+#include "precompute/solvers/mesh_blame.h"
 
 namespace exmat::precompute {
 
@@ -18,8 +19,10 @@ LaplaceBasis laplace_basis(const TetMesh& mesh, Eigen::Index count, const std::s
   basis.centroid = centroid(mesh);
   basis.vertices = normalised_positions(mesh);
   const Eigen::MatrixXd constant = Eigen::MatrixXd::Constant(mesh.vertex_count(), 1, 1 / std::sqrt(basis.volume));
-  const SemidefiniteSolver solver(stiffness, mass * constant, name + ": Laplacian", constant);
-  const auto pairs = smallest_eigenpairs(stiffness, mass, solver, count);
+  const Eigenpairs pairs = with_mesh_blamed(mesh, name, [&] {
+    const SemidefiniteSolver solver(stiffness, mass * constant, name + ": Laplacian", constant);
+    return smallest_eigenpairs(stiffness, mass, solver, count);
+  });
   basis.eigenvalues = pairs.values * std::pow(basis.volume, 2.0 / 3.0);
   basis.eigenfunctions = pairs.vectors * std::sqrt(basis.volume);
   basis.mass = mass / basis.volume;

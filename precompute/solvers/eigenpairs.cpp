@@ -2,7 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <exception>
 #include <random>
 #include <utility>
@@ -10,6 +12,7 @@
 
 #include "common/core/error.h"
 #include "common/core/progress.h"
+#include "precompute/solvers/refinement.h"
 #include "precompute/solvers/solver_access.h"
 
 namespace exmat::precompute {
@@ -17,9 +20,14 @@ namespace {
 
 constexpr double kConvergence = 1e-12;       // of Krylov-Schur, relative to the eigenvalue
 constexpr double kLobpcgConvergence = 1e-9;  // |K x - lambda M x| / |lambda M x|, about
-constexpr double kResidualLimit = 1e-9;      // of the returned pairs
-constexpr int kMostPolishes = 4;             // one does after Krylov-Schur
-constexpr double kMissedMargin = 1e-7;       // a find below (1 - this) times the largest kept value was missed
+// Of |K x - lambda M x| / |lambda M x|. Rounding alone leaves eps |K| |x| / |lambda M x|, which is more for slender
+// bodies and those with flat tets: their pairs are refined.
+constexpr double kCoarse = 1e-9;
+// Of the returned pairs: |lambda K^-1 M x - x| of those that were refined, what rounding of K makes of their
+// eigenvalues, and the backward error of all.
+constexpr double kChangeLimit = 1e-6, kRoundingLimit = 1e-3, kBackwardLimit = 1e-11;
+constexpr int kMostPolishes = 4;        // one does after Krylov-Schur
+constexpr double kMissedMargin = 1e-7;  // a find below (1 - this) times the largest kept value was missed
 
 // y = K^+ x, of each rank's rows; `solve` does it.
 template <typename Solve>
@@ -206,31 +214,62 @@ class TeamProblem {
   EigenShare share_;
 };
 
+struct Polished {
+  Eigenpairs pairs;
+  double residual = 0;  // largest |K x - lambda M x| / |lambda M x|
+};
+
 // A step of inverse iteration and Rayleigh-Ritz: orthonormal to rounding, residuals far below Krylov-Schur's.
-Eigenpairs polish_once(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
-                       const Eigen::MatrixXd& vectors) {
+Polished polish_once(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                     const Eigen::MatrixXd& vectors) {
   const Eigen::MatrixXd improved = solver.solve(mass * vectors);
   const Eigen::MatrixXd K = improved.transpose() * (stiffness * improved);
   const Eigen::MatrixXd M = improved.transpose() * (mass * improved);
   const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> ritz(K, M);
-  Eigenpairs pairs{ritz.eigenvalues(), improved * ritz.eigenvectors(), {}};
+  Eigenpairs pairs{ritz.eigenvalues(), improved * ritz.eigenvectors()};
   // The Ritz vectors inherit the conditioning of `improved`; a second orthonormalisation removes it.
   const Eigen::MatrixXd gram = pairs.vectors.transpose() * (mass * pairs.vectors);
   gram.llt().matrixU().solveInPlace<Eigen::OnTheRight>(pairs.vectors);
   const Eigen::MatrixXd mass_vectors = mass * pairs.vectors;
   const Eigen::MatrixXd scaled = mass_vectors * pairs.values.asDiagonal();
-  pairs.residuals =
-      ((stiffness * pairs.vectors - scaled).colwise().norm().array() / scaled.colwise().norm().array()).transpose();
-  return pairs;
+  const double residual =
+      ((stiffness * pairs.vectors - scaled).colwise().norm().array() / scaled.colwise().norm().array()).maxCoeff();
+  return {std::move(pairs), residual};
 }
 
 // Until the residuals are small, for those found by LOBPCG.
-Eigenpairs polish(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
-                  const Eigen::MatrixXd& vectors) {
-  Eigenpairs pairs = polish_once(stiffness, mass, solver, vectors);
-  for (int pass = 1; pass < kMostPolishes && pairs.residuals.maxCoeff() > kResidualLimit; ++pass)
-    pairs = polish_once(stiffness, mass, solver, pairs.vectors);
-  return pairs;
+Polished polish(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                const Eigen::MatrixXd& vectors) {
+  Polished polished = polish_once(stiffness, mass, solver, vectors);
+  for (int pass = 1; pass < kMostPolishes && polished.residual > kCoarse; ++pass)
+    polished = polish_once(stiffness, mass, solver, polished.pairs.vectors);
+  return polished;
+}
+
+std::string scientific(double value) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.1e", value);
+  return text.data();
+}
+
+void require(double found, double limit, const char* what) {
+  if (found <= limit) return;
+  throw IllConditioned(std::string("eigensolver: ") + what + " is " + scientific(found) + ", above " +
+                       scientific(limit) + ": numbers of 16 digits do not hold this body");
+}
+
+void refine_where_coarse(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                         Polished& polished) {
+  Eigenpairs& pairs = polished.pairs;
+  if (polished.residual > kCoarse) {
+    RefinedPairs refined = refine(stiffness, mass, solver, pairs.values, pairs.vectors);
+    pairs = {std::move(refined.values), std::move(refined.vectors)};
+    require(rounding_share(stiffness, mass, pairs.values, pairs.vectors), kRoundingLimit,
+            "the relative error of an eigenvalue by the rounding of the matrix");
+    require(refined.change, kChangeLimit, "the relative change of an eigenvector by one more iteration");
+  }
+  require(backward_errors(stiffness, mass, pairs.values, pairs.vectors).maxCoeff(), kBackwardLimit,
+          "the backward error");
 }
 
 }  // namespace
@@ -259,21 +298,19 @@ Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix
                                const SemidefiniteSolver& solver, Eigen::Index count) {
   const TeamProblem problem(stiffness, mass, solver);
   Eigen::MatrixXd found = problem.search(Eigen::MatrixXd(solver.size(), 0), count);
-  Eigenpairs pairs = polish(stiffness, mass, solver, found);
+  Polished polished = polish(stiffness, mass, solver, found);
   for (;;) {
+    Eigenpairs& pairs = polished.pairs;
     const Eigen::MatrixXd extra = problem.search(pairs.vectors, 1);
-    const Eigen::VectorXd x = extra.col(0);
-    if (x.dot(stiffness * x) / x.dot(mass * x) >= (1 - kMissedMargin) * pairs.values[count - 1]) break;
+    if (rayleigh_quotient(stiffness, mass, extra.col(0)) >= (1 - kMissedMargin) * pairs.values[count - 1]) break;
     found.resize(found.rows(), count + 1);
     found << pairs.vectors, extra;
-    pairs = polish(stiffness, mass, solver, found);
-    pairs = {pairs.values.head(count), pairs.vectors.leftCols(count), pairs.residuals.head(count)};
+    polished = polish(stiffness, mass, solver, found);
+    pairs = {pairs.values.head(count), pairs.vectors.leftCols(count)};
   }
-  if (pairs.residuals.maxCoeff() > kResidualLimit)
-    throw WorkError("eigensolver: residual " + std::to_string(1e9 * pairs.residuals.maxCoeff()) +
-                    "e-9 is above 1e-9; the mesh has very bad elements, or parts that can move without deforming it");
-  fix_signs(pairs.vectors);
-  return pairs;
+  refine_where_coarse(stiffness, mass, solver, polished);
+  fix_signs(polished.pairs.vectors);
+  return std::move(polished.pairs);
 }
 
 void fix_signs(Eigen::MatrixXd& columns) {

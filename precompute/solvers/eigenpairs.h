@@ -8,15 +8,15 @@ namespace exmat::precompute {
 
 /// Eigenpairs of K x = lambda M x.
 struct Eigenpairs {
-  Eigen::VectorXd values;     ///< k, ascending
-  Eigen::MatrixXd vectors;    ///< n x k, M-orthonormal, signs fixed (see fix_signs)
-  Eigen::VectorXd residuals;  ///< k, |K x - lambda M x| / |lambda M x|
+  Eigen::VectorXd values;   ///< k, ascending
+  Eigen::MatrixXd vectors;  ///< n x k, M-orthonormal, signs fixed (see fix_signs)
 };
 
 /// The `count` smallest eigenpairs of K x = lambda M x outside the null space of K, by SLEPc's Krylov-Schur on the
 /// inverse that `solver` has factored. No copy of a multiple eigenvalue is missed: the search is repeated in the
-/// complement of what was found until nothing smaller turns up. Throws WorkError when it does not converge or a
-/// residual exceeds 1e-9.
+/// complement of what was found until nothing smaller turns up. Residuals |K x - lambda M x| / |lambda M x| are at most
+/// 1e-9, or pairs are refined in long double until |lambda K^-1 M x - x| is, in the norm of M. Throws WorkError when
+/// the search does not converge, IllConditioned when the refinement does not.
 Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass,
                                const SemidefiniteSolver& solver, Eigen::Index count);
 

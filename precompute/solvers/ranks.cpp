@@ -143,14 +143,17 @@ bool started_by_mpirun() {
   return false;
 }
 
-// A single process needs no daemon, no binding and no network. mpirun sets its own.
+// A single process needs no daemon, no binding, no network, and nothing that others share: neither a folder in the
+// temporary directory, which Open MPI's processes remove under each other, nor shared memory. mpirun sets its own.
 void set_environment() {
   setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // ranks may be more than cores
   setenv("HWLOC_HIDE_ERRORS", "2", 0);             // stderr is for the log, also in containers without /sys
   if (started_by_mpirun()) return;
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
-  setenv("OMPI_MCA_btl", "self,vader", 0);
+  setenv("OMPI_MCA_btl", "self", 0);
+  setenv("OMPI_MCA_shmem", "mmap", 0);  // the other kinds try themselves out in /dev/shm
+  setenv("OMPI_MCA_orte_create_session_dirs", "0", 0);
 }
 
 // Keeps the text of the first error for check_petsc, which throws it once the call has returned.

@@ -2,6 +2,7 @@
 
 #include <Eigen/QR>
 #include <algorithm>
+#include <array>
 #include <slepcsys.h>
 #include <vector>
 
@@ -19,6 +20,8 @@ constexpr PetscInt kMostIterations = 2000;
 // vectors.
 constexpr double kShift = 1e-6;
 constexpr Eigen::Index kRigidMotions = 6;
+// Work space beyond what the pattern of the matrix needs [%], tried one after the other; the first is MUMPS's own.
+constexpr std::array<PetscInt, 7> kWorkSpaces{20, 60, 140, 300, 700, 1500, 3100};
 // Right-hand sides that are copied and solved for together: more are no faster.
 constexpr Eigen::Index kSolvedTogether = 32;
 
@@ -76,18 +79,48 @@ NullSpaceHandle null_space_of(const Eigen::MatrixXd& own, Eigen::Index block) {
   throw WorkError(std::string("not enough memory for the ") + what + "; use more ranks, or --eigensolver gamg");
 }
 
+// INFOG(1) of MUMPS: 0 or more where it has done its work.
+PetscInt state_of(Mat factor) {
+  PetscInt state = 0;
+  check_petsc(MatMumpsGetInfog(factor, 1, &state), "state of MUMPS");
+  return state;
+}
+
+// The system had no more memory to give.
+bool lacks_memory(PetscInt state) { return state == -5 || state == -7 || state == -13; }
+
+// More entries than the analysis had foreseen: pivots that were put off.
+bool lacks_work_space(PetscInt state) { return state == -8 || state == -9 || state == -17 || state == -20; }
+
 // MUMPS's failures are no errors to PETSc.
 void require_factors(Mat factor) {
   MatFactorError error = MAT_FACTOR_NOERROR;
   check_petsc(MatFactorGetError(factor, &error), "state of the factorisation");
-  if (error == MAT_FACTOR_OUTMEMORY) refuse_for_memory("factors");
-  if (error != MAT_FACTOR_NOERROR) throw WorkError("MUMPS cannot factorise the matrix");
+  if (error == MAT_FACTOR_NOERROR) return;
+  const PetscInt state = state_of(factor);
+  if (lacks_memory(state)) refuse_for_memory("factors");
+  if (lacks_work_space(state))
+    throw IllConditioned("MUMPS cannot factorise the matrix in " + std::to_string(1 + kWorkSpaces.back() / 100) +
+                         " times the work space that its pattern needs");
+  throw WorkError("MUMPS cannot factorise the matrix: INFOG(1) = " + std::to_string(state));
+}
+
+// L D L^T with `more` work space [%].
+void factorise_within(PetscInt more, Mat matrix, MatHandle& factor) {
+  factor = {};
+  Mat& made = *factor.out();
+  check_petsc(MatGetFactor(matrix, MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &made), "choice of MUMPS");
+  check_petsc(MatMumpsSetIcntl(made, 13, 1), "MUMPS option");  // inertia needs the root factored in one piece
+  check_petsc(MatMumpsSetIcntl(made, 24, 1), "MUMPS option");  // detect null pivots
+  check_petsc(MatMumpsSetIcntl(made, 14, more), "MUMPS option");
+  MatFactorInfo info;
+  check_petsc(MatFactorInfoInitialize(&info), "factor options");
+  check_petsc(MatCholeskyFactorSymbolic(made, matrix, nullptr, &info), "symbolic factorisation");
+  check_petsc(MatCholeskyFactorNumeric(made, matrix, &info), "factorisation");
 }
 
 void require_solved(PetscErrorCode code, Mat factor) {
-  constexpr PetscInt kNoMemory = -13;  // INFOG(1) of MUMPS
-  PetscInt state = 0;
-  if (code != 0 && MatMumpsGetInfog(factor, 1, &state) == 0 && state == kNoMemory) refuse_for_memory("solutions");
+  if (code != 0 && lacks_memory(state_of(factor))) refuse_for_memory("solutions");
   check_petsc(code, "solve");
 }
 
@@ -126,15 +159,11 @@ void SolverShare::factorise_directly(const SparseMatrix& whole, const Eigen::Mat
   const double border_norm = leads() && border > 0 ? mass_times_null_space.cwiseAbs().maxCoeff() : 1.0;
   matrix = to_petsc(layout, whole, mass_times_null_space * (scale / border_norm), border);
 
-  Mat& made = *factor.out();
-  check_petsc(MatGetFactor(matrix.get(), MATSOLVERMUMPS, MAT_FACTOR_CHOLESKY, &made), "choice of MUMPS");
-  check_petsc(MatMumpsSetIcntl(made, 13, 1), "MUMPS option");  // inertia needs the root factored in one piece
-  check_petsc(MatMumpsSetIcntl(made, 24, 1), "MUMPS option");  // detect null pivots
-  MatFactorInfo info;
-  check_petsc(MatFactorInfoInitialize(&info), "factor options");
-  check_petsc(MatCholeskyFactorSymbolic(made, matrix.get(), nullptr, &info), "symbolic factorisation");
-  check_petsc(MatCholeskyFactorNumeric(made, matrix.get(), &info), "factorisation");
-  require_factors(made);
+  for (const PetscInt more : kWorkSpaces) {
+    factorise_within(more, matrix.get(), factor);
+    if (!lacks_work_space(state_of(factor.get()))) break;
+  }
+  require_factors(factor.get());
   matrix = {};
 }
 
@@ -230,7 +259,7 @@ SemidefiniteSolver::SemidefiniteSolver(const SparseMatrix& matrix, const Eigen::
   PetscInt negative = 0, zero = 0, positive = 0;
   check_petsc(MatGetInertia(share_->factor.get(), &negative, &zero, &positive), "inertia");
   if (negative != share_->border || zero != 0)
-    throw WorkError(
+    throw IllConditioned(
         name + ": expected " + std::to_string(share_->border) + " negative and no zero pivots, found " +
         std::to_string(negative) + " and " + std::to_string(zero) +
         ": parts of the body can move without deforming it (hinges, or tets joined only in an edge or a vertex)");

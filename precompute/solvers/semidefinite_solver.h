@@ -4,12 +4,19 @@
 #include <memory>
 #include <string>
 
+#include "common/core/error.h"
 #include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
 
 /// "PETSc 3.18.5, SLEPc 3.18.2".
 std::string solver_versions();
+
+/// What a matrix is to blame for: that of a mesh with flat tets, with hinges, or of a very slender body.
+class IllConditioned : public WorkError {
+ public:
+  using WorkError::WorkError;
+};
 
 struct SolverShare;
 
@@ -20,8 +27,8 @@ struct SolverShare;
 class SemidefiniteSolver {
  public:
   /// `soft_fields` [n x k] deform next to nothing, which multigrid has to know: R where there is a null space, else the
-  /// rigid motions of elasticity; none: not known. `name` is for messages. Throws WorkError unless the inertia of the
-  /// factors shows that K is positive semi-definite and has no other null vectors; multigrid cannot tell.
+  /// rigid motions of elasticity; none: not known. `name` is for messages. Throws IllConditioned unless the inertia of
+  /// the factors shows that K is positive semi-definite and has no other null vectors; multigrid cannot tell.
   SemidefiniteSolver(const SparseMatrix& matrix, const Eigen::MatrixXd& mass_times_null_space, const std::string& name,
                      const Eigen::MatrixXd& soft_fields = {});
   ~SemidefiniteSolver();

@@ -78,6 +78,23 @@ TEST(ContactVertices, OfASampleAreSpreadEvenlyAndShareAllTheArea) {
   EXPECT_EQ(contact_data(object, basis, all(object), 100000).vertices, everything.vertices);
 }
 
+// 20 x 16 x 16 cells: 1794 vertices on the surface, of which 289 are fixed.
+TEST(ContactVertices, OfALargeSurfaceAreASampleUnlessAllAreAskedFor) {
+  ObjectData object = box();
+  object.mesh = test::box_mesh({20, 16, 16}, {2, 1, 1});
+  object.surface = surface_triangles(object.mesh.tets);
+  object.fixed = (object.mesh.vertices.col(0).array() < 1e-9).cast<std::uint8_t>();
+  const RowMatrix basis = RowMatrix::Zero(3 * object.mesh.vertex_count(), 1);
+  const ContactData sample = contact_data(object, basis, all(object), std::nullopt);
+  const ContactData everything = contact_data(object, basis, all(object), 1505);
+  EXPECT_EQ(sample.vertices.size(), 1000);
+  EXPECT_EQ(everything.vertices.size(), 1505);
+  EXPECT_NEAR(sample.areas.sum(), everything.areas.sum(), 1e-12);
+  EXPECT_EQ(contact_summary(object, all(object), sample),
+            "contact: a sample of 1000 of 1505 surface vertices; \"contact\": { \"count\": 1505 } takes all");
+  EXPECT_EQ(contact_summary(object, all(object), everything), "contact: all 1505 surface vertices");
+}
+
 TEST(FarthestPoints, StartAtTheEndsOfALine) {
   VertexArray points = VertexArray::Zero(9, 3);
   points.col(0) = Eigen::VectorXd::LinSpaced(9, 0, 8);

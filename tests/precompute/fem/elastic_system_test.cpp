@@ -126,6 +126,14 @@ TEST(ElasticSystem, UniaxialStretchHasTheRightEnergy) {
   EXPECT_NEAR(0.5 * u.dot(K * u) / (0.5 * E * strain * strain * 1.2), 1.0, 1e-12);
 }
 
+// 40 m long, 5 mm thick, clamped at its narrow end.
+TEST(ElasticSystem, ClampMayBeSmallBesideTheBody) {
+  const TetMesh tape = test::box_mesh({160, 4, 1}, {40, 1, 0.005});
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(tape.tet_count());
+  const FlagVector end = (tape.vertices.col(0).array() < 1e-9).cast<std::uint8_t>();
+  EXPECT_TRUE(build_elastic_system(tape, {1000 * ones, 1e6 * ones, 0.3 * ones}, end).constrained());
+}
+
 TEST(ElasticSystem, ClampOnALineIsRefused) {
   const auto mesh = test::box_mesh({3, 2, 2}, {1, 1, 1});
   FlagVector fixed = FlagVector::Zero(mesh.vertex_count());
