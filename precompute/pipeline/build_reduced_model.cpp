@@ -248,12 +248,13 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const Semidefin
       if (options_.training_budget > 0) return work();
       return cache_.get(stage, work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
                         copies_of(example_sets(body)), object_.contact, asset_.contact_count, text_of(plan.loads),
-                        asset_.training.segments, asset_.training.seconds, seed, asset_.linear_modes);
+                        asset_.training.segments, asset_.training.seconds, seed,
+                        solver != nullptr ? asset_.linear_modes : 0);
     };
     if (solver != nullptr)
       std::tie(motions.set, motions.elements) = cached("training in modes", [&] {
         const ManyModes modes =
-            many_modes(stages, body, *solver, motions.chains, plan.loads.obstacle.has_value(), asset_.seed);
+            many_modes(stages, body, *solver, motions.chains, plan.loads.obstacle.has_value(), seed);
         return std::pair(run_training(modes, system, motions.chains), *modes.model.cubature);
       });
     else
