@@ -56,12 +56,14 @@ AlignedRest ExampleAligner::map_rest(const LaplaceBasis& basis, const Eigen::Mat
   return rest;
 }
 
-// None if it is good as it stands; else that of the object's own mesh, or of its landmarks, or the one that fits best.
+// None if it is good as it stands, or a map of its vertices will say; else that of the object's own mesh, or of its
+// landmarks, or the one that fits best.
 RestTurn ExampleAligner::turn_of_rest(const LaplaceBasis& basis, RestPlacing& placing) const {
-  if (asset_.alignment.frame == AlignmentFrame::kShared) return {};
+  if (asset_.alignment.frame == AlignmentFrame::kShared || examples_.rest.on_object.size() > 0) return {};
   const RestTurn none;
   if (placing.gap(none.rotation) <= kSameFrame && map_rest(basis, none.rotation).map.doubt <= kGoodDoubt) return none;
-  if (examples_.rest.mesh.tets == object_input_.mesh.tets) {
+  const TetArray &our_tets = object_input_.mesh.tets, &their_tets = examples_.rest.mesh.tets;
+  if (our_tets.rows() == their_tets.rows() && our_tets == their_tets) {
     const Eigen::Matrix3d R = procrustes_rotation(object_.vertices.transpose() * (object_.mass * basis.vertices));
     if ((basis.vertices * R.transpose() - object_.vertices).norm() < kSameMesh * object_.vertices.norm()) return {R};
   }

@@ -252,6 +252,19 @@ TEST_F(ArmedBar, ExamplesWithAnotherAxisUpAreTurnedBack) {
   EXPECT_THAT(shared.alignments[0].message, HasSubstr("the examples stand turned by 90 degrees about x"));
 }
 
+// The same tets as the object's, in another frame: its vertices tell how a symmetric body is turned.
+TEST_F(ExampleFrames, TheObjectsOwnMeshTurnedIsNotAmbiguous) {
+  set_bar();
+  const Pose turn = linear(Eigen::AngleAxisd(2.0, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix());
+  const Pose pose = bend(kLength, 0.8);
+  const TetMesh rest = bar({14, 4, 3});
+  input_.rest.mesh = posed(rest, turn);
+  add({"pose", "pose.msh", posed(posed(rest, pose), turn)});
+  const ShapeStage stage = align();
+  EXPECT_EQ(stage.alignments[0].verdict, AlignmentVerdict::kGood) << stage.alignments[0].message;
+  EXPECT_LE(error(stage, pose), 0.001);
+}
+
 // Landmarks tell how the rest example stands; what stands so are its poses, too.
 TEST_F(ExampleFrames, LandmarksTurnTheRestExampleAndItsPoses) {
   set_bar();
