@@ -7,9 +7,15 @@
 
 namespace exmat::precompute {
 
-AlignedShape aligned_shape(const TetMesh& mesh, Eigen::Index functions, const std::string& name) {
+VertexArray placed_positions(const TetMesh& mesh, const Placing& placing) {
+  return placing.size * normalised_positions(mesh) * placing.rotation.transpose();
+}
+
+AlignedShape aligned_shape(const TetMesh& mesh, Eigen::Index functions, const std::string& name,
+                           const Placing& placing) {
   const Eigen::Index count = std::min(std::max(functions, kAlignmentFunctions), mesh.vertex_count() - 2);
   AlignedShape shape{{}, laplace_basis(mesh, count, name), surface_triangles(mesh.tets)};
+  shape.basis.vertices = placed_positions(mesh, placing);
   shape.mesh = {shape.basis.vertices, mesh.tets};
   return shape;
 }

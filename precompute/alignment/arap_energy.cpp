@@ -82,4 +82,14 @@ double ArapEnergy::inverted_fraction(const VertexArray& positions) const {
   return sum;
 }
 
+double ArapEnergy::squeezed_fraction(const VertexArray& positions, double factor) const {
+  Eigen::VectorXd ratios(tets_.rows());
+  for (Eigen::Index t = 0; t < tets_.rows(); ++t) ratios[t] = deformation_gradient(positions, t).determinant();
+  const double whole = ratios.dot(volumes_);
+  double sum = 0;
+  for (Eigen::Index t = 0; t < tets_.rows(); ++t)
+    if (ratios[t] * factor < whole || ratios[t] > factor * whole) sum += volumes_[t];
+  return sum;
+}
+
 }  // namespace exmat::precompute

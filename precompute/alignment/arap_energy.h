@@ -28,6 +28,10 @@ class ArapEnergy {
   /// Share of the volume in tets with det F < 0.
   double inverted_fraction(const VertexArray& positions) const;
 
+  /// Share of the volume in tets whose volume is less than 1 / `factor` or more than `factor` times what the body as a
+  /// whole makes of its own.
+  double squeezed_fraction(const VertexArray& positions, double factor) const;
+
  private:
   Eigen::Matrix3d deformation_gradient(const VertexArray& positions, Eigen::Index tet) const;
 

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "common/mesh/nearest_point.h"
 #include "precompute/alignment/spectral_tree.h"
@@ -26,6 +27,9 @@ constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense
 constexpr int kTurningRounds = 4;            // of landmarks on a body of revolution
 constexpr double kMirrorMargin = 0.5;        // of the best F, from which on a mirror image is believed
 constexpr double kMirrorWorthwhile = 0.05;   // F above which it is looked for
+constexpr double kMirrorResidual = 0.05;     // of a mirror image that fits
+constexpr double kSqueezed = 2;              // factor of a tet's volume that no pose has
+constexpr double kUncovered = 0.15;          // distance from the other surface, over the body's size
 
 // Where a registration begins.
 struct Start {
@@ -85,7 +89,7 @@ class PoseAligner {
   const Fit& choose(const std::vector<Fit>& poses) const;
   Registered turn_to_landmarks(VertexArray positions) const;
   Registered settle(const VertexArray& positions) const;
-  bool mirror_fits_better(double misfit) const;
+  std::optional<double> mirror_residual(double misfit) const;
   PoseAlignment result(const Fit& taken, const std::vector<Fit>& poses) const;
 
   const AlignedShape& rest_;
@@ -273,15 +277,17 @@ std::vector<Fit> PoseAligner::symmetric_copies(const Fit& taken) const {
   return copies;
 }
 
-bool PoseAligner::mirror_fits_better(double misfit) const {
-  if (misfit < kMirrorWorthwhile) return false;
+// Distance of the pose's surface from that of the rest example's mirror image, bent over it, where that fits and the
+// rest example does not. A body that is its own mirror image fits by either, if at all.
+std::optional<double> PoseAligner::mirror_residual(double misfit) const {
+  if (misfit < kMirrorWorthwhile || symmetry_.mirrored || reflected_start_.rows() == 0) return std::nullopt;
   TetMesh mirrored = rest_.mesh;
   mirrored.vertices.col(0) *= -1;
   mirrored.tets.col(0).swap(mirrored.tets.col(1));
-  const Registration registration(mirrored, pose_.mesh);
-  double least = std::numeric_limits<double>::infinity();
-  if (reflected_start_.rows() > 0) least = registration.run(reflected_start_).misfit();
-  return least < kMirrorMargin * misfit;
+  const Registered registered = Registration(mirrored, pose_.mesh).run(reflected_start_);
+  const double residual = std::sqrt(registered.chamfer) / size_;
+  if (residual > kMirrorResidual || registered.misfit() > kMirrorMargin * misfit) return std::nullopt;
+  return residual;
 }
 
 PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& poses) const {
@@ -311,7 +317,13 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
     if (!has_landmarks() && (hints_.free_frame || pose.size < farther * taken.size)) alignment.ambiguous = true;
   }
   alignment.hides_twist = symmetry_.of_revolution && !has_landmarks();
-  alignment.mirrored = mirror_fits_better(registered.misfit());
+  const auto mirror = mirror_residual(registered.misfit());
+  alignment.mirrored = mirror.has_value();
+  alignment.mirror_residual = mirror.value_or(0);
+  const SurfaceTree found(registered.positions, rest_.surface);
+  alignment.uncovered = std::max(uncovered_share(found, registration_.fixed_surface(), kUncovered * size_),
+                                 uncovered_share(registration_.fixed_surface(), found, kUncovered * size_));
+  alignment.squeezed_fraction = registration_.arap().squeezed_fraction(registered.positions, kSqueezed);
   return alignment;
 }
 

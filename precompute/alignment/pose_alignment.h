@@ -34,7 +34,10 @@ struct PoseAlignment {
   double inverted_fraction = 0;     ///< of the rest example's volume
   std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
   bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is
-  bool mirrored = false;            ///< the mirror image of the rest example fits much better
+  bool mirrored = false;            ///< the mirror image of the rest example fits, and this does not
+  double mirror_residual = 0;       ///< of that mirror image, where it does
+  double squeezed_fraction = 0;     ///< of the volume, in tets that shrink to half beside the whole, or grow to twice
+  double uncovered = 0;             ///< of the area of either surface, the larger: far from the other
   bool hides_twist = false;         ///< a body of revolution: a turn about its axis leaves no trace
   double displacement = 0;          ///< RMS from rest, over the RMS radius
   double turn = 0;                  ///< angle of the rotation that lays the rest example best over the pose [rad]

@@ -29,7 +29,8 @@ RowMatrix with_normals(const TriangleSamples& samples) {
   return points;
 }
 
-double mean_squared_distance(const SurfaceTree& from, const SurfaceTree& to) {
+// Of the centres of the triangles of one surface from another.
+Eigen::VectorXd squared_distances(const SurfaceTree& from, const SurfaceTree& to) {
   const TriangleSamples& samples = from.samples();
   Eigen::VectorXd squared(samples.areas.size());
 #pragma omp parallel for schedule(static)
@@ -37,7 +38,11 @@ double mean_squared_distance(const SurfaceTree& from, const SurfaceTree& to) {
     const Eigen::Vector3d centre = samples.centres.row(k);
     squared[k] = (to.nearest(centre).position - centre).squaredNorm();
   }
-  return squared.dot(samples.areas) / samples.areas.sum();
+  return squared;
+}
+
+double mean_squared_distance(const SurfaceTree& from, const SurfaceTree& to) {
+  return squared_distances(from, to).dot(from.samples().areas) / from.samples().areas.sum();
 }
 
 }  // namespace
@@ -128,6 +133,13 @@ SurfacePoint SurfaceTree::nearest_facing(const Eigen::Vector3d& point, const Eig
     best = candidate;
   }
   return best;
+}
+
+double uncovered_share(const SurfaceTree& surface, const SurfaceTree& other, double distance) {
+  const Eigen::VectorXd& areas = surface.samples().areas;
+  const Eigen::VectorXd far = (squared_distances(surface, other).array() > distance * distance)
+                                  .select(areas, Eigen::VectorXd::Zero(areas.size()));
+  return far.sum() / areas.sum();
 }
 
 double two_way_chamfer(const SurfaceTree& a, const SurfaceTree& b) {

@@ -36,6 +36,9 @@ class SurfaceTree {
   /// side.
   SurfacePoint nearest_facing(const Eigen::Vector3d& point, const Eigen::Vector3d& normal) const;
 
+  /// The surface turned, or mirrored.
+  SurfaceTree rotated(const Eigen::Matrix3d& rotation) const { return {vertices_ * rotation.transpose(), triangles_}; }
+
   const TriangleSamples& samples() const { return samples_; }
   const TriangleArray& triangles() const { return triangles_; }
 
@@ -52,6 +55,9 @@ class SurfaceTree {
   KdTree centres_;
   KdTree centres_and_normals_;
 };
+
+/// Share of a surface's area that is farther than `distance` from another.
+double uncovered_share(const SurfaceTree& surface, const SurfaceTree& other, double distance);
 
 /// Mean squared distance of samples of each surface from the other, in both directions: their two-way Chamfer distance.
 double two_way_chamfer(const SurfaceTree& a, const SurfaceTree& b);

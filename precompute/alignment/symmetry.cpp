@@ -31,10 +31,11 @@ class SelfFit {
     samples_ = centres(farthest_points(centres, kSettlingSamples), Eigen::all);
   }
 
-  // The rotation that iterated closest points reach from a first guess.
+  // The rotation that iterated closest points reach from a first guess; a reflection from one.
   Eigen::Matrix3d settle(Eigen::Matrix3d rotation) const {
+    const double sign = rotation.determinant() < 0 ? -1 : 1;
     for (int round = 0; round < kSettlingRounds; ++round)
-      rotation = procrustes_rotation(nearest(samples_ * rotation.transpose()).transpose() * samples_);
+      rotation = sign * procrustes_rotation(sign * nearest(samples_ * rotation.transpose()).transpose() * samples_);
     return rotation;
   }
 
@@ -121,7 +122,11 @@ Symmetry rest_symmetry(const AlignedShape& shape, double tolerance) {
     if (self.gap(turn.toRotationMatrix()) < limit) symmetry.of_revolution = true;
   }
   std::vector<Eigen::Matrix3d> found{Eigen::Matrix3d::Identity()};
-  for (const Eigen::Matrix3d& guess : guesses(axes, moments)) {
+  const std::vector<Eigen::Matrix3d> all = guesses(axes, moments);
+  symmetry.mirrored =
+      self.gap(self.settle(-Eigen::Matrix3d::Identity())) < limit ||
+      std::ranges::any_of(all, [&](const Eigen::Matrix3d& guess) { return self.gap(self.settle(-guess)) < limit; });
+  for (const Eigen::Matrix3d& guess : all) {
     const Eigen::Matrix3d rotation = symmetry.of_revolution ? guess : self.settle(guess);
     if (self.gap(rotation) >= limit) continue;
     if (std::ranges::none_of(found, [&](const auto& other) { return angle_between(other, rotation) < kSameRotation; }))

@@ -11,10 +11,12 @@ namespace exmat::precompute {
 struct Symmetry {
   std::vector<Eigen::Matrix3d> rotations;  ///< without the identity
   bool of_revolution = false;              ///< some axis admits any angle
+  bool mirrored = false;                   ///< it is its own mirror image
 };
 
-/// Looks about the principal axes, and refines by iterated closest points; of a body of revolution only some of its
-/// many. Two bodies count as one where their surfaces are `tolerance` apart (RMS, over the RMS radius).
+/// Looks about the principal axes, for mirror images too, and refines by iterated closest points; of a body of
+/// revolution only some of its many. Two bodies count as one where their surfaces are `tolerance` apart (RMS, over the
+/// RMS radius).
 Symmetry rest_symmetry(const AlignedShape& shape, double tolerance = 0.02);
 
 /// Columns: principal axes of the second moments of mass, right-handed, moments ascending.

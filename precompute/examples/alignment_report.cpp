@@ -95,10 +95,10 @@ void write_alignment_report(const std::string& asset, const TetMesh& object, con
   std::vector<ReportedPose> page;
   for (std::size_t k = 0; k < input.poses.size(); ++k) {
     const PoseInput& pose = input.poses[k];
-    const auto& [rotation, displacement] = stage.poses[k];
+    const auto& [rotation, scale, displacement] = stage.poses[k];
     const TetMesh transferred{object.vertices + displacement, object.tets};
-    TetMesh original{normalised_positions(pose.mesh), pose.mesh.tets};
-    original.vertices = std::cbrt(stage.data.volume) * original.vertices * rotation.transpose();
+    TetMesh original{pose.mesh.vertices.rowwise() - centroid(pose.mesh).transpose(), pose.mesh.tets};
+    original.vertices = scale * original.vertices * rotation.transpose();
     original.vertices.rowwise() += stage.data.centroid.transpose();
     // Beside it along z, the example to the right.
     TetMesh beside = original;

@@ -11,7 +11,9 @@ namespace {
 
 constexpr double kDoubtWarning = 0.5, kDoubtRefusal = 1.2;
 constexpr double kInvertedLimit = 0.05;
-constexpr double kResidualWarning = 0.05, kResidualRefusal = 0.15;
+// Shares of the volume and of the surface that no pose has.
+constexpr double kSqueezedWarning = 0.025, kUncoveredWarning = 0.05;
+constexpr double kResidualRefusal = 0.15;
 // Rotations of a whole pose that its frame, taken to be the object's, makes unlikely and incredible [rad].
 constexpr double kTurnWarning = 50 * std::numbers::pi / 180, kTurnRefusal = 80 * std::numbers::pi / 180;
 // A distance of landmarks, over the body's size, that is to blame for a doubt.
@@ -33,6 +35,19 @@ void judge_competitors(const PoseAlignment& alignment, bool free_frame, Alignmen
                                      others, kLandmarks, kSameMesh)
                        : fmt::format("{} and {} no farther from rest; give {}, or {}", others,
                                      alignment.competing_maps == 1 ? "is" : "are", kLandmarks, kSameMesh));
+}
+
+// A pose that lacks a part of the body, or has one more: what is left is crushed into it, or drawn over it.
+void judge_parts(const PoseAlignment& alignment, AlignmentOutcome& outcome) {
+  const std::string advice = "has the pose all parts of the rest example, and no others?";
+  if (alignment.squeezed_fraction > kSqueezedWarning)
+    object_to(outcome, AlignmentVerdict::kDoubtful,
+              fmt::format("{:.0f} % of the rest example's volume shrinks to less than half beside the whole, or grows "
+                          "to more than twice; {}",
+                          100 * alignment.squeezed_fraction, advice));
+  if (alignment.uncovered > kUncoveredWarning)
+    object_to(outcome, AlignmentVerdict::kDoubtful,
+              fmt::format("{:.0f} % of a surface is far from the other; {}", 100 * alignment.uncovered, advice));
 }
 
 void judge_revolution(const PoseAlignment& alignment, AlignmentOutcome& outcome) {
@@ -68,7 +83,7 @@ const char* name_of(AlignmentVerdict verdict) {
 void object_to(AlignmentOutcome& outcome, AlignmentVerdict verdict, const std::string& message) {
   if (outcome.verdict >= verdict) return;
   outcome.verdict = verdict;
-  outcome.message = message;
+  outcome.message = outcome.message.empty() ? message : message + "; besides, " + outcome.message;
 }
 
 void judge_doubt(AlignmentOutcome& outcome, const std::string& advice) {
@@ -82,11 +97,11 @@ void judge_doubt(AlignmentOutcome& outcome, const std::string& advice) {
   if (outcome.doubt > kDoubtWarning) object_to(outcome, AlignmentVerdict::kDoubtful, objection);
 }
 
-void judge_residual(AlignmentOutcome& outcome, const std::string& advice) {
+void judge_residual(AlignmentOutcome& outcome, const std::string& advice, double warning) {
   const auto misfit = fmt::format("its surface is {:.1f} % from what was found (of the body's size); {}",
                                   100 * outcome.residual, advice);
   if (outcome.residual > kResidualRefusal) object_to(outcome, AlignmentVerdict::kRefused, misfit);
-  if (outcome.residual > kResidualWarning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
+  if (outcome.residual > warning) object_to(outcome, AlignmentVerdict::kDoubtful, misfit);
 }
 
 void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome) {
@@ -96,8 +111,10 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
   outcome.competing_maps = alignment.competing_maps;
   if (alignment.mirrored)
     object_to(outcome, AlignmentVerdict::kRefused,
-              fmt::format("the mirror image of the rest example fits much better; mirror the example back, or give {}",
-                          kSameMesh));
+              fmt::format("the mirror image of the rest example fits: its surface is {:.1f} % from the pose's (of the "
+                          "body's size), the rest example's own {:.1f} %; mirror the example back, or give {}",
+                          100 * alignment.mirror_residual, 100 * alignment.residual, kSameMesh));
+  judge_parts(alignment, outcome);
   const std::string advice =
       alignment.missed_landmarks > kMissedLandmarks
           ? fmt::format("the landmarks are {:.0f} % of the body's size from where they belong: do they correspond?",

@@ -31,14 +31,14 @@ void pass_members(Archive& archive, AlignmentOutcome& value) {
            value.competing_maps, value.shape_space_error, value.verdict, value.message);
 }
 
-/// Raises the verdict to `verdict` with a message; one as grave or graver stands.
+/// Raises the verdict to `verdict` with a message, before that of a lesser one; one as grave or graver stands alone.
 void object_to(AlignmentOutcome& outcome, AlignmentVerdict verdict, const std::string& message);
 
 /// Doubt J and share of inverted volume against their limits; `advice` says what input would help.
 void judge_doubt(AlignmentOutcome& outcome, const std::string& advice);
 
-/// Residual, the distance of the pose's surface from what was found, against its limits.
-void judge_residual(AlignmentOutcome& outcome, const std::string& advice);
+/// Residual, the distance of the pose's surface from what was found, against its limits: that of a doubt, and 0.15.
+void judge_residual(AlignmentOutcome& outcome, const std::string& advice, double warning = 0.05);
 
 /// Fills in an outcome from a registered pose. `frame` is that of the asset; `free_frame` what it came to.
 void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome);

@@ -15,12 +15,8 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGoodDoubt = 0.5;          // of a rest example that stands as the object does
-constexpr double kBetterRotation = 0.5;     // of the doubt as it stands, for a rotation to be believed
-constexpr double kCompetingRotation = 1.4;  // of the best one's doubt
-constexpr double kCompetingFloor = 0.05;    // added to it: below, rotations differ by the tessellation alone
-constexpr double kSameMesh = 1e-6;          // a doubt that only the object's own mesh has
-constexpr double kSameRotation = 0.5;       // [rad]
+constexpr double kGoodDoubt = 0.5;  // of a rest example that stands as the object does
+constexpr double kSameMesh = 1e-6;  // a distance of vertices, over the body's size, that only the object's own mesh has
 constexpr Eigen::Index kFewestLandmarks = 4;
 constexpr double kMissedLandmarks = 0.25;  // share of their displacement, RMS, that coupled bases may miss unremarked
 
@@ -60,11 +56,17 @@ AlignedRest ExampleAligner::map_rest(const LaplaceBasis& basis, const Eigen::Mat
   return rest;
 }
 
-// The rest example as it stands if that is good; else turned by its landmarks, or by the rotation between its
-// principal axes and the object's that fits best.
-AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
-  AlignedRest as_it_stands = map_rest(basis, Eigen::Matrix3d::Identity());
-  if (asset_.alignment.frame == AlignmentFrame::kShared || as_it_stands.map.doubt <= kGoodDoubt) return as_it_stands;
+// None if it is good as it stands, or a map of its vertices will say; else that of the object's own mesh, or of its
+// landmarks, or the one that fits best.
+RestTurn ExampleAligner::turn_of_rest(const LaplaceBasis& basis, RestPlacing& placing) const {
+  if (asset_.alignment.frame == AlignmentFrame::kShared || examples_.rest.on_object.size() > 0) return {};
+  const RestTurn none;
+  if (placing.gap(none.rotation) <= kSameFrame && map_rest(basis, none.rotation).map.doubt <= kGoodDoubt) return none;
+  const TetArray &our_tets = object_input_.mesh.tets, &their_tets = examples_.rest.mesh.tets;
+  if (our_tets.rows() == their_tets.rows() && our_tets == their_tets) {
+    const Eigen::Matrix3d R = procrustes_rotation(object_.vertices.transpose() * (object_.mass * basis.vertices));
+    if ((basis.vertices * R.transpose() - object_.vertices).norm() < kSameMesh * object_.vertices.norm()) return {R};
+  }
   std::vector<Eigen::Vector3d> ours, theirs;
   for (Eigen::Index k = 0; k < examples_.landmarks.rows(); ++k) {
     const auto on_object = examples_.landmarks(k, 0), on_rest = examples_.landmarks(k, examples_.rest.column);
@@ -72,32 +74,10 @@ AlignedRest ExampleAligner::best_rotation(const LaplaceBasis& basis) const {
     ours.emplace_back(object_.vertices.row(on_object));
     theirs.emplace_back(basis.vertices.row(on_rest));
   }
-  if (std::ssize(ours) >= kFewestLandmarks) {
-    const Eigen::Map<const Eigen::Matrix3Xd> a(ours.front().data(), 3, std::ssize(ours)),
-        b(theirs.front().data(), 3, std::ssize(theirs));
-    const Eigen::Matrix3d moments = (a.colwise() - a.rowwise().mean()) * (b.colwise() - b.rowwise().mean()).transpose();
-    return map_rest(basis, procrustes_rotation(moments));
-  }
-  const Eigen::Matrix3d from = principal_axes(basis), to = principal_axes(object_);
-  std::vector<AlignedRest> turned;
-  for (const Eigen::Matrix3d& turn : cube_rotations()) turned.push_back(map_rest(basis, to * turn * from.transpose()));
-  std::ranges::stable_sort(turned, {}, [](const AlignedRest& rest) { return rest.map.doubt; });
-  AlignedRest& best = turned.front();
-  if (best.map.doubt > kBetterRotation * as_it_stands.map.doubt) return as_it_stands;
-  const double most = best.map.doubt < kSameMesh
-                          ? kSameMesh
-                          : std::max(kCompetingRotation * best.map.doubt, best.map.doubt + kCompetingFloor);
-  for (const AlignedRest& other : turned) {
-    const double apart = Eigen::AngleAxisd(Eigen::Matrix3d(best.rotation.transpose() * other.rotation)).angle();
-    if (apart > kSameRotation && other.map.doubt < most) ++best.outcome.competing_maps;
-  }
-  if (best.outcome.competing_maps > 0)
-    object_to(
-        best.outcome, AlignmentVerdict::kRefused,
-        fmt::format("it stands otherwise than the object, and {} other rotations of its symmetric body fit as well "
-                    "as the best; turn it as the object stands, or give alignment.landmarks with its vertices",
-                    best.outcome.competing_maps));
-  return best;
+  if (std::ssize(ours) < kFewestLandmarks) return placing.turn();
+  const Eigen::Map<const Eigen::Matrix3Xd> a(ours.front().data(), 3, std::ssize(ours)),
+      b(theirs.front().data(), 3, std::ssize(theirs));
+  return {procrustes_rotation((a.colwise() - a.rowwise().mean()) * (b.colwise() - b.rowwise().mean()).transpose())};
 }
 
 // The map that the user gives instead of nearest points.
@@ -137,23 +117,27 @@ AlignedRest ExampleAligner::align_rest() {
     const auto basis = cache_.get(
         "eigenfunctions of the rest example", [&] { return laplace_basis(mesh, count, examples_.rest.name); }, mesh,
         count);
-    rest = best_rotation(basis);
+    RestPlacing placing(basis, mesh.tets, object_, object_input_.mesh.tets);
+    const RestTurn turn = turn_of_rest(basis, placing);
+    rest = map_rest(basis, turn.rotation);
     use_vertex_map(rest);
     if (asset_.alignment.method == AlignmentMethod::kCoupled) {
       rest.map.functional_map = coupled_map(examples_.rest, rest.basis);
       rest.map.by_functions = true;
       rest.outcome.method = "coupled";
     }
+    rest.outcome.doubt = rest.map.doubt;
+    rest.outcome.residual = placing.gap(rest.rotation);
+    if (rest.outcome.method == "rest_map") placing.judge(turn, rest.outcome);
     log::info(fmt::format("rest example {}: {:.1f} % from the object, doubt {:.3f} (0 is certain)", examples_.rest.name,
-                          100 * rest.map.residual, rest.map.doubt));
+                          100 * rest.outcome.residual, rest.map.doubt));
+    if (!rest.rotation.isIdentity(kSameMesh))
+      log::info(fmt::format("rest example {}: stands {} against the object; it and its poses are turned back",
+                            examples_.rest.name, describe_turn(rest.rotation)));
   }
   rest.carried = {rest.map.functional_map * coefficients(rest.basis, rest.basis.vertices),
                   rest.map.pull_back * rest.basis.vertices};
   rest.outcome.name = examples_.rest.name;
-  rest.outcome.residual = rest.map.residual;
-  rest.outcome.doubt = rest.map.doubt;
-  if (rest.outcome.method == "rest_map")
-    judge_doubt(rest.outcome, "expected a rest example that has about the object's shape and lies where it does");
   rest.free_poses = asset_.alignment.frame == AlignmentFrame::kFree ||
                     (asset_.alignment.frame == AlignmentFrame::kAuto && !rest.map.same_frame);
   if (asset_.alignment.frame == AlignmentFrame::kAuto)
@@ -209,11 +193,11 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
   return {on_rest, at_vertices(on_pose, pose_size)};
 }
 
-AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput& pose) {
+AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput& pose, const Placing& placing) {
   AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != AlignmentMethod::kAuto};
   const bool is_mapped = pose.on_object.size() > 0;
   hints.landmarks_alone = hints.landmarks_alone || is_mapped;
-  const AlignedShape shape = aligned_shape(pose.mesh, 0, pose.name);
+  const AlignedShape shape = aligned_shape(pose.mesh, 0, pose.name, placing);
   const PoseAlignment alignment = precompute::align_pose(rest_shape(rest), symmetry_, shape, hints);
   AlignedPose aligned;
   aligned.positions = alignment.positions;
@@ -287,10 +271,10 @@ VertexArray ExampleAligner::registered_points(const AlignedRest& rest, const Ali
   return rest.map.pull_back * Registration(moving, pose.mesh).run(start).positions;
 }
 
-AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& pose) {
+AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& pose, const Placing& placing) {
   AlignedPose aligned;
   const Eigen::Index size = example_function_count(functions(), pose.mesh.vertex_count());
-  const AlignedShape shape = aligned_shape(pose.mesh, size, pose.name);
+  const AlignedShape shape = aligned_shape(pose.mesh, size, pose.name, placing);
   const LaplaceBasis basis = first_functions(shape.basis, size);
   const Eigen::MatrixXd map = coupled_map(pose, basis);
   const Eigen::MatrixXd &carried_rest = rest.carried.coefficients, carried = map * coefficients(basis, basis.vertices);
@@ -309,7 +293,9 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
   const double missed = missed_landmarks(rest, pose, posed, displacement);
   aligned.outcome.doubt = score.total() + missed;
   aligned.outcome.inverted_fraction = score.inverted;
-  const std::string advice = "give more landmarks or regions, or take alignment.method \"auto\"";
+  const std::string advice =
+      "give landmarks or regions that tell the body's ends, sides and edges apart (slabs across a "
+      "bar do not), or take alignment.method \"auto\"";
   judge_doubt(aligned.outcome, advice);
   judge_residual(aligned.outcome, advice);
   if (missed > kMissedLandmarks)
@@ -322,19 +308,26 @@ AlignedPose ExampleAligner::coupled(const AlignedRest& rest, const PoseInput& po
 }
 
 AlignedPose ExampleAligner::align_pose(const AlignedRest& rest, const PoseInput& pose) {
+  const PoseScale scale =
+      scale_of_pose(tet_volumes(pose.mesh).sum(), tet_volumes(examples_.rest.mesh).sum(), pose.same_connectivity);
+  const Placing placing{scale.size, rest.rotation};
+  AlignedPose aligned;
   if (pose.same_connectivity) {
-    AlignedPose aligned;
-    aligned.positions = normalised_positions(pose.mesh);
+    aligned.positions = placed_positions(pose.mesh, placing);
     aligned.outcome = {pose.name, "same_connectivity", rest.outcome.residual, rest.outcome.doubt,
                        pose.inverted_fraction};
-    return aligned;
+  } else {
+    const AlignmentConfig& config = asset_.alignment;
+    const bool couples = config.method == AlignmentMethod::kCoupled;
+    aligned = cache_.get(
+        "alignment of " + pose.name,
+        [&] { return couples ? coupled(rest, pose, placing) : registered(rest, pose, placing); }, object_,
+        object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
+        landmarks_of(pose), config.landmarks.has_value(), examples_.parts, pose.parts, config.method, config.frame);
   }
-  const AlignmentConfig& config = asset_.alignment;
-  return cache_.get(
-      "alignment of " + pose.name,
-      [&] { return config.method == AlignmentMethod::kCoupled ? coupled(rest, pose) : registered(rest, pose); },
-      object_, object_input_.mesh.tets, rest, examples_.rest.mesh, examples_.object_is_rest, pose.mesh, pose.on_object,
-      landmarks_of(pose), config.landmarks.has_value(), examples_.parts, pose.parts, config.method, config.frame);
+  aligned.scale = scale;
+  if (!scale.objection.empty()) object_to(aligned.outcome, AlignmentVerdict::kRefused, scale.objection);
+  return aligned;
 }
 
 // [l x 3] of the object, the rest example and the pose: what its alignment sees of them.

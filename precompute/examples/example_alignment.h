@@ -7,6 +7,8 @@
 #include "common/config/asset_config.h"
 #include "precompute/alignment/pose_alignment.h"
 #include "precompute/examples/alignment_verdict.h"
+#include "precompute/examples/example_scale.h"
+#include "precompute/examples/rest_placing.h"
 #include "precompute/inputs/inputs.h"
 #include "precompute/shape_space/transfer.h"
 
@@ -32,12 +34,13 @@ void pass_members(Archive& archive, AlignedRest& value) {
 
 /// A pose as the rest example's vertices show it, or, of coupled bases, as it comes over to the object.
 struct AlignedPose {
-  VertexArray positions;                ///< n_0 x 3, normalised, in the frame of the pose
-  std::optional<CarriedShape> carried;  ///< of coupled bases, normalised, in the frame of the pose
+  VertexArray positions;                ///< n_0 x 3, placed beside the rest example, turned as that was
+  std::optional<CarriedShape> carried;  ///< of coupled bases, likewise
+  PoseScale scale;
   AlignmentOutcome outcome;
 };
 
-/// What the stage cache keeps of it.
+/// What the stage cache keeps of it: all but the scale.
 template <typename Archive>
 void pass_members(Archive& archive, AlignedPose& value) {
   pass_all(archive, value.positions, value.carried, value.outcome);
@@ -57,14 +60,14 @@ class ExampleAligner {
  private:
   Eigen::Index functions() const { return object_.eigenvalues.size(); }
   AlignedRest map_rest(const LaplaceBasis& basis, const Eigen::Matrix3d& rotation) const;
-  AlignedRest best_rotation(const LaplaceBasis& basis) const;
+  RestTurn turn_of_rest(const LaplaceBasis& basis, RestPlacing& placing) const;
   void use_vertex_map(AlignedRest& rest) const;
   const AlignedShape& rest_shape(const AlignedRest& rest);
   Correspondences correspondences(const AlignedRest& rest, const PoseInput& pose) const;
-  AlignedPose registered(const AlignedRest& rest, const PoseInput& pose);
+  AlignedPose registered(const AlignedRest& rest, const PoseInput& pose, const Placing& placing);
   double missed_landmarks(const AlignedRest& rest, const PoseInput& pose, const VertexArray& posed,
                           const VertexArray& displacement) const;
-  AlignedPose coupled(const AlignedRest& rest, const PoseInput& pose);
+  AlignedPose coupled(const AlignedRest& rest, const PoseInput& pose, const Placing& placing);
   VertexArray registered_points(const AlignedRest& rest, const AlignedShape& pose, const VertexArray& displacement,
                                 const Eigen::Matrix3d& to_rest);
   Eigen::MatrixXd coupled_map(const PoseInput& example, const LaplaceBasis& basis) const;

@@ -1,5 +1,6 @@
 #include "precompute/examples/example_stage.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -18,8 +19,18 @@ namespace {
 
 // Eigenfunctions computed beyond m, to see whether the cut splits a cluster.
 constexpr Eigen::Index kExtraEigenfunctions = 4;
-// A displacement, over the object's size, that is none.
-constexpr double kNoPose = 1e-6;
+// A displacement, over the object's size, that is none: numbers written with few digits have as much. Two
+// tessellations of one body have more.
+constexpr double kNoPose = 1e-4, kNoRegisteredPose = 0.01;
+// A turn that is worth words [rad].
+constexpr double kTurned = 0.02;
+
+// "the rest pose", and how it is turned.
+std::string rest_pose_text(const RowMatrix3& to_object) {
+  const Eigen::Matrix3d rotation = to_object;
+  if (Eigen::AngleAxisd(rotation).angle() < kTurned) return "the rest pose";
+  return "the rest pose, " + describe_turn(rotation);
+}
 
 class ShapeStageBuilder {
  public:
@@ -36,9 +47,9 @@ class ShapeStageBuilder {
   SparseMatrix fit_weights() const;
   void add_rest(const AlignedRest& rest, ExampleGroup& group) const;
   TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
-  void add_pose(const PoseInput& input, const AlignmentOutcome& outcome, const TransferredPose& transferred,
-                ExampleGroup& group) const;
-  ExampleData example_data(const AlignmentOutcome& outcome, double volume, const ExampleGroup& group) const;
+  void add_pose(const AlignedPose& pose, const TransferredPose& transferred, ExampleGroup& group) const;
+  ExampleData example_data(const AlignmentOutcome& outcome, double scale, const ExampleGroup& group) const;
+  void report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred);
   void add_groups(const AlignedRest& rest);
   PoseFrame region_frame(const AlignedRest& rest, const RegionView& view) const;
   Eigen::VectorXd share_of_region(const AlignedRest& rest, const RegionInput& input) const;
@@ -50,6 +61,7 @@ class ShapeStageBuilder {
   const ExampleInput& input_;
   StageCache& cache_;
   std::vector<std::string>& warnings_;
+  double rest_scale_ = 1;  // from the rest example's unit of length to the object's
   ShapeStage stage_;
 };
 
@@ -94,12 +106,12 @@ SparseMatrix ShapeStageBuilder::fit_weights() const {
   return SparseMatrix(Eigen::VectorXd(object_.fixed.cast<double>()).asDiagonal());
 }
 
-ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, double volume,
+ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, double scale,
                                             const ExampleGroup& group) const {
   ExampleData example;
   example.name = outcome.name;
   example.index = std::ssize(group.examples.examples);
-  example.scale = std::cbrt(stage_.object.volume / volume);
+  example.scale = scale;
   example.method = outcome.method;
   example.alignment_residual = outcome.residual;
   example.doubt = outcome.doubt;
@@ -109,7 +121,7 @@ ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, dou
 }
 
 void ShapeStageBuilder::add_rest(const AlignedRest& rest, ExampleGroup& group) const {
-  ExampleData example = example_data(rest.outcome, rest.basis.volume, group);
+  ExampleData example = example_data(rest.outcome, rest_scale_, group);
   example.is_rest = true;
   example.rotation = rest.rotation;
   example.descriptor = stage_.data.rest_descriptor;
@@ -118,23 +130,38 @@ void ShapeStageBuilder::add_rest(const AlignedRest& rest, ExampleGroup& group) c
 
 TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const AlignedPose& pose,
                                             const PoseFrame& frame) const {
-  if (pose.carried)
-    return transfer_carried(stage_.object, stage_.rest_coefficients, rest.carried, *pose.carried, frame);
-  return transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
+  TransferredPose transferred =
+      pose.carried
+          ? transfer_carried(stage_.object, stage_.rest_coefficients, rest.carried, *pose.carried, frame)
+          : transfer_pose(stage_.object, stage_.rest_coefficients, rest.map, rest.basis, pose.positions, frame);
+  transferred.rotation = transferred.rotation * rest.rotation;
+  return transferred;
 }
 
-void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignmentOutcome& outcome,
-                                 const TransferredPose& transferred, ExampleGroup& group) const {
-  ExampleData example = example_data(outcome, tet_volumes(input.mesh).sum(), group);
+// What is worth saying of its scale, and where it is hardly a pose.
+void ShapeStageBuilder::report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred) {
+  if (!pose.scale.note.empty()) log::info(fmt::format("example {}: {}", name, pose.scale.note));
+  if (!pose.scale.warning.empty()) warn(warnings_, fmt::format("example {}: {}", name, pose.scale.warning));
+  const double share = transferred.displacement.norm() / stage_.object.vertices.norm();
+  if (pose.outcome.method == "same_connectivity" || share > kNoRegisteredPose) return;
+  warn(warnings_,
+       fmt::format("example {}: it differs by {:.2g} % of the body's size from {}, no more than two meshes of "
+                   "one body do; leave it out, or pose the rest example's own mesh",
+                   name, 100 * share, rest_pose_text(transferred.rotation)));
+}
+
+void ShapeStageBuilder::add_pose(const AlignedPose& pose, const TransferredPose& transferred,
+                                 ExampleGroup& group) const {
+  ExampleData example = example_data(pose.outcome, rest_scale_ / pose.scale.unit, group);
   example.rotation = transferred.rotation;
   example.shape_space_error = transferred.shape_space_error;
   example.descriptor = stage_.weights.asDiagonal() * transferred.coefficients;
   if (transferred.displacement.norm() <= kNoPose * stage_.object.vertices.norm())
-    throw InputError({"", "/examples, " + input.name,
+    throw InputError({"", "/examples, " + example.name,
                       group.region.empty()
                           ? "a pose that differs from the rest pose"
                           : fmt::format("a pose that differs from the rest pose in the region {}", group.region),
-                      "the rest pose", "leave it out: the rest pose is always an example"});
+                      rest_pose_text(transferred.rotation), "leave it out: the rest pose is always an example"});
   group.fields.conservativeResize(3 * object_.mesh.vertex_count(), group.fields.cols() + 1);
   group.fields.rightCols(1) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
   group.examples.examples.push_back(std::move(example));
@@ -174,23 +201,27 @@ void ShapeStageBuilder::add_groups(const AlignedRest& rest) {
 void ShapeStageBuilder::add_examples() {
   ExampleAligner aligner(asset_, stage_.object, object_, input_, cache_);
   const AlignedRest rest = aligner.align_rest();
+  rest_scale_ = std::cbrt(stage_.object.volume / rest.basis.volume);
+  const std::string remark = remark_on_rest_scale(rest.basis.volume, stage_.object.volume);
+  if (!remark.empty()) warn(warnings_, fmt::format("rest example {}: {}", rest.outcome.name, remark));
   stage_.alignments.push_back(rest.outcome);
   add_groups(rest);
   const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
   for (const PoseInput& input : input_.poses) {
     const AlignedPose pose = aligner.align_pose(rest, input);
     const TransferredPose whole = transfer(rest, pose, frame);
-    stage_.poses.push_back({whole.rotation, carried_displacement(whole)});
+    report(input.name, pose, whole);
+    stage_.poses.push_back({whole.rotation, rest_scale_ / pose.scale.unit, carried_displacement(whole)});
     stage_.alignments.push_back(pose.outcome);
     stage_.alignments.back().shape_space_error = whole.shape_space_error;
-    if (input_.whole_body && input.in_whole_body) add_pose(input, pose.outcome, whole, stage_.groups.front());
+    if (input_.whole_body && input.in_whole_body) add_pose(pose, whole, stage_.groups.front());
     for (std::size_t i = 0; i < input_.regions.size(); ++i) {
       const RegionInput& region = input_.regions[i];
       if (std::ranges::find(region.examples, input.name) == region.examples.end()) continue;
       ExampleGroup& group = stage_.groups[i + (input_.whole_body ? 1 : 0)];
       TransferredPose local = transfer(rest, pose, region_frame(rest, *group.view));
       cut(*group.view, share_of_region(rest, region), local);
-      add_pose(input, pose.outcome, local, group);
+      add_pose(pose, local, group);
     }
   }
 }

@@ -25,6 +25,7 @@ struct ExampleGroup {
 /// A pose brought to the object as a whole, whatever it acts on.
 struct StagedPose {
   RowMatrix3 rotation = RowMatrix3::Identity();  ///< from the example's frame to the object's
+  double scale = 1;                              ///< from the example's unit of length to the object's
   VertexArray displacement;                      ///< n x 3, what the m functions carry [m]
 };
 

@@ -17,6 +17,7 @@
 #include "precompute/examples/example_finish.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/fem/rigid_moments.h"
+#include "precompute/inputs/object_size.h"
 #include "precompute/modes/linear_modes.h"
 #include "precompute/pipeline/basis_stage.h"
 #include "precompute/pipeline/cubature_stage.h"
@@ -309,6 +310,7 @@ std::string generator() { return fmt::format("exmat-precompute {}", version()); 
 void Pipeline::read() {
   if (needs_.internal_force == ForceMethod::kPolynomial) require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
+  warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
   require_regions(asset_, needs_);
   report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions),
                                asset_.render_mesh.has_value());
@@ -445,6 +447,7 @@ std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::
                                            BuildReport& report) {
   report.inputs.push_back(asset.file);
   const auto object = read_object(asset, report.inputs);
+  warn_of_size(object, asset.object_mesh.string(), report.warnings);
   if (asset.render_mesh) read_render_mesh(asset, object, report.inputs, report.warnings);
   if (asset.examples.empty()) return {};
   const auto input = read_examples(asset, object, report.inputs);

@@ -12,6 +12,9 @@ namespace {
 
 // A second singular value below this, relative to the first, leaves the angle about an axis open.
 constexpr double kRankOne = 1e-8;
+// Fits of a pose to the rest pose, and the turn that ends them [rad].
+constexpr int kMostFits = 30;
+constexpr double kNoTurn = 1e-12;
 // Displacements below this, relative to the body's size, are rounding.
 constexpr double kNoDisplacement = 1e-12;
 
@@ -33,10 +36,18 @@ VertexArray centred(const VertexArray& field, const SparseMatrix& mass) {
 TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
                            const Eigen::MatrixXd& change, const VertexArray& displacement,
                            const Eigen::Matrix3d& to_rest, const PoseFrame& frame) {
-  const Eigen::Matrix3d fit = fit_rotation(object.vertices + displacement, object.vertices, frame.fit_weights);
   TransferredPose pose;
-  pose.coefficients = (rest_coefficients + change) * fit.transpose();
-  pose.rotation = fit * to_rest;
+  pose.coefficients = rest_coefficients + change;
+  pose.rotation = to_rest;
+  Eigen::Matrix3d fit = fit_rotation(object.vertices + displacement, object.vertices, frame.fit_weights);
+  for (int round = 0; round < kMostFits; ++round) {
+    pose.coefficients = (pose.coefficients * fit.transpose()).eval();
+    pose.rotation = fit * pose.rotation;
+    // What the functions lose of the rest pose is not turned with the rest of it, so a little of a turn is left.
+    if (frame.fit_whole || Eigen::AngleAxisd(fit).angle() < kNoTurn) break;
+    const VertexArray left = object.eigenfunctions * (pose.coefficients - rest_coefficients);
+    fit = fit_rotation(object.vertices + left, object.vertices, frame.fit_weights);
+  }
   return pose;
 }
 

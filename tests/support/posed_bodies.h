@@ -54,6 +54,37 @@ inline TetMesh cylinder_mesh(int along, int across, double length, double radius
   return mesh;
 }
 
+/// Without the tets whose centre is in the hole.
+inline TetMesh without(const TetMesh& mesh, const std::function<bool(const Eigen::RowVector3d&)>& hole) {
+  std::vector<Eigen::Index> kept;
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+    Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
+    for (const auto v : mesh.tets.row(t)) centre += mesh.vertices.row(v) / 4;
+    if (!hole(centre)) kept.push_back(t);
+  }
+  TetMesh result;
+  result.tets = mesh.tets(kept, Eigen::all);
+  std::vector<std::int32_t> index(static_cast<std::size_t>(mesh.vertex_count()), -1);
+  std::vector<Eigen::Index> vertices;
+  for (auto& corner : result.tets.reshaped<Eigen::RowMajor>()) {
+    auto& at = index[static_cast<std::size_t>(corner)];
+    if (at < 0) {
+      at = static_cast<std::int32_t>(vertices.size());
+      vertices.push_back(corner);
+    }
+    corner = at;
+  }
+  result.vertices = mesh.vertices(vertices, Eigen::all);
+  return result;
+}
+
+/// A bar of 4 x 0.8 x 0.6 along x with an arm on one side, of half its thickness and 13 % of the volume: no rotation
+/// and no mirror lays it upon itself. `cells` of a box of 4 x 2 x 0.6: multiples of 10, 5 and 2.
+inline TetMesh armed_bar(const std::array<int, 3>& cells) {
+  return without(box_mesh(cells, {4, 2, 0.6}),
+                 [](const Eigen::RowVector3d& x) { return x[1] > 0.8 && (x[0] < 2.4 || x[0] > 3.2 || x[2] > 0.3); });
+}
+
 /// Poses of a body along x about the origin, between x = -length/2 and length/2.
 using Pose = std::function<Eigen::Vector3d(const Eigen::Vector3d&)>;
 

@@ -38,6 +38,17 @@ TEST(ArapEnergy, OfAUniformStretchIsKnown) {
   EXPECT_NEAR(arap.inverted_fraction(mirrored), 1, 1e-12);
 }
 
+// Half of the length squeezed by five, the other half longer by as much: 0.2 and 1.8 of a volume, the whole as it was.
+TEST(ArapEnergy, SqueezedVolumeIsThatBesideTheWhole) {
+  const TetMesh box = test::box_mesh({4, 2, 2}, {4, 1, 1});
+  const ArapEnergy arap(box);
+  VertexArray x = box.vertices;
+  for (auto vertex : x.rowwise()) vertex[0] = vertex[0] < 2 ? 0.2 * vertex[0] : 0.4 + 1.8 * (vertex[0] - 2);
+  EXPECT_NEAR(arap.squeezed_fraction(x, 4), 0.5, 1e-12);
+  EXPECT_EQ(arap.squeezed_fraction(x, 6), 0);
+  EXPECT_EQ(arap.squeezed_fraction(3 * box.vertices, 4), 0);  // 27 times, everywhere
+}
+
 // Central differences of step h err by h^2 and rounding / h: 1e-8 at h = 1e-5.
 TEST(ArapEnergy, GradientAgreesWithDifferences) {
   const ArapEnergy arap(body());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <vector>
 
+#include "common/mesh/geometry.h"
 #include "common/mesh/nearest_point.h"
 #include "precompute/shape_space/transfer.h"
 #include "tests/support/posed_bodies.h"
@@ -16,40 +17,16 @@ TetMesh bar(const std::array<int, 3>& cells, double height, std::uint32_t seed) 
   return test::centred(test::shaken_box(cells, {kLength, 1, height}, seed));
 }
 
-// Without the tets whose centre is in the hole.
-TetMesh without(const TetMesh& mesh, const std::function<bool(const Eigen::RowVector3d&)>& hole) {
-  std::vector<Eigen::Index> kept;
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    Eigen::RowVector3d centre = Eigen::RowVector3d::Zero();
-    for (const auto v : mesh.tets.row(t)) centre += mesh.vertices.row(v) / 4;
-    if (!hole(centre)) kept.push_back(t);
-  }
-  TetMesh result;
-  result.tets = mesh.tets(kept, Eigen::all);
-  std::vector<std::int32_t> index(static_cast<std::size_t>(mesh.vertex_count()), -1);
-  std::vector<Eigen::Index> vertices;
-  for (auto& corner : result.tets.reshaped<Eigen::RowMajor>()) {
-    auto& at = index[static_cast<std::size_t>(corner)];
-    if (at < 0) {
-      at = static_cast<std::int32_t>(vertices.size());
-      vertices.push_back(corner);
-    }
-    corner = at;
-  }
-  result.vertices = mesh.vertices(vertices, Eigen::all);
-  return result;
-}
-
 // A bar with a square hole through it, the grid's lines on its edges.
 TetMesh holed_bar(const std::array<int, 3>& cells) {
-  return without(test::centred(test::box_mesh(cells, {kLength, 1, 0.6})),
-                 [](const Eigen::RowVector3d& x) { return std::abs(x[0] - 0.5) < 0.5 && std::abs(x[1]) < 0.25; });
+  return test::without(test::centred(test::box_mesh(cells, {kLength, 1, 0.6})),
+                       [](const Eigen::RowVector3d& x) { return std::abs(x[0] - 0.5) < 0.5 && std::abs(x[1]) < 0.25; });
 }
 
 // An L of unequal arms and unequal thickness: no symmetry but the mirror at its middle plane, which `crooked` removes.
 TetMesh corner_piece(const std::array<int, 3>& cells, bool crooked) {
-  TetMesh mesh = without(test::box_mesh(cells, {3, 2, 0.5}),
-                         [](const Eigen::RowVector3d& x) { return x[0] > 0.75 && x[1] > 0.5; });
+  TetMesh mesh = test::without(test::box_mesh(cells, {3, 2, 0.5}),
+                               [](const Eigen::RowVector3d& x) { return x[0] > 0.75 && x[1] > 0.5; });
   if (crooked)
     for (auto x : mesh.vertices.rowwise()) x[2] += 0.3 * x[0] * x[0] / 3 - 0.25 * x[1] * x[1];
   return mesh;
@@ -194,7 +171,38 @@ TEST(AlignPose, AMirrorImageIsTold) {
     EXPECT_FALSE(same.alignment.mirrored) << free_frame;
     const Result reflected = align(rest, mirrored(other), kMirror, {free_frame, {}, false});
     EXPECT_TRUE(reflected.alignment.mirrored) << free_frame;
+    EXPECT_LE(reflected.alignment.mirror_residual, 0.03);
   }
+}
+
+// A body that is its own mirror image fits by that no better, whatever the pose: another body, or one whose rotation is
+// not found.
+TEST(AlignPose, OfABodyWithMirrorSymmetryNoMirrorImageIsTold) {
+  const TetMesh rest = corner_piece({12, 8, 2}, false);
+  const TetMesh ball = test::centred(test::shaken_box({6, 6, 6}, {1, 1, 1}, 3)),
+                other = corner_piece({16, 8, 3}, false);
+  const auto pose = test::bend(3, 2.5);
+  for (const bool free_frame : {false, true})
+    for (const TetMesh& posed : {ball, test::posed(other, pose), mirrored(test::posed(other, pose))})
+      EXPECT_FALSE(align(rest, posed, pose, {free_frame, {}, false}).alignment.mirrored) << free_frame;
+}
+
+// Crushed into the bar, or drawn over it.
+TEST(AlignPose, APartThatIsMissingIsTold) {
+  const TetMesh whole = test::armed_bar({20, 5, 4}), other = test::armed_bar({10, 10, 4});
+  const auto no_arm = [](const TetMesh& mesh) {
+    return test::without(mesh, [](const Eigen::RowVector3d& x) { return x[1] > 0.8; });
+  };
+  const auto pose = test::bend(kLength, 1.0);
+  const auto told = [&](const TetMesh& rest, const TetMesh& posed) {
+    const AlignedShape a = aligned_shape(rest, 0, "rest");
+    const double size = std::cbrt(tet_volumes(posed).sum() / tet_volumes(rest).sum());
+    const auto found = align_pose(a, rest_symmetry(a), aligned_shape(test::posed(posed, pose), 0, "posed", {size}), {});
+    return std::max(found.squeezed_fraction / 0.025, found.uncovered / 0.05);  // over the limits of a doubt
+  };
+  EXPECT_LE(told(whole, other), 0.5);
+  EXPECT_GT(told(whole, no_arm(other)), 1);
+  EXPECT_GT(told(no_arm(whole), other), 1);
 }
 
 // The mirror image of a bend is a bend the other way of a bar that is its own mirror image.
@@ -259,6 +267,10 @@ TEST(RestSymmetry, OfBodiesWithKnownSymmetries) {
   EXPECT_TRUE(cylinder.of_revolution);
   EXPECT_GE(cylinder.rotations.size(), 15U);
   EXPECT_FALSE(of(bar({12, 4, 4}, 1, 1)).of_revolution);
+  EXPECT_TRUE(of(bar({12, 4, 3}, 0.6, 1)).mirrored);
+  EXPECT_TRUE(of(corner_piece({12, 8, 2}, false)).mirrored);
+  EXPECT_TRUE(cylinder.mirrored);
+  EXPECT_FALSE(of(corner_piece({12, 8, 2}, true)).mirrored);
 }
 
 }  // namespace

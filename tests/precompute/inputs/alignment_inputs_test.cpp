@@ -83,6 +83,8 @@ TEST(AlignmentVerdict, FollowsTheLimits) {
   EXPECT_THAT(refused.message, HasSubstr("alignment.landmarks (8 vertices that do not lie in a plane)"));
   EXPECT_EQ(with([](auto& a) { a.inverted_fraction = 0.05; }).verdict, AlignmentVerdict::kRefused);
   EXPECT_THAT(with([](auto& a) { a.mirrored = true; }).message, HasSubstr("mirror image"));
+  EXPECT_EQ(with([](auto& a) { a.squeezed_fraction = 0.1; }).verdict, AlignmentVerdict::kDoubtful);
+  EXPECT_THAT(with([](auto& a) { a.uncovered = 0.1; }).message, HasSubstr("has the pose all parts"));
   const auto revolved = with([](auto& a) { a.hides_twist = true; });
   EXPECT_EQ(revolved.verdict, AlignmentVerdict::kDoubtful);
   EXPECT_THAT(revolved.message, HasSubstr("alignment.map"));
@@ -110,6 +112,10 @@ TEST(AlignmentVerdict, RefusalsAreOneErrorUnlessAccepted) {
               require_aligned(asset, {judged(good()), bad}, warnings);
             }),
             "example bend: alignment refused: first reason");
+  AlignmentOutcome worse = judged(good());
+  object_to(worse, AlignmentVerdict::kDoubtful, "doubt");
+  object_to(worse, AlignmentVerdict::kRefused, "refusal");
+  EXPECT_EQ(worse.message, "refusal; besides, doubt");
   asset.alignment.accept = true;
   require_aligned(asset, {bad}, warnings);
   ASSERT_EQ(warnings.size(), 1U);

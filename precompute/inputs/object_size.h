@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "precompute/inputs/inputs.h"
+
+namespace exmat::precompute {
+
+/// Why an object is hardly as large as its file says, in metres, for its material; empty where it may be. Elastic
+/// bodies bear their own weight: density x gravity x longest edge / Young's modulus, the strain at the foot of a column
+/// as high as the body is long, is below 1 (Galilei 1638). Stiff ones, which bear any, are at most kLargest long.
+std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials);
+
+/// Warns (in the log and in `warnings`) of that. `name` of the object's file.
+void warn_of_size(const ObjectInput& object, const std::string& name, std::vector<std::string>& warnings);
+
+/// Length of a body [m] that its file gives in another unit, as a rule.
+constexpr double kLargest = 50;
+
+}  // namespace exmat::precompute
