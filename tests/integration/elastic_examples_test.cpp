@@ -32,7 +32,8 @@ class ElasticExamples : public testing::Test {
 };
 
 // Of 144 degrees of freedom 40 are left, which have learned from the scene: with all tets, then with the elements
-// chosen. The twist of so coarse a mesh is 0.5 % short of volume, which these forces are stiff against: 30 hold it badly.
+// chosen. The twist of so coarse a mesh is 0.5 % short of volume, which these forces are stiff against: 30 hold it
+// badly.
 TEST_F(ElasticExamples, ReducedMotionIsNearTheFullSpace) {
   const Json basis = {{"basis", {{"size", 40}, {"linear_modes", 20}, {"training", "scene"}}}};
   Json all = basis;
