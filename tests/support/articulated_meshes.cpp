@@ -127,7 +127,8 @@ TetMesh largest_part(const TetMesh& mesh) {
 
 std::vector<std::int32_t> surface_vertices(const TetMesh& mesh) {
   std::set<std::int32_t> ids;
-  for (const auto v : surface_triangles(mesh.tets).reshaped()) ids.insert(v);
+  const TriangleArray triangles = surface_triangles(mesh.tets);
+  for (const auto v : triangles.reshaped()) ids.insert(v);
   return {ids.begin(), ids.end()};
 }
 

@@ -38,7 +38,7 @@ const std::string kBegin = "<!-- truth: begin -->", kEnd = "<!-- truth: end -->"
 // How object, rest example and pose are meshed, and what is told beside them.
 struct Kind {
   std::string name;
-  Meshing object, rest, pose;  // cells relative to the body's
+  Meshing object{}, rest{}, pose{};  // cells relative to the body's
   bool own_rest = false;       // the object is the rest example
   Proportions rest_proportions{};
   int landmarks = 0;
