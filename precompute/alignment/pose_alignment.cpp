@@ -7,16 +7,22 @@
 #include <optional>
 
 #include "common/mesh/nearest_point.h"
+#include "precompute/alignment/landmark_check.h"
+#include "precompute/alignment/rigid_fit.h"
 #include "precompute/alignment/spectral_tree.h"
 #include "precompute/shape_space/transfer.h"
-
 namespace exmat::precompute {
 namespace {
 
 constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30;
 constexpr std::size_t kTreeMaps = 12;
 constexpr std::size_t kPolished = 6;
-constexpr double kMostInverted = 0.2;        // of a start's volume
+constexpr double kMostInverted = 0.2;      // of a start's volume
+constexpr std::size_t kLeastPolished = 3;  // though they turn more inside out
+constexpr double kMirrorLike = 0.45;       // of a start's volume turned inside out: a mirror image rather
+// Turns of the whole pose that it may begin with in a shared frame [rad].
+constexpr double kLeastTurned = 0.15, kMostTurned = 1.4;
+constexpr std::size_t kTurnedStarts = 2;
 constexpr double kCompeting = 1.4;           // times the least F
 constexpr double kCompetingFloor = 0.003;    // added to it: below, fits differ by their tessellation alone
 constexpr double kSamePose = 0.25;           // difference of displacements, relative to the larger
@@ -79,6 +85,7 @@ class PoseAligner {
   void add_map(const std::string& name, const Eigen::MatrixXd& map, std::vector<Start>& starts);
   Eigen::MatrixXd spatial_map(const VertexArray& rest_positions) const;
   void add_landmark_starts(std::vector<Start>& starts) const;
+  void add_turned_starts(std::vector<Start>& starts) const;
   std::vector<Start> best_distinct(std::vector<Start> starts) const;
   Fit fit(const std::string& start, Registered registered) const;
   std::vector<Fit> polish(const std::vector<Start>& starts) const;
@@ -99,6 +106,7 @@ class PoseAligner {
   double size_;
   Registration registration_;
   ZoomOut zoom_out_;
+  std::vector<Start> sure_starts_;
   // Of the starts that turn the body inside out, the best as a map: what a mirror image would begin with.
   VertexArray reflected_start_;
   double reflected_score_ = std::numeric_limits<double>::infinity();
@@ -163,10 +171,19 @@ std::vector<Start> PoseAligner::mapped_starts() {
 
 // Those that turn little of the body inside out. Where there is nothing else to begin with, those that turn the least.
 std::vector<Start> PoseAligner::upright(std::vector<Start> starts) const {
-  double most = kMostInverted;
-  if (!starts.empty() && sure_starts().empty())
+  std::ranges::stable_sort(starts, {}, &Start::J);
+  std::size_t kept = 0;
+  const bool none_else = sure_starts_.empty();
+  std::vector<Start> result;
+  double most = kMirrorLike;
+  if (none_else && !starts.empty())
     most = std::max(most, std::ranges::min_element(starts, {}, &Start::inverted)->inverted);
-  std::erase_if(starts, [&](const Start& start) { return start.inverted > most; });
+  for (Start& start : starts) {
+    if (start.inverted > (kept < kLeastPolished ? most : kMostInverted)) continue;
+    ++kept;
+    result.push_back(std::move(start));
+  }
+  starts = std::move(result);
   return starts;
 }
 
@@ -202,8 +219,23 @@ void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
 std::vector<Start> PoseAligner::sure_starts() const {
   std::vector<Start> starts;
   if (has_landmarks()) add_landmark_starts(starts);
-  if (!hints_.free_frame && !hints_.landmarks_alone) starts.push_back({"rest", rest_.mesh.vertices, 0});
+  if (!hints_.free_frame && !hints_.landmarks_alone) {
+    starts.push_back({"rest", rest_.mesh.vertices, 0});
+    add_turned_starts(starts);
+  }
   return starts;
+}
+
+// A pose that is held at one end is turned as a whole, though its frame is the object's.
+void PoseAligner::add_turned_starts(std::vector<Start>& starts) const {
+  const RigidFitter fitter(body_surface(rest_.basis, rest_.mesh.tets), body_surface(pose_.basis, pose_.mesh.tets));
+  std::size_t added = 0;
+  for (const RigidFit& fit : fitter.fits(false)) {
+    const double turn = Eigen::AngleAxisd(fit.rotation).angle();
+    if (turn > kMostTurned || turn < kLeastTurned || added == kTurnedStarts) continue;
+    starts.push_back({"turned", rest_.mesh.vertices * fit.rotation.transpose(), 0});
+    ++added;
+  }
 }
 
 std::vector<Start> PoseAligner::best_distinct(std::vector<Start> starts) const {
@@ -320,7 +352,7 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   const auto mirror = mirror_residual(registered.misfit());
   alignment.mirrored = mirror.has_value();
   alignment.mirror_residual = mirror.value_or(0);
-  const SurfaceTree found(registered.positions, rest_.surface);
+  const SurfaceTree found = registration_.moved_surface(registered.positions);
   alignment.uncovered = std::max(uncovered_share(found, registration_.fixed_surface(), kUncovered * size_),
                                  uncovered_share(registration_.fixed_surface(), found, kUncovered * size_));
   alignment.squeezed_fraction = registration_.arap().squeezed_fraction(registered.positions, kSqueezed);
@@ -352,8 +384,9 @@ Registered PoseAligner::settle(const VertexArray& positions) const {
 }
 
 PoseAlignment PoseAligner::align() {
+  sure_starts_ = sure_starts();
   std::vector<Start> starts = best_distinct(mapped_starts());
-  for (Start& sure : sure_starts()) starts.push_back(std::move(sure));
+  for (Start& sure : sure_starts_) starts.push_back(std::move(sure));
   std::vector<Fit> poses = distinct_poses(polish(starts));
   if (!has_landmarks()) {
     for (Fit& copy : symmetric_copies(choose(poses))) poses.push_back(std::move(copy));
@@ -363,11 +396,51 @@ PoseAlignment PoseAligner::align() {
   return result(fit(chosen.start, settle(chosen.registered.positions)), poses);
 }
 
+// The vertex that weighs most in each row.
+std::vector<std::int32_t> vertices_of(const SparseMatrix& points) {
+  std::vector<std::int32_t> vertices;
+  for (Eigen::Index row = 0; row < points.rows(); ++row) {
+    double most = -1;
+    std::int32_t vertex = 0;
+    for (SparseMatrix::InnerIterator entry(points, row); entry; ++entry)
+      if (entry.value() > most) {
+        most = entry.value();
+        vertex = static_cast<std::int32_t>(entry.col());
+      }
+    vertices.push_back(vertex);
+  }
+  return vertices;
+}
+
+// Of landmarks, not of a dense map.
+std::vector<std::size_t> wrong_landmarks(const AlignedShape& rest, const AlignedShape& pose,
+                                         const Correspondences& landmarks) {
+  if (landmarks.count() > kFewLandmarks) return {};
+  return contradicting_landmarks(rest.mesh, vertices_of(landmarks.on_rest), pose.mesh, vertices_of(landmarks.on_pose));
+}
+
+Correspondences without_rows(const Correspondences& all, const std::vector<std::size_t>& left_out) {
+  SparseMatrix kept(all.count() - std::ssize(left_out), all.count());
+  Eigen::Index row = 0;
+  for (Eigen::Index k = 0; k < all.count(); ++k)
+    if (std::ranges::find(left_out, static_cast<std::size_t>(k)) == left_out.end()) kept.insert(row++, k) = 1;
+  return {kept * all.on_rest, kept * all.on_pose};
+}
+
 }  // namespace
 
 PoseAlignment align_pose(const AlignedShape& rest, const Symmetry& symmetry, const AlignedShape& pose,
                          const AlignmentHints& hints) {
-  return PoseAligner(rest, symmetry, pose, hints).align();
+  const std::vector<std::size_t> wrong = wrong_landmarks(rest, pose, hints.correspondences);
+  if (wrong.empty()) return PoseAligner(rest, symmetry, pose, hints).align();
+  AlignmentHints others = hints;
+  others.correspondences = without_rows(hints.correspondences, wrong);
+  PoseAlignment alignment = PoseAligner(rest, symmetry, pose, others).align();
+  const VertexArray misses = hints.correspondences.on_rest * alignment.positions -
+                             hints.correspondences.on_pose * VertexArray(pose.mesh.vertices);
+  for (const std::size_t k : wrong)
+    alignment.left_out.push_back({k, misses.row(static_cast<Eigen::Index>(k)).norm() / rms_radius(rest.basis)});
+  return alignment;
 }
 
 }  // namespace exmat::precompute

@@ -24,6 +24,12 @@ struct AlignmentHints {
   bool landmarks_alone = false;     ///< no starts but from the correspondences
 };
 
+/// A landmark that contradicts the others.
+struct LeftOutLandmark {
+  std::size_t index = 0;  ///< row of the correspondences
+  double missed = 0;      ///< distance from where it belongs by the pose that was found, over the RMS radius
+};
+
 /// A posed example registered from the rest example: the positions of the rest example's vertices in the pose.
 struct PoseAlignment {
   VertexArray positions;            ///< n_0 x 3, normalised, in the frame of the pose
@@ -40,7 +46,8 @@ struct PoseAlignment {
   double uncovered = 0;             ///< of the area of either surface, the larger: far from the other
   bool hides_twist = false;         ///< a body of revolution: a turn about its axis leaves no trace
   double displacement = 0;          ///< RMS from rest, over the RMS radius
-  double turn = 0;                  ///< angle of the rotation that lays the rest example best over the pose [rad]
+  std::vector<LeftOutLandmark> left_out;  ///< landmarks that were not used
+  double turn = 0;                        ///< angle of the rotation that lays the rest example best over the pose [rad]
 };
 
 /// Registers a pose: docs/alignment.md, "How a pose on another mesh is registered". Both shapes normalised; `symmetry`

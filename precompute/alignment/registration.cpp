@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/mesh/geometry.h"
+#include "precompute/alignment/surface_smoothing.h"
 
 namespace exmat::precompute {
 namespace {
@@ -12,7 +13,8 @@ namespace {
 constexpr int kRounds = 25, kRefiningRounds = 8;
 constexpr int kStepsPerRound = 2;  // local and global
 constexpr double kFirstWeight = 20, kLastWeight = 400;
-constexpr double kPairWeight = 20;  // of pairs given, whatever the round
+constexpr double kLastWeightOfSteps = 80;  // of a staircase
+constexpr double kPairWeight = 20;         // of pairs given, whatever the round
 constexpr Eigen::Index kCornersOfATet = 4;
 constexpr double kPointToPoint = 0.1;    // beside point-to-plane
 constexpr int kFactors = 4;              // weights between the first and the last that are factored
@@ -22,6 +24,17 @@ constexpr int kMostIterations = 60;
 
 double factored_weight(int factor) {
   return kFirstWeight * std::pow(kLastWeight / kFirstWeight, factor / static_cast<double>(kFactors - 1));
+}
+
+double last_weight(const TetMesh& moving, const TetMesh& fixed) {
+  const bool steps = is_staircase(moving.vertices, surface_triangles(moving.tets)) ||
+                     is_staircase(fixed.vertices, surface_triangles(fixed.tets));
+  return steps ? kLastWeightOfSteps : kLastWeight;
+}
+
+SurfaceTree smoothed_surface(const TetMesh& mesh) {
+  const TriangleArray triangles = surface_triangles(mesh.tets);
+  return {surface_smoothing(mesh.vertices, triangles) * mesh.vertices, triangles};
 }
 
 }  // namespace
@@ -50,7 +63,9 @@ Registration::Registration(const TetMesh& moving, const TetMesh& fixed, PointPai
     : arap_(moving),
       triangles_(surface_triangles(moving.tets)),
       areas_(triangle_samples(moving.vertices, triangles_).areas),
-      fixed_(fixed.vertices, surface_triangles(fixed.tets)),
+      smoothing_(surface_smoothing(moving.vertices, triangles_)),
+      fixed_(smoothed_surface(fixed)),
+      last_weight_(last_weight(moving, fixed)),
       pairs_(std::move(pairs)) {
   areas_ /= areas_.sum();
   std::vector<Eigen::Triplet<double>> entries;
@@ -76,7 +91,7 @@ const CholeskyFactor& Registration::preconditioner(double weight) const {
 }
 
 std::vector<Registration::SurfacePair> Registration::surface_pairs(const VertexArray& positions) const {
-  const SurfaceTree moved(positions, triangles_);
+  const SurfaceTree moved = moved_surface(positions);
   const auto& ours = moved.samples();
   const auto& theirs = fixed_.samples();
   const Eigen::Index forward = triangles_.rows(), count = forward + theirs.areas.size();
@@ -111,14 +126,17 @@ void Registration::round(double weight, VertexArray& positions) const {
   const auto pairs = surface_pairs(positions);
   const double pair_weight = pairs_.count() > 0 ? kPairWeight / static_cast<double>(pairs_.count()) : 0;
   const auto apply = [&](const VertexArray& x) {
-    VertexArray y = VertexArray::Zero(x.rows(), 3);
-    for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.point(x)), y);
+    const VertexArray smooth = smoothing_ * x;
+    VertexArray pulls = VertexArray::Zero(x.rows(), 3);
+    for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.point(smooth)), pulls);
+    VertexArray y = smoothing_.transpose() * pulls;
     y += arap_.stiffness() * x;
     if (pair_weight > 0) y += pairs_.points.transpose() * (pair_weight * (pairs_.points * x));
     return y;
   };
   VertexArray targets = VertexArray::Zero(positions.rows(), 3);
   for (const auto& pair : pairs) pair.add(weight * pair.pull(pair.target), targets);
+  targets = smoothing_.transpose() * targets;
   if (pair_weight > 0) targets += pairs_.points.transpose() * (pair_weight * pairs_.targets);
   const CholeskyFactor& factor = preconditioner(weight);
   for (int step = 0; step < kStepsPerRound; ++step) {
@@ -143,13 +161,13 @@ void Registration::round(double weight, VertexArray& positions) const {
 Registered Registration::run(const VertexArray& start) const {
   VertexArray positions = start;
   for (int k = 0; k < kRounds; ++k)
-    round(kFirstWeight * std::pow(kLastWeight / kFirstWeight, k / (kRounds - 1.0)), positions);
+    round(kFirstWeight * std::pow(last_weight_ / kFirstWeight, k / (kRounds - 1.0)), positions);
   return assess(positions);
 }
 
 Registered Registration::refine(const VertexArray& start) const {
   VertexArray positions = start;
-  for (int k = 0; k < kRefiningRounds; ++k) round(kLastWeight, positions);
+  for (int k = 0; k < kRefiningRounds; ++k) round(last_weight_, positions);
   return assess(positions);
 }
 
@@ -157,7 +175,7 @@ Registered Registration::assess(const VertexArray& positions) const {
   Registered result;
   result.positions = positions;
   result.distortion = arap_.energy(positions);
-  result.chamfer = two_way_chamfer(SurfaceTree(positions, triangles_), fixed_);
+  result.chamfer = two_way_chamfer(moved_surface(positions), fixed_);
   result.inverted = arap_.inverted_fraction(positions);
   if (pairs_.count() > 0)
     result.landmark_rms =

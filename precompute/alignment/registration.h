@@ -32,14 +32,16 @@ struct Registered {
 
 /// As-rigid-as-possible registration of one body's surface to another's, both of volume 1 at centroid 0. Each round
 /// pairs samples of both surfaces with the nearest points that face the same way, then takes local and global steps
-/// of E_ARAP + w (point-to-plane + a little point-to-point) + pairs given. The global step is solved by conjugate
+/// of E_ARAP + w (point-to-plane + a little point-to-point) + pairs given. Surfaces that are staircases are smoothed
+/// (surface_smoothing) before they are compared. The global step is solved by conjugate
 /// gradients, preconditioned by prefactored sparse Cholesky. docs/alignment.md, "How a pose on another mesh is
 /// registered".
 class Registration {
  public:
   Registration(const TetMesh& moving, const TetMesh& fixed, PointPairs pairs = {});
 
-  /// From a start [n x 3], the weight growing from 20 to 400. Several may run at once.
+  /// From a start [n x 3], the weight growing from 20 to 400; to 80 where a surface is a staircase, which is
+  /// no better known than that. Several may run at once.
   Registered run(const VertexArray& start) const;
 
   /// From a start that is nearly there, at the last weight.
@@ -50,6 +52,8 @@ class Registration {
   const ArapEnergy& arap() const { return arap_; }
   const SurfaceTree& fixed_surface() const { return fixed_; }
   const TriangleArray& moving_triangles() const { return triangles_; }
+  /// The moving surface as it is compared: without the steps of a staircase.
+  SurfaceTree moved_surface(const VertexArray& positions) const { return {smoothing_ * positions, triangles_}; }
 
  private:
   struct SurfacePair;
@@ -60,8 +64,10 @@ class Registration {
 
   ArapEnergy arap_;
   TriangleArray triangles_;
-  Eigen::VectorXd areas_;  // of the moving triangles at rest, of sum 1
+  Eigen::VectorXd areas_;   // of the moving triangles at rest, of sum 1
+  SparseMatrix smoothing_;  // n x n
   SurfaceTree fixed_;
+  double last_weight_;
   PointPairs pairs_;
   std::vector<CholeskyFactor> factors_;
 };

@@ -109,6 +109,10 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
   outcome.doubt = alignment.doubt;
   outcome.inverted_fraction = alignment.inverted_fraction;
   outcome.competing_maps = alignment.competing_maps;
+  fprintf(stderr, "CAL J %g res %g missed %g squeezed %g uncovered %g inv %g comp %d amb %d turn %g\n",
+          alignment.doubt - 2 * alignment.missed_landmarks, alignment.residual, alignment.missed_landmarks,
+          alignment.squeezed_fraction, alignment.uncovered, alignment.inverted_fraction, (int)alignment.competing_maps,
+          (int)alignment.ambiguous, alignment.turn);
   if (alignment.mirrored)
     object_to(outcome, AlignmentVerdict::kRefused,
               fmt::format("the mirror image of the rest example fits: its surface is {:.1f} % from the pose's (of the "
@@ -125,6 +129,20 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
   judge_competitors(alignment, free_frame, outcome);
   judge_revolution(alignment, outcome);
   if (frame == AlignmentFrame::kAuto && !free_frame) judge_turn(alignment, outcome);
+}
+
+void judge_landmarks(const PoseAlignment& alignment, const std::vector<Eigen::Index>& numbers,
+                     AlignmentOutcome& outcome) {
+  if (alignment.left_out.empty()) return;
+  std::string names;
+  for (const LeftOutLandmark& landmark : alignment.left_out)
+    names += fmt::format("{}landmark {} misses by {:.0f} % of the body's size", names.empty() ? "" : ", ",
+                         numbers[landmark.index], 100 * landmark.missed);
+  const std::string message = names + " from where the others and the surface have it: left out; does it correspond?";
+  if (outcome.verdict == AlignmentVerdict::kGood)
+    object_to(outcome, AlignmentVerdict::kDoubtful, message);
+  else
+    outcome.message += "; besides, " + message;
 }
 
 void require_aligned(const AssetConfig& asset, const std::vector<AlignmentOutcome>& outcomes,

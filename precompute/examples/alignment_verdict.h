@@ -43,6 +43,10 @@ void judge_residual(AlignmentOutcome& outcome, const std::string& advice, double
 /// Fills in an outcome from a registered pose. `frame` is that of the asset; `free_frame` what it came to.
 void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame, AlignmentOutcome& outcome);
 
+/// Names the landmarks that contradict the others; `numbers` are their places in the file, from 1.
+void judge_landmarks(const PoseAlignment& alignment, const std::vector<Eigen::Index>& numbers,
+                     AlignmentOutcome& outcome);
+
 /// Throws WorkError that names every refused example, unless the asset accepts them. Doubts, and refusals that are
 /// accepted, are warnings: appended and logged.
 void require_aligned(const AssetConfig& asset, const std::vector<AlignmentOutcome>& outcomes,

@@ -193,6 +193,17 @@ Correspondences ExampleAligner::correspondences(const AlignedRest& rest, const P
   return {on_rest, at_vertices(on_pose, pose_size)};
 }
 
+// The places in the list of landmarks of those that a pose has.
+std::vector<Eigen::Index> ExampleAligner::landmark_numbers(const PoseInput& pose) const {
+  std::vector<Eigen::Index> numbers;
+  const auto& landmarks = examples_.landmarks;
+  for (Eigen::Index k = 0; k < landmarks.rows(); ++k) {
+    const auto at_rest = examples_.object_is_rest ? landmarks(k, 0) : landmarks(k, examples_.rest.column);
+    if (landmarks(k, pose.column) >= 0 && (at_rest >= 0 || landmarks(k, 0) >= 0)) numbers.push_back(k + 1);
+  }
+  return numbers;
+}
+
 AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput& pose, const Placing& placing) {
   AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != AlignmentMethod::kAuto};
   const bool is_mapped = pose.on_object.size() > 0;
@@ -204,6 +215,7 @@ AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput&
   aligned.outcome.name = pose.name;
   aligned.outcome.method = is_mapped ? "map" : hints.correspondences.count() > 0 ? "landmarks" : "registered";
   judge_pose(alignment, asset_.alignment.frame, rest.free_poses, aligned.outcome);
+  judge_landmarks(alignment, landmark_numbers(pose), aligned.outcome);
   log::info(
       fmt::format("example {}: registered from {}, {:.2f} % from its surface, doubt {:.3f} (0 is certain), {} "
                   "competing poses",

@@ -64,6 +64,7 @@ class ExampleAligner {
   void use_vertex_map(AlignedRest& rest) const;
   const AlignedShape& rest_shape(const AlignedRest& rest);
   Correspondences correspondences(const AlignedRest& rest, const PoseInput& pose) const;
+  std::vector<Eigen::Index> landmark_numbers(const PoseInput& pose) const;
   AlignedPose registered(const AlignedRest& rest, const PoseInput& pose, const Placing& placing);
   double missed_landmarks(const AlignedRest& rest, const PoseInput& pose, const VertexArray& posed,
                           const VertexArray& displacement) const;

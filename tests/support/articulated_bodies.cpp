@@ -9,7 +9,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kBlend = 0.3;  // of a bone's radius, over which its motion gives way to its neighbour's
+constexpr double kBlend = 1.2;  // of a bone's radius, over which its motion gives way to its neighbour's
 
 double smooth_step(double x) {
   const double t = std::clamp(x, 0.0, 1.0);
@@ -64,17 +64,16 @@ class Skeleton {
       if (bones_[b].parent >= 0) motion = motions[static_cast<std::size_t>(bones_[b].parent)];
       for (const Turn& turned : turns)
         if (turned.bone == static_cast<int>(b))
-          motion =
-              motion * Eigen::Translation3d(bones_[b].from) * turned.rotation * Eigen::Translation3d(-bones_[b].from);
+          motion.translate(bones_[b].from).rotate(turned.rotation).translate(-bones_[b].from);
       motions.push_back(motion);
     }
     return [bones = bones_, motions](const Vector3d& x) {
-      double least = std::numeric_limits<double>::infinity();
-      for (const Bone& bone : bones) least = std::min(least, bone.distance(x));
+      const Bone& own = *std::ranges::min_element(bones, {}, [&](const Bone& bone) { return bone.distance(x); });
       Vector3d sum = Vector3d::Zero();
       double total = 0;
       for (std::size_t b = 0; b < bones.size(); ++b) {
-        const double weight = std::exp(-(bones[b].distance(x) - least) / (kBlend * bones[b].radius_from));
+        const double reach = kBlend * std::min(own.radius_from, bones[b].radius_from);
+        const double beyond = (bones[b].distance(x) - own.distance(x)) / reach, weight = std::exp(-beyond * beyond);
         sum += weight * (motions[b] * x);
         total += weight;
       }
@@ -130,9 +129,9 @@ PosableBody figure_body(const Proportions& proportions, double strength) {
     const auto at = [&](double x, double y, double z) { return Vector3d(side * x, y, z); };
     bones.push_back({0, at(0.2, 0, 0.52), at(0.2 + 0.36 * l, 0, 0.52), 0.1 * g, 0.09 * g});
     bones.push_back({first, at(0.2 + 0.36 * l, 0, 0.52), at(0.2 + 0.75 * l, 0, 0.52), 0.09 * g, 0.085 * g});
-    bones.push_back({0, at(0.13, 0, -0.06), at(0.17, 0, -0.06 - 0.45 * l), 0.12 * g, 0.105 * g});
-    bones.push_back({first + 2, at(0.17, 0, -0.06 - 0.45 * l), at(0.19, 0, -0.06 - 0.9 * l), 0.105 * g, 0.09 * g});
-    bones.push_back({first + 3, at(0.19, 0, -0.06 - 0.9 * l), at(0.19, -0.22, -0.06 - 0.9 * l), 0.09 * g, 0.08 * g});
+    bones.push_back({0, at(0.17, 0, -0.06), at(0.21, 0, -0.06 - 0.45 * l), 0.105 * g, 0.1 * g});
+    bones.push_back({first + 2, at(0.21, 0, -0.06 - 0.45 * l), at(0.23, 0, -0.06 - 0.9 * l), 0.1 * g, 0.09 * g});
+    bones.push_back({first + 3, at(0.23, 0, -0.06 - 0.9 * l), at(0.23, -0.22, -0.06 - 0.9 * l), 0.09 * g, 0.08 * g});
   }
   // Bones: torso 0, head 1; arm 2, 3, leg 4, 5, foot 6 of one side, and so on of the other.
   return skinned(
@@ -167,7 +166,7 @@ PosableBody animal_body(const Proportions& proportions, double strength) {
   for (const double x : {0.42, -0.42})
     for (const double side : {1.0, -1.0}) {
       const int first = static_cast<int>(bones.size());
-      const double y = 0.17 * side;
+      const double y = 0.2 * side;
       bones.push_back({x > 0 ? 1 : 0, {x, y, -0.06}, {x, y, -0.06 - 0.38 * l}, 0.105 * g, 0.09 * g});
       bones.push_back({first, {x, y, -0.06 - 0.38 * l}, {x, y, -0.06 - 0.74 * l}, 0.09 * g, 0.08 * g});
     }
@@ -252,8 +251,8 @@ PosableBody armed_bar_body(const Proportions& proportions, double strength) {
   body.bounds = Eigen::AlignedBox3d(low, high).merged({arm_low, arm_high});
   const Pose aside = [=](const Vector3d& x) {
     const Vector3d pivot(0.75, 0.4 * g, 0);
-    const double share = smooth_step((x[1] - 0.25 * g) / 0.5);
-    return Vector3d(pivot + turn('z', 40 * s * share) * (x - pivot));
+    const double share = smooth_step((x[1] - 0.2 * g) / 0.8);
+    return Vector3d(pivot + turn('z', 35 * s * share) * (x - pivot));
   };
   body.poses = {
       {"bent", bend(4, 1.3 * s)}, {"twisted", twist(4, 1.2 * s)}, {"S", s_bend(4, 0.8 * s)}, {"arm aside", aside}};
