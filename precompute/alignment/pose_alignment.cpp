@@ -31,11 +31,14 @@ constexpr double kNoPose = 0.03;             // a displacement from rest, relati
 constexpr double kClearlyFarther = 1.2;      // times the displacement of the pose that is taken
 constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
 constexpr int kTurningRounds = 4;            // of landmarks on a body of revolution
-constexpr double kMirrorMargin = 0.5;        // of the best F, from which on a mirror image is believed
-constexpr double kMirrorWorthwhile = 0.05;   // F above which it is looked for
-constexpr double kMirrorResidual = 0.05;     // of a mirror image that fits
-constexpr double kSqueezed = 2;              // factor of a tet's volume that no pose has
-constexpr double kUncovered = 0.15;          // distance from the other surface, over the body's size
+// Weights of doubt: docs/alignment.md, "What the user is told".
+constexpr double kDoubtOfMap = 0.6, kDoubtOfResidual = 10, kDoubtOfLandmarks = 2;
+constexpr double kAmbiguous = 1.15;         // times the misfit that is taken, in a shared frame
+constexpr double kMirrorMargin = 0.5;       // of the best F, from which on a mirror image is believed
+constexpr double kMirrorWorthwhile = 0.05;  // F above which it is looked for
+constexpr double kMirrorResidual = 0.05;    // of a mirror image that fits
+constexpr double kSqueezed = 2;             // factor of a tet's volume that no pose has
+constexpr double kUncovered = 0.15;         // distance from the other surface, over the body's size
 
 // Where a registration begins.
 struct Start {
@@ -331,10 +334,11 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   alignment.start = taken.start;
   alignment.residual = std::sqrt(registered.chamfer) / size_;
   alignment.missed_landmarks = registered.landmark_rms / size_;
-  alignment.doubt = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)), registered.distortion,
-                             registered.inverted}
-                        .total() +
-                    2 * alignment.missed_landmarks;
+  const double J = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)), registered.distortion,
+                            registered.inverted}
+                       .total();
+  alignment.doubt =
+      kDoubtOfMap * (J + kDoubtOfResidual * alignment.residual) + kDoubtOfLandmarks * alignment.missed_landmarks;
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const Eigen::Matrix3d turn =
@@ -346,7 +350,9 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   for (const Fit& pose : poses) {
     if (same_pose(pose, taken) || pose.registered.objective() > most) continue;
     ++alignment.competing_maps;
-    if (!has_landmarks() && (hints_.free_frame || pose.size < farther * taken.size)) alignment.ambiguous = true;
+    const bool as_good = pose.registered.objective() <= kAmbiguous * taken.registered.objective() + kCompetingFloor;
+    if (!has_landmarks() && (hints_.free_frame || (as_good && pose.size < farther * taken.size)))
+      alignment.ambiguous = true;
   }
   alignment.hides_twist = symmetry_.of_revolution && !has_landmarks();
   const auto mirror = mirror_residual(registered.misfit());

@@ -36,7 +36,7 @@ struct PoseAlignment {
   std::string start;                ///< what the registration began with
   double residual = 0;              ///< RMS distance of the two surfaces, over the RMS radius of the rest example
   double missed_landmarks = 0;      ///< RMS distance of the landmarks from where they belong, over the RMS radius
-  double doubt = 0;                 ///< J of docs/alignment.md + 2 missed_landmarks; 0 is certain
+  double doubt = 0;                 ///< docs/alignment.md, "What the user is told"; 0 is certain
   double inverted_fraction = 0;     ///< of the rest example's volume
   std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
   bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is

@@ -109,10 +109,6 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
   outcome.doubt = alignment.doubt;
   outcome.inverted_fraction = alignment.inverted_fraction;
   outcome.competing_maps = alignment.competing_maps;
-  fprintf(stderr, "CAL J %g res %g missed %g squeezed %g uncovered %g inv %g comp %d amb %d turn %g\n",
-          alignment.doubt - 2 * alignment.missed_landmarks, alignment.residual, alignment.missed_landmarks,
-          alignment.squeezed_fraction, alignment.uncovered, alignment.inverted_fraction, (int)alignment.competing_maps,
-          (int)alignment.ambiguous, alignment.turn);
   if (alignment.mirrored)
     object_to(outcome, AlignmentVerdict::kRefused,
               fmt::format("the mirror image of the rest example fits: its surface is {:.1f} % from the pose's (of the "

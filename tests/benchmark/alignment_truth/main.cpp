@@ -1,17 +1,14 @@
-// Alignments of articulated bodies whose true poses are known. Prints the table of docs/alignment.md, and renews it
-// where the page is named: alignment_truth [--seed N] [--every N] [--list FILE.csv] [--page PAGE.md]
+// Alignments of articulated bodies whose true poses are known: a line of each case, of comma-separated values.
+// report.py makes the table of docs/alignment.md of them.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <array>
 #include <ctime>
 #include <fmt/format.h>
-#include <fstream>
 #include <iostream>
-#include <map>
 #include <optional>
 
-#include "common/core/error.h"
 #include "common/mesh/farthest_points.h"
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/kd_tree.h"
@@ -19,7 +16,6 @@
 #include "precompute/examples/example_alignment.h"
 #include "precompute/shape_space/transfer.h"
 #include "tests/support/articulated_bodies.h"
-#include "tests/support/temporary_folder.h"
 
 namespace exmat::benchmarks {
 namespace {
@@ -33,7 +29,6 @@ using test::TetKind;
 
 constexpr double kWrong = 0.35;  // above the error of the ideal projection: another pose, not a worse one
 constexpr int kFunctions = 20;
-const std::string kBegin = "<!-- truth: begin -->", kEnd = "<!-- truth: end -->";
 
 // How object, rest example and pose are meshed, and what is told beside them.
 struct Kind {
@@ -91,8 +86,6 @@ struct Outcome {
 
   // An error below half a cell is the mesh's.
   bool wrong() const { return ours > ideal + kWrong && ours > half_cell; }
-  bool refused() const { return verdict == AlignmentVerdict::kRefused; }
-  double ratio() const { return ours / ideal; }
 };
 
 double mean_length(const precompute::LaplaceBasis& basis, const VertexArray& field) {
@@ -194,138 +187,36 @@ class Case {
   precompute::LaplaceBasis basis_;
 };
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + std::ssize(values) / 2;
-  std::ranges::nth_element(values, middle);
-  return *middle;
-}
-
-struct Counts {
-  int cases = 0, good = 0, doubtful = 0, refused = 0, right_refused = 0, wrong = 0, wrong_doubtful = 0, silent = 0;
-  std::vector<double> ratios, seconds;
-
-  void add(const Outcome& outcome) {
-    ++cases;
-    const bool doubts = outcome.verdict == AlignmentVerdict::kDoubtful, refuses = outcome.refused();
-    good += !doubts && !refuses ? 1 : 0;
-    doubtful += doubts ? 1 : 0;
-    refused += refuses ? 1 : 0;
-    wrong += outcome.wrong() ? 1 : 0;
-    right_refused += refuses && !outcome.wrong() ? 1 : 0;
-    wrong_doubtful += doubts && outcome.wrong() ? 1 : 0;
-    silent += !doubts && !refuses && outcome.wrong() ? 1 : 0;
-    if (!refuses) ratios.push_back(outcome.ratio());
-    seconds.push_back(outcome.seconds);
-  }
-
-  std::string row(const std::string& name) const {
-    return fmt::format("| {} | {} | {} | {} ({} wrong) | {} | {} | {:.2f} | {:.1f} |\n", name, cases, good, doubtful,
-                       wrong_doubtful, refused, right_refused, median(ratios), median(seconds));
-  }
-};
-
-// Share of wrong ones by classes of doubt.
-std::string classes(const std::vector<Outcome>& outcomes) {
-  std::string text = "\n| doubt | cases | wrong |\n| --- | --- | --- |\n";
-  const std::vector<double> limits{0, 0.25, 0.5, 0.8, 1.2, 1e9};
-  for (std::size_t k = 0; k + 1 < limits.size(); ++k) {
-    int cases = 0, wrong = 0;
-    for (const Outcome& outcome : outcomes)
-      if (outcome.doubt >= limits[k] && outcome.doubt < limits[k + 1]) {
-        ++cases;
-        wrong += outcome.wrong() ? 1 : 0;
-      }
-    const std::string name =
-        k + 2 < limits.size() ? fmt::format("{} to {}", limits[k], limits[k + 1]) : fmt::format("above {}", limits[k]);
-    text += fmt::format("| {} | {} | {} ({:.0f} %) |\n", name, cases, wrong, cases > 0 ? 100.0 * wrong / cases : 0.0);
-  }
-  double ordered = 0, pairs = 0;
-  for (const Outcome& a : outcomes)
-    for (const Outcome& b : outcomes)
-      if (a.ours - a.ideal > b.ours - b.ideal + 0.1) {
-        ++pairs;
-        ordered += a.doubt > b.doubt ? 1 : 0;
-      }
-  return text +
-         fmt::format("\nOf two cases whose errors differ by more than 0.1, doubt puts {:.0f} % in their order.\n",
-                     pairs > 0 ? 100 * ordered / pairs : 0.0);
-}
-
-std::string report(const std::vector<Outcome>& outcomes) {
-  std::string text =
-      "| meshes | cases | taken as good | with a warning | refused | refused though right | median error | CPU s, "
-      "median |\n"
-      "| --- | --- | --- | --- | --- | --- | --- | --- |\n";
-  Counts all;
-  std::map<std::string, Counts> by_body;
-  for (const Kind& kind : kinds()) {
-    Counts counts;
-    for (const Outcome& outcome : outcomes)
-      if (outcome.kind == kind.name) counts.add(outcome);
-    if (counts.cases > 0) text += counts.row(kind.name);
-  }
-  for (const Outcome& outcome : outcomes) {
-    all.add(outcome);
-    by_body[outcome.body].add(outcome);
-  }
-  for (const auto& [body, counts] : by_body) text += counts.row("all of: " + body);
-  text += all.row("all");
-  text += fmt::format(
-      "\n{} cases, {} wrong. Silently wrong: {}. Refused though right: {} ({:.1f} %). Median error {:.2f}.\n",
-      all.cases, all.wrong, all.silent, all.right_refused, 100.0 * all.right_refused / std::max(1, all.cases),
-      median(all.ratios));
-  return text + classes(outcomes);
-}
-
-std::string listed(const Outcome& o) {
+std::string line(const Outcome& o) {
   std::string message = o.message;
   std::ranges::replace(message, '"', '\'');
-  return fmt::format("\"{}\",{},{},{},{:.4f},{:.4f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", o.kind.substr(0, 60), o.body,
-                     o.pose, name_of(o.verdict), o.doubt, o.residual, o.ideal, o.ours, o.seconds,
-                     o.wrong() ? "wrong" : "right", message);
-}
-
-void renew(const std::string& file, const std::string& results) {
-  const std::string page = test::read_file(file);
-  const auto begin = page.find(kBegin), end = page.find(kEnd);
-  if (begin == std::string::npos || end == std::string::npos) throw WorkError(file + ": no place for the results");
-  test::write_file(file, page.substr(0, begin + kBegin.size()) + "\n" + results + page.substr(end));
+  return fmt::format("\"{}\",{},{},{},{:.4f},{:.4f},{:.3f},{:.3f},{:.2f},{},\"{}\"\n", o.kind, o.body, o.pose,
+                     name_of(o.verdict), o.doubt, o.residual, o.ideal, o.ours, o.seconds, o.wrong() ? "wrong" : "right",
+                     message);
 }
 
 int run(int argc, char** argv) {
   std::uint32_t seed = 0;
   int every = 1, only = -1;
-  std::string page, list;
   CLI::App app("Alignments of articulated bodies whose true poses are known");
   app.add_option("--seed", seed, "of meshes and of the strength of poses");
   app.add_option("--every", every, "every Nth case alone");
   app.add_option("--kind", only, "index of one kind alone");
-  app.add_option("--page", page, "a page whose table is renewed");
-  app.add_option("--list", list, "a file for a line of each case");
   CLI11_PARSE(app, argc, argv);
-  std::vector<Outcome> outcomes;
-  std::ofstream lines;
-  if (!list.empty()) lines.open(list);
   int number = 0;
-  for (const Kind& kind : kinds()) {
-    if (only >= 0 && &kind != &kinds()[static_cast<std::size_t>(only)]) continue;
+  for (const Kind& kind : kinds())
     for (std::size_t b = 0; b < kBodies.size(); ++b) {
+      const auto index = &kind - kinds().data();
       // Strong poses and weaker ones by turns.
-      const double strength = ((&kind - kinds().data()) + b + seed) % 2 == 0 ? 1.0 : 0.6;
+      const double strength = (index + static_cast<std::int64_t>(b) + seed) % 2 == 0 ? 1.0 : 0.6;
       std::optional<Case> alignment;
-      const std::size_t poses = kBodies[b]({}, 1).poses.size();
+      const std::size_t poses = kBodies.at(b)({}, 1).poses.size();
       for (std::size_t k = 0; k < poses; ++k) {
-        if (number++ % every != 0) continue;
-        if (!alignment) alignment.emplace(kBodies[b], kind, strength, seed);
-        outcomes.push_back(alignment->run(k));
-        if (lines) lines << listed(outcomes.back()) << std::flush;
+        if ((only >= 0 && index != only) || number++ % every != 0) continue;
+        if (!alignment) alignment.emplace(kBodies.at(b), kind, strength, seed);
+        std::cout << line(alignment->run(k)) << std::flush;
       }
     }
-  }
-  const std::string results = report(outcomes);
-  std::cout << results;
-  if (!page.empty()) renew(page, results);
   return 0;
 }
 
