@@ -7,13 +7,15 @@
 
 namespace exmat::precompute {
 
-SurfaceMesh read_surface(const std::filesystem::path& file) {
+SurfaceFile read_surface_file(const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
   if (extension == ".obj") return read_obj(file);
   if (extension == ".ply") return read_ply(file);
-  throw InputError({file.string(), "", "a surface with the extension .obj or .ply",
+  throw InputError({file.string(), "", "a surface with the extension .glb, .gltf, .obj, .ply or .stl",
                     extension.empty() ? "no extension" : quote(extension), ""});
 }
+
+SurfaceMesh read_surface(const std::filesystem::path& file) { return std::move(read_surface_file(file).mesh); }
 
 void add_fan(const std::vector<std::int32_t>& polygon, std::vector<std::array<std::int32_t, 3>>& triangles) {
   for (std::size_t corner = 2; corner < polygon.size(); ++corner)
