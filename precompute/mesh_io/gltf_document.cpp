@@ -2,7 +2,7 @@
 
 #include <bit>
 #include <fmt/format.h>
-#include <fstream>  // of tiny_gltf.h, which does not include it without a file system
+#include <fstream>  // of the glTF library, which does not include it without a file system
 #include <optional>
 #include <string_view>
 
