@@ -1,19 +1,18 @@
-#define TINYGLTF_IMPLEMENTATION
-#define TINYGLTF_NO_STB_IMAGE
-#define TINYGLTF_NO_STB_IMAGE_WRITE
-#define TINYGLTF_NO_FS
-#include <fstream>  // which tiny_gltf.h needs and does not include without a file system
-// Its implementation is in this source alone.
+#include "precompute/mesh_io/gltf_document.h"
+
 #include <bit>
 #include <fmt/format.h>
+#include <fstream>  // of the glTF library, which does not include it without a file system
 #include <optional>
 #include <string_view>
 
 #include "common/core/error.h"
-#include "precompute/mesh_io/gltf_document.h"
 #include "precompute/mesh_io/gltf_json.h"
 #include "precompute/mesh_io/text_input.h"
 #include "precompute/mesh_io/value_cursor.h"
+
+#define TINYGLTF_IMPLEMENTATION
+#include <tiny_gltf.h>
 
 namespace exmat::precompute {
 namespace {

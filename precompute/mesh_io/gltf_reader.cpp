@@ -83,6 +83,7 @@ class GltfReader {
   bool has_colours_ = false;
   std::vector<Triangle> triangles_;
   std::vector<std::string> morph_names_;
+  std::map<std::string, std::size_t> morph_of_name_;
   std::vector<Block> blocks_;
   SurfaceParts parts_;
   std::vector<std::size_t> first_of_node_;
@@ -131,19 +132,21 @@ void GltfReader::end_node(int node) {
 void GltfReader::name_targets(Instance& instance) {
   if (instance.mesh.primitives.empty()) return;
   const std::size_t count = instance.mesh.primitives.front().targets.size();
+  spend(count, 1, instance.place);
   const tinygltf::Value names =
       instance.mesh.extras.Has("targetNames") ? instance.mesh.extras.Get("targetNames") : tinygltf::Value();
   std::set<std::string> own;
   for (std::size_t k = 0; k < count; ++k) {
     std::string name = k < names.ArrayLen() ? names.Get(static_cast<int>(k)).Get<std::string>() : "";
     if (name.empty() || !own.insert(name).second) name = fmt::format("target {}", k);
-    const auto known = std::ranges::find(morph_names_, name);
-    instance.morphs.push_back(static_cast<std::size_t>(known - morph_names_.begin()));
-    if (known == morph_names_.end()) morph_names_.push_back(std::move(name));
+    const auto [known, is_new] = morph_of_name_.try_emplace(name, morph_names_.size());
+    instance.morphs.push_back(known->second);
+    if (is_new) morph_names_.push_back(std::move(name));
   }
 }
 
 void GltfReader::add_primitive(Instance& instance, const tinygltf::Primitive& primitive, const std::string& place) {
+  spend(1 + primitive.attributes.size() + primitive.targets.size(), 1, place);
   const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
   if (mode > TINYGLTF_MODE_TRIANGLE_FAN)
     fail_in_gltf(file_, place + "/mode", "a mode from 0 to 6", std::to_string(mode));
@@ -283,7 +286,8 @@ void GltfReader::add_morphs(SurfaceFile& surface) {
 void GltfReader::add_remarks(SurfaceFile& surface) const {
   auto& remarks = surface.remarks;
   if (nodes_with_meshes_ > 1)
-    remarks.push_back(fmt::format("{} meshes in {} nodes are taken as one object", meshes_.size(), nodes_with_meshes_));
+    remarks.push_back(fmt::format("{} {} in {} nodes are taken as one object", meshes_.size(),
+                                  meshes_.size() == 1 ? "mesh" : "meshes", nodes_with_meshes_));
   if (document_.model.scenes.size() > 1)
     remarks.push_back(fmt::format("one of {} scenes is read: the default one", document_.model.scenes.size()));
   if (left_out_ > 0) remarks.push_back(fmt::format("primitives of points or lines are left out: {}", left_out_));

@@ -11,7 +11,10 @@ constexpr std::size_t kFlagsPerByte = 64, kFlags = 64'000'000;
 }  // namespace
 
 void SurfaceParts::add_triangles(const std::string& name, std::size_t begin, std::size_t end) {
-  if (!name.empty() && begin < end) parts_[name].triangles.emplace_back(begin, end);
+  if (name.empty() || begin >= end) return;
+  auto& ranges = parts_[name].triangles;
+  while (!ranges.empty() && ranges.back().first >= begin) ranges.pop_back();
+  ranges.emplace_back(begin, end);
 }
 
 void SurfaceParts::add_vertex(const std::string& name, std::int32_t vertex) { parts_[name].vertices.push_back(vertex); }

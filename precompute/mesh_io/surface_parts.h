@@ -13,7 +13,8 @@ namespace exmat::precompute {
 /// Gathers the parts that a surface's file names, while it is read.
 class SurfaceParts {
  public:
-  /// The corners of the triangles from `begin` to before `end` are of the part. Empty names and ranges are none.
+  /// The corners of the triangles from `begin` to before `end` are of the part. Empty names and ranges are none. `end`
+  /// is that of all triangles so far: earlier ranges from `begin` on are within it.
   void add_triangles(const std::string& name, std::size_t begin, std::size_t end);
   void add_vertex(const std::string& name, std::int32_t vertex);
 
