@@ -33,6 +33,8 @@ constexpr double kDrawnFarther = 1.1;
 constexpr double kCountTolerance = 0.1;
 // Cell sizes over the diagonal that are tried at most: one cell for all, ten million.
 constexpr double kLargestSize = 0.5, kSmallestSize = 0.002;
+// Twice the area of a triangle that has none, over the diagonal's square: rounding of corners on one line.
+constexpr double kNoArea = 1e-14;
 // A vertex is inside when it is no farther out, over the diagonal: rounding.
 constexpr double kInside = 1e-9;
 
@@ -58,7 +60,7 @@ UnitSurface unit_surface(const SurfaceMesh& surface, const std::string& name) {
   for (const auto& corners : surface.triangles.rowwise()) {
     const Eigen::RowVector3d a = surface.vertices.row(corners[0]), b = surface.vertices.row(corners[1]),
                              c = surface.vertices.row(corners[2]);
-    if (((b - a) / unit.diagonal).cross((c - a) / unit.diagonal).norm() == 0) continue;
+    if (((b - a) / unit.diagonal).cross((c - a) / unit.diagonal).norm() <= kNoArea) continue;
     Eigen::RowVector3i& triangle = triangles.emplace_back();
     for (int corner = 0; corner < 3; ++corner) {
       std::int32_t& found = number[static_cast<std::size_t>(corners[corner])];
@@ -140,14 +142,18 @@ TetMesh CageMaker::tets(double size, double offset, unsigned seed, bool improve)
   return mesh;
 }
 
+// Of few digits: the last ones of roots and powers are not the same everywhere, and a mesh follows from every bit.
+double tried_size(double size) { return std::round(std::clamp(size, kSmallestSize, kLargestSize) * 1e5) / 1e5; }
+
 // The number of tets grows as a power of the cell size between 2 (sheets) and 3 (solids), and more where fine cells
 // reach what coarse ones bridge: a secant in logarithms.
 double CageMaker::size_for(int cells) {
-  double size = std::clamp(std::cbrt(0.5 / cells), kSmallestSize, kLargestSize);
+  double size = tried_size(std::cbrt(0.5 / cells));
   double best = size, best_miss = INFINITY, power = 2.5;
   double last_size = 0, last_count = 0;
   for (int trial = 0; trial < kSizeTrials; ++trial) {
     const auto count = static_cast<double>(tets(size, kOffset, 0, false).tet_count());
+    log::debug(fmt::format("{}: {} tets for cells of {} of the diagonal", name_, count, size));
     const double miss = std::abs(std::log(count / cells));
     if (miss < best_miss) std::tie(best, best_miss) = std::pair(size, miss);
     if (miss <= kCountTolerance) break;
@@ -155,7 +161,7 @@ double CageMaker::size_for(int cells) {
       power = std::clamp(-std::log(count / last_count) / std::log(size / last_size), 1.5, 4.0);
     last_size = size;
     last_count = count;
-    size = std::clamp(size * std::pow(count / cells, 1 / power), kSmallestSize, kLargestSize);
+    size = tried_size(size * std::pow(count / cells, 1 / power));
     if (size == last_size) break;
   }
   return best;

@@ -143,7 +143,7 @@ def write_obj(path, points, triangles):
 
 
 def run(*words):
-    return subprocess.run([str(word) for word in words], capture_output=True, text=True)
+    return subprocess.run([str(word) for word in words], capture_output=True, text=True, timeout=120)
 
 
 def farthest_outside(bundle):

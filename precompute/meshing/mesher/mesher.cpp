@@ -86,10 +86,10 @@ exmat::TetMesh make_tets(const MesherRequest& request) {
                           params::cell_radius_edge_ratio = kRadiusEdgeRatio, params::cell_size = request.cell_size);
   if (!request.improve)
     return tets_of(
-        CGAL::make_mesh_3<Complex>(domain, criteria, params::manifold(), params::no_perturb(), params::no_exude()));
+        CGAL::make_mesh_3<Complex>(domain, criteria, params::no_perturb(), params::no_exude()));
   // No time limits: the mesh must not depend on the machine's speed.
   const Complex complex = CGAL::make_mesh_3<Complex>(
-      domain, criteria, params::manifold(), params::odt(params::max_iteration_number = 10, params::time_limit = 0),
+      domain, criteria, params::odt(params::max_iteration_number = 10, params::time_limit = 0),
       params::perturb(params::sliver_bound = kSliverBound, params::time_limit = 0),
       params::exude(params::sliver_bound = kSliverBound, params::time_limit = 0));
   return tets_of(complex);
