@@ -37,6 +37,8 @@ constexpr double kLargestSize = 0.5, kSmallestSize = 0.002;
 constexpr double kNoArea = 1e-14;
 // A vertex is inside when it is no farther out, over the diagonal: rounding.
 constexpr double kInside = 1e-9;
+// Places at diagonal 1 are multiples of this (2^-40): a surface in another unit has the same ones, to the last bit.
+constexpr double kGrid = 0x1p-40;
 
 // The triangles that have an area, at diagonal 1 about the origin: any unit of length gives the same cage.
 struct UnitSurface {
@@ -72,7 +74,8 @@ UnitSurface unit_surface(const SurfaceMesh& surface, const std::string& name) {
     }
   }
   if (triangles.empty()) refuse(fmt::format("{} triangles without any", surface.triangles.rows()));
-  unit.mesh.vertices = (surface.vertices(kept, Eigen::all).rowwise() - unit.centre) / unit.diagonal;
+  const VertexArray places = (surface.vertices(kept, Eigen::all).rowwise() - unit.centre) / unit.diagonal;
+  unit.mesh.vertices = (places / kGrid).array().round() * kGrid;
   unit.mesh.triangles.resize(std::ssize(triangles), 3);
   for (Eigen::Index t = 0; t < unit.mesh.triangles.rows(); ++t)
     unit.mesh.triangles.row(t) = triangles[static_cast<std::size_t>(t)];

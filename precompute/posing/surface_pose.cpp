@@ -24,7 +24,7 @@ constexpr double kFirstStiffness = 1, kLastStiffness = 1e5, kStiffen = 10;
 constexpr double kFirstFromRest = 1e-3;
 // A stage that brings the surface less than this share nearer is the last, and so is one that brings it so near (RMS
 // over the diagonal): a tenth of what is asked of a pose.
-constexpr double kGain = 0.1, kNear = 1e-4;
+constexpr double kGain = 0.3, kNear = 1e-4;
 // Newton's method ends where an iteration lowers the energy by less than this share of it, between stages and at last.
 constexpr double kBetween = 1e-3, kLast = 1e-8;
 constexpr int kMostIterations = 100;
@@ -142,6 +142,8 @@ SurfacePose PoseSolver::solve(VertexArray x, double first) {
     // What inverts tets asks for more than the cage can hold, but for the first stages, which come from a guess.
     if (sound && !here_sound) break;
     const double rms = springs_.rms(x);
+    log::debug(fmt::format("springs of {:.0e}: missed by {:.3g} of the diagonal, energy {:.4g}, {} inverted", stiffness,
+                           rms, elasticity_.energy(displacements(x)), inverted(x)));
     const bool gained = rms < (1 - kGain) * last_rms;
     if (!sound || gained) {
       best = x;
@@ -158,6 +160,7 @@ SurfacePose PoseSolver::solve(VertexArray x, double first) {
   pose.rms = springs_.rms(best);
   pose.farthest = springs_.farthest(best);
   pose.energy = elasticity_.energy(displacements(best));
+  pose.stiffness = reached;
   pose.positions = best;
   return pose;
 }

@@ -85,8 +85,7 @@ exmat::TetMesh make_tets(const MesherRequest& request) {
                           params::facet_distance = kSurfaceDistance * request.offset,
                           params::cell_radius_edge_ratio = kRadiusEdgeRatio, params::cell_size = request.cell_size);
   if (!request.improve)
-    return tets_of(
-        CGAL::make_mesh_3<Complex>(domain, criteria, params::no_perturb(), params::no_exude()));
+    return tets_of(CGAL::make_mesh_3<Complex>(domain, criteria, params::no_perturb(), params::no_exude()));
   // No time limits: the mesh must not depend on the machine's speed.
   const Complex complex = CGAL::make_mesh_3<Complex>(
       domain, criteria, params::odt(params::max_iteration_number = 10, params::time_limit = 0),
@@ -97,7 +96,8 @@ exmat::TetMesh make_tets(const MesherRequest& request) {
 
 }  // namespace
 
-extern "C" __attribute__((visibility("default"))) void exmat_make_tets(const MesherRequest& request, exmat::TetMesh& mesh, std::string& failure) {
+extern "C" __attribute__((visibility("default"))) void exmat_make_tets(const MesherRequest& request,
+                                                                       exmat::TetMesh& mesh, std::string& failure) {
   try {
     mesh = make_tets(request);
   } catch (const std::exception& error) {
@@ -105,4 +105,6 @@ extern "C" __attribute__((visibility("default"))) void exmat_make_tets(const Mes
   }
 }
 
-extern "C" __attribute__((visibility("default"))) const char* exmat_mesher_version() { return "CGAL " CGAL_VERSION_STR; }
+extern "C" __attribute__((visibility("default"))) const char* exmat_mesher_version() {
+  return "CGAL " CGAL_VERSION_STR;
+}
