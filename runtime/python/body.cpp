@@ -11,7 +11,7 @@ using Vector3 = std::array<double, 3>;
 using Shared = std::shared_ptr<BodyObject>;
 
 py::array_t<double> array_of(const double* numbers, std::size_t count) {
-  return {static_cast<py::ssize_t>(count), numbers};
+  return py::array_t<double>(static_cast<py::ssize_t>(count), numbers);
 }
 
 // ---- what is read

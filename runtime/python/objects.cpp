@@ -79,7 +79,7 @@ void require_shape(const py::array& array, const char* name, const std::vector<p
 py::array view(const double* data, std::size_t count, const py::object& owner) {
   py::array_t<double> array({static_cast<py::ssize_t>(count)}, {static_cast<py::ssize_t>(sizeof(double))}, data, owner);
   py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
-  return std::move(array);
+  return array;
 }
 
 }  // namespace exmat::python

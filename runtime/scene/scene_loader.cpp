@@ -115,7 +115,7 @@ ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConf
 
 ExampleSettings example_settings(const ExampleForceConfig& config) {
   return {config.stiffness, config.damping, config.bias, config.target_iterations,
-          config.law == ExampleForceLaw::kElastic, {}};
+          config.law == ExampleForceLaw::kElastic};
 }
 
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
