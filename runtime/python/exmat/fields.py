@@ -65,7 +65,7 @@ class _File(Mapping[str, Field]):
 
     def __init__(self, path: StrPath) -> None:
         try:
-            import h5py
+            import h5py  # type: ignore[import]
         except ImportError:
             raise ImportError(f"exmat.{type(self).__name__} needs h5py; install python3-h5py") from None
 
