@@ -24,19 +24,28 @@ void step(WorldObject& world, std::int64_t steps, int threads) {
   step_bodies(world.bodies, world.handles, steps, threads);
 }
 
-void step_list(const py::sequence& bodies, std::int64_t steps, int threads) {
+/// The bodies of a sequence; the list keeps them.
+BodyList list_of(const py::sequence& bodies) {
   BodyList list;
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    list.push_back(py::object(bodies[i]).cast<std::shared_ptr<BodyObject>>());
+  return list;
+}
+
+std::vector<exmat_body*> handles_of(const BodyList& bodies) {
   std::vector<exmat_body*> handles;
-  for (const py::handle body : bodies) {
-    list.push_back(body.cast<std::shared_ptr<BodyObject>>());
-    handles.push_back(list.back()->body.get());
-  }
-  step_bodies(list, handles, steps, threads);
+  for (const auto& body : bodies) handles.push_back(body->get().get());
+  return handles;
+}
+
+void step_list(const py::sequence& bodies, std::int64_t steps, int threads) {
+  const BodyList list = list_of(bodies);
+  step_bodies(list, handles_of(list), steps, threads);
 }
 
 std::uint64_t hash_of(const py::sequence& bodies) {
-  std::vector<exmat_body*> handles;
-  for (const py::handle body : bodies) handles.push_back(body.cast<BodyObject&>().get().get());
+  const BodyList list = list_of(bodies);
+  const std::vector<exmat_body*> handles = handles_of(list);
   std::uint64_t hash = 0;
   detail::check(exmat_bodies_hash(handles.data(), static_cast<std::int64_t>(handles.size()), &hash));
   return hash;

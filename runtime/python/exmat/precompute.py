@@ -109,8 +109,12 @@ class Job:
         self.log: List[str] = []  #: lines of the program's log
         self.output = ""  #: what it printed, when it has ended
         command = [_program(program), "--progress", "json", "--threads", str(threads), *arguments]
-        self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
-                                         errors="replace")
+        try:
+            self._process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, stdin=subprocess.DEVNULL, text=True,
+                                             errors="replace")
+        except OSError as error:
+            folder.cleanup()
+            raise Failure(f"{command[0]}: {error.strerror}; expected the program exmat-precompute") from None
         self._readers = [threading.Thread(target=self._read_errors, daemon=True), threading.Thread(target=self._read_output, daemon=True)]
         for reader in self._readers:
             reader.start()

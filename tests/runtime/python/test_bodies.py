@@ -110,7 +110,7 @@ def test_arrays_are_views_that_change_with_the_body_and_outlive_its_name(model):
 def test_forces_push(body):
     points = exmat.Points(body.model, [339, 300])
     still = copy.copy(body)
-    body.apply_forces(points, [[0, 0, 50], [0, 0, 50]])
+    body.apply_forces(points, [[0, 0, 500], [0, 0, 500]])
     for either in (body, still):
         either.step(40)
     pushed = (body.positions(points) - still.positions(points))[:, 2]
