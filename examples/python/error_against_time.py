@@ -24,10 +24,10 @@ def main():
     figure, axes = plt.subplots(figsize=(5.5, 3.6))
     for elements, mark in zip((20, 60, 120), "osv"):
         points = [point for point in result.points if point.settings.cubature_elements == elements]
-        axes.loglog([1e6 * point.step_seconds.median for point in points], [100 * point.errors.position.mean for point in points], mark, label=f"s = {elements}")
-        for point in points:
-            axes.annotate(point.settings.basis_size, (1e6 * point.step_seconds.median, 100 * point.errors.position.mean), fontsize=6,
-                          xytext=(3, 3), textcoords="offset points")
+        places = [(point.times.median_us, 100 * point.errors.position.mean) for point in points]
+        axes.loglog(*zip(*places), mark, label=f"s = {elements}")
+        for point, place in zip(points, places):
+            axes.annotate(point.settings.basis_size, place, fontsize=6, xytext=(3, 3), textcoords="offset points")
     axes.set_xlabel("one step [us]")
     axes.set_ylabel("error of position [%]")
     axes.set_title("numbers are modes r", fontsize=8)

@@ -24,10 +24,13 @@ def main():
             shapes[body.time] = body.positions(points)
         body.step(20)
 
-    figure = plt.figure(figsize=(10, 3.4))
+    with exmat.Bundle(given.folder / "twisted_bar.h5") as bundle:
+        surface = bundle["object/surface"][:]
+    figure = plt.figure(figsize=(11, 3.4))
+    figure.subplots_adjust(wspace=0.4, hspace=0.3)
     for place, (time, xyz) in enumerate(shapes.items()):
         axes = figure.add_subplot(1, 4, 1 + place, projection="3d", box_aspect=np.ptp(xyz, axis=0))
-        axes.scatter(*xyz.T, s=3, c=xyz[:, 0], cmap="viridis")
+        axes.plot_trisurf(*xyz.T, triangles=surface, cmap="viridis", linewidth=0.2, edgecolor="k")
         axes.set_title(f"{time:.1f} s", fontsize=9)
         axes.set_axis_off()
     axes = figure.add_subplot(2, 4, 4)
