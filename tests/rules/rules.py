@@ -17,7 +17,7 @@ TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "te
 LAYERS = {
     "common": "bundle hdf5 console config model mesh elastic core",
     "runtime": "app api bench scene output sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
-    "precompute": "app study/sweep study/sources study/stability study/drawing study/measure study/baseline pipeline training examples inputs cache"
+    "precompute": "app study/sweep study/sources study/stability study/drawing study/measure study/baseline pipeline training examples inputs posing meshing/mesher meshing cache"
                   " full_space alignment render shape_space targets polynomial cubature modes contact mesh_io solvers fem",
 }
 INNER = {f"{stage}/{folder}": (stage, depth) for stage, folders in LAYERS.items() for depth, folder in enumerate(folders.split())}

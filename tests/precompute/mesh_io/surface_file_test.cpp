@@ -258,9 +258,9 @@ INSTANTIATE_TEST_SUITE_P(Malformed, RefusesSurface, testing::ValuesIn(kMalformed
                          [](const auto& param) { return std::string(param.param.name); });
 
 TEST(ReadSurface, NamesTheKnownExtensions) {
-  const Complaint complaint = complaint_of([] { read_surface("body.stl"); });
-  EXPECT_THAT(complaint.expected, HasSubstr(".obj or .ply"));
-  EXPECT_EQ(complaint.found, "'.stl'");
+  const Complaint complaint = complaint_of([] { read_surface("body.fbx"); });
+  EXPECT_THAT(complaint.expected, HasSubstr(".glb, .gltf, .obj, .ply or .stl"));
+  EXPECT_EQ(complaint.found, "'.fbx'");
 }
 
 }  // namespace
