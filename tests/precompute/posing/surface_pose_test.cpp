@@ -6,8 +6,8 @@
 #include <numbers>
 
 #include "common/core/error.h"
-#include "common/elastic/stable_neo_hookean.h"
 #include "precompute/posing/surface_springs.h"
+#include "tests/support/pose_energy.h"
 #include "tests/support/surfaces.h"
 
 namespace exmat::precompute {
@@ -47,22 +47,6 @@ VertexArray bent(VertexArray x, double angle) {
   return x;
 }
 
-// Energy of a pose of the cage's vertices, a sum over the tets, with the material of poses.
-double energy_of(const TetMesh& cage, const VertexArray& posed) {
-  const LameParameters lame = lame_parameters(1, kPosePoisson);
-  double sum = 0;
-  for (Eigen::Index t = 0; t < cage.tet_count(); ++t) {
-    Eigen::Matrix3d rest, here;
-    for (int k = 0; k < 3; ++k) {
-      rest.col(k) = (cage.vertices.row(cage.tets(t, k + 1)) - cage.vertices.row(cage.tets(t, 0))).transpose();
-      here.col(k) = (posed.row(cage.tets(t, k + 1)) - posed.row(cage.tets(t, 0))).transpose();
-    }
-    const Eigen::Matrix3d H = here * rest.inverse() - Eigen::Matrix3d::Identity();
-    sum += rest.determinant() / 6 * StableNeoHookean::energy(H, lame);
-  }
-  return sum;
-}
-
 TEST_F(SurfacePoseTest, RigidMotionsTakeNoEnergy) {
   const Eigen::Matrix3d rotation = Eigen::AngleAxisd(3, Eigen::Vector3d(1, 1, -1).normalized()).toRotationMatrix();
   const auto move = [&](const VertexArray& points) -> VertexArray {
@@ -84,10 +68,10 @@ TEST_F(SurfacePoseTest, TakesNoMoreEnergyThanTheMapThatMadeThePose) {
         std::pair(bent(surface.vertices, 2), bent(cage.vertices, 2))}) {
     const SurfacePose found = pose(posed);
     const VertexArray missed = (embedding.points.interpolation(cage) * own - posed) / diagonal;
-    const double reference = energy_of(cage, own) / volume,
+    const double reference = test::pose_energy(cage, own) / volume,
                  reference_springs = found.stiffness * missed.rowwise().squaredNorm().dot(shares) / 2,
                  energy = found.energy / volume, springs = found.stiffness * found.rms * found.rms / 2;
-    EXPECT_NEAR(energy, energy_of(cage, found.positions) / volume, 1e-9 * reference);
+    EXPECT_NEAR(energy, test::pose_energy(cage, found.positions) / volume, 1e-9 * reference);
     EXPECT_LT(energy + springs, reference + reference_springs);
     EXPECT_GT(energy, 0.7 * reference);  // a relaxed pose, not an escape from the springs
     EXPECT_LT(energy, 1.3 * reference);  // the springs leave no folds
@@ -105,7 +89,9 @@ TEST_F(SurfacePoseTest, SquashesArriveInside) {
   for (Eigen::Index v = 0; v < cage.vertex_count(); ++v) {
     const Eigen::RowVector3d x = cage.vertices.row(v);
     const bool deep = x[0] > 1 && x[0] < 3 && x[1] > 0.3 && x[1] < 0.7 && x[2] > 0.3 && x[2] < 0.7;
-    if (deep) EXPECT_LT((found.positions.row(v) - ideal.row(v)).norm(), 0.01);
+    if (deep) {
+      EXPECT_LT((found.positions.row(v) - ideal.row(v)).norm(), 0.01);
+    }
   }
 }
 
