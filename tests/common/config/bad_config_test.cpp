@@ -123,7 +123,8 @@ const BadConfig kBadAssets[] = {
     {"NotInTheList", asset(R"("shape_space": {"weighting": "area"})"),
      "a.json: /shape_space/weighting: expected \"eigenvalue\" or \"none\", found \"area\""},
     {"Null", object(R"("fixed": null)"),
-     "a.json: /object/fixed: expected exactly one of \"box\", \"color\", \"file\", \"ids\", \"part\" and \"sphere\", found null"},
+     "a.json: /object/fixed: expected exactly one of \"box\", \"color\", \"file\", \"ids\", \"part\" and \"sphere\", "
+     "found null"},
     {"Incompressible", object(R"("material": {"poisson_ratio": 0.5})"),
      "a.json: /object/material/poisson_ratio: expected a number > -1 and < 0.5, found 0.5"},
     {"ZeroDensity", object(R"("material": {"density": 0})"),
