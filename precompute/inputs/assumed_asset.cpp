@@ -41,7 +41,8 @@ bool is_surface_file(const std::filesystem::path& file) {
 
 Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::path& folder) {
   const SurfaceFile file = read_surface_file(surface);
-  const auto path = std::filesystem::absolute(surface).lexically_proximate(std::filesystem::absolute(folder));
+  const auto here = std::filesystem::current_path();  // absolute() refuses an empty path
+  const auto path = (here / surface).lexically_normal().lexically_proximate((here / folder).lexically_normal());
   Json asset = {{"name", surface.stem().string().substr(0, 64)},
                 {"object",
                  {{"surface", path.string()},
