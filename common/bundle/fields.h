@@ -68,6 +68,9 @@ void visit_example(const FieldPlace& place, Example& example, Visitor& visit) {
   visit.attribute("doubt", example.doubt);
   visit.attribute("inverted_fraction", example.inverted_fraction);
   visit.attribute("competing_maps", example.competing_maps);
+  visit.attribute("surface_rms", example.surface_rms);
+  visit.attribute("surface_farthest", example.surface_farthest);
+  visit.attribute("surface_iterations", example.surface_iterations);
   visit.attribute("shape_space_error", example.shape_space_error);
   visit.attribute("basis_error", example.basis_error);
   visit.dataset("descriptor", example.descriptor);

@@ -44,7 +44,7 @@ class AssetReader {
 
  private:
   void read_object(const Json& json, AssetConfig& asset) const {
-    asset.object_mesh = resolve_path(file_, json["mesh"]);
+    read_object_mesh(json, asset);
     const Json material = member_or(json, "material", Json::object());
     asset.material.model = choice_or(material, "model", asset.material.model);
     asset.material.youngs_modulus = optional_member<double>(material, "youngs_modulus");
@@ -60,7 +60,21 @@ class AssetReader {
     }
     if (json.contains("fixed")) asset.fixed = read_selection(json["fixed"], "/object/fixed");
     asset.object_drop = read_drop(json);
+    asset.render_mesh = asset.object_surface;
     if (json.contains("render_mesh")) asset.render_mesh = resolve_path(file_, json["render_mesh"]);
+  }
+
+  void read_object_mesh(const Json& json, AssetConfig& asset) const {
+    const bool has_mesh = json.contains("mesh"), has_surface = json.contains("surface");
+    if (has_mesh == has_surface) refuse("/object", "mesh (tets) or surface (triangles)", has_mesh ? "both" : "neither");
+    asset.object_mesh = resolve_path(file_, json[has_mesh ? "mesh" : "surface"]);
+    if (has_surface) asset.object_surface = asset.object_mesh;
+    asset.cells = optional_member<int>(json, "cells");
+    asset.cell_size = optional_member<double>(json, "cell_size");
+    for (const char* member : {"cells", "cell_size"})
+      if (has_mesh && json.contains(member))
+        refuse(fmt::format("/object/{}", member), "none beside object.mesh, which has its tets", "one");
+    if (asset.cells && asset.cell_size) refuse("/object", "cells or cell_size", "both");
   }
 
   TetSelection read_tets(const Json& json, const std::string& place) const {
@@ -73,6 +87,9 @@ class AssetReader {
     if (json.contains("sphere"))
       return SphereSelection{json["sphere"]["center"].get<std::array<double, 3>>(), json["sphere"]["radius"]};
     if (json.contains("file")) return FileSelection{resolve_path(file_, json["file"])};
+    if (json.contains("part")) return PartSelection{json["part"]};
+    if (json.contains("color"))
+      return ColourSelection{json["color"]["rgb"].get<std::array<double, 3>>(), json["color"].value("within", 0.1)};
     return IdSelection{read_ids(json["ids"], file_, place + "/ids")};
   }
 
@@ -101,11 +118,32 @@ class AssetReader {
     for (std::size_t i = 0; i < json.size(); ++i) {
       const std::string place = fmt::format("/examples/{}", i);
       const Json& example = json[i];
-      ExampleConfig config{example["name"], resolve_path(file_, example["mesh"]), example.value("rest", false),
-                           read_drop(example)};
+      ExampleConfig config{example["name"], {}, example.value("rest", false), read_drop(example)};
+      read_shape(example, place, asset, config);
       check_example(config, asset.examples, place);
       asset.examples.push_back(std::move(config));
     }
+  }
+
+  // The mesh, surface or morph target of an example.
+  void read_shape(const Json& json, const std::string& place, const AssetConfig& asset, ExampleConfig& example) const {
+    if (json.contains("mesh")) example.mesh = resolve_path(file_, json["mesh"]);
+    if (json.contains("surface")) example.surface = resolve_path(file_, json["surface"]);
+    example.morph = optional_member<std::string>(json, "morph");
+    example.frame = optional_member<std::int64_t>(json, "frame");
+    const bool has_surface = example.surface || example.morph;
+    if (json.contains("mesh") == has_surface)
+      refuse(place, "mesh (tets), or surface or morph (triangles)", has_surface ? "both" : "none of them");
+    const bool of_object = has_surface && (!example.surface || example.frame);
+    if (of_object && !asset.object_surface)
+      refuse(place, "object.surface, whose vertices a morph target or a point cache moves", "object.mesh");
+    const bool is_cache = example.surface && example.surface->extension() == ".pc2";
+    if (is_cache != example.frame.has_value())
+      refuse(place, is_cache ? "the frame of the point cache" : "no frame but of a point cache (.pc2)",
+             is_cache ? "none" : "a frame");
+    if (is_cache && example.morph) refuse(place, "a frame or a morph target", "both");
+    if (example.rest && of_object)
+      refuse(place, "a rest example with a mesh or surface of its own", "a pose of the object's surface");
   }
 
   void check_example(const ExampleConfig& example, const std::vector<ExampleConfig>& earlier,
@@ -257,8 +295,9 @@ class AssetReader {
 
 }  // namespace
 
-AssetConfig load_asset(const std::filesystem::path& file) {
-  const Json json = read_json(file);
+AssetConfig load_asset(const std::filesystem::path& file) { return asset_of(read_json(file), file); }
+
+AssetConfig asset_of(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "asset", file);
   return AssetReader(file).read(json);
 }

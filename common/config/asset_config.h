@@ -31,7 +31,17 @@ struct FileSelection {
 struct IdSelection {
   std::vector<std::int64_t> ids;
 };
-using VertexSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection>;
+/// What is nearest to a part of the object's surface, by its name in the file.
+struct PartSelection {
+  std::string name;
+};
+/// What is nearest to a part of the object's surface that has a colour.
+struct ColourSelection {
+  std::array<double, 3> colour{};  ///< red, green, blue, 0 to 1
+  double within = 0.1;             ///< largest difference of each
+};
+using VertexSelection =
+    std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, PartSelection, ColourSelection>;
 
 /// A set of tets that the mesh file names.
 struct SetSelection {
@@ -39,7 +49,8 @@ struct SetSelection {
 };
 
 /// Tets by their centroids, by their ids in the mesh file, or by a set of it.
-using TetSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, SetSelection>;
+using TetSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, PartSelection,
+                                  ColourSelection, SetSelection>;
 
 struct MaterialConfig {
   MaterialModel model = MaterialModel::kStVenantKirchhoff;
@@ -59,11 +70,20 @@ struct DropConfig {
   bool smaller_components = false;
 };
 
+/// One of mesh, surface and morph; morph may stand beside surface.
 struct ExampleConfig {
   std::string name;
-  std::filesystem::path mesh;
+  std::filesystem::path mesh;  ///< tets; empty: none
   bool rest = false;
   DropConfig drop;
+  std::optional<std::filesystem::path> surface{};
+  std::optional<std::string> morph{};   ///< of `surface`, else of the object's
+  std::optional<std::int64_t> frame{};  ///< of a point cache
+
+  /// What its messages name: the file that it is read from.
+  const std::filesystem::path& file(const std::filesystem::path& object_surface) const {
+    return surface ? *surface : morph ? object_surface : mesh;
+  }
 };
 
 /// The vertex of an example for every vertex of the object, in a text file.
@@ -127,7 +147,10 @@ struct TrainingConfig {
 struct AssetConfig {
   std::filesystem::path file;
   std::string name;
-  std::filesystem::path object_mesh;
+  std::filesystem::path object_mesh;  ///< tets, or, where object_surface is there, that
+  std::optional<std::filesystem::path> object_surface;
+  std::optional<int> cells;         ///< of the tets that enclose it; both absent: the default
+  std::optional<double> cell_size;  ///< [m]
   MaterialConfig material;
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
   std::optional<VertexSelection> fixed;                ///< absent: a free body

@@ -3,6 +3,7 @@
 #include <filesystem>
 
 #include "common/config/asset_config.h"
+#include "common/config/json_values.h"
 #include "common/config/scene_config.h"
 #include "common/model/needs.h"
 
@@ -12,6 +13,9 @@ namespace exmat {
 /// file, the JSON pointer, what was expected and found; an unknown member suggests the nearest name.
 AssetConfig load_asset(const std::filesystem::path& file);
 SceneConfig load_scene(const std::filesystem::path& file);
+
+/// Of the content of an ASSET.json; `file` is for messages, and paths are relative to it. Throws as load_asset.
+AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
 
 /// What a scene needs of its bundle.
 Needs needs_of(const SceneConfig& scene);

@@ -45,11 +45,13 @@ struct ExampleData {
   double doubt = 0;                 ///< J of docs/alignment.md; 0 is certain, above 1.2 refused
   double inverted_fraction = 0;     ///< share of the volume that the pose turns inside out
   std::int64_t competing_maps = 0;  ///< other poses that fit the example about as well
-  double shape_space_error = 0;     ///< share of its displacement that the m functions lose, relative M-norm
-  double basis_error = 0;           ///< share of its transferred displacement that U loses, relative M-norm
-  RowMatrix descriptor;             ///< m x 3
-  Eigen::VectorXd reduced;          ///< r, T^+ (e_k - e_0)
-  Eigen::VectorXd pose;             ///< r, p_k: the same with the fixed vertices of a clamped body put back
+  double surface_rms = 0, surface_farthest = 0;  ///< what a pose by a surface misses of it, over its diagonal
+  std::int64_t surface_iterations = 0;           ///< that this pose took
+  double shape_space_error = 0;  ///< share of its displacement that the m functions lose, relative M-norm
+  double basis_error = 0;        ///< share of its transferred displacement that U loses, relative M-norm
+  RowMatrix descriptor;          ///< m x 3
+  Eigen::VectorXd reduced;       ///< r, T^+ (e_k - e_0)
+  Eigen::VectorXd pose;          ///< r, p_k: the same with the fixed vertices of a clamped body put back
 };
 
 /// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex. docs/step_in_detail.md,

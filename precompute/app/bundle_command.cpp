@@ -13,6 +13,7 @@
 #include "common/core/log.h"
 #include "common/hdf5/schema.h"
 #include "common/mesh/geometry.h"
+#include "precompute/app/asset_input.h"
 #include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/pipeline/depfile.h"
 #include "precompute/pipeline/run_report.h"
@@ -45,6 +46,10 @@ void print_examples(const std::string& title, const ExampleSet& set) {
   for (const auto& example : set.examples)
     fmt::print("{:<20}{:<18}{:>8.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.doubt,
                100 * example.shape_space_error, 100 * example.basis_error);
+  for (const auto& example : set.examples)
+    if (example.surface_iterations > 0)
+      fmt::print("{}: its surface is missed by {:.3g} % of the diagonal (RMS), {:.3g} % at most\n", example.name,
+                 100 * example.surface_rms, 100 * example.surface_farthest);
 }
 
 void print_render_mesh(const ReducedModel& model) {
@@ -117,7 +122,7 @@ void require_writable(const BundleOptions& options) {
 
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
-  const AssetConfig asset = load_asset(options.asset);
+  const AssetConfig asset = asset_from(options.asset, options.write_asset);
   std::optional<SceneConfig> scene;
   if (!options.scene.empty()) scene = load_scene(options.scene);
   const Needs needs = precompute::resolve_needs(asset, scene_needs(options, scene, asset));

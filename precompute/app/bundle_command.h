@@ -5,7 +5,8 @@
 namespace exmat {
 
 struct BundleOptions {
-  std::string asset, bundle;
+  std::string asset, bundle;     ///< asset: ASSET.json, or a surface that stands for one
+  std::string write_asset;       ///< file for what a surface stands for; empty: none
   std::string scene;             ///< empty: what the asset needs
   std::string alignment_report;  ///< folder; empty: none
   std::string depfile, report;   ///< files; empty: none

@@ -6,8 +6,10 @@
 #include "common/core/log.h"
 #include "common/core/version.h"
 #include "common/hdf5/library_versions.h"
+#include "precompute/app/asset_input.h"
 #include "precompute/app/bundle_command.h"
 #include "precompute/app/full_space_command.h"
+#include "precompute/app/mesh_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
 #include "precompute/pipeline/build_reduced_model.h"
@@ -34,7 +36,7 @@ void print_alignments(const std::vector<precompute::AlignmentOutcome>& outcomes)
 
 void check(const CheckOptions& options) {
   precompute::BuildReport report;
-  const AssetConfig asset = load_asset(options.asset);
+  const AssetConfig asset = asset_from(options.asset);
   const auto outcomes = precompute::check_inputs(asset, options.alignment_report, report);
   if (!outcomes.empty()) print_alignments(outcomes);
   precompute::require_aligned(asset, outcomes, report.warnings);
@@ -44,7 +46,8 @@ void check(const CheckOptions& options) {
 int run(std::vector<char*> words) {
   CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
   app.set_version_flag("--version", [] {
-    return fmt::format("exmat-precompute {}, {}, {}", version(), precompute::solver_versions(), library_versions());
+    return fmt::format("exmat-precompute {}, {}, {}, mesher: {}", version(), precompute::solver_versions(),
+                       library_versions(), precompute::mesher_version());
   });
   app.require_subcommand(1);
   CommonOptions common;
@@ -54,9 +57,13 @@ int run(std::vector<char*> words) {
 
   BundleOptions options;
   auto* bundle_command_line = app.add_subcommand("bundle", "compute the offline stage and write a bundle");
-  bundle_command_line->add_option("ASSET", options.asset, "asset file (JSON)")->required();
+  const char* asset_text =
+      "asset file (JSON), or a surface (.glb, .gltf, .obj, .ply, .stl) that an asset is assumed for";
+  bundle_command_line->add_option("ASSET", options.asset, asset_text)->required();
   bundle_command_line->add_option("-o,--output", options.bundle, "bundle to write (HDF5)")->required();
   bundle_command_line->add_option("--scene", options.scene, "write only what this scene needs");
+  bundle_command_line->add_option("--write-asset", options.write_asset,
+                                  "file to write the asset that a surface stands for into (JSON)");
   bundle_command_line->add_option("--depfile", options.depfile, "file to list what was read in, for Make and Ninja");
   bundle_command_line->add_option(
       "--report", options.report,
@@ -73,13 +80,25 @@ int run(std::vector<char*> words) {
   CheckOptions check_options;
   auto* check_command =
       app.add_subcommand("check", "read and check the inputs and align the examples, compute nothing else");
-  check_command->add_option("ASSET", check_options.asset, "asset file (JSON)")->required();
+  check_command->add_option("ASSET", check_options.asset, asset_text)->required();
   const auto add_alignment_report = [](CLI::App* command, std::string& folder) {
     command->add_option("--alignment-report", folder,
                         "folder to write each transferred pose beside its example into (.vtk and .svg)");
   };
   add_alignment_report(bundle_command_line, options.alignment_report);
   add_alignment_report(check_command, check_options.alignment_report);
+
+  MeshCommandOptions mesh_options;
+  auto* mesh_command_line =
+      app.add_subcommand("mesh", "enclose a surface with tets, write these and what they are like");
+  mesh_command_line->add_option("SURFACE", mesh_options.surface, "surface (.glb, .gltf, .obj, .ply, .stl)")->required();
+  mesh_command_line->add_option("-o,--output", mesh_options.mesh, "mesh to write (Gmsh .msh)")->required();
+  auto* cells = mesh_command_line->add_option("--cells", mesh_options.settings.cells, "about so many tets")
+                    ->check(CLI::Range(50, 2000000));
+  mesh_command_line
+      ->add_option("--cell-size", mesh_options.settings.cell_size, "radius of the sphere about a tet, at most [m]")
+      ->check(CLI::PositiveNumber)
+      ->excludes(cells);
 
   StudyCommandOptions study_options;
   auto* study_command_line = app.add_subcommand(
@@ -140,6 +159,7 @@ int run(std::vector<char*> words) {
     if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
     if (bundle_command_line->parsed()) bundle_command(options);
     if (check_command->parsed()) check(check_options);
+    if (mesh_command_line->parsed()) mesh_command(mesh_options);
     if (full_space_command_line->parsed()) full_space_command(full_space_options);
     if (study_command_line->parsed())
       study_options.stability ? stability_command(study_options) : study_command(study_options);

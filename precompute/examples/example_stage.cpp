@@ -47,7 +47,8 @@ class ShapeStageBuilder {
   SparseMatrix fit_weights() const;
   void add_rest(const AlignedRest& rest, ExampleGroup& group) const;
   TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
-  void add_pose(const AlignedPose& pose, const TransferredPose& transferred, ExampleGroup& group) const;
+  void add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred,
+                ExampleGroup& group) const;
   ExampleData example_data(const AlignmentOutcome& outcome, double scale, const ExampleGroup& group) const;
   void report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred);
   void add_groups(const AlignedRest& rest);
@@ -150,12 +151,17 @@ void ShapeStageBuilder::report(const std::string& name, const AlignedPose& pose,
                    name, 100 * share, rest_pose_text(transferred.rotation)));
 }
 
-void ShapeStageBuilder::add_pose(const AlignedPose& pose, const TransferredPose& transferred,
+void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred,
                                  ExampleGroup& group) const {
   ExampleData example = example_data(pose.outcome, rest_scale_ / pose.scale.unit, group);
   example.rotation = transferred.rotation;
   example.shape_space_error = transferred.shape_space_error;
   example.descriptor = stage_.weights.asDiagonal() * transferred.coefficients;
+  if (input.surface) {
+    example.surface_rms = input.surface->rms;
+    example.surface_farthest = input.surface->farthest;
+    example.surface_iterations = input.surface->iterations;
+  }
   if (transferred.displacement.norm() <= kNoPose * stage_.object.vertices.norm())
     throw InputError({"", "/examples, " + example.name,
                       group.region.empty()
@@ -214,14 +220,14 @@ void ShapeStageBuilder::add_examples() {
     stage_.poses.push_back({whole.rotation, rest_scale_ / pose.scale.unit, carried_displacement(whole)});
     stage_.alignments.push_back(pose.outcome);
     stage_.alignments.back().shape_space_error = whole.shape_space_error;
-    if (input_.whole_body && input.in_whole_body) add_pose(pose, whole, stage_.groups.front());
+    if (input_.whole_body && input.in_whole_body) add_pose(input, pose, whole, stage_.groups.front());
     for (std::size_t i = 0; i < input_.regions.size(); ++i) {
       const RegionInput& region = input_.regions[i];
       if (std::ranges::find(region.examples, input.name) == region.examples.end()) continue;
       ExampleGroup& group = stage_.groups[i + (input_.whole_body ? 1 : 0)];
       TransferredPose local = transfer(rest, pose, region_frame(rest, *group.view));
       cut(*group.view, share_of_region(rest, region), local);
-      add_pose(pose, local, group);
+      add_pose(input, pose, local, group);
     }
   }
 }

@@ -1,5 +1,7 @@
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -8,6 +10,9 @@
 #include "common/model/reduced_model.h"
 
 namespace exmat::precompute {
+
+class ObjectSurface;
+class StageCache;
 
 /// The object, read, checked and resolved.
 struct ObjectInput {
@@ -20,6 +25,13 @@ struct ObjectInput {
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file
   VertexArray file_positions;                          ///< of all vertices in the file
   std::vector<std::vector<std::int64_t>> pushed;       ///< vertices of each of the forces of basis.loads
+  std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh encloses; none where tets were given
+};
+
+/// What a pose by the object's surface misses of it.
+struct SurfaceMiss {
+  double rms = 0, farthest = 0;  ///< over the diagonal of the surface's bounding box
+  int iterations = 0;            ///< of Newton's method
 };
 
 /// One posed example, on the mesh of the rest example or another.
@@ -34,6 +46,7 @@ struct PoseInput {
   bool in_whole_body = true;         ///< no region has it
   Eigen::Index column = 0;           ///< in ExampleInput::landmarks
   std::vector<IndexVector> parts{};  ///< for each of ExampleInput::parts its vertices of `mesh`; none where not given
+  std::optional<SurfaceMiss> surface{};  ///< of a pose of the object's surface
 };
 
 /// A region of the asset, and the poses that act there.
@@ -59,7 +72,10 @@ struct ExampleInput {
 using InputFiles = std::vector<std::filesystem::path>;
 
 /// Throws InputError with the file, the place, what was expected and found.
+/// Cages and poses of surfaces come from the cache where it has them; without one they are computed.
+ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache& cache);
 ObjectInput read_object(const AssetConfig& asset, InputFiles& files);
+ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, InputFiles& files, StageCache& cache);
 ExampleInput read_examples(const AssetConfig& asset, const ObjectInput& object, InputFiles& files);
 
 /// The asset's render mesh, embedded in the object. Warns (in the log and in `warnings`) where a vertex is farther

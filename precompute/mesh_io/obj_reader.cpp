@@ -1,5 +1,6 @@
 #include "precompute/mesh_io/obj_reader.h"
 
+#include <algorithm>
 #include <array>
 #include <fmt/format.h>
 #include <string>
@@ -7,18 +8,36 @@
 #include "precompute/mesh_io/commented_lines.h"
 #include "precompute/mesh_io/mesh_arrays.h"
 #include "precompute/mesh_io/mesh_tables.h"
+#include "precompute/mesh_io/surface_parts.h"
 #include "precompute/mesh_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {
 
+std::vector<std::string> words(std::string_view text) {
+  std::vector<std::string> found;
+  for (std::size_t begin = 0; (begin = text.find_first_not_of(" \t", begin)) != std::string_view::npos;) {
+    const std::size_t end = std::min(text.find_first_of(" \t", begin), text.size());
+    found.emplace_back(text.substr(begin, end - begin));
+    begin = end;
+  }
+  return found;
+}
+
 class ObjReader {
  public:
   explicit ObjReader(const std::filesystem::path& file) : lines_(file, "an .obj file") {}
 
-  SurfaceMesh read();
+  SurfaceFile read();
 
  private:
+  // Names of a statement and the first triangle that they are of.
+  struct Naming {
+    std::string_view keyword;
+    std::vector<std::string> names{};
+    std::size_t begin = 0;
+  };
+  void name_part(Naming& naming, std::vector<std::string> names);
   std::string whole_statement();
   void read_statement(const FileLine& line);
   void read_vertex(const FileLine& line, Fields fields);
@@ -31,13 +50,17 @@ class ObjReader {
   // The largest index so far and its line: vertices may follow the faces.
   std::int64_t largest_ = -1;
   FileLine line_of_largest_;
+  std::array<Naming, 3> namings_{{{"o"}, {"g"}, {"usemtl"}}};
+  SurfaceParts parts_;
+  std::size_t bytes_ = 0;  // read so far
 };
 
-SurfaceMesh ObjReader::read() {
+SurfaceFile ObjReader::read() {
   for (; lines_.current(); lines_.advance()) {
     FileLine line = *lines_.current();
     const std::string statement = whole_statement();
     line.text = statement;
+    bytes_ += statement.size() + 1;
     read_statement(line);
   }
   if (vertices_.empty()) lines_.fail("vertices ('v x y z')");
@@ -45,7 +68,12 @@ SurfaceMesh ObjReader::read() {
   if (largest_ >= std::ssize(vertices_))
     fail_at(line_of_largest_, fmt::format("vertices 1 to {}, which the file has", vertices_.size()),
             std::to_string(largest_ + 1));
-  return {vertex_array(vertices_), triangle_array(triangles_)};
+  for (Naming& naming : namings_) name_part(naming, {});
+  SurfaceFile surface;
+  surface.mesh = {vertex_array(vertices_), triangle_array(triangles_)};
+  surface.files = lines_.files();
+  parts_.finish(surface, bytes_);
+  return surface;
 }
 
 // With the lines that continue it, after a backslash at the end of each.
@@ -65,6 +93,16 @@ void ObjReader::read_statement(const FileLine& line) {
   const std::string_view keyword = fields.next();
   if (keyword == "v") read_vertex(line, fields);
   if (keyword == "f") read_face(line, fields);
+  const auto naming = std::ranges::find(namings_, keyword, &Naming::keyword);
+  if (naming == namings_.end()) return;
+  const std::string_view rest = trimmed(line.text.substr(keyword.size()));
+  name_part(*naming, keyword == "g" ? words(rest) : std::vector{std::string(rest)});
+}
+
+void ObjReader::name_part(Naming& naming, std::vector<std::string> names) {
+  for (const std::string& name : naming.names) parts_.add_triangles(name, naming.begin, triangles_.size());
+  naming.names = std::move(names);
+  naming.begin = triangles_.size();
 }
 
 // A weight or a colour may follow.
@@ -99,6 +137,6 @@ std::int32_t ObjReader::read_corner(const FileLine& line, std::string_view field
 
 }  // namespace
 
-SurfaceMesh read_obj(const std::filesystem::path& file) { return ObjReader(file).read(); }
+SurfaceFile read_obj(const std::filesystem::path& file) { return ObjReader(file).read(); }
 
 }  // namespace exmat::precompute

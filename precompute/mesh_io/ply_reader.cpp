@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <fmt/format.h>
 #include <optional>
 #include <string>
@@ -51,7 +52,7 @@ class PlyReader {
   PlyReader(std::string file, std::string_view bytes)
       : cursor_(std::move(file), bytes, ValueCursor::Layout::kAnywhere) {}
 
-  SurfaceMesh read();
+  SurfaceFile read();
 
  private:
   void read_header();
@@ -61,6 +62,7 @@ class PlyReader {
   void check_properties(const Element& element) const;
   void check_count(const Element& element) const;
   void read_element(const Element& element);
+  double read_channel(const Property& property);
   void read_list(const Element& element, const Property& property);
   void check_faces() const;
 
@@ -69,13 +71,26 @@ class PlyReader {
   std::vector<Element> elements_;
   std::vector<std::array<double, 3>> vertices_;
   std::vector<std::array<std::int32_t, 3>> triangles_;
+  std::vector<std::array<double, 3>> colours_;  // of each vertex, where all three properties are there
 };
 
 bool is_corners(const Element& element, const Property& property) {
   return element.name == "face" && (property.name == "vertex_indices" || property.name == "vertex_index");
 }
 
-SurfaceMesh PlyReader::read() {
+constexpr std::array<std::string_view, 3> kAxes{"x", "y", "z"}, kChannels{"red", "green", "blue"};
+
+// 3 where the name is none of them.
+std::size_t index_of(const std::array<std::string_view, 3>& names, std::string_view name) {
+  return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+}
+
+// Whether it has a property that is one number.
+bool has(const Element& element, std::string_view name) {
+  return std::ranges::any_of(element.properties, [&](const Property& p) { return p.name == name && !p.count; });
+}
+
+SurfaceFile PlyReader::read() {
   read_header();
   for (const Element& element : elements_) check_properties(element);
   if (binary_) cursor_.set_binary(swap_);
@@ -87,7 +102,10 @@ SurfaceMesh PlyReader::read() {
   if (vertices_.empty()) cursor_.fail("vertices", "none");
   if (triangles_.empty()) cursor_.fail("faces of at least 3 vertices", "none");
   check_faces();
-  return {vertex_array(vertices_), triangle_array(triangles_)};
+  SurfaceFile surface;
+  surface.mesh = {vertex_array(vertices_), triangle_array(triangles_)};
+  surface.colours = vertex_array(colours_);
+  return surface;
 }
 
 void PlyReader::read_header() {
@@ -149,10 +167,8 @@ NumberType PlyReader::type(std::string_view name) const {
 }
 
 void PlyReader::check_properties(const Element& element) const {
-  const auto has = [&](std::string_view name) {
-    return std::ranges::any_of(element.properties, [&](const Property& p) { return p.name == name && !p.count; });
-  };
-  if (element.name == "vertex" && !(has("x") && has("y") && has("z")))
+  if (element.name == "vertex" &&
+      !std::ranges::all_of(kAxes, [&](std::string_view name) { return has(element, name); }))
     cursor_.fail("properties x, y and z of the vertices", "fewer");
   if (element.name == "face" && std::ranges::none_of(element.properties, [&](const Property& p) {
         return is_corners(element, p) && p.count && p.type.kind != Kind::kReal;
@@ -172,20 +188,31 @@ void PlyReader::read_element(const Element& element) {
   check_count(element);
   if (element.properties.empty()) return;
   const bool is_vertex = element.name == "vertex";
+  const bool coloured =
+      is_vertex && std::ranges::all_of(kChannels, [&](std::string_view name) { return has(element, name); });
   for (std::uint64_t k = 0; k < element.count; ++k) {
     if (is_vertex) vertices_.emplace_back();
+    if (coloured) colours_.emplace_back();
     for (const Property& property : element.properties) {
-      if (property.count) {
+      const std::size_t axis = index_of(kAxes, property.name), channel = index_of(kChannels, property.name);
+      if (property.count)
         read_list(element, property);
-        continue;
-      }
-      const std::size_t axis = property.name == "x" ? 0 : property.name == "y" ? 1 : property.name == "z" ? 2 : 3;
-      if (is_vertex && axis < 3)
+      else if (is_vertex && axis < 3)
         vertices_.back()[axis] = cursor_.read_real_of(property.type, fmt::format("coordinate {}", property.name));
+      else if (coloured && channel < 3)
+        colours_.back()[channel] = read_channel(property);
       else
         cursor_.skip_values(1, property.type, fmt::format("property '{}'", property.name));
     }
   }
+}
+
+double PlyReader::read_channel(const Property& property) {
+  const double value = cursor_.read_real_of(property.type, fmt::format("colour '{}'", property.name));
+  const bool is_signed = property.type.kind == Kind::kSigned;
+  const double largest =
+      property.type.kind == Kind::kReal ? 1 : std::exp2(8 * static_cast<int>(property.type.bytes) - is_signed) - 1;
+  return std::clamp(value / largest, 0.0, 1.0);
 }
 
 void PlyReader::read_list(const Element& element, const Property& property) {
@@ -218,9 +245,11 @@ void PlyReader::check_faces() const {
 
 }  // namespace
 
-SurfaceMesh read_ply(const std::filesystem::path& file) {
+SurfaceFile read_ply(const std::filesystem::path& file) {
   const std::string bytes = read_whole_file(file, "a .ply file");
-  return PlyReader(file.string(), bytes).read();
+  SurfaceFile surface = PlyReader(file.string(), bytes).read();
+  surface.files = {file};
+  return surface;
 }
 
 }  // namespace exmat::precompute

@@ -75,6 +75,12 @@ class Selector {
     return require_some(std::move(ids), selection.file.string(), "");
   }
 
+  // Those that a surface has are ids by now (precompute/inputs/object_surface).
+  std::vector<std::int32_t> operator()(const PartSelection& selection) const {
+    refuse_without_surface("part", fmt::format("\"{}\"", selection.name));
+  }
+  std::vector<std::int32_t> operator()(const ColourSelection&) const { refuse_without_surface("color", "a color"); }
+
   std::vector<std::int32_t> operator()(const SetSelection& selection) const {
     const auto found = sets_->find(selection.name);
     if (found == sets_->end())
@@ -84,6 +90,11 @@ class Selector {
   }
 
  private:
+  [[noreturn]] void refuse_without_surface(const char* place, const std::string& found) const {
+    throw InputError({asset_file_, place, "parts and colors of an object that is given as object.surface", found,
+                      "choose a box, a sphere or ids"});
+  }
+
   std::vector<std::int32_t> require_some(std::vector<std::int32_t> ids, const std::string& file,
                                          const std::string& place) const {
     if (ids.empty())

@@ -309,13 +309,13 @@ std::string generator() { return fmt::format("exmat-precompute {}", version()); 
 
 void Pipeline::read() {
   if (needs_.internal_force == ForceMethod::kPolynomial) require_polynomial(asset_.material.model, asset_.basis_size);
-  object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs); });
+  object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs, cache_); });
   warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
   require_regions(asset_, needs_);
   report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions),
                                asset_.render_mesh.has_value());
   if (includes(report_.ledger, "shape_space")) {
-    examples_ = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs); });
+    examples_ = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs, cache_); });
     keep_needed(needs_, includes(report_.ledger, "examples"), *examples_);
   }
 

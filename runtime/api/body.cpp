@@ -27,11 +27,11 @@ void add(const StepReport& step, exmat_report& sum) noexcept {
   sum.residual = step.residual;
 }
 
-void advance(exmat_body& body, std::int64_t steps) noexcept {
+void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcept {
   const Timer timer;
   body.report = {};
   while (body.report.steps < steps) {
-    const StepReport report = step(body.model(), body.scene, body.state, body.workspace);
+    const StepReport report = step(body.model(), body.scene, body.state, workspace);
     add(report, body.report);
     if ((report.status & kStepNonFinite) != 0) break;
     ++body.report.steps;
@@ -62,7 +62,8 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source)
       start(source->loaded.start),
       workspace(model(), scene),
       drawing(VertexPositions::make_workspace(model().modes())),
-      force(Eigen::VectorXd::Zero(model().modes())) {
+      force(Eigen::VectorXd::Zero(model().modes())),
+      frame_numbers(model().frame->numbers(start.frame).size()) {
   refresh_weights(model(), scene, start, workspace);
   state = start;
 }
@@ -105,7 +106,7 @@ exmat_status exmat_body_step(exmat_body* body, std::int64_t steps, exmat_report*
   if (report != nullptr)
     if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
   if (!acquire(*body)) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps this body", __func__);
-  advance(*body, steps);
+  advance(*body, body->workspace, steps);
   const bool finite = !non_finite(*body);
   if (report != nullptr) give(body->report, report->size, report);
   const exmat_status status = finite ? EXMAT_OK : fail_non_finite(__func__, "body", *body);
@@ -131,8 +132,15 @@ exmat_status exmat_bodies_step(exmat_body* const* bodies, std::int64_t count, st
   }
   const int wanted = threads > 0 ? threads : omp_get_num_procs();
   const int used = static_cast<int>(std::min<std::int64_t>(wanted, count));
-#pragma omp parallel for schedule(dynamic) num_threads(used) if (used > 1)
-  for (std::int64_t i = 0; i < count; ++i) advance(*bodies[i], steps);
+#pragma omp parallel num_threads(used) if (used > 1)
+  {
+    exmat_body* lender = nullptr;  // of this thread: bodies of one model share the scratch that is in its cache
+#pragma omp for schedule(dynamic)
+    for (std::int64_t i = 0; i < count; ++i) {
+      if (lender == nullptr || lender->source != bodies[i]->source) lender = bodies[i];
+      advance(*bodies[i], lender->workspace, steps);
+    }
+  }
   exmat_status status = EXMAT_OK;
   const auto failed = std::ranges::find_if(all, [](const exmat_body* body) { return non_finite(*body); });
   if (failed != all.end()) {

@@ -99,6 +99,10 @@ double exmat_model_time_step(const exmat_model* model) noexcept {
   return model != nullptr ? model->source->loaded.scene.time_step : -1;
 }
 
+const char* exmat_model_input_sha256(const exmat_model* model) noexcept {
+  return model != nullptr ? model->source->loaded.summary.input_sha256.c_str() : nullptr;
+}
+
 // ---- points ---------------------------------------------------------------------------------------------------------
 
 exmat_status exmat_points_create_vertices(const exmat_model* model, const std::int64_t* ids, std::int64_t count,

@@ -32,7 +32,8 @@ struct exmat_body {
   exmat::runtime::State start, state;
   exmat::runtime::Workspace workspace;
   exmat::runtime::VertexPositions::Workspace drawing;
-  Eigen::VectorXd force;  ///< r
+  Eigen::VectorXd force;      ///< r
+  std::size_t frame_numbers;  ///< of the frame's state
   exmat_report report{};
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
 };

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "runtime/export/gltf_file.h"
 #include "runtime/scene/scene_run.h"
 
 namespace exmat::runtime {
@@ -22,9 +23,13 @@ struct BenchCommandOptions {
 };
 
 struct ExportOptions {
-  std::filesystem::path trajectory, output;
-  bool mesh = false;                 ///< the tet mesh, not the render mesh
-  std::optional<double> frame_rate;  ///< [1/s]
+  std::filesystem::path trajectory;  ///< empty: a bundle without motion
+  std::filesystem::path output;
+  std::optional<std::filesystem::path> bundle;  ///< instead of the one that the trajectory names
+  bool mesh = false;                            ///< the tet mesh, not the render mesh
+  std::optional<double> frame_rate;             ///< [1/s]
+  std::optional<std::int64_t> targets;          ///< morph targets, >= 1
+  UpAxis up = UpAxis::kY;
 };
 
 // The commands of exmat-runtime: results on stdout, logs and progress on stderr; failures are InputError or WorkError.

@@ -1,5 +1,7 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
+#include <map>
+#include <string>
 
 #include "common/console/console.h"
 #include "common/core/version.h"
@@ -37,15 +39,23 @@ int main(int argc, char** argv) {
 
   runtime::ExportOptions export_options;
   CLI::App& export_command = *app.add_subcommand(
-      "export", "Write a trajectory as a point cache (.pc2), for Blender's and 3ds Max's mesh caches");
-  export_command.add_option("trajectory", export_options.trajectory, "TRAJECTORY.h5")->required();
-  export_command.add_option("-o,--output", export_options.output, "Point cache to write (.pc2)")->required();
-  export_command.add_flag("--mesh", export_options.mesh,
-                          "The tet mesh's vertices, also where the trajectory holds a render mesh");
+      "export", "Write a motion for other programs: glTF with morph targets (.glb), USD (.usda), point cache (.pc2)");
+  export_command.add_option("trajectory", export_options.trajectory, "TRAJECTORY.h5; none: the modes of --bundle");
+  export_command.add_option("-o,--output", export_options.output, "File to write (.glb, .usda or .pc2)")->required();
+  export_command.add_option("--bundle", export_options.bundle,
+                            "Bundle whose modes become morph targets of a .glb, instead of the one that was stepped");
+  export_command
+      .add_option("--targets", export_options.targets,
+                  "Morph targets of a .glb, by principal components of the motion; default: one for each mode")
+      ->check(CLI::Range(std::int64_t{1}, std::int64_t{1'000'000}));
+  export_command.add_flag("--mesh", export_options.mesh, "The tet mesh, also where there is a render mesh");
   export_command
       .add_option("--frame-rate", export_options.frame_rate,
-                  "Frames a second of the animation, which then plays in real time; default: a sample is a frame")
+                  "Frames a second of the animation; default: 24 of a .usda, of a .pc2 a sample is a frame")
       ->check(CLI::Range(1e-3, 1e6));
+  const std::map<std::string, runtime::UpAxis> axes{{"y", runtime::UpAxis::kY}, {"z", runtime::UpAxis::kZ}};
+  export_command.add_option("--up", export_options.up, "Axis of the object that points up, y (default) or z")
+      ->transform(CLI::CheckedTransformer(axes, CLI::ignore_case));
 
   std::filesystem::path bundle;
   CLI::App& info = *app.add_subcommand("info", "Say what a bundle holds");

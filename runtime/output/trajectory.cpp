@@ -32,6 +32,7 @@ Hdf5File create_file(const AtomicFile& output, const ReducedModel& model, const 
   write_header(file, trajectory_schema(), generator_name());
   file.write_attribute("/", "asset_name", model.asset_name);
   file.write_attribute("/", "input_sha256", model.input_sha256);
+  file.write_attribute("/", "bundle", info.bundle);
   file.write_attribute("/", "integrator", info.integrator);
   file.write_attribute("/", "time_step", info.time_step);
   const auto regional = [](const WeightInfo& weights) { return !weights.region.empty(); };

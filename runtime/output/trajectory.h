@@ -23,6 +23,7 @@ struct WeightInfo {
 /// What a trajectory says of its run.
 struct TrajectoryInfo {
   std::string integrator;
+  std::string bundle;       ///< path from the folder of the trajectory
   double time_step = 0;     ///< [s]
   std::int64_t frames = 0;  ///< that will be appended
   std::vector<WeightInfo> weights{};

@@ -4,7 +4,6 @@
 #include <omp.h>
 #include <utility>
 
-#include "common/core/fnv_hash.h"
 #include "common/core/timer.h"
 
 namespace exmat::runtime {
@@ -17,6 +16,12 @@ Bodies::Bodies(const Model& model, const StepScene& scene, State start, int coun
       threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene}, {}}) {
   refresh_weights(model, scene, start_, threads_.front().workspace);
   states_.assign(reports_.size(), start_);
+}
+
+void add_to_hash(const Model& model, const State& state, FnvHash& hash) {
+  hash.add_all(state.q);
+  hash.add_all(state.v);
+  hash.add_all(model.frame->coordinates(state.frame));
 }
 
 void Bodies::restart() {
@@ -59,11 +64,7 @@ std::optional<int> Bodies::first_non_finite() const {
 
 std::uint64_t Bodies::hash() const {
   FnvHash hash;
-  for (const State& state : states_) {
-    hash.add_all(state.q);
-    hash.add_all(state.v);
-    hash.add_all(model_.frame->coordinates(state.frame));
-  }
+  for (const State& state : states_) add_to_hash(model_, state, hash);
   return hash.value();
 }
 

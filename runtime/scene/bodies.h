@@ -5,10 +5,14 @@
 #include <span>
 #include <vector>
 
+#include "common/core/fnv_hash.h"
 #include "runtime/scene/step_work.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
+
+/// Adds the bits of q and v of a body, of a free one also where it is and its momenta.
+void add_to_hash(const Model& model, const State& state, FnvHash& hash);
 
 /// N bodies of one model in one scene, stepped together from the same start. OpenMP over the bodies in fixed shares,
 /// one Workspace for each thread: no body depends on another, nor on the number of threads.
@@ -32,7 +36,7 @@ class Bodies {
   /// The first body that the last step left because of a number that is not finite.
   std::optional<int> first_non_finite() const;
 
-  /// FNV-1a over the bits of q and v of all bodies, in order; of a free body also where it is and its momenta.
+  /// FNV-1a over all bodies, in order, by add_to_hash().
   std::uint64_t hash() const;
 
   /// Lets steps measure their stages and count their work.

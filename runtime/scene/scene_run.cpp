@@ -13,7 +13,11 @@ namespace {
 
 std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
   if (!config.trajectory) return nullptr;
-  TrajectoryInfo info{std::string(name_of(config.integrator)), config.time_step, 1 + config.steps / config.every};
+  const std::filesystem::path folder = std::filesystem::absolute(*config.trajectory).parent_path();
+  const std::string bundle =
+      std::filesystem::proximate(std::filesystem::absolute(config.bundle), folder).generic_string();
+  TrajectoryInfo info{std::string(name_of(config.integrator)), bundle, config.time_step,
+                      1 + config.steps / config.every};
   for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i) {
     const ExampleModel& examples = loaded.model->examples[i];
     if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});

@@ -28,11 +28,16 @@ SOURCES = {
     "node": [MESH_IO + "tetgen_reader.cpp"],
     "obj": [MESH_IO + "obj_reader.cpp"],
     "ply": [MESH_IO + "ply_reader.cpp"],
+    "stl": [MESH_IO + "stl_reader.cpp"],
+    "glb": [MESH_IO + "gltf_"],
+    "gltf": [MESH_IO + "gltf_"],
+    "pc2": [MESH_IO + "point_cache_reader.cpp"],
     "json": ["common/config/"],
     "bundle": BUNDLE,
     "bundle_edits": BUNDLE,
 }
-SHARED = [MESH_IO + name for name in ("commented_lines.cpp", "mesh_tables.cpp", "text_input.cpp", "value_cursor.cpp")]
+SHARED = [MESH_IO + name for name in ("commented_lines.cpp", "mesh_tables.cpp", "surface_parts.cpp", "text_input.cpp",
+                                      "value_cursor.cpp")]
 
 
 def replay(program, corpora, folder):

@@ -1,5 +1,10 @@
 // Any bytes in a file of the extension EXMAT_FUZZ_EXTENSION are a mesh or refused. A TetGen pair is one input, split by
-// the first zero byte, and so are a .veg file and input.inc, which it may include.
+// the first zero byte, and so are a .veg file and input.inc, which it may include, and a .gltf file and input.bin. Of a
+// .pc2 file the first and the last frame are read.
+#include <algorithm>
+#include <array>
+#include <cstring>
+
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "precompute/mesh_io/mesh_file.h"
@@ -24,6 +29,34 @@ void check(const precompute::SurfaceMesh& surface) {
   require_indices(surface.triangles, surface.vertices.rows());
 }
 
+void check(const precompute::SurfaceFile& surface) {
+  check(surface.mesh);
+  const Eigen::Index count = surface.mesh.vertices.rows();
+  for (const auto& morph : surface.morphs) require(morph.positions.rows() == count && morph.positions.allFinite());
+  for (const auto& [name, flags] : surface.parts) require(flags.size() == count && flags.maxCoeff() == 1);
+  require(surface.colours.rows() == 0 || surface.colours.rows() == count);
+  require((surface.colours.array() >= 0).all() && (surface.colours.array() <= 1).all());
+  require(!surface.files.empty());
+}
+
+bool is_surface(std::string_view extension) {
+  constexpr std::array<std::string_view, 5> kSurfaces{".obj", ".ply", ".stl", ".glb", ".gltf"};
+  return std::ranges::find(kSurfaces, extension) != kSurfaces.end();
+}
+
+// With the number of vertices that its header has, and with another.
+void read_frames(const std::filesystem::path& file, std::string_view bytes) {
+  std::int32_t vertices = 0, frames = 0;
+  if (bytes.size() >= 32) {
+    std::memcpy(&vertices, bytes.data() + 16, sizeof vertices);
+    std::memcpy(&frames, bytes.data() + 28, sizeof frames);
+  }
+  for (const std::int64_t frame : {std::int64_t{0}, std::int64_t{frames} - 1}) {
+    const VertexArray positions = precompute::read_point_cache_frame(file, frame, vertices);
+    require(positions.rows() == vertices && positions.allFinite());
+  }
+}
+
 void check(const precompute::MeshFile& file) {
   require(file.mesh.vertices.allFinite());
   require_indices(file.mesh.tets, file.mesh.vertex_count());
@@ -39,12 +72,14 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace exmat;
   const std::string_view extension = EXMAT_FUZZ_EXTENSION;
   std::string_view bytes(reinterpret_cast<const char*>(data), size);
-  if (extension == ".node" || extension == ".veg")
-    bytes = fuzz::split_off(bytes, extension == ".node" ? ".ele" : ".inc");
+  if (extension == ".node" || extension == ".veg" || extension == ".gltf")
+    bytes = fuzz::split_off(bytes, extension == ".node" ? ".ele" : extension == ".veg" ? ".inc" : ".bin");
   const auto file = fuzz::input_file(EXMAT_FUZZ_EXTENSION, bytes);
   try {
-    if (extension == ".obj" || extension == ".ply")
-      check(precompute::read_surface(file));
+    if (is_surface(extension))
+      check(precompute::read_surface_file(file));
+    else if (extension == ".pc2")
+      read_frames(file, bytes);
     else
       check(precompute::read_mesh(file));
   } catch (const InputError&) {

@@ -146,7 +146,7 @@ TEST_F(RenderMesh, WhatIsNoTrajectoryIsNotExported) {
   ASSERT_EQ(bundle(asset(kObj, Json::parse(R"({ "needs": [] })"))).status, kDone);
   ASSERT_EQ(exmat_runtime({"run", scene(R"({ "trajectory": "t.h5", "every": 4 })")}).status, kDone);
   refused(bundle_, "a.pc2", "bundle.h5: /@format: expected \"exmat-trajectory\", found \"exmat-bundle\"");
-  refused(folder_ / "t.h5", "a.obj", "a.obj: expected an output with the extension .pc2");
+  refused(folder_ / "t.h5", "a.obj", "a.obj: expected an output with the extension .glb, .usda or .pc2");
   // The last number of the last frame.
   const Hdf5File file = Hdf5File::open(folder_ / "t.h5");
   const std::vector<float> values = floats(file, "/vertices");

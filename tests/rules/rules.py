@@ -12,16 +12,16 @@ sys.path.insert(0, str(Path(__file__).parent))
 from references import references  # noqa: E402
 
 TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "tests", "examples", "docs", "README.md", "LICENSE",
-             "CHANGELOG.md", "CONTRIBUTING.md", "CMakePresets.json", "install-dependencies"}
+             "CHANGELOG.md", "CONTRIBUTING.md", "CMakePresets.json", "install-dependencies", "pyproject.toml", "setup.py"}
 # What may include what: from top to bottom, a folder sees itself and those below it.
 LAYERS = {
     "common": "bundle hdf5 console config model mesh elastic core",
-    "runtime": "app api bench scene output sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
-    "precompute": "app study/sweep study/sources study/stability study/drawing study/measure study/baseline pipeline training examples inputs cache"
+    "runtime": "app export api bench scene output sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
+    "precompute": "app study/sweep study/sources study/stability study/drawing study/measure study/baseline pipeline training examples inputs posing meshing/mesher meshing cache"
                   " full_space alignment render shape_space targets polynomial cubature modes contact mesh_io solvers fem",
 }
 INNER = {f"{stage}/{folder}": (stage, depth) for stage, folders in LAYERS.items() for depth, folder in enumerate(folders.split())}
-OUTER = {"runtime/include"}
+OUTER = {"runtime/include", "runtime/python"}
 SEEN_FROM = {"common": (), "runtime": ("common/",), "precompute": ("common/", "runtime/sim/", "runtime/kernels")}
 LONGEST = 500  # lines of a source
 LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime/kernels", "runtime/sim")
@@ -131,6 +131,14 @@ def public_headers(root):
                 yield f"{name}:{number}: includes {header}"
 
 
+def python_module(root):
+    """The Python package sees the public interface, pybind11 and the standard library: what it can do, any program can."""
+    for name, path in sources(root, ("runtime/python",)):
+        for number, header in includes(path):
+            if not re.fullmatch(r"[a-z_0-9]+|exmat/exmat\.hp*|pybind11/.*|runtime/python/.*", header):
+                yield f"{name}:{number}: includes {header}"
+
+
 def length(root):
     """Sources are short enough to be known."""
     for name, path in sources(root, ("common", "precompute", "runtime", "tests")):
@@ -167,7 +175,7 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, length, mirrored_tests, references, top_level,
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, python_module, length, mirrored_tests, references, top_level,
                                         formatting)}
 
 

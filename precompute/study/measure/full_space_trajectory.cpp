@@ -54,6 +54,7 @@ Hdf5File create_file(const AtomicFile& output, const SceneConfig& config, const 
   write_header(file, trajectory_schema(), generator_name());
   file.write_attribute("/", "asset_name", data.asset_name);
   file.write_attribute("/", "input_sha256", data.input_sha256);
+  file.write_attribute("/", "bundle", std::string());
   file.write_attribute("/", "integrator", std::string(name_of(config.integrator)));
   file.write_attribute("/", "time_step", config.time_step);
   write_groups(file, forces);

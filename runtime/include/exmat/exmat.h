@@ -9,9 +9,9 @@
  * not said to allow it, and a length that does not fit, are EXMAT_INVALID_ARGUMENT. Lengths count numbers, not points
  * or bytes.
  *
- * Memory: only ..._create... functions allocate (and the first exmat_bodies_step() with more threads than before, which
- * starts them). What they create is the caller's, to be given to the matching ..._destroy, in any order: a body or a
- * set of points keeps what it needs of its model. ..._destroy(NULL) does nothing.
+ * Memory: only ..._create... functions allocate (and those of states, and the first exmat_bodies_step() with more
+ * threads than before, which starts them). What they create is the caller's, to be given to the matching ..._destroy,
+ * in any order: a body or a set of points keeps what it needs of its model. ..._destroy(NULL) does nothing.
  *
  * Threads: models and points never change: any number of threads may use them. A body is for one thread at a time.
  * ..._create... functions may be called from any thread and take turns.
@@ -105,6 +105,8 @@ EXMAT_API int64_t exmat_model_regions(const exmat_model* model) EXMAT_NOEXCEPT;
 EXMAT_API int64_t exmat_model_region_examples(const exmat_model* model, int64_t region) EXMAT_NOEXCEPT;
 EXMAT_API const char* exmat_model_region_name(const exmat_model* model, int64_t region) EXMAT_NOEXCEPT;
 EXMAT_API double exmat_model_time_step(const exmat_model* model) EXMAT_NOEXCEPT; /* [s] */
+/* What the bundle was made of, as 64 hexadecimal digits: equal where its arrays are. NULL where `model` is NULL. */
+EXMAT_API const char* exmat_model_input_sha256(const exmat_model* model) EXMAT_NOEXCEPT;
 
 /* ---- points ---------------------------------------------------------------------------------------------------- */
 
@@ -229,6 +231,13 @@ EXMAT_API exmat_status exmat_body_read_weights(const exmat_body* body, double* w
 EXMAT_API exmat_status exmat_body_read_region_weights(const exmat_body* body, int64_t region, double* weights,
                                                       int64_t count) EXMAT_NOEXCEPT;
 
+/* The arrays themselves: reduced displacement q and velocity v [r], example weights [K]. They stay where they are as
+   long as the body, and change with it; the caller does not write into them. NULL where `body` is NULL, and of the
+   weights where K = 0. */
+EXMAT_API const double* exmat_body_displacement(const exmat_body* body) EXMAT_NOEXCEPT;
+EXMAT_API const double* exmat_body_velocity(const exmat_body* body) EXMAT_NOEXCEPT;
+EXMAT_API const double* exmat_body_weights(const exmat_body* body) EXMAT_NOEXCEPT;
+
 /* Of the last step. */
 typedef struct exmat_energies {
   size_t size;      /* sizeof(exmat_energies), set by the caller */
@@ -240,6 +249,40 @@ EXMAT_API exmat_status exmat_body_read_energies(const exmat_body* body, exmat_en
 
 /* Time of the body: its steps times the time step [s]; negative where `body` is NULL. */
 EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
+
+/* ---- examples of one body -------------------------------------------------------------------------------------- */
+
+/* Of the body, instead of the model's, until set again; exmat_body_reset() keeps them. `region`: -1 is the whole body,
+   else as in exmat_body_read_region_weights(). The model has to have that example force: use_examples, or the scene.
+   A state does not hold them. */
+
+/* kappa >= 0 [1/s^2]. */
+EXMAT_API exmat_status exmat_body_set_example_stiffness(exmat_body* body, int64_t region, double kappa) EXMAT_NOEXCEPT;
+
+/* Weights [count = K], none negative, of sum 1 to 1e-9, instead of those of the pose; the bias does not act on them.
+   NULL with count 0: those of the pose again. */
+EXMAT_API exmat_status exmat_body_set_example_weights(exmat_body* body, int64_t region, const double* weights,
+                                                      int64_t count) EXMAT_NOEXCEPT;
+
+/* ---- states ---------------------------------------------------------------------------------------------------- */
+
+/* A state is all that a body carries from step to step, as numbers: steps, displacement and velocity now and one step
+   earlier, motion, applied forces, targets, contacts. Bodies of the same bundle, settings or scene take it and go on to
+   the last bit, in this version of the library. */
+
+/* How many numbers it has now: the same for all bodies of a model, but for 6 for each contact. Negative where `body` is
+   NULL. */
+EXMAT_API int64_t exmat_body_state_size(const exmat_body* body) EXMAT_NOEXCEPT;
+
+/* `numbers` [count = exmat_body_state_size()]. */
+EXMAT_API exmat_status exmat_body_read_state(const exmat_body* body, double* numbers, int64_t count) EXMAT_NOEXCEPT;
+
+/* `numbers` [count] that exmat_body_read_state() wrote. Numbers that are no state of this model are refused. */
+EXMAT_API exmat_status exmat_body_set_state(exmat_body* body, const double* numbers, int64_t count) EXMAT_NOEXCEPT;
+
+/* Hash over the bits of q and v of `count` bodies in order, of free ones of their motion, too: the state hash that
+   exmat-runtime run prints. */
+EXMAT_API exmat_status exmat_bodies_hash(exmat_body* const* bodies, int64_t count, uint64_t* hash) EXMAT_NOEXCEPT;
 
 #ifdef __cplusplus
 }

@@ -83,6 +83,7 @@ class Model {
     return exmat_model_region_name(get(), static_cast<std::int64_t>(region));
   }
   double time_step() const noexcept { return exmat_model_time_step(get()); }
+  std::string input_sha256() const { return exmat_model_input_sha256(get()); }
 
   const exmat_model* get() const noexcept { return handle_.get(); }
 
@@ -202,6 +203,31 @@ class Body {
     return energies;
   }
   double time() const noexcept { return exmat_body_time(get()); }
+
+  /// Of the body; they change with it. `modes` is the model's r, `examples` its K.
+  std::span<const double> displacement(std::size_t modes) const noexcept {
+    return {exmat_body_displacement(get()), modes};
+  }
+  std::span<const double> velocity(std::size_t modes) const noexcept { return {exmat_body_velocity(get()), modes}; }
+  std::span<const double> weights(std::size_t examples) const noexcept { return {exmat_body_weights(get()), examples}; }
+
+  /// `region` -1: the whole body.
+  void set_example_stiffness(double kappa, std::int64_t region = -1) {
+    detail::check(exmat_body_set_example_stiffness(get(), region, kappa));
+  }
+  /// Empty: those of the pose again.
+  void set_example_weights(std::span<const double> weights, std::int64_t region = -1) {
+    detail::check(exmat_body_set_example_weights(get(), region, weights.data(), detail::length(weights)));
+  }
+
+  std::vector<double> state() const {
+    std::vector<double> numbers(static_cast<std::size_t>(exmat_body_state_size(get())));
+    detail::check(exmat_body_read_state(get(), numbers.data(), static_cast<std::int64_t>(numbers.size())));
+    return numbers;
+  }
+  void set_state(std::span<const double> numbers) {
+    detail::check(exmat_body_set_state(get(), numbers.data(), detail::length(numbers)));
+  }
 
   exmat_body* get() const noexcept { return handle_.get(); }
 

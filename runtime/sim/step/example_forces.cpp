@@ -43,6 +43,10 @@ void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::V
   for (std::size_t i = 0; i < scene.examples.size(); ++i) {
     if (!acts(scene.examples[i])) continue;
     ExampleWorkspace& scratch = workspace.examples[i];
+    if (scene.examples[i].given_weights.size() > 0) {
+      scratch.weights = scene.examples[i].given_weights;
+      continue;
+    }
     model.examples[i].weights.solve(q, scratch.weights_solver, scratch.weights);
     apply_example_bias(scene.examples[i].bias, scratch.weights);
   }

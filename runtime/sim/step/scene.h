@@ -22,6 +22,7 @@ struct ExampleSettings {
   /// The force is that of the elastic energy with the target as the undeformed shape, times the stiffness, in place of
   /// the linear one; the model has to have what that takes.
   bool elastic = false;
+  Eigen::VectorXd given_weights{};  ///< [K] taken as they are, without the bias; empty: those of the pose
 };
 
 /// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.

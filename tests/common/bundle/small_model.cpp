@@ -55,6 +55,9 @@ ExampleData small_example(const std::string& name, std::int64_t index) {
   example.alignment_residual = 0.01;
   example.inverted_fraction = 0.02;
   example.competing_maps = 3;
+  example.surface_rms = 0.003;
+  example.surface_farthest = 0.02;
+  example.surface_iterations = 41;
   example.doubt = 0.25;
   example.shape_space_error = 0.125;
   example.basis_error = 0.0625;

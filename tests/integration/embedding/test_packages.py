@@ -10,7 +10,9 @@ import unittest
 from pathlib import Path
 
 BUILD = Path(sys.argv.pop(1)).resolve()
+PYTHON = (BUILD / "python/exmat").is_dir()
 OFFLINE = (BUILD / "bin/exmat-precompute").exists()
+MESHING = (BUILD / "lib/exmat/exmat-mesher.so").exists()
 
 
 def output_of(*command):
@@ -38,7 +40,8 @@ class Packages(unittest.TestCase):
         return {str(path.relative_to(root)) for path in root.rglob("*") if not path.is_dir()}
 
     def test_one_for_each_stage(self):
-        self.assertEqual(set(self.packages), {"exmat-runtime"} | ({"exmat-precompute"} if OFFLINE else set()))
+        built = {"exmat-runtime": True, "exmat-precompute": OFFLINE, "exmat-meshing": MESHING, "python3-exmat": PYTHON}
+        self.assertEqual(set(self.packages), {name for name, is_built in built.items() if is_built})
 
     def test_the_run_time_needs_neither_mpi_nor_petsc(self):
         depends = self.depends("exmat-runtime")
@@ -53,7 +56,7 @@ class Packages(unittest.TestCase):
         self.assertIn("usr/include/exmat/exmat.h", files)
         self.assertIn("usr/share/doc/exmat-runtime/copyright", files)
         self.assertTrue(any(name.endswith("exmat-config.cmake") for name in files))
-        self.assertFalse(any("precompute" in name for name in files))
+        self.assertFalse(any("precompute" in name or "python" in name for name in files))
         self.assertIn("HDF5", output_of(str(root / "usr/bin/exmat-runtime"), "--version"))
 
     @unittest.skipUnless(OFFLINE, "built without the offline stage")
@@ -62,6 +65,33 @@ class Packages(unittest.TestCase):
         root = self.unpacked("exmat-precompute")
         self.assertEqual(self.files(root), {"usr/bin/exmat-precompute", "usr/share/doc/exmat-precompute/copyright"})
         self.assertIn("SLEPc", output_of(str(root / "usr/bin/exmat-precompute"), "--version"))
+
+    @unittest.skipUnless(MESHING, "built without the mesher")
+    def test_the_mesher_is_a_module_with_its_own_licence(self):
+        self.assertNotIn("gmp", self.depends("exmat-precompute"))
+        root = self.unpacked("exmat-meshing")
+        self.assertEqual(self.files(root), {"usr/lib/exmat/exmat-mesher.so", "usr/share/doc/exmat-meshing/copyright"})
+        self.assertIn("GPL-3", (root / "usr/share/doc/exmat-meshing/copyright").read_text())
+        alone = self.unpacked("exmat-precompute") / "usr/bin/exmat-precompute"
+        self.assertIn("mesher: none", output_of(str(alone), "--version"))
+        beside = output_of("env", f"EXMAT_MESHER_FOLDER={root / 'usr/lib/exmat'}", str(alone), "--version")
+        self.assertIn("mesher: CGAL", beside)
+
+    @unittest.skipUnless(PYTHON, "built without the Python package")
+    def test_the_python_package_runs_on_the_run_times_library(self):
+        depends = self.depends("python3-exmat")
+        self.assertIn("exmat-runtime (= ", depends)
+        self.assertIn("python3-numpy", depends)
+        self.assertNotIn("petsc", depends)
+        root, library = self.unpacked("python3-exmat"), next(self.unpacked("exmat-runtime").rglob("libexmat_runtime.so.*"))
+        place = root / "usr/lib/python3/dist-packages"
+        self.assertIn("usr/lib/python3/dist-packages/exmat/py.typed", self.files(root))
+        self.assertEqual(len(list(place.glob("exmat/_exmat*.so"))), 1)
+        script = "import exmat; print(exmat.__file__, exmat.Body.step.__doc__)"
+        found = subprocess.run(["/usr/bin/python3", "-c", script], capture_output=True, text=True, check=True,
+                               env={"PYTHONPATH": str(place), "LD_LIBRARY_PATH": str(library.parent)}).stdout
+        self.assertIn(str(place), found)
+        self.assertIn("NonFinite", found)
 
 
 if __name__ == "__main__":

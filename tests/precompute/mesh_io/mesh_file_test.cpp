@@ -3,7 +3,6 @@
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <locale>
 #include <random>
 
 #include "common/mesh/checks.h"
@@ -72,18 +71,11 @@ TEST_P(EachFlavour, GivesTheSameMeshAndSets) {
   EXPECT_NO_THROW(check_mesh(checked.mesh, file.string(), {}));
 }
 
-struct DecimalComma : std::numpunct<char> {
-  char do_decimal_point() const override { return ','; }
-  char do_thousands_sep() const override { return '.'; }
-  std::string do_grouping() const override { return "\3"; }
-};
-
 TEST_P(EachFlavour, IsReadInAnyLocale) {
   const MeshFile sample = test::sample_mesh(1);
   const auto file = write(GetParam().write(sample));
-  const std::locale before = std::locale::global(std::locale(std::locale::classic(), new DecimalComma));
+  const test::DecimalComma comma;
   const MeshFile result = read_mesh(file);
-  std::locale::global(before);
   EXPECT_TRUE(test::same_mesh(result.mesh, sample.mesh));
 }
 

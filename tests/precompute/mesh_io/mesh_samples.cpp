@@ -14,6 +14,12 @@
 namespace exmat::precompute::test {
 namespace {
 
+struct Punctuation : std::numpunct<char> {
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
 constexpr int kSoft = 7, kAll = 8;
 
 std::string names_section() {
@@ -57,6 +63,10 @@ std::string joined_tags(const auto& vertices) {
 }
 
 }  // namespace
+
+DecimalComma::DecimalComma() : before_(std::locale::global(std::locale(std::locale::classic(), new Punctuation))) {}
+
+DecimalComma::~DecimalComma() { std::locale::global(before_); }
 
 MeshFile sample_mesh(int cells) {
   MeshFile result;

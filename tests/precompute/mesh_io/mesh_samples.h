@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <locale>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,6 +34,18 @@ class ByteWriter {
 
   bool swap_;
   std::string bytes_;
+};
+
+/// While it lives, the global locale writes "1,5" and "1.000".
+class DecimalComma {
+ public:
+  DecimalComma();
+  ~DecimalComma();
+  DecimalComma(const DecimalComma&) = delete;
+  DecimalComma& operator=(const DecimalComma&) = delete;
+
+ private:
+  std::locale before_;
 };
 
 /// The mesh and its sets in each format, with a point, a line and a triangle besides the tets where the format has

@@ -5,9 +5,11 @@
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <map>
 #include <random>
 
 #include "common/mesh/geometry.h"
+#include "tests/precompute/mesh_io/gltf_samples.h"
 #include "tests/precompute/mesh_io/mesh_samples.h"
 #include "tests/support/box_mesh.h"
 
@@ -27,6 +29,19 @@ SurfaceMesh sample() {
   for (Eigen::Index v = 0; v < surface.vertices.rows(); ++v)
     surface.vertices.row(v) +=
         0.01 * Eigen::RowVector3d(std::sin(v), std::cos(v), std::sin(2.0 * static_cast<double>(v)));
+  return surface;
+}
+
+// One that formats of single precision and of triangles without indices keep: vertices in the order of the triangles.
+SurfaceMesh single_sample() {
+  const SurfaceMesh all = sample();
+  SurfaceMesh surface{VertexArray(all.vertices.rows(), 3), all.triangles};
+  std::map<std::int32_t, std::int32_t> index;
+  for (std::int32_t& corner : surface.triangles.reshaped<Eigen::RowMajor>()) {
+    const auto [entry, is_new] = index.try_emplace(corner, static_cast<std::int32_t>(index.size()));
+    if (is_new) surface.vertices.row(entry->second) = all.vertices.row(corner).cast<float>().cast<double>();
+    corner = entry->second;
+  }
   return surface;
 }
 
@@ -83,9 +98,49 @@ std::string to_ply(const SurfaceMesh& surface, Encoding encoding) {
   return out.bytes();
 }
 
+std::string to_stl_text(const SurfaceMesh& surface) {
+  std::string text = "solid sample of text\n";
+  for (const auto& triangle : surface.triangles.rowwise()) {
+    text += "  facet normal 0 0 1\n    outer loop\n";
+    for (const auto corner : triangle)
+      text += fmt::format("      vertex {} {} {}\n", surface.vertices(corner, 0), surface.vertices(corner, 1),
+                          surface.vertices(corner, 2));
+    text += "    endloop\n  endfacet\n";
+  }
+  return text + "endsolid\n";
+}
+
+std::string to_stl_binary(const SurfaceMesh& surface, const std::string& header) {
+  std::string bytes = header;
+  bytes.resize(80, '\0');
+  bytes += test::gltf_bytes(test::kUnsignedInt, {static_cast<double>(surface.triangles.rows())});
+  for (const auto& triangle : surface.triangles.rowwise()) {
+    bytes += test::gltf_bytes(test::kFloat, {0, 0, 1});
+    for (const auto corner : triangle)
+      for (const double x : surface.vertices.row(corner)) bytes += test::gltf_bytes(test::kFloat, {x});
+    bytes += std::string(2, '\0');
+  }
+  return bytes;
+}
+
+test::GltfWriter gltf_writer(const SurfaceMesh& surface) {
+  test::GltfWriter writer;
+  const auto numbers = [](const auto& array) {
+    const auto values = array.template reshaped<Eigen::RowMajor>();
+    return std::vector<double>(values.begin(), values.end());
+  };
+  const int positions = writer.positions(numbers(surface.vertices));
+  const int corners = writer.accessor(test::kUnsignedByte, "SCALAR", numbers(surface.triangles));
+  writer.mesh_in_node("body", {{"attributes", {{"POSITION", positions}}}, {"indices", corners}});
+  return writer;
+}
+
 struct SurfaceFlavour {
   std::string name, extension;
   std::string (*write)(const SurfaceMesh&);
+  SurfaceMesh (*surface)() = sample;
+  std::size_t accepted =
+      0;  // truncations that lose nothing: the last line of a text needs neither its blank nor its end
 };
 
 void PrintTo(const SurfaceFlavour& flavour, std::ostream* stream) { *stream << flavour.name; }
@@ -100,25 +155,25 @@ class EachSurfaceFlavour : public testing::TestWithParam<SurfaceFlavour> {
 };
 
 TEST_P(EachSurfaceFlavour, GivesTheSameSurface) {
-  EXPECT_TRUE(same_surface(read(GetParam().write(sample())), sample()));
+  EXPECT_TRUE(same_surface(read(GetParam().write(GetParam().surface())), GetParam().surface()));
 }
 
 TEST_P(EachSurfaceFlavour, IsRefusedAtEveryTruncationOrHasFewerFaces) {
-  const std::string whole = GetParam().write(sample());
+  const std::string whole = GetParam().write(GetParam().surface());
   std::size_t accepted = 0;
   for (std::size_t length = 0; length < whole.size(); ++length) try {
       const SurfaceMesh result = read(std::string_view(whole).substr(0, length));
       ++accepted;
-      EXPECT_EQ(result.vertices, sample().vertices) << length;
+      EXPECT_EQ(result.vertices, GetParam().surface().vertices) << length;
     } catch (const InputError& error) {
       EXPECT_FALSE(error.complaint().expected.empty());
     }
-  // An .obj does not say how many faces it has; the last line of a text .ply needs neither its blank nor its end.
-  EXPECT_LE(accepted, GetParam().extension == ".obj" ? whole.size() - whole.find("f 1/1") : 2);
+  // An .obj does not say how many faces it has.
+  EXPECT_LE(accepted, GetParam().extension == ".obj" ? whole.size() - whole.find("f 1/1") : GetParam().accepted);
 }
 
 TEST_P(EachSurfaceFlavour, IsReadOrRefusedWithAnyByteChanged) {
-  const std::string whole = GetParam().write(sample());
+  const std::string whole = GetParam().write(GetParam().surface());
   std::mt19937 random(7);
   for (int trial = 0; trial < 500; ++trial) {
     std::string bytes = whole;
@@ -137,12 +192,24 @@ TEST_P(EachSurfaceFlavour, IsReadOrRefusedWithAnyByteChanged) {
 
 INSTANTIATE_TEST_SUITE_P(
     Surface, EachSurfaceFlavour,
-    testing::Values(SurfaceFlavour{"Obj", ".obj", to_obj},
-                    SurfaceFlavour{"PlyText", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kText); }},
-                    SurfaceFlavour{"PlyLittle", ".ply",
-                                   [](const SurfaceMesh& s) { return to_ply(s, Encoding::kLittle); }},
-                    SurfaceFlavour{"PlyBig", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kBig); }}),
+    testing::Values(
+        SurfaceFlavour{"Obj", ".obj", to_obj},
+        SurfaceFlavour{"PlyText", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kText); }, sample, 2},
+        SurfaceFlavour{"PlyLittle", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kLittle); }},
+        SurfaceFlavour{"PlyBig", ".ply", [](const SurfaceMesh& s) { return to_ply(s, Encoding::kBig); }},
+        SurfaceFlavour{"StlText", ".stl", to_stl_text, single_sample, 1},
+        SurfaceFlavour{"StlBinary", ".stl", [](const SurfaceMesh& s) { return to_stl_binary(s, "made by a test"); },
+                       single_sample},
+        SurfaceFlavour{"StlSolidBinary", ".stl", [](const SurfaceMesh& s) { return to_stl_binary(s, "solid body"); },
+                       single_sample},
+        SurfaceFlavour{"Glb", ".glb", [](const SurfaceMesh& s) { return gltf_writer(s).glb(); }, single_sample},
+        SurfaceFlavour{"Gltf", ".gltf", [](const SurfaceMesh& s) { return gltf_writer(s).gltf(); }, single_sample}),
     [](const auto& param) { return param.param.name; });
+
+TEST_P(EachSurfaceFlavour, IsReadInAnyLocale) {
+  const test::DecimalComma comma;
+  EXPECT_TRUE(same_surface(read(GetParam().write(GetParam().surface())), GetParam().surface()));
+}
 
 constexpr auto kObj = R"(# a square and a triangle
 v 0 0 0
@@ -191,6 +258,48 @@ TEST(ReadSurface, TakesPolygonsAsFansAndIndicesFromTheEnd) {
   const SurfaceMesh ply = read_surface(folder.write("body.ply", kPly));
   EXPECT_EQ(ply.triangles, obj.triangles.topRows(2));
   EXPECT_EQ(ply.vertices, obj.vertices.topRows(4));
+}
+
+TEST(ReadSurface, NamesPartsOfAnObjAndItsFile) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("body.obj",
+                                 "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 9 9 9\no my body\ng left all\nusemtl skin\n"
+                                 "f 1 2 3\ng right all\nf 1 3 4\nusemtl cloth\nf 1 2 4\nusemtl empty\n");
+  const SurfaceFile surface = read_surface_file(file);
+  EXPECT_THAT(surface.files, testing::ElementsAre(file));
+  const auto flags = [](std::array<std::uint8_t, 5> values) {
+    return FlagVector(Eigen::Map<FlagVector>(values.data(), 5));
+  };
+  const std::map<std::string, FlagVector> expected{
+      {"my body", flags({1, 1, 1, 1, 0})}, {"all", flags({1, 1, 1, 1, 0})},  {"left", flags({1, 1, 1, 0, 0})},
+      {"right", flags({1, 1, 1, 1, 0})},   {"skin", flags({1, 1, 1, 1, 0})}, {"cloth", flags({1, 1, 0, 1, 0})}};
+  EXPECT_EQ(surface.parts, expected);
+}
+
+TEST(ReadSurface, KeepsNoPartsOutOfProportionToTheFile) {
+  const TemporaryFolder folder;
+  std::string text;
+  for (int v = 0; v < 20'000; ++v) text += "v 0 0 0\n";
+  for (int name = 0; name < 20'000; ++name) text += fmt::format("g {}\nf 1 2 3\n", name);
+  const SurfaceFile surface = read_surface_file(folder.write("body.obj", text));
+  EXPECT_TRUE(surface.parts.empty());
+  EXPECT_THAT(surface.remarks, testing::ElementsAre(HasSubstr("20000 names of parts are too many")));
+}
+
+TEST(ReadSurface, TakesColoursOfAPly) {
+  const TemporaryFolder folder;
+  const auto colours = [&](const std::string& type, const std::string& rows) {
+    std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n";
+    for (const char* name : {"red", "green", "blue", "alpha"}) text += "property " + type + " " + name + "\n";
+    text += "element face 1\nproperty list uchar int vertex_indices\nend_header\n" + rows + "3 0 1 2\n";
+    return read_surface_file(folder.write("body.ply", text)).colours;
+  };
+  EXPECT_EQ(colours("uchar", "0 0 0 255 0 51 9\n1 0 0 0 102 0 9\n0 1 0 0 0 0 9\n"),
+            (VertexArray(3, 3) << 1, 0, 0.2, 0, 0.4, 0, 0, 0, 0).finished());
+  EXPECT_EQ(colours("float", "0 0 0 0.25 -1 2 9\n1 0 0 0 0 0 9\n0 1 0 0 0 1 9\n"),
+            (VertexArray(3, 3) << 0.25, 0, 1, 0, 0, 0, 0, 0, 1).finished());
+  EXPECT_EQ(read_surface_file(folder.write("plain.ply", kPly)).colours.rows(), 0);
 }
 
 struct Malformed {
@@ -258,9 +367,9 @@ INSTANTIATE_TEST_SUITE_P(Malformed, RefusesSurface, testing::ValuesIn(kMalformed
                          [](const auto& param) { return std::string(param.param.name); });
 
 TEST(ReadSurface, NamesTheKnownExtensions) {
-  const Complaint complaint = complaint_of([] { read_surface("body.stl"); });
-  EXPECT_THAT(complaint.expected, HasSubstr(".obj or .ply"));
-  EXPECT_EQ(complaint.found, "'.stl'");
+  const Complaint complaint = complaint_of([] { read_surface("body.fbx"); });
+  EXPECT_THAT(complaint.expected, HasSubstr(".glb, .gltf, .obj, .ply or .stl"));
+  EXPECT_EQ(complaint.found, "'.fbx'");
 }
 
 }  // namespace

@@ -1,0 +1,39 @@
+#include "precompute/app/asset_input.h"
+
+#include <fmt/format.h>
+
+#include "common/config/config.h"
+#include "common/core/atomic_file.h"
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "precompute/inputs/assumed_asset.h"
+
+namespace exmat {
+
+AssetConfig asset_from(const std::filesystem::path& asset_or_surface, const std::filesystem::path& write_to) {
+  if (!precompute::is_surface_file(asset_or_surface)) {
+    if (!write_to.empty())
+      throw InputError({"--write-asset", "", "a surface in place of an asset file, whose asset is to be written",
+                        asset_or_surface.string(), ""});
+    return load_asset(asset_or_surface);
+  }
+  const auto text = [&](const std::filesystem::path& folder) {
+    return precompute::assumed_asset(asset_or_surface, folder);
+  };
+  const Json assumed = text(asset_or_surface.parent_path());
+  AssetConfig asset = asset_of(assumed, asset_or_surface);
+  const auto& material = asset.material;
+  log::info(
+      fmt::format("{}: no asset file; assumed are {} examples, {} cells, Young's modulus {:.2g} Pa, Poisson ratio {}, "
+                  "{} kg/m^3, {}{}",
+                  asset_or_surface.string(), asset.examples.size(), *asset.cells, *material.youngs_modulus,
+                  *material.poisson_ratio, *material.density, asset.fixed ? "clamped at _FIXED" : "a free body",
+                  write_to.empty() ? "; --write-asset FILE writes them down" : ""));
+  if (!write_to.empty()) {
+    write_file_atomically(write_to, text(write_to.parent_path()).dump(2) + "\n");
+    log::info(fmt::format("{}: written", write_to.string()));
+  }
+  return asset;
+}
+
+}  // namespace exmat

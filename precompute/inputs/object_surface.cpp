@@ -1,0 +1,109 @@
+#include "precompute/inputs/object_surface.h"
+
+#include <fmt/format.h>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+
+namespace exmat::precompute {
+namespace {
+
+SurfaceFile read_recorded(const std::filesystem::path& path, InputFiles& files) {
+  SurfaceFile file = read_surface_file(path);
+  files.insert(files.end(), file.files.begin(), file.files.end());
+  for (const std::string& remark : file.remarks) log::info(fmt::format("{}: {}", path.string(), remark));
+  return file;
+}
+
+Cage cached_cage(const SurfaceMesh& surface, const AssetConfig& asset, const std::string& name, StageCache& cache) {
+  const CageSettings settings{asset.cells, asset.cell_size};
+  return cache.get(
+      "cage", [&] { return make_cage(surface, settings, name); }, surface.vertices, surface.triangles, asset.cells,
+      asset.cell_size, mesher_version());
+}
+
+template <typename Named>
+std::string list_of(const Named& named, const char* none) {
+  std::string names;
+  for (const auto& entry : named) {
+    if constexpr (requires { entry.name; })
+      names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", entry.name);
+    else
+      names += fmt::format("{}\"{}\"", names.empty() ? "" : ", ", entry.first);
+  }
+  return names.empty() ? none : "it has " + names;
+}
+
+}  // namespace
+
+ObjectSurface::ObjectSurface(const AssetConfig& asset, InputFiles& files, StageCache& cache)
+    : asset_(asset),
+      file_(read_recorded(*asset.object_surface, files)),
+      cage_(cached_cage(file_.mesh, asset, asset.object_surface->string(), cache)),
+      embedding_(embed_points(cage_.mesh, file_.mesh.vertices, asset.object_surface->string())),
+      tree_(file_.mesh.vertices, file_.mesh.triangles) {}
+
+Eigen::VectorXd ObjectSurface::marks(const PartSelection& part) const {
+  const auto found = file_.parts.find(part.name);
+  if (found == file_.parts.end())
+    throw InputError({asset_.file.string(), "part", "a part of " + asset_.object_surface->string(),
+                      fmt::format("\"{}\"", part.name), list_of(file_.parts, "it has none")});
+  return found->second.cast<double>();
+}
+
+Eigen::VectorXd ObjectSurface::marks(const ColourSelection& colour) const {
+  if (file_.colours.rows() == 0)
+    throw InputError({asset_.file.string(), "color", "colors of the vertices of " + asset_.object_surface->string(),
+                      "none", "export them, or name a part"});
+  const Eigen::RowVector3d wanted(colour.colour.data());
+  return ((file_.colours.rowwise() - wanted).cwiseAbs().rowwise().maxCoeff().array() <= colour.within).cast<double>();
+}
+
+IdSelection ObjectSurface::nearest_to(const Eigen::VectorXd& marks, const VertexArray& points,
+                                      const std::string& what) const {
+  IdSelection selection;
+  for (Eigen::Index k = 0; k < points.rows(); ++k) {
+    const SurfacePoint point = tree_.nearest(points.row(k).transpose());
+    double mark = 0;
+    for (int corner = 0; corner < 3; ++corner)
+      mark += point.weights[corner] * marks[file_.mesh.triangles(point.triangle, corner)];
+    if (mark >= 0.5) selection.ids.push_back(k);
+  }
+  if (selection.ids.empty())
+    throw InputError({asset_.file.string(), what, "a part of the surface that some of the cage is nearest to",
+                      fmt::format("{} vertices, nearest to none", static_cast<int>(marks.sum())),
+                      "choose a larger part, or more cells"});
+  return selection;
+}
+
+std::optional<VertexArray> ObjectSurface::posed(const ExampleConfig& example, InputFiles& files) const {
+  if (example.frame) {
+    files.push_back(*example.surface);
+    return read_point_cache_frame(*example.surface, *example.frame, file_.mesh.vertices.rows());
+  }
+  if (!example.surface) return morph_target(file_, *example.morph, *asset_.object_surface);
+  const SurfaceFile other = read_recorded(*example.surface, files);
+  if (other.mesh.vertices.rows() != file_.mesh.vertices.rows() || other.mesh.triangles != file_.mesh.triangles)
+    return std::nullopt;
+  return example.morph ? morph_target(other, *example.morph, *example.surface) : other.mesh.vertices;
+}
+
+SurfacePose ObjectSurface::pose(const VertexArray& posed, const std::string& name, StageCache& cache) const {
+  return cache.get(
+      "pose of surface", [&] { return pose_by_surface(cage_.mesh, file_.mesh, embedding_, posed, name); },
+      cage_.mesh.vertices, cage_.mesh.tets, file_.mesh.vertices, file_.mesh.triangles, posed);
+}
+
+TetMesh cage_of(const SurfaceMesh& surface, const AssetConfig& asset, const std::string& name, StageCache& cache) {
+  return cached_cage(surface, asset, name, cache).mesh;
+}
+
+const VertexArray& morph_target(const SurfaceFile& surface, const std::string& name,
+                                const std::filesystem::path& file) {
+  for (const MorphTarget& morph : surface.morphs)
+    if (morph.name == name) return morph.positions;
+  throw InputError({file.string(), "", fmt::format("a morph target \"{}\"", name), "none of that name",
+                    list_of(surface.morphs, "it has none")});
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,62 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "common/config/asset_config.h"
+#include "precompute/alignment/surface_tree.h"
+#include "precompute/cache/stage_cache.h"
+#include "precompute/inputs/inputs.h"
+#include "precompute/mesh_io/surface_file.h"
+#include "precompute/meshing/cage.h"
+#include "precompute/posing/surface_pose.h"
+#include "precompute/render/embedding.h"
+
+namespace exmat::precompute {
+
+/// A surface in place of tets: the cage about it, what is nearest to which of its parts, and its poses.
+class ObjectSurface {
+ public:
+  /// Reads the surface that the asset names and encloses it.
+  ObjectSurface(const AssetConfig& asset, InputFiles& files, StageCache& cache);
+
+  const SurfaceFile& file() const { return file_; }
+  const Cage& cage() const { return cage_; }
+  const Embedding& embedding() const { return embedding_; }
+
+  /// The ids of the points [k x 3] that a part or a colour of the surface is nearest to; other selections as they are.
+  /// `place` in the asset is for messages.
+  template <typename Selection>
+  Selection resolved(const Selection& selection, const VertexArray& points) const {
+    if (const auto* part = std::get_if<PartSelection>(&selection)) return nearest_to(marks(*part), points, part->name);
+    if (const auto* colour = std::get_if<ColourSelection>(&selection))
+      return nearest_to(marks(*colour), points, "color");
+    return selection;
+  }
+
+  /// The surface's vertices in the pose that an example names, or nothing where that has other vertices.
+  std::optional<VertexArray> posed(const ExampleConfig& example, InputFiles& files) const;
+
+  /// The cage in a pose of its surface.
+  SurfacePose pose(const VertexArray& posed, const std::string& name, StageCache& cache) const;
+
+ private:
+  Eigen::VectorXd marks(const PartSelection& part) const;
+  Eigen::VectorXd marks(const ColourSelection& colour) const;
+  IdSelection nearest_to(const Eigen::VectorXd& marks, const VertexArray& points, const std::string& what) const;
+
+  AssetConfig asset_;
+  SurfaceFile file_;
+  Cage cage_;
+  Embedding embedding_;
+  SurfaceTree tree_;
+};
+
+/// Tets that enclose a surface of other vertices than the object's, with what settings the asset has for its own.
+TetMesh cage_of(const SurfaceMesh& surface, const AssetConfig& asset, const std::string& name, StageCache& cache);
+
+/// The vertices of a morph target of a surface. Throws InputError that names those that it has.
+const VertexArray& morph_target(const SurfaceFile& surface, const std::string& name, const std::filesystem::path& file);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,18 @@
+#pragma once
+
+#include "precompute/mesh_io/surface_file.h"
+
+namespace exmat::precompute {
+
+/// Reads the shapes of a glTF 2.0 file, .glb or .gltf with its buffers: all triangles (lists, strips, fans) of the
+/// meshes in the nodes of the default scene, in metres, in the order of the nodes; without scenes those of all roots.
+/// Primitives of a mesh that share their attributes share their vertices; a mesh in several nodes is there several
+/// times. Morph targets keep the names of `extras.targetNames`, else they are "target 0" and so on. Parts are the
+/// triangles' vertices of materials, meshes and nodes (with what hangs below them), and vertices whose custom scalar
+/// attribute is above 0.5, by its name with the underscore. Vertices without colours are white where others have some.
+///
+/// Throws InputError (see read_gltf_document), also for skins, for nodes that are no tree and for shapes that repeat
+/// what is in the file so often that they are out of proportion to its bytes.
+SurfaceFile read_gltf(const std::filesystem::path& file);
+
+}  // namespace exmat::precompute

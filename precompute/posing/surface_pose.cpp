@@ -1,0 +1,194 @@
+#include "precompute/posing/surface_pose.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+#include <numeric>
+#include <vector>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/core/progress.h"
+#include "common/mesh/geometry.h"
+#include "precompute/full_space/mesh_elasticity.h"
+#include "precompute/full_space/sparse_direction.h"
+#include "precompute/posing/surface_springs.h"
+
+namespace exmat::precompute {
+namespace {
+
+// Stiffness of the springs over Young's modulus, at diagonal 1, first and last: each stage takes kStiffen times that of
+// the one before. At the first the surface misses a pose by some percent, at the last by what the cage cannot hold.
+constexpr double kFirstStiffness = 1, kLastStiffness = 1e5, kStiffen = 10;
+// From rest, poses are reached by softer springs first.
+constexpr double kFirstFromRest = 1e-3;
+// A stage that brings the surface less than this share nearer is the last, and so is one that brings it so near (RMS
+// over the diagonal): a tenth of what is asked of a pose.
+constexpr double kGain = 0.3, kNear = 1e-4;
+// Newton's method ends where an iteration lowers the energy by less than this share of it, between stages and at last.
+constexpr double kBetween = 1e-3, kLast = 1e-8;
+constexpr int kMostIterations = 100;
+constexpr double kArmijo = 1e-4;
+constexpr int kHalvings = 30;
+
+// The cage and its surface at diagonal 1, about the origin.
+struct UnitBody {
+  TetMesh cage;
+  SurfaceMesh surface;
+  double diagonal = 1;
+  Eigen::RowVector3d centre;
+};
+
+UnitBody unit_body(const TetMesh& cage, const SurfaceMesh& surface) {
+  UnitBody body;
+  body.diagonal = bounding_box_diagonal(surface.vertices);
+  body.centre = surface.vertices.colwise().mean();
+  body.cage = {(cage.vertices.rowwise() - body.centre) / body.diagonal, cage.tets};
+  body.surface = {(surface.vertices.rowwise() - body.centre) / body.diagonal, surface.triangles};
+  return body;
+}
+
+MeshElasticity elasticity_of(const TetMesh& cage) {
+  const auto all = [&](double value) { return Eigen::VectorXd::Constant(cage.tet_count(), value); };
+  std::vector<std::int32_t> dofs(static_cast<std::size_t>(3 * cage.vertex_count()));
+  std::iota(dofs.begin(), dofs.end(), 0);
+  return {cage, {all(1), all(1), all(kPosePoisson), MaterialModel::kStableNeoHookean}, dofs};
+}
+
+class PoseSolver {
+ public:
+  PoseSolver(const UnitBody& body, const Embedding& embedding, const VertexArray& places)
+      : body_(body),
+        springs_(body.cage, body.surface, embedding, places),
+        elasticity_(elasticity_of(body.cage)),
+        spring_values_(elasticity_.values_of(springs_.hessian())),
+        direction_(elasticity_.pattern()) {}
+
+  /// From positions x, by springs from `first` on.
+  SurfacePose solve(VertexArray x, double first);
+
+ private:
+  void minimise(VertexArray& x, double stiffness, double end, SurfacePose& pose);
+  double energy(const VertexArray& x, double stiffness) const;
+  int inverted(const VertexArray& x) const;
+  Eigen::VectorXd displacements(const VertexArray& x) const {
+    const VertexArray moved = x - body_.cage.vertices;
+    return moved.reshaped<Eigen::RowMajor>();
+  }
+
+  const UnitBody& body_;
+  SurfaceSprings springs_;
+  MeshElasticity elasticity_;
+  Eigen::VectorXd spring_values_;
+  SparseDirection direction_;
+};
+
+double PoseSolver::energy(const VertexArray& x, double stiffness) const {
+  return elasticity_.energy(displacements(x)) + stiffness * springs_.energy(x);
+}
+
+int PoseSolver::inverted(const VertexArray& x) const {
+  return static_cast<int>((tet_volumes({x, body_.cage.tets}).array() <= 0).count());
+}
+
+void PoseSolver::minimise(VertexArray& x, double stiffness, double end, SurfacePose& pose) {
+  Eigen::VectorXd force, step;
+  LowerTriangle hessian;
+  const double rounding = 1e-14;
+  // Exact tangents where they serve: far from the minimum they do not, as a rule.
+  runtime::Tangent tangent = runtime::Tangent::kPositiveSemidefinite;
+  for (int iteration = 0; iteration < kMostIterations; ++iteration) {
+    const double here =
+        elasticity_.force_and_stiffness(displacements(x), tangent, force, hessian) + stiffness * springs_.energy(x);
+    hessian.coeffs() += stiffness * spring_values_.array();
+    const VertexArray pull = stiffness * springs_.gradient(x);
+    const Eigen::VectorXd gradient = force + pull.reshaped<Eigen::RowMajor>();
+    const auto product = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+      return hessian.selfadjointView<Eigen::Lower>() * v;
+    };
+    if (!direction_.solve(hessian, product, -gradient, step)) {
+      if (tangent == runtime::Tangent::kExact) {
+        tangent = runtime::Tangent::kPositiveSemidefinite;
+        continue;
+      }
+      if (!direction_.solve_shifted(hessian, product, -gradient, step)) return;
+    }
+    const double slope = gradient.dot(step);
+    double length = 1, there = here;
+    VertexArray trial;
+    for (int halving = 0; halving <= kHalvings; ++halving, length /= 2) {
+      trial = x + length * step.reshaped<Eigen::RowMajor>(x.rows(), 3);
+      there = energy(trial, stiffness);
+      if (there <= here + kArmijo * length * slope) break;
+    }
+    ++pose.iterations;
+    if (!(there < here)) return;
+    x = trial;
+    if (here - there <= std::max(end, rounding) * here) return;
+    tangent =
+        length == 1 && here - there < 0.05 * here ? runtime::Tangent::kExact : runtime::Tangent::kPositiveSemidefinite;
+  }
+}
+
+SurfacePose PoseSolver::solve(VertexArray x, double first) {
+  SurfacePose pose;
+  double last_rms = INFINITY, stiffness = first, reached = first;
+  VertexArray best = x;
+  bool sound = false;
+  for (; stiffness <= 1.001 * kLastStiffness; stiffness *= kStiffen) {
+    minimise(x, stiffness, kBetween, pose);
+    ++pose.stages;
+    const bool here_sound = inverted(x) == 0;
+    // What inverts tets asks for more than the cage can hold, but for the first stages, which come from a guess.
+    if (sound && !here_sound) break;
+    const double rms = springs_.rms(x);
+    log::debug(fmt::format("springs of {:.0e}: missed by {:.3g} of the diagonal, energy {:.4g}, {} inverted", stiffness,
+                           rms, elasticity_.energy(displacements(x)), inverted(x)));
+    const bool gained = rms < (1 - kGain) * last_rms;
+    if (!sound || gained) {
+      best = x;
+      reached = stiffness;
+    }
+    sound = here_sound;
+    if (sound && (!gained || rms <= kNear)) break;
+    last_rms = rms;
+  }
+  VertexArray settled = best;
+  minimise(settled, reached, kLast, pose);
+  if (inverted(settled) <= inverted(best)) best = settled;
+  pose.inverted = inverted(best);
+  pose.rms = springs_.rms(best);
+  pose.farthest = springs_.farthest(best);
+  pose.energy = elasticity_.energy(displacements(best));
+  pose.stiffness = reached;
+  pose.positions = best;
+  return pose;
+}
+
+}  // namespace
+
+SurfacePose pose_by_surface(const TetMesh& cage, const SurfaceMesh& surface, const Embedding& embedding,
+                            const VertexArray& posed, const std::string& name) {
+  if (!posed.allFinite())
+    throw InputError({name, "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
+  const UnitBody body = unit_body(cage, surface);
+  const VertexArray places = (posed.rowwise() - body.centre) / body.diagonal;
+  PoseSolver solver(body, embedding, places);
+  SurfacePose pose = solver.solve(rigid_start(body.cage, body.surface, places), kFirstStiffness);
+  if (pose.inverted > 0) {
+    SurfacePose other = solver.solve(body.cage.vertices, kFirstFromRest);
+    const int iterations = pose.iterations + other.iterations;
+    if (other.inverted < pose.inverted) pose = std::move(other);
+    pose.iterations = iterations;
+  }
+  pose.positions = (pose.positions * body.diagonal).rowwise() + body.centre;
+  pose.energy *= body.diagonal * body.diagonal * body.diagonal;
+  log::info(
+      fmt::format("{}: the cage misses the posed surface by {:.2g} % of the diagonal (RMS), {:.2g} % at most; {} "
+                  "iterations{}",
+                  name, 100 * pose.rms, 100 * pose.farthest, pose.iterations,
+                  pose.inverted > 0 ? fmt::format(", {} tets inside out", pose.inverted) : ""));
+  return pose;
+}
+
+}  // namespace exmat::precompute

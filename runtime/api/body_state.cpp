@@ -1,0 +1,241 @@
+#include "runtime/api/body_state.h"
+
+#include <algorithm>
+#include <cmath>
+#include <fmt/format.h>
+
+#include "runtime/api/arguments.h"
+#include "runtime/api/failures.h"
+#include "runtime/scene/bodies.h"
+
+namespace exmat::runtime {
+namespace {
+
+constexpr double kLayout = 1;
+constexpr std::size_t kHeadNumbers = 5, kContactNumbers = 6;
+constexpr double kMostSteps = 9007199254740992;  // 2^53: whole numbers up to here have all their digits
+
+constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q,          &State::v, &State::q_previous,
+                                                   &State::v_previous, &State::a, &State::applied_force};
+
+class Writer {
+ public:
+  void add(double number) { numbers_.push_back(number); }
+  void add_all(const auto& numbers) { numbers_.insert(numbers_.end(), numbers.begin(), numbers.end()); }
+  std::vector<double> take() { return std::move(numbers_); }
+
+ private:
+  std::vector<double> numbers_;
+};
+
+/// There are as many numbers as are read.
+class Reader {
+ public:
+  explicit Reader(std::span<const double> numbers) : numbers_(numbers) {}
+
+  double number() { return take(1).front(); }
+  void read(Eigen::VectorXd& array) { std::ranges::copy(take(static_cast<std::size_t>(array.size())), array.begin()); }
+  std::span<const double> take(std::size_t count) {
+    const auto taken = numbers_.first(count);
+    numbers_ = numbers_.subspan(count);
+    return taken;
+  }
+  bool flag(const char* name) {
+    const double found = number();
+    if (found != 0 && found != 1)
+      throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected 0 or 1", name, found));
+    return found == 1;
+  }
+  /// A whole number below `end`.
+  double count(const char* name, double end) {
+    const double found = number();
+    if (!(found >= 0 && found < end && found == std::floor(found)))
+      throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected a whole number below {:g}", name, found, end));
+    return found;
+  }
+
+ private:
+  std::span<const double> numbers_;
+};
+
+std::size_t contact_count(const exmat_body& body) { return body.state.contacts.count; }
+
+std::size_t size_without_contacts(const exmat_body& body) {
+  std::size_t size = kHeadNumbers + 1 + std::size(kModeArrays) * static_cast<std::size_t>(body.modes());
+  size += body.frame_numbers;
+  for (const ExampleState& examples : body.state.examples)
+    size += static_cast<std::size_t>(examples.weights.size() + examples.target.size()) + 2;
+  return size;
+}
+
+void read_contacts(Reader& reader, std::size_t count, const exmat_body& body, ContactState& contacts) {
+  if (count > contacts.held.size())
+    throw InvalidArgument(fmt::format("numbers: {} contacts: expected at most {}", count, contacts.held.size()));
+  contacts.count = count;
+  for (HeldContact& held : std::span(contacts.held).first(count)) {
+    held.vertex = static_cast<int>(reader.count("vertex", static_cast<double>(body.model().contact->vertices())));
+    held.obstacle = static_cast<int>(reader.count("obstacle", static_cast<double>(body.scene.obstacles.size())));
+    held.normal_force = reader.number();
+    held.anchor = Eigen::Vector3d(reader.take(3).data());
+  }
+}
+
+/// The force of a region, of the whole body where it is -1.
+std::size_t example_force(const exmat_body& body, std::int64_t region) {
+  const Model& model = body.model();
+  const bool whole = region == -1 && model.has_whole_body_examples();
+  if (!whole && model.region(region) == nullptr)
+    throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
+                                      model.has_whole_body_examples() ? "the whole body (-1) and " : "",
+                                      model.region_count()));
+  const std::size_t force = whole ? 0 : static_cast<std::size_t>(model.region(region) - model.examples.data());
+  if (force >= body.scene.examples.size()) throw InvalidArgument("the model was created without its example force");
+  return force;
+}
+
+void check_weights(std::span<const double> weights, Eigen::Index examples) {
+  constexpr double kSumTolerance = 1e-9;
+  if (std::ssize(weights) != examples)
+    throw InvalidArgument(fmt::format("count = {}: expected {}", weights.size(), examples));
+  double sum = 0;
+  for (const double weight : weights) {
+    if (!(weight >= 0)) throw InvalidArgument("weights: expected numbers that are not negative");
+    sum += weight;
+  }
+  if (!(std::abs(sum - 1) <= kSumTolerance))
+    throw InvalidArgument(fmt::format("weights: their sum is {:g}: expected 1", sum));
+}
+
+}  // namespace
+
+std::size_t state_size(const exmat_body& body) {
+  return size_without_contacts(body) + kContactNumbers * contact_count(body);
+}
+
+std::vector<double> write_state(const exmat_body& body) {
+  const State& state = body.state;
+  Writer writer;
+  for (const double number : {kLayout, body.scene.time_step, static_cast<double>(state.step),
+                              state.begins_anew ? 1.0 : 0.0, static_cast<double>(contact_count(body))})
+    writer.add(number);
+  writer.add(state.elastic_energy);
+  for (const auto member : kModeArrays) writer.add_all(state.*member);
+  writer.add_all(body.model().frame->numbers(state.frame));
+  for (const ExampleState& examples : state.examples) {
+    writer.add_all(examples.weights);
+    writer.add_all(examples.target);
+    writer.add(examples.has_target ? 1 : 0);
+    writer.add(examples.target_converged ? 1 : 0);
+  }
+  for (const HeldContact& held : std::span(state.contacts.held).first(contact_count(body))) {
+    for (const double number :
+         {static_cast<double>(held.vertex), static_cast<double>(held.obstacle), held.normal_force})
+      writer.add(number);
+    writer.add_all(held.anchor);
+  }
+  return writer.take();
+}
+
+void set_state(std::span<const double> numbers, exmat_body& body) {
+  const std::size_t least = size_without_contacts(body);
+  if (numbers.size() < least || (numbers.size() - least) % kContactNumbers != 0)
+    throw InvalidArgument(fmt::format("count = {}: expected {} and {} for each contact: is it of another model?",
+                                      numbers.size(), least, kContactNumbers));
+  if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
+  Reader reader(numbers);
+  if (const double layout = reader.number(); layout != kLayout)
+    throw InvalidArgument(
+        fmt::format("numbers: layout {:g}: expected {:g}; is it of another version?", layout, kLayout));
+  if (const double step = reader.number(); step != body.scene.time_step)
+    throw InvalidArgument(
+        fmt::format("numbers: time step {:g} s: expected the model's {:g} s", step, body.scene.time_step));
+  State state = body.state;
+  state.step = static_cast<std::int64_t>(reader.count("steps", kMostSteps));
+  state.time = static_cast<double>(state.step) * body.scene.time_step;
+  state.begins_anew = reader.flag("begins_anew");
+  const auto contacts = static_cast<std::size_t>(reader.count("contacts", kMostSteps));
+  if (contacts != (numbers.size() - least) / kContactNumbers)
+    throw InvalidArgument(
+        fmt::format("numbers: {} contacts: expected {}", contacts, (numbers.size() - least) / kContactNumbers));
+  state.elastic_energy = reader.number();
+  for (const auto member : kModeArrays) reader.read(state.*member);
+  body.model().frame->set_numbers(reader.take(body.frame_numbers), state.frame);
+  for (ExampleState& examples : state.examples) {
+    reader.read(examples.weights);
+    reader.read(examples.target);
+    examples.has_target = reader.flag("has_target");
+    examples.target_converged = reader.flag("target_converged");
+  }
+  read_contacts(reader, contacts, body, state.contacts);
+  body.state = state;  // into the arrays that are there: they are handed out
+  body.report = {};
+}
+
+}  // namespace exmat::runtime
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+std::int64_t exmat_body_state_size(const exmat_body* body) noexcept {
+  return body != nullptr ? static_cast<std::int64_t>(state_size(*body)) : -1;
+}
+
+exmat_status exmat_body_read_state(const exmat_body* body, double* numbers, std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(numbers);
+  EXMAT_REQUIRE_LENGTH(count, state_size(*body));
+  return guarded(__func__, [&] { std::ranges::copy(write_state(*body), numbers); });
+}
+
+exmat_status exmat_body_set_state(exmat_body* body, const double* numbers, std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(numbers);
+  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
+  return guarded(__func__, [&] { set_state({numbers, static_cast<std::size_t>(count)}, *body); });
+}
+
+exmat_status exmat_bodies_hash(exmat_body* const* bodies, std::int64_t count, std::uint64_t* hash) noexcept {
+  EXMAT_REQUIRE(hash);
+  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
+  if (count > 0) EXMAT_REQUIRE(bodies);
+  FnvHash sum;
+  for (std::int64_t i = 0; i < count; ++i) {
+    if (bodies[i] == nullptr) return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%" PRId64 "] is NULL", __func__, i);
+    add_to_hash(bodies[i]->model(), bodies[i]->state, sum);
+  }
+  *hash = sum.value();
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_example_stiffness(exmat_body* body, std::int64_t region, double kappa) noexcept {
+  EXMAT_REQUIRE(body);
+  if (!(kappa >= 0 && std::isfinite(kappa)))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: kappa = %g: expected a finite number >= 0", __func__, kappa);
+  return guarded(__func__, [&] { body->scene.examples[example_force(*body, region)].stiffness = kappa; });
+}
+
+exmat_status exmat_body_set_example_weights(exmat_body* body, std::int64_t region, const double* weights,
+                                            std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
+  if (count > 0) EXMAT_REQUIRE(weights);
+  return guarded(__func__, [&] {
+    const std::size_t force = example_force(*body, region);
+    const std::span given(weights, static_cast<std::size_t>(count));
+    if (count > 0) check_weights(given, body->model().examples[force].weights.examples());
+    body->scene.examples[force].given_weights = Eigen::Map<const Eigen::VectorXd>(weights, count);
+  });
+}
+
+const double* exmat_body_displacement(const exmat_body* body) noexcept {
+  return body != nullptr ? body->state.q.data() : nullptr;
+}
+
+const double* exmat_body_velocity(const exmat_body* body) noexcept {
+  return body != nullptr ? body->state.v.data() : nullptr;
+}
+
+const double* exmat_body_weights(const exmat_body* body) noexcept {
+  return body != nullptr && body->model().has_whole_body_examples() ? body->state.examples.front().weights.data()
+                                                                    : nullptr;
+}

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "runtime/api/handles.h"
+
+namespace exmat::runtime {
+
+/// How many numbers write_state() writes: 5, 6 r, the frame's, K + d + 2 for each example force, 6 for each contact.
+std::size_t state_size(const exmat_body& body);
+
+/// All that the body carries from step to step; state_size() numbers, after 5 that say of what: the layout, the time
+/// step, the steps taken, whether the next one begins anew, the number of contacts.
+std::vector<double> write_state(const exmat_body& body);
+
+/// Takes what write_state() wrote of a body of the same model. Throws InvalidArgument, and the body is as it was, where
+/// numbers are none, or of another model.
+void set_state(std::span<const double> numbers, exmat_body& body);
+
+}  // namespace exmat::runtime

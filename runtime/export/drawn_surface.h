@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <filesystem>
+#include <string>
+
+#include "common/core/arrays.h"
+
+namespace exmat::runtime {
+
+/// What is drawn of a reduced body: v vertices, f triangles, r modes. A body with reduced coordinates q stands at
+/// vertices + modes q in its own frame, the origin of which is at `origin` in the world at rest.
+struct DrawnSurface {
+  std::string name;                                  ///< of the asset
+  std::string source;                                ///< dataset of the bundle that it is made from
+  VertexArray vertices;                              ///< v x 3, at rest, from the origin [m]
+  TriangleArray triangles;                           ///< f x 3
+  RowMatrix modes;                                   ///< 3v x r [kg^(-1/2)], row 3k + axis
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of a free body the centre of mass, else 0 [m]
+
+  Eigen::Index vertex_count() const { return vertices.rows(); }
+  Eigen::Index mode_count() const { return modes.cols(); }
+};
+
+/// The render mesh of a bundle or, with `mesh` or where it has none, the surface of its tet mesh. Throws InputError.
+DrawnSurface read_drawn_surface(const std::filesystem::path& bundle, bool mesh);
+
+}  // namespace exmat::runtime

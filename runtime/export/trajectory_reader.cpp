@@ -1,0 +1,126 @@
+#include "runtime/export/trajectory_reader.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <limits>
+
+#include "common/bundle/file_schemas.h"
+#include "common/core/error.h"
+#include "common/hdf5/value_checks.h"
+#include "common/mesh/geometry.h"
+
+namespace exmat::runtime {
+namespace {
+
+Hdf5File open(const std::filesystem::path& trajectory) {
+  Hdf5File file = Hdf5File::open(trajectory);
+  for (const AttributeSchema& schema : trajectory_schema().attributes) {
+    if (schema.name != "format" && schema.name != "format_version") continue;
+    const AttributeValue value = file.read_attribute("/", schema.name);
+    if (const auto fault = check_value(schema, value, {}))
+      throw InputError({file.name(), "/@" + schema.name, fault->expected, fault->found, "is this a trajectory?"});
+    const auto* version = std::get_if<std::int64_t>(&value);
+    if (version != nullptr && *version > trajectory_schema().format_version)
+      throw InputError({file.name(), "/@" + schema.name, fmt::format("at most {}", trajectory_schema().format_version),
+                        fmt::format("{}", *version), "a newer version of exmat wrote this trajectory"});
+  }
+  return file;
+}
+
+template <typename Array>
+void resize(Array& array, const std::vector<std::int64_t>& sizes) {
+  if constexpr (Array::ColsAtCompileTime == Eigen::Dynamic)
+    array.resize(sizes.front(), sizes.size() > 1 ? sizes.back() : 1);
+  else
+    array.resize(sizes.front(), Array::ColsAtCompileTime);
+}
+
+}  // namespace
+
+TrajectoryReader::TrajectoryReader(const std::filesystem::path& trajectory) : file_(open(trajectory)) {}
+
+std::string TrajectoryReader::text(const std::string& attribute) const {
+  if (!file_.has_attribute("/", attribute)) return {};
+  const AttributeValue value = file_.read_attribute("/", attribute);
+  const auto* text = std::get_if<std::string>(&value);
+  if (text == nullptr) refuse("/@" + attribute, "a string", "another type");
+  return *text;
+}
+
+Hdf5Dataset TrajectoryReader::open_dataset(const std::string& path) {
+  const DatasetSchema& schema = trajectory_schema().dataset(path);
+  Hdf5Dataset dataset = file_.open_dataset(path);
+  const auto text = [&] { return fmt::format("{} of {}", dataset.type_name(), fmt::join(dataset.sizes(), " x ")); };
+  if (dataset.type() != schema.type)
+    refuse(path, fmt::format("{} of {}", name_of(schema.type), schema.dims_text), text());
+  if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), path)) refuse(path, *expected, text());
+  if (dataset.element_count() == 0) refuse(path, "some elements", text());
+  dataset.check_storage();
+  return dataset;
+}
+
+void TrajectoryReader::check_sum(const Hdf5Dataset& dataset, std::uint32_t crc) const {
+  const AttributeValue stored = file_.read_attribute(dataset.path(), "crc32");
+  const auto* sum = std::get_if<std::int64_t>(&stored);
+  if (sum == nullptr || *sum != crc)
+    refuse(dataset.path(), sum == nullptr ? "a checksum" : fmt::format("checksum {:08x}", *sum),
+           fmt::format("{:08x}", crc), "the data are damaged or were changed after the trajectory was written");
+}
+
+template <typename Array>
+void TrajectoryReader::read_all(const std::string& path, Array& array) {
+  const Hdf5Dataset dataset = open_dataset(path);
+  const DatasetSchema& schema = trajectory_schema().dataset(path);
+  resize(array, dataset.sizes());
+  dataset.read(array.data(), schema.type);
+  if (const auto fault = check_values(schema, dataset.sizes(), array.data(), sizes_))
+    refuse(path, fault->expected, fault->found);
+  check_sum(dataset, crc32_of(std::as_bytes(std::span(array.data(), static_cast<std::size_t>(array.size())))));
+}
+
+RowMatrix TrajectoryReader::read(const std::string& dataset) {
+  RowMatrix rows;
+  read_all(dataset, rows);
+  return rows;
+}
+
+TriangleArray TrajectoryReader::triangles(bool mesh) {
+  TriangleArray triangles;
+  if (!mesh && has("/render/triangles")) {
+    open_dataset("/render/vertices");  // that the triangles are of
+    read_all("/render/triangles", triangles);
+    return triangles;
+  }
+  TetArray tets;
+  open_dataset("/vertices");
+  read_all("/tets", tets);
+  return surface_triangles(tets);
+}
+
+const std::string& TrajectoryReader::open_positions(bool mesh) {
+  positions_.clear();
+  positions_.push_back(open_dataset(!mesh && has("/render/vertices") ? "/render/vertices" : "/vertices"));
+  for (const std::int64_t size : {samples(), points()})
+    if (size > std::numeric_limits<std::int32_t>::max())
+      refuse(positions_.front().path(), "as many frames and points as a 32-bit number counts", fmt::format("{}", size));
+  next_ = 0;
+  crc_ = 0;
+  return positions_.front().path();
+}
+
+void TrajectoryReader::read_next(std::vector<float>& frame) {
+  const Hdf5Dataset& dataset = positions_.front();
+  frame.resize(static_cast<std::size_t>(3 * points()));
+  dataset.read_rows(next_++, 1, frame.data(), ElementType::kFloat32);
+  crc_ = crc32_of(std::as_bytes(std::span(frame)), crc_);
+  const std::int64_t sizes[] = {points(), 3};
+  if (const auto fault = check_values(trajectory_schema().dataset(dataset.path()), sizes, frame.data(), {}))
+    refuse(fmt::format("{}, frame {}", dataset.path(), next_ - 1), fault->expected, fault->found);
+}
+
+void TrajectoryReader::refuse(const std::string& place, const std::string& expected, const std::string& found,
+                              const std::string& advice) const {
+  throw InputError({file_.name(), place, expected, found, advice});
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "common/hdf5/hdf5_file.h"
+#include "common/hdf5/schema.h"
+
+namespace exmat::runtime {
+
+/// A trajectory, read and checked: format, sizes, values, checksums. Each call throws InputError that names the file
+/// and the dataset.
+class TrajectoryReader {
+ public:
+  explicit TrajectoryReader(const std::filesystem::path& trajectory);
+
+  const std::string& name() const { return file_.name(); }
+  bool has(const std::string& dataset) const { return file_.has_dataset(dataset); }
+  /// An attribute of the root; empty where the trajectory is older than it.
+  std::string text(const std::string& attribute) const;
+  /// All rows of a dataset of numbers, F x columns.
+  RowMatrix read(const std::string& dataset);
+  /// Of the render mesh, or the boundary of the tets.
+  TriangleArray triangles(bool mesh);
+
+  /// The dataset that positions are read from: of the render mesh where there is one, of the tets with `mesh`.
+  const std::string& open_positions(bool mesh);
+  std::int64_t samples() const { return positions_.front().sizes()[0]; }
+  std::int64_t points() const { return positions_.front().sizes()[1]; }
+  /// The next frame, xyz of each point [m].
+  void read_next(std::vector<float>& frame);
+  /// To be called after the last frame.
+  void check_sum() const { check_sum(positions_.front(), crc_); }
+
+  [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,
+                           const std::string& advice = "") const;
+
+ private:
+  Hdf5Dataset open_dataset(const std::string& path);
+  void check_sum(const Hdf5Dataset& dataset, std::uint32_t crc) const;
+  template <typename Array>
+  void read_all(const std::string& path, Array& array);
+
+  Hdf5File file_;
+  SymbolSizes sizes_;
+  std::vector<Hdf5Dataset> positions_;  ///< the open one
+  std::int64_t next_ = 0;               ///< frame
+  std::uint32_t crc_ = 0;               ///< of the frames before it
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "runtime/export/gltf_file.h"
+
+namespace exmat::runtime {
+
+struct UsdOptions {
+  bool mesh = false;       ///< the tet mesh's surface also where the trajectory holds a render mesh
+  double frame_rate = 24;  ///< time codes a second, > 0
+  UpAxis up = UpAxis::kY;
+};
+
+/// What was written.
+struct UsdSummary {
+  std::string dataset;  ///< that the points are of
+  std::int64_t points = 0, samples = 0, bytes = 0;
+};
+
+/// Writes the positions of a trajectory as Universal Scene Description in text (.usda): one Mesh with points at each
+/// frame, in metres. Throws InputError (no trajectory, damaged) and WorkError; `target` is then as it was.
+UsdSummary write_usd(const std::filesystem::path& trajectory, const std::filesystem::path& target,
+                     const UsdOptions& options = {});
+
+}  // namespace exmat::runtime

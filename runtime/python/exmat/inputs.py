@@ -1,0 +1,128 @@
+"""Files for exmat-precompute from what a program has: members as dicts, meshes as arrays."""
+import json
+import os
+import pathlib
+from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
+
+import numpy as np
+
+from .errors import InvalidArgument
+
+StrPath = Union[str, "os.PathLike[str]"]
+PATHS = ("mesh", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples")
+
+
+def write_mesh(path: StrPath, vertices: Any, tets: Any) -> None:
+    """Writes a tet mesh, `vertices` (n, 3) [m] and `tets` (n_t, 4) of 0-based vertices, as legacy .vtk in double precision."""
+    points = _array(vertices, "vertices", 3, ">f8")
+    cells = _array(tets, "tets", 4, ">i4")
+    if len(cells) == 0 or cells.min() < 0 or cells.max() >= len(points):
+        raise InvalidArgument(f"tets: expected vertices of 0 to {len(points) - 1}")
+    counted = np.column_stack([np.full(len(cells), 4, ">i4"), cells]).astype(">i4")
+    with open(path, "wb") as file:
+        file.write(b"# vtk DataFile Version 3.0\nexmat\nBINARY\nDATASET UNSTRUCTURED_GRID\n")
+        file.write(f"POINTS {len(points)} double\n".encode() + points.tobytes())
+        file.write(f"\nCELLS {len(cells)} {5 * len(cells)}\n".encode() + counted.tobytes())
+        file.write(f"\nCELL_TYPES {len(cells)}\n".encode() + np.full(len(cells), 10, ">i4").tobytes() + b"\n")
+
+
+def write_surface(path: StrPath, vertices: Any, triangles: Any) -> None:
+    """Writes a surface, `vertices` (v, 3) [m] and `triangles` (f, 3) of 0-based vertices, as .obj."""
+    points = _array(vertices, "vertices", 3, "f8")
+    faces = _array(triangles, "triangles", 3, "i8")
+    if len(faces) == 0 or faces.min() < 0 or faces.max() >= len(points):
+        raise InvalidArgument(f"triangles: expected vertices of 0 to {len(points) - 1}")
+    lines = ["v {!r} {!r} {!r}".format(*map(float, point)) for point in points]
+    lines += ["f {} {} {}".format(*(int(corner) + 1 for corner in face)) for face in faces]
+    pathlib.Path(path).write_text("\n".join(lines) + "\n")
+
+
+def write_asset(asset: Union[StrPath, Mapping[str, Any]], folder: pathlib.Path) -> pathlib.Path:
+    """The asset file: `asset` where it is one, else one in `folder`, with the meshes that are given as arrays beside it."""
+    if not isinstance(asset, Mapping):
+        return pathlib.Path(asset)
+    members: Dict[str, Any] = _plain(asset)
+    given = asset.get("object", {})
+    if isinstance(given, Mapping):
+        _take_object(given, members["object"], folder)
+    examples = asset.get("examples", [])
+    for place, example in enumerate(examples):
+        tets = _tets_of_poses(examples, given)
+        members["examples"][place]["mesh"] = _mesh_file(example.get("mesh"), folder / f"example_{place}.vtk", tets, f"examples[{place}].mesh")
+    return _write_json(folder / "asset.json", members)
+
+
+def write_members(given: Union[StrPath, Mapping[str, Any]], path: pathlib.Path) -> pathlib.Path:
+    """The file `given`, or `path` with these members; paths in members become absolute."""
+    return _write_json(path, _plain(given)) if isinstance(given, Mapping) else pathlib.Path(given)
+
+
+def _take_object(given: Mapping[str, Any], members: Dict[str, Any], folder: pathlib.Path) -> None:
+    if "mesh" in given:
+        members["mesh"] = _mesh_file(given["mesh"], folder / "object.vtk", None, "object.mesh")
+    surface = given.get("render_mesh")
+    if surface is not None and not isinstance(surface, (str, os.PathLike)):
+        path = folder / "render_mesh.obj"
+        write_surface(path, *_pair(surface, "object.render_mesh", "triangles"))
+        members["render_mesh"] = str(path)
+
+
+def _mesh_file(mesh: Any, path: pathlib.Path, tets: Optional[Any], place: str) -> Any:
+    if mesh is None or isinstance(mesh, (str, os.PathLike)):
+        return None if mesh is None else os.path.abspath(mesh)
+    if not isinstance(mesh, (tuple, Mapping)):
+        if tets is None:
+            raise InvalidArgument(f"{place}: expected (vertices, tets), or vertices alone where the rest example or the object is given so; "
+                                  "found vertices alone")
+        mesh = (mesh, tets)
+    write_mesh(path, *_pair(mesh, place, "tets"))
+    return str(path)
+
+
+def _pair(mesh: Any, place: str, cells: str) -> Tuple[Any, Any]:
+    if isinstance(mesh, Mapping) and set(mesh) == {"vertices", cells}:
+        return mesh["vertices"], mesh[cells]
+    if isinstance(mesh, tuple) and len(mesh) == 2:
+        return mesh[0], mesh[1]
+    raise InvalidArgument(f"{place}: expected a path or (vertices, {cells})")
+
+
+def _tets_of_poses(examples: Any, given: Any) -> Optional[Any]:
+    """Tets that vertices alone stand for: those of the rest example, of the object where there is none."""
+    rest = next((example.get("mesh") for example in examples if example.get("rest")), None)
+    mesh = given.get("mesh") if rest is None else rest
+    if isinstance(mesh, (tuple, Mapping)):
+        return _pair(mesh, "mesh", "tets")[1]
+    return None
+
+
+def _plain(value: Any, key: str = "") -> Any:
+    """As JSON has it: arrays as lists, paths absolute. Meshes in arrays are left out."""
+    if isinstance(value, Mapping):
+        return {str(name): _plain(member, str(name)) for name, member in value.items()}
+    if isinstance(value, os.PathLike) or (isinstance(value, str) and key in PATHS):
+        return os.path.abspath(value)
+    if key in ("mesh", "render_mesh"):
+        return None
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    return [_plain(member) for member in value] if isinstance(value, (list, tuple)) else value
+
+
+def _array(values: Any, name: str, width: int, kind: str) -> Any:
+    array = np.asarray(values)
+    if array.ndim != 2 or array.shape[1] != width:
+        raise InvalidArgument(f"{name}: shape {array.shape}: expected (..., {width})")
+    if "i" in kind and array.dtype.kind not in "iu":
+        raise InvalidArgument(f"{name}: expected whole numbers")
+    return np.ascontiguousarray(array, kind)
+
+
+def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:
+    path.write_text(json.dumps(members, indent=1))
+    return path
+
+
+__all__: List[str] = ["write_asset", "write_members", "write_mesh", "write_surface"]

@@ -1,0 +1,135 @@
+#include <array>
+#include <pybind11/stl.h>
+
+#include "runtime/python/objects.h"
+
+namespace exmat::python {
+namespace {
+
+template <std::size_t kCount>
+std::int32_t number_of(const py::handle& value, const char* setting, const std::array<const char*, kCount>& names) {
+  const auto name = value.cast<std::string>();
+  std::string expected;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    if (name == names[i]) return static_cast<std::int32_t>(i);
+    expected += (i > 0 ? ", " : "") + std::string(names[i]);
+  }
+  throw Error(EXMAT_INVALID_ARGUMENT,
+              (std::string(setting) + " = '" + name + "': expected one of " + expected).c_str());
+}
+
+exmat_settings settings_of(const py::dict& given) {
+  exmat_settings settings = default_settings();
+  const std::map<std::string, double exmat_settings::*> numbers{
+      {"time_step", &exmat_settings::time_step},
+      {"mass_damping", &exmat_settings::mass_damping},
+      {"stiffness_damping", &exmat_settings::stiffness_damping},
+      {"newton_tolerance", &exmat_settings::newton_tolerance},
+      {"example_stiffness", &exmat_settings::example_stiffness},
+      {"example_damping", &exmat_settings::example_damping},
+      {"example_bias", &exmat_settings::example_bias}};
+  const std::map<std::string, std::int32_t exmat_settings::*> counts{
+      {"newton_iterations", &exmat_settings::newton_iterations},
+      {"target_iterations", &exmat_settings::target_iterations},
+      {"use_examples", &exmat_settings::use_examples}};
+  for (const auto& [key, value] : given) {
+    const auto name = key.cast<std::string>();
+    if (const auto number = numbers.find(name); number != numbers.end())
+      settings.*(number->second) = value.cast<double>();
+    else if (const auto count = counts.find(name); count != counts.end())
+      settings.*(count->second) = value.cast<std::int32_t>();
+    else if (name == "gravity")
+      std::ranges::copy(value.cast<std::array<double, 3>>(), settings.gravity);
+    else if (name == "integrator")
+      settings.integrator = number_of<3>(value, "integrator", {"bdf2", "backward_euler", "newmark"});
+    else if (name == "internal_force")
+      settings.internal_force = number_of<3>(value, "internal_force", {"auto", "cubature", "polynomial"});
+    else if (name == "example_target")
+      settings.example_target = number_of<3>(value, "example_target", {"auto", "table", "solve"});
+    else if (name == "energy_reference")
+      settings.energy_reference = number_of<2>(value, "energy_reference", {"example", "rest"});
+    else
+      throw Error(EXMAT_INVALID_ARGUMENT, ("there is no setting " + name).c_str());
+  }
+  return settings;
+}
+
+/// Of a scene where `settings` is None.
+std::shared_ptr<ModelObject> load(const std::string& path, const py::object& settings) {
+  if (settings.is_none()) {
+    const py::gil_scoped_release unlocked;
+    return std::make_shared<ModelObject>(Model::from_scene(path));
+  }
+  const exmat_settings members = settings_of(settings.cast<py::dict>());
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<ModelObject>(Model(path, members));
+}
+
+std::shared_ptr<PointsObject> vertices(std::shared_ptr<ModelObject> model, const Ids& ids) {
+  if (ids.ndim() != 1) throw Error(EXMAT_INVALID_ARGUMENT, "ids: expected an array of one dimension");
+  const std::span<const std::int64_t> span(ids.data(), static_cast<std::size_t>(ids.size()));
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<PointsObject>(PointsObject{Points::vertices(model->model, span), std::move(model)});
+}
+
+std::shared_ptr<PointsObject> all_vertices(std::shared_ptr<ModelObject> model) {
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<PointsObject>(PointsObject{Points::all_vertices(model->model), std::move(model)});
+}
+
+std::shared_ptr<PointsObject> points_at(std::shared_ptr<ModelObject> model, const Numbers& xyz) {
+  if (xyz.ndim() != 2) throw Error(EXMAT_INVALID_ARGUMENT, "xyz: expected an array of shape (k, 3)");
+  require_shape(xyz, "xyz", {xyz.shape(0), 3});
+  const std::span<const double> span = read_span(xyz);
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<PointsObject>(PointsObject{Points::at(model->model, span), std::move(model)});
+}
+
+void bind_points(py::module_& module) {
+  py::class_<PointsObject, std::shared_ptr<PointsObject>>(
+      module, "Points", "k material points of a model's bodies, in the order given; they never change.")
+      .def(py::init(&vertices), py::arg("model"), py::arg("ids"),
+           "Vertices of the object, 0-based `ids` of shape (k,), k >= 1; repeated ones are allowed.")
+      .def_static("all_vertices", &all_vertices, py::arg("model"),
+                  "All n vertices of the object. They can be read, not pushed.")
+      .def_static("at", &points_at, py::arg("model"), py::arg("xyz"),
+                  "Points of the rest shape, `xyz` of shape (k, 3) [m]. Each moves with the tet that holds it, or with "
+                  "the nearest one where none does.")
+      .def("__len__", [](const PointsObject& points) { return points.count; })
+      .def_readonly("model", &PointsObject::model, "The model that the points are of.")
+      .def_property_readonly(
+          "distances",
+          [](const PointsObject& points) {
+            py::array_t<double> result(static_cast<py::ssize_t>(points.count));
+            std::ranges::copy(points.points.distances(), result.mutable_data());
+            return result;
+          },
+          "From each point to the object at rest, 0 inside: shape (k,) [m]. A copy.");
+}
+
+}  // namespace
+
+void bind_model(py::module_& module) {
+  py::class_<ModelObject, std::shared_ptr<ModelObject>>(module, "Model", "What exmat.Model stands on.")
+      .def(py::init(&load), py::arg("path"), py::arg("settings"))
+      .def_readonly("modes", &ModelObject::modes, "r, the number of modes.")
+      .def_property_readonly(
+          "vertices", [](const ModelObject& model) { return model.model.vertices(); }, "n, the object's vertices.")
+      .def_readonly("examples", &ModelObject::examples,
+                    "K, the examples of the whole body, the rest pose counted; 0 without its example force.")
+      .def_property_readonly(
+          "regions",
+          [](const ModelObject& model) {
+            py::dict regions;
+            for (std::size_t i = 0; i < model.model.regions(); ++i)
+              regions[py::str(model.model.region_name(i))] = model.model.region_examples(i);
+            return regions;
+          },
+          "Of each region with an example force of its own, its name and its K, in the scene's order.")
+      .def_property_readonly(
+          "time_step", [](const ModelObject& model) { return model.model.time_step(); }, "[s].")
+      .def_readonly("input_sha256", &ModelObject::sha, "What the bundle was made of, 64 hexadecimal digits.");
+  bind_points(module);
+}
+
+}  // namespace exmat::python

@@ -1,0 +1,13 @@
+#include "runtime/python/objects.h"
+
+// The module exmat._exmat: exmat.hpp for Python. The package beside it says what is for users.
+
+PYBIND11_MODULE(_exmat, module) {
+  using namespace exmat::python;  // NOLINT(google-build-using-namespace)
+  module.doc() = "The compiled part of exmat. Use the package exmat.";
+  module.attr("version") = exmat_version();
+  bind_errors();
+  bind_model(module);
+  bind_body(module);
+  bind_world(module);
+}

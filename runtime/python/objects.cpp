@@ -1,0 +1,85 @@
+#include "runtime/python/objects.h"
+
+#include <algorithm>
+
+namespace exmat::python {
+namespace {
+
+std::string shape_text(const py::ssize_t* shape, std::size_t dimensions) {
+  std::string text = "(";
+  for (std::size_t i = 0; i < dimensions; ++i) text += (i > 0 ? ", " : "") + std::to_string(shape[i]);
+  return text + (dimensions == 1 ? ",)" : ")");
+}
+
+/// Marks bodies as being stepped while it lives.
+class Stepping {
+ public:
+  explicit Stepping(const BodyList& bodies) : bodies_(bodies) {
+    for (const auto& body : bodies) body->get();
+    mark(true);
+  }
+  ~Stepping() { mark(false); }
+  Stepping(const Stepping&) = delete;
+  Stepping& operator=(const Stepping&) = delete;
+
+ private:
+  void mark(bool stepping) {
+    for (const auto& body : bodies_) body->stepping = stepping;
+  }
+  const BodyList& bodies_;
+};
+
+}  // namespace
+
+WorldObject::WorldObject(std::shared_ptr<ModelObject> its_model, BodyList its_bodies)
+    : model(std::move(its_model)), bodies(std::move(its_bodies)) {
+  for (const auto& body : bodies) handles.push_back(body->body.get());
+}
+
+void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles, std::int64_t steps, int threads) {
+  const Stepping stepping(bodies);
+  const auto count = static_cast<std::int64_t>(handles.size());
+  const exmat_status status = [&] {
+    const py::gil_scoped_release unlocked;
+    return exmat_bodies_step(handles.data(), count, steps, threads);
+  }();
+  detail::check(status);
+}
+
+void set_stiffness(BodyObject& body, double kappa, std::int64_t region) {
+  body.get().set_example_stiffness(kappa, region);
+  body.stiffness[region] = kappa;
+}
+
+void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region) {
+  body.get().set_example_weights(weights, region);
+  if (weights.empty())
+    body.weights.erase(region);
+  else
+    body.weights[region] = weights;
+}
+
+StateObject state_of(BodyObject& body) { return {body.get().state(), body.model->sha}; }
+
+void set_state(BodyObject& body, const StateObject& state) {
+  if (state.sha != body.model->sha)
+    throw Error(EXMAT_INVALID_ARGUMENT,
+                "state: it is of another bundle; take a body of the bundle that it was read with");
+  body.get().set_state(state.numbers);
+}
+
+void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape) {
+  const auto dimensions = static_cast<std::size_t>(array.ndim());
+  if (std::equal(shape.begin(), shape.end(), array.shape(), array.shape() + dimensions)) return;
+  const std::string message = std::string(name) + ": shape " + shape_text(array.shape(), dimensions) + ": expected " +
+                              shape_text(shape.data(), shape.size());
+  throw Error(EXMAT_INVALID_ARGUMENT, message.c_str());
+}
+
+py::array view(const double* data, std::size_t count, const py::object& owner) {
+  py::array_t<double> array({static_cast<py::ssize_t>(count)}, {static_cast<py::ssize_t>(sizeof(double))}, data, owner);
+  py::detail::array_proxy(array.ptr())->flags &= ~py::detail::npy_api::NPY_ARRAY_WRITEABLE_;
+  return array;
+}
+
+}  // namespace exmat::python

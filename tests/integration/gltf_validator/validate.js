@@ -1,0 +1,10 @@
+// Prints what the validator of glTF finds in files; exit status 1 for errors or warnings.
+const fs = require("fs");
+const validator = require("gltf-validator");
+
+Promise.all(process.argv.slice(2).map(async (file) => {
+  const { issues } = await validator.validateBytes(new Uint8Array(fs.readFileSync(file)));
+  console.log(`${file}: ${issues.numErrors} errors, ${issues.numWarnings} warnings, ${issues.numInfos} infos, ${issues.numHints} hints`);
+  issues.messages.forEach((message) => console.log(`  ${message.pointer}: ${message.message}`));
+  return issues.numErrors + issues.numWarnings;
+})).then((found) => process.exit(found.some((count) => count > 0) ? 1 : 0));

@@ -1,0 +1,292 @@
+#!/usr/bin/python3
+"""Motions as other programs read them: .glb by VTK's reader, .usda by its text, each against the trajectory.
+
+Usage: test_export.py FOLDER_OF_PROGRAMS [--keep FOLDER]    (Debian: python3-vtk9 python3-h5py)
+
+--keep copies the .glb files that were written into a folder.
+"""
+import itertools
+import json
+import re
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import h5py
+import numpy as np
+import vtk
+from vtk.util.numpy_support import vtk_to_numpy
+
+PROGRAMS = Path(sys.argv.pop(1)).resolve()
+KEPT = Path(sys.argv.pop()) if "--keep" in sys.argv else None
+sys.argv = sys.argv[:1]
+PRECOMPUTE, RUNTIME = PROGRAMS / "exmat-precompute", PROGRAMS / "exmat-runtime"
+SIZE = np.linalg.norm([4, 1, 1])
+WITHIN = 1e-5 * SIZE  # single precision at coordinates up to 10 m: 1e-6 m
+
+
+def bar():
+    """Text of a .veg file: 8 x 2 x 2 cubes of six tets each, 4 m long."""
+    number = {place: k + 1 for k, place in enumerate(itertools.product(range(9), range(3), range(3)))}
+    tets = []
+    for cell in itertools.product(range(8), range(2), range(2)):
+        for order in itertools.permutations(range(3)):
+            place, path = list(cell), [number[cell]]
+            for axis in order:
+                place[axis] += 1
+                path.append(number[tuple(place)])
+            tets.append(path)
+    lines = ["*VERTICES", f"{len(number)} 3 0 0"] + [f"{k} {0.5 * x} {0.5 * y} {0.5 * z}" for (x, y, z), k in number.items()]
+    lines += ["*ELEMENTS", "TET", f"{len(tets)} 4 0"] + [" ".join(map(str, [k + 1, *tet])) for k, tet in enumerate(tets)]
+    return "\n".join(lines) + "\n", [k for (x, _, _), k in number.items() if x == 0]
+
+
+def tube():
+    """Text of an .obj file: a round tube about the bar's axis, its seam twice."""
+    lines = []
+    for i, j in itertools.product(range(41), range(25)):
+        angle = 2 * np.pi * (j % 24) / 24
+        lines.append(f"v {0.1 * i} {0.5 + 0.45 * np.cos(angle)} {0.5 + 0.45 * np.sin(angle)}")
+    for i, j in itertools.product(range(40), range(24)):
+        a = 25 * i + j + 1
+        lines.append(f"f {a} {a + 1} {a + 26} {a + 25}")
+    return "\n".join(lines) + "\n"
+
+
+def contents(path):
+    """JSON of a .glb, and its arrays by accessor."""
+    data = path.read_bytes()
+    magic, version, length, size, kind = struct.unpack("<4sIII4s", data[:20])
+    assert (magic, version, length, kind) == (b"glTF", 2, len(data), b"JSON")
+    document = json.loads(data[20:20 + size])
+    binary = data[28 + size:]
+    arrays = []
+    for accessor in document["accessors"]:
+        view = document["bufferViews"][accessor["bufferView"]]
+        kind = {5126: np.float32, 5123: np.uint16, 5125: np.uint32}[accessor["componentType"]]
+        width = {"SCALAR": 1, "VEC3": 3, "VEC4": 4}[accessor["type"]]
+        offset = view.get("byteOffset", 0)
+        array = np.frombuffer(binary[offset:offset + view["byteLength"]], kind).reshape(-1, width)
+        assert len(array) == accessor["count"]
+        for name, found in (("min", array.min(0)), ("max", array.max(0))):
+            assert name not in accessor or np.array_equal(np.array(accessor[name], np.float32), found)
+        arrays.append(array)
+    return document, arrays
+
+
+class Export(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        cls.folder = Path(holder.name)
+        mesh, clamp = bar()
+        (cls.folder / "bar.veg").write_text(mesh)
+        (cls.folder / "tube.obj").write_text(tube())
+        (cls.folder / "end.txt").write_text("\n".join(map(str, clamp)))
+        for name, more in (("free", {}), ("clamped", {"fixed": {"file": "end.txt"}})):
+            asset = {"name": name, "object": {"mesh": "bar.veg", "render_mesh": "tube.obj", **more,
+                                              "material": {"youngs_modulus": 2e5, "poisson_ratio": 0.4, "density": 1000}},
+                     "basis": {"size": 8, "linear_modes": 4, "training": "none"}, "cubature": {"elements": 16, "training_poses": 20},
+                     "needs": ["rigid", "render"], "examples": []}
+            (cls.folder / f"{name}.json").write_text(json.dumps(asset))
+            cls.call(PRECOMPUTE, "bundle", f"{name}.json", "-o", f"{name}.h5")
+        cls.run_scene("clamped", {"gravity": [0, 0, -9.81]})
+        cls.run_scene("free", {"gravity": [0, -9.81, 0], "body": {"position": [2, 1, -1], "orientation": [0.8, 0, 0.6, 0],
+                                                                   "angular_velocity": [1, 4, 9], "linear_velocity": [3, 5, 0]}})
+        half = np.sqrt(0.5)
+        cls.run_scene("clamped", {"body": {"motion": [{"time": 0}, {"time": 0.5, "position": [0, 2, 0], "orientation": [half, 0, half, 0]},
+                                                      {"time": 2, "position": [1, 0, 0]}]}}, "carried")
+
+    @classmethod
+    def call(cls, *words):
+        done = subprocess.run(words, cwd=cls.folder, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    @classmethod
+    def run_scene(cls, bundle, members, name=None):
+        name = name or bundle
+        scene = {"bundle": f"{bundle}.h5", "time_step": 0.01, "steps": 100, **members,
+                 "output": {"trajectory": f"{name}_run.h5", "every": 5, "render": True}}
+        (cls.folder / f"{name}_scene.json").write_text(json.dumps(scene))
+        cls.call(RUNTIME, "run", f"{name}_scene.json")
+
+    def export(self, *words):
+        printed = self.call(RUNTIME, "export", *words)
+        if KEPT and (name := words[words.index("-o") + 1]).endswith(".glb"):
+            shutil.copy(self.folder / name, KEPT / f"{self.id().split('.')[-1]}_{len(list(KEPT.iterdir()))}.glb")
+        return printed
+
+    def trajectory(self, name):
+        with h5py.File(self.folder / f"{name}_run.h5") as f:
+            return {key: f[key][:] for key in ("time", "vertices", "render/vertices", "reduced")}
+
+    def frames(self, file, times):
+        """Points at times, by VTK."""
+        reader = vtk.vtkGLTFReader()
+        reader.SetFileName(str(self.folder / file))
+        reader.ApplyDeformationsToGeometryOn()
+        reader.SetFrameRate(1000)  # of the times that the reader offers: those of the frames are among them
+        reader.UpdateInformation()
+        reader.EnableAnimation(0)
+        reader.UpdateInformation()
+        frames = []
+        for time in times:
+            reader.UpdateTimeStep(time)
+            reader.Update()
+            iterator = reader.GetOutput().NewIterator()
+            iterator.InitTraversal()
+            frames.append(vtk_to_numpy(iterator.GetCurrentDataObject().GetPoints().GetData()).astype(float))
+        return np.array(frames)
+
+    def check(self, name, within=WITHIN, file="motion.glb"):
+        run = self.trajectory(name)
+        missed = np.linalg.norm(self.frames(file, run["time"]) - run["render/vertices"], axis=2)
+        self.assertLess(missed.max(), within)
+        return missed
+
+    def test_a_reader_of_gltf_sees_the_trajectory(self):
+        for name in ("clamped", "free", "carried"):
+            with self.subTest(name):
+                printed = self.export(f"{name}_run.h5", "-o", "motion.glb")
+                self.assertRegex(printed, r"morph targets +8, modes")
+                self.assertRegex(printed, r"surface +1025 vertices, 1920 triangles of /render")
+                self.check(name)
+                x = self.trajectory(name)["render/vertices"]
+                self.assertGreater(np.linalg.norm(x - x[0], axis=2).max(), 0.3)  # it moves
+
+    def test_fewer_targets_miss_what_is_said(self):
+        for name, fewer in itertools.product(("clamped", "free"), (1, 3)):
+            with self.subTest(name, targets=fewer):
+                printed = self.export(f"{name}_run.h5", "-o", "motion.glb", "--targets", str(fewer))
+                largest, share, rms = map(float, re.search(r"largest (\S+) m \((\S+) of the size\), RMS (\S+) m", printed).groups())
+                missed = self.check(name, within=1)
+                self.assertAlmostEqual(missed.max() / largest, 1, delta=0.06)  # two digits are printed
+                self.assertAlmostEqual(np.sqrt((missed**2).mean()) / rms, 1, delta=0.06)
+                size = np.linalg.norm([4, 0.9, 0.9])
+                self.assertAlmostEqual(share * size / largest, 1, delta=0.1)
+
+    def test_the_file_is_what_the_format_asks_for(self):
+        self.export("free_run.h5", "-o", "motion.glb", "--targets", "4")
+        document, arrays = contents(self.folder / "motion.glb")
+        mesh = document["meshes"][0]
+        self.assertEqual(mesh["extras"]["targetNames"], [f"component {k}" for k in range(1, 5)])
+        self.assertEqual(len(mesh["weights"]), 4)
+        primitive = mesh["primitives"][0]
+        normals = arrays[primitive["attributes"]["NORMAL"]]
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-6)
+        channels = {c["target"]["path"]: document["animations"][0]["samplers"][c["sampler"]] for c in document["animations"][0]["channels"]}
+        self.assertEqual(set(channels), {"translation", "rotation", "weights"})
+        weights = arrays[channels["weights"]["output"]]
+        self.assertEqual(len(weights), 21 * 4)
+        self.assertAlmostEqual(np.abs(weights).max(), 1, places=6)
+        np.testing.assert_allclose(np.linalg.norm(arrays[channels["rotation"]["output"]], axis=1), 1, atol=1e-6)
+        self.assertTrue(np.all(np.diff(arrays[channels["weights"]["input"]].ravel()) > 0))
+
+    def test_it_is_smaller_than_a_point_cache(self):
+        self.export("clamped_run.h5", "-o", "motion.glb", "--targets", "3")
+        self.export("clamped_run.h5", "-o", "motion.pc2")
+        glb, cache = ((self.folder / f"motion.{kind}").stat().st_size for kind in ("glb", "pc2"))
+        self.assertLess(glb, 0.5 * cache)  # of 21 frames; a frame more costs 3 + 1 numbers in place of 3,075
+
+    def test_z_up_is_turned(self):
+        self.export("carried_run.h5", "-o", "motion.glb", "--up", "z")
+        run = self.trajectory("carried")
+        x, y, z = np.moveaxis(run["render/vertices"], 2, 0)
+        self.assertLess(np.abs(self.frames("motion.glb", run["time"]) - np.stack([x, z, -y], 2)).max(), WITHIN)
+
+    def test_the_mesh_in_place_of_the_render_mesh(self):
+        self.export("clamped_run.h5", "-o", "motion.glb", "--mesh")
+        run = self.trajectory("clamped")
+        drawn = self.frames("motion.glb", run["time"])
+        pairs = np.linalg.norm(drawn[0][:, None] - run["vertices"][0][None], axis=2).argmin(1)
+        self.assertEqual(len(set(pairs)), 9 * 9 - 7)  # all but those inside
+        self.assertLess(np.abs(drawn - run["vertices"][:, pairs]).max(), WITHIN)
+
+    def test_modes_without_a_motion(self):
+        printed = self.export("--bundle", "clamped.h5", "-o", "modes.glb")
+        self.assertRegex(printed, r"morph targets +8, modes")
+        document, arrays = contents(self.folder / "modes.glb")
+        self.assertNotIn("animations", document)
+        primitive = document["meshes"][0]["primitives"][0]
+        rest = arrays[primitive["attributes"]["POSITION"]].astype(float)
+        targets = np.array([arrays[target["POSITION"]] for target in primitive["targets"]], float)
+        run = self.trajectory("clamped")
+        drawn = rest + np.einsum("fk,kvc->fvc", run["reduced"], targets)  # the weights are q
+        self.assertLess(np.abs(drawn - run["render/vertices"]).max(), WITHIN)
+
+    def test_usd_has_the_points_of_the_trajectory(self):
+        for name, mesh in (("free", False), ("clamped", True)):
+            self.export(f"{name}_run.h5", "-o", "motion.usda", "--frame-rate", "50", *(["--mesh"] if mesh else []))
+            text = (self.folder / "motion.usda").read_text()
+            self.assertTrue(text.startswith("#usda 1.0\n"))
+            self.assertIn("timeCodesPerSecond = 50\n", text)
+            self.assertIn("endTimeCode = 50\n", text)
+            run = self.trajectory(name)
+            expected = run["vertices" if mesh else "render/vertices"]
+            samples = re.search(r"points.timeSamples = \{\n(.*?)\n    \}", text, re.S)[1].splitlines()
+            self.assertEqual(len(samples), len(expected))
+            for line, time, points in zip(samples, run["time"], expected):
+                code, values = line.split(":")
+                self.assertAlmostEqual(float(code), 50 * time, places=6)
+                found = np.array(re.findall(r"[-+.\de]+", values), np.float32).reshape(-1, 3)
+                np.testing.assert_array_equal(found, points)  # to the last digit
+            counts, corners = (np.array(re.search(rf"int\[\] {key} = \[(.*?)\]", text)[1].split(", "), int)
+                               for key in ("faceVertexCounts", "faceVertexIndices"))
+            self.assertTrue((counts == 3).all())
+            faces = corners.reshape(-1, 3)
+            self.assertEqual(len(faces), len(counts))
+            a, b, c = (expected[0].astype(float)[faces[:, k]] for k in range(3))
+            volume = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+            if mesh:
+                self.assertAlmostEqual(volume, 4, delta=1e-5)  # closed, outward
+
+    def refused(self, *words, status=2):
+        before = set(self.folder.iterdir())
+        done = subprocess.run([RUNTIME, "export", *words], cwd=self.folder, capture_output=True, text=True)
+        self.assertEqual(done.returncode, status, done.stderr)
+        self.assertEqual(set(self.folder.iterdir()), before)
+        return done.stderr
+
+    def test_what_cannot_be_is_refused_in_words(self):
+        run = "free_run.h5"
+        self.assertIn("Alembic is not written", self.refused(run, "-o", "a.abc"))
+        self.assertIn("expected an output with the extension .glb, .usda or .pc2, found \".fbx\"", self.refused(run, "-o", "a.fbx"))
+        self.assertIn("expected a trajectory, or a bundle by --bundle, found neither", self.refused("-o", "a.glb"))
+        self.assertIn("expected a trajectory to write as .usda", self.refused("--bundle", "free.h5", "-o", "a.usda"))
+        self.assertIn("expected at most 8 targets", self.refused(run, "-o", "a.glb", "--targets", "9"))
+        self.assertIn("--targets", self.refused(run, "-o", "a.usda", "--targets", "3"))
+        self.assertIn("whose components", self.refused("--bundle", "free.h5", "-o", "a.glb", "--targets", "3"))
+        self.assertIn("--frame-rate", self.refused(run, "-o", "a.glb", "--frame-rate", "3"))
+        self.assertIn("/@input_sha256", self.refused(run, "--bundle", "clamped.h5", "-o", "a.glb"))
+        self.assertIn("is this a trajectory?", self.refused("free.h5", "-o", "a.glb"))
+
+    def test_a_trajectory_finds_its_bundle(self):
+        moved = self.folder / "elsewhere"
+        moved.mkdir(exist_ok=True)
+        (moved / "lost.h5").write_bytes((self.folder / "free_run.h5").read_bytes())
+        self.assertIn("name it by --bundle BUNDLE.h5", self.refused("elsewhere/lost.h5", "-o", "a.glb"))
+        self.export("elsewhere/lost.h5", "--bundle", "free.h5", "-o", "motion.glb")
+        self.check("free")
+        done = subprocess.run([RUNTIME, "export", self.folder / "free_run.h5", "-o", self.folder / "motion.glb"], cwd="/", capture_output=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_damage_is_found(self):
+        damaged = self.folder / "damaged.h5"
+        for dataset, row in (("reduced", 3), ("body/position", 2)):
+            damaged.write_bytes((self.folder / "free_run.h5").read_bytes())
+            with h5py.File(damaged, "r+") as f:
+                f[dataset][row, 0] += 1
+            self.assertIn("checksum", self.refused("damaged.h5", "-o", "a.glb"))
+        with h5py.File(damaged, "r+") as f:
+            del f["reduced"]
+        self.assertIn("export it as .usda or .pc2", self.refused("damaged.h5", "-o", "a.glb"))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,188 @@
+#include "precompute/meshing/cage.h"
+
+#include <Eigen/Geometry>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <numbers>
+
+#include "common/core/error.h"
+#include "common/mesh/checks.h"
+#include "tests/support/random.h"
+#include "tests/support/surfaces.h"
+
+namespace exmat::precompute {
+namespace {
+
+using test::ball_surface;
+using test::box_surface;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+// Whether a point is in some tet, by the signs of the four volumes that it makes with the faces.
+bool is_inside(const TetMesh& mesh, const Eigen::RowVector3d& point) {
+  const auto volume = [](const Eigen::RowVector3d& a, const Eigen::RowVector3d& b, const Eigen::RowVector3d& c,
+                         const Eigen::RowVector3d& d) { return (b - a).dot(Eigen::RowVector3d((c - a).cross(d - a))); };
+  for (const auto& tet : mesh.tets.rowwise()) {
+    const Eigen::RowVector3d a = mesh.vertices.row(tet[0]), b = mesh.vertices.row(tet[1]),
+                             c = mesh.vertices.row(tet[2]), d = mesh.vertices.row(tet[3]);
+    // Rounding of a point that lies on a face.
+    const double least = -1e-7 * volume(a, b, c, d);
+    if (volume(point, b, c, d) >= least && volume(a, point, c, d) >= least && volume(a, b, point, d) >= least &&
+        volume(a, b, c, point) >= least)
+      return true;
+  }
+  return false;
+}
+
+// By the normals of the two faces at each edge.
+double least_dihedral_angle(const TetMesh& mesh) {
+  double least = 180;
+  for (const auto& tet : mesh.tets.rowwise())
+    for (int i = 0; i < 4; ++i)
+      for (int j = i + 1; j < 4; ++j) {
+        const auto outward = [&](int without) {
+          std::vector<Eigen::Vector3d> face;
+          for (int corner = 0; corner < 4; ++corner)
+            if (corner != without) face.push_back(mesh.vertices.row(tet[corner]).transpose());
+          const Eigen::Vector3d normal = (face[1] - face[0]).cross(face[2] - face[0]).normalized();
+          const Eigen::Vector3d inward = mesh.vertices.row(tet[without]).transpose() - face[0];
+          return Eigen::Vector3d(normal.dot(inward) > 0 ? -normal : normal);
+        };
+        const double between = std::acos(std::clamp(outward(i).dot(outward(j)), -1.0, 1.0));
+        least = std::min(least, 180 - between * 180 / std::numbers::pi);
+      }
+  return least;
+}
+
+void expect_cage(const Cage& cage, const SurfaceMesh& surface) {
+  TetMesh copy = cage.mesh;
+  EXPECT_EQ(check_mesh(copy, "cage", {}).reoriented_tets, 0);
+  for (const auto& corners : surface.triangles.rowwise())
+    for (const std::int32_t corner : corners)
+      EXPECT_TRUE(is_inside(cage.mesh, surface.vertices.row(corner))) << "vertex " << corner;
+  const double angle = least_dihedral_angle(cage.mesh);
+  EXPECT_GE(angle, kLeastDihedralAngle);
+  EXPECT_NEAR(cage.least_angle, angle, 1e-6);
+}
+
+TEST(Cage, EnclosesABall) {
+  const SurfaceMesh ball = ball_surface(8, 0.5);
+  const Cage cage = make_cage(ball, {400, {}}, "ball");
+  expect_cage(cage, ball);
+  EXPECT_NEAR(static_cast<double>(cage.mesh.tet_count()), 400, 0.3 * 400);
+  ASSERT_TRUE(cage.volume_ratio);
+  const double volume = 4.0 / 3 * std::numbers::pi * 0.125;
+  EXPECT_GT(cage.volume, volume);
+  EXPECT_GT(cage.farthest, 0);
+  EXPECT_LT(cage.farthest, cage.cell_size);
+}
+
+// The cage stands off by a share of a cell, so its volume goes to the ball's with the first power of the cell size; the
+// chords of its triangles, which cut off a part with the second power, make that slower.
+TEST(Cage, FitsCloserTheFinerItIs) {
+  const SurfaceMesh ball = ball_surface(12, 1);
+  const auto excess = [&](double size) { return *make_cage(ball, {{}, size}, "ball").volume_ratio - 1; };
+  const double coarse = excess(0.2), fine = excess(0.05);
+  EXPECT_GT(coarse, 0);
+  EXPECT_GT(fine, 0);
+  EXPECT_LT(fine, 0.45 * coarse);
+}
+
+TEST(Cage, IsTheSameForTheSameSurface) {
+  const SurfaceMesh box = box_surface({6, 3, 3}, {2, 1, 1});
+  const Cage first = make_cage(box, {300, {}}, "box"), second = make_cage(box, {300, {}}, "box");
+  EXPECT_EQ(first.mesh.vertices, second.mesh.vertices);
+  EXPECT_EQ(first.mesh.tets, second.mesh.tets);
+}
+
+class CageOfAnySize : public testing::TestWithParam<double> {};
+TEST_P(CageOfAnySize, IsThatOfSizeOneScaled) {
+  SurfaceMesh box = box_surface({6, 3, 3}, {2, 1, 1});
+  const Cage unit = make_cage(box, {300, {}}, "box");
+  box.vertices *= GetParam();
+  const Cage cage = make_cage(box, {300, {}}, "box");
+  expect_cage(cage, box);
+  EXPECT_NEAR(static_cast<double>(cage.mesh.tet_count()) / static_cast<double>(unit.mesh.tet_count()), 1, 0.1);
+  EXPECT_NEAR(*cage.volume_ratio, *unit.volume_ratio, 0.05);
+}
+INSTANTIATE_TEST_SUITE_P(Sizes, CageOfAnySize, testing::Values(1e-6, 1e6));
+
+TEST(Cage, EnclosesSurfacesThatAreNotClosed) {
+  SurfaceMesh open = ball_surface(8, 1);
+  open.triangles.conservativeResize(open.triangles.rows() - 60, Eigen::NoChange);
+  const Cage cage = make_cage(open, {500, {}}, "open");
+  expect_cage(cage, open);
+  EXPECT_FALSE(cage.volume_ratio);
+}
+
+TEST(Cage, EnclosesSoupsOfFlippedAndDoubledTriangles) {
+  const SurfaceMesh ball = ball_surface(6, 1);
+  SurfaceMesh soup;
+  const Eigen::Index n = ball.triangles.rows();
+  soup.vertices.resize(6 * n, 3);
+  soup.triangles.resize(2 * n, 3);
+  for (Eigen::Index t = 0; t < 2 * n; ++t)
+    for (int corner = 0; corner < 3; ++corner) {
+      const auto vertex = static_cast<std::int32_t>(3 * t + corner);
+      soup.vertices.row(vertex) = ball.vertices.row(ball.triangles(t % n, corner));
+      soup.triangles(t, t % 3 == 0 ? 2 - corner : corner) = vertex;
+    }
+  expect_cage(make_cage(soup, {500, {}}, "soup"), soup);
+}
+
+TEST(Cage, EnclosesSurfacesThatCrossThemselves) {
+  SurfaceMesh other = ball_surface(6, 0.6);
+  other.vertices.col(0).array() += 0.9;
+  const SurfaceMesh crossing = test::together(ball_surface(6, 0.7), other);
+  expect_cage(make_cage(crossing, {800, {}}, "crossing"), crossing);
+}
+
+TEST(Cage, EnclosesASheetThinnerThanACell) {
+  const SurfaceMesh sheet = box_surface({12, 8, 1}, {1, 0.7, 0.001});
+  const Cage cage = make_cage(sheet, {1500, {}}, "sheet");
+  expect_cage(cage, sheet);
+}
+
+TEST(Cage, IgnoresTrianglesWithoutAreaAndVerticesWithoutTriangles) {
+  SurfaceMesh ball = ball_surface(6, 1);
+  const Eigen::Index n = ball.vertices.rows();
+  ball.vertices.conservativeResize(n + 1, Eigen::NoChange);
+  ball.vertices.row(n) << 3, 0, 0;
+  ball.triangles.conservativeResize(ball.triangles.rows() + 1, Eigen::NoChange);
+  ball.triangles.bottomRows(1) << 5, 5, 7;
+  const Cage cage = make_cage(ball, {{}, 0.5}, "ball");
+  EXPECT_FALSE(is_inside(cage.mesh, ball.vertices.row(n)));
+}
+
+std::string refusal(const SurfaceMesh& surface, const CageSettings& settings) {
+  try {
+    make_cage(surface, settings, "s.obj");
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(Cage, RefusesSeveralBodies) {
+  SurfaceMesh other = ball_surface(6, 1);
+  other.vertices.col(0).array() += 6;
+  EXPECT_THAT(refusal(test::together(ball_surface(6, 1), other), {500, {}}),
+              AllOf(HasSubstr("s.obj: the tets that enclose the surface"), HasSubstr("component"),
+                    HasSubstr("join the parts")));
+}
+
+TEST(Cage, RefusesSurfacesWithoutAnExtent) {
+  SurfaceMesh none = ball_surface(4, 1);
+  none.triangles.col(1) = none.triangles.col(0);
+  EXPECT_THAT(refusal(none, {}), HasSubstr("s.obj: expected a surface: triangles that have an area"));
+  none.vertices.setZero();
+  EXPECT_THAT(refusal(none, {}), HasSubstr("a bounding box whose diagonal is 0 m long"));
+}
+
+TEST(Cage, RefusesCellsThatAreNoSizeForIt) {
+  EXPECT_THAT(refusal(ball_surface(6, 1), {{}, 50.0}),
+              AllOf(HasSubstr("s.obj: cell size: expected 0.00693 to 1.73 m"), HasSubstr("found 50 m")));
+}
+
+}  // namespace
+}  // namespace exmat::precompute

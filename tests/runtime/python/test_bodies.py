@@ -1,0 +1,189 @@
+"""Models, points and bodies against the program and against their own arrays."""
+import copy
+import gc
+import pickle
+
+import numpy as np
+import pytest
+
+import exmat
+
+FALLING = {"time_step": 0.002, "gravity": [0, 0, -9.81], "body": {"linear_velocity": [0.2, 0, -1], "angular_velocity": [1, 2, 3]},
+           "obstacles": [{"plane": {"point": [0, 0, -0.05], "normal": [0, 0, 1]}, "stiffness": 1e6, "friction": 0.4}]}
+
+
+def hash_of(bodies):
+    return f"{exmat.state_hash(bodies):016x}"
+
+
+def test_state_hash_is_that_of_the_program(bundle, runtime, scene_file):
+    scene = scene_file(bundle=bundle, steps=200, gravity=[0, 0, -1], damping={"mass": 0.2, "stiffness": 0.01}, instances=3,
+                       examples={"stiffness": 4000, "damping": 10, "bias": 0.2})
+    world = exmat.World(exmat.Model.from_scene(scene), 3)
+    world.step(200)
+    assert hash_of(world) == runtime("run", scene)["state hash"].strip()
+    settings = exmat.Model(bundle, gravity=(0, 0, -1), mass_damping=0.2, stiffness_damping=0.01, example_stiffness=4000, example_damping=10,
+                           example_bias=0.2)
+    bodies = [exmat.Body(settings) for _ in range(3)]
+    for _ in range(200):
+        exmat.step(bodies, 1, threads=2)
+    assert hash_of(bodies) == hash_of(world)
+
+
+def test_free_bodies_with_obstacles_are_those_of_the_program(free_bundle, runtime, scene_file):
+    scene = scene_file(bundle=free_bundle, steps=300, **FALLING)
+    body = exmat.Body(exmat.Model.from_scene({"bundle": free_bundle, **FALLING}))
+    assert body.step(300).steps == 300
+    assert hash_of([body]) == runtime("run", scene)["state hash"].strip()
+    assert body.state.numbers.size == exmat.Body(body.model).state.numbers.size + 6 * int(body.state.numbers[4])
+
+
+def test_a_model_says_its_sizes(model):
+    assert (model.modes, model.vertices, model.examples, model.regions, model.time_step) == (12, 340, 2, {}, 0.001)
+    assert len(model.input_sha256) == 64
+    assert "bar.h5: 12 modes, 340 vertices, 2 examples" in repr(model)
+
+
+@pytest.mark.parametrize("setting, other", [("integrator", "newmark"), ("example_target", "solve"), ("energy_reference", "rest"), ("time_step", 0.002),
+                                            ("gravity", (0, 1, 0)), ("mass_damping", 3.0), ("stiffness_damping", 0.01), ("newton_tolerance", 1e-2)])
+def test_each_setting_counts(bundle, setting, other):
+    def end(**settings):
+        body = exmat.Body(exmat.Model(bundle, **{"gravity": (0, 0, -9.81), "example_stiffness": 4000, "example_bias": 0.2, **settings}))
+        body.step(20)
+        return body.q.copy()
+
+    assert not np.array_equal(end(), end(**{setting: other}))
+
+
+def test_report_and_energies(body):
+    report = body.step(5)
+    assert report.steps == 5 and report.newton_iterations >= 5 and report.seconds > 0 and body.report.residual == report.residual
+    energies = body.energies
+    assert energies.kinetic == pytest.approx(0.5 * body.v @ body.v, rel=1e-12)  # the modes are orthonormal by mass
+    assert energies.total == energies.kinetic + energies.elastic + energies.potential
+    assert body.time == pytest.approx(0.005) and "steps=5" in repr(report) and "kinetic" in repr(energies)
+
+
+def test_positions_are_rest_and_basis_times_q(bundle, body):
+    body.step(50)
+    points = exmat.Points.all_vertices(body.model)
+    found = body.positions(points)
+    with exmat.Bundle(bundle) as data:
+        expected = data["object/vertices"][:] + np.asarray(data["modal/basis"]) @ body.q
+    assert found.dtype == np.float32 and found.shape == (340, 3)
+    assert abs(found - expected).max() < 5e-7  # two roundings of coordinates up to 4 m
+    some = exmat.Points(body.model, [3, 0, 3])
+    assert np.array_equal(body.positions(some), found[[3, 0, 3]]) and len(some) == 3
+    at = exmat.Points.at(body.model, expected[:2] * 0 + [[0.5, 0.5, 0.5], [0.5, 0.5, 2.0]])
+    assert at.distances[0] == 0 and at.distances[1] > 0.5
+
+
+def test_out_is_filled_and_refused_where_it_does_not_fit(body):
+    points = exmat.Points(body.model, [1, 2])
+    out = np.empty((2, 3), np.float32)
+    assert body.positions(points, out) is out and body.positions(points, out=out) is out
+    for bad in (np.empty((2, 3)), np.empty((3, 2), np.float32), np.empty((2, 6), np.float32)[:, ::2], np.asfortranarray(out)):
+        with pytest.raises(exmat.InvalidArgument, match="out: "):
+            body.positions(points, bad)
+    out.flags.writeable = False
+    with pytest.raises(exmat.InvalidArgument, match="can be written"):
+        body.positions(points, out)
+
+
+def test_arrays_are_views_that_change_with_the_body_and_outlive_its_name(model):
+    body = exmat.Body(model)
+    q, v, weights = body.q, body.v, body.weights
+    kept = q.copy()
+    body.step(30)
+    assert np.array_equal(q, body.q) and not np.array_equal(q, kept) and weights.sum() == pytest.approx(1)
+    assert q.__array_interface__["data"] == body.q.__array_interface__["data"]
+    for array in (q, v, weights):
+        with pytest.raises(ValueError):
+            array[0] = 1
+    expected = q.copy()
+    del body
+    gc.collect()
+    [exmat.Body(model) for _ in range(100)]
+    assert np.array_equal(q, expected)
+
+
+def test_forces_push(body):
+    points = exmat.Points(body.model, [339, 300])
+    still = copy.copy(body)
+    body.apply_forces(points, [[0, 0, 500], [0, 0, 500]])
+    for either in (body, still):
+        either.step(40)
+    pushed = (body.positions(points) - still.positions(points))[:, 2]
+    assert (pushed > 1e-4).all()
+    body.clear_forces()
+    body.restart_integrator()
+    body.reset()
+    assert body.time == 0 and np.array_equal(body.q, exmat.Body(body.model).q)
+
+
+def test_free_motion_is_set_and_read(free_bundle):
+    body = exmat.Body(exmat.Model(free_bundle))
+    body.motion = exmat.Motion(position=(1, 2, 3), orientation=(2, 0, 0, 0), linear_velocity=(0.5, 0, 0))
+    assert body.motion.orientation.tolist() == [1, 0, 0, 0] and body.motion.linear_velocity.tolist() == [0.5, 0, 0]
+    body.step(100)
+    assert body.motion.position == pytest.approx([1.05, 2, 3], abs=1e-9)
+
+
+@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda body: pickle.loads(pickle.dumps(body))])
+def test_a_copied_body_goes_on_to_the_last_bit(body, duplicate):
+    body.set_example_stiffness(1234)
+    body.set_example_weights([0.25, 0.75])
+    body.step(33)
+    other = duplicate(body)
+    assert other.state == body.state and other.time == body.time
+    body.step(33)
+    other.step(33)
+    assert hash_of([other]) == hash_of([body]) and other.weights.tolist() == [0.25, 0.75]
+
+
+def test_states_are_set_kept_and_refused(body, bundle, free_bundle):
+    body.step(10)
+    state = pickle.loads(pickle.dumps(body.state))
+    assert state == body.state and state == copy.deepcopy(state)
+    body.step(10)
+    after = hash_of([body])
+    body.state = state
+    body.step(10)
+    assert hash_of([body]) == after and state != body.state
+    with pytest.raises(exmat.InvalidArgument, match="another bundle"):
+        exmat.Body(exmat.Model(free_bundle)).state = state
+    with pytest.raises(exmat.InvalidArgument, match="time step"):
+        exmat.Body(exmat.Model(bundle, time_step=0.01, example_stiffness=1)).state = state
+    with pytest.raises(TypeError):
+        hash(state)
+
+
+def test_a_pickled_model_wants_the_same_bundle(model, bundle, free_bundle, tmp_path):
+    moved = tmp_path / "bar.h5"
+    moved.write_bytes(bundle.read_bytes())
+    for kept in (pickle.dumps(exmat.Model(moved)), pickle.dumps(exmat.Model.from_scene({"bundle": moved}))):
+        moved.write_bytes(bundle.read_bytes())
+        assert pickle.loads(kept).input_sha256 == model.input_sha256
+        moved.write_bytes(free_bundle.read_bytes())
+        with pytest.raises(exmat.BadInput, match="that was pickled"):
+            pickle.loads(kept)
+    assert copy.deepcopy(model) is model
+
+
+def test_given_weights_and_stiffness_are_of_the_body_alone(bundle):
+    def end(kappa, model):
+        body = exmat.Body(model)
+        if kappa is not None:
+            body.set_example_stiffness(kappa)
+        body.step(30)
+        return hash_of([body])
+
+    soft, stiff = (exmat.Model(bundle, gravity=(0, 0, -1), example_stiffness=kappa, example_bias=0.2) for kappa in (10, 4000))
+    assert end(4000, soft) == end(None, stiff) != end(None, soft)
+    body = exmat.Body(soft)
+    body.set_example_weights([0, 1])
+    body.step()
+    assert body.weights.tolist() == [0, 1]
+    body.set_example_weights(None)
+    body.step()
+    assert body.weights[0] > 0
