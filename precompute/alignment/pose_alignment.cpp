@@ -11,6 +11,7 @@
 #include "precompute/alignment/rigid_fit.h"
 #include "precompute/alignment/spectral_tree.h"
 #include "precompute/shape_space/transfer.h"
+
 namespace exmat::precompute {
 namespace {
 
