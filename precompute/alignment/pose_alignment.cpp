@@ -36,7 +36,7 @@ constexpr int kTurningRounds = 4;            // of landmarks on a body of revolu
 constexpr double kDoubtOfMap = 0.6, kDoubtOfResidual = 10, kDoubtOfLandmarks = 2;
 constexpr double kAmbiguous = 1.15;         // times the misfit that is taken, in a shared frame
 constexpr double kMirrorMargin = 0.5;       // of the best F, from which on a mirror image is believed
-constexpr double kMirrorWorthwhile = 0.05;  // F above which it is looked for
+constexpr double kMirrorWorthwhile = 0.03;  // F above which it is looked for
 constexpr double kMirrorResidual = 0.05;    // of a mirror image that fits
 constexpr double kSqueezed = 2;             // factor of a tet's volume that no pose has
 constexpr double kUncovered = 0.15;         // distance from the other surface, over the body's size

@@ -1,5 +1,6 @@
 #include "precompute/alignment/pose_alignment.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <vector>
 
@@ -198,7 +199,8 @@ TEST(AlignPose, APartThatIsMissingIsTold) {
     const AlignedShape a = aligned_shape(rest, 0, "rest");
     const double size = std::cbrt(tet_volumes(posed).sum() / tet_volumes(rest).sum());
     const auto found = align_pose(a, rest_symmetry(a), aligned_shape(test::posed(posed, pose), 0, "posed", {size}), {});
-    return std::max(found.squeezed_fraction / 0.025, found.uncovered / 0.05);  // over the limits of a doubt
+    // Over the limits of a warning. An arm that a bar lacks is drawn out of its side, which doubt tells.
+    return std::max({found.squeezed_fraction / 0.025, found.uncovered / 0.05, found.doubt / 0.5});
   };
   EXPECT_LE(told(whole, other), 0.5);
   EXPECT_GT(told(whole, no_arm(other)), 1);
@@ -255,7 +257,38 @@ TEST(AlignPose, LandmarksThatAreInterchangedAreTold) {
   std::swap(ids[0], ids[1]);  // at opposite ends
   const Correspondences wrong{at_vertices(test::box_corners(ours), ours), at_vertices(ids, theirs)};
   const Result result = align(bar(ours, 0.6, 1), test::posed(bar(theirs, 0.6, 2), pose), pose, {true, wrong, true});
+  // Found, named and left out; the six others and the surface say where the body is.
+  std::vector<std::size_t> left_out;
+  for (const LeftOutLandmark& landmark : result.alignment.left_out) {
+    left_out.push_back(landmark.index);
+    EXPECT_GT(landmark.missed, 1);
+  }
+  EXPECT_THAT(left_out, testing::UnorderedElementsAre(0, 1));
+  EXPECT_LE(result.error, 0.03);
+}
+
+// Three of eight are more than may be left out: doubt refuses.
+TEST(AlignPose, MoreLandmarksThanMayBeLeftOutAreDoubted) {
+  const std::array<int, 3> ours{12, 4, 3}, theirs{11, 3, 3};
+  const auto pose = test::bend(kLength, 1.57);
+  std::vector<std::int32_t> ids = test::box_corners(theirs);
+  std::rotate(ids.begin(), ids.begin() + 1, ids.begin() + 4);  // each at the opposite end, or across
+  const Correspondences wrong{at_vertices(test::box_corners(ours), ours), at_vertices(ids, theirs)};
+  const Result result = align(bar(ours, 0.6, 1), test::posed(bar(theirs, 0.6, 2), pose), pose, {true, wrong, true});
   EXPECT_GT(result.alignment.doubt, 1.2);
+}
+
+// Held at one end a bend turns the body as a whole. In its own frame what is found is that of the free frame.
+TEST(AlignPose, APoseHeldAtOneEndIsFoundInASharedFrame) {
+  for (const double angle : {0.8, 1.05, 1.57}) {
+    const auto pose = [&](const Eigen::Vector3d& x) {
+      const double radius = kLength / angle, turn = (x[0] + kLength / 2) / radius;
+      return Eigen::Vector3d((radius - x[2]) * std::sin(turn), x[1], radius - (radius - x[2]) * std::cos(turn));
+    };
+    const Result result = align(bar({12, 4, 3}, 0.6, 1), test::posed(bar({11, 3, 3}, 0.6, 2), pose), pose);
+    EXPECT_LE(result.error, 0.05) << angle;
+    EXPECT_FALSE(result.alignment.ambiguous) << angle;
+  }
 }
 
 TEST(RestSymmetry, OfBodiesWithKnownSymmetries) {
