@@ -1,18 +1,21 @@
 #!/usr/bin/python3
 """Alignments of bodies whose true poses are known, as tables: how many are wrong, and what doubt says of that.
 
-Usage: report.py PROGRAM [--jobs N] [--seed N] [--lines FILE.csv] [--page PAGE.md]    reads the lines if they are there; renews a page
+Usage: report.py PROGRAM [--jobs N] [--seed N] [--every N] [--lines FILE.csv] [--page PAGE.md] [--check]
+Reads the lines if they are there; renews a page; --every takes each Nth case of a kind; --check fails where the limits are not kept.
 """
 import argparse
 import csv
 import statistics
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 BEGIN, END = "<!-- truth: begin -->", "<!-- truth: end -->"
 KINDS = 12
 MEMBERS = "kind body pose verdict doubt residual ideal ours seconds truth message".split()
+MOST_REFUSED, MOST_ERROR = 0.05, 1.4  # share of cases; median of the error over that of the ideal projection
 CLASSES = [0, 0.25, 0.5, 0.8, 1.2, float("inf")]
 
 
@@ -21,7 +24,7 @@ def lines_of(arguments):
         return arguments.lines.read_text()
 
     def run(kind):
-        command = [arguments.program, "--seed", str(arguments.seed), "--kind", str(kind)]
+        command = [arguments.program, "--seed", str(arguments.seed), "--every", str(arguments.every), "--kind", str(kind)]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout
 
     with ThreadPoolExecutor(arguments.jobs) as pool:
@@ -66,20 +69,34 @@ def tables(cases):
     return "\n".join(lines) + "\n"
 
 
+def broken_limits(cases):
+    silent = [f"silently wrong: {c['kind']}, {c['body']}, {c['pose']}" for c in cases if c["wrong"] and c["verdict"] == "good"]
+    refused = sum(not c["wrong"] and c["verdict"] == "refused" for c in cases) / len(cases)
+    error = statistics.median(c["ours"] / c["ideal"] for c in cases if c["verdict"] != "refused")
+    return (silent + [f"right ones refused: {refused:.3f} of all, at most {MOST_REFUSED}"] * (refused > MOST_REFUSED) +
+            [f"median error: {error:.2f}, at most {MOST_ERROR}"] * (error > MOST_ERROR))
+
+
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("program")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--every", type=int, default=1)
+    parser.add_argument("--check", action="store_true")
     parser.add_argument("--lines", type=Path)
     parser.add_argument("--page", type=Path)
     arguments = parser.parse_args()
-    text = tables(cases_of(lines_of(arguments)))
+    cases = cases_of(lines_of(arguments))
+    text = tables(cases)
     print(text)
     if arguments.page:
         page = arguments.page.read_text()
         arguments.page.write_text(page[:page.index(BEGIN) + len(BEGIN)] + "\n" + text + page[page.index(END):])
+    broken = broken_limits(cases) if arguments.check else []
+    print("\n".join(broken))
+    return 1 if broken else 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())
