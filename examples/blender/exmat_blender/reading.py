@@ -1,4 +1,5 @@
 """From Blender's data to arrays."""
+import json
 import os
 
 import bpy
@@ -76,8 +77,6 @@ def poses_of(obj):
 
 
 def muted_by_bake(obj):
-    import json
-
     return set(json.loads(obj.exmat.kept).get("muted", [])) if obj.exmat.kept else set()
 
 
