@@ -1,6 +1,7 @@
 """From what the panel says to the members of an asset and of a scene (schemas/asset.json, schemas/scene.json)."""
 import dataclasses
 import hashlib
+import json
 from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
@@ -11,6 +12,7 @@ CLAMP = "_FIXED"
 RESERVED = {".", "..", "gram", "h0", "hq"}
 LONGEST = 64  # bytes of a name
 STILL = 1e-6  # of the size: a pose that moves no vertex farther shows the rest shape
+ROUNDED = 1e-5  # of the scale
 SPRING = 0.05  # of Young's modulus times size: a spring that is stiff beside the body
 
 
@@ -25,7 +27,7 @@ class Region:
 
 @dataclasses.dataclass
 class Shape:
-    """A mesh object as the body's frame has it [m]."""
+    """A mesh object, in local coordinates or as the body's frame has it [m]."""
 
     name: str
     vertices: np.ndarray  #: (v, 3) at rest
@@ -33,6 +35,10 @@ class Shape:
     poses: Dict[str, np.ndarray] = dataclasses.field(default_factory=dict)  #: shape keys: (v, 3)
     clamp: Optional[np.ndarray] = None  #: (v,) bool; none: a free body
     regions: List[Region] = dataclasses.field(default_factory=list)
+
+    def mapped(self, to):
+        """With vertices to(vertices)."""
+        return dataclasses.replace(self, vertices=to(self.vertices), poses={name: to(pose) for name, pose in self.poses.items()})
 
     @property
     def size(self):
@@ -120,18 +126,23 @@ def scene_of(shape, settings, bundle):
     return scene
 
 
-def fingerprint(shape):
-    """Of what a bundle was made of: another one means that it has to be made again."""
+def made_of(shape, stretch):
+    """What a bundle is made of, to be kept with it: a digest of the object in local coordinates, and how it is scaled (3, 3)."""
     digest = hashlib.sha256()
-    grain = 1e-5 * (shape.size or 1)
     for array in (shape.vertices, *shape.poses.values()):
-        digest.update(np.round(array / grain).astype("<i8").tobytes())
+        digest.update(np.ascontiguousarray(array, "<f8").tobytes())
     digest.update(np.ascontiguousarray(shape.triangles, "<i8").tobytes())
-    digest.update(b"" if shape.clamp is None else shape.clamp.astype("u1").tobytes())
+    digest.update(b"free" if shape.clamp is None else shape.clamp.astype("u1").tobytes())
     for region in shape.regions:
         digest.update(repr((region.name, sorted(region.examples))).encode() + region.marks.astype("u1").tobytes())
     digest.update("\0".join(shape.poses).encode())
-    return digest.hexdigest()
+    return json.dumps({"shape": digest.hexdigest(), "stretch": np.asarray(stretch).ravel().tolist()})
+
+
+def is_made_of(kept, shape, stretch):
+    """Whether it is what was kept; the scale to single precision, since objects may be moved and turned."""
+    now, then = json.loads(made_of(shape, stretch)), json.loads(kept)
+    return now["shape"] == then["shape"] and np.abs(np.subtract(now["stretch"], then["stretch"])).max() <= ROUNDED * np.abs(stretch).max()
 
 
 def notes(shape):

@@ -2,7 +2,6 @@
 import json
 
 import bpy
-import numpy as np
 from mathutils import Matrix
 
 from . import playing, reading
@@ -11,6 +10,7 @@ from .fault import Fault
 from .point_cache import write_pc2
 
 MODIFIER = "exmat"
+PLACE = ("location", "rotation_euler", "rotation_quaternion", "rotation_axis_angle", "scale")
 KEY = reading.OWN_KEY + " {:03d}"
 
 
@@ -44,11 +44,11 @@ def bake_cache(obj, scene):
     except OSError as error:
         raise Fault(f"{path} cannot be written: {error.strerror}.") from None
     modifier = obj.modifiers.new(MODIFIER, "MESH_CACHE")
+    with bpy.context.temp_override(object=obj):
+        bpy.ops.object.modifier_move_to_index(modifier=MODIFIER, index=0)
     modifier.cache_format = "PC2"
     modifier.filepath = path if obj.exmat.cache and not obj.exmat.cache.startswith("//") else bpy.path.relpath(path)
     modifier.frame_start = scene.frame_start
-    while obj.modifiers.find(MODIFIER) > 0:
-        obj.modifiers.move(obj.modifiers.find(MODIFIER), obj.modifiers.find(MODIFIER) - 1)
     return path
 
 
@@ -85,7 +85,7 @@ def bake_keys(obj, scene):
             key.value = value
             key.keyframe_insert("value", frame=first + place)
     if motions:
-        keep["matrix"] = [list(row) for row in obj.matrix_world]
+        keep["place"] = {name: list(getattr(obj, name)) for name in PLACE}
         keep["mode"] = obj.rotation_mode
         keep["action"] = new_action(obj, f"{obj.name} exmat motion")
         obj.rotation_mode = "QUATERNION"
@@ -139,10 +139,11 @@ def clear(obj):
                 keys.key_blocks[name].mute = False
         if keep["bare"]:
             obj.shape_key_clear()
-    if "matrix" in keep:
+    if "place" in keep:
         put_back(obj, keep["action"])
         obj.rotation_mode = keep["mode"]
-        obj.matrix_world = Matrix(keep["matrix"])
+        for name, values in keep["place"].items():
+            setattr(obj, name, values)
 
 
 def put_back(owner, name):

@@ -2,7 +2,7 @@
 import bpy
 
 from . import reading
-from .asset import asset_of, fingerprint, notes
+from .asset import asset_of, made_of, notes
 from .fault import Fault
 
 EVERY = 0.2  # s
@@ -31,13 +31,13 @@ def start(obj, scene):
         raise Fault("It is being made already.")
     exmat = reading.exmat()
     out = reading.bundle_of(obj)
-    shape = reading.shape_of(obj, reading.frame_of(obj, scene))
-    asset = asset_of(shape, reading.body_settings(obj))
+    shape, frame = reading.shape_of(obj), reading.frame_of(obj, scene)
+    asset = asset_of(shape.mapped(frame.to_body), reading.body_settings(obj))
     try:
         job = exmat.precompute.start_bundle(asset, out, program=reading.program())
     except (exmat.Error, OSError) as error:
         raise Fault(str(error)) from None
-    running[obj.name] = Running(job, fingerprint(shape), notes(shape))
+    running[obj.name] = Running(job, made_of(shape, frame.stretch), notes(shape))
     say(obj, "Precompute has begun.")
     if not bpy.app.timers.is_registered(look):
         bpy.app.timers.register(look, first_interval=EVERY)

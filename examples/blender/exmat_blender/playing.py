@@ -4,7 +4,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from . import jobs, reading
-from .asset import fingerprint, scene_of
+from .asset import is_made_of, scene_of
 from .fault import Fault
 from .player import Player
 
@@ -19,11 +19,12 @@ class Session:
         reading.check_object(obj)
         exmat = reading.exmat()
         self.frame = reading.frame_of(obj, scene)
-        shape = reading.shape_of(obj, self.frame)
+        local = reading.shape_of(obj)
+        shape = local.mapped(self.frame.to_body)
         bundle = reading.bundle_of(obj)
         if not obj.exmat.made_of:
             raise Fault("There is no bundle yet: press Precompute.")
-        if fingerprint(shape) != obj.exmat.made_of:
+        if not is_made_of(obj.exmat.made_of, local, self.frame.stretch):
             raise Fault("The mesh, its scale, shape keys or groups have changed since the bundle was made: press Precompute.")
         settings = reading.motion_settings(obj, scene, self.frame)
         self.scene = scene_of(shape, settings, bundle)
@@ -43,8 +44,7 @@ class Session:
 def start(obj, scene):
     """Raises Fault."""
     stop(obj)
-    if scene.frame_current != scene.frame_start:
-        scene.frame_set(scene.frame_start)
+    scene.frame_set(scene.frame_start)
     session = playing[obj.name] = Session(obj, scene)
     try:
         show(obj, session.go_to(obj, scene.frame_current))

@@ -93,15 +93,14 @@ def weights_of(obj, name):
     return weights
 
 
-def shape_of(obj, frame):
-    """The body as the frame has it. Raises Fault."""
+def shape_of(obj):
+    """The object in local coordinates. Raises Fault."""
     check_object(obj)
     settings, mesh = obj.exmat, obj.data
     mesh.calc_loop_triangles()
     triangles = np.empty(3 * len(mesh.loop_triangles), "i4")
     mesh.loop_triangles.foreach_get("vertices", triangles)
-    shape = Shape(obj.name, frame.to_body(rest_of(obj)), triangles.reshape(-1, 3).astype("i8"),
-                  {name: frame.to_body(pose) for name, pose in poses_of(obj).items()})
+    shape = Shape(obj.name, rest_of(obj), triangles.reshape(-1, 3).astype("i8"), poses_of(obj))
     if settings.clamp:
         shape.clamp = weights_of(obj, settings.clamp) > INSIDE
     for row in settings.regions:

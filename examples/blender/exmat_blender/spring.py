@@ -1,7 +1,7 @@
 """Damped springs that draw points of a body to targets."""
 import numpy as np
 
-FASTEST = 0.15  # of the spring's frequency times the time step: beyond it a force that is taken from the step before grows
+FASTEST = 0.25  # of the spring's frequency times the time step: beyond it a force that is taken from the step before grows
 
 
 class Spring:
