@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Precomputes the bundle of an example's scene, steps it and compares what came out with what is expected.
 #   examples/tools/run_scene.sh SCENE.json OUTPUT_FOLDER [FOLDER_OF_PROGRAMS]    (03_car_wall/scene_arc_paper.json)
-# asset_NAME.json and expected_NAME.json lie beside scene_NAME.json; an example of one scene leaves out _NAME.
+# asset_NAME.json and expected_NAME.json lie beside scene_NAME.json; an example of one scene leaves out _NAME. Where there is a surface and
+# no asset, the bundle is made from the surface, and the motion exported beside the trajectory, with eight morph targets.
 set -euo pipefail
 here=$(cd "$(dirname "$0")" && pwd)
 source=$1
@@ -13,8 +14,16 @@ variant=${variant#scene}
 
 member() { sed -n "s/.*\"$1\": *\"\([^\"]*\)\".*/\1/p" "$source"; }
 
+asset=$folder/asset$variant.json
+surface=$(find "$folder" -maxdepth 1 -name '*.glb')
+[ -e "$asset" ] || asset=$surface
+
 mkdir -p "$output"
 cp "$source" "$output/scene$variant.json"
-"$programs/exmat-precompute" bundle "$folder/asset$variant.json" --scene "$source" -o "$output/$(member bundle)"
+"$programs/exmat-precompute" bundle "$asset" --scene "$source" -o "$output/$(member bundle)"
 "$programs/exmat-runtime" run "$output/scene$variant.json"
+if [ "$asset" = "$surface" ]; then
+  trajectory=$output/$(member trajectory)
+  "$programs/exmat-runtime" export "$trajectory" -o "${trajectory%.h5}.glb" --targets 8
+fi
 "$here/expect.py" "$folder/expected$variant.json" "$output/$(member trajectory)"

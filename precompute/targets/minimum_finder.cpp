@@ -1,5 +1,6 @@
 #include "precompute/targets/minimum_finder.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "common/core/progress.h"
@@ -15,17 +16,19 @@ MinimumFinder::Minimum MinimumFinder::lowest(const Eigen::VectorXd& weights, con
                                              runtime::TargetSolver::Workspace& workspace) const {
   Minimum lowest{Eigen::VectorXd::Constant(target_.dimension(), std::numeric_limits<double>::quiet_NaN())};
   bool found = false;
-  for (Eigen::VectorXd y : starts) {
+  const auto descend = [&](Eigen::VectorXd y) {
     const auto report = target_.solve(weights, workspace, y);
     const bool solved =
         report.status == runtime::NewtonStatus::kConverged || report.residual <= kResidual * same_distance_;
-    if (!solved) continue;
+    if (!solved) return;
     const bool same = found && (y - lowest.y).norm() <= same_distance_;
     lowest.only = lowest.only && (same || !found);
     if (!found || (!same && target_.energy(weights, y, workspace) < target_.energy(weights, lowest.y, workspace)))
       lowest.y = y;
     found = true;
-  }
+  };
+  std::ranges::for_each(starts, descend);
+  if (!found) descend(blend(target_, weights));
   return lowest;
 }
 

@@ -10,7 +10,8 @@
 
 namespace exmat::precompute {
 
-/// p*(w) in the coordinates y of TargetSolver: of the minima that several starts lead to, the lowest.
+/// p*(w) in the coordinates y of TargetSolver: of the minima that several starts lead to, the lowest; from the blend of
+/// the examples where none leads to one.
 class MinimumFinder {
  public:
   using Starts = std::function<std::vector<Eigen::VectorXd>(const Eigen::VectorXd& weights, Eigen::Index row)>;

@@ -26,7 +26,7 @@ constexpr int kFirstDegree = 4, kDegreeStep = 2;
 constexpr int kDegreesPerGrid = 2;       // degrees that are fitted to the same nodes
 constexpr double kOversampling = 1.25;   // degree of the nodes over that of the polynomial
 constexpr int kChecksPerDimension = 64;  // weights on every edge; twice as many on every face
-constexpr Eigen::Index kEveryStart = 4;  // every fourth of them is solved from every example
+constexpr Eigen::Index kEveryStart = 4;  // every fourth weight is solved from every start
 constexpr double kMargin = 0.7;          // of the tolerance: more may turn up between the checks
 constexpr double kSame = 0.1;            // of the tolerance: answers nearer to each other are one minimum
 
@@ -87,9 +87,10 @@ TargetSamples TableBuilder::solve_checks() {
 
 TargetSamples TableBuilder::solve_nodes(int degree) {
   const RowMatrix weights = interpolation_nodes(BernsteinBasis(degree, static_cast<int>(examples_)).exponents());
-  const auto starts = [&](const Eigen::VectorXd& w, Eigen::Index) {
-    std::vector<Eigen::VectorXd> from{blend(target_, w)};
+  const auto starts = [&](const Eigen::VectorXd& w, Eigen::Index row) {
+    std::vector<Eigen::VectorXd> from;
     if (former_) from.emplace_back(error_.decode(*former_, w.transpose()).row(0).transpose());
+    if (!former_ || row % kEveryStart == 0) from.push_back(blend(target_, w));
     return from;
   };
   return {weights, finder_.find(weights, starts, "targets of the table")};

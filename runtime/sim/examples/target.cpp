@@ -67,6 +67,10 @@ std::optional<Complaint> inverted_element(const ExampleData& example, const Eige
   return std::nullopt;
 }
 
+// Of whole meshes, where a Hessian costs many gradients.
+constexpr Eigen::Index kManyElements = 500;
+constexpr double kManyChordRate = 0.6, kManyChordSteps = 16;
+
 }  // namespace
 
 void TargetSolver::set_quadratic(const CubatureData& cubature, const Eigen::VectorXd& displacement_gradients) {
@@ -202,7 +206,12 @@ NewtonReport TargetSolver::solve(const Eigen::VectorXd& weights, Workspace& work
   double scale = 0;
   for (Eigen::Index k = 0; k < examples(); ++k) scale += weights[k] * centres_[k].squaredNorm();
   Problem problem(potential_, blended, scale, workspace);
-  return newton_minimise(problem, {max_iterations, force_tolerance_}, y, workspace.newton);
+  NewtonSettings settings{max_iterations, force_tolerance_};
+  if (potential_.elements() > kManyElements) {
+    settings.chord_rate = kManyChordRate;
+    settings.chord_steps = kManyChordSteps;
+  }
+  return newton_minimise(problem, settings, y, workspace.newton);
 }
 
 double TargetSolver::energy(const Eigen::VectorXd& weights, const Eigen::VectorXd& y,

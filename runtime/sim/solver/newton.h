@@ -17,6 +17,9 @@ namespace exmat::runtime {
 struct NewtonSettings {
   int max_iterations = 200;
   double tolerance = 1e-6;  ///< |gradient| <= tolerance * scale of the evaluation
+  /// An earlier factor serves while an iteration leaves at most this share of the residual, and so many more are
+  /// expected at most: what a new Hessian costs, in iterations without one.
+  double chord_rate = 0.25, chord_steps = 4;
 };
 
 /// Faults that a test plants, to see that it notices them; no file sets one.
@@ -75,8 +78,6 @@ namespace detail {
 
 inline constexpr int kShifts = 12;
 inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
-inline constexpr double kChordRate = 0.25;   // of the residual from one iteration to the next
-inline constexpr double kChordSteps = 4;     // that cost less than a new Hessian
 
 inline bool factorise(NewtonWorkspace& workspace, NewtonReport& report) {
   const Eigen::Index size = workspace.hessian.rows();
@@ -143,9 +144,9 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
 }
 
 /// Whether the factor at hand brings the residual to its limit for less than a new Hessian costs.
-inline bool factor_serves(double before, double now, double limit) {
+inline bool factor_serves(const NewtonSettings& settings, double before, double now, double limit) {
   const double rate = now / before;
-  return rate <= kChordRate && std::log(now / limit) <= -kChordSteps * std::log(rate);
+  return rate <= settings.chord_rate && std::log(now / limit) <= -settings.chord_steps * std::log(rate);
 }
 
 }  // namespace detail
@@ -230,7 +231,8 @@ NewtonReport newton_minimise(Problem& problem, const NewtonSettings& settings, E
     const double before = report.residual;
     report.residual = gradient.norm();
     const double next_limit = settings.tolerance * here.force_scale;
-    state = detail::factor_serves(before, report.residual, next_limit) ? Hessian::kFactorised : Hessian::kStale;
+    state =
+        detail::factor_serves(settings, before, report.residual, next_limit) ? Hessian::kFactorised : Hessian::kStale;
   }
 }
 
