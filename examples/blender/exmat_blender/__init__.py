@@ -15,9 +15,9 @@ bl_info = {
 
 
 def modules():
-    from . import jobs, operators, panel, playing, properties
+    from . import importing, jobs, operators, panel, playing, properties
 
-    return properties, operators, panel, playing, jobs
+    return properties, operators, panel, playing, importing, jobs
 
 
 def register():
