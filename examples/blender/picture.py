@@ -1,6 +1,6 @@
 """Draws the pictures of the page: the panel beside a figure that an empty draws, and the motion as it was baked.
 
-Usage: xvfb-run -a -s "-screen 0 1600x900x24" blender --factory-startup --window-geometry 0 0 1600 900 --python picture.py -- BUILD_FOLDER FOLDER
+Usage: xvfb-run -a -s "-screen 0 1360x860x24" blender --factory-startup --window-geometry 0 0 1360 860 --python picture.py -- BUILD_FOLDER FOLDER
 """
 import sys
 import traceback
@@ -111,4 +111,5 @@ def after_start():
     bpy.ops.wm.quit_blender()
 
 
+bpy.context.preferences.view.show_splash = False
 bpy.app.timers.register(after_start, first_interval=1)

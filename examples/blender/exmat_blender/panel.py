@@ -58,9 +58,10 @@ class EXMAT_PT_pulls(Child, bpy.types.Panel):
             row.prop(pull, "target", text="")
             row.prop_search(pull, "group", obj, "vertex_groups", text="")
             row.operator("exmat.remove_pull", text="", icon="X").index = number
-            row = layout.row(align=True)
-            row.prop(pull, "strength")
-            row.prop(pull, "damping")
+            column = layout.column(align=True)
+            column.use_property_split = True
+            column.prop(pull, "strength")
+            column.prop(pull, "damping")
         layout.operator("exmat.add_pull", icon="EMPTY_AXIS")
 
 
