@@ -39,8 +39,8 @@ def main():
     figure.exmat.bias = 0
     bpy.ops.exmat.precompute(wait=True)
     scene.cursor.location = HAND
-    bpy.ops.exmat.add_pull()
-    empty = figure.exmat.pulls[0].target
+    bpy.ops.exmat.add_grip()
+    empty = figure.exmat.grips[0].target
     for frame, place in ((1, HAND), (30, AWAY), (60, AWAY)):
         empty.location = place
         empty.keyframe_insert("location", frame=frame)

@@ -36,10 +36,9 @@ def calls(model):
     body = exmat.Body(model)
     body.step(1000)
     step = best(lambda: body.step(1000), 20) / 1000
-    rows = [("a step, of 1,000 in one call", step)]
-    rows += [(f"`body.{name}`, a call without a step" if name == "step(0)" else f"`body.{name}`", best(work, 20, 10000))
-             for name, work in (("step(0)", lambda: body.step(0)), ("q", lambda: body.q), ("weights", lambda: body.weights),
-                                ("energies", lambda: body.energies), ("report", lambda: body.report))]
+    works = (("step(0)`, a call without a step", lambda: body.step(0)), ("q`", lambda: body.q), ("weights`", lambda: body.weights),
+             ("energies`", lambda: body.energies), ("report`", lambda: body.report))
+    rows = [("a step, of 1,000 in one call", step)] + [(f"`body.{name}", best(work, 20, 10000)) for name, work in works]
     return rows
 
 
@@ -81,8 +80,8 @@ def worlds(build, folder, scene):
 
 
 def table(rows):
-    lines = ["| | time [us] |", "| --- | ---: |"]
-    return "\n".join(lines + [f"| {what} | {1e6 * seconds:,.3g} |" if seconds < 1e-4 else f"| {what} | {1e6 * seconds:,.0f} |" for what, seconds in rows])
+    lines = [f"| {what} | {1e6 * seconds:,.3g} |" for what, seconds in rows]
+    return "\n".join(["| | time [us] |", "| --- | ---: |", *lines])
 
 
 def main():

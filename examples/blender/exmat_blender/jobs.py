@@ -1,4 +1,6 @@
 """Precompute in the background: one job an object, asked now and then how far it is."""
+import time
+
 import bpy
 
 from . import reading
@@ -14,6 +16,7 @@ class Running:
 
     def __init__(self, job, made_of, remarks):
         self.job, self.made_of, self.remarks = job, made_of, remarks
+        self.begin = time.monotonic()
 
 
 def say(obj, message, failed=False):
@@ -52,21 +55,14 @@ def look():
         elif now.job.poll():
             finish(name)
         elif now.job.latest is not None:
-            say(obj, progress_of(now.job.latest))
+            say(obj, progress_of(now))
     return EVERY if running else None
 
 
-def progress_of(latest):
-    share = f": {100 * latest.done / latest.total:.0f} %" if latest.total else ""
-    return f"{latest.stage}{share}, {latest.elapsed_seconds:.0f} s"
-
-
-def fraction(name):
-    """Of the stage that is being worked on; none without a job."""
-    if name not in running:
-        return None
-    latest = running[name].job.latest
-    return latest.done / latest.total if latest is not None and latest.total else 0.0
+def progress_of(now):
+    latest = now.job.latest
+    share = f": {100 * min(latest.done / latest.total, 1):.0f} %" if latest.total else ""
+    return f"{latest.stage}{share}; {time.monotonic() - now.begin:.0f} s in all"
 
 
 def finish(name):

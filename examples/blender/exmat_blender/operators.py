@@ -126,32 +126,32 @@ class EXMAT_OT_remove_region(Worded, bpy.types.Operator):
         obj.exmat.regions.remove(self.index)
 
 
-class EXMAT_OT_add_pull(Worded, bpy.types.Operator):
+class EXMAT_OT_add_grip(Worded, bpy.types.Operator):
     """Add an empty at the 3D cursor that draws the nearest vertex"""
 
-    bl_idname, bl_label = "exmat.add_pull", "Add Empty"
+    bl_idname, bl_label = "exmat.add_grip", "Add Empty"
 
     def work(self, obj, context):
-        empty = bpy.data.objects.new(f"{obj.name} pull", None)
+        empty = bpy.data.objects.new(f"{obj.name} grip", None)
         empty.empty_display_type = "SPHERE"
         empty.empty_display_size = 0.1 * max(obj.dimensions)
         empty.location = context.scene.cursor.location
         context.collection.objects.link(empty)
-        obj.exmat.pulls.add().target = empty
+        obj.exmat.grips.add().target = empty
 
 
-class EXMAT_OT_remove_pull(Worded, bpy.types.Operator):
-    """Remove this pull; the empty stays"""
+class EXMAT_OT_remove_grip(Worded, bpy.types.Operator):
+    """Remove this grip; the empty stays"""
 
-    bl_idname, bl_label = "exmat.remove_pull", "Remove Pull"
+    bl_idname, bl_label = "exmat.remove_grip", "Remove Grip"
     index: bpy.props.IntProperty()
 
     def work(self, obj, context):
-        obj.exmat.pulls.remove(self.index)
+        obj.exmat.grips.remove(self.index)
 
 
 CLASSES = (EXMAT_OT_precompute, EXMAT_OT_cancel, EXMAT_OT_play, EXMAT_OT_stop, EXMAT_OT_bake_cache, EXMAT_OT_bake_keys,
-           EXMAT_OT_clear, EXMAT_OT_add_region, EXMAT_OT_remove_region, EXMAT_OT_add_pull, EXMAT_OT_remove_pull)
+           EXMAT_OT_clear, EXMAT_OT_add_region, EXMAT_OT_remove_region, EXMAT_OT_add_grip, EXMAT_OT_remove_grip)
 
 
 def register():

@@ -23,7 +23,7 @@ class EXMAT_PT_body(bpy.types.Panel):
         layout.use_property_split = True
         if obj.name in jobs.running:
             row = layout.row(align=True)
-            row.label(text=f"Precompute: {100 * jobs.fraction(obj.name):.0f} % of", icon="TIME")
+            row.label(text="Precompute is running", icon="TIME")
             row.operator("exmat.cancel", icon="CANCEL")
         else:
             layout.operator("exmat.precompute", icon="MOD_PHYSICS")
@@ -47,22 +47,22 @@ class Child:
     bl_options = {"DEFAULT_CLOSED"}
 
 
-class EXMAT_PT_pulls(Child, bpy.types.Panel):
+class EXMAT_PT_grips(Child, bpy.types.Panel):
     bl_label = "Empties"
     bl_options = set()
 
     def draw(self, context):
         obj, layout = context.object, self.layout
-        for number, pull in enumerate(obj.exmat.pulls):
+        for number, grip in enumerate(obj.exmat.grips):
             row = layout.row(align=True)
-            row.prop(pull, "target", text="")
-            row.prop_search(pull, "group", obj, "vertex_groups", text="")
-            row.operator("exmat.remove_pull", text="", icon="X").index = number
+            row.prop(grip, "target", text="")
+            row.prop_search(grip, "group", obj, "vertex_groups", text="")
+            row.operator("exmat.remove_grip", text="", icon="X").index = number
             column = layout.column(align=True)
             column.use_property_split = True
-            column.prop(pull, "strength")
-            column.prop(pull, "damping")
-        layout.operator("exmat.add_pull", icon="EMPTY_AXIS")
+            column.prop(grip, "strength")
+            column.prop(grip, "damping")
+        layout.operator("exmat.add_grip", icon="EMPTY_AXIS")
 
 
 class EXMAT_PT_examples(Child, bpy.types.Panel):
@@ -107,7 +107,7 @@ class EXMAT_PT_motion(Child, bpy.types.Panel):
         self.layout.prop(given, "cache")
 
 
-CLASSES = (EXMAT_PT_body, EXMAT_PT_pulls, EXMAT_PT_examples, EXMAT_PT_material, EXMAT_PT_motion)
+CLASSES = (EXMAT_PT_body, EXMAT_PT_grips, EXMAT_PT_examples, EXMAT_PT_material, EXMAT_PT_motion)
 
 
 def register():

@@ -90,7 +90,7 @@ class Player:
         for step in range(self.steps):
             self.body.clear_forces()
             for spring, then, velocity in zip(self.springs, before, velocities):
-                spring.pull(self.body, then + (step + 1) * dt * velocity, velocity, dt)
+                spring.act(self.body, then + (step + 1) * dt * velocity, velocity, dt)
             self.body.step(1)
         self.body.clear_forces()
         self._targets = targets

@@ -13,7 +13,7 @@ class ExmatRegion(bpy.types.PropertyGroup):
     key: StringProperty(name="Shape Key", description="Example that acts there, and nowhere else")
 
 
-class ExmatPull(bpy.types.PropertyGroup):
+class ExmatGrip(bpy.types.PropertyGroup):
     """An empty that draws a point of the body."""
 
     target: PointerProperty(name="Empty", type=bpy.types.Object, description="The body is drawn to it by a damped spring")
@@ -28,7 +28,7 @@ class ExmatSettings(bpy.types.PropertyGroup):
     bundle: StringProperty(name="Bundle", subtype="FILE_PATH", default="", description="File of the bundle; empty: named after the object, beside the .blend file")
     clamp: StringProperty(name="Clamp", description="Vertex group that never moves (weight above 0.5); empty: a free body")
     regions: CollectionProperty(type=ExmatRegion)
-    pulls: CollectionProperty(type=ExmatPull)
+    grips: CollectionProperty(type=ExmatGrip)
     cells: IntProperty(name="Tets", default=2000, min=50, max=2000000, soft_max=20000, description="About how many tets enclose the surface")
     modes: IntProperty(name="Modes", default=30, min=1, max=10000, soft_max=100, description="How many shapes the body moves in")
     training: EnumProperty(name="Training", default="none", items=(
@@ -65,7 +65,7 @@ class ExmatPreferences(bpy.types.AddonPreferences):
         self.layout.prop(self, "program")
 
 
-CLASSES = (ExmatRegion, ExmatPull, ExmatSettings, ExmatPreferences)
+CLASSES = (ExmatRegion, ExmatGrip, ExmatSettings, ExmatPreferences)
 
 
 def register():

@@ -138,13 +138,13 @@ def springs_of(obj, shape, frame):
     """Springs of a Player, where the empties are now."""
     stiffness = spring_stiffness(shape, body_settings(obj))
     springs = []
-    for row in obj.exmat.pulls:
+    for row in obj.exmat.grips:
         if row.target is None:
-            raise Fault("A pull has no empty: choose one, or remove it.")
+            raise Fault("A grip has no empty: choose one, or remove it.")
         if row.group:
             marks = weights_of(obj, row.group) > INSIDE
             if not marks.any():
-                raise Fault(f"The vertex group '{row.group}' of a pull is empty.")
+                raise Fault(f"The vertex group '{row.group}' of a grip is empty.")
             points = shape.vertices[marks]
         else:
             place = frame.point_to_body(row.target.matrix_world.translation)
@@ -155,7 +155,7 @@ def springs_of(obj, shape, frame):
 
 def targets_of(obj, frame):
     """Where the empties are [m]."""
-    return [frame.point_to_body(row.target.matrix_world.translation) for row in obj.exmat.pulls if row.target is not None]
+    return [frame.point_to_body(row.target.matrix_world.translation) for row in obj.exmat.grips if row.target is not None]
 
 
 def file_of(obj, given, ending):

@@ -30,7 +30,7 @@ class Spring:
         """Forgets how fast the points move: after the body's state was set."""
         self._place = None
 
-    def pull(self, body, target, velocity, dt):
+    def act(self, body, target, velocity, dt):
         """Adds the force of this step: `target` [m], its `velocity` [m/s], `dt` [s] since the last."""
         place = self.middle(body)
         moving = np.zeros(3) if self._place is None else (place - self._place) / dt

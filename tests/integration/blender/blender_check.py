@@ -97,8 +97,8 @@ class Motion(unittest.TestCase):
         scene = fresh(frames=FRAMES)
         obj = made(bar(), clamp="clamp")
         scene.cursor.location = (3, 0, 0)
-        bpy.ops.exmat.add_pull()
-        empty = obj.exmat.pulls[0].target
+        bpy.ops.exmat.add_grip()
+        empty = obj.exmat.grips[0].target
         bpy.context.view_layer.update()
         empty.keyframe_insert("location", frame=1)
         empty.location = (2.5, 1.0, 1.0)
