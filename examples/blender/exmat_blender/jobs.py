@@ -77,6 +77,8 @@ def finish(name):
         return
     if obj is not None:
         obj.exmat.made_of = now.made_of
+        if bpy.ops.ed.undo_push.poll():
+            bpy.ops.ed.undo_push(message="Precompute")  # what is undone later leaves the bundle known
         say(obj, " ".join([f"The bundle has {report.sizes.modes} modes.", *now.remarks, *now.job.warnings]))
 
 

@@ -283,6 +283,65 @@ class Mistakes(unittest.TestCase):
         bpy.context.scene.frame_set(3)
         self.assertFalse(playing.playing)
 
+    def test_what_was_animated_is_so_again(self):
+        scene = fresh(frames=10)
+        obj = bar()
+        key = obj.data.shape_keys.key_blocks["bow"]
+        for frame, value in ((1, 0.0), (10, 1.0)):
+            key.value = value
+            key.keyframe_insert("value", frame=frame)
+            obj.location.x = value
+            obj.keyframe_insert("location", frame=frame)
+        made(obj, clamp="")
+        scene.frame_set(10)
+        before, actions = evaluated(obj), (obj.animation_data.action, obj.data.shape_keys.animation_data.action)
+        bpy.ops.exmat.play()
+        bpy.ops.exmat.stop()
+        scene.frame_set(10)
+        self.assertFalse(np.any(evaluated(obj) - before))
+        bpy.ops.exmat.bake_keys()
+        bpy.ops.exmat.bake_keys()
+        self.assertTrue(key.mute)
+        self.assertEqual(len(bpy.data.actions), 4)
+        bpy.ops.exmat.clear()
+        scene.frame_set(10)
+        self.assertEqual((obj.animation_data.action, obj.data.shape_keys.animation_data.action), actions)
+        self.assertFalse(np.any(evaluated(obj) - before))
+        self.assertEqual(len(bpy.data.actions), 2)
+
+    def test_what_cannot_be_keyed(self):
+        fresh(frames=5)
+        obj = made(bar(), clamp="")
+        twin = bpy.data.objects.new("twin", obj.data)
+        bpy.context.collection.objects.link(twin)
+        self.says("Other objects share the mesh", bpy.ops.exmat.bake_keys)
+        bpy.data.objects.remove(twin)
+        obj.constraints.new("LIMIT_LOCATION")
+        self.says("has constraints", bpy.ops.exmat.bake_keys)
+        self.assertEqual(bpy.ops.exmat.bake_cache(), {"FINISHED"})
+        obj.constraints.clear()
+        parent = bpy.data.objects.new("parent", None)
+        bpy.context.collection.objects.link(parent)
+        obj.parent, parent.scale, obj.rotation_euler = parent, (1, 2, 1), (0, 0, 0.5)
+        bpy.context.view_layer.update()
+        bpy.ops.exmat.precompute(wait=True)
+        self.says("sheared by its parent", bpy.ops.exmat.bake_keys)
+        self.assertEqual(bpy.ops.exmat.bake_cache(), {"FINISHED"})
+
+    def test_undo_leaves_the_bundle_known(self):
+        fresh(frames=5)
+        bpy.ops.ed.undo_push(message="begin")
+        obj = made(bar())
+        obj.exmat.bias = 0.1
+        bpy.ops.ed.undo_push(message="bias")
+        bpy.ops.ed.undo()
+        self.assertAlmostEqual(bpy.data.objects["bar"].exmat.bias, 0.5)
+        self.assertEqual(bpy.ops.exmat.play(), {"FINISHED"})
+        bpy.context.object.name = "other"
+        bpy.context.scene.frame_set(3)
+        bpy.ops.exmat.stop()
+        self.assertNotIn("exmat live", bpy.context.object.data.shape_keys.key_blocks)
+
     def test_a_body_that_cannot_be_stepped(self):
         from exmat_blender import playing
 
