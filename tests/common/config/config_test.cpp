@@ -129,6 +129,36 @@ TEST(LoadScene, FillsInDefaults) {
   EXPECT_EQ(scene.every, 10);
 }
 
+TEST(LoadAsset, ReadsEveryMemberOfSurfaces) {
+  const TemporaryFolder folder;
+  const AssetConfig asset = load(folder, load_asset, R"({
+    "name": "hero",
+    "object": {"surface": "art/hero.glb", "cell_size": 0.25, "fixed": {"part": "_FIXED"},
+               "materials": [{"tets": {"color": {"rgb": [1, 0.5, 0], "within": 0.2}}, "density": 7}]},
+    "contact": {"vertices": {"color": {"rgb": [0, 0, 1]}}},
+    "examples": [{"name": "wave", "morph": "Wave"}, {"name": "bow", "surface": "art/bow.obj"},
+                 {"name": "jump", "surface": "art/jump.pc2", "frame": 12},
+                 {"name": "other", "surface": "art/other.glb", "morph": "key"}]})");
+  EXPECT_EQ(asset.object_surface, folder / "art/hero.glb");
+  EXPECT_EQ(asset.object_mesh, *asset.object_surface);
+  EXPECT_EQ(asset.render_mesh, asset.object_surface);  // what is drawn, where nothing else is named
+  EXPECT_EQ(asset.cell_size, 0.25);
+  EXPECT_FALSE(asset.cells);
+  EXPECT_EQ(std::get<PartSelection>(*asset.fixed).name, "_FIXED");
+  const auto& orange = std::get<ColourSelection>(asset.material_regions[0].tets);
+  EXPECT_THAT(orange.colour, ElementsAre(1, 0.5, 0));
+  EXPECT_EQ(orange.within, 0.2);
+  EXPECT_THAT(std::get<ColourSelection>(*asset.contact_vertices).colour, ElementsAre(0, 0, 1));
+  ASSERT_EQ(asset.examples.size(), 4u);
+  EXPECT_EQ(asset.examples[0].morph, "Wave");
+  EXPECT_FALSE(asset.examples[0].surface);
+  EXPECT_EQ(asset.examples[0].file(asset.object_mesh), folder / "art/hero.glb");
+  EXPECT_EQ(asset.examples[1].surface, folder / "art/bow.obj");
+  EXPECT_EQ(asset.examples[1].file(asset.object_mesh), folder / "art/bow.obj");
+  EXPECT_EQ(asset.examples[2].frame, 12);
+  EXPECT_EQ(asset.examples[3].morph, "key");
+}
+
 TEST(LoadScene, ReadsEveryMember) {
   const TemporaryFolder folder;
   write_file(folder / "ids.txt", "3, 1\n");

@@ -1,0 +1,245 @@
+#!/usr/bin/python3
+"""Bundles from surfaces as an artist has them: one .glb with and without an asset, parts by name, poses of every kind.
+
+Usage: test_surfaces.py FOLDER_OF_PROGRAMS    (Debian: python3-h5py)
+"""
+import json
+import os
+import shutil
+import struct
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+PROGRAMS = Path(sys.argv.pop(1)).resolve()
+PRECOMPUTE = PROGRAMS / "exmat-precompute"
+LENGTH, STEPS, AROUND = 3.0, 24, 16
+
+
+def tube():
+    """A closed round tube along x, 3 m long and 1 m thick."""
+    rings = [(0.0, 0.0)] + [(LENGTH * k / STEPS, 0.5) for k in range(STEPS + 1)] + [(LENGTH, 0.0)]
+    angles = 2 * np.pi * np.arange(AROUND) / AROUND
+    points = np.array([[x, r * np.cos(a), r * np.sin(a)] for x, r in rings[1:-1] for a in angles] + [[0, 0, 0], [LENGTH, 0, 0]])
+    start, end = len(points) - 2, len(points) - 1
+    at = lambda ring, k: AROUND * ring + k % AROUND
+    triangles = [t for k in range(AROUND) for t in
+                 ([(start, at(0, k + 1), at(0, k)), (end, at(STEPS, k), at(STEPS, k + 1))]
+                  + [t for ring in range(STEPS) for t in ((at(ring, k), at(ring, k + 1), at(ring + 1, k + 1)),
+                                                          (at(ring, k), at(ring + 1, k + 1), at(ring + 1, k)))])]
+    return points, np.array(triangles)
+
+
+def bent(points, degrees):
+    """About y, from the end at x = 0; lengths along the axis stay."""
+    curvature = np.radians(degrees) / LENGTH
+    angle, radius = curvature * points[:, 0], 1 / curvature - points[:, 2]
+    return np.stack([radius * np.sin(angle), points[:, 1], 1 / curvature - radius * np.cos(angle)], 1)
+
+
+def twisted(points, degrees):
+    angle = np.radians(degrees) * points[:, 0] / LENGTH
+    c, s = np.cos(angle), np.sin(angle)
+    return np.stack([points[:, 0], c * points[:, 1] - s * points[:, 2], s * points[:, 1] + c * points[:, 2]], 1)
+
+
+def write_glb(path, points, triangles, morphs=None, attributes=None, materials=None, colours=None, node=None):
+    """`materials`: name -> rows of the triangles, a primitive each. `morphs`: name -> points."""
+    document = {"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0, "name": "tube", **(node or {})}],
+                "meshes": [{"name": "tube mesh", "primitives": []}], "accessors": [], "bufferViews": [], "buffers": [{}]}
+    binary = bytearray()
+
+    def accessor(array, kind, code):
+        document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
+        binary.extend(array.tobytes())
+        document["accessors"].append({"bufferView": len(document["bufferViews"]) - 1, "componentType": code, "count": len(array), "type": kind})
+        return len(document["accessors"]) - 1
+
+    floats = lambda array: np.ascontiguousarray(array, np.float32)
+    named = {"POSITION": accessor(floats(points), "VEC3", 5126)}
+    for name, values in (attributes or {}).items():
+        named[name] = accessor(floats(values), "SCALAR", 5126)
+    if colours is not None:
+        named["COLOR_0"] = accessor(floats(colours), "VEC3", 5126)
+    targets = [{"POSITION": accessor(floats(posed - points), "VEC3", 5126)} for posed in (morphs or {}).values()]
+    if morphs:
+        document["meshes"][0]["extras"] = {"targetNames": list(morphs)}
+    for name, rows in (materials or {None: slice(None)}).items():
+        primitive = {"attributes": named, "indices": accessor(np.ascontiguousarray(triangles[rows].ravel(), np.uint32), "SCALAR", 5125)}
+        if morphs:
+            primitive["targets"] = targets
+        if name:
+            document.setdefault("materials", []).append({"name": name})
+            primitive["material"] = len(document["materials"]) - 1
+        document["meshes"][0]["primitives"].append(primitive)
+    document["buffers"][0]["byteLength"] = len(binary)
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(binary)) + struct.pack("<II", len(text), 0x4E4F534A) + text
+                     + struct.pack("<II", len(binary), 0x004E4942) + bytes(binary))
+
+
+def write_obj(path, points, triangles):
+    path.write_text("".join(f"v {x!r} {y!r} {z!r}\n" for x, y, z in points.tolist()) +
+                    "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in triangles.tolist()))
+
+
+def write_pc2(path, frames):
+    path.write_bytes(struct.pack("<12siiffi", b"POINTCACHE2\0", 1, len(frames[0]), 0, 1, len(frames)) +
+                     np.array(frames, "<f4").tobytes())
+
+
+class Surfaces(unittest.TestCase):
+    def setUp(self):
+        holder = tempfile.TemporaryDirectory()
+        self.addCleanup(holder.cleanup)
+        self.folder = Path(holder.name)
+        self.points, self.triangles = tube()
+        self.clamp = self.points[:, 0] < 0.3
+        write_glb(self.folder / "tube.glb", self.points, self.triangles, {"bend": bent(self.points, 90), "twist": twisted(self.points, 120)},
+                  {"_FIXED": self.clamp})
+
+    def run_program(self, *words, status=0, program=PRECOMPUTE, **more):
+        done = subprocess.run([program, *words], cwd=self.folder, capture_output=True, text=True, timeout=200, **more)
+        self.assertEqual(done.returncode, status, done.stderr)
+        return done.stdout + done.stderr
+
+    def asset(self, name="asset.json", **changes):
+        asset = {"name": "tube", "object": {"surface": "tube.glb", "cells": 400, "fixed": {"part": "_FIXED"},
+                                            "material": {"youngs_modulus": 1e5, "poisson_ratio": 0.4, "density": 1000}},
+                 "shape_space": {"eigenfunctions": 8}, "basis": {"size": 8, "linear_modes": 5, "training": "none"},
+                 "cubature": {"elements": 16, "training_poses": 20}, "needs": ["examples", "render"], "examples": []}
+        for key, value in changes.items():
+            asset[key] = {**asset.get(key, {}), **value} if isinstance(value, dict) else value
+        (self.folder / name).write_text(json.dumps(asset))
+        return name
+
+    def bundle(self, **changes):
+        printed = self.run_program("bundle", self.asset(**changes), "-o", "tube.h5")
+        return h5py.File(self.folder / "tube.h5"), printed
+
+    def refused(self, **changes):
+        before = {path.name for path in self.folder.iterdir()} | {"asset.json"}
+        printed = self.run_program("bundle", self.asset(**changes), "-o", "none.h5", status=2)
+        self.assertEqual({path.name for path in self.folder.iterdir()}, before)
+        return printed
+
+    def test_one_file_without_an_asset(self):
+        # By a relative name and from another folder; what is written down makes the same bundle.
+        self.run_program("bundle", "tube.glb", "-o", "a.h5", "--write-asset", "asset.json")
+        asset = json.loads((self.folder / "asset.json").read_text())
+        self.assertEqual(asset["object"]["surface"], "tube.glb")
+        self.assertEqual([example["morph"] for example in asset["examples"]], ["bend", "twist"])
+        self.run_program("bundle", "asset.json", "-o", "b.h5")
+        with h5py.File(self.folder / "a.h5") as a, h5py.File(self.folder / "b.h5") as b:
+            for name in ("object/vertices", "object/tets", "object/fixed", "modal/basis", "cubature/weights", "examples/bend/pose", "render/vertices"):
+                np.testing.assert_array_equal(a[name][:], b[name][:], name)
+            rest = a["render/vertices"][:]
+            np.testing.assert_allclose(rest, np.float32(self.points), rtol=0, atol=1e-7)
+            fixed = a["object/vertices"][:][a["object/fixed"][:] > 0]
+            self.assertGreater(len(fixed), 5)
+            self.assertLess(fixed[:, 0].max(), 0.3 + 0.5)  # within a cell of the mark
+            self.assertEqual(a["render"].attrs["outside"], 0)
+
+    def test_check_takes_a_surface(self):
+        printed = self.run_program("check", "tube.glb")
+        for name in ("bend", "twist"):
+            self.assertRegex(printed, rf"{name} +same_connectivity")
+
+    def test_poses_of_every_kind_are_the_same_pose(self):
+        posed = bent(self.points, 90)
+        write_obj(self.folder / "posed.obj", posed, self.triangles)
+        write_pc2(self.folder / "posed.pc2", [self.points, posed])
+        write_glb(self.folder / "other.glb", self.points, self.triangles, {"there": posed})
+        file, _ = self.bundle(examples=[{"name": "morph", "morph": "bend"}, {"name": "obj", "surface": "posed.obj"},
+                                        {"name": "frame", "surface": "posed.pc2", "frame": 1},
+                                        {"name": "other", "surface": "other.glb", "morph": "there"}])
+        with file:
+            poses = {name: file[f"examples/{name}/pose"][:] for name in ("morph", "obj", "frame", "other")}
+            size = np.linalg.norm(poses["morph"])
+            for name, pose in poses.items():  # single precision in the files: 1e-7 of 3 m, of a pose of 2 m
+                self.assertLess(np.linalg.norm(pose - poses["morph"]), 1e-5 * size, name)
+                self.assertIn("same_connectivity", str(file[f"examples/{name}"].attrs["method"]))
+                self.assertLess(file[f"examples/{name}"].attrs["surface_rms"], 0.01)
+
+    def test_a_surface_of_other_vertices_is_registered(self):
+        points, triangles = tube()
+        finer = np.concatenate([points, points[triangles].mean(1)])
+        split = np.concatenate([[(a, b, len(points) + k), (b, c, len(points) + k), (c, a, len(points) + k)] for k, (a, b, c) in enumerate(triangles)])
+        write_obj(self.folder / "someone.obj", bent(finer, 30), split)
+        file, printed = self.bundle(examples=[{"name": "morph", "morph": "bend"}, {"name": "someone", "surface": "someone.obj"}])
+        with file:
+            self.assertNotIn("same_connectivity", str(file["examples/someone"].attrs["method"]))
+            self.assertEqual(file["examples/someone"].attrs["surface_iterations"], 0)
+
+    def test_parts_by_material_colour_node_and_transform(self):
+        left = self.points[self.triangles].mean(1)[:, 0] < 1.5
+        colours = np.where(self.points[:, :1] < 0.3, [[1.0, 0, 0]], [[0.2, 0.2, 0.2]])
+        write_glb(self.folder / "tube.glb", self.points, self.triangles, None, None, {"steel": np.flatnonzero(left), "rubber": np.flatnonzero(~left)},
+                  colours, {"translation": [10, 0, 0]})
+        file, _ = self.bundle(object={"fixed": {"color": {"rgb": [1, 0, 0]}}, "materials": [
+            {"tets": {"part": "rubber"}, "youngs_modulus": 1e4, "poisson_ratio": 0.3, "density": 500}]})
+        with file:
+            x = file["object/vertices"][:][:, 0] - 10
+            fixed = file["object/fixed"][:] > 0
+            self.assertGreater(fixed.sum(), 5)
+            self.assertLess(x[fixed].max(), 0.8)
+            self.assertGreater(x[~fixed].min(), 0.1)
+            middles = x[file["object/tets"][:]].mean(1)
+            soft = file["object/density"][:] == 500
+            self.assertGreater(middles[soft].min(), 1.5 - 0.3)
+            self.assertLess(middles[~soft].max(), 1.5 + 0.3)
+
+    def test_what_is_wrong_is_said(self):
+        self.assertIn('"bend", "twist"', self.refused(examples=[{"name": "wave", "morph": "wave"}]))
+        self.assertIn("_FIXED", self.refused(object={"fixed": {"part": "feet"}}))
+        self.assertIn("asset.json: /object", self.refused(object={"cells": 400, "cell_size": 0.2}))
+        write_pc2(self.folder / "posed.pc2", [self.points])
+        self.assertIn("frame", self.refused(examples=[{"name": "a", "surface": "posed.pc2", "frame": 3}]))
+        write_pc2(self.folder / "posed.pc2", [self.points[:-1]])
+        self.assertIn("posed.pc2", self.refused(examples=[{"name": "a", "surface": "posed.pc2", "frame": 0}]))
+        inside_out = self.points * [1, 1, -1]
+        write_obj(self.folder / "mirrored.obj", inside_out, self.triangles)
+        mirrored = [{"name": "other", "surface": "mirrored.obj"}]
+        self.assertIn("is it not mirrored?", self.refused(examples=mirrored))
+        _, printed = self.bundle(examples=mirrored, alignment={"accept": True})
+        self.assertIn("[warning] example other: the cage misses the pose by", printed)
+        scattered = self.points[np.random.default_rng(1).permutation(len(self.points))]
+        write_obj(self.folder / "mirrored.obj", scattered, self.triangles)
+        self.assertIn("example other", self.refused(examples=mirrored))
+
+    def test_nothing_is_done_again_where_nothing_has_changed(self):
+        name = self.asset(examples=[{"name": "bend", "morph": "bend"}])
+        words = ("bundle", name, "-o", "tube.h5", "--cache", "cache", "--depfile", "tube.d", "--if-changed")
+        self.run_program(*words)
+        made = os.stat(self.folder / "tube.h5").st_mtime_ns
+        self.assertIn("nothing to do", self.run_program(*words))
+        self.assertEqual(os.stat(self.folder / "tube.h5").st_mtime_ns, made)
+        self.assertEqual((self.folder / "tube.d").read_text().count("tube.glb"), 1)
+        write_glb(self.folder / "tube.glb", self.points, self.triangles, {"bend": bent(self.points, 60)}, {"_FIXED": self.clamp})
+        self.assertNotIn("nothing to do", self.run_program(*words))
+
+    def test_without_the_mesher_a_surface_is_refused_in_words(self):
+        alone = self.folder / "alone"
+        alone.mkdir()
+        program = shutil.copy(PRECOMPUTE, alone)
+        printed = self.run_program("bundle", "tube.glb", "-o", "none.h5", status=2, program=program)
+        self.assertIn("exmat-meshing", printed)
+        self.assertFalse((self.folder / "none.h5").exists())
+
+    def test_the_cage_alone(self):
+        printed = self.run_program("mesh", "tube.glb", "-o", "tube.msh")
+        self.assertRegex(printed, r"tets +\d+")
+        self.assertRegex(printed, r"dihedral angles")
+        first = (self.folder / "tube.msh").read_bytes()
+        self.run_program("mesh", "tube.glb", "-o", "again.msh")
+        self.assertEqual((self.folder / "again.msh").read_bytes(), first)
+
+
+if __name__ == "__main__":
+    unittest.main()
