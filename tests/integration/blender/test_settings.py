@@ -1,15 +1,17 @@
 """Frames, assets and scenes of the add-on."""
 import json
+import pathlib
 import struct
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from exmat_blender import library
 from exmat_blender.asset import BodySettings, MotionSettings, Region, Shape, asset_of, example_names, is_made_of, made_of, notes, scene_of
 from exmat_blender.fault import Fault
 from exmat_blender.frame import BodyFrame
 from exmat_blender.point_cache import write_pc2
+
+ROOT = pathlib.Path(__file__).resolve().parents[3]
 
 
 def askew(scale=(2, 0.5, 1)):
