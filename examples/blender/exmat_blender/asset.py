@@ -9,6 +9,7 @@ import numpy as np
 from .fault import Fault
 
 CLAMP = "_FIXED"
+NEEDS = ("examples", "targets", "rigid", "contact", "regions", "render")  # rigid: the object may carry the body
 RESERVED = {".", "..", "gram", "h0", "hq"}
 LONGEST = 64  # bytes of a name
 STILL = 1e-6  # of the size: a pose that moves no vertex farther shows the rest shape
@@ -97,7 +98,7 @@ def asset_of(shape, settings):
     asset = {"name": _name(shape.name) or "object", "object": body,
              "examples": [{"name": names[key], "surface": pose} for key, pose in shape.poses.items()],
              "basis": {"size": settings.modes, "training": "auto" if settings.training else "none"},
-             "cubature": {"elements": 2 * settings.modes}}
+             "cubature": {"elements": 2 * settings.modes}, "needs": list(NEEDS)}
     regions = []
     for number, region in enumerate(shape.regions):
         part = f"_REGION_{number}"

@@ -42,12 +42,30 @@ class BodyFrame:
         """Of a direction of the world, its length kept."""
         return self.turn.T @ np.asarray(world, float)
 
+    def motion_to(self, other):
+        """Rotation (3, 3) and translation (3,) [m] of another frame in this one: x -> rotation x + translation. Raises Fault."""
+        if np.abs(other.stretch - self.stretch).max() > 1e-4 * np.abs(self.stretch).max():
+            raise Fault("The object's scale is animated: a body keeps its scale.")
+        return self.turn.T @ other.turn, self.point_to_body(other.origin)
+
     def moved(self, rotation, translation):
         """The object's matrix (4, 4) where the body has moved by x -> rotation x + translation [m], in its frame."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.turn @ rotation @ self.stretch / self.unit
         matrix[:3, 3] = self.origin + self.turn @ translation / self.unit
         return matrix
+
+
+def quaternion(rotation):
+    """Of a rotation (3, 3): w, x, y, z."""
+    r = np.asarray(rotation)
+    # Eigenvector of the largest eigenvalue: exact to rounding at any angle.
+    symmetric = np.array([
+        [r[0, 0] + r[1, 1] + r[2, 2], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
+        [0, r[0, 0] - r[1, 1] - r[2, 2], r[1, 0] + r[0, 1], r[0, 2] + r[2, 0]],
+        [0, 0, r[1, 1] - r[0, 0] - r[2, 2], r[2, 1] + r[1, 2]],
+        [0, 0, 0, r[2, 2] - r[0, 0] - r[1, 1]]])
+    return np.linalg.eigh(symmetric, UPLO="U")[1][:, -1]
 
 
 def _turn(linear):

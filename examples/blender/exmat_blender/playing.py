@@ -6,9 +6,11 @@ from bpy.app.handlers import persistent
 from . import jobs, reading
 from .asset import is_made_of, scene_of
 from .fault import Fault
+from .frame import quaternion
 from .player import Player
 
 LIVE_KEY = reading.OWN_KEY + " live"
+STILL = 1e-6  # of the scale: an object that moves no farther stands
 playing = {}  # sessions, by the name of their object
 
 
@@ -28,6 +30,11 @@ class Session:
             raise Fault("The mesh, its scale, shape keys or groups have changed since the bundle was made: press Precompute.")
         settings = reading.motion_settings(obj, scene, self.frame)
         self.scene = scene_of(shape, settings, bundle)
+        self.motions = {} if shape.clamp is None else motions_of(obj, scene, self.frame)
+        if self.motions:
+            self.scene["body"] = {"motion": [
+                {"time": (frame - scene.frame_start) * settings.frame_time, "position": list(translation), "orientation": list(quaternion(rotation))}
+                for frame, (rotation, translation) in self.motions.items()]}
         self.player = Player(exmat, self.scene, shape.vertices, settings.steps, reading.springs_of(obj, shape, self.frame),
                              scene.frame_start)
         self.free = shape.clamp is None
@@ -38,7 +45,23 @@ class Session:
         if len(obj.data.vertices) != len(self.player.rest):
             raise Fault("The mesh has other vertices than when Play began: press Stop, then Precompute.")
         self.player.go_to(frame, reading.targets_of(obj, self.frame))
-        return self.frame.to_local(self.player.positions())
+        positions = self.player.positions()
+        if self.motions:  # the object carries the body: Blender adds its motion
+            rotation, translation = self.motions[min(max(frame, min(self.motions)), max(self.motions))]
+            positions = (positions - translation) @ rotation
+        return self.frame.to_local(positions)
+
+
+def motions_of(obj, scene, frame):
+    """How the object moves over the scene's frames, from its frame at the first: rotations and translations; empty where it stands."""
+    current, found = scene.frame_current, {}
+    for number in range(scene.frame_start, scene.frame_end + 1):
+        scene.frame_set(number)
+        found[number] = frame.motion_to(reading.frame_of(obj, scene))
+    scene.frame_set(current)
+    moves = any(np.abs(rotation - np.eye(3)).max() > STILL or np.abs(translation).max() > STILL * np.abs(frame.stretch).max()
+                for rotation, translation in found.values())
+    return found if moves else {}
 
 
 def start(obj, scene):

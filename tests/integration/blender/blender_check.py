@@ -43,6 +43,7 @@ class Motion(unittest.TestCase):
         from exmat_blender import playing
 
         members = playing.Session(obj, scene).scene
+        self.assertEqual(scene.frame_current, 1)
         body = trajectory_of(members, FRAMES, obj.exmat.steps)
         return to_world(body, obj.matrix_world, scene.unit_settings.scale_length)
 
@@ -56,6 +57,7 @@ class Motion(unittest.TestCase):
         self.assertLess(np.abs(evaluated(obj) - expected[19]).max(), CLOSE * np.ptp(still, axis=0).max())
         self.agrees(self.shown(obj, scene), expected)  # twice
         bpy.ops.exmat.stop()
+        scene.frame_set(1)
         self.assertFalse(np.any(evaluated(obj) - still))
 
         self.assertEqual(bpy.ops.exmat.bake_cache(), {"FINISHED"}, obj.exmat.message)
@@ -85,6 +87,17 @@ class Motion(unittest.TestCase):
         stand_askew(obj)
         obj.exmat.floor, obj.exmat.floor_height = True, -2.0
         self.check_all(made(obj, clamp=""), scene)
+
+    def test_the_object_carries_a_clamped_body(self):
+        scene = fresh(unit=0.1, frames=FRAMES)
+        obj = bar()
+        stand_askew(obj)
+        for frame, place, turn in ((1, (1, -2, 3), 1.2), (15, (2, -2, 3.5), 1.5), (40, (1, 0, 3), -1)):
+            obj.location, obj.rotation_euler.z = place, turn
+            obj.keyframe_insert("location", frame=frame)
+            obj.keyframe_insert("rotation_euler", frame=frame)
+        scene.frame_set(1)
+        self.check_all(made(obj), scene)
 
     def test_regions(self):
         scene = fresh(frames=FRAMES)

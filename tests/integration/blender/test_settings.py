@@ -8,7 +8,7 @@ import pytest
 from exmat_blender import library
 from exmat_blender.asset import BodySettings, MotionSettings, Region, Shape, asset_of, example_names, is_made_of, made_of, notes, scene_of
 from exmat_blender.fault import Fault
-from exmat_blender.frame import BodyFrame
+from exmat_blender.frame import BodyFrame, quaternion
 from exmat_blender.point_cache import write_pc2
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
@@ -42,6 +42,24 @@ def test_the_frame_keeps_the_world(scale, unit):
     assert np.allclose(frame.moved(np.eye(3), np.zeros(3)), matrix, atol=1e-12)
     lifted = frame.moved(np.eye(3), frame.direction_to_body([0, 0, 2 * unit]))
     assert np.allclose(lifted[:3, 3], matrix[:3, 3] + [0, 0, 2], atol=1e-12)
+
+
+def test_a_frame_that_moves():
+    rng = np.random.default_rng(4)
+    for _ in range(20):
+        wxyz = rng.standard_normal(4)
+        w, x, y, z = wxyz / np.linalg.norm(wxyz)
+        turn = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)], [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+        found = quaternion(turn)
+        assert min(np.abs(found - [w, x, y, z]).max(), np.abs(found + [w, x, y, z]).max()) < 1e-14
+        first, carry = askew(), np.eye(4)
+        carry[:3, :3], carry[:3, 3] = turn, rng.standard_normal(3)
+        before, after = BodyFrame(first, 0.1), BodyFrame(carry @ first, 0.1)
+        rotation, translation = before.motion_to(after)
+        assert np.allclose(before.moved(rotation, translation), carry @ first, atol=1e-12)
+    with pytest.raises(Fault, match="scale is animated"):
+        BodyFrame(askew()).motion_to(BodyFrame(askew((2, 1, 1))))
 
 
 def test_a_sheared_object_and_one_without_a_scale():
