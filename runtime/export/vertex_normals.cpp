@@ -37,7 +37,7 @@ VertexNormals::VertexNormals(const VertexArray& vertices, TriangleArray triangle
   const VertexArray sums = area_sums(vertices);
   const auto has_area = [&](Eigen::Index vertex) { return !sums.row(vertex).isZero(0); };
   for (std::vector<Eigen::Index>& set : coincident(vertices)) {
-    std::ranges::stable_partition(set, has_area);
+    std::stable_partition(set.begin(), set.end(), has_area);
     std::vector<std::vector<Eigen::Index>> groups;
     for (const Eigen::Index vertex : set) {
       const auto smooth = [&](const auto& group) {

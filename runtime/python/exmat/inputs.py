@@ -6,16 +6,17 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
+from .arrays import StrPath, array, surface_arrays
 from .errors import InvalidArgument
+from .surfaces import write_glb
 
-StrPath = Union[str, "os.PathLike[str]"]
-PATHS = ("mesh", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples")
+PATHS = ("mesh", "surface", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples")
 
 
 def write_mesh(path: StrPath, vertices: Any, tets: Any) -> None:
     """Writes a tet mesh, `vertices` (n, 3) [m] and `tets` (n_t, 4) of 0-based vertices, as legacy .vtk in double precision."""
-    points = _array(vertices, "vertices", 3, ">f8")
-    cells = _array(tets, "tets", 4, ">i4")
+    points = array(vertices, "vertices", 3, ">f8")
+    cells = array(tets, "tets", 4, ">i4")
     if len(cells) == 0 or cells.min() < 0 or cells.max() >= len(points):
         raise InvalidArgument(f"tets: expected vertices of 0 to {len(points) - 1}")
     counted = np.column_stack([np.full(len(cells), 4, ">i4"), cells]).astype(">i4")
@@ -28,10 +29,7 @@ def write_mesh(path: StrPath, vertices: Any, tets: Any) -> None:
 
 def write_surface(path: StrPath, vertices: Any, triangles: Any) -> None:
     """Writes a surface, `vertices` (v, 3) [m] and `triangles` (f, 3) of 0-based vertices, as .obj."""
-    points = _array(vertices, "vertices", 3, "f8")
-    faces = _array(triangles, "triangles", 3, "i8")
-    if len(faces) == 0 or faces.min() < 0 or faces.max() >= len(points):
-        raise InvalidArgument(f"triangles: expected vertices of 0 to {len(points) - 1}")
+    points, faces = surface_arrays(vertices, triangles)
     lines = ["v {!r} {!r} {!r}".format(*map(float, point)) for point in points]
     lines += ["f {} {} {}".format(*(int(corner) + 1 for corner in face)) for face in faces]
     pathlib.Path(path).write_text("\n".join(lines) + "\n")
@@ -46,7 +44,10 @@ def write_asset(asset: Union[StrPath, Mapping[str, Any]], folder: pathlib.Path) 
     if isinstance(given, Mapping):
         _take_object(given, members["object"], folder)
     examples = asset.get("examples", [])
+    _take_surfaces(given, examples, members, folder)
     for place, example in enumerate(examples):
+        if "mesh" not in example:
+            continue
         tets = _tets_of_poses(examples, given)
         members["examples"][place]["mesh"] = _mesh_file(example.get("mesh"), folder / f"example_{place}.vtk", tets, f"examples[{place}].mesh")
     return _write_json(folder / "asset.json", members)
@@ -65,6 +66,34 @@ def _take_object(given: Mapping[str, Any], members: Dict[str, Any], folder: path
         path = folder / "render_mesh.obj"
         write_surface(path, *_pair(surface, "object.render_mesh", "triangles"))
         members["render_mesh"] = str(path)
+
+
+def _take_surfaces(given: Any, examples: Any, members: Dict[str, Any], folder: pathlib.Path) -> None:
+    """Surfaces in arrays: the object's as a .glb whose morph targets are the poses, examples with triangles of their own as .obj."""
+    surface = given.get("surface") if isinstance(given, Mapping) else None
+    poses: Dict[str, Any] = {}
+    for place, example in enumerate(examples):
+        pose = example.get("surface")
+        if pose is None or isinstance(pose, (str, os.PathLike)):
+            continue
+        if isinstance(pose, (tuple, Mapping)):
+            path = folder / f"example_{place}.obj"
+            write_surface(path, *_pair(pose, f"examples[{place}].surface", "triangles"))
+            members["examples"][place]["surface"] = str(path)
+        elif surface is None or isinstance(surface, (str, os.PathLike)):
+            raise InvalidArgument(f"examples[{place}].surface: expected (vertices, triangles), or vertices alone where the object's surface is "
+                                  "given in arrays; found vertices alone")
+        else:
+            poses[example["name"]] = pose
+            del members["examples"][place]["surface"]
+            members["examples"][place]["morph"] = example["name"]
+    if surface is None or isinstance(surface, (str, os.PathLike)):
+        return
+    parts = surface.get("parts") if isinstance(surface, Mapping) else None
+    if isinstance(surface, Mapping):
+        surface = {name: value for name, value in surface.items() if name != "parts"}
+    write_glb(folder / "surface.glb", *_pair(surface, "object.surface", "triangles"), poses, parts)
+    members["object"]["surface"] = str(folder / "surface.glb")
 
 
 def _mesh_file(mesh: Any, path: pathlib.Path, tets: Optional[Any], place: str) -> Any:
@@ -102,22 +131,13 @@ def _plain(value: Any, key: str = "") -> Any:
         return {str(name): _plain(member, str(name)) for name, member in value.items()}
     if isinstance(value, os.PathLike) or (isinstance(value, str) and key in PATHS):
         return os.path.abspath(value)
-    if key in ("mesh", "render_mesh"):
+    if key in ("mesh", "surface", "render_mesh"):
         return None
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
     return [_plain(member) for member in value] if isinstance(value, (list, tuple)) else value
-
-
-def _array(values: Any, name: str, width: int, kind: str) -> Any:
-    array = np.asarray(values)
-    if array.ndim != 2 or array.shape[1] != width:
-        raise InvalidArgument(f"{name}: shape {array.shape}: expected (..., {width})")
-    if "i" in kind and array.dtype.kind not in "iu":
-        raise InvalidArgument(f"{name}: expected whole numbers")
-    return np.ascontiguousarray(array, kind)
 
 
 def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:

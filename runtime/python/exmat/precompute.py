@@ -3,7 +3,8 @@
 The program is the argument `program`, else the environment's EXMAT_PRECOMPUTE, else the one of the same build, else that
 of the PATH. Members of assets, scenes and studies are those of their files. A mesh may be arrays instead of a path:
 (vertices, tets) of shapes (n, 3) [m] and (n_t, 4), of a pose the vertices alone where it has the rest example's or the
-object's tets. Relative paths in members are relative to the current folder.
+object's tets. A surface may be (vertices, triangles), or a dict of these and of parts, which name a number for each vertex,
+above 0.5 inside; a pose of it the vertices alone. Relative paths in members are relative to the current folder.
 """
 import json
 import os
@@ -17,6 +18,7 @@ from typing import Any, Callable, Iterator, List, Mapping, NamedTuple, Optional,
 
 from .errors import BadInput, Cancelled, Failure
 from .inputs import write_asset, write_members, write_mesh, write_surface
+from .surfaces import write_glb
 
 StrPath = Union[str, "os.PathLike[str]"]
 Members = Union[StrPath, Mapping[str, Any]]
@@ -319,4 +321,4 @@ def _record(value: Any) -> Any:
 
 
 __all__ = ["BundleReport", "CheckReport", "Example", "Job", "Progress", "Record", "StudyResult", "bundle", "check", "start_bundle", "study",
-           "write_mesh", "write_surface"]
+           "write_glb", "write_mesh", "write_surface"]
