@@ -119,9 +119,13 @@ TEST(ContactStep, ImpactTakesNoEnergyAndMomentumIsTheIntegralOfTheForces) {
 // way that the body went, less where that would be more energy than before, and of the force that is reported.
 TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
   int unconverged = 0, slowed = 0, given_back = 0;
-  for (const auto& [stiffness, iterations] :
-       {std::pair(1e6, 1), std::pair(1e8, 1), std::pair(1e6, 2), std::pair(1e8, 4)}) {
-    Dropped dropped(1.0 / 30, stiffness, 0.5);
+  struct Case {
+    double time_step, stiffness;
+    int iterations;
+  };
+  for (const auto& [dt, stiffness, iterations] :
+       {Case{1.0 / 30, 1e6, 1}, Case{1.0 / 30, 1e8, 1}, Case{1e-2, 1e5, 2}, Case{3e-3, 1e7, 2}}) {
+    Dropped dropped(dt, stiffness, 0.5);
     dropped.scene.newton.max_iterations = iterations;
     FrameMotion motion;
     motion.position = Eigen::Vector3d(0, 0, 0.05);
@@ -129,7 +133,6 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
     motion.angular_velocity = Eigen::Vector3d(0, 4, 1);
     set_motion(*dropped.model, motion, dropped.state);
     Workspace workspace(*dropped.model, dropped.scene);
-    const double dt = dropped.scene.time_step;
     for (int i = 0; i < 10; ++i) {
       const FreeState before = free_state(dropped.state);
       const double energy = dropped.energy();
@@ -144,6 +147,7 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
       Eigen::Matrix<double, 3, 2> parts;
       parts.col(0) = before.linear_momentum + dt * dropped.mass() * dropped.scene.gravity;
       parts.col(1) = of_way - parts.col(0);
+      if (parts.col(1).norm() <= 1e-9 * of_way.norm()) continue;  // nothing touched
       const Eigen::Vector2d left = parts.colPivHouseholderQr().solve(after.linear_momentum);
       EXPECT_LE((after.linear_momentum - parts * left).norm(), 1e-9 * of_way.norm()) << stiffness << " step " << i;
       EXPECT_LE(left[0], 1 + 1e-9) << stiffness << " step " << i;
