@@ -116,7 +116,7 @@ Needs needs_of(const SceneConfig& scene) {
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
               .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
-              .contact = !scene.obstacles.empty(),
+              .contact = scene.meets_others || !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};
   if (scene.examples) needs.energy_reference = scene.examples->energy_reference;

@@ -110,6 +110,7 @@ struct SceneConfig {
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact
+  bool meets_others = false;              ///< contact with obstacles that a host adds; no file sets it
   int instances = 1;                      ///< bodies that are stepped; the trajectory shows the first
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;

@@ -6,7 +6,9 @@
 #include "common/core/timer.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
+#include "runtime/api/body_obstacles.h"
 #include "runtime/api/handles.h"
+#include "runtime/api/startable_threads.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -30,10 +32,12 @@ void add(const StepReport& step, exmat_report& sum) noexcept {
 void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcept {
   const Timer timer;
   body.report = {};
+  body.contacts.clear();
   while (body.report.steps < steps) {
     const StepReport report = step(body.model(), body.scene, body.state, workspace);
     add(report, body.report);
     if ((report.status & kStepNonFinite) != 0) break;
+    body.contacts.add(report, body.model(), body.state, workspace);
     ++body.report.steps;
   }
   body.report.seconds = timer.seconds();
@@ -50,8 +54,16 @@ exmat_status fail_non_finite(const char* function, const char* which, const exma
 }
 
 void put_to_rest(exmat_body& body) noexcept {
+  const double time = body.state.time;
   body.state = body.start;  // vectors of the same lengths: no allocation
   body.report = {};
+  body.contacts.clear();
+  keep_host_obstacles(time, body);
+}
+
+/// Whether one may step in the scratch of the other.
+bool lends(const exmat_body* lender, const exmat_body& body) noexcept {
+  return lender != nullptr && lender->source == body.source && lender->obstacles.size() == body.obstacles.size();
 }
 
 }  // namespace
@@ -66,6 +78,8 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source)
       frame_numbers(model().frame->numbers(start.frame).size()) {
   refresh_weights(model(), scene, start, workspace);
   state = start;
+  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) obstacles.push_back({next_obstacle++, false});
+  contacts.prepare(model(), obstacles.size());
 }
 
 exmat_status exmat_body_create(const exmat_model* model, exmat_body** body) noexcept {
@@ -131,13 +145,13 @@ exmat_status exmat_bodies_step(exmat_body* const* bodies, std::int64_t count, st
                 taken - all.begin());
   }
   const int wanted = threads > 0 ? threads : omp_get_num_procs();
-  const int used = static_cast<int>(std::min<std::int64_t>(wanted, count));
+  const int used = startable_threads(static_cast<int>(std::min<std::int64_t>(wanted, count)));
 #pragma omp parallel num_threads(used) if (used > 1)
   {
     exmat_body* lender = nullptr;  // of this thread: bodies of one model share the scratch that is in its cache
 #pragma omp for schedule(dynamic)
     for (std::int64_t i = 0; i < count; ++i) {
-      if (lender == nullptr || lender->source != bodies[i]->source) lender = bodies[i];
+      if (!lends(lender, *bodies[i])) lender = bodies[i];
       advance(*bodies[i], lender->workspace, steps);
     }
   }
@@ -258,10 +272,8 @@ exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion)
                       wanted.angular_velocity.allFinite() && std::isfinite(length);
   if (!finite || !(length > 0))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
-  State& state = body->state;
-  if (!body->model().frame->set_motion(wanted, state.q, state.v, body->workspace.frame, state.frame))
+  if (!move_body(body->model(), body->scene, wanted, body->state, body->workspace))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
-  body->state.begins_anew = true;
   return EXMAT_OK;
 }
 

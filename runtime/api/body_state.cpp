@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "runtime/api/arguments.h"
+#include "runtime/api/body_obstacles.h"
 #include "runtime/api/failures.h"
 #include "runtime/scene/bodies.h"
 
@@ -80,32 +81,6 @@ void read_contacts(Reader& reader, std::size_t count, const exmat_body& body, Co
   }
 }
 
-/// The force of a region, of the whole body where it is -1.
-std::size_t example_force(const exmat_body& body, std::int64_t region) {
-  const Model& model = body.model();
-  const bool whole = region == -1 && model.has_whole_body_examples();
-  if (!whole && model.region(region) == nullptr)
-    throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
-                                      model.has_whole_body_examples() ? "the whole body (-1) and " : "",
-                                      model.region_count()));
-  const std::size_t force = whole ? 0 : static_cast<std::size_t>(model.region(region) - model.examples.data());
-  if (force >= body.scene.examples.size()) throw InvalidArgument("the model was created without its example force");
-  return force;
-}
-
-void check_weights(std::span<const double> weights, Eigen::Index examples) {
-  constexpr double kSumTolerance = 1e-9;
-  if (std::ssize(weights) != examples)
-    throw InvalidArgument(fmt::format("count = {}: expected {}", weights.size(), examples));
-  double sum = 0;
-  for (const double weight : weights) {
-    if (!(weight >= 0)) throw InvalidArgument("weights: expected numbers that are not negative");
-    sum += weight;
-  }
-  if (!(std::abs(sum - 1) <= kSumTolerance))
-    throw InvalidArgument(fmt::format("weights: their sum is {:g}: expected 1", sum));
-}
-
 }  // namespace
 
 std::size_t state_size(const exmat_body& body) {
@@ -167,8 +142,11 @@ void set_state(std::span<const double> numbers, exmat_body& body) {
     examples.target_converged = reader.flag("target_converged");
   }
   read_contacts(reader, contacts, body, state.contacts);
+  const double time = body.state.time;
   body.state = state;  // into the arrays that are there: they are handed out
   body.report = {};
+  body.contacts.clear();
+  keep_host_obstacles(time, body);
 }
 
 }  // namespace exmat::runtime
@@ -205,26 +183,6 @@ exmat_status exmat_bodies_hash(exmat_body* const* bodies, std::int64_t count, st
   }
   *hash = sum.value();
   return EXMAT_OK;
-}
-
-exmat_status exmat_body_set_example_stiffness(exmat_body* body, std::int64_t region, double kappa) noexcept {
-  EXMAT_REQUIRE(body);
-  if (!(kappa >= 0 && std::isfinite(kappa)))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: kappa = %g: expected a finite number >= 0", __func__, kappa);
-  return guarded(__func__, [&] { body->scene.examples[example_force(*body, region)].stiffness = kappa; });
-}
-
-exmat_status exmat_body_set_example_weights(exmat_body* body, std::int64_t region, const double* weights,
-                                            std::int64_t count) noexcept {
-  EXMAT_REQUIRE(body);
-  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
-  if (count > 0) EXMAT_REQUIRE(weights);
-  return guarded(__func__, [&] {
-    const std::size_t force = example_force(*body, region);
-    const std::span given(weights, static_cast<std::size_t>(count));
-    if (count > 0) check_weights(given, body->model().examples[force].weights.examples());
-    body->scene.examples[force].given_weights = Eigen::Map<const Eigen::VectorXd>(weights, count);
-  });
 }
 
 const double* exmat_body_displacement(const exmat_body* body) noexcept {

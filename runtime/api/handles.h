@@ -1,12 +1,25 @@
 #pragma once
 
 #include <atomic>
+#include <cstdint>
 #include <limits>
 #include <memory>
+#include <vector>
 
 #include "exmat/exmat.h"
+#include "runtime/api/contact_record.h"
 #include "runtime/api/point_set.h"
 #include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+
+/// One of a body's obstacles, as its host knows it.
+struct HostedObstacle {
+  std::int64_t id = 0;
+  bool hosted = false;  ///< added or moved by the host, not by the scene
+};
+
+}  // namespace exmat::runtime
 
 // What the handles of the C API point to. NOLINTBEGIN(readability-identifier-naming): their names are the API's.
 
@@ -28,13 +41,16 @@ struct exmat_body {
   Eigen::Index modes() const { return state.q.size(); }
 
   std::shared_ptr<const exmat::runtime::Source> source;
-  exmat::runtime::StepScene scene;  ///< the model's
+  exmat::runtime::StepScene scene;                        ///< the model's, and what was set for this body
+  std::vector<exmat::runtime::HostedObstacle> obstacles;  ///< as in scene.obstacles
+  std::int64_t next_obstacle = 0;
   exmat::runtime::State start, state;
   exmat::runtime::Workspace workspace;
   exmat::runtime::VertexPositions::Workspace drawing;
   Eigen::VectorXd force;      ///< r
   std::size_t frame_numbers;  ///< of the frame's state
   exmat_report report{};
+  exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
 };
 

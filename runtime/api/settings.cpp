@@ -80,6 +80,8 @@ void check_ranges(const exmat_settings& settings) {
   }
   if (settings.use_examples != 0 && settings.use_examples != 1)
     throw InvalidArgument(fmt::format("settings.use_examples = {}: expected 0 or 1", settings.use_examples));
+  if (settings.use_contact != 0 && settings.use_contact != 1)
+    throw InvalidArgument(fmt::format("settings.use_contact = {}: expected 0 or 1", settings.use_contact));
 }
 
 }  // namespace
@@ -123,6 +125,7 @@ SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* 
   examples.target_iterations = settings.target_iterations;
   examples.energy_reference = choice_of<EnergyReference>(settings.energy_reference, "energy_reference");
   if (settings.use_examples == 1) scene.examples = examples;
+  scene.meets_others = settings.use_contact == 1;
   return scene;
 }
 

@@ -15,6 +15,8 @@ inline constexpr StructSizes kSettingsSizes{120, sizeof(exmat_settings)};
 inline constexpr StructSizes kReportSizes{80, sizeof(exmat_report)};
 inline constexpr StructSizes kMotionSizes{112, sizeof(exmat_motion)};
 inline constexpr StructSizes kEnergiesSizes{32, sizeof(exmat_energies)};
+inline constexpr StructSizes kObstacleSizes{152, sizeof(exmat_obstacle)};
+inline constexpr StructSizes kContactSizes{96, sizeof(exmat_contact)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
 
 /// The defaults of a scene file.

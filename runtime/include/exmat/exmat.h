@@ -9,9 +9,10 @@
  * not said to allow it, and a length that does not fit, are EXMAT_INVALID_ARGUMENT. Lengths count numbers, not points
  * or bytes.
  *
- * Memory: only ..._create... functions allocate (and those of states, and the first exmat_bodies_step() with more
- * threads than before, which starts them). What they create is the caller's, to be given to the matching ..._destroy,
- * in any order: a body or a set of points keeps what it needs of its model. ..._destroy(NULL) does nothing.
+ * Memory: only ..._create... functions allocate (and those of states and of obstacles, and the first
+ * exmat_bodies_step() with more threads than before, which starts them). What they create is the caller's, to be given
+ * to the matching ..._destroy, in any order: a body or a set of points keeps what it needs of its model.
+ * ..._destroy(NULL) does nothing.
  *
  * Threads: models and points never change: any number of threads may use them. A body is for one thread at a time.
  * ..._create... functions may be called from any thread and take turns.
@@ -79,7 +80,7 @@ typedef struct exmat_settings {
   int32_t example_target;    /* EXMAT_TARGET_AUTO: by the table where the bundle has one */
   int32_t target_iterations; /* most in one step, 1 to 1000; 4 */
   int32_t energy_reference;  /* EXMAT_ENERGY_REFERENCE_EXAMPLE */
-  int32_t reserved;          /* 0 */
+  int32_t use_contact;       /* 1: bodies can touch obstacles of exmat_body_add_obstacle(); 0 */
 } exmat_settings;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
@@ -178,8 +179,9 @@ typedef struct exmat_report {
 EXMAT_API exmat_status exmat_body_step(exmat_body* body, int64_t steps, exmat_report* report) EXMAT_NOEXCEPT;
 
 /* The same for `count` different bodies, of any models, by up to `threads` threads (0: as many as there are
-   processors). Each body is stepped by one of them: the results do not depend on their number. EXMAT_NON_FINITE names
-   the first such body; the others have taken all their steps. */
+   processors), and never more than there are bodies and processors, or than the system lets start. Each body is stepped
+   by one of them: the results do not depend on their number. EXMAT_NON_FINITE names the first such body; the others
+   have taken all their steps. */
 EXMAT_API exmat_status exmat_bodies_step(exmat_body* const* bodies, int64_t count, int64_t steps,
                                          int32_t threads) EXMAT_NOEXCEPT;
 
@@ -208,7 +210,8 @@ typedef struct exmat_motion {
    origin of the moving frame; rest where there is none. */
 EXMAT_API exmat_status exmat_body_read_motion(const exmat_body* body, exmat_motion* motion) EXMAT_NOEXCEPT;
 
-/* Free bodies only; the shape and how fast it changes stay. The quaternion is normalised. */
+/* Free bodies only; the shape and how fast it changes stay. What friction holds it by goes with the body. The
+   quaternion is normalised. */
 EXMAT_API exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion) EXMAT_NOEXCEPT;
 
 /* To be called after forces have changed abruptly: the next step then takes nothing from the ones before but position
@@ -250,25 +253,109 @@ EXMAT_API exmat_status exmat_body_read_energies(const exmat_body* body, exmat_en
 /* Time of the body: its steps times the time step [s]; negative where `body` is NULL. */
 EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
 
-/* ---- examples of one body -------------------------------------------------------------------------------------- */
+/* ---- settings of one body -------------------------------------------------------------------------------------- */
 
-/* Of the body, instead of the model's, until set again; exmat_body_reset() keeps them. `region`: -1 is the whole body,
-   else as in exmat_body_read_region_weights(). The model has to have that example force: use_examples, or the scene.
-   A state does not hold them. */
+/* Of the body, instead of the model's, until set again; exmat_body_reset() keeps them. A state does not hold them. They
+   may change between any two steps; after an abrupt change exmat_body_restart_integrator() keeps impulses exact. */
+
+/* `gravity` [3], world [m/s^2]. */
+EXMAT_API exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) EXMAT_NOEXCEPT;
+
+/* Of examples. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model has to have that
+   example force: use_examples, or the scene. */
 
 /* kappa >= 0 [1/s^2]. */
 EXMAT_API exmat_status exmat_body_set_example_stiffness(exmat_body* body, int64_t region, double kappa) EXMAT_NOEXCEPT;
+
+/* c_kappa >= 0 [1/s]; not of an elastic force. */
+EXMAT_API exmat_status exmat_body_set_example_damping(exmat_body* body, int64_t region, double c_kappa) EXMAT_NOEXCEPT;
+
+/* In [0, 1]: factor on the weight of the rest pose. */
+EXMAT_API exmat_status exmat_body_set_example_bias(exmat_body* body, int64_t region, double bias) EXMAT_NOEXCEPT;
 
 /* Weights [count = K], none negative, of sum 1 to 1e-9, instead of those of the pose; the bias does not act on them.
    NULL with count 0: those of the pose again. */
 EXMAT_API exmat_status exmat_body_set_example_weights(exmat_body* body, int64_t region, const double* weights,
                                                       int64_t count) EXMAT_NOEXCEPT;
 
+/* ---- obstacles of one body ------------------------------------------------------------------------------------- */
+
+/* What a body may touch: those of its scene, and those that its host adds, moves and removes between steps. The model
+   has to know of contact: use_contact, or a scene with obstacles. Obstacles are each body's own and have a number,
+   `id` >= 0, that no later one gets. exmat_body_reset() and states keep the host's where they are. */
+
+enum { EXMAT_PLANE = 0, EXMAT_SPHERE = 1, EXMAT_BOX = 2, EXMAT_CAPSULE = 3 }; /* shape */
+
+/* Its shape, in its own frame, which is the world until the obstacle is moved, and its law: pressures on the body's
+   surface. Members that the shape does not name are not looked at. */
+typedef struct exmat_obstacle {
+  size_t size;     /* sizeof(exmat_obstacle) where the caller was compiled */
+  double point[3]; /* of the plane; centre of sphere and box; where the capsule's axis begins [m]; 0 */
+  double
+      direction[3]; /* the plane's, away from the solid; from the beginning to the end of the capsule's axis [m]; z */
+  double half_extents[3]; /* of the box, > 0 [m]; 1 */
+  double orientation[4];  /* of the box, a quaternion, w first; 1 0 0 0 */
+  double radius;          /* of sphere and capsule, > 0 [m]; 1 */
+  double stiffness;       /* pressure per depth, > 0 [N/m^3]; 1e6 */
+  double damping;         /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
+  double friction;        /* Coulomb's coefficient, >= 0; 0 */
+  int32_t shape;          /* EXMAT_PLANE */
+  int32_t reserved;       /* 0 */
+} exmat_obstacle;
+
+/* Sets all members to their defaults; `size` is sizeof(exmat_obstacle). */
+EXMAT_API exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, size_t size) EXMAT_NOEXCEPT;
+
+EXMAT_API exmat_status exmat_body_add_obstacle(exmat_body* body, const exmat_obstacle* obstacle,
+                                               int64_t* id) EXMAT_NOEXCEPT;
+/* What it held by friction is let go. */
+EXMAT_API exmat_status exmat_body_remove_obstacle(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
+
+/* How many there are; negative where `body` is NULL. And `ids` [count] of all, in ascending order. */
+EXMAT_API int64_t exmat_body_obstacles(const exmat_body* body) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_obstacle_ids(const exmat_body* body, int64_t* ids, int64_t count) EXMAT_NOEXCEPT;
+
+/* Where the obstacle's frame is now and how it moves on from here, straight and about a fixed axis, until it is moved
+   again: to be called before each step, or each few, with the pose and the velocities of the host's rigid body. What
+   touches is carried along by the velocities and not by a jump of the pose. */
+EXMAT_API exmat_status exmat_body_move_obstacle(exmat_body* body, int64_t id,
+                                                const exmat_motion* motion) EXMAT_NOEXCEPT;
+
+/* Either may be NULL. `motion` is that at the body's time. */
+EXMAT_API exmat_status exmat_body_read_obstacle(const exmat_body* body, int64_t id, exmat_obstacle* obstacle,
+                                                exmat_motion* motion) EXMAT_NOEXCEPT;
+
+/* Changes the law alone: stiffness > 0, damping >= 0, friction >= 0, as in exmat_obstacle. */
+EXMAT_API exmat_status exmat_body_set_obstacle_law(exmat_body* body, int64_t id, double stiffness, double damping,
+                                                   double friction) EXMAT_NOEXCEPT;
+
+/* A vertex of the object that touched at the end of the last step. */
+typedef struct exmat_contact {
+  int64_t vertex;     /* 0-based */
+  int64_t obstacle;   /* its id */
+  double position[3]; /* of the vertex, world [m] */
+  double normal[3];   /* unit, away from the obstacle */
+  double force[3];    /* on the body [N] */
+  double depth;       /* of the vertex in the obstacle; negative where damping alone acts [m] */
+} exmat_contact;
+
+/* How many; negative where `body` is NULL. And `contacts` [count] in order of vertex and obstacle; `size` is
+   sizeof(exmat_contact). */
+EXMAT_API int64_t exmat_body_contacts(const exmat_body* body) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_contacts(const exmat_body* body, exmat_contact* contacts, int64_t count,
+                                                size_t size) EXMAT_NOEXCEPT;
+
+/* What contacts did in the last call that stepped the body, as a constant force [3] [N] and torque [3] [N m] over its
+   steps, world: on the obstacle `id`, about the origin of its frame; or, -1, on the body, about its centre of mass
+   where it is free, else about the origin of the frame that it deforms in. Either may be NULL. */
+EXMAT_API exmat_status exmat_body_read_contact_load(const exmat_body* body, int64_t id, double* force,
+                                                    double* torque) EXMAT_NOEXCEPT;
+
 /* ---- states ---------------------------------------------------------------------------------------------------- */
 
 /* A state is all that a body carries from step to step, as numbers: steps, displacement and velocity now and one step
-   earlier, motion, applied forces, targets, contacts. Bodies of the same bundle, settings or scene take it and go on to
-   the last bit, in this version of the library. */
+   earlier, motion, applied forces, targets, contacts. Bodies of the same bundle, settings or scene, with the same
+   obstacles, take it and go on to the last bit, in this version of the library. */
 
 /* How many numbers it has now: the same for all bodies of a model, but for 6 for each contact. Negative where `body` is
    NULL. */

@@ -56,6 +56,12 @@ inline exmat_settings default_settings() {
   return settings;
 }
 
+inline exmat_obstacle default_obstacle() {
+  exmat_obstacle obstacle;
+  detail::check(exmat_obstacle_default(&obstacle, sizeof obstacle));
+  return obstacle;
+}
+
 /// A bundle prepared for stepping. All of these are moved, not copied; one that was moved from is empty.
 class Model {
  public:
@@ -211,13 +217,63 @@ class Body {
   std::span<const double> velocity(std::size_t modes) const noexcept { return {exmat_body_velocity(get()), modes}; }
   std::span<const double> weights(std::size_t examples) const noexcept { return {exmat_body_weights(get()), examples}; }
 
+  void set_gravity(std::span<const double, 3> gravity) { detail::check(exmat_body_set_gravity(get(), gravity.data())); }
   /// `region` -1: the whole body.
   void set_example_stiffness(double kappa, std::int64_t region = -1) {
     detail::check(exmat_body_set_example_stiffness(get(), region, kappa));
   }
+  void set_example_damping(double c_kappa, std::int64_t region = -1) {
+    detail::check(exmat_body_set_example_damping(get(), region, c_kappa));
+  }
+  void set_example_bias(double bias, std::int64_t region = -1) {
+    detail::check(exmat_body_set_example_bias(get(), region, bias));
+  }
   /// Empty: those of the pose again.
   void set_example_weights(std::span<const double> weights, std::int64_t region = -1) {
     detail::check(exmat_body_set_example_weights(get(), region, weights.data(), detail::length(weights)));
+  }
+
+  /// Its id. Sets obstacle.size itself, as the functions below do.
+  std::int64_t add_obstacle(exmat_obstacle obstacle) {
+    obstacle.size = sizeof obstacle;
+    std::int64_t id = -1;
+    detail::check(exmat_body_add_obstacle(get(), &obstacle, &id));
+    return id;
+  }
+  void remove_obstacle(std::int64_t id) { detail::check(exmat_body_remove_obstacle(get(), id)); }
+  void move_obstacle(std::int64_t id, exmat_motion motion) {
+    motion.size = sizeof motion;
+    detail::check(exmat_body_move_obstacle(get(), id, &motion));
+  }
+  void set_obstacle_law(std::int64_t id, double stiffness, double damping, double friction) {
+    detail::check(exmat_body_set_obstacle_law(get(), id, stiffness, damping, friction));
+  }
+  std::vector<std::int64_t> obstacle_ids() const {
+    std::vector<std::int64_t> ids(static_cast<std::size_t>(exmat_body_obstacles(get())));
+    detail::check(exmat_body_read_obstacle_ids(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
+    return ids;
+  }
+  exmat_obstacle obstacle(std::int64_t id) const {
+    exmat_obstacle obstacle;
+    obstacle.size = sizeof obstacle;
+    detail::check(exmat_body_read_obstacle(get(), id, &obstacle, nullptr));
+    return obstacle;
+  }
+  exmat_motion obstacle_motion(std::int64_t id) const {
+    exmat_motion motion;
+    motion.size = sizeof motion;
+    detail::check(exmat_body_read_obstacle(get(), id, nullptr, &motion));
+    return motion;
+  }
+  std::vector<exmat_contact> contacts() const {
+    std::vector<exmat_contact> contacts(static_cast<std::size_t>(exmat_body_contacts(get())));
+    detail::check(exmat_body_read_contacts(get(), contacts.data(), static_cast<std::int64_t>(contacts.size()),
+                                           sizeof(exmat_contact)));
+    return contacts;
+  }
+  /// On an obstacle, or, -1, on the body; force and torque [3] each, either may be null.
+  void read_contact_load(std::int64_t id, double* force, double* torque) const {
+    detail::check(exmat_body_read_contact_load(get(), id, force, torque));
   }
 
   std::vector<double> state() const {

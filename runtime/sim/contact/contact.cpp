@@ -45,6 +45,9 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   data_indices_.resize(static_cast<std::size_t>(count));
   std::iota(data_indices_.begin(), data_indices_.end(), 0);
   if (count > 0) build_branch(data_indices_, 0, count, data.basis, rest);
+  const bool numbered = data.vertices.size() == count;
+  for (const int index : data_indices_)
+    object_vertices_.push_back(numbered ? static_cast<int>(data.vertices[index]) : index);
   rest_ = rest(data_indices_, Eigen::all);
   areas_ = data.areas(data_indices_);
   basis_.resize(3 * count, data.basis.cols());

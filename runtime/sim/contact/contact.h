@@ -58,7 +58,9 @@ class ContactSet {
   Eigen::Index vertices() const noexcept { return areas_.size(); }
   Eigen::Index modes() const noexcept { return basis_.cols(); }
 
-  /// Place in ContactData of a vertex; the set has an order of its own.
+  /// Of a vertex: its number in the object, and its place in ContactData, which is the number, too, where the data has
+  /// none; the set has an order of its own.
+  int object_vertex(int vertex) const noexcept { return object_vertices_[static_cast<std::size_t>(vertex)]; }
   int data_index(int vertex) const noexcept { return data_indices_[static_cast<std::size_t>(vertex)]; }
 
   /// Nothing touches.
@@ -122,7 +124,7 @@ class ContactSet {
   VertexArray rest_;       // k x 3, X
   RowMatrix basis_;        // 3k x r
   Eigen::VectorXd areas_;  // k
-  std::vector<int> data_indices_;
+  std::vector<int> data_indices_, object_vertices_;
   std::vector<Node> nodes_;
   RowMatrix means_;        // 3 nodes x r
   RowMatrix deviations_;   // nodes x r

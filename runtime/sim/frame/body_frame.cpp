@@ -1,5 +1,7 @@
 #include "runtime/sim/frame/body_frame.h"
 
+#include <cmath>
+
 #include "runtime/sim/frame/carried_frame.h"
 #include "runtime/sim/frame/free_frame.h"
 
@@ -11,6 +13,13 @@ void BodyFrame::begin(const FrameStep& step, FrameWorkspace& /*workspace*/,
   external_force += step.loads.gravity_force;
   for (const ScriptedForce& force : step.loads.forces)
     if (force.acts_at(step.midpoint())) external_force += force.force;
+}
+
+Eigen::Vector3d BodyFrame::limit_kinetic_energy(double allowed, const Eigen::Vector3d& /*impulse*/,
+                                                FrameWorkspace& /*workspace*/, Eigen::VectorXd& v,
+                                                FrameState& state) const noexcept {
+  v *= std::sqrt(allowed / kinetic_energy(v, state));
+  return Eigen::Vector3d::Zero();
 }
 
 std::shared_ptr<const BodyFrame> make_frame(const RigidData* rigid, bool carried, const RowMatrix& gravity_load) {

@@ -108,10 +108,12 @@ class BodyFrame {
                      FrameState& /*state*/) const noexcept {}
   virtual void clear_forces(FrameState& /*state*/) const noexcept {}
 
-  /// Scales all of its motion, where that is its own. Returns the linear momentum that it had.
-  virtual Eigen::Vector3d slow_down(double /*share*/, FrameState& /*state*/) const noexcept {
-    return Eigen::Vector3d::Zero();
-  }
+  /// After a step near obstacles whose contacts gave the linear `impulse` [kg m/s]: takes out motion, q's velocity v
+  /// included, until the kinetic energy, which is above it, is `allowed` [J]. The vibration goes first, which has no
+  /// momentum, then what the contacts gave, then the rest. Returns the linear momentum that this took.
+  virtual Eigen::Vector3d limit_kinetic_energy(double allowed, const Eigen::Vector3d& impulse,
+                                               FrameWorkspace& workspace, Eigen::VectorXd& v,
+                                               FrameState& state) const noexcept;
   /// Whether something outside moves it whatever energy that takes.
   virtual bool is_driven() const noexcept { return false; }
 

@@ -1,6 +1,7 @@
 #include "runtime/sim/frame/free_frame.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "runtime/sim/frame/frame_numbers.h"
@@ -124,14 +125,39 @@ void FreeFrame::clear_forces(FrameState& state) const noexcept {
   own(state).applied_torque.setZero();
 }
 
-Eigen::Vector3d FreeFrame::slow_down(double share, FrameState& state) const noexcept {
+/// With momenta and the velocity v given, the energy is p^2 / 2m + l^T J^-1 l / 2, the rigid part, and a part that is
+/// quadratic in v.
+Eigen::Vector3d FreeFrame::limit_kinetic_energy(double allowed, const Eigen::Vector3d& impulse,
+                                                FrameWorkspace& workspace, Eigen::VectorXd& v,
+                                                FrameState& state) const noexcept {
+  const FreeMotionWorkspace& free = own(workspace);
   FreeState& body = own(state);
+  const double mass = body.mass;
   const Eigen::Vector3d before = body.linear_momentum;
-  body.linear_momentum *= share;
-  body.angular_momentum *= share;
-  body.spin *= share;
-  body.momentum *= share;
-  return before;
+  const Eigen::Matrix3d to_body = body.orientation.toRotationMatrix().transpose();
+  const Eigen::Matrix3d inverse = free.moments.inertia.inverse();
+  Eigen::Vector3d l = to_body * body.angular_momentum;
+  const auto product = [&](const Eigen::Vector3d& p, const Eigen::Vector3d& l_p, const Eigen::Vector3d& of,
+                           const Eigen::Vector3d& l_of) { return p.dot(of) / mass + l_p.dot(inverse * l_of); };
+  const double rigid = 0.5 * product(before, l, before, l);
+  const double whole = kinetic_energy(v, state);
+  v *= rigid < allowed ? std::sqrt((allowed - rigid) / (whole - rigid)) : 0;
+  if (rigid > allowed) {
+    const Eigen::Vector3d turn = l - to_body * (free.unknowns.start_rotation * free.problem.momentum);
+    const double slope = product(before, l, impulse, turn), curvature = product(impulse, turn, impulse, turn);
+    const double root = std::sqrt(std::max(0.0, slope * slope - 2 * curvature * (rigid - allowed)));
+    const double share = curvature > 0 ? std::clamp((slope - root) / curvature, 0.0, 1.0) : 0;
+    body.linear_momentum -= share * impulse;
+    l -= share * turn;
+    const double left = 0.5 * product(body.linear_momentum, l, body.linear_momentum, l);
+    const double rest = left > allowed ? std::sqrt(allowed / left) : 1;
+    body.linear_momentum *= rest;
+    l *= rest;
+    body.angular_momentum = to_body.transpose() * l;
+  }
+  body.spin = inverse * (l - free.moments.deformation.transpose() * v);
+  body.momentum = v + free.moments.deformation.lazyProduct(body.spin);
+  return before - body.linear_momentum;
 }
 
 // ---- A step ---------------------------------------------------------------------------------------------------------

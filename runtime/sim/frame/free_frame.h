@@ -39,7 +39,8 @@ class FreeFrame final : public BodyFrame {
   void set_numbers(std::span<const double> numbers, FrameState& state) const noexcept override;
   void apply(const Eigen::Vector3d& force, const Eigen::Vector3d& torque, FrameState& state) const noexcept override;
   void clear_forces(FrameState& state) const noexcept override;
-  Eigen::Vector3d slow_down(double share, FrameState& state) const noexcept override;
+  Eigen::Vector3d limit_kinetic_energy(double allowed, const Eigen::Vector3d& impulse, FrameWorkspace& workspace,
+                                       Eigen::VectorXd& v, FrameState& state) const noexcept override;
 
   void begin(const FrameStep& step, FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept override;
   void move(const FrameStep& step, bool near, bool dissipative, const FrameState& state, FrameWorkspace& workspace,

@@ -70,7 +70,23 @@ RigidMotion::RigidMotion(const std::vector<Keyframe>& keys) {
   }
 }
 
+RigidMotion RigidMotion::going_on(double time, const MotionSample& sample) {
+  RigidMotion motion;
+  motion.start_ = time;
+  motion.first_ = sample;
+  motion.first_.linear_acceleration.setZero();
+  motion.first_.angular_acceleration.setZero();
+  motion.goes_on_ = !sample.linear_velocity.isZero(0) || !sample.angular_velocity.isZero(0);
+  return motion;
+}
+
 MotionSample RigidMotion::sample(double time) const noexcept {
+  if (goes_on_) {
+    MotionSample sample = first_;
+    sample.position += (time - start_) * first_.linear_velocity;
+    sample.rotation = rotation_of((time - start_) * first_.angular_velocity) * first_.rotation;
+    return sample;
+  }
   if (segments_.empty() || time <= segments_.front().start) return first_;
   const auto after = std::upper_bound(segments_.begin(), segments_.end(), time,
                                       [](double t, const Segment& segment) { return t < segment.start; });

@@ -44,6 +44,9 @@ class RigidMotion {
   /// Times ascend strictly.
   explicit RigidMotion(const std::vector<Keyframe>& keys);
 
+  /// The pose of `sample` at `time`, going on with its velocities: the origin straight, the turn about a fixed axis.
+  static RigidMotion going_on(double time, const MotionSample& sample);
+
   /// Velocities and accelerations are the exact derivatives of the pose.
   MotionSample sample(double time) const noexcept;
 
@@ -51,7 +54,7 @@ class RigidMotion {
   bool has_key(double from, double to) const noexcept;
 
   /// Whether the pose changes at all.
-  bool moves() const noexcept { return !segments_.empty(); }
+  bool moves() const noexcept { return !segments_.empty() || goes_on_; }
 
  private:
   /// Between two keys: p(s) by Hermite's basis; R(s) = R_0 exp(w_0 b_0(s)) exp(w_1 b_1(s)) exp(w_2 b_2(s)).
@@ -64,6 +67,8 @@ class RigidMotion {
   static void sample_position(const Segment& segment, double s, MotionSample& sample) noexcept;
   static void sample_rotation(const Segment& segment, double s, MotionSample& sample) noexcept;
 
+  bool goes_on_ = false;  // first_ at start_ and its velocities are all
+  double start_ = 0;      // [s]
   MotionSample first_, last_;
   std::vector<Segment> segments_;
 };

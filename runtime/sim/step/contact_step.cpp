@@ -59,6 +59,15 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
   return total;
 }
 
+void carry_contacts(const StepScene& scene, const Placement& from, const Placement& to, State& state) noexcept {
+  const Eigen::Matrix3d turn = to.rotation * from.rotation.transpose();
+  for (std::size_t i = 0; i < state.contacts.count; ++i) {
+    HeldContact& held = state.contacts.held[i];
+    const MotionSample pose = scene.obstacles[static_cast<std::size_t>(held.obstacle)].motion.sample(state.time);
+    held.anchor = pose.to_frame(to.position + turn * (pose.to_world(held.anchor) - from.position));
+  }
+}
+
 void commit_contacts(const Model& model, bool near, const Workspace& workspace, State& state) noexcept {
   if (near)
     model.contact->commit(pose_of(model, state), workspace.near->contact, state.contacts);

@@ -14,6 +14,9 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
 NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,
                                  IncrementalPotential& potential, Workspace& workspace) noexcept;
 
+/// The anchors of friction go with a body that is put from one place to another.
+void carry_contacts(const StepScene& scene, const Placement& from, const Placement& to, State& state) noexcept;
+
 /// What the state, already that of the end of the step, remembers of its contacts.
 void commit_contacts(const Model& model, bool near, const Workspace& workspace, State& state) noexcept;
 

@@ -26,7 +26,7 @@ State make_state(const Model& model, const Eigen::VectorXd& q, const Eigen::Vect
 }
 
 void prepare_contacts(const Model& model, std::size_t obstacles, State& state) {
-  if (model.contact) state.contacts = model.contact->make_state(obstacles);
+  if (model.contact) state.contacts.held.resize(obstacles * static_cast<std::size_t>(model.contact->vertices()));
 }
 
 bool set_motion(const Model& model, const FrameMotion& motion, State& state) {

@@ -36,10 +36,10 @@ struct State {
 inline FreeState& free_state(State& state) { return *std::get_if<FreeState>(&state.frame); }
 inline const FreeState& free_state(const State& state) { return *std::get_if<FreeState>(&state.frame); }
 
-/// Sets how a free body moves; its q and v stay. False, and nothing is done, for other bodies.
+/// Sets how a free body moves that touches nothing; its q and v stay. False, and nothing is done, for other bodies.
 bool set_motion(const Model& model, const FrameMotion& motion, State& state);
 
-/// Sizes what a state remembers of its contacts with so many obstacles.
+/// Sizes what a state remembers of its contacts with so many obstacles; those that it has stay.
 void prepare_contacts(const Model& model, std::size_t obstacles, State& state);
 
 /// At rest at time 0.

@@ -116,14 +116,15 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
 
 /// A step near obstacles that did not converge may leave contact forces that throw the body: it is slowed down until it
 /// has no more energy than before, or stands still. The force of the contacts tells the difference.
-void take_back_energy(const Model& model, const StepScene& scene, const Energies& before, State& state,
-                      StepReport& report) {
+void take_back_energy(const Model& model, const StepScene& scene, const Energies& before, Workspace& workspace,
+                      State& state, StepReport& report) {
   const Energies now = energies(model, scene, state);
-  const double allowed = before.total() - now.elastic - now.potential;
+  const double allowed = std::max(0.0, before.total() - now.elastic - now.potential);
   if (model.frame->is_driven() || now.kinetic <= allowed) return;
-  const double share = std::sqrt(std::max(allowed, 0.0) / now.kinetic);
-  state.v *= share;
-  report.contact_force -= (1 - share) / scene.time_step * model.frame->slow_down(share, state.frame);
+  const Eigen::Vector3d impulse = scene.time_step * report.contact_force;
+  const Eigen::Vector3d lost =
+      model.frame->limit_kinetic_energy(allowed, impulse, workspace.frame, state.v, state.frame);
+  report.contact_force -= lost / scene.time_step;
 }
 
 void add_newton_report(const NewtonReport& newton, StepReport& report) {
@@ -191,7 +192,7 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
   const bool unbalanced = near && newton.status != NewtonStatus::kConverged;
   const Energies before = unbalanced ? energies(model, scene, state) : Energies{};
   commit(model, scene, elastic_energy, workspace, state);
-  if (unbalanced) take_back_energy(model, scene, before, state, report);
+  if (unbalanced) take_back_energy(model, scene, before, workspace, state, report);
   state.begins_anew = near;
   commit_contacts(model, near, workspace, state);
   return report;
@@ -200,6 +201,15 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   evaluate_weights(model, scene, state.q, workspace);
   commit_weights(scene, workspace, state);
+}
+
+bool move_body(const Model& model, const StepScene& scene, const FrameMotion& motion, State& state,
+               Workspace& workspace) noexcept {
+  const Placement before = model.frame->placement(state.frame);
+  if (!model.frame->set_motion(motion, state.q, state.v, workspace.frame, state.frame)) return false;
+  carry_contacts(scene, before, model.frame->placement(state.frame), state);
+  state.begins_anew = true;
+  return true;
 }
 
 void follow_frame(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {

@@ -18,6 +18,11 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
 /// After q or v of `state` were set: what its frame carries follows (BodyFrame::follow).
 void follow_frame(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
+/// Sets how a free body moves; its q and v stay. The anchors of its friction go with it, so that a body that is held
+/// stays so where it is put. False, and nothing is done, for other bodies.
+bool move_body(const Model& model, const StepScene& scene, const FrameMotion& motion, State& state,
+               Workspace& workspace) noexcept;
+
 /// Example weights of a state that no step has led to, for its output.
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 

@@ -45,6 +45,24 @@ TEST(RigidMotion, PassesThroughItsKeys) {
   }
 }
 
+TEST(RigidMotion, GoesOnAlongAHelix) {
+  MotionSample start;
+  start.position = Eigen::Vector3d(1, 2, 3);
+  start.rotation = turned(0.3, -0.2, 0.5).toRotationMatrix();
+  start.linear_velocity = Eigen::Vector3d(0.5, -1, 2);
+  start.angular_velocity = Eigen::Vector3d(3, 1, -2);
+  const RigidMotion motion = RigidMotion::going_on(4, start);
+  EXPECT_TRUE(motion.moves());
+  for (const double time : {3.0, 4.0, 4.5, 40.0}) {
+    const MotionSample sample = motion.sample(time);
+    const Eigen::AngleAxisd turn((time - 4) * start.angular_velocity.norm(), start.angular_velocity.normalized());
+    EXPECT_LE((sample.position - start.position - (time - 4) * start.linear_velocity).norm(), 1e-13);
+    EXPECT_LE((sample.rotation - turn * start.rotation).norm(), 1e-13);  // rounding of an angle of 135 rad
+    EXPECT_EQ(sample.angular_velocity, start.angular_velocity);
+  }
+  EXPECT_FALSE(RigidMotion::going_on(4, motion.sample(4)).has_key(0, 10));
+}
+
 TEST(RigidMotion, HasTheDerivativesOfItsPose) {
   const RigidMotion motion(wild_keys());
   constexpr double kStep = 1e-5;

@@ -1,0 +1,10 @@
+#pragma once
+
+#include "runtime/api/handles.h"
+
+namespace exmat::runtime {
+
+/// After the body's time was set back or on: obstacles of the host stay where they were at `time_before` [s].
+void keep_host_obstacles(double time_before, exmat_body& body) noexcept;
+
+}  // namespace exmat::runtime

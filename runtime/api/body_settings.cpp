@@ -1,0 +1,90 @@
+#include <cinttypes>
+#include <cmath>
+#include <fmt/format.h>
+#include <span>
+
+#include "exmat/exmat.h"
+#include "runtime/api/arguments.h"
+#include "runtime/api/handles.h"
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+/// The force of a region, of the whole body where it is -1.
+std::size_t example_force(const exmat_body& body, std::int64_t region) {
+  const Model& model = body.model();
+  const bool whole = region == -1 && model.has_whole_body_examples();
+  if (!whole && model.region(region) == nullptr)
+    throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
+                                      model.has_whole_body_examples() ? "the whole body (-1) and " : "",
+                                      model.region_count()));
+  const std::size_t force = whole ? 0 : static_cast<std::size_t>(model.region(region) - model.examples.data());
+  if (force >= body.scene.examples.size()) throw InvalidArgument("the model was created without its example force");
+  return force;
+}
+
+ExampleSettings& example_settings(exmat_body& body, std::int64_t region) {
+  return body.scene.examples[example_force(body, region)];
+}
+
+void check_weights(std::span<const double> weights, Eigen::Index examples) {
+  constexpr double kSumTolerance = 1e-9;
+  if (std::ssize(weights) != examples)
+    throw InvalidArgument(fmt::format("count = {}: expected {}", weights.size(), examples));
+  double sum = 0;
+  for (const double weight : weights) {
+    if (!(weight >= 0)) throw InvalidArgument("weights: expected numbers that are not negative");
+    sum += weight;
+  }
+  if (!(std::abs(sum - 1) <= kSumTolerance))
+    throw InvalidArgument(fmt::format("weights: their sum is {:g}: expected 1", sum));
+}
+
+bool is_factor(double number) { return number >= 0 && std::isfinite(number); }
+
+}  // namespace
+
+exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(gravity);
+  if (!all_finite(gravity, 3)) return fail(EXMAT_INVALID_ARGUMENT, "%s: gravity: expected finite numbers", __func__);
+  body->scene.gravity = Eigen::Map<const Eigen::Vector3d>(gravity);
+  body->scene.gravity_force.noalias() = body->model().gravity_load.transpose() * body->scene.gravity;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_example_stiffness(exmat_body* body, std::int64_t region, double kappa) noexcept {
+  EXMAT_REQUIRE(body);
+  if (!is_factor(kappa))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: kappa = %g: expected a finite number >= 0", __func__, kappa);
+  return guarded(__func__, [&] { example_settings(*body, region).stiffness = kappa; });
+}
+
+exmat_status exmat_body_set_example_damping(exmat_body* body, std::int64_t region, double c_kappa) noexcept {
+  EXMAT_REQUIRE(body);
+  if (!is_factor(c_kappa))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: c_kappa = %g: expected a finite number >= 0", __func__, c_kappa);
+  return guarded(__func__, [&] { example_settings(*body, region).damping = c_kappa; });
+}
+
+exmat_status exmat_body_set_example_bias(exmat_body* body, std::int64_t region, double bias) noexcept {
+  EXMAT_REQUIRE(body);
+  if (!(bias >= 0 && bias <= 1))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: bias = %g: expected a number of 0 to 1", __func__, bias);
+  return guarded(__func__, [&] { example_settings(*body, region).bias = bias; });
+}
+
+exmat_status exmat_body_set_example_weights(exmat_body* body, std::int64_t region, const double* weights,
+                                            std::int64_t count) noexcept {
+  EXMAT_REQUIRE(body);
+  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
+  if (count > 0) EXMAT_REQUIRE(weights);
+  return guarded(__func__, [&] {
+    const std::size_t force = example_force(*body, region);
+    const std::span given(weights, static_cast<std::size_t>(count));
+    if (count > 0) check_weights(given, body->model().examples[force].weights.examples());
+    body->scene.examples[force].given_weights = Eigen::Map<const Eigen::VectorXd>(weights, count);
+  });
+}
