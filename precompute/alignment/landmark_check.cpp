@@ -29,8 +29,7 @@ std::vector<std::vector<std::int32_t>> neighbours_of(const TetMesh& mesh) {
         if (a != b) neighbours[static_cast<std::size_t>(a)].push_back(b);
   for (auto& list : neighbours) {
     std::ranges::sort(list);
-    const auto [first, last] = std::ranges::unique(list);
-    list.erase(first, last);
+    list.erase(std::unique(list.begin(), list.end()), list.end());
   }
   return neighbours;
 }

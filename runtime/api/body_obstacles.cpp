@@ -166,8 +166,9 @@ std::size_t place_of(const exmat_body& body, std::int64_t id) {
 void forget(std::size_t place, ContactState& contacts) {
   const int gone = static_cast<int>(place);
   const auto held = std::span(contacts.held).first(contacts.count);
-  const auto left = std::ranges::remove(held, gone, &HeldContact::obstacle);
-  contacts.count -= left.size();
+  const auto end =
+      std::remove_if(held.begin(), held.end(), [=](const HeldContact& contact) { return contact.obstacle == gone; });
+  contacts.count = static_cast<std::size_t>(end - held.begin());
   for (HeldContact& contact : std::span(contacts.held).first(contacts.count))
     if (contact.obstacle > gone) --contact.obstacle;
 }

@@ -171,14 +171,21 @@ void take_weights(BodyObject& body, const py::object& weights, const py::object&
 
 // ---- copies
 
-py::tuple kept(BodyObject& body) { return py::make_tuple(body.model, state_of(body), body.stiffness, body.weights); }
+using KeptFactors = std::map<std::pair<int, std::int64_t>, double>;
+
+py::tuple kept(BodyObject& body) {
+  KeptFactors factors;
+  for (const auto& [key, number] : body.factors) factors[{static_cast<int>(key.first), key.second}] = number;
+  return py::make_tuple(body.model, state_of(body), factors, body.weights, body.gravity);
+}
 
 Shared restored(const py::tuple& from) {
   auto body = std::make_shared<BodyObject>(from[0].cast<std::shared_ptr<ModelObject>>());
-  for (const auto& [region, kappa] : from[2].cast<std::map<std::int64_t, double>>())
-    set_stiffness(*body, kappa, region);
+  for (const auto& [key, number] : from[2].cast<KeptFactors>())
+    set_factor(*body, static_cast<ExampleFactor>(key.first), number, key.second);
   for (const auto& [region, weights] : from[3].cast<std::map<std::int64_t, std::vector<double>>>())
     set_weights(*body, weights, region);
+  if (const auto gravity = from[4].cast<std::optional<std::array<double, 3>>>()) set_gravity(*body, *gravity);
   set_state(*body, from[1].cast<StateObject>());
   return body;
 }
@@ -189,7 +196,7 @@ void bind_body_class(py::module_& module) {
   py::class_<BodyObject, Shared>(
       module, "Body",
       "One body of a model: its state and the forces on it. Steps release the interpreter's lock; until they are done, "
-      "other threads are refused. copy.copy() and pickle keep state, example stiffness and weights.")
+      "other threads are refused. copy.copy() and pickle keep the state and what was set for this body alone.")
       .def(py::init([](std::shared_ptr<ModelObject> model) { return std::make_shared<BodyObject>(std::move(model)); }),
            py::arg("model"), "At rest at time 0, or as the model's scene starts it.")
       .def_readonly("model", &BodyObject::model, "The model that it is of.")
@@ -250,10 +257,25 @@ void bind_body_class(py::module_& module) {
       .def_property(
           "state", [](BodyObject& body) { return state_of(body); }, &set_state,
           "The whole State, a copy; a State of the same bundle and time step to be set.")
+      .def("set_gravity", &set_gravity, py::arg("gravity"),
+           "Gravity of this body alone, three numbers [m/s^2]; after an abrupt change restart_integrator() keeps the "
+           "impulse exact. reset() keeps it.")
+      .def(
+          "set_example_damping",
+          [](BodyObject& body, double c_kappa, const py::object& region) {
+            set_factor(body, ExampleFactor::kDamping, c_kappa, region_of(body, region));
+          },
+          py::arg("c_kappa"), py::arg("region") = py::none(), "c_kappa [1/s], likewise.")
+      .def(
+          "set_example_bias",
+          [](BodyObject& body, double bias, const py::object& region) {
+            set_factor(body, ExampleFactor::kBias, bias, region_of(body, region));
+          },
+          py::arg("bias"), py::arg("region") = py::none(), "Factor in [0, 1] on the weight of the rest pose, likewise.")
       .def(
           "set_example_stiffness",
           [](BodyObject& body, double kappa, const py::object& region) {
-            set_stiffness(body, kappa, region_of(body, region));
+            set_factor(body, ExampleFactor::kStiffness, kappa, region_of(body, region));
           },
           py::arg("kappa"), py::arg("region") = py::none(),
           "kappa [1/s^2] of this body alone, of the whole body or of a region by its name. reset() keeps it. The model "

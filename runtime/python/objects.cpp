@@ -46,9 +46,25 @@ void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles
   detail::check(status);
 }
 
-void set_stiffness(BodyObject& body, double kappa, std::int64_t region) {
-  body.get().set_example_stiffness(kappa, region);
-  body.stiffness[region] = kappa;
+void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int64_t region) {
+  Body& target = body.get();
+  switch (factor) {
+    case ExampleFactor::kStiffness:
+      target.set_example_stiffness(number, region);
+      break;
+    case ExampleFactor::kDamping:
+      target.set_example_damping(number, region);
+      break;
+    case ExampleFactor::kBias:
+      target.set_example_bias(number, region);
+      break;
+  }
+  body.factors[{factor, region}] = number;
+}
+
+void set_gravity(BodyObject& body, const std::array<double, 3>& gravity) {
+  body.get().set_gravity(gravity);
+  body.gravity = gravity;
 }
 
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region) {

@@ -1,12 +1,15 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <exmat/exmat.hpp>
 #include <map>
 #include <memory>
+#include <optional>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 #include <string>
+#include <utility>
 #include <vector>
 
 // What the Python classes hold. All calls into Python, and all that reads or sets `stepping`, hold the interpreter's
@@ -42,6 +45,9 @@ struct StateObject {
   bool operator==(const StateObject&) const = default;
 };
 
+/// A factor of an example force that a body may have of its own.
+enum class ExampleFactor { kStiffness, kDamping, kBias };
+
 struct BodyObject {
   explicit BodyObject(std::shared_ptr<ModelObject> its_model) : body(its_model->model), model(std::move(its_model)) {}
 
@@ -54,8 +60,9 @@ struct BodyObject {
   Body body;
   std::shared_ptr<ModelObject> model;
   bool stepping = false;
-  std::map<std::int64_t, double> stiffness;               ///< that was set, by region
-  std::map<std::int64_t, std::vector<double>> weights{};  ///< likewise
+  std::map<std::pair<ExampleFactor, std::int64_t>, double> factors;  ///< that were set, by region
+  std::map<std::int64_t, std::vector<double>> weights;               ///< likewise
+  std::optional<std::array<double, 3>> gravity;                      ///< likewise
 };
 
 using BodyList = std::vector<std::shared_ptr<BodyObject>>;
@@ -72,7 +79,8 @@ struct WorldObject {
 void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles, std::int64_t steps, int threads);
 
 /// Sets what a body has instead of its model, and remembers it.
-void set_stiffness(BodyObject& body, double kappa, std::int64_t region);
+void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int64_t region);
+void set_gravity(BodyObject& body, const std::array<double, 3>& gravity);
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region);
 
 StateObject state_of(BodyObject& body);

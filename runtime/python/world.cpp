@@ -127,7 +127,7 @@ void apply_forces(WorldObject& world, const PointsObject& points, const Numbers&
 void take_stiffness(WorldObject& world, const Numbers& kappa) {
   if (kappa.ndim() > 0) require_shape(kappa, "kappa", {count(world)});
   for (std::size_t i = 0; i < world.bodies.size(); ++i)
-    set_stiffness(*world.bodies[i], kappa.data()[kappa.ndim() > 0 ? i : 0], -1);
+    set_factor(*world.bodies[i], ExampleFactor::kStiffness, kappa.data()[kappa.ndim() > 0 ? i : 0], -1);
 }
 
 void take_weights(WorldObject& world, const py::object& given) {

@@ -170,6 +170,27 @@ def test_a_pickled_model_wants_the_same_bundle(model, bundle, free_bundle, tmp_p
     assert copy.deepcopy(model) is model
 
 
+def test_settings_of_a_body_are_those_of_a_model(bundle):
+    settings = dict(gravity=(0, 0.5, -2), example_stiffness=3000, example_damping=7, example_bias=0.3)
+    expected = exmat.Body(exmat.Model(bundle, **settings))
+    expected.step(30)
+    model = exmat.Model(bundle, example_stiffness=10)
+    body = exmat.Body(model)
+    body.set_gravity(settings["gravity"])
+    body.set_example_stiffness(3000)
+    body.set_example_damping(7)
+    body.set_example_bias(0.3)
+    body.reset()
+    twin, kept = copy.copy(body), pickle.loads(pickle.dumps(body))
+    for each in (body, twin, kept):
+        each.step(30)
+        assert hash_of([each]) == hash_of([expected])
+    with pytest.raises(exmat.InvalidArgument, match="bias = 2: expected a number of 0 to 1"):
+        body.set_example_bias(2)
+    with pytest.raises(exmat.InvalidArgument, match="c_kappa = -1"):
+        body.set_example_damping(-1)
+
+
 def test_given_weights_and_stiffness_are_of_the_body_alone(bundle):
     def end(kappa, model):
         body = exmat.Body(model)
