@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "common/mesh/geometry.h"
 #include "common/mesh/nearest_point.h"
 #include "precompute/alignment/landmark_check.h"
 #include "precompute/alignment/rigid_fit.h"
@@ -33,7 +34,8 @@ constexpr double kClearlyFarther = 1.2;      // times the displacement of the po
 constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
 constexpr int kTurningRounds = 4;            // of landmarks on a body of revolution
 // Weights of doubt: docs/alignment.md, "What the user is told".
-constexpr double kDoubtOfMap = 0.6, kDoubtOfResidual = 10, kDoubtOfLandmarks = 2;
+constexpr double kDoubtOfMap = 0.6, kDoubtOfResidual = 10, kDoubtOfLandmarks = 2, kDoubtOfVolume = 0.5;
+constexpr double kVolumeOfPoses = 0.12;     // change of volume that a pose may have, as in example_scale.cpp
 constexpr double kAmbiguous = 1.15;         // times the misfit that is taken, in a shared frame
 constexpr double kMirrorMargin = 0.5;       // of the best F, from which on a mirror image is believed
 constexpr double kMirrorWorthwhile = 0.03;  // F above which it is looked for
@@ -338,8 +340,10 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   const double J = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)), registered.distortion,
                             registered.inverted}
                        .total();
-  alignment.doubt =
-      kDoubtOfMap * (J + kDoubtOfResidual * alignment.residual) + kDoubtOfLandmarks * alignment.missed_landmarks;
+  const double grown = std::abs(std::log(tet_volumes(pose_.mesh).sum() / tet_volumes(rest_.mesh).sum()));
+  alignment.doubt = kDoubtOfMap * (J + kDoubtOfResidual * alignment.residual) +
+                    kDoubtOfLandmarks * alignment.missed_landmarks +
+                    kDoubtOfVolume * std::max(0.0, grown - std::log1p(kVolumeOfPoses));
   alignment.inverted_fraction = registered.inverted;
   alignment.displacement = taken.size / size_;
   const Eigen::Matrix3d turn =
