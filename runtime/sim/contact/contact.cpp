@@ -1,29 +1,13 @@
 #include "runtime/sim/contact/contact.h"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 namespace exmat::runtime {
 namespace {
 
-constexpr int kLeafVertices = 16;
 constexpr Eigen::Index kFactorColumns = 32;
-
-using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
-
-/// Largest singular value of each 3 x r block less `mean`.
-double largest_norm(const RowMatrix& basis, const std::vector<int>& order, int first, int last, const Rows& mean) {
-  double largest = 0;
-  for (int i = first; i < last; ++i) {
-    const Rows rows = basis.middleRows<3>(3 * order[static_cast<std::size_t>(i)]) - mean;
-    const Eigen::Matrix3d square = rows * rows.transpose();
-    largest = std::max(largest, Eigen::JacobiSVD<Eigen::Matrix3d>(square).singularValues()[0]);
-  }
-  return std::sqrt(largest);
-}
 
 /// Lower triangle of A += F F^T, F the first `used` columns of `factors`. Eigen keeps its panels on the stack up to r =
 /// 500.
@@ -42,9 +26,8 @@ ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_c
 ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   const auto count = static_cast<int>(data.areas.size());
   const VertexArray rest = data.positions.rowwise() - origin.transpose();
-  data_indices_.resize(static_cast<std::size_t>(count));
-  std::iota(data_indices_.begin(), data_indices_.end(), 0);
-  if (count > 0) build_branch(data_indices_, 0, count, data.basis, rest);
+  tree_ = DeformationTree(IndexVector::LinSpaced(count, 0, count - 1), rest, data.basis);
+  data_indices_ = tree_.order();
   const bool numbered = data.vertices.size() == count;
   for (const int index : data_indices_)
     object_vertices_.push_back(numbered ? static_cast<int>(data.vertices[index]) : index);
@@ -52,50 +35,7 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   areas_ = data.areas(data_indices_);
   basis_.resize(3 * count, data.basis.cols());
   for (int i = 0; i < count; ++i) basis_.middleRows<3>(3 * i) = data.basis.middleRows<3>(3 * data_index(i));
-  if (count == 0) return;
-  reach_ = rest.rowwise().norm().maxCoeff();
-  basis_norm_ = largest_norm(data.basis, data_indices_, 0, count, Rows::Zero(3, modes()));
-}
-
-void ContactSet::build_branch(std::vector<int>& order, int first, int last, const RowMatrix& basis,
-                              const VertexArray& rest) {
-  const std::size_t at = nodes_.size();
-  nodes_.emplace_back();
-  nodes_[at].first = first;
-  nodes_[at].last = last;
-  nodes_[at].is_leaf = last - first <= kLeafVertices;
-  set_bounds(nodes_[at], order, basis, rest);
-  if (!nodes_[at].is_leaf) {
-    const std::vector<int> ids(order.begin() + first, order.begin() + last);
-    const VertexArray points = rest(ids, Eigen::all);
-    Eigen::Index axis = 0;
-    (points.colwise().maxCoeff() - points.colwise().minCoeff()).maxCoeff(&axis);
-    const int middle = first + (last - first) / 2;
-    std::nth_element(order.begin() + first, order.begin() + middle, order.begin() + last, [&](int a, int b) {
-      return rest(a, axis) != rest(b, axis) ? rest(a, axis) < rest(b, axis) : a < b;
-    });
-    build_branch(order, first, middle, basis, rest);
-    build_branch(order, middle, last, basis, rest);
-  }
-  nodes_[at].next = static_cast<int>(nodes_.size());
-}
-
-void ContactSet::set_bounds(Node& node, const std::vector<int>& order, const RowMatrix& basis,
-                            const VertexArray& rest) {
-  const std::vector<int> ids(order.begin() + node.first, order.begin() + node.last);
-  const VertexArray points = rest(ids, Eigen::all);
-  node.centre = 0.5 * (points.colwise().maxCoeff() + points.colwise().minCoeff()).transpose();
-  node.radius = (points.rowwise() - node.centre.transpose()).rowwise().norm().maxCoeff();
-  Rows mean = Rows::Zero(3, basis.cols());
-  for (const int id : ids) mean += basis.middleRows<3>(3 * id) / static_cast<double>(ids.size());
-  Eigen::RowVectorXd deviation = Eigen::RowVectorXd::Zero(basis.cols());
-  for (const int id : ids) deviation = deviation.cwiseMax((basis.middleRows<3>(3 * id) - mean).colwise().norm());
-  node.deviation_norm = largest_norm(basis, order, node.first, node.last, mean);
-  const Eigen::Index index = deviations_.rows();
-  means_.conservativeResize(3 * (index + 1), basis.cols());
-  means_.bottomRows<3>() = mean;
-  deviations_.conservativeResize(index + 1, basis.cols());
-  deviations_.bottomRows<1>() = deviation;
+  if (count > 0) reach_ = rest.rowwise().norm().maxCoeff();
 }
 
 ContactState ContactSet::make_state(std::size_t obstacle_count) const {
@@ -103,25 +43,25 @@ ContactState ContactSet::make_state(std::size_t obstacle_count) const {
 }
 
 double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept {
-  const double reach = reach_ + basis_norm_ * pose.q.norm();
-  return time_step * (velocity.linear.norm() + velocity.angular.norm() * reach + basis_norm_ * velocity.v.norm());
+  const double reach = reach_ + tree_.basis_norm() * pose.q.norm();
+  return time_step *
+         (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.basis_norm() * velocity.v.norm());
 }
 
 bool ContactSet::body_is_near(const BodyPose& pose, double q_norm, double margin,
                               const ContactWorkspace& workspace) const noexcept {
-  const Eigen::Vector3d centre = pose.position + pose.rotation * nodes_.front().centre;
-  const double radius = nodes_.front().radius + basis_norm_ * q_norm + margin;
+  const DeformationTree::Node& all = tree_.nodes().front();
+  const Eigen::Vector3d centre = pose.position + pose.rotation * all.centre;
+  const double radius = all.radius + tree_.basis_norm() * q_norm + margin;
   return std::any_of(workspace.obstacles.begin(), workspace.obstacles.end(),
                      [&](const PlacedObstacle& obstacle) { return obstacle.signed_distance(centre) <= radius; });
 }
 
 bool ContactSet::is_near(int node, const BodyPose& pose, double q_norm, double margin,
                          const ContactWorkspace& workspace) const noexcept {
-  const Node& ball = nodes_[static_cast<std::size_t>(node)];
-  const Eigen::Vector3d moved = ball.centre + means_.middleRows<3>(3 * node).lazyProduct(pose.q);
-  const Eigen::Vector3d centre = pose.position + pose.rotation * moved;
-  const double spread = std::min(deviations_.row(node).dot(pose.q.cwiseAbs()), ball.deviation_norm * q_norm);
-  const double radius = ball.radius + spread + margin;
+  const DeformationTree::Ball ball = tree_.ball(node, pose.q, q_norm);
+  const Eigen::Vector3d centre = pose.position + pose.rotation * ball.centre;
+  const double radius = ball.radius + margin;
   return std::any_of(workspace.obstacles.begin(), workspace.obstacles.end(),
                      [&](const PlacedObstacle& obstacle) { return obstacle.signed_distance(centre) <= radius; });
 }
@@ -137,7 +77,7 @@ Eigen::Vector3d ContactSet::world_velocity(int vertex, const Eigen::Vector3d& ar
   return velocity.at(arm) + pose.rotation * own;
 }
 
-void ContactSet::test_vertices(const Node& node, const BodyPose& pose, double margin,
+void ContactSet::test_vertices(const DeformationTree::Node& node, const BodyPose& pose, double margin,
                                ContactWorkspace& workspace) const noexcept {
   for (int vertex = node.first; vertex < node.last; ++vertex) {
     ++workspace.tested_vertices;
@@ -155,18 +95,18 @@ void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time,
                         double margin, ContactWorkspace& workspace) const noexcept {
   workspace.candidate_count = 0;
   workspace.visited_nodes = workspace.tested_vertices = 0;
-  if (nodes_.empty()) return;
+  if (tree_.empty()) return;
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     workspace.obstacles[i] = PlacedObstacle(obstacles[i], end_time, time_step);
   const double q_norm = pose.q.norm();
   if (!body_is_near(pose, q_norm, margin, workspace)) return;
-  const auto count = static_cast<int>(nodes_.size());
+  const auto count = static_cast<int>(tree_.nodes().size());
   for (int node = 0; node < count;) {
     ++workspace.visited_nodes;
-    const Node& ball = nodes_[static_cast<std::size_t>(node)];
+    const DeformationTree::Node& branch = tree_.node(node);
     const bool near = is_near(node, pose, q_norm, margin, workspace);
-    if (near && ball.is_leaf) test_vertices(ball, pose, margin, workspace);
-    node = near ? node + 1 : ball.next;
+    if (near && branch.is_leaf) test_vertices(branch, pose, margin, workspace);
+    node = near ? node + 1 : branch.next;
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "common/model/reduced_model.h"
 #include "runtime/sim/contact/contact_law.h"
+#include "runtime/sim/contact/deformation_tree.h"
 #include "runtime/sim/frame/placement.h"
 
 namespace exmat::runtime {
@@ -98,26 +99,26 @@ class ContactSet {
   /// Writes the contacts of the last evaluation, anchors moved where they slid.
   void commit(const BodyPose& pose, const ContactWorkspace& workspace, ContactState& state) const noexcept;
 
+  // Of one vertex.
+
+  /// x - position, world [m].
+  Eigen::Vector3d world_arm(int vertex, const BodyPose& pose) const noexcept;
+  /// World [m/s]; `arm` is that of the vertex.
+  Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
+                                 const BodyVelocity& velocity) const noexcept;
+  double area(int vertex) const noexcept { return areas_[vertex]; }  ///< share of the surface [m^2]
+  auto basis_rows(int vertex) const noexcept { return basis_.middleRows<3>(3 * vertex); }  ///< 3 x r
+
+  const DeformationTree& tree() const noexcept { return tree_; }  ///< its items are the vertices, in their order
+  double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
+
  private:
-  /// A node of a bounded deformation tree (James and Pai 2004), depth first: its vertices lie in the ball about
-  /// centre + mean q of radius + min(deviation . |q|, deviation_norm |q|).
-  struct Node {
-    int first = 0, last = 0;  // vertices
-    int next = 0;             // node after the whole branch
-    bool is_leaf = false;
-    double radius = 0, deviation_norm = 0;             // [m], [kg^-1/2]
-    Eigen::Vector3d centre = Eigen::Vector3d::Zero();  // body frame [m]
-  };
-  void build_branch(std::vector<int>& order, int first, int last, const RowMatrix& basis, const VertexArray& rest);
-  void set_bounds(Node& node, const std::vector<int>& order, const RowMatrix& basis, const VertexArray& rest);
   bool is_near(int node, const BodyPose& pose, double q_norm, double margin,
                const ContactWorkspace& workspace) const noexcept;
   bool body_is_near(const BodyPose& pose, double q_norm, double margin,
                     const ContactWorkspace& workspace) const noexcept;
-  void test_vertices(const Node& node, const BodyPose& pose, double margin, ContactWorkspace& workspace) const noexcept;
-  Eigen::Vector3d world_arm(int vertex, const BodyPose& pose) const noexcept;
-  Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
-                                 const BodyVelocity& velocity) const noexcept;
+  void test_vertices(const DeformationTree::Node& node, const BodyPose& pose, double margin,
+                     ContactWorkspace& workspace) const noexcept;
   template <int kRigid>
   void add_stiffness_of(const BodyPose& pose, ContactWorkspace& workspace, Eigen::MatrixXd& stiffness) const noexcept;
 
@@ -125,11 +126,8 @@ class ContactSet {
   RowMatrix basis_;        // 3k x r
   Eigen::VectorXd areas_;  // k
   std::vector<int> data_indices_, object_vertices_;
-  std::vector<Node> nodes_;
-  RowMatrix means_;        // 3 nodes x r
-  RowMatrix deviations_;   // nodes x r
-  double reach_ = 0;       // largest |X|
-  double basis_norm_ = 0;  // largest |U_i|
+  DeformationTree tree_;
+  double reach_ = 0;  // largest |X|
 };
 
 }  // namespace exmat::runtime

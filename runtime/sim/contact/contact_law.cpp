@@ -70,17 +70,24 @@ bool precedes(const HeldContact& held, const ContactCandidate& candidate) {
 
 }  // namespace
 
+void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Eigen::Vector3d& carried,
+                    const Eigen::Vector3d& predicted, double area, double time_step,
+                    ContactCandidate& candidate) noexcept {
+  candidate.carried = candidate.anchor = carried;
+  const double predicted_gap = surface.distance + surface.normal.dot(predicted - carried);
+  const bool touches = std::min(surface.distance, predicted_gap) < 0;
+  candidate.normal = surface.normal;
+  candidate.stiffness = law.stiffness * area;
+  candidate.damping = touches ? law.damping / (law.stiffness * time_step) : 0;
+  candidate.friction_force = 0;
+}
+
 void freeze_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const Eigen::Vector3d& predicted,
                     double area, double time_step, ContactCandidate& candidate) noexcept {
   const Obstacle& obstacle = *placed.obstacle;
-  candidate.carried = candidate.anchor = placed.carried(point);
-  const SurfacePoint surface = placed.nearest_surface_point(candidate.carried);
-  const double predicted_gap = surface.distance + surface.normal.dot(predicted - candidate.carried);
-  const bool touches = std::min(surface.distance, predicted_gap) < 0;
-  candidate.normal = surface.normal;
-  candidate.stiffness = obstacle.stiffness * area;
-  candidate.damping = touches ? obstacle.damping / (obstacle.stiffness * time_step) : 0;
-  candidate.friction_force = 0;
+  const Eigen::Vector3d carried = placed.carried(point);
+  freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction}, placed.nearest_surface_point(carried),
+                 carried, predicted, area, time_step, candidate);
 }
 
 void take_friction(const PlacedObstacle& placed, const ContactState& state, std::size_t& next,
@@ -93,13 +100,17 @@ void take_friction(const PlacedObstacle& placed, const ContactState& state, std:
   candidate.friction_force = placed.obstacle->friction * held.normal_force;
 }
 
-void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
-                      ContactCandidate& candidate) noexcept {
+void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept {
   candidate.force.setZero();
   candidate.weights.setZero();
   candidate.normal_force = 0;
-  evaluate_normal(candidate, placed.nearest_surface_point(point), point);
+  evaluate_normal(candidate, surface, point);
   evaluate_friction(candidate, point);
+}
+
+void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
+                      ContactCandidate& candidate) noexcept {
+  evaluate_contact(placed.nearest_surface_point(point), point, candidate);
 }
 
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept {
@@ -110,32 +121,39 @@ double contact_potential(const ContactCandidate& candidate, double gap, const Ei
   return energy / (1 + candidate.damping);
 }
 
+void FrictionChange::refresh(double friction, ContactCandidate& candidate) noexcept {
+  const double force = friction * candidate.normal_force;
+  change = std::max(change, std::abs(force - candidate.friction_force));
+  largest = std::max({largest, force, candidate.friction_force});
+  candidate.friction_force = force;
+}
+
 double refresh_friction(const std::vector<PlacedObstacle>& obstacles, std::vector<ContactCandidate>& candidates,
                         std::size_t count) noexcept {
-  double largest = 0, change = 0;
+  FrictionChange total;
   for (std::size_t i = 0; i < count; ++i) {
-    ContactCandidate& candidate = candidates[i];
-    const double friction = obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction;
-    const double force = friction * candidate.normal_force;
-    change = std::max(change, std::abs(force - candidate.friction_force));
-    largest = std::max({largest, force, candidate.friction_force});
-    candidate.friction_force = force;
+    const PlacedObstacle& placed = obstacles[static_cast<std::size_t>(candidates[i].obstacle)];
+    total.refresh(placed.obstacle->friction, candidates[i]);
   }
-  return largest > 0 ? change / largest : 0;
+  return total.relative();
+}
+
+Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point,
+                             const ContactCandidate& candidate) noexcept {
+  const double full = 2 * friction * candidate.normal_force / candidate.stiffness;
+  const double length = candidate.slip.norm();
+  return length > full ? Eigen::Vector3d(candidate.slip * (full / length))
+                       : tangential(point - candidate.anchor, candidate.normal);
 }
 
 void hold_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const ContactCandidate& candidate,
                   ContactState& state) noexcept {
   if (candidate.normal_force <= 0) return;
-  const double full = 2 * placed.obstacle->friction * candidate.normal_force / candidate.stiffness;
-  const double length = candidate.slip.norm();
-  const Eigen::Vector3d stretch = length > full ? Eigen::Vector3d(candidate.slip * (full / length))
-                                                : tangential(point - candidate.anchor, candidate.normal);
   HeldContact& held = state.held[state.count++];
   held.vertex = candidate.vertex;
   held.obstacle = candidate.obstacle;
   held.normal_force = candidate.normal_force;
-  held.anchor = placed.pose.to_frame(point - stretch);
+  held.anchor = placed.pose.to_frame(point - held_stretch(placed.obstacle->friction, point, candidate));
 }
 
 }  // namespace exmat::runtime

@@ -25,6 +25,13 @@ inline constexpr double kContactMarginSteps = 2;  ///< way of a vertex that cand
 inline constexpr int kFrictionRounds = 3;         ///< solutions of one step for the normal forces of friction
 inline constexpr double kSameFriction = 0.05;     ///< relative change of friction that needs no further one
 
+/// Of a pair of surfaces, per area.
+struct ContactLaw {
+  double stiffness = 0;  ///< pressure per depth, > 0 [N/m^3]
+  double damping = 0;    ///< pressure per approach velocity, >= 0 [N s/m^3]
+  double friction = 0;   ///< Coulomb's coefficient, >= 0
+};
+
 /// What a touching vertex remembers from step to step.
 struct HeldContact {
   int vertex = 0, obstacle = 0;
@@ -65,6 +72,11 @@ struct ContactCandidate {
 void freeze_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const Eigen::Vector3d& predicted,
                     double area, double time_step, ContactCandidate& candidate) noexcept;
 
+/// The same for a vertex that is `carried` to `surface`, its nearest point there; `predicted` is where it would be.
+void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Eigen::Vector3d& carried,
+                    const Eigen::Vector3d& predicted, double area, double time_step,
+                    ContactCandidate& candidate) noexcept;
+
 /// Then friction and anchor of the last step, if the vertex touched. Candidates come in order; `next`, 0 before the
 /// first one, is where the search in `state` goes on.
 void take_friction(const PlacedObstacle& placed, const ContactState& state, std::size_t& next,
@@ -73,13 +85,29 @@ void take_friction(const PlacedObstacle& placed, const ContactState& state, std:
 /// Force and stiffness of the vertex at `point` at the end of the step.
 void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
 
+/// The same where `surface` is its nearest point of what it may touch.
+void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
+
 /// W [J] of the vertex at `point` whose distance is `gap` [m].
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;
+
+/// How much friction has changed by taking lambda anew.
+struct FrictionChange {
+  double change = 0, largest = 0;  ///< of mu lambda [N]
+
+  /// Takes lambda of a candidate from its last evaluation.
+  void refresh(double friction, ContactCandidate& candidate) noexcept;
+  double relative() const noexcept { return largest > 0 ? change / largest : 0; }
+};
 
 /// Takes lambda of the first `count` candidates from their last evaluation. Returns the largest change of mu lambda
 /// over the largest mu lambda.
 double refresh_friction(const std::vector<PlacedObstacle>& obstacles, std::vector<ContactCandidate>& candidates,
                         std::size_t count) noexcept;
+
+/// How far the tangential spring of a touching candidate is stretched at the end of the step, its vertex at `point`
+/// [m].
+Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point, const ContactCandidate& candidate) noexcept;
 
 /// Writes a candidate of the last evaluation, its vertex at `point`, if it touches; its anchor is moved where it slid.
 void hold_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const ContactCandidate& candidate,

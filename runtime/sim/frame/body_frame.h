@@ -184,6 +184,10 @@ class BodyFrame {
                              FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*x*/) const noexcept {}
   /// Where it stands at x, at the end of the step.
   virtual Placement place(const Eigen::VectorXd& /*x*/, FrameWorkspace& /*workspace*/) const noexcept { return {}; }
+  /// The rotation vector in the world [rad] of a change of the unknown t at x.
+  virtual Eigen::Matrix3d turn_to_world(const Eigen::VectorXd& /*x*/, const Placement& /*placement*/) const noexcept {
+    return Eigen::Matrix3d::Identity();
+  }
   /// Inertia of the unknowns, less the work of the contacts' force [N] and torque [N m, about the centre of mass]:
   /// value, and with `gradient` its head. That of t is exact in the gradient, a quadratic form and a frozen rest in the
   /// value.

@@ -306,13 +306,17 @@ double FreeFrame::accept_rigid(FrameWorkspace& workspace) const noexcept {
   return change;
 }
 
+/// Contacts turn about world axes, the unknown t is a rotation vector.
+Eigen::Matrix3d FreeFrame::turn_to_world(const Eigen::VectorXd& x, const Placement& placement) const noexcept {
+  return placement.rotation * right_jacobian(x.segment<3>(3));
+}
+
 void FreeFrame::add_rigid_hessian(const Eigen::VectorXd& x, const Placement& placement,
                                   Eigen::MatrixXd& contact_stiffness, FrameWorkspace& workspace,
                                   Eigen::MatrixXd& hessian) const noexcept {
   const FreeMotionWorkspace& free = own(workspace);
   const double dt = free.unknowns.time_step;
-  // The contacts turn about world axes, the unknown t is a rotation vector.
-  const Eigen::Matrix3d to_world = placement.rotation * right_jacobian(x.segment<3>(3));
+  const Eigen::Matrix3d to_world = turn_to_world(x, placement);
   Eigen::MatrixXd& K = contact_stiffness;
   K.triangularView<Eigen::StrictlyUpper>() = K.transpose();
   for (Eigen::Index i = 0; i < K.rows(); ++i) {

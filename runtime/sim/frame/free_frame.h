@@ -64,6 +64,7 @@ class FreeFrame final : public BodyFrame {
   void begin_contact(const FrameState& state, const Eigen::VectorXd& q, double time_step, FrameWorkspace& workspace,
                      Eigen::VectorXd& x) const noexcept override;
   Placement place(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept override;
+  Eigen::Matrix3d turn_to_world(const Eigen::VectorXd& x, const Placement& placement) const noexcept override;
   double rigid_potential(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept override;
   void rigid_gradient(const Eigen::VectorXd& x, const FrameMomenta& contact, FrameWorkspace& workspace,
                       Eigen::VectorXd& gradient) const noexcept override;

@@ -21,26 +21,30 @@ BodyPose ContactProblem::place(const Eigen::VectorXd& x) noexcept {
 
 PotentialEvaluation ContactProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                                              Eigen::MatrixXd& hessian) noexcept {
+  const PotentialEvaluation evaluation = finish(x, evaluate_alone(x, /*first=*/true), gradient);
   const BodyPose pose = place(x);
-  PotentialEvaluation inner = potential_.evaluate(near_.q, near_.gradient_q, workspace_.newton.hessian);
-  model_.contact->evaluate(pose, near_.contact);
-  PotentialEvaluation evaluation = finish(x, inner, gradient);
   frame_.accept_rigid(workspace_.frame);
-  assemble_hessian(pose, x, hessian);
+  start_stiffness(pose);
+  finish_hessian(pose, x, hessian);
   return evaluation;
 }
 
 PotentialEvaluation ContactProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
-  const BodyPose pose = place(x);
-  const PotentialEvaluation inner = potential_.evaluate(near_.q, near_.gradient_q);
-  model_.contact->evaluate(pose, near_.contact);
-  return finish(x, inner, gradient);
+  return finish(x, evaluate_alone(x, /*first=*/false), gradient);
 }
 
-PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const PotentialEvaluation& inner,
+PotentialEvaluation ContactProblem::evaluate_alone(const Eigen::VectorXd& x, bool first) noexcept {
+  const BodyPose pose = place(x);
+  const PotentialEvaluation alone = first ? potential_.evaluate(near_.q, near_.gradient_q, workspace_.newton.hessian)
+                                          : potential_.evaluate(near_.q, near_.gradient_q);
+  model_.contact->evaluate(pose, near_.contact);
+  return alone;
+}
+
+PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,
                                            Eigen::VectorXd& gradient) noexcept {
   const ContactWorkspace& contact = near_.contact;
-  PotentialEvaluation evaluation = inner;
+  PotentialEvaluation evaluation = alone;
   gradient.tail(near_.q.size()) = near_.gradient_q - contact.generalised;
   const double added = contact.potential + frame_.rigid_potential(x, workspace_.frame);
   frame_.rigid_gradient(x, {contact.force, contact.torque}, workspace_.frame, gradient);
@@ -62,22 +66,31 @@ PotentialValue ContactProblem::value(const Eigen::VectorXd& x) noexcept {
 
 void ContactProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
   const BodyPose pose = place(x);
-  potential_.hessian(near_.q, tangent, workspace_.newton.hessian);
-  assemble_hessian(pose, x, hessian);
+  evaluate_elastic_hessian(pose, tangent);
+  start_stiffness(pose);
+  finish_hessian(pose, x, hessian);
 }
 
-void ContactProblem::assemble_hessian(const BodyPose& pose, const Eigen::VectorXd& x,
-                                      Eigen::MatrixXd& hessian) noexcept {
+void ContactProblem::evaluate_elastic_hessian(const BodyPose& pose, Tangent tangent) noexcept {
+  potential_.hessian(pose.q, tangent, workspace_.newton.hessian);
+}
+
+void ContactProblem::start_stiffness(const BodyPose& pose) noexcept {
+  near_.stiffness.setZero();
+  if (frame_.rigid_unknowns() == 0)
+    model_.contact->add_reduced_stiffness(pose, near_.contact, near_.stiffness);
+  else
+    model_.contact->add_stiffness(pose, near_.contact, near_.stiffness);
+}
+
+void ContactProblem::finish_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept {
   const Eigen::Index modes = near_.q.size();
   hessian.setZero();
   hessian.bottomRightCorner(modes, modes).triangularView<Eigen::Lower>() = workspace_.newton.hessian;
-  if (frame_.rigid_unknowns() == 0) {
-    model_.contact->add_reduced_stiffness(pose, near_.contact, hessian);
-    return;
-  }
-  near_.stiffness.setZero();
-  model_.contact->add_stiffness(pose, near_.contact, near_.stiffness);
-  frame_.add_rigid_hessian(x, pose, near_.stiffness, workspace_.frame, hessian);
+  if (frame_.rigid_unknowns() == 0)
+    hessian.triangularView<Eigen::Lower>() += near_.stiffness;
+  else
+    frame_.add_rigid_hessian(x, pose, near_.stiffness, workspace_.frame, hessian);
 }
 
 void ContactProblem::accept(PotentialEvaluation& evaluation) noexcept {

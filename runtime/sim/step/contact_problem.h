@@ -33,11 +33,22 @@ class ContactProblem {
   /// Pose at the unknowns x.
   BodyPose place(const Eigen::VectorXd& x) noexcept;
 
- private:
-  void assemble_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;
-  PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& inner,
-                             Eigen::VectorXd& gradient) noexcept;
+  // The same in parts: between them others add what they do to this body, to the sums and the stiffness in
+  // workspace.near.
 
+  /// What the body and its obstacles make of x; sums of the contacts in workspace.near->contact. `first`: with the
+  /// elastic Hessian of the potential's start().
+  PotentialEvaluation evaluate_alone(const Eigen::VectorXd& x, bool first) noexcept;
+  PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,
+                             Eigen::VectorXd& gradient) noexcept;
+  /// The elastic Hessian at a pose, into workspace.newton.
+  void evaluate_elastic_hessian(const BodyPose& pose, Tangent tangent) noexcept;
+  /// The stiffness of the obstacles, alone in workspace.near->stiffness.
+  void start_stiffness(const BodyPose& pose) noexcept;
+  /// Lower triangle of the sum of both and of inertia.
+  void finish_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;
+
+ private:
   const Model& model_;
   const BodyFrame& frame_;
   const State& state_;

@@ -5,8 +5,6 @@
 namespace exmat::runtime {
 namespace {
 
-BodyPose pose_of(const Model& model, const State& state) { return {model.frame->placement(state.frame), state.q}; }
-
 void add(const NewtonReport& more, NewtonReport& total) {
   total.status = more.status;
   total.residual = more.residual;
@@ -18,7 +16,26 @@ void add(const NewtonReport& more, NewtonReport& total) {
 
 }  // namespace
 
+BodyPose pose_of(const Model& model, const State& state) noexcept {
+  return {model.frame->placement(state.frame), state.q};
+}
+
+void start_contact(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept {
+  ContactProblemWorkspace& near = *workspace.near;
+  near.x.setZero();
+  near.x.tail(state.q.size()) = workspace.q - state.q;
+  model.frame->begin_contact(state.frame, workspace.q, scene.time_step, workspace.frame, near.x);
+}
+
+void finish_contact(const Model& model, const State& state, bool converged, const Eigen::Vector3d& torque,
+                    Workspace& workspace) noexcept {
+  ContactProblemWorkspace& near = *workspace.near;
+  workspace.q = state.q + near.x.tail(state.q.size());
+  model.frame->end_contact(near.x, converged, torque, state.frame, workspace.frame, near.contact.force);
+}
+
 bool is_near_obstacles(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept {
+  if (workspace.near) workspace.near->contact.candidate_count = 0;
   if (!touches(model, scene)) return false;
   const StageTimer timer(workspace.profile, Stage::kContact);
   const BodyPose pose = pose_of(model, state);
@@ -38,9 +55,7 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
 NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,
                                  IncrementalPotential& potential, Workspace& workspace) noexcept {
   ContactProblemWorkspace& near = *workspace.near;
-  near.x.setZero();
-  near.x.tail(state.q.size()) = workspace.q - state.q;
-  model.frame->begin_contact(state.frame, workspace.q, scene.time_step, workspace.frame, near.x);
+  start_contact(model, scene, state, workspace);
   near.newton.profile = workspace.profile;
   ContactProblem problem(model, state, potential, workspace);
   NewtonReport total;
@@ -53,9 +68,7 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
   }
-  workspace.q = state.q + near.x.tail(state.q.size());
-  model.frame->end_contact(near.x, total.status == NewtonStatus::kConverged, near.contact.torque, state.frame,
-                           workspace.frame, near.contact.force);
+  finish_contact(model, state, total.status == NewtonStatus::kConverged, near.contact.torque, workspace);
   return total;
 }
 

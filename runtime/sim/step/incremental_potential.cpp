@@ -63,6 +63,7 @@ double IncrementalPotential::potential_at_start() const noexcept {
 /// A and its gradient g at q_n: value 1/2 x^T A x + g^T x, x = q - q_n. Differences from q_n keep the digits that
 /// products with c_a would lose.
 void IncrementalPotential::prepare() noexcept {
+  at_first_iterate_ = true;
   const StepForm& form = workspace_.form;
   Eigen::MatrixXd& A = workspace_.quadratic;
   Eigen::VectorXd& g = workspace_.linear;

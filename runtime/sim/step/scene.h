@@ -33,6 +33,7 @@ struct StepScene : WorldLoads {
   double stiffness_damping = 0;  ///< beta >= 0 [s]
   NewtonSettings newton;
   std::vector<Obstacle> obstacles;
+  bool meets_bodies = false;              ///< whether the body is one of a World, whose bodies touch each other
   std::vector<ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, example forces
 };
 
@@ -55,9 +56,14 @@ inline bool is_filtered(const ExampleSettings& examples) noexcept {
 /// Whether any examples exert a force.
 inline bool runs_examples(const StepScene& scene) noexcept { return std::ranges::any_of(scene.examples, acts); }
 
-/// Whether steps look for contacts.
+/// Whether steps look for contacts with obstacles.
 inline bool touches(const Model& model, const StepScene& scene) noexcept {
   return model.contact && !scene.obstacles.empty();
+}
+
+/// Whether a step may be one near something, obstacles or bodies.
+inline bool may_touch(const Model& model, const StepScene& scene) noexcept {
+  return touches(model, scene) || (model.contact && scene.meets_bodies);
 }
 
 /// [r] generalised force of gravity [m/s^2].

@@ -32,7 +32,7 @@ Workspace::Workspace(const Model& model, const StepScene& scene)
   q = v = external_force = internal_force = acceleration = offset = linear = zero;
   frozen_force = next_frozen_force = zero;
   if (model.frame->exerts_forces()) newton.lu.emplace(model.modes());
-  if (touches(model, scene)) near.emplace(model, scene);
+  if (may_touch(model, scene)) near.emplace(model, scene);
   product.setZero(padded(model.modes()));
   quadratic.setZero(padded(model.modes()), model.modes());
   for (std::size_t i = 0; i < scene.examples.size(); ++i) examples.emplace_back(model.examples[i]);

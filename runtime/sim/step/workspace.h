@@ -60,7 +60,7 @@ struct Workspace {
 
   Eigen::VectorXd frozen_force, next_frozen_force;  ///< r, see IncrementalPotential
 
-  std::optional<ContactProblemWorkspace> near;  ///< with obstacles
+  std::optional<ContactProblemWorkspace> near;  ///< where it may touch anything
   FrameWorkspace frame;                         ///< of the model's frame
   std::vector<ExampleWorkspace> examples;       ///< one for each of the scene's
 };

@@ -1,0 +1,166 @@
+#include "runtime/sim/contact/body_contact.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace exmat::runtime {
+namespace {
+
+auto rows_of(const BodyCandidates& candidates, std::size_t index) {
+  return candidates.basis.middleRows<3>(3 * static_cast<Eigen::Index>(index));
+}
+
+/// y - position, world.
+Eigen::Vector3d surface_arm(const BodyCandidates& candidates, std::size_t index, const BodyPose& pose) {
+  const Eigen::Vector3d moved = candidates.all[index].rest + rows_of(candidates, index).lazyProduct(pose.q);
+  return pose.rotation * moved;
+}
+
+/// One row more, with room for as many again where there is none.
+Eigen::Ref<RowMatrix> append_rows(BodyCandidates& candidates, Eigen::Index modes) {
+  const Eigen::Index needed = 3 * std::ssize(candidates.all);
+  if (candidates.basis.cols() != modes) candidates.basis.resize(0, modes);
+  if (candidates.basis.rows() < needed) candidates.basis.conservativeResize(2 * needed, modes);
+  return candidates.basis.middleRows(needed - 3, 3);
+}
+
+/// The tangential spring of the last step: as long, and tangential to the surface as it is now.
+void take_stretch(const HeldBodyContact& held, const Eigen::Matrix3d& rotation, BodyCandidate& candidate) {
+  const Eigen::Vector3d stretch = rotation * held.stretch;
+  const Eigen::Vector3d along = stretch - candidate.normal.dot(stretch) * candidate.normal;
+  const double length = along.norm();
+  if (length > 0) candidate.anchor -= held.stretch.norm() / length * along;
+}
+
+}  // namespace
+
+void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
+                         const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
+                         BodyCandidates& candidates) const {
+  candidates.all.clear();
+  const DeformationTree& tree = a.set.tree();
+  const double q_norm = a.pose.q.norm();
+  double deepest = anew ? 2 * b.surface.bound(b.pose.q).radius : 0;
+  for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
+  auto last = held.begin();
+  const auto test = [&](int vertex) {
+    while (last != held.end() && last->vertex < vertex) ++last;
+    const bool was_inside = last != held.end() && last->vertex == vertex;
+    const Eigen::Vector3d arm = a.set.world_arm(vertex, a.pose);
+    const Eigen::Vector3d offset = a.pose.position + arm - b.pose.position;
+    const double depth = anew ? deepest : was_inside ? -last->gap : 0;
+    const auto hit = b.surface.nearest(b.pose.rotation.transpose() * offset, margin + depth, shape);
+    if (!hit || hit->distance > margin) return;
+    BodyCandidate& candidate = candidates.all.emplace_back();
+    candidate.vertex = vertex;
+    candidate.rest = b.surface.rest_of(*hit);
+    b.surface.basis_of(*hit, append_rows(candidates, b.pose.q.size()));
+    const Eigen::Vector3d arm_b = surface_arm(candidates, candidates.all.size() - 1, b.pose);
+    const Eigen::Vector3d own_b =
+        b.pose.rotation * rows_of(candidates, candidates.all.size() - 1).lazyProduct(b.velocity.v).eval();
+    const Eigen::Vector3d apart = a.set.world_velocity(vertex, arm, a.pose, a.velocity) - b.velocity.at(arm_b) - own_b;
+    const Eigen::Vector3d place = offset - arm_b;
+    const SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
+    freeze_contact(law_, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
+    if (!was_inside) return;
+    candidate.friction_force = law_.friction * last->normal_force;
+    take_stretch(*last, b.pose.rotation, candidate);
+  };
+  const auto count = static_cast<int>(tree.nodes().size());
+  for (int node = 0; node < count;) {
+    const DeformationTree::Ball ball = tree.ball(node, a.pose.q, q_norm);
+    const Eigen::Vector3d offset = a.pose.position + a.pose.rotation * ball.centre - b.pose.position;
+    const bool near =
+        b.surface.may_be_within(b.pose.rotation.transpose() * offset, ball.radius + margin + deepest, shape);
+    if (near && tree.node(node).is_leaf)
+      for (int vertex = tree.node(node).first; vertex < tree.node(node).last; ++vertex) test(vertex);
+    node = near ? node + 1 : tree.node(node).next;
+  }
+}
+
+void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
+                           ContactWorkspace& sums_a, ContactWorkspace& sums_b) const noexcept {
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    BodyCandidate& candidate = candidates.all[i];
+    candidate.arm = set.world_arm(candidate.vertex, a);
+    candidate.surface_arm = surface_arm(candidates, i, b);
+    const Eigen::Vector3d place = a.position + candidate.arm - b.position - candidate.surface_arm;
+    const double gap = candidate.normal.dot(place);
+    evaluate_contact(SurfacePoint{gap, candidate.normal, Eigen::Vector3d::Zero()}, place, candidate);
+    if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
+    if (candidate.normal_force > 0) {
+      ++sums_a.touching;
+      ++sums_b.touching;
+    }
+    sums_a.force += candidate.force;
+    sums_a.torque += candidate.arm.cross(candidate.force);
+    const Eigen::Vector3d force_a = a.rotation.transpose() * candidate.force;
+    sums_a.generalised += set.basis_rows(candidate.vertex).transpose().lazyProduct(force_a);
+    sums_a.potential += contact_potential(candidate, gap, place);
+    sums_b.force -= candidate.force;
+    sums_b.torque -= candidate.surface_arm.cross(candidate.force);
+    const Eigen::Vector3d force_b = b.rotation.transpose() * candidate.force;
+    sums_b.generalised -= rows_of(candidates, i).transpose().lazyProduct(force_b);
+  }
+}
+
+double BodyContact::potential(const ContactSet& set, const BodyPose& a, const BodyPose& b,
+                              const BodyCandidates& candidates) const noexcept {
+  double sum = 0;
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    const BodyCandidate& candidate = candidates.all[i];
+    const Eigen::Vector3d place =
+        a.position + set.world_arm(candidate.vertex, a) - b.position - surface_arm(candidates, i, b);
+    sum += contact_potential(candidate, candidate.normal.dot(place), place);
+  }
+  return sum;
+}
+
+void BodyContact::refresh_friction(BodyCandidates& candidates, FrictionChange& change) const noexcept {
+  for (BodyCandidate& candidate : candidates.all) change.refresh(law_.friction, candidate);
+}
+
+Eigen::Index BodyContact::stiffness_columns(const ContactSet& set, int rigid_a, int rigid_b, const BodyPose& a,
+                                            const BodyPose& b, const BodyCandidates& candidates,
+                                            Eigen::MatrixXd& columns_a, Eigen::MatrixXd& columns_b) {
+  const Eigen::Index most = 3 * std::ssize(candidates.all);
+  if (columns_a.rows() != rigid_a + a.q.size() || columns_a.cols() < most)
+    columns_a.resize(rigid_a + a.q.size(), 2 * most);
+  if (columns_b.rows() != rigid_b + b.q.size() || columns_b.cols() < most)
+    columns_b.resize(rigid_b + b.q.size(), 2 * most);
+  Eigen::Index used = 0;
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    const BodyCandidate& candidate = candidates.all[i];
+    for (int k = 0; k < 3; ++k) {
+      if (candidate.weights[k] <= 0) continue;
+      const Eigen::Vector3d direction = std::sqrt(candidate.weights[k]) * candidate.directions.col(k);
+      auto column_a = columns_a.col(used);
+      auto column_b = columns_b.col(used);
+      ++used;
+      if (rigid_a > 0) column_a.head<6>() << direction, candidate.arm.cross(direction);
+      if (rigid_b > 0) column_b.head<6>() << direction, candidate.surface_arm.cross(direction);
+      const Eigen::Vector3d in_a = a.rotation.transpose() * direction, in_b = b.rotation.transpose() * direction;
+      column_a.tail(a.q.size()) = set.basis_rows(candidate.vertex).transpose().lazyProduct(in_a);
+      column_b.tail(b.q.size()) = rows_of(candidates, i).transpose().lazyProduct(in_b);
+    }
+  }
+  return used;
+}
+
+void BodyContact::commit(const BodyPose& a, const BodyPose& b, const BodyCandidates& candidates,
+                         std::vector<HeldBodyContact>& held) const {
+  held.clear();
+  for (const BodyCandidate& candidate : candidates.all) {
+    if (candidate.gap >= 0 && candidate.normal_force <= 0) continue;
+    HeldBodyContact& contact = held.emplace_back();
+    contact.vertex = candidate.vertex;
+    contact.gap = std::min(0.0, candidate.gap);
+    contact.normal_force = candidate.normal_force;
+    const Eigen::Vector3d place = a.position + candidate.arm - b.position - candidate.surface_arm;
+    if (candidate.normal_force > 0)
+      contact.stretch = b.rotation.transpose() * held_stretch(law_.friction, place, candidate);
+  }
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "runtime/sim/contact/body_surface.h"
+#include "runtime/sim/contact/contact.h"
+
+namespace exmat::runtime {
+
+/// What a vertex that is inside another body remembers from step to step.
+struct HeldBodyContact {
+  int vertex = 0;
+  double gap = 0;                                     ///< at the end of the last step [m]
+  double normal_force = 0;                            ///< likewise [N]
+  Eigen::Vector3d stretch = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the other body [m]
+};
+
+/// A vertex of one body that may touch the surface of another in this step. Its law is that of contact_law.h with the
+/// place of the vertex from the surface's material point y in place of its place in the world; point and normal are
+/// those of the beginning of the step.
+struct BodyCandidate : ContactCandidate {
+  Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< of y, frame of the other body [m]
+  Eigen::Vector3d surface_arm = Eigen::Vector3d::Zero();  ///< y - position of the other body [m]; last evaluation
+};
+
+/// Candidates of a pair of bodies, one's vertices against the other's surface. Grows where more are met than before.
+struct BodyCandidates {
+  std::vector<BodyCandidate> all;
+  RowMatrix basis;  ///< 3 of `all` x r and more, rows of the basis at each y
+};
+
+/// One body of a pair: what it is, where, and how it moves.
+struct TouchingBody {
+  const ContactSet& set;
+  const BodySurface& surface;
+  BodyPose pose;
+  BodyVelocity velocity;
+};
+
+/// Contact of the vertices of one body, `a`, with the surface of another, `b`, which may be the same kind of body.
+/// Forces are equal and opposite, at the vertex and at y. docs/step_in_detail.md, "Bodies that touch".
+///
+/// One step: gather, then evaluate, potential and add_stiffness as often as needed, then evaluate at the accepted poses
+/// and commit. No call but gather() and commit() allocates, and these only where more is met than ever before.
+class BodyContact {
+ public:
+  /// `law` of one direction: where both are looked at, each has half of the stiffness and damping.
+  explicit BodyContact(const ContactLaw& law) : law_(law) {}
+
+  /// Finds and freezes the candidates: vertices less than `margin` [m] outside, and those inside: that were so in the
+  /// last step, `held`, or of any depth where `anew`, that is without a last step. `shape` is that of b, placed.
+  void gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
+              const std::vector<HeldBodyContact>& held, SurfaceShape& shape, BodyCandidates& candidates) const;
+
+  /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone.
+  void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
+                ContactWorkspace& sums_a, ContactWorkspace& sums_b) const noexcept;
+
+  /// W alone [J].
+  double potential(const ContactSet& set, const BodyPose& a, const BodyPose& b,
+                   const BodyCandidates& candidates) const noexcept;
+
+  void refresh_friction(BodyCandidates& candidates, FrictionChange& change) const noexcept;
+
+  /// -df/dx = J^T K J at the poses, column by column: sqrt(w) J^T d of either body [(rigid + r) x columns], about
+  /// world axes as ContactSet::add_stiffness() has them. `rigid` of each is 6 or 0. Returns the number of columns.
+  static Eigen::Index stiffness_columns(const ContactSet& set, int rigid_a, int rigid_b, const BodyPose& a,
+                                        const BodyPose& b, const BodyCandidates& candidates, Eigen::MatrixXd& columns_a,
+                                        Eigen::MatrixXd& columns_b);
+
+  /// What has to be remembered of the last evaluation.
+  void commit(const BodyPose& a, const BodyPose& b, const BodyCandidates& candidates,
+              std::vector<HeldBodyContact>& held) const;
+
+ private:
+  ContactLaw law_;
+};
+
+}  // namespace exmat::runtime

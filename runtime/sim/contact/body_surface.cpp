@@ -1,0 +1,218 @@
+#include "runtime/sim/contact/body_surface.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <map>
+#include <utility>
+
+#include "common/mesh/geometry.h"
+#include "runtime/sim/contact/nearest_on_triangle.h"
+
+namespace exmat::runtime {
+namespace {
+
+constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it normals of the surface say which way is out
+
+/// Across the edge that begins at each corner; -1 where there is none or more than one.
+TriangleArray neighbours_of(const TriangleArray& triangles) {
+  std::map<std::pair<int, int>, int> edges;  // first triangle of each directed edge
+  for (int t = 0; t < triangles.rows(); ++t)
+    for (int c = 0; c < 3; ++c) edges.try_emplace({triangles(t, c), triangles(t, (c + 1) % 3)}, t);
+  TriangleArray neighbours(triangles.rows(), 3);
+  for (int t = 0; t < triangles.rows(); ++t)
+    for (int c = 0; c < 3; ++c) {
+      const auto across = edges.find({triangles(t, (c + 1) % 3), triangles(t, c)});
+      neighbours(t, c) = across == edges.end() ? -1 : across->second;
+    }
+  return neighbours;
+}
+
+}  // namespace
+
+BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray triangles,
+                         const Eigen::Vector3d& origin)
+    : rest_(rest.rowwise() - origin.transpose()),
+      basis_(std::move(basis)),
+      triangles_(std::move(triangles)),
+      neighbours_(neighbours_of(triangles_)),
+      fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
+      tree_(triangles_, rest_, basis_) {
+  for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
+    ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
+  for (std::size_t i = 1; i < fan_starts_.size(); ++i) fan_starts_[i] += fan_starts_[i - 1];
+  fans_.resize(static_cast<std::size_t>(triangles_.size()));
+  std::vector<int> next = fan_starts_;
+  for (int t = 0; t < triangles_.rows(); ++t)
+    for (int c = 0; c < 3; ++c) fans_[static_cast<std::size_t>(next[static_cast<std::size_t>(triangles_(t, c))]++)] = t;
+}
+
+BodySurface BodySurface::of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
+                                 const Eigen::Vector3d& origin) {
+  TriangleArray triangles = surface_triangles(tets);
+  std::vector<int> used(static_cast<std::size_t>(rest.rows()), -1), kept;
+  for (std::int32_t& vertex : triangles.reshaped<Eigen::RowMajor>()) {
+    int& number = used[static_cast<std::size_t>(vertex)];
+    if (number < 0) {
+      number = static_cast<int>(kept.size());
+      kept.push_back(vertex);
+    }
+    vertex = number;
+  }
+  RowMatrix rows(3 * kept.size(), basis.cols());
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * kept[i]);
+  return {rest(kept, Eigen::all), std::move(rows), std::move(triangles), origin};
+}
+
+SurfaceShape BodySurface::make_shape() const {
+  SurfaceShape shape;
+  shape.q.setZero(modes());
+  shape.positions = rest_;
+  shape.position_of.assign(static_cast<std::size_t>(rest_.rows()), 0);
+  shape.balls.resize(tree_.nodes().size());
+  shape.ball_of.assign(tree_.nodes().size(), 0);
+  return shape;
+}
+
+void BodySurface::place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept {
+  shape.q = q;
+  shape.q_norm = q.norm();
+  ++shape.placed;
+}
+
+const DeformationTree::Ball& BodySurface::ball(int node, SurfaceShape& shape) const noexcept {
+  const auto index = static_cast<std::size_t>(node);
+  if (shape.ball_of[index] != shape.placed) {
+    shape.balls[index] = tree_.ball(node, shape.q, shape.q_norm);
+    shape.ball_of[index] = shape.placed;
+  }
+  return shape.balls[index];
+}
+
+Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noexcept {
+  int& placed = shape.position_of[static_cast<std::size_t>(vertex)];
+  if (placed != shape.placed) {
+    const Eigen::Vector3d moved = basis_.middleRows<3>(3 * vertex).lazyProduct(shape.q);
+    shape.positions.row(vertex) = rest_.row(vertex) + moved.transpose();
+    placed = shape.placed;
+  }
+  return shape.positions.row(vertex);
+}
+
+bool BodySurface::may_be_within(const Eigen::Vector3d& point, double radius, SurfaceShape& shape) const noexcept {
+  const auto count = static_cast<int>(tree_.nodes().size());
+  for (int node = 0; node < count;) {
+    const DeformationTree::Ball& around = ball(node, shape);
+    const double reach = radius + around.radius;
+    const bool near = (point - around.centre).squaredNorm() <= reach * reach;
+    if (near && tree_.node(node).is_leaf) return true;
+    node = near ? node + 1 : tree_.node(node).next;
+  }
+  return false;
+}
+
+std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius,
+                                               SurfaceShape& shape) const noexcept {
+  const auto distance_to = [&](int node) {
+    const DeformationTree::Ball& around = ball(node, shape);
+    return (point - around.centre).norm() - around.radius;
+  };
+  int waiting[64];  // halves of a tree of at most 2^32 leaves
+  int count = 0;
+  TrianglePoint best;
+  int found = -1;
+  double nearest = radius * radius;
+  if (!tree_.empty()) waiting[count++] = 0;
+  while (count > 0) {
+    const int node = waiting[--count];
+    const double bound = distance_to(node);
+    if (bound > 0 && bound * bound > nearest) continue;
+    const DeformationTree::Node& branch = tree_.node(node);
+    if (!branch.is_leaf) {
+      const int left = node + 1, right = tree_.node(left).next;
+      const bool left_first = distance_to(left) <= distance_to(right);
+      waiting[count++] = left_first ? right : left;
+      waiting[count++] = left_first ? left : right;
+      continue;
+    }
+    for (int i = branch.first; i < branch.last; ++i) {
+      const int triangle = tree_.order()[static_cast<std::size_t>(i)];
+      const TrianglePoint here =
+          nearest_on_triangle(point, position(triangles_(triangle, 0), shape), position(triangles_(triangle, 1), shape),
+                              position(triangles_(triangle, 2), shape));
+      if (here.squared_distance > nearest) continue;
+      if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
+      nearest = here.squared_distance;
+      best = here;
+      found = triangle;
+    }
+  }
+  if (found < 0) return std::nullopt;
+  const Eigen::Vector3d out = outward(found, best.barycentric, shape);
+  const Eigen::Vector3d away = point - best.point;
+  const double distance = std::sqrt(nearest);
+  const double side = away.dot(out) >= 0 ? 1 : -1;
+  SurfaceHit hit{found, best.barycentric, side * distance, out};
+  if (distance * distance > kNoDistance * kNoDistance * area_normal(found, shape).norm())
+    hit.normal = side / distance * away;
+  return hit;
+}
+
+/// Its length is twice the area.
+Eigen::Vector3d BodySurface::area_normal(int triangle, SurfaceShape& shape) const noexcept {
+  const Eigen::Vector3d a = position(triangles_(triangle, 0), shape);
+  return (position(triangles_(triangle, 1), shape) - a).cross(position(triangles_(triangle, 2), shape) - a);
+}
+
+Eigen::Vector3d BodySurface::vertex_normal(int vertex, SurfaceShape& shape) const noexcept {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  const auto at = static_cast<std::size_t>(vertex);
+  for (int i = fan_starts_[at]; i < fan_starts_[at + 1]; ++i) {
+    const int triangle = fans_[static_cast<std::size_t>(i)];
+    int corner = 0;
+    while (triangles_(triangle, corner) != vertex) ++corner;
+    const Eigen::Vector3d here = position(vertex, shape);
+    const Eigen::Vector3d to_next = position(triangles_(triangle, (corner + 1) % 3), shape) - here;
+    const Eigen::Vector3d to_last = position(triangles_(triangle, (corner + 2) % 3), shape) - here;
+    const Eigen::Vector3d normal = to_next.cross(to_last);
+    const double length = normal.norm();
+    if (length > 0) sum += std::atan2(length, to_next.dot(to_last)) / length * normal;
+  }
+  return sum;
+}
+
+/// Unit normal of the face, edge or vertex that a point of a triangle is on.
+Eigen::Vector3d BodySurface::outward(int triangle, const Eigen::Vector3d& barycentric,
+                                     SurfaceShape& shape) const noexcept {
+  int zeros = 0, corner = 0, missing = 0;
+  for (int c = 0; c < 3; ++c) {
+    if (barycentric[c] > 0) {
+      corner = c;
+    } else {
+      missing = c;
+      ++zeros;
+    }
+  }
+  Eigen::Vector3d normal = area_normal(triangle, shape);
+  if (zeros == 2) {
+    normal = vertex_normal(triangles_(triangle, corner), shape);
+  } else if (zeros == 1) {
+    const int across = neighbours_(triangle, (missing + 1) % 3);
+    if (across >= 0) normal = normal.stableNormalized() + area_normal(across, shape).stableNormalized();
+  }
+  const double length = normal.stableNorm();
+  return length > 0 ? Eigen::Vector3d(normal / length) : Eigen::Vector3d::UnitZ();
+}
+
+Eigen::Vector3d BodySurface::rest_of(const SurfaceHit& hit) const noexcept {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 3; ++c) point += hit.barycentric[c] * rest_.row(triangles_(hit.triangle, c)).transpose();
+  return point;
+}
+
+void BodySurface::basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept {
+  rows.setZero();
+  for (int c = 0; c < 3; ++c) rows += hit.barycentric[c] * basis_.middleRows<3>(3 * triangles_(hit.triangle, c));
+}
+
+}  // namespace exmat::runtime

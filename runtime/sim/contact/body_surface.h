@@ -1,0 +1,78 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "runtime/sim/contact/deformation_tree.h"
+
+namespace exmat::runtime {
+
+/// The point of a deformed surface nearest to a given one, frame of the body.
+struct SurfaceHit {
+  int triangle = 0;
+  Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();  ///< of the nearest point, >= 0, sum 1
+  double distance = 0;                                    ///< negative inside [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();      ///< unit, outward: the gradient of the distance
+};
+
+/// A surface at some q: what was computed of it so far. Sized once by BodySurface::make_shape(); one thread at a time.
+struct SurfaceShape {
+  Eigen::VectorXd q;  ///< [r]
+  double q_norm = 0;
+  int placed = 0;         ///< times that it was placed
+  VertexArray positions;  ///< k x 3, where `position_of` is `placed` [m]
+  std::vector<DeformationTree::Ball> balls;
+  std::vector<int> position_of, ball_of;
+};
+
+/// The closed surface of a reduced body: signed distances to it as it deforms, in the frame of the body. Only what is
+/// near is ever computed. Inside and outside are told apart by angle-weighted normals (Baerentzen and Aanaes 2005). r
+/// modes. No call but the constructor and make_shape() allocates.
+class BodySurface {
+ public:
+  BodySurface() = default;
+  /// Vertices at rest `rest` [k x 3, world, m], moved by `basis` [3k x r]; `triangles` [f x 3] of them look outward.
+  /// `origin` [m], world: what rest positions are about, BodyFrame::origin().
+  BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray triangles, const Eigen::Vector3d& origin);
+
+  /// The boundary of tetrahedra [n_t x 4] of points at rest [n x 3], moved by a basis [3n x r].
+  static BodySurface of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
+                             const Eigen::Vector3d& origin);
+
+  Eigen::Index modes() const noexcept { return basis_.cols(); }
+  Eigen::Index triangles() const noexcept { return triangles_.rows(); }
+
+  SurfaceShape make_shape() const;
+  void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;
+
+  /// A ball about all of it.
+  DeformationTree::Ball bound(const Eigen::VectorXd& q) const noexcept { return tree_.ball(0, q, q.norm()); }
+
+  /// False only where no point of the surface is within `radius` of `point`.
+  bool may_be_within(const Eigen::Vector3d& point, double radius, SurfaceShape& shape) const noexcept;
+
+  /// Nothing where the surface is farther away than `radius` [m].
+  std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape) const noexcept;
+
+  /// Its material point of a hit: at rest [m], and the rows of the basis [3 x r].
+  Eigen::Vector3d rest_of(const SurfaceHit& hit) const noexcept;
+  void basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept;
+
+ private:
+  const DeformationTree::Ball& ball(int node, SurfaceShape& shape) const noexcept;
+  Eigen::Vector3d position(int vertex, SurfaceShape& shape) const noexcept;
+  Eigen::Vector3d area_normal(int triangle, SurfaceShape& shape) const noexcept;
+  Eigen::Vector3d outward(int triangle, const Eigen::Vector3d& barycentric, SurfaceShape& shape) const noexcept;
+  Eigen::Vector3d vertex_normal(int vertex, SurfaceShape& shape) const noexcept;
+
+  VertexArray rest_;  // k x 3, X
+  RowMatrix basis_;   // 3k x r
+  TriangleArray triangles_;
+  TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
+  std::vector<int> fan_starts_, fans_;  // triangles of each vertex
+  DeformationTree tree_;                // of the triangles
+};
+
+}  // namespace exmat::runtime

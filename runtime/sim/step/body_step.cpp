@@ -1,0 +1,215 @@
+#include "runtime/sim/step/body_step.h"
+
+#include <algorithm>
+#include <algorithm>
+#include <cmath>
+
+#include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/example_forces.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+namespace {
+
+constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
+FrameStep frame_step(const StepScene& scene, const State& state) {
+  const double end = static_cast<double>(state.step + 1) * scene.time_step;
+  return {scene, scene.time_step, state.time, end, state.q, state.v, state.applied_force};
+}
+
+StepHistory history_of(const Model& model, const State& state) {
+  return {state.q, state.v, state.q_previous, model.frame->momentum(state.v, state.frame),
+          model.frame->former_momentum(state.v_previous, state.frame)};
+}
+
+/// What resolves a step: backward Euler where a body that is not clamped in the world turns too far in it for anything
+/// of second order.
+Integrator integrator_of_step(const Model& model, const StepScene& scene, const State& state, bool near) {
+  const bool resolved = !near && model.frame->turn_rate(state.frame) * scene.time_step <= kResolvedTurn;
+  return resolved ? scene.integrator : Integrator::kBackwardEuler;
+}
+
+/// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with, or in which
+/// the accelerations of the frame jump.
+bool begins_anew(const Model& model, const StepScene& scene, const State& state, double midpoint) {
+  if (state.begins_anew) return true;
+  for (const ScriptedForce& force : scene.forces)
+    if (force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step)) return true;
+  return model.frame->jumps(scene, midpoint - scene.time_step, midpoint);
+}
+
+/// a_n of Newmark's method from the equation of motion at the beginning of the step.
+void start_acceleration(const Model& model, const StepScene& scene, const FrameStep& frame_step, const State& state,
+                        Workspace& workspace, StepReport& report) {
+  model.frame->enter_start(frame_step, workspace.frame, workspace.external_force);
+  Eigen::VectorXd& a = workspace.acceleration;
+  if (scene.stiffness_damping > 0) {
+    Eigen::MatrixXd& stiffness = workspace.newton.hessian;
+    model.internal_force.force_and_stiffness(state.q, workspace.elasticity, workspace.internal_force, stiffness);
+    workspace.offset.noalias() = stiffness.selfadjointView<Eigen::Lower>() * state.v;
+    a = workspace.external_force - workspace.internal_force - scene.stiffness_damping * workspace.offset;
+  } else {
+    model.internal_force.force(state.q, workspace.elasticity, workspace.internal_force);
+    a = workspace.external_force - workspace.internal_force;
+  }
+  a -= scene.mass_damping * state.v;
+  model.frame->add_start_force(frame_step, state.frame, workspace.frame, a);
+  model.frame->leave_start(frame_step, workspace.frame, workspace.external_force);
+  if (!runs_examples(scene)) return;
+  update_targets(model, scene, state, state.q, workspace, report);
+  add_example_forces(model, scene, state, workspace, a);
+}
+
+void prepare_integrator(const Model& model, const StepScene& scene, const FrameStep& frame_step, Integrator integrator,
+                        const State& state, Workspace& workspace, StepReport& report) {
+  const bool anew = begins_anew(model, scene, state, frame_step.midpoint());
+  const StepHistory history = history_of(model, state);
+  if (integrator == Integrator::kNewmark) {
+    if (anew) {
+      start_acceleration(model, scene, frame_step, state, workspace, report);
+    } else {
+      workspace.acceleration = state.a;
+    }
+    newmark_form(history, workspace.acceleration, scene.time_step, workspace.form);
+  } else if (integrator == Integrator::kBdf2 && !anew) {
+    bdf2_form(history, scene.time_step, workspace.form);
+  } else {
+    backward_euler_form(history, scene.time_step, workspace.form);
+  }
+}
+
+/// The predictor q_n + dt v_n or q_n itself, whichever has the lower potential, into workspace.q, and its elasticity.
+void choose_first_iterate(const StepScene& scene, const State& state, IncrementalPotential& potential,
+                          Workspace& workspace, StepReport& report) {
+  workspace.q = state.q + scene.time_step * state.v;
+  const double predicted = potential.start(workspace.q);
+  if (predicted <= potential.potential_at_start() || workspace.q == state.q) return;
+  ++report.line_search_evaluations;
+  workspace.q = state.q;
+  potential.start(workspace.q);
+}
+
+/// Arithmetic on subnormal numbers takes a hundred times as long, and a body that comes to rest is full of them.
+bool flush_subnormals(Eigen::VectorXd& numbers) {
+  bool found = false;
+  for (double& number : numbers)
+    if (std::fpclassify(number) == FP_SUBNORMAL) {
+      number = 0;
+      found = true;
+    }
+  return found;
+}
+
+void commit(const Model& model, const StepScene& scene, double elastic_energy, Workspace& workspace, State& state) {
+  const StepForm& form = workspace.form;
+  state.q_previous = state.q;
+  state.v_previous = state.v;
+  state.q = workspace.q;
+  state.v = workspace.v;
+  state.a = form.acceleration_factor * (state.q - form.acceleration_centre);
+  model.frame->commit(scene, form.velocity_factor, state.q, state.v, state.a, workspace.frame, state.frame);
+  state.elastic_energy = elastic_energy;
+  ++state.step;
+  state.time = static_cast<double>(state.step) * scene.time_step;
+  commit_weights(scene, workspace, state);
+  commit_targets(model, scene, workspace, state);
+}
+
+void add_newton_report(const NewtonReport& newton, StepReport& report) {
+  report.newton_iterations = newton.iterations;
+  report.line_search_evaluations += newton.line_search_evaluations;
+  report.factorisations = newton.factorisations;
+  report.projections = newton.projections;
+  report.residual = newton.residual;
+  if (newton.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
+  if (newton.status == NewtonStatus::kIterationLimit) report.status |= kStepIterationLimit;
+  if (newton.status == NewtonStatus::kStagnated) report.status |= kStepStagnated;
+}
+
+}  // namespace
+
+BodyStep::BodyStep(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept
+    : model_(model),
+      scene_(scene),
+      state_(state),
+      workspace_(workspace),
+      in_frame_(frame_step(scene, state)),
+      potential_(model, scene, state, workspace) {}
+
+void BodyStep::begin(bool touches_others) noexcept {
+  const BodyFrame& frame = *model_.frame;
+  frame.begin(in_frame_, workspace_.frame, workspace_.external_force);
+  near_ = is_near_obstacles(model_, scene_, state_, workspace_) || touches_others;
+  const Integrator integrator = integrator_of_step(model_, scene_, state_, near_);
+  frame.move(in_frame_, near_, integrator == Integrator::kBackwardEuler, state_.frame, workspace_.frame,
+             workspace_.external_force);
+  prepare_integrator(model_, scene_, in_frame_, integrator, state_, workspace_, report_);
+  workspace_.newton.profile = workspace_.profile;
+}
+
+bool BodyStep::prepare() noexcept {
+  choose_first_iterate(scene_, state_, potential_, workspace_, report_);
+  if (!workspace_.q.allFinite()) return false;
+  if (runs_examples(scene_)) {
+    update_targets(model_, scene_, state_, workspace_.q, workspace_, report_);
+    if (report_.status & kStepNonFinite) return false;
+    prepare_example_forces(scene_, workspace_);
+  }
+  potential_.prepare();
+  return true;
+}
+
+NewtonReport BodyStep::solve_once() noexcept {
+  NewtonReport failed;
+  failed.status = NewtonStatus::kNonFinite;
+  if (!prepare()) return failed;
+  return near_ ? solve_with_contacts(model_, scene_, state_, potential_, workspace_)
+               : newton_minimise(potential_, scene_.newton, workspace_.q, workspace_.newton);
+}
+
+NewtonReport BodyStep::solve() noexcept {
+  const NewtonReport newton = solve_once();
+  if (newton.status != NewtonStatus::kNonFinite || near_) return newton;
+  if (!model_.frame->fall_back(in_frame_, workspace_.frame)) return newton;
+  backward_euler_form(history_of(model_, state_), scene_.time_step, workspace_.form);
+  return solve_once();
+}
+
+StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
+  const bool unbalanced = near_ && newton.status != NewtonStatus::kConverged;
+  const Energies before = unbalanced ? energies(model_, scene_, state_) : Energies{};
+  const StepReport& report = take(newton);
+  if (!unbalanced || (report.status & kStepNonFinite)) return report;
+  const Energies now = energies(model_, scene_, state_);
+  limit_kinetic_energy(before.total() - now.elastic - now.potential);
+  return report_;
+}
+
+const StepReport& BodyStep::take(const NewtonReport& newton) noexcept {
+  add_newton_report(newton, report_);
+  Workspace& workspace = workspace_;
+  workspace.v = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
+  if (!workspace.q.allFinite() || !workspace.v.allFinite()) report_.status |= kStepNonFinite;
+  if (report_.status & kStepNonFinite) return report_;
+  if (near_) {
+    report_.contacts = workspace.near->contact.touching;
+    report_.contact_force = workspace.near->contact.force;
+  }
+  const bool small_q = flush_subnormals(workspace.q), small_v = flush_subnormals(workspace.v);
+  if (small_q || small_v) report_.status |= kStepSubnormal;
+  commit(model_, scene_, potential_.elastic_energy(), workspace, state_);
+  state_.begins_anew = near_;
+  commit_contacts(model_, near_, workspace, state_);
+  return report_;
+}
+
+void BodyStep::limit_kinetic_energy(double allowed) noexcept {
+  const double limit = std::max(0.0, allowed);
+  if (model_.frame->is_driven() || model_.frame->kinetic_energy(state_.v, state_.frame) <= limit) return;
+  const Eigen::Vector3d impulse = scene_.time_step * report_.contact_force;
+  const Eigen::Vector3d lost =
+      model_.frame->limit_kinetic_energy(limit, impulse, workspace_.frame, state_.v, state_.frame);
+  report_.contact_force -= lost / scene_.time_step;
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,55 @@
+#pragma once
+
+#include "runtime/sim/step/incremental_potential.h"
+#include "runtime/sim/step/model.h"
+#include "runtime/sim/step/scene.h"
+#include "runtime/sim/step/state.h"
+#include "runtime/sim/step/step_report.h"
+#include "runtime/sim/step/workspace.h"
+
+namespace exmat::runtime {
+
+/// One step of one body in parts: begin(), solve(), finish(). Bodies that touch are solved together instead: begin(),
+/// prepare(), their common solution, finish(). Refers to all that it is made of. No call allocates.
+class BodyStep {
+ public:
+  BodyStep(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
+
+  /// External forces, obstacles near, and the form of the integrator.
+  void begin(bool touches_others) noexcept;
+
+  /// The first iterate, targets and example forces. False where numbers are not finite.
+  bool prepare() noexcept;
+
+  /// prepare() and Newton's method; q at the end of the step into the workspace.
+  NewtonReport solve() noexcept;
+
+  /// take(); near obstacles a solution that did not converge may hold contact forces that throw the body: it is then
+  /// slowed down until it has no more energy than before, or stands still.
+  StepReport finish(const NewtonReport& newton) noexcept;
+
+  /// Takes the solution in the workspace, unless it is not finite.
+  const StepReport& take(const NewtonReport& newton) noexcept;
+
+  /// After take(): slows the body down to a kinetic energy of at most `allowed` [J]; the force of the contacts tells
+  /// the difference.
+  void limit_kinetic_energy(double allowed) noexcept;
+
+  const StepReport& report() const noexcept { return report_; }
+
+  IncrementalPotential& potential() noexcept { return potential_; }
+
+ private:
+  NewtonReport solve_once() noexcept;
+
+  const Model& model_;
+  const StepScene& scene_;
+  State& state_;
+  Workspace& workspace_;
+  FrameStep in_frame_;
+  IncrementalPotential potential_;
+  bool near_ = false;
+  StepReport report_;
+};
+
+}  // namespace exmat::runtime
