@@ -80,7 +80,7 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double ti
 }
 
 void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
-                           ContactWorkspace& sums_a, ContactWorkspace& sums_b) const noexcept {
+                           ContactSums& sums_a, ContactSums& sums_b) const noexcept {
   for (std::size_t i = 0; i < candidates.all.size(); ++i) {
     BodyCandidate& candidate = candidates.all[i];
     candidate.arm = set.world_arm(candidate.vertex, a);

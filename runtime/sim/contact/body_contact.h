@@ -55,7 +55,7 @@ class BodyContact {
 
   /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone.
   void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
-                ContactWorkspace& sums_a, ContactWorkspace& sums_b) const noexcept;
+                ContactSums& sums_a, ContactSums& sums_b) const noexcept;
 
   /// W alone [J].
   double potential(const ContactSet& set, const BodyPose& a, const BodyPose& b,

@@ -20,8 +20,9 @@ void add_factors(const Eigen::MatrixXd& factors, Eigen::Index used, Eigen::Matri
 ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_count)
     : obstacles(obstacle_count),
       candidates(obstacle_count * static_cast<std::size_t>(set.vertices())),
-      generalised(Eigen::VectorXd::Zero(set.modes())),
-      factors(Eigen::MatrixXd::Zero(6 + set.modes(), kFactorColumns)) {}
+      factors(Eigen::MatrixXd::Zero(6 + set.modes(), kFactorColumns)) {
+  set_zero(set.modes());
+}
 
 ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   const auto count = static_cast<int>(data.areas.size());
@@ -125,11 +126,7 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, doub
 }
 
 void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) const noexcept {
-  workspace.force.setZero();
-  workspace.torque.setZero();
-  workspace.generalised.setZero();
-  workspace.potential = 0;
-  workspace.touching = 0;
+  workspace.set_zero(modes());
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     ContactCandidate& candidate = workspace.candidates[i];
     candidate.arm = world_arm(candidate.vertex, pose);

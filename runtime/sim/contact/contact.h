@@ -23,21 +23,38 @@ struct BodyVelocity : FrameVelocity {
 
 class ContactSet;
 
-/// Scratch of one step of one body, sized once; holds nothing from step to step.
-struct ContactWorkspace {
+/// What contacts do to a body, of one evaluation.
+struct ContactSums {
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< sum of f_i, world [N]
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< sum of (x_i - position) x f_i, world [N m]
+  Eigen::VectorXd generalised;                       ///< sum of U_i^T rotation^T f_i [r]
+  double potential = 0;                              ///< W [J], f = -dW/dx; none of it without candidates
+  int touching = 0;                                  ///< candidates with a normal force
+
+  void set_zero(Eigen::Index modes) {
+    generalised.setZero(modes);
+    force.setZero();
+    torque.setZero();
+    potential = 0;
+    touching = 0;
+  }
+  void add(const ContactSums& more) noexcept {
+    force += more.force;
+    torque += more.torque;
+    generalised += more.generalised;
+    potential += more.potential;
+    touching += more.touching;
+  }
+};
+
+/// Scratch of one step of one body, sized once; holds nothing from step to step. Sums are of the last evaluation.
+struct ContactWorkspace : ContactSums {
   ContactWorkspace() = default;
   ContactWorkspace(const ContactSet& set, std::size_t obstacle_count);
 
   std::vector<PlacedObstacle> obstacles;     ///< at the end of the step
   std::vector<ContactCandidate> candidates;  ///< the first candidate_count, in order of vertex and obstacle
   std::size_t candidate_count = 0;
-
-  // Of the last evaluation.
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< sum of f_i, world [N]
-  Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< sum of (x_i - position) x f_i, world [N m]
-  Eigen::VectorXd generalised;                       ///< sum of U_i^T rotation^T f_i [r]
-  double potential = 0;                              ///< W [J], f = -dW/dx; none of it without candidates
-  int touching = 0;                                  ///< candidates with a normal force
 
   // Of the last gather().
   int visited_nodes = 0;

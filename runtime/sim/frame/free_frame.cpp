@@ -342,13 +342,14 @@ void FreeFrame::end_contact(const Eigen::VectorXd& x, bool converged, const Eige
   FreeMotionWorkspace& free = own(workspace);
   FreeState& body = free.moved;
   const double dt = free.unknowns.time_step;
-  body.position += x.head<3>();
   const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
   const Eigen::Vector3d deformation = free.moments.deformation.transpose() * free.velocity;
   if (converged) {
+    body.position += dt * dt / body.mass * force;  // d, but for the residual: the centre goes as its momentum says
     body.angular_momentum += dt * torque;
     free.solution.spin = free.moments.inertia.inverse() * (rotation.transpose() * body.angular_momentum - deformation);
   } else {
+    body.position += x.head<3>();
     force = body.mass / (dt * dt) * x.head<3>();
     free.solution.spin = free.solution.rotation / dt;
     body.angular_momentum = rotation * (free.moments.inertia * free.solution.spin + deformation);

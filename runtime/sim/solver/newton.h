@@ -65,6 +65,14 @@ struct NewtonWorkspace {
         factor(size * padded(size)),
         direction(size) {}
 
+  /// For a problem that keeps its Hessian itself.
+  void resize_vectors(Eigen::Index size) {
+    gradient.resize(size);
+    trial.resize(size);
+    trial_gradient.resize(size);
+    if (direction.size() < size) direction = AlignedArray(size);
+  }
+
   Eigen::VectorXd gradient, trial, trial_gradient;
   Eigen::MatrixXd hessian;  ///< lower triangle
   AlignedArray factor;      ///< its Cholesky factor, see Kernels::cholesky
@@ -79,6 +87,12 @@ namespace detail {
 inline constexpr int kShifts = 12;
 inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
 
+/// A problem that keeps its Hessian itself.
+template <class Problem>
+inline constexpr bool kFactorises = requires(Problem& problem) {
+  problem.factorise();
+};
+
 inline bool factorise(NewtonWorkspace& workspace, NewtonReport& report) {
   const Eigen::Index size = workspace.hessian.rows();
   const StageTimer timer(workspace.profile, Stage::kSolve, static_cast<double>(size * size * size) / 3);
@@ -86,9 +100,21 @@ inline bool factorise(NewtonWorkspace& workspace, NewtonReport& report) {
   return kernels().cholesky(workspace.hessian.data(), size, workspace.hessian.outerStride(), workspace.factor.data());
 }
 
+template <class Problem>
+bool factorise(Problem& problem, NewtonWorkspace& workspace, NewtonReport& report) {
+  if constexpr (kFactorises<Problem>) {
+    ++report.factorisations;
+    return problem.factorise();
+  } else {
+    return factorise(workspace, report);
+  }
+}
+
 /// A Hessian that even projected tangents leave indefinite is shifted until it is not.
-inline bool factorise_shifted(NewtonWorkspace& workspace, NewtonReport& report) {
-  if (factorise(workspace, report)) return true;
+template <class Problem>
+bool factorise_shifted(Problem& problem, NewtonWorkspace& workspace, NewtonReport& report) {
+  if (factorise(problem, workspace, report)) return true;
+  if constexpr (kFactorises<Problem>) return false;
   double shift = kFirstShift * workspace.hessian.diagonal().cwiseAbs().maxCoeff();
   for (int attempt = 0; attempt < kShifts; ++attempt, shift *= 10) {
     workspace.hessian.diagonal().array() += shift;
@@ -125,7 +151,12 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
     direction.noalias() = workspace.lu->solve(-workspace.gradient);
     return workspace.gradient.dot(direction);
   }
-  const auto solve = [&] { kernels().cholesky_solve(workspace.factor.data(), size, direction.data()); };
+  const auto solve = [&] {
+    if constexpr (kFactorises<Problem>)
+      problem.solve(direction);
+    else
+      kernels().cholesky_solve(workspace.factor.data(), size, direction.data());
+  };
   direction = -workspace.gradient;
   solve();
   if constexpr (requires { problem.gyroscopic_terms(); }) {
@@ -162,6 +193,10 @@ inline bool factor_serves(const NewtonSettings& settings, double before, double 
 ///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
 ///                                                        of forces without a potential, or null where it is weak
 ///   int gyroscopic_terms(); VectorXd gyroscopic_product(x)   optional: how often a weak one is applied, its product
+///   bool factorise(); void solve(Map<VectorXd>& x)       optional: of a problem that keeps its Hessian itself, the
+///                                                        matrix handed to it is empty then; false where it is not
+///                                                        positive definite. x from the right-hand side, which
+///                                                        descends wherever that is minus the gradient
 ///   bool kSeeksLowest                                    optional constant: lengths are halved for as long as the
 ///                                                        potential falls, beyond the first that is low enough
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
@@ -192,14 +227,14 @@ NewtonReport newton_minimise(Problem& problem, const NewtonSettings& settings, E
 
     const bool fresh = state != Hessian::kFactorised;
     if (state == Hessian::kStale) problem.hessian(x, Tangent::kExact, hessian);
-    if (fresh && !detail::factorise(workspace, report)) {
+    if (fresh && !detail::factorise(problem, workspace, report)) {
       if (!policy.projection) return finish(NewtonStatus::kStagnated);
       ++report.projections;
       problem.hessian(x, Tangent::kPositiveSemidefinite, hessian);
       here = problem.evaluate(x, gradient);
       problem.accept(here);
       report.residual = gradient.norm();
-      if (!detail::factorise_shifted(workspace, report)) return finish(NewtonStatus::kNonFinite);
+      if (!detail::factorise_shifted(problem, workspace, report)) return finish(NewtonStatus::kNonFinite);
     }
     if (fresh) {
       const Eigen::MatrixXd* part = detail::gyroscopic_part(problem);

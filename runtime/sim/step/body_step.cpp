@@ -1,7 +1,6 @@
 #include "runtime/sim/step/body_step.h"
 
 #include <algorithm>
-#include <algorithm>
 #include <cmath>
 
 #include "runtime/sim/step/contact_step.h"

@@ -21,9 +21,9 @@ BodyPose ContactProblem::place(const Eigen::VectorXd& x) noexcept {
 
 PotentialEvaluation ContactProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                                              Eigen::MatrixXd& hessian) noexcept {
-  const PotentialEvaluation evaluation = finish(x, evaluate_alone(x, /*first=*/true), gradient);
+  PotentialEvaluation evaluation = finish(x, evaluate_alone(x, /*first=*/true), gradient);
   const BodyPose pose = place(x);
-  frame_.accept_rigid(workspace_.frame);
+  evaluation.potential.value += frame_.accept_rigid(workspace_.frame);
   start_stiffness(pose);
   finish_hessian(pose, x, hessian);
   return evaluation;

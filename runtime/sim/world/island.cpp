@@ -1,0 +1,356 @@
+#include "runtime/sim/world/island.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+namespace {
+
+constexpr Eigen::Index kDenseUnknowns = 160;  // a factorisation of more takes longer than conjugate gradients
+constexpr double kSolutionError = 1e-3;       // of conjugate gradients, in the norm of the preconditioner
+constexpr int kMostGradients = 400;
+
+/// Calls work(i) for i < count, each once.
+template <class Work>
+void for_all(std::size_t count, int threads, const Work& work) {
+  const auto end = static_cast<std::ptrdiff_t>(count);
+  if (threads == 1 || end < 2) {
+    for (std::ptrdiff_t i = 0; i < end; ++i) work(static_cast<std::size_t>(i));
+    return;
+  }
+#pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
+  for (std::ptrdiff_t i = 0; i < end; ++i) work(static_cast<std::size_t>(i));
+}
+
+void add(const NewtonReport& more, NewtonReport& total) {
+  total.status = more.status;
+  total.residual = more.residual;
+  total.iterations += more.iterations;
+  total.factorisations += more.factorisations;
+  total.line_search_evaluations += more.line_search_evaluations;
+  total.projections += more.projections;
+}
+
+}  // namespace
+
+IslandProblem::IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                             std::span<const std::vector<Incidence>> incidences, int threads,
+                             IslandWorkspace& workspace)
+    : bodies_(bodies), pairs_(pairs), incidences_(incidences), threads_(threads), workspace_(workspace) {
+  workspace.unknowns.resize(bodies.size());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    body(i).offset = unknowns_;
+    workspace.unknowns[i].resize(body(i).unknowns());
+    unknowns_ += body(i).unknowns();
+  }
+  is_dense_ = unknowns_ <= kDenseUnknowns;
+  workspace.newton.resize_vectors(unknowns_);
+  workspace.x.resize(unknowns_);
+  workspace.evaluations.resize(bodies.size());
+  workspace.values.resize(bodies.size() + pairs.size());
+  for (Eigen::VectorXd* vector :
+       {&workspace.residual, &workspace.preconditioned, &workspace.direction, &workspace.product})
+    vector->resize(unknowns_);
+  if (!is_dense_) return;
+  workspace.dense.resize(unknowns_, unknowns_);
+  if (workspace.factor.size() < unknowns_ * padded(unknowns_)) {
+    workspace.factor = AlignedArray(unknowns_ * padded(unknowns_));
+    workspace.right_side = AlignedArray(unknowns_);
+  }
+}
+
+const WorldBody& IslandProblem::first(const PairContact& pair) const noexcept {
+  return body(static_cast<std::size_t>(pair.body(0)));
+}
+const WorldBody& IslandProblem::second(const PairContact& pair) const noexcept {
+  return body(static_cast<std::size_t>(pair.body(1)));
+}
+
+/// x of each body, and its placement and q there.
+void IslandProblem::place(const Eigen::VectorXd& x) noexcept {
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    workspace_.unknowns[i] = x.segment(body(i).offset, body(i).unknowns());
+    body(i).placement = body(i).problem->place(workspace_.unknowns[i]);
+  });
+}
+
+PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool is_first,
+                                                Eigen::VectorXd& gradient) noexcept {
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    Eigen::VectorXd& own = workspace_.unknowns[i];
+    own = x.segment(body(i).offset, body(i).unknowns());
+    workspace_.evaluations[i] = body(i).problem->evaluate_alone(own, is_first);
+    body(i).placement = body(i).problem->place(own);
+  });
+  for_all(pairs_.size(), threads_, [&](std::size_t p) { pairs_[p]->evaluate(first(*pairs_[p]), second(*pairs_[p])); });
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    WorldBody& own = body(i);
+    for (const auto& [pair, side] : incidences_[i])
+      own.near().contact.add(pairs_[static_cast<std::size_t>(pair)]->sums(side));
+    Eigen::VectorXd& part = own.near().newton.gradient;
+    workspace_.evaluations[i] = own.problem->finish(workspace_.unknowns[i], workspace_.evaluations[i], part);
+    gradient.segment(own.offset, own.unknowns()) = part;
+  });
+  PotentialEvaluation sum;
+  double squares = 0;
+  for (const PotentialEvaluation& evaluation : workspace_.evaluations) {
+    sum.potential.value += evaluation.potential.value;
+    sum.potential.magnitude += evaluation.potential.magnitude;
+    squares += evaluation.force_scale * evaluation.force_scale;
+  }
+  sum.force_scale = std::sqrt(squares);
+  return sum;
+}
+
+PotentialEvaluation IslandProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
+                                            Eigen::MatrixXd& /*hessian*/) noexcept {
+  PotentialEvaluation evaluation = evaluate_all(x, /*is_first=*/true, gradient);
+  for (WorldBody* const own : bodies_)
+    evaluation.potential.value += own->model.frame->accept_rigid(own->workspace.frame);
+  assemble();
+  return evaluation;
+}
+
+PotentialEvaluation IslandProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
+  return evaluate_all(x, /*is_first=*/false, gradient);
+}
+
+PotentialValue IslandProblem::value(const Eigen::VectorXd& x) noexcept {
+  const std::size_t bodies = bodies_.size();
+  for_all(bodies, threads_, [&](std::size_t i) {
+    Eigen::VectorXd& own = workspace_.unknowns[i];
+    own = x.segment(body(i).offset, body(i).unknowns());
+    workspace_.values[i] = body(i).problem->value(own);
+    body(i).placement = body(i).problem->place(own);
+  });
+  for_all(pairs_.size(), threads_, [&](std::size_t p) {
+    const double potential = pairs_[p]->potential(first(*pairs_[p]), second(*pairs_[p]));
+    workspace_.values[bodies + p] = {potential, std::abs(potential)};
+  });
+  PotentialValue sum;
+  for (const PotentialValue& value : workspace_.values) {
+    sum.value += value.value;
+    sum.magnitude += value.magnitude;
+  }
+  return sum;
+}
+
+void IslandProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& /*hessian*/) noexcept {
+  place(x);
+  for_all(bodies_.size(), threads_,
+          [&](std::size_t i) { body(i).problem->evaluate_elastic_hessian(body(i).pose(), tangent); });
+  assemble();
+}
+
+void IslandProblem::accept(PotentialEvaluation& evaluation) noexcept {
+  for (WorldBody* const own : bodies_) own->problem->accept(evaluation);
+}
+
+/// Own Hessians of the bodies, in their own workspaces, and the couplings of the pairs, at the poses of the last
+/// evaluation.
+void IslandProblem::assemble() noexcept {
+  for_all(pairs_.size(), threads_,
+          [&](std::size_t p) { pairs_[p]->set_columns(first(*pairs_[p]), second(*pairs_[p])); });
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    WorldBody& own = body(i);
+    own.problem->start_stiffness(own.pose());
+    for (const auto& [pair, side] : incidences_[i])
+      pairs_[static_cast<std::size_t>(pair)]->add_stiffness(side, own.near().stiffness);
+    own.problem->finish_hessian(own.pose(), workspace_.unknowns[i], own.near().newton.hessian);
+  });
+  for_all(pairs_.size(), threads_, [&](std::size_t p) {
+    const auto x_of = [&](int side) -> const Eigen::VectorXd& {
+      return workspace_.unknowns[static_cast<std::size_t>(pairs_[p]->body(side))];
+    };
+    pairs_[p]->set_coupling(first(*pairs_[p]), x_of(0), second(*pairs_[p]), x_of(1));
+  });
+}
+
+void IslandProblem::assemble_dense() noexcept {
+  Eigen::MatrixXd& A = workspace_.dense;
+  A.setZero();
+  for (const WorldBody* const own : bodies_)
+    A.block(own->offset, own->offset, own->unknowns(), own->unknowns()) = own->near().newton.hessian;
+  for (const PairContact* const pair : pairs_) {
+    const WorldBody &a = first(*pair), &b = second(*pair);
+    A.block(b.offset, a.offset, b.unknowns(), a.unknowns()) += pair->coupling().transpose();
+  }
+}
+
+bool IslandProblem::factorise() noexcept {
+  if (is_dense_) {
+    assemble_dense();
+    return kernels().cholesky(workspace_.dense.data(), unknowns_, unknowns_, workspace_.factor.data());
+  }
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    NewtonWorkspace& own = body(i).near().newton;
+    const Eigen::Index size = own.hessian.rows();
+    const bool positive = kernels().cholesky(own.hessian.data(), size, size, own.factor.data());
+    workspace_.values[i].value = positive ? 1 : 0;
+  });
+  return std::all_of(workspace_.values.begin(), workspace_.values.begin() + std::ssize(bodies_),
+                     [](const PotentialValue& positive) { return positive.value > 0; });
+}
+
+void IslandProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
+  if (!is_dense_) return solve_by_gradients(x);
+  std::copy(x.begin(), x.end(), workspace_.right_side.data());
+  kernels().cholesky_solve(workspace_.factor.data(), unknowns_, workspace_.right_side.data());
+  x = Eigen::Map<const Eigen::VectorXd>(workspace_.right_side.data(), unknowns_);
+}
+
+void IslandProblem::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product) const noexcept {
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    const WorldBody& own = body(i);
+    auto part = product.segment(own.offset, own.unknowns());
+    part.noalias() = own.near().newton.hessian.selfadjointView<Eigen::Lower>() * x.segment(own.offset, own.unknowns());
+    for (const auto& [index, side] : incidences_[i]) {
+      const PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
+      const WorldBody& other = side == 0 ? second(pair) : first(pair);
+      const auto theirs = x.segment(other.offset, other.unknowns());
+      if (side == 0)
+        part.noalias() += pair.coupling() * theirs;
+      else
+        part.noalias() += pair.coupling().transpose() * theirs;
+    }
+  });
+}
+
+void IslandProblem::precondition(const Eigen::VectorXd& residual, Eigen::VectorXd& result) noexcept {
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    const WorldBody& own = body(i);
+    NewtonWorkspace& factors = body(i).near().newton;
+    Eigen::Map<Eigen::VectorXd> part(factors.direction.data(), own.unknowns());
+    part = residual.segment(own.offset, own.unknowns());
+    kernels().cholesky_solve(factors.factor.data(), own.unknowns(), factors.direction.data());
+    result.segment(own.offset, own.unknowns()) = part;
+  });
+}
+
+/// Where the matrix is not positive definite, the iterate before it shows: a direction of descent in any case.
+void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept {
+  Eigen::VectorXd &residual = workspace_.residual, &z = workspace_.preconditioned, &p = workspace_.direction,
+                  &product = workspace_.product;
+  residual = x;
+  precondition(residual, z);
+  p = z;
+  x.setZero();
+  double square = residual.dot(z);
+  const double enough = kSolutionError * kSolutionError * square;
+  for (int iteration = 0; iteration < kMostGradients && square > enough; ++iteration) {
+    multiply(p, product);
+    ++conjugate_gradients_;
+    const double curvature = p.dot(product);
+    if (!(curvature > 0)) {
+      if (iteration == 0) x = p;
+      return;
+    }
+    const double length = square / curvature;
+    x += length * p;
+    residual -= length * product;
+    precondition(residual, z);
+    const double next = residual.dot(z);
+    p = z + next / square * p;
+    square = next;
+  }
+}
+
+namespace {
+
+/// Friction of all contacts of an island follows the normal forces of its solution.
+double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
+  FrictionChange change;
+  for (WorldBody* const own : bodies) {
+    ContactWorkspace& contact = own->near().contact;
+    for (std::size_t i = 0; i < contact.candidate_count; ++i) {
+      ContactCandidate& candidate = contact.candidates[i];
+      change.refresh(contact.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
+    }
+  }
+  for (PairContact* const pair : pairs) pair->refresh_friction(change);
+  return change.relative();
+}
+
+NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                          std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
+  IslandProblem problem(bodies, pairs, incidences, threads, workspace);
+  for (const WorldBody* const own : bodies) workspace.x.segment(own->offset, own->unknowns()) = own->near().x;
+  NewtonReport total;
+  for (int round = 0; round < kFrictionRounds; ++round) {
+    if (round > 0)
+      for_all(bodies.size(), threads, [&](std::size_t i) { bodies[i]->step->potential().start(bodies[i]->near().q); });
+    add(newton_minimise(problem, bodies.front()->scene.newton, workspace.x, workspace.newton), total);
+    if (total.status == NewtonStatus::kNonFinite) return total;
+    if (refresh_friction(bodies, pairs) <= kSameFriction) break;
+  }
+  for (WorldBody* const own : bodies) own->near().x = workspace.x.segment(own->offset, own->unknowns());
+  return total;
+}
+
+double kinetic_and_total(std::span<WorldBody* const> bodies, double& total) noexcept {
+  double kinetic = 0;
+  total = 0;
+  for (const WorldBody* const own : bodies) {
+    const Energies energy = energies(own->model, own->scene, own->state);
+    kinetic += energy.kinetic;
+    total += energy.total();
+  }
+  return kinetic;
+}
+
+/// The step of an island that did not converge: its bodies together have no more energy than before.
+void take_solution(std::span<WorldBody* const> bodies, const NewtonReport& newton) noexcept {
+  double before = 0, now = 0;
+  const bool converged = newton.status == NewtonStatus::kConverged;
+  if (!converged) kinetic_and_total(bodies, before);
+  for (WorldBody* const own : bodies) own->step->take(newton);
+  if (converged) return;
+  const double kinetic = kinetic_and_total(bodies, now);
+  if (!(now > before) || !(kinetic > 0)) return;
+  const double share = std::max(0.0, 1 - (now - before) / kinetic);
+  for (WorldBody* const own : bodies)
+    own->step->limit_kinetic_energy(share * own->model.frame->kinetic_energy(own->state.v, own->state.frame));
+}
+
+}  // namespace
+
+NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                         std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
+  for_all(bodies.size(), threads, [&](std::size_t i) {
+    WorldBody& own = *bodies[i];
+    own.step.emplace(own.model, own.scene, own.state, own.workspace);
+    own.step->begin(/*touches_others=*/true);
+    if (own.step->prepare()) {
+      start_contact(own.model, own.scene, own.state, own.workspace);
+    } else {
+      own.near().x.setConstant(std::numeric_limits<double>::quiet_NaN());
+    }
+    own.problem.emplace(own.model, own.state, own.step->potential(), own.workspace);
+  });
+  const NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
+  if (getenv("DBG") && newton.status != NewtonStatus::kConverged) {double sc=0; for (auto& e: workspace.evaluations) sc+=e.force_scale*e.force_scale; fprintf(stderr,"status %d it %d fact %d ls %d proj %d res %g scale %g step %ld\n",(int)newton.status,newton.iterations,newton.factorisations,newton.line_search_evaluations,newton.projections,newton.residual,std::sqrt(sc),(long)bodies[0]->state.step);}
+  const bool converged = newton.status == NewtonStatus::kConverged;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    WorldBody& own = *bodies[i];
+    Eigen::Vector3d torque = own.near().contact.torque;
+    for (const auto& [index, side] : incidences[i]) {
+      const PairContact& pair = *pairs[static_cast<std::size_t>(index)];
+      const WorldBody &a = *bodies[static_cast<std::size_t>(pair.body(0))],
+                      &b = *bodies[static_cast<std::size_t>(pair.body(1))];
+      const auto way = [](const WorldBody& body) -> Eigen::Vector3d {
+        return body.placement.position - body.model.frame->placement(body.state.frame).position;
+      };
+      torque += pair.torque_correction(a, way(a), b, way(b));
+    }
+    finish_contact(own.model, own.state, converged, torque, own.workspace);
+  }
+  take_solution(bodies, newton);
+  for (WorldBody* const own : bodies) own->report = own->step->report();
+  return newton;
+}
+
+}  // namespace exmat::runtime

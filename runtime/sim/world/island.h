@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "runtime/sim/solver/newton.h"
+#include "runtime/sim/world/pair_contact.h"
+
+namespace exmat::runtime {
+
+/// Scratch of the steps of islands; grows, holds nothing from step to step.
+struct IslandWorkspace {
+  NewtonWorkspace newton;
+  Eigen::VectorXd x;
+  std::vector<PotentialEvaluation> evaluations;  ///< of each body
+  std::vector<PotentialValue> values;            ///< of each body, then of each pair
+  std::vector<Eigen::VectorXd> unknowns;         ///< of each body
+
+  // Linear solutions.
+  Eigen::MatrixXd dense;  ///< all unknowns of a small island, lower triangle
+  AlignedArray factor, right_side;
+  Eigen::VectorXd residual, preconditioned, direction, product;
+};
+
+/// The pairs that a body of an island is in.
+struct Incidence {
+  int pair = 0;  ///< of the island's
+  int side = 0;  ///< which of the pair's bodies it is
+};
+
+/// Bodies that touch in a step and the contacts between them: what one step of all of them minimises, the sum of their
+/// own potentials and that of the contacts, in the unknowns of all. For newton_minimise. Small islands are factorised;
+/// larger ones solve by conjugate gradients, preconditioned by the factors of the bodies' own Hessians. Sums are taken
+/// in the order of bodies and pairs, whatever the number of threads.
+class IslandProblem {
+ public:
+  static constexpr bool kSeeksLowest = true;
+
+  /// Bodies after start_contact(). `incidences[i]` are those of body i.
+  IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
+
+  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
+  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
+  PotentialValue value(const Eigen::VectorXd& x) noexcept;
+  void hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept;
+  void accept(PotentialEvaluation& evaluation) noexcept;
+
+  bool factorise() noexcept;
+  void solve(Eigen::Map<Eigen::VectorXd>& x) noexcept;
+
+  int conjugate_gradients() const noexcept { return conjugate_gradients_; }  ///< iterations so far
+
+ private:
+  WorldBody& body(std::size_t i) const noexcept { return *bodies_[i]; }
+  const WorldBody& first(const PairContact& pair) const noexcept;
+  const WorldBody& second(const PairContact& pair) const noexcept;
+  void place(const Eigen::VectorXd& x) noexcept;
+  PotentialEvaluation evaluate_all(const Eigen::VectorXd& x, bool is_first, Eigen::VectorXd& gradient) noexcept;
+  void assemble() noexcept;
+  void assemble_dense() noexcept;
+  void multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product) const noexcept;
+  void precondition(const Eigen::VectorXd& residual, Eigen::VectorXd& result) noexcept;
+  void solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept;
+
+  std::span<WorldBody* const> bodies_;
+  std::span<PairContact* const> pairs_;
+  std::span<const std::vector<Incidence>> incidences_;
+  int threads_;
+  IslandWorkspace& workspace_;
+  Eigen::Index unknowns_ = 0;
+  bool is_dense_ = false;
+  int conjugate_gradients_ = 0;
+};
+
+/// One step of the bodies of an island, from BodyStep's begin() to its report. Returns Newton's report, the same for
+/// all of them.
+NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                         std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,112 @@
+#include "runtime/sim/world/pair_contact.h"
+
+#include <Eigen/Geometry>
+
+#include "runtime/sim/step/contact_step.h"
+
+namespace exmat::runtime {
+namespace {
+
+TouchingBody touching(const WorldBody& body) {
+  return {body.contact(), body.surface, pose_of(body.model, body.state),
+          BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
+}
+
+/// Columns about world axes become those of the unknowns.
+void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index used, Eigen::MatrixXd& columns) {
+  if (body.rigid() == 0) return;
+  const Eigen::Matrix3d turn = body.model.frame->turn_to_world(x, body.placement).transpose();
+  for (Eigen::Index i = 0; i < used; ++i) {
+    const Eigen::Vector3d turned = turn * columns.block<3, 1>(3, i);
+    columns.block<3, 1>(3, i) = turned;
+  }
+}
+
+}  // namespace
+
+void PairContact::reset(int first, int second, const HeldPair* held) {
+  bodies_ = {first, second};
+  held_ = held;
+  for (BodyCandidates& candidates : candidates_) candidates.all.clear();
+}
+
+void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin) {
+  static const std::vector<HeldBodyContact> none;
+  half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction};
+  const auto at = static_cast<std::size_t>(side);
+  BodyContact(half_).gather(touching(own), touching(other), own.scene.time_step, margin, own.anew || other.anew,
+                            held_ != nullptr ? held_->held[at] : none, other.shape, candidates_[at]);
+}
+
+void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
+  sums_[0].set_zero(first.state.q.size());
+  sums_[1].set_zero(second.state.q.size());
+  const BodyContact contact(half_);
+  contact.evaluate(first.contact(), first.pose(), second.pose(), candidates_[0], sums_[0], sums_[1]);
+  contact.evaluate(second.contact(), second.pose(), first.pose(), candidates_[1], sums_[1], sums_[0]);
+}
+
+double PairContact::potential(const WorldBody& first, const WorldBody& second) const noexcept {
+  const BodyContact contact(half_);
+  return contact.potential(first.contact(), first.pose(), second.pose(), candidates_[0]) +
+         contact.potential(second.contact(), second.pose(), first.pose(), candidates_[1]);
+}
+
+void PairContact::set_columns(const WorldBody& first, const WorldBody& second) {
+  for (std::size_t at = 0; at < 2; ++at) {
+    const WorldBody& own = at == 0 ? first : second;
+    const WorldBody& other = at == 0 ? second : first;
+    used_[at] = BodyContact::stiffness_columns(own.contact(), own.rigid(), other.rigid(), own.pose(), other.pose(),
+                                               candidates_[at], own_columns_[at], other_columns_[at]);
+  }
+}
+
+void PairContact::add_stiffness(int side, Eigen::MatrixXd& stiffness) const {
+  const auto at = static_cast<std::size_t>(side);
+  auto lower = stiffness.selfadjointView<Eigen::Lower>();
+  if (used_[at] > 0) lower.rankUpdate(own_columns_[at].leftCols(used_[at]));
+  if (used_[1 - at] > 0) lower.rankUpdate(other_columns_[1 - at].leftCols(used_[1 - at]));
+}
+
+void PairContact::set_coupling(const WorldBody& first, const Eigen::VectorXd& x_first, const WorldBody& second,
+                               const Eigen::VectorXd& x_second) {
+  coupling_.setZero(first.unknowns(), second.unknowns());
+  to_unknowns(first, x_first, used_[0], own_columns_[0]);
+  to_unknowns(second, x_second, used_[0], other_columns_[0]);
+  to_unknowns(second, x_second, used_[1], own_columns_[1]);
+  to_unknowns(first, x_first, used_[1], other_columns_[1]);
+  if (used_[0] > 0)
+    coupling_.noalias() -= own_columns_[0].leftCols(used_[0]) * other_columns_[0].leftCols(used_[0]).transpose();
+  if (used_[1] > 0)
+    coupling_.noalias() -= other_columns_[1].leftCols(used_[1]) * own_columns_[1].leftCols(used_[1]).transpose();
+}
+
+void PairContact::refresh_friction(FrictionChange& change) noexcept {
+  for (BodyCandidates& candidates : candidates_) BodyContact(half_).refresh_friction(candidates, change);
+}
+
+Eigen::Vector3d PairContact::torque_correction(const WorldBody& first, const Eigen::Vector3d& way_first,
+                                               const WorldBody& second,
+                                               const Eigen::Vector3d& way_second) const noexcept {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  if (first.rigid() == 0 || second.rigid() == 0) return sum;
+  for (std::size_t at = 0; at < 2; ++at) {
+    const WorldBody& own = at == 0 ? first : second;
+    const WorldBody& other = at == 0 ? second : first;
+    const Eigen::Vector3d own_way = at == 0 ? way_first : way_second, other_way = at == 0 ? way_second : way_first;
+    const Eigen::Vector3d between = own.placement.position - other.placement.position - (own_way - other_way);
+    for (const BodyCandidate& candidate : candidates_[at].all) {
+      const Eigen::Vector3d apart = between + candidate.arm - candidate.surface_arm;
+      sum -= 0.5 * apart.cross(candidate.force);
+    }
+  }
+  return sum;
+}
+
+void PairContact::commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const {
+  const BodyContact contact(half_);
+  contact.commit(first.pose(), second.pose(), candidates_[0], held.held[0]);
+  contact.commit(second.pose(), first.pose(), candidates_[1], held.held[1]);
+}
+
+}  // namespace exmat::runtime

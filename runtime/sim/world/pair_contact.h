@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <vector>
+
+#include "runtime/sim/contact/body_contact.h"
+#include "runtime/sim/world/world_body.h"
+
+namespace exmat::runtime {
+
+/// What two bodies remember of their contacts from step to step.
+struct HeldPair {
+  int first = 0, second = 0;                           ///< bodies, first < second
+  std::array<std::vector<HeldBodyContact>, 2> held{};  ///< the first's vertices, the second's vertices
+};
+
+/// Two bodies that may touch in a step: each one's vertices against the other's surface, with half of the law.
+class PairContact {
+ public:
+  /// Bodies and what they remember; nothing is met yet.
+  void reset(int first, int second, const HeldPair* held);
+
+  /// Its bodies are called by these numbers from now on.
+  void number(int first, int second) noexcept { bodies_ = {first, second}; }
+  int body(int side) const noexcept { return bodies_[static_cast<std::size_t>(side)]; }
+  bool empty() const noexcept { return candidates_[0].all.empty() && candidates_[1].all.empty(); }
+
+  /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
+  void gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin);
+
+  // At the iterates of the bodies.
+
+  void evaluate(const WorldBody& first, const WorldBody& second);
+  double potential(const WorldBody& first, const WorldBody& second) const noexcept;
+  const ContactSums& sums(int side) const noexcept { return sums_[static_cast<std::size_t>(side)]; }
+
+  /// Stiffness as products of columns, about world axes.
+  void set_columns(const WorldBody& first, const WorldBody& second);
+  /// Adds the stiffness of one side's own unknowns about world axes, lower triangle.
+  void add_stiffness(int side, Eigen::MatrixXd& stiffness) const;
+  /// After that: the stiffness between the unknowns of the two, `x` of each.
+  void set_coupling(const WorldBody& first, const Eigen::VectorXd& x_first, const WorldBody& second,
+                    const Eigen::VectorXd& x_second);
+  const Eigen::MatrixXd& coupling() const noexcept { return coupling_; }  ///< first's unknowns x second's
+
+  void refresh_friction(FrictionChange& change) noexcept;
+
+  /// What has to be added to the torque on either body [N m], if both move freely, for the angular momentum of the two
+  /// to stay what it is: forces act at points that are apart by the gap and the slip, and momenta are taken about
+  /// centres of mass that go on during the step by `way_first` and `way_second` [m].
+  Eigen::Vector3d torque_correction(const WorldBody& first, const Eigen::Vector3d& way_first, const WorldBody& second,
+                                    const Eigen::Vector3d& way_second) const noexcept;
+
+  /// The contacts alone, into `held`.
+  void commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const;
+
+ private:
+  std::array<int, 2> bodies_{};
+  const HeldPair* held_ = nullptr;
+  ContactLaw half_;
+  std::array<BodyCandidates, 2> candidates_;  // vertices of the first, of the second
+  std::array<ContactSums, 2> sums_;           // of the first, of the second
+  // Columns of the candidates of each, of the side's body and of the other.
+  std::array<Eigen::MatrixXd, 2> own_columns_, other_columns_;
+  std::array<Eigen::Index, 2> used_{};
+  Eigen::MatrixXd coupling_;
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,194 @@
+#include "runtime/sim/world/world.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/stepper.h"
+#include "runtime/sim/world/broad_phase.h"
+
+namespace exmat::runtime {
+namespace {
+
+constexpr std::size_t kSharedIsland = 32;  // bodies; a larger one is shared by the threads
+
+/// The root of a body's tree of touching ones.
+int root_of(std::vector<int>& parents, int body) {
+  while (parents[static_cast<std::size_t>(body)] != body) {
+    int& parent = parents[static_cast<std::size_t>(body)];
+    parent = parents[static_cast<std::size_t>(parent)];
+    body = parent;
+  }
+  return body;
+}
+
+}  // namespace
+
+World::World(std::vector<WorldBodyStart> bodies, const ContactLaw& law) : law_(law) {
+  for (WorldBodyStart& body : bodies) {
+    WorldBody& own = *bodies_.emplace_back(std::make_unique<WorldBody>(body.kind, std::move(body.state)));
+    refresh_weights(own.model, own.scene, own.state, own.workspace);
+  }
+  balls_.resize(bodies_.size());
+  margins_.resize(bodies_.size());
+  against_.resize(bodies_.size());
+}
+
+WorldReport World::step(int threads) {
+  find_pairs(threads);
+  gather(threads);
+  make_islands();
+  WorldReport report;
+  report.pairs = static_cast<int>(near_.size());
+  const auto is_large = [](const Island& island) { return island.bodies.size() > kSharedIsland; };
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (island_of_[i] >= 0) continue;
+    WorldBody& own = *bodies_[i];
+    own.report = runtime::step(own.model, own.scene, own.state, own.workspace);
+  }
+  const auto solve = [](Island& island, int own_threads) {
+    island.newton = step_island(island.bodies, island.pairs, island.incidences, own_threads, island.workspace);
+  };
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
+  for (std::size_t i = 0; i < island_count_; ++i)
+    if (!is_large(*islands_[i])) solve(*islands_[i], 1);
+  for (std::size_t i = 0; i < island_count_; ++i)
+    if (is_large(*islands_[i])) solve(*islands_[i], threads);
+  for (std::size_t i = 0; i < island_count_; ++i) {
+    const Island& island = *islands_[i];
+    ++report.islands;
+    report.touching_pairs += static_cast<int>(island.pairs.size());
+    report.largest_island = std::max(report.largest_island, static_cast<int>(island.bodies.size()));
+    report.newton_iterations = std::max(report.newton_iterations, island.newton.iterations);
+    if (island.newton.status != NewtonStatus::kConverged) ++report.unconverged_islands;
+  }
+  remember();
+  return report;
+}
+
+/// Pairs of bodies whose bounds, wider by how far they may go, overlap.
+void World::find_pairs(int threads) {
+#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    WorldBody& own = *bodies_[i];
+    const double dt = own.scene.time_step;
+    const BodyPose pose = pose_of(own.model, own.state);
+    const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
+    const double travel = own.contact().travel_bound(pose, velocity, dt);
+    margins_[i] = kContactMarginSteps * travel + dt * dt * own.scene.gravity.norm();
+    const DeformationTree::Ball ball = own.surface.bound(own.state.q);
+    balls_[i] = {pose.position + pose.rotation * ball.centre, ball.radius + margins_[i]};
+  }
+  overlapping_pairs(balls_, order_, near_);
+}
+
+const HeldPair* World::held_of(int first, int second) const {
+  const auto before = [](const HeldPair& a, const std::pair<int, int>& b) { return std::pair(a.first, a.second) < b; };
+  const auto found = std::lower_bound(held_.begin(), held_.end(), std::pair(first, second), before);
+  return found != held_.end() && found->first == first && found->second == second ? &*found : nullptr;
+}
+
+/// Candidates, the surface of one body at a time: what is computed of its shape serves all that are near.
+void World::gather(int threads) {
+  while (pairs_.size() < near_.size()) pairs_.push_back(std::make_unique<PairContact>());
+  for (std::vector<Incidence>& pairs : against_) pairs.clear();
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    const auto [first, second] = near_[p];
+    pairs_[p]->reset(first, second, held_of(first, second));
+    against_[static_cast<std::size_t>(second)].push_back({static_cast<int>(p), 0});
+    against_[static_cast<std::size_t>(first)].push_back({static_cast<int>(p), 1});
+  }
+#pragma omp parallel for schedule(dynamic, 4) num_threads(threads) if (threads > 1)
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (against_[i].empty()) continue;
+    WorldBody& other = *bodies_[i];
+    other.surface.place(other.state.q, other.shape);
+    for (const auto& [index, side] : against_[i]) {
+      PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
+      const int own = pair.body(side);
+      pair.gather(law_, side, at(own), other, margins_[static_cast<std::size_t>(own)] + margins_[i]);
+    }
+  }
+}
+
+/// Bodies that touch, directly or through others, in ascending order of their first body.
+void World::make_islands() {
+  parents_.resize(bodies_.size());
+  std::iota(parents_.begin(), parents_.end(), 0);
+  island_of_.assign(bodies_.size(), -1);
+  place_in_island_.assign(bodies_.size(), -1);
+  island_count_ = 0;
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    if (pairs_[p]->empty()) continue;
+    const int a = root_of(parents_, near_[p].first), b = root_of(parents_, near_[p].second);
+    parents_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
+  }
+  const auto add_body = [&](int body) {
+    const auto root = static_cast<std::size_t>(root_of(parents_, body));
+    if (island_of_[root] < 0) {
+      if (island_count_ == islands_.size()) islands_.push_back(std::make_unique<Island>());
+      Island& fresh = *islands_[island_count_];
+      fresh.bodies.clear();
+      fresh.pairs.clear();
+      island_of_[root] = static_cast<int>(island_count_++);
+    }
+    const auto index = static_cast<std::size_t>(body);
+    island_of_[index] = island_of_[root];
+    if (place_in_island_[index] >= 0) return;
+    Island& island = *islands_[static_cast<std::size_t>(island_of_[index])];
+    place_in_island_[index] = static_cast<int>(island.bodies.size());
+    island.bodies.push_back(bodies_[index].get());
+  };
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    if (pairs_[p]->empty()) continue;
+    add_body(near_[p].first);
+    add_body(near_[p].second);
+  }
+  for (std::size_t i = 0; i < island_count_; ++i) {
+    std::vector<std::vector<Incidence>>& incidences = islands_[i]->incidences;
+    incidences.resize(std::max(incidences.size(), islands_[i]->bodies.size()));
+    for (std::vector<Incidence>& pairs : incidences) pairs.clear();
+  }
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    if (pairs_[p]->empty()) continue;
+    const auto first = static_cast<std::size_t>(near_[p].first), second = static_cast<std::size_t>(near_[p].second);
+    Island& island = *islands_[static_cast<std::size_t>(island_of_[first])];
+    const auto index = static_cast<int>(island.pairs.size());
+    island.pairs.push_back(pairs_[p].get());
+    island.pairs.back()->number(place_in_island_[first], place_in_island_[second]);
+    island.incidences[static_cast<std::size_t>(place_in_island_[first])].push_back({index, 0});
+    island.incidences[static_cast<std::size_t>(place_in_island_[second])].push_back({index, 1});
+  }
+}
+
+/// What the next step has to know of the contacts of this one.
+void World::remember() {
+  std::size_t kept = 0;
+  std::vector<HeldPair>& next = next_held_;
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    if (pairs_[p]->empty()) continue;
+    if (kept == next.size()) next.emplace_back();
+    HeldPair& held = next[kept];
+    pairs_[p]->commit(at(near_[p].first), at(near_[p].second), held);
+    held.first = near_[p].first;
+    held.second = near_[p].second;
+    if (!held.held[0].empty() || !held.held[1].empty()) ++kept;
+  }
+  next.resize(kept);
+  held_.swap(next);
+  for (const auto& body : bodies_) body->anew = false;
+}
+
+Energies World::energies() const {
+  Energies sum;
+  for (const auto& body : bodies_) {
+    const Energies own = runtime::energies(body->model, body->scene, body->state);
+    sum.kinetic += own.kinetic;
+    sum.elastic += own.elastic;
+    sum.potential += own.potential;
+  }
+  return sum;
+}
+
+}  // namespace exmat::runtime

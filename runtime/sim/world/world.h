@@ -1,0 +1,85 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "runtime/sim/step/stepper.h"
+#include "runtime/sim/world/island.h"
+
+namespace exmat::runtime {
+
+struct WorldBodyStart {
+  BodyKind kind;
+  State state;
+};
+
+/// What one step of a World did.
+struct WorldReport {
+  int pairs = 0;           ///< of bodies whose bounds overlap
+  int touching_pairs = 0;  ///< of those, with vertices that may touch
+  int islands = 0;         ///< of two bodies or more, solved together
+  int largest_island = 0;  ///< bodies
+  int unconverged_islands = 0;
+  int newton_iterations = 0;  ///< most of an island
+};
+
+/// Bodies that touch each other, stepped together. Bodies that no other is near take the step of a single body
+/// (stepper.h); those that touch are solved together, island by island, so that a stiff pile converges as one body
+/// does. Linear and angular momentum of free bodies among themselves are conserved to rounding. Results do not depend
+/// on the number of threads. docs/step_in_detail.md, "Bodies that touch".
+class World {
+ public:
+  /// All with the same time step, `law` between any two of them. Models, scenes and surfaces outlive the world.
+  World(std::vector<WorldBodyStart> bodies, const ContactLaw& law);
+
+  int count() const noexcept { return static_cast<int>(bodies_.size()); }
+  State& state(int body) noexcept { return at(body).state; }
+  const State& state(int body) const noexcept { return at(body).state; }
+  const Model& model(int body) const noexcept { return at(body).model; }
+  const StepScene& scene(int body) const noexcept { return at(body).scene; }
+  const StepReport& report(int body) const noexcept { return at(body).report; }
+
+  /// One step of all bodies by so many threads, >= 1.
+  WorldReport step(int threads);
+
+  /// Of bodies that touch each other at the end of the last step, in ascending order.
+  const std::vector<HeldPair>& held() const noexcept { return held_; }
+
+  /// Kinetic, elastic and potential energy of all bodies [J].
+  Energies energies() const;
+
+ private:
+  WorldBody& at(int body) const noexcept { return *bodies_[static_cast<std::size_t>(body)]; }
+  void find_pairs(int threads);
+  void gather(int threads);
+  void make_islands();
+  void remember();
+  const HeldPair* held_of(int first, int second) const;
+
+  struct Island {
+    std::vector<WorldBody*> bodies;
+    std::vector<PairContact*> pairs;
+    std::vector<std::vector<Incidence>> incidences;  // of each body
+    IslandWorkspace workspace;
+    NewtonReport newton;
+  };
+
+  std::vector<std::unique_ptr<WorldBody>> bodies_;
+  ContactLaw law_;
+  std::vector<HeldPair> held_, next_held_;
+
+  // Of one step.
+  std::vector<DeformationTree::Ball> balls_;
+  std::vector<double> margins_;
+  std::vector<int> order_, parents_, island_of_, place_in_island_;
+  std::vector<std::pair<int, int>> near_;
+  std::vector<std::unique_ptr<PairContact>> pairs_;
+  std::vector<std::vector<Incidence>> against_;  // of each body: pairs in which its surface is met, and by which side
+  std::vector<std::unique_ptr<Island>> islands_;
+  std::size_t island_count_ = 0;
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "runtime/sim/contact/body_surface.h"
+#include "runtime/sim/step/body_step.h"
+#include "runtime/sim/step/contact_problem.h"
+
+namespace exmat::runtime {
+
+/// What bodies of a world are of: prepared once, shared by all of a kind.
+struct BodyKind {
+  const Model* model = nullptr;      ///< with contact
+  const StepScene* scene = nullptr;  ///< that meets bodies
+  std::shared_ptr<const BodySurface> surface;
+};
+
+/// A body of a World, with its scratch.
+struct WorldBody {
+  WorldBody(const BodyKind& kind, State start)
+      : model(*kind.model),
+        scene(*kind.scene),
+        surface(*kind.surface),
+        state(std::move(start)),
+        workspace(model, scene),
+        shape(surface.make_shape()) {}
+
+  const Model& model;
+  const StepScene& scene;
+  const BodySurface& surface;
+  State state;
+  Workspace workspace;
+  SurfaceShape shape;
+  StepReport report;
+  bool anew = true;  ///< no step has led to where it is: what it overlaps was not watched coming
+
+  // Of one step.
+  std::optional<BodyStep> step;
+  std::optional<ContactProblem> problem;
+  Placement placement;      ///< at the iterate
+  Eigen::Index offset = 0;  ///< of its unknowns in those of its island
+
+  ContactProblemWorkspace& near() noexcept { return *workspace.near; }
+  const ContactProblemWorkspace& near() const noexcept { return *workspace.near; }
+  const ContactSet& contact() const noexcept { return *model.contact; }
+  int rigid() const noexcept { return static_cast<int>(model.frame->rigid_unknowns()); }
+  Eigen::Index unknowns() const noexcept { return near().x.size(); }
+  BodyPose pose() const noexcept { return {placement, near().q}; }  ///< at the iterate
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,114 @@
+#include "runtime/sim/contact/body_surface.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+#include <random>
+
+#include "common/mesh/geometry.h"
+#include "runtime/sim/contact/nearest_on_triangle.h"
+#include "runtime/sim/contact/obstacle.h"
+#include "tests/support/allocation_counter.h"
+#include "tests/support/synthetic_model.h"
+
+namespace exmat::runtime {
+namespace {
+
+struct Surface {
+  Surface() : bar(test::make_bar({.free = true})), triangles(surface_triangles(mesh().tets)) {
+    surface = BodySurface::of_tets(mesh().tets, mesh().vertices, bar.basis(), Eigen::Vector3d::Zero());
+  }
+  const TetMesh& mesh() const { return bar.model.object->mesh; }
+  VertexArray positions(const Eigen::VectorXd& q) const {
+    VertexArray moved = mesh().vertices;
+    moved.reshaped<Eigen::RowMajor>() += bar.basis() * q;
+    return moved;
+  }
+
+  test::Bar bar;
+  TriangleArray triangles;
+  BodySurface surface;
+};
+
+/// Solid angle of the surface over 4 pi: 1 inside, 0 outside (van Oosterom and Strackee 1983).
+double winding_number(const VertexArray& x, const TriangleArray& triangles, const Eigen::Vector3d& p) {
+  double sum = 0;
+  for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
+    const Eigen::Vector3d a = x.row(triangles(t, 0)).transpose() - p, b = x.row(triangles(t, 1)).transpose() - p,
+                          c = x.row(triangles(t, 2)).transpose() - p;
+    sum += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() +
+                                                 b.dot(c) * a.norm() + c.dot(a) * b.norm());
+  }
+  return sum / (4 * std::numbers::pi);
+}
+
+TEST(BodySurface, SignedDistanceIsThatOfAllTrianglesAndTheWindingNumber) {
+  Surface body;
+  SurfaceShape shape = body.surface.make_shape();
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  int inside = 0;
+  for (int trial = 0; trial < 4; ++trial) {
+    Eigen::VectorXd q = Eigen::VectorXd::NullaryExpr(body.bar.modes(), [&] { return unit(random); });
+    q *= 0.3 * trial;
+    body.surface.place(q, shape);
+    const VertexArray x = body.positions(q);
+    for (int i = 0; i < 300; ++i) {
+      const Eigen::Vector3d p = Eigen::Vector3d(0.5, 0.12, 0.12) +
+                                Eigen::Vector3d(0.7 * unit(random), 0.3 * unit(random), 0.3 * unit(random));
+      double nearest = std::numeric_limits<double>::infinity();
+      for (Eigen::Index t = 0; t < body.triangles.rows(); ++t)
+        nearest = std::min(nearest, nearest_on_triangle(p, x.row(body.triangles(t, 0)), x.row(body.triangles(t, 1)),
+                                                        x.row(body.triangles(t, 2)))
+                                        .squared_distance);
+      const auto hit = body.surface.nearest(p, 10, shape);
+      ASSERT_TRUE(hit);
+      EXPECT_NEAR(std::abs(hit->distance), std::sqrt(nearest), 1e-12);
+      EXPECT_EQ(hit->distance < 0, winding_number(x, body.triangles, p) > 0.5) << p.transpose();
+      inside += hit->distance < 0;
+      // Its material point is where it says.
+      RowMatrix rows(3, q.size());
+      body.surface.basis_of(*hit, rows);
+      const Eigen::Vector3d point = body.surface.rest_of(*hit) + rows * q;
+      EXPECT_NEAR((p - point - hit->distance * hit->normal).norm(), 0, 1e-9);
+      // Nothing is found nearer than it is.
+      EXPECT_FALSE(body.surface.nearest(p, 0.999 * std::abs(hit->distance), shape));
+      EXPECT_TRUE(body.surface.may_be_within(p, 1.001 * std::abs(hit->distance), shape));
+    }
+  }
+  EXPECT_GT(inside, 100);
+}
+
+TEST(BodySurface, AtRestIsTheBoxThatItIs) {
+  Surface body;
+  SurfaceShape shape = body.surface.make_shape();
+  body.surface.place(Eigen::VectorXd::Zero(body.bar.modes()), shape);
+  const Box box{{0.5, 0.125, 0.125}, {0.5, 0.125, 0.125}, Eigen::Matrix3d::Identity()};
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (int i = 0; i < 500; ++i) {
+    const Eigen::Vector3d p = box.centre + Eigen::Vector3d(0.8 * unit(random), 0.3 * unit(random), 0.3 * unit(random));
+    const SurfacePoint expected = nearest_surface_point(box, p);
+    const auto hit = body.surface.nearest(p, 10, shape);
+    ASSERT_TRUE(hit);
+    EXPECT_NEAR(hit->distance, expected.distance, 1e-12);
+    if (expected.distance > 0.01) {
+      EXPECT_NEAR((hit->normal - expected.normal).norm(), 0, 1e-9);
+    }
+  }
+}
+
+TEST(BodySurface, QueriesDoNotAllocate) {
+  Surface body;
+  SurfaceShape shape = body.surface.make_shape();
+  const Eigen::VectorXd q = 0.2 * Eigen::VectorXd::Ones(body.bar.modes());
+  const test::AllocationCounter counter;
+  body.surface.place(q, shape);
+  body.surface.nearest({0.5, 0.3, 0.1}, 1, shape);
+  body.surface.may_be_within({0.5, 0.3, 0.1}, 1, shape);
+  EXPECT_EQ(counter.count(), 0);
+}
+
+}  // namespace
+}  // namespace exmat::runtime

@@ -1,0 +1,142 @@
+#include "runtime/sim/world/world.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/runtime/sim/world/touching_blocks.h"
+
+namespace exmat::runtime {
+namespace {
+
+using test::Blocks;
+
+constexpr double kGravity = 9.81;
+
+/// Largest energy over its start, and momenta, of a collision.
+struct Collision {
+  double energy_before = 0, highest = 0, energy_after = 0;
+  test::Momenta before, after;
+  double largest_drift = 0, largest_turn_drift = 0;  // of momenta in any step
+  int touching = 0, unconverged = 0;
+};
+
+Collision collide(const Blocks& blocks, std::vector<WorldBodyStart> bodies, const ContactLaw& law, double time) {
+  World world(std::move(bodies), law);
+  Collision run;
+  run.before = test::momenta(blocks, world);
+  run.energy_before = run.highest = world.energies().total();
+  const int steps = static_cast<int>(std::lround(time / blocks.scene.time_step));
+  for (int i = 0; i < steps; ++i) {
+    const WorldReport report = world.step(1);
+    run.touching += report.touching_pairs;
+    run.unconverged += report.unconverged_islands;
+    run.highest = std::max(run.highest, world.energies().total());
+    const test::Momenta now = test::momenta(blocks, world);
+    run.largest_drift = std::max(run.largest_drift, (now.linear - run.before.linear).norm());
+    run.largest_turn_drift = std::max(run.largest_turn_drift, (now.angular - run.before.angular).norm());
+  }
+  run.after = test::momenta(blocks, world);
+  run.energy_after = world.energies().total();
+  return run;
+}
+
+TEST(World, ACollisionKeepsMomentaAndTakesNoEnergy) {
+  const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 0.5).normalized()));
+  for (const double time_step : {2e-4, 1e-3, 5e-3})
+    for (const double stiffness : {1e6, 1e8})
+      for (const bool oblique : {false, true}) {
+        const Blocks blocks(time_step);
+        std::vector<WorldBodyStart> bodies;
+        bodies.push_back(blocks.body({0, 0, 0}, {2, 0, 0}));
+        if (oblique)
+          bodies.push_back(blocks.body({0.5, 0.12, 0.05}, {-2, 0.5, 0}, {1, 2, 3}, turn));
+        else
+          bodies.push_back(blocks.body({0.45, 0, 0}, {-2, 0, 0}));
+        const Collision run = collide(blocks, std::move(bodies), {stiffness, stiffness / 1e4, 0.4}, 0.2);
+        SCOPED_TRACE(testing::Message() << time_step << " s, " << stiffness << " N/m^3, oblique " << oblique);
+        EXPECT_GT(run.touching, 0);
+        EXPECT_EQ(run.unconverged, 0);
+        const double size = blocks.mass() * 4;  // of momenta that meet
+        EXPECT_LE(run.largest_drift, 1e-12 * size);
+        EXPECT_LE(run.largest_turn_drift, 1e-12 * size);
+        EXPECT_LE(run.highest, run.energy_before * (1 + 1e-9));
+      }
+}
+
+TEST(World, BodiesThatDoNotMeetTakeTheStepOfASingleBody) {
+  Blocks blocks(1e-3);
+  std::vector<WorldBodyStart> bodies;
+  for (int i = 0; i < 5; ++i) bodies.push_back(blocks.body({2.0 * i, 0, 0}, {1, 0.1 * i, 0}, {0, i * 1.0, 1}));
+  World world(bodies, {1e7, 0, 0.5});
+  Blocks alone(1e-3);
+  Workspace workspace(*alone.model, alone.scene);
+  for (int i = 0; i < 100; ++i) {
+    const WorldReport report = world.step(1);
+    EXPECT_EQ(report.islands, 0);
+    for (WorldBodyStart& body : bodies) step(*alone.model, alone.scene, body.state, workspace);
+  }
+  for (int i = 0; i < 5; ++i) {
+    const State& other = bodies[static_cast<std::size_t>(i)].state;
+    EXPECT_EQ(world.state(i).q, other.q);
+    EXPECT_EQ(free_state(world.state(i)).position, free_state(other).position);
+  }
+}
+
+TEST(World, AStackComesToRestAndEachBodyCarriesWhatIsAboveIt) {
+  Blocks blocks(2e-3);
+  blocks.set_gravity(kGravity);
+  blocks.add_floor(1e7, 0.5, 2e4);
+  blocks.scene.mass_damping = 2;
+  blocks.scene.stiffness_damping = 2e-3;
+  std::vector<WorldBodyStart> bodies;
+  constexpr int kCount = 5;
+  for (int i = 0; i < kCount; ++i) bodies.push_back(blocks.body({0.01 * (i % 2), 0, 0.01 + 0.205 * i}));
+  World world(std::move(bodies), {1e7, 2e4, 0.5});
+  std::vector<Eigen::Vector3d> there;
+  for (int i = 0; i < 2500; ++i) {
+    const WorldReport report = world.step(1);
+    ASSERT_EQ(report.unconverged_islands, 0) << i;
+    if (i == 1500)
+      for (int b = 0; b < kCount; ++b) there.push_back(free_state(world.state(b)).position);
+  }
+  const double weight = blocks.mass() * kGravity;
+  EXPECT_LE(world.energies().kinetic, 1e-6 * weight * 0.01);
+  for (int b = 0; b < kCount; ++b) {
+    // The sum of all contact forces on a body carries it.
+    EXPECT_NEAR(world.report(b).contact_force[2], weight, 1e-3 * weight) << b;
+    EXPECT_LE((free_state(world.state(b)).position - there[static_cast<std::size_t>(b)]).norm(), 1e-5) << b;
+  }
+  // Each of the pairs holds the weight of what lies on it.
+  ASSERT_EQ(world.held().size(), kCount - 1u);
+  for (const HeldPair& pair : world.held()) {
+    double force = 0;
+    for (const auto& side : pair.held)
+      for (const HeldBodyContact& contact : side) force += contact.normal_force;
+    EXPECT_NEAR(force, weight * (kCount - 1 - pair.first), 0.01 * weight);
+  }
+}
+
+TEST(World, ThreadsAndTheWayOfSolvingDoNotChangeTheResult) {
+  const auto run = [](int threads) {
+    Blocks blocks(2e-3);
+    blocks.set_gravity(kGravity);
+    blocks.add_floor(1e7, 0.5, 2e4);
+    std::vector<WorldBodyStart> bodies;
+    for (int i = 0; i < 60; ++i)
+      bodies.push_back(blocks.body({0.25 * (i % 4), 0.15 * (i / 4 % 3), 0.02 + 0.21 * (i / 12)}, {0, 0, -1}));
+    World world(std::move(bodies), {1e7, 2e4, 0.5});
+    WorldReport report;
+    for (int i = 0; i < 40; ++i) report = world.step(threads);
+    EXPECT_GT(report.largest_island, 33);
+    std::vector<Eigen::VectorXd> result;
+    for (int i = 0; i < world.count(); ++i) {
+      result.push_back(world.state(i).q);
+      result.push_back(free_state(world.state(i)).position);
+    }
+    return result;
+  };
+  const auto one = run(1), two = run(2);
+  for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i], two[i]);
+}
+
+}  // namespace
+}  // namespace exmat::runtime
