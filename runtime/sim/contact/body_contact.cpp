@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <utility>
 
 namespace exmat::runtime {
 namespace {
@@ -33,7 +35,32 @@ void take_stretch(const HeldBodyContact& held, const Eigen::Matrix3d& rotation, 
   if (length > 0) candidate.anchor -= held.stretch.norm() / length * along;
 }
 
+/// The nearest point; of a vertex inside that looks the way `looks`, preferably of what does not look the same way:
+/// where edges lie on each other, the nearest may be that of a side.
+std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen::Vector3d& point,
+                                         const Eigen::Vector3d& looks, double radius, SurfaceShape& shape) {
+  auto hit = surface.nearest(point, radius, shape);
+  if (!hit || hit->distance >= 0 || hit->normal.dot(looks) <= 0) return hit;
+  auto facing = surface.nearest(point, radius, shape, &looks);
+  if (!facing) return hit;
+  if (facing->distance > 0) {  // told by a part of the surface alone; it is inside
+    facing->distance = -facing->distance;
+    facing->normal = -facing->normal;
+  }
+  return facing;
+}
+
 }  // namespace
+
+TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of)
+    : surface(std::move(of)), normals(set.vertices(), 3) {
+  SurfaceShape shape = surface.make_shape();
+  surface.place(Eigen::VectorXd::Zero(surface.modes()), shape);
+  for (int i = 0; i < normals.rows(); ++i) {
+    const auto hit = surface.nearest(set.rest(i), std::numeric_limits<double>::infinity(), shape);
+    normals.row(i) = hit ? hit->normal : Eigen::Vector3d::Zero();
+  }
+}
 
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
                          const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
@@ -41,7 +68,7 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double ti
   candidates.all.clear();
   const DeformationTree& tree = a.set.tree();
   const double q_norm = a.pose.q.norm();
-  double deepest = anew ? 2 * b.surface.bound(b.pose.q).radius : 0;
+  double deepest = anew ? 2 * b.touching.surface.bound(b.pose.q).radius : 0;
   for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
   auto last = held.begin();
   const auto test = [&](int vertex) {
@@ -50,12 +77,15 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double ti
     const Eigen::Vector3d arm = a.set.world_arm(vertex, a.pose);
     const Eigen::Vector3d offset = a.pose.position + arm - b.pose.position;
     const double depth = anew ? deepest : was_inside ? -last->gap : 0;
-    const auto hit = b.surface.nearest(b.pose.rotation.transpose() * offset, margin + depth, shape);
+    const Eigen::Vector3d looks =
+        b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
+    const auto hit =
+        nearest_facing(b.touching.surface, b.pose.rotation.transpose() * offset, looks, margin + depth, shape);
     if (!hit || hit->distance > margin) return;
     BodyCandidate& candidate = candidates.all.emplace_back();
     candidate.vertex = vertex;
-    candidate.rest = b.surface.rest_of(*hit);
-    b.surface.basis_of(*hit, append_rows(candidates, b.pose.q.size()));
+    candidate.rest = b.touching.surface.rest_of(*hit);
+    b.touching.surface.basis_of(*hit, append_rows(candidates, b.pose.q.size()));
     const Eigen::Vector3d arm_b = surface_arm(candidates, candidates.all.size() - 1, b.pose);
     const Eigen::Vector3d own_b =
         b.pose.rotation * rows_of(candidates, candidates.all.size() - 1).lazyProduct(b.velocity.v).eval();
@@ -72,7 +102,7 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double ti
     const DeformationTree::Ball ball = tree.ball(node, a.pose.q, q_norm);
     const Eigen::Vector3d offset = a.pose.position + a.pose.rotation * ball.centre - b.pose.position;
     const bool near =
-        b.surface.may_be_within(b.pose.rotation.transpose() * offset, ball.radius + margin + deepest, shape);
+        b.touching.surface.may_be_within(b.pose.rotation.transpose() * offset, ball.radius + margin + deepest, shape);
     if (near && tree.node(node).is_leaf)
       for (int vertex = tree.node(node).first; vertex < tree.node(node).last; ++vertex) test(vertex);
     node = near ? node + 1 : tree.node(node).next;

@@ -30,10 +30,18 @@ struct BodyCandidates {
   RowMatrix basis;  ///< 3 of `all` x r and more, rows of the basis at each y
 };
 
+/// The surface of a body that touches others, and how its vertices look.
+struct TouchingSurface {
+  TouchingSurface(const ContactSet& set, BodySurface of);
+
+  BodySurface surface;
+  VertexArray normals;  ///< of the vertices of the set at rest, unit, outward
+};
+
 /// One body of a pair: what it is, where, and how it moves.
 struct TouchingBody {
   const ContactSet& set;
-  const BodySurface& surface;
+  const TouchingSurface& touching;
   BodyPose pose;
   BodyVelocity velocity;
 };

@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it normals of the surface say which way is out
 
+constexpr double kSameWay = 0.5;  // cosine
+
 /// Across the edge that begins at each corner; -1 where there is none or more than one.
 TriangleArray neighbours_of(const TriangleArray& triangles) {
   std::map<std::pair<int, int>, int> edges;  // first triangle of each directed edge
@@ -111,8 +113,8 @@ bool BodySurface::may_be_within(const Eigen::Vector3d& point, double radius, Sur
   return false;
 }
 
-std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius,
-                                               SurfaceShape& shape) const noexcept {
+std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
+                                               const Eigen::Vector3d* facing) const noexcept {
   const auto distance_to = [&](int node) {
     const DeformationTree::Ball& around = ball(node, shape);
     return (point - around.centre).norm() - around.radius;
@@ -142,6 +144,10 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
                               position(triangles_(triangle, 2), shape));
       if (here.squared_distance > nearest) continue;
       if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
+      if (facing != nullptr) {
+        const Eigen::Vector3d normal = area_normal(triangle, shape);
+        if (normal.dot(*facing) > kSameWay * normal.norm()) continue;
+      }
       nearest = here.squared_distance;
       best = here;
       found = triangle;

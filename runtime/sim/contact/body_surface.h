@@ -53,8 +53,10 @@ class BodySurface {
   /// False only where no point of the surface is within `radius` of `point`.
   bool may_be_within(const Eigen::Vector3d& point, double radius, SurfaceShape& shape) const noexcept;
 
-  /// Nothing where the surface is farther away than `radius` [m].
-  std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape) const noexcept;
+  /// Nothing where the surface is farther away than `radius` [m]. With a unit vector `facing`, that of the surface that
+  /// does not look the same way, within 60 degrees.
+  std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
+                                    const Eigen::Vector3d* facing = nullptr) const noexcept;
 
   /// Its material point of a hit: at rest [m], and the rows of the basis [3 x r].
   Eigen::Vector3d rest_of(const SurfaceHit& hit) const noexcept;

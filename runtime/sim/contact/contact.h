@@ -123,7 +123,8 @@ class ContactSet {
   /// World [m/s]; `arm` is that of the vertex.
   Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
                                  const BodyVelocity& velocity) const noexcept;
-  double area(int vertex) const noexcept { return areas_[vertex]; }  ///< share of the surface [m^2]
+  Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }  ///< frame of the body [m]
+  double area(int vertex) const noexcept { return areas_[vertex]; }              ///< share of the surface [m^2]
   auto basis_rows(int vertex) const noexcept { return basis_.middleRows<3>(3 * vertex); }  ///< 3 x r
 
   const DeformationTree& tree() const noexcept { return tree_; }  ///< its items are the vertices, in their order

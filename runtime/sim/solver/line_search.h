@@ -18,8 +18,9 @@ struct PotentialEvaluation {
   double force_scale = 0;
 };
 
-inline constexpr double kArmijo = 1e-4;  // share of the decrease that the slope promises
-inline constexpr int kHalvings = 30;     // at most, of one direction
+inline constexpr double kArmijo = 1e-4;         // share of the decrease that the slope promises
+inline constexpr int kHalvings = 30;            // at most, of one direction
+inline constexpr double kNearRounding = 1e-10;  // of a potential's magnitude: its terms may cancel
 inline constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();  // of a potential's magnitude
 
 /// Where a search begins, and which way it goes. All but the slope are referred to.
@@ -33,6 +34,12 @@ struct SearchLine {
 
   /// Whether the potential cannot tell the end of the full step from its beginning.
   bool below_rounding() const { return std::abs(slope) <= kRounding * start.magnitude; }
+  /// Whether the end of the full step is lower as far as its slope there tells, the values being equal but for terms
+  /// that cancel (the approximate condition of Hager and Zhang 2005).
+  bool is_lower_by_slope(const PotentialValue& value, double slope_there) const {
+    return value.value <= start.value + kNearRounding * start.magnitude && std::abs(slope_there) <= 0.9 * -slope &&
+           -slope <= kNearRounding * start.magnitude;
+  }
   /// Armijo's rule for a share of the full step, but for rounding.
   bool is_low_enough(double length, const PotentialValue& value) const {
     return value.value <= start.value + kArmijo * length * slope + kRounding * start.magnitude;
@@ -59,6 +66,7 @@ bool search_line(Problem& problem, const SearchLine<Direction>& line, const Sear
   end.x = line.x + line.direction;
   end.there = problem.evaluate(end.x, end.gradient);
   if (line.is_low_enough(1, end.there.potential)) return true;
+  if (line.is_lower_by_slope(end.there.potential, end.gradient.dot(line.direction))) return true;
   // Forces without a potential may need what raises it.
   if constexpr (requires { problem.gyroscopic(); })
     if (end.gradient.norm() <= 0.5 * line.gradient.norm()) return true;

@@ -8,7 +8,7 @@ namespace exmat::runtime {
 namespace {
 
 TouchingBody touching(const WorldBody& body) {
-  return {body.contact(), body.surface, pose_of(body.model, body.state),
+  return {body.contact(), body.touching, pose_of(body.model, body.state),
           BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
 }
 

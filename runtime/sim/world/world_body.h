@@ -3,7 +3,7 @@
 #include <memory>
 #include <optional>
 
-#include "runtime/sim/contact/body_surface.h"
+#include "runtime/sim/contact/body_contact.h"
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/contact_problem.h"
 
@@ -13,7 +13,7 @@ namespace exmat::runtime {
 struct BodyKind {
   const Model* model = nullptr;      ///< with contact
   const StepScene* scene = nullptr;  ///< that meets bodies
-  std::shared_ptr<const BodySurface> surface;
+  std::shared_ptr<const TouchingSurface> surface;
 };
 
 /// A body of a World, with its scratch.
@@ -21,13 +21,15 @@ struct WorldBody {
   WorldBody(const BodyKind& kind, State start)
       : model(*kind.model),
         scene(*kind.scene),
-        surface(*kind.surface),
+        touching(*kind.surface),
+        surface(kind.surface->surface),
         state(std::move(start)),
         workspace(model, scene),
         shape(surface.make_shape()) {}
 
   const Model& model;
   const StepScene& scene;
+  const TouchingSurface& touching;
   const BodySurface& surface;
   State state;
   Workspace workspace;

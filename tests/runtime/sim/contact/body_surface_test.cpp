@@ -65,7 +65,7 @@ TEST(BodySurface, SignedDistanceIsThatOfAllTrianglesAndTheWindingNumber) {
       const auto hit = body.surface.nearest(p, 10, shape);
       ASSERT_TRUE(hit);
       EXPECT_NEAR(std::abs(hit->distance), std::sqrt(nearest), 1e-12);
-      EXPECT_EQ(hit->distance < 0, winding_number(x, body.triangles, p) > 0.5) << p.transpose();
+      EXPECT_EQ(hit->distance<0, winding_number(x, body.triangles, p)> 0.5) << p.transpose();
       inside += hit->distance < 0;
       // Its material point is where it says.
       RowMatrix rows(3, q.size());

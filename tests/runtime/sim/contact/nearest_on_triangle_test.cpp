@@ -15,8 +15,7 @@ double distance_by_parts(const Eigen::Vector3d& p, const Eigen::Matrix3d& corner
     const double along = std::clamp(edge.dot(p - a) / edge.squaredNorm(), 0.0, 1.0);
     nearest = std::min(nearest, (a + along * edge - p).norm());
   }
-  const Eigen::Vector3d normal =
-      (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
+  const Eigen::Vector3d normal = (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
   const Eigen::Vector3d foot = p - normal.dot(p - corners.col(0)) * normal;
   Eigen::Matrix3d system;
   system << corners.col(1) - corners.col(0), corners.col(2) - corners.col(0), normal;

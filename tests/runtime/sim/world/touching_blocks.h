@@ -20,8 +20,9 @@ struct Blocks {
     scene.meets_bodies = true;
     scene.gravity_force = Eigen::VectorXd::Zero(model->modes());
     const ObjectData& object = *bar.model.object;
-    surface = std::make_shared<BodySurface>(BodySurface::of_tets(object.mesh.tets, object.mesh.vertices, bar.basis(),
-                                                                 model->frame->origin()));
+    surface = std::make_shared<TouchingSurface>(
+        *model->contact,
+        BodySurface::of_tets(object.mesh.tets, object.mesh.vertices, bar.basis(), model->frame->origin()));
   }
 
   static exmat::test::BarOptions free_block() {
@@ -54,7 +55,7 @@ struct Blocks {
   exmat::test::Bar bar;
   std::unique_ptr<const Model> model;
   StepScene scene;
-  std::shared_ptr<const BodySurface> surface;
+  std::shared_ptr<const TouchingSurface> surface;
 };
 
 struct Momenta {

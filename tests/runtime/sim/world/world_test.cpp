@@ -84,18 +84,18 @@ TEST(World, BodiesThatDoNotMeetTakeTheStepOfASingleBody) {
 TEST(World, AStackComesToRestAndEachBodyCarriesWhatIsAboveIt) {
   Blocks blocks(2e-3);
   blocks.set_gravity(kGravity);
-  blocks.add_floor(1e7, 0.5, 2e4);
+  blocks.add_floor(1e7, 0.5, 1e5);
   blocks.scene.mass_damping = 2;
   blocks.scene.stiffness_damping = 2e-3;
   std::vector<WorldBodyStart> bodies;
   constexpr int kCount = 5;
-  for (int i = 0; i < kCount; ++i) bodies.push_back(blocks.body({0.01 * (i % 2), 0, 0.01 + 0.205 * i}));
-  World world(std::move(bodies), {1e7, 2e4, 0.5});
+  for (int i = 0; i < kCount; ++i) bodies.push_back(blocks.body({0.013 * (i % 2), 0.007 * (i % 3), 0.01 + 0.205 * i}));
+  World world(std::move(bodies), {1e7, 1e5, 0.5});
   std::vector<Eigen::Vector3d> there;
-  for (int i = 0; i < 2500; ++i) {
+  for (int i = 0; i < 4000; ++i) {
     const WorldReport report = world.step(1);
     ASSERT_EQ(report.unconverged_islands, 0) << i;
-    if (i == 1500)
+    if (i == 3000)
       for (int b = 0; b < kCount; ++b) there.push_back(free_state(world.state(b)).position);
   }
   const double weight = blocks.mass() * kGravity;
@@ -122,11 +122,16 @@ TEST(World, ThreadsAndTheWayOfSolvingDoNotChangeTheResult) {
     blocks.add_floor(1e7, 0.5, 2e4);
     std::vector<WorldBodyStart> bodies;
     for (int i = 0; i < 60; ++i)
-      bodies.push_back(blocks.body({0.25 * (i % 4), 0.15 * (i / 4 % 3), 0.02 + 0.21 * (i / 12)}, {0, 0, -1}));
+      bodies.push_back(
+          blocks.body({0.405 * (i % 4) + 0.1 * (i / 12 % 2), 0.205 * (i / 4 % 3), 0.02 + 0.21 * (i / 12)}, {0, 0, -1}));
     World world(std::move(bodies), {1e7, 2e4, 0.5});
     WorldReport report;
-    for (int i = 0; i < 40; ++i) report = world.step(threads);
-    EXPECT_GT(report.largest_island, 33);
+    int largest = 0;
+    for (int i = 0; i < 40; ++i) {
+      report = world.step(threads);
+      largest = std::max(largest, report.largest_island);
+    }
+    EXPECT_GT(largest, 33);
     std::vector<Eigen::VectorXd> result;
     for (int i = 0; i < world.count(); ++i) {
       result.push_back(world.state(i).q);
