@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 
 #include "common/config/asset_config.h"
 #include "common/config/json_values.h"
@@ -13,6 +14,9 @@ namespace exmat {
 /// file, the JSON pointer, what was expected and found; an unknown member suggests the nearest name.
 AssetConfig load_asset(const std::filesystem::path& file);
 SceneConfig load_scene(const std::filesystem::path& file);
+
+/// The same of a scene of several bodies; nothing where it is one of one body. load_scene() refuses those of several.
+std::optional<WorldConfig> load_world(const std::filesystem::path& file);
 
 /// Of the content of an ASSET.json; `file` is for messages, and paths are relative to it. Throws as load_asset.
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file);

@@ -8,6 +8,7 @@
 #include "common/config/json_values.h"
 #include "common/config/motion_reader.h"
 #include "common/config/obstacle_reader.h"
+#include "common/config/pose_file.h"
 #include "common/config/vertex_ids.h"
 #include "common/core/error.h"
 
@@ -26,12 +27,13 @@ ExampleForceConfig read_example_force(const Json& json) {
   return config;
 }
 
-std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::filesystem::path& file) {
+std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::filesystem::path& file,
+                                                  const std::string& place) {
   std::vector<RegionForceConfig> regions;
   for (std::size_t i = 0; i < json.size(); ++i) {
     RegionForceConfig region{json[i]["name"], read_example_force(json[i])};
     if (std::ranges::find(regions, region.name, &RegionForceConfig::name) != regions.end())
-      throw InputError({file.string(), fmt::format("/regions/{}/name", i), "each region once",
+      throw InputError({file.string(), fmt::format("{}/regions/{}/name", place, i), "each region once",
                         fmt::format("\"{}\" again", region.name), ""});
     regions.push_back(std::move(region));
   }
@@ -75,40 +77,116 @@ BodyConfig read_body(const Json& json, const std::filesystem::path& file, const 
   return body;
 }
 
-}  // namespace
-
-SceneConfig load_scene(const std::filesystem::path& file) {
-  const Json json = read_json(file);
-  check_against_schema(json, "scene", file);
+/// Of the members of a scene of one body, those of `own` from `place` of the file.
+SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem::path& file, const std::string& place) {
   SceneConfig scene;
   scene.file = file;
-  scene.bundle = resolve_path(file, json["bundle"]);
-  scene.time_step = json.value("time_step", scene.time_step);
-  scene.steps = json.value("steps", scene.steps);
-  if (json.contains("gravity")) scene.gravity = read_vector(json["gravity"]);
-  scene.integrator = choice_or(json, "integrator", scene.integrator);
-  scene.internal_force = choice_or(json, "internal_force", scene.internal_force);
-  const Json damping = member_or(json, "damping", Json::object());
+  scene.place = place;
+  scene.bundle = resolve_path(file, own["bundle"]);
+  scene.time_step = shared.value("time_step", scene.time_step);
+  scene.steps = shared.value("steps", scene.steps);
+  if (shared.contains("gravity")) scene.gravity = read_vector(shared["gravity"]);
+  scene.integrator = choice_or(shared, "integrator", scene.integrator);
+  scene.internal_force = choice_or(own, "internal_force", scene.internal_force);
+  const Json damping = member_or(shared, "damping", Json::object());
   scene.mass_damping = damping.value("mass", scene.mass_damping);
   scene.stiffness_damping = damping.value("stiffness", scene.stiffness_damping);
-  const Json newton = member_or(json, "newton", Json::object());
+  const Json newton = member_or(shared, "newton", Json::object());
   scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
   scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
-  if (json.contains("examples")) scene.examples = read_example_force(json["examples"]);
-  scene.regions = read_region_forces(member_or(json, "regions", Json::array()), file);
-  const Json forces = member_or(json, "forces", Json::array());
+  if (own.contains("examples")) scene.examples = read_example_force(own["examples"]);
+  scene.regions = read_region_forces(member_or(own, "regions", Json::array()), file, place);
+  const Json forces = member_or(own, "forces", Json::array());
   for (std::size_t i = 0; i < forces.size(); ++i)
-    scene.forces.push_back(read_vertex_force(forces[i], file, fmt::format("/forces/{}", i)));
-  scene.body = read_body(member_or(json, "body", Json::object()), file, "/body");
-  const Json obstacles = member_or(json, "obstacles", Json::array());
+    scene.forces.push_back(read_vertex_force(forces[i], file, fmt::format("{}/forces/{}", place, i)));
+  scene.body = read_body(member_or(own, "body", Json::object()), file, place + "/body");
+  const Json obstacles = member_or(shared, "obstacles", Json::array());
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     scene.obstacles.push_back(read_obstacle(obstacles[i], file, fmt::format("/obstacles/{}", i)));
-  scene.instances = json.value("instances", scene.instances);
-  const Json output = member_or(json, "output", Json::object());
+  scene.instances = shared.value("instances", scene.instances);
+  const Json output = member_or(shared, "output", Json::object());
   if (output.contains("trajectory")) scene.trajectory = resolve_path(file, output["trajectory"]);
   scene.every = output.value("every", scene.every);
   scene.render = output.value("render", scene.render);
   return scene;
+}
+
+Json read_scene(const std::filesystem::path& file) {
+  Json json = read_json(file);
+  check_against_schema(json, "scene", file);
+  if (json.contains("bundle") == json.contains("bodies"))
+    throw InputError({file.string(), "/", "bundle or bodies", json.contains("bundle") ? "both" : "neither", ""});
+  return json;
+}
+
+/// Members that a scene of several bodies has elsewhere, or not at all.
+void refuse_members_of_one_body(const Json& json, const std::filesystem::path& file) {
+  for (const char* name : {"internal_force", "examples", "regions", "forces", "body"})
+    if (json.contains(name))
+      throw InputError({file.string(), fmt::format("/{}", name), "no such member beside bodies", "one",
+                        fmt::format("move it into the bodies that it is for: /bodies/0/{}", name)});
+  if (json.contains("instances"))
+    throw InputError(
+        {file.string(), "/instances", "no such member beside bodies", "one", "give a body a \"grid\" or \"poses\""});
+  if (json.contains("output") && json["output"].value("render", false))
+    throw InputError({file.string(), "/output/render", "false beside bodies", "true",
+                      "render meshes are written for scenes of one body"});
+}
+
+std::vector<BodyPlace> read_grid(const Json& grid) {
+  const Eigen::Vector3d spacing = read_vector(grid["spacing"]);
+  std::vector<BodyPlace> places;
+  for (int z = 0; z < grid["counts"][2].get<int>(); ++z)
+    for (int y = 0; y < grid["counts"][1].get<int>(); ++y)
+      for (int x = 0; x < grid["counts"][0].get<int>(); ++x)
+        places.push_back({spacing.cwiseProduct(Eigen::Vector3d(x, y, z)), Eigen::Quaterniond::Identity()});
+  return places;
+}
+
+std::vector<BodyPlace> read_places(const Json& own, const std::filesystem::path& file, const std::string& place) {
+  if (own.contains("grid") && own.contains("poses"))
+    throw InputError({file.string(), place, "grid or poses", "both", ""});
+  if (own.contains("grid")) return read_grid(own["grid"]);
+  if (own.contains("poses")) return read_poses(resolve_path(file, own["poses"]));
+  return {BodyPlace{}};
+}
+
+}  // namespace
+
+SceneConfig load_scene(const std::filesystem::path& file) {
+  const Json json = read_scene(file);
+  if (json.contains("bodies"))
+    throw InputError({file.string(), "/bodies", "a scene of one body, by \"bundle\"", "one of several",
+                      "exmat-runtime run steps scenes of several bodies"});
+  return scene_of(json, json, file, "");
+}
+
+std::optional<WorldConfig> load_world(const std::filesystem::path& file) {
+  const Json json = read_scene(file);
+  if (!json.contains("bodies")) return std::nullopt;
+  refuse_members_of_one_body(json, file);
+  WorldConfig world;
+  world.file = file;
+  for (std::size_t i = 0; i < json["bodies"].size(); ++i) {
+    const Json& own = json["bodies"][i];
+    const std::string place = fmt::format("/bodies/{}", i);
+    BodiesConfig bodies{own["name"], scene_of(json, own, file, place), read_places(own, file, place)};
+    if (std::ranges::find(world.bodies, bodies.name, &BodiesConfig::name) != world.bodies.end())
+      throw InputError(
+          {file.string(), place + "/name", "each name once", fmt::format("\"{}\" again", bodies.name), ""});
+    bodies.scene.meets_others = bodies.scene.meets_bodies = true;
+    world.bodies.push_back(std::move(bodies));
+  }
+  const SceneConfig& shared = world.bodies.front().scene;
+  world.time_step = shared.time_step;
+  world.steps = shared.steps;
+  world.trajectory = shared.trajectory;
+  world.every = shared.every;
+  const Json contact = member_or(json, "contact", Json::object());
+  world.contact.stiffness = contact.value("stiffness", world.contact.stiffness);
+  world.contact.damping = contact.value("damping", world.contact.damping);
+  world.contact.friction = contact.value("friction", world.contact.friction);
+  return world;
 }
 
 Needs needs_of(const SceneConfig& scene) {

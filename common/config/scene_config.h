@@ -110,11 +110,44 @@ struct SceneConfig {
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact
-  bool meets_others = false;              ///< contact with obstacles that a host adds; no file sets it
-  int instances = 1;                      ///< bodies that are stepped; the trajectory shows the first
+  bool meets_others = false;  ///< contact with obstacles that a host adds, or with other bodies; no file sets it
+  bool meets_bodies = false;  ///< one of several bodies; no file sets it
+  std::string place;          ///< JSON pointer that forces, regions and body are below; empty: the root
+  int instances = 1;          ///< bodies that are stepped; the trajectory shows the first
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;
   bool render = false;  ///< the trajectory holds the render mesh
+};
+
+/// How bodies touch each other; all per area of their surfaces.
+struct BodyContactConfig {
+  double stiffness = 1e6;  ///< pressure per depth [N/m^3]
+  double damping = 0;      ///< pressure per approach velocity [N s/m^3]
+  double friction = 0;     ///< Coulomb's coefficient
+};
+
+/// Where a body stands beyond what its BodyConfig says.
+struct BodyPlace {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< [m]
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
+};
+
+/// Bodies of one kind: what a scene of one of them would say.
+struct BodiesConfig {
+  std::string name;
+  SceneConfig scene;  ///< with what holds for all bodies
+  std::vector<BodyPlace> places;
+};
+
+/// A scene of several bodies that touch each other.
+struct WorldConfig {
+  std::filesystem::path file;
+  double time_step = 0.001;  ///< [s]
+  std::int64_t steps = 1000;
+  std::vector<BodiesConfig> bodies;
+  BodyContactConfig contact;
+  std::optional<std::filesystem::path> trajectory;
+  std::int64_t every = 10;
 };
 
 }  // namespace exmat

@@ -37,7 +37,7 @@ Eigen::VectorXd example_coordinates(const SceneConfig& config, const ReducedMode
   const auto examples = examples_of(data);
   const auto example = std::ranges::find(examples, pose.example, &ExampleData::name);
   if (example == examples.end())
-    throw InputError({config.file.string(), "/body/pose/example",
+    throw InputError({config.file.string(), config.place + "/body/pose/example",
                       fmt::format("an example of {}; {}", config.bundle.string(), example_names(data)),
                       '"' + pose.example + '"', ""});
   return pose.weight * (*example)->pose;
@@ -67,11 +67,11 @@ void check_body(const SceneConfig& config, bool constrained) {
                                                       {"angular_velocity", body.angular_velocity.has_value()}};
   for (const auto& [name, given] : rigid_state)
     if (given && constrained)
-      throw InputError({config.file.string(), fmt::format("/body/{}", name), "no such member",
+      throw InputError({config.file.string(), fmt::format("{}/body/{}", config.place, name), "no such member",
                         "one, and the bundle's body has fixed vertices",
                         "\"motion\" says where they are; an asset without \"fixed\" makes a free body"});
   if (!body.motion.empty() && !constrained)
-    throw InputError({config.file.string(), "/body/motion", "no such member",
+    throw InputError({config.file.string(), config.place + "/body/motion", "no such member",
                       "one, and the bundle's body has no fixed vertices to carry",
                       "name \"fixed\" vertices in the asset"});
 }
@@ -81,7 +81,7 @@ Eigen::VectorXd start_coordinates(const SceneConfig& config, const ReducedModel&
   if (body.pose) return example_coordinates(config, data);
   if (!body.reduced) return Eigen::VectorXd::Zero(modes);
   if (body.reduced->size() != modes)
-    throw InputError({config.file.string(), "/body/reduced",
+    throw InputError({config.file.string(), config.place + "/body/reduced",
                       fmt::format("{} numbers, as many as {} has modes", modes, config.bundle.string()),
                       std::to_string(body.reduced->size()), ""});
   return *body.reduced;

@@ -28,7 +28,7 @@ void check_regions(const SceneConfig& config, const BundleSummary& summary) {
     const std::string& name = config.regions[i].name;
     if (std::ranges::find(summary.regions, name, &RegionSummary::name) != summary.regions.end()) continue;
     throw InputError(
-        {config.file.string(), fmt::format("/regions/{}/name", i),
+        {config.file.string(), fmt::format("{}/regions/{}/name", config.place, i),
          fmt::format("a region of {}; {}", config.bundle.string(), names.empty() ? "it has none" : "it has " + names),
          '"' + name + '"', "name regions in the asset and precompute it again"});
   }
@@ -74,7 +74,7 @@ void check_force_vertices(const SceneConfig& config, const BundleSummary& summar
   for (std::size_t i = 0; i < config.forces.size(); ++i)
     for (const std::int64_t vertex : config.forces[i].vertices)
       if (vertex < 0 || vertex >= summary.vertices)
-        throw InputError({config.file.string(), fmt::format("/forces/{}/vertices", i),
+        throw InputError({config.file.string(), fmt::format("{}/forces/{}/vertices", config.place, i),
                           fmt::format("vertices of the object, 0 to {} (0-based)", summary.vertices - 1),
                           std::to_string(vertex), ""});
 }
@@ -126,6 +126,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
   scene.obstacles = make_obstacles(config);
+  scene.meets_bodies = config.meets_bodies;
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
@@ -213,7 +214,7 @@ LoadedScene load_run(const SceneConfig& config) {
                               std::ssize(loaded.summary.regions), loaded.summary.render_vertices > 0);
   // A force on a body that moves needs to know where it acts.
   const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
-  const bool positions = config.trajectory || (moves && !config.forces.empty());
+  const bool positions = config.trajectory || config.meets_bodies || (moves && !config.forces.empty());
   const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   loaded.model = prepare(config, loaded.data);

@@ -332,12 +332,6 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
     own.problem.emplace(own.model, own.state, own.step->potential(), own.workspace);
   });
   const NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
-    double sc = 0;
-    for (auto& e : workspace.evaluations) sc += e.force_scale * e.force_scale;
-    fprintf(stderr, "status %d it %d fact %d ls %d proj %d res %g scale %g step %ld\n", (int)newton.status,
-            newton.iterations, newton.factorisations, newton.line_search_evaluations, newton.projections,
-            newton.residual, std::sqrt(sc), (long)bodies[0]->state.step);
-  }
   const bool converged = newton.status == NewtonStatus::kConverged;
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
