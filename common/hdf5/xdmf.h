@@ -14,9 +14,15 @@ struct XdmfCells {
   std::int64_t corners = 0, cells = 0, vertices = 0;
 };
 
+/// One of the bodies that an .xdmf shows.
+struct XdmfPart {
+  std::string name;
+  XdmfCells drawn;
+};
+
 /// Text of the .xdmf beside `trajectory`, in its folder: one grid for each time [s], whose vertices are float32
-/// [times x vertices x 3].
-std::string xdmf_text(const std::filesystem::path& trajectory, const std::string& name, const XdmfCells& drawn,
+/// [times x vertices x 3]; of several parts a collection of such grids.
+std::string xdmf_text(const std::filesystem::path& trajectory, const std::vector<XdmfPart>& parts,
                       const std::vector<double>& times);
 
 }  // namespace exmat

@@ -1,11 +1,13 @@
 #include <fmt/format.h>
 
 #include "common/config/config.h"
+#include "common/core/error.h"
 #include "common/core/log.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
 #include "runtime/app/print.h"
 #include "runtime/scene/scene_run.h"
+#include "runtime/scene/world_run.h"
 
 namespace exmat::runtime {
 namespace {
@@ -50,9 +52,61 @@ void print_profile(const RunSummary& summary) {
   }
 }
 
+void print_world(const WorldSummary& summary, const WorldConfig& config) {
+  const double mean = summary.step_seconds.mean();
+  print("bodies", std::to_string(summary.bodies));
+  print("threads", std::to_string(summary.threads));
+  print("steps", std::to_string(summary.steps));
+  print("simulated time", fmt::format("{:g} s", summary.simulated_seconds));
+  print("body-steps per second", fmt::format("{:.0f}", mean > 0 ? 1 / mean : 0));
+  print("mean step time", microseconds(mean) + " a body");
+  print("median step time", microseconds(summary.step_seconds.quantile(0.5)) + " a body");
+  print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)) + " a body");
+  print("real-time factor", fmt::format("{:.2f}", mean > 0 ? config.time_step / (mean * summary.bodies) : 0));
+  print("touching pairs", fmt::format("{:.1f} a step, at most {}", summary.touching_pairs.mean(), summary.most_pairs));
+  print("largest island", fmt::format("{} bodies solved together", summary.largest_island));
+  print("Newton iterations", fmt::format("{:.2f} a step, most of an island", summary.newton_iterations.mean()));
+  print("unconverged islands", std::to_string(summary.unconverged_islands));
+  print("unconverged steps", std::to_string(summary.unconverged_steps));
+  print("kinetic energy", fmt::format("{:.6g} J", summary.end.kinetic));
+  print("elastic energy", fmt::format("{:.6g} J", summary.end.elastic));
+  print("potential energy", fmt::format("{:.6g} J", summary.end.potential));
+  print("energy at the start", fmt::format("{:.6g} J", summary.start.total()));
+  print("deepest contact", fmt::format("{:.3g} m between bodies at the end", summary.deepest));
+  if (summary.largest_displacement)
+    print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
+  print("state hash", fmt::format("{:016x}", summary.state_hash));
+  if (config.trajectory) print("trajectory", config.trajectory->string());
+}
+
+void run_world(WorldConfig config, const RunCommandOptions& options) {
+  if (options.run.from_state || options.run.dump_state || options.run.profiled)
+    throw InputError(
+        {config.file.string(), "/bodies", "a scene of one body for --profile and state files", "one of several", ""});
+  if (options.trajectory) config.trajectory = options.trajectory;
+  if (options.steps) config.steps = *options.steps;
+  const LoadedWorld loaded = load_world_run(config);
+  for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
+    const LoadedScene& kind = loaded.kinds[i].loaded;
+    log::info(fmt::format(
+        "{}: {} of r = {} modes, {} vertices against {} triangles", config.bodies[i].name,
+        config.bodies[i].places.size() == 1 ? std::string("a body")
+                                            : fmt::format("{} bodies", config.bodies[i].places.size()),
+        kind.model->modes(), kind.model->contact->vertices(), loaded.kinds[i].surface->surface.triangles()));
+  }
+  const WorldSummary summary = run(loaded, config);
+  if (summary.unconverged_islands > 0)
+    log::warning(
+        fmt::format("{} solutions of bodies that touch did not reach the tolerance; a smaller time_step or "
+                    "contact stiffness may help",
+                    summary.unconverged_islands));
+  print_world(summary, config);
+}
+
 }  // namespace
 
 void run_command(const RunCommandOptions& options) {
+  if (std::optional<WorldConfig> world = load_world(options.scene)) return run_world(std::move(*world), options);
   SceneConfig config = load_scene(options.scene);
   if (options.trajectory) config.trajectory = options.trajectory;
   if (options.steps) config.steps = *options.steps;

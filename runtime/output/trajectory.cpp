@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "common/bundle/file_schemas.h"
 #include "common/hdf5/xdmf.h"
@@ -27,27 +28,40 @@ SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
   return sizes;
 }
 
-Hdf5File create_file(const AtomicFile& output, const ReducedModel& model, const TrajectoryInfo& info) {
-  Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
-  write_header(file, trajectory_schema(), generator_name());
-  file.write_attribute("/", "asset_name", model.asset_name);
-  file.write_attribute("/", "input_sha256", model.input_sha256);
-  file.write_attribute("/", "bundle", info.bundle);
-  file.write_attribute("/", "integrator", info.integrator);
-  file.write_attribute("/", "time_step", info.time_step);
+void write_run(Hdf5File& file, const std::string& group, const ReducedModel& model, const TrajectoryInfo& info) {
+  file.write_attribute(group, "asset_name", model.asset_name);
+  file.write_attribute(group, "input_sha256", model.input_sha256);
+  file.write_attribute(group, "bundle", info.bundle);
+  file.write_attribute(group, "integrator", info.integrator);
+  file.write_attribute(group, "time_step", info.time_step);
+}
+
+/// The groups of one body below `parent`.
+void write_groups(Hdf5File& file, const std::string& parent, const ReducedModel& model, const TrajectoryInfo& info) {
   const auto regional = [](const WeightInfo& weights) { return !weights.region.empty(); };
   for (const GroupSchema& group : trajectory_schema().groups) {
+    if (group.group == "bodies") continue;
     if (group.group == "examples" && std::ranges::all_of(info.weights, regional)) continue;
     if (group.group == "regions" && std::ranges::none_of(info.weights, regional)) continue;
     if (group.group == "render" && !model.render) continue;
     if (is_single(group.path)) {
-      write_group(file, group, group.path);
+      write_group(file, group, parent + group.path);
       continue;
     }
     for (const WeightInfo& weights : info.weights)
-      if (regional(weights)) write_group(file, group, fill_name(group.path, kRegionPlaceholder, weights.region));
+      if (regional(weights))
+        write_group(file, group, parent + fill_name(group.path, kRegionPlaceholder, weights.region));
   }
+}
+
+Hdf5File create_file(const AtomicFile& output) {
+  Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
+  write_header(file, trajectory_schema(), generator_name());
   return file;
+}
+
+const GroupSchema& group_schema(std::string_view path) {
+  return *std::ranges::find(trajectory_schema().groups, path, &GroupSchema::path);
 }
 
 std::span<const double> row_of(const Eigen::VectorXd& vector) {
@@ -65,13 +79,13 @@ void append_drawn(const VertexArray& positions, RowWriter& dataset) {
 }  // namespace
 
 /// Open datasets, in the order of the format.
-struct TrajectoryWriter::Datasets {
-  Datasets(Hdf5File& file, const SymbolSizes& sizes, const std::vector<WeightInfo>& forces)
-      : file_(file), sizes_(sizes) {
+struct BodyFrames::Datasets {
+  Datasets(Hdf5File& file, const std::string& group, const SymbolSizes& sizes, const std::vector<WeightInfo>& forces)
+      : file_(file), group_(group), sizes_(sizes) {
     for (const WeightInfo& force : forces) {
       DatasetSchema schema =
           trajectory_schema().dataset(force.region.empty() ? "/examples/weights" : "/regions/{region}/weights");
-      schema.path = fill_name(schema.path, kRegionPlaceholder, force.region);
+      schema.path = group + fill_name(schema.path, kRegionPlaceholder, force.region);
       SymbolSizes own = sizes;
       own.set("K", force.count, "the bundle");
       weights.emplace_back(file, schema, own);
@@ -88,9 +102,14 @@ struct TrajectoryWriter::Datasets {
   }
 
  private:
-  RowWriter rows(const char* path) const { return {file_, trajectory_schema().dataset(path), sizes_}; }
+  RowWriter rows(const char* path) const {
+    DatasetSchema schema = trajectory_schema().dataset(path);
+    schema.path = group_ + schema.path;
+    return {file_, schema, sizes_};
+  }
 
   Hdf5File& file_;
+  const std::string& group_;
   const SymbolSizes& sizes_;
 
  public:
@@ -110,29 +129,34 @@ struct TrajectoryWriter::Datasets {
   std::optional<RowWriter> render;  // vertices of the render mesh
 };
 
-TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
-                                   const TrajectoryInfo& info)
+BodyFrames::BodyFrames(Hdf5File& file, std::string group, const ReducedModel& model, const BodyFrame& frame,
+                       TrajectoryInfo info)
     : model_(model),
       frame_(frame),
-      info_(info),
-      output_(path),
-      file_(create_file(output_, model, info)),
+      info_(std::move(info)),
+      group_(std::move(group)),
+      tets_(group_ + "/tets"),
+      vertices_(group_ + "/vertices"),
+      render_triangles_(group_ + "/render/triangles"),
+      render_vertices_(group_ + "/render/vertices"),
       rest_masses_(tet_volumes(model.object->mesh).cwiseProduct(model.object->materials.density)),
       displacements_(model.object->mesh.vertex_count(), 3),
       velocities_(model.object->mesh.vertex_count(), 3) {
-  const SymbolSizes sizes = sizes_of(model, info);
+  write_run(file, group_.empty() ? "/" : group_, model, info_);
+  write_groups(file, group_, model, info_);
+  const SymbolSizes sizes = sizes_of(model, info_);
   const auto write = [&](const char* name, const auto& array) {
     const DatasetSchema& schema = trajectory_schema().dataset(name);
-    write_dataset(file_, schema, schema.path, sizes.evaluate(schema.dims), array.data());
+    write_dataset(file, schema, group_ + schema.path, sizes.evaluate(schema.dims), array.data());
   };
   write("/tets", model.object->mesh.tets);
   if (model.render) write("/render/triangles", model.render->triangles);
-  datasets_ = std::make_unique<Datasets>(file_, sizes, info.weights);
+  datasets_ = std::make_unique<Datasets>(file, group_, sizes, info_.weights);
 }
 
-TrajectoryWriter::~TrajectoryWriter() = default;
+BodyFrames::~BodyFrames() = default;
 
-void TrajectoryWriter::append(const State& state, const Energies& energies, double step_seconds) {
+void BodyFrames::append(const State& state, const Energies& energies, double step_seconds) {
   const FrameMotion motion = frame_.motion(state.frame);
   const Eigen::Quaterniond& turn = motion.orientation;
   const std::array orientation{turn.w(), turn.x(), turn.y(), turn.z()};
@@ -151,7 +175,7 @@ void TrajectoryWriter::append(const State& state, const Energies& energies, doub
     datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
 }
 
-void TrajectoryWriter::append_positions(const State& state) {
+void BodyFrames::append_positions(const State& state) {
   const RowMatrix& basis = model_.modal->basis;
   displacements_.reshaped<Eigen::RowMajor>().noalias() = basis * state.q;
   velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
@@ -168,7 +192,7 @@ void TrajectoryWriter::append_positions(const State& state) {
 
 /// From the positions of the tets' vertices, which the trajectory holds in any case: 12 products a vertex, where rows
 /// of the basis of its own would take 3 r and as much memory. Weights add up to 1, so that the world frame serves.
-void TrajectoryWriter::append_render_mesh(const VertexArray& positions) {
+void BodyFrames::append_render_mesh(const VertexArray& positions) {
   const RenderData& render = *model_.render;
   VertexArray drawn(render.tets.size(), 3);
   for (Eigen::Index k = 0; k < drawn.rows(); ++k) {
@@ -179,25 +203,72 @@ void TrajectoryWriter::append_render_mesh(const VertexArray& positions) {
   append_drawn(drawn, *datasets_->render);
 }
 
-void TrajectoryWriter::finish() {
+void BodyFrames::finish() {
   datasets_->finish();
   datasets_.reset();
+}
+
+XdmfCells BodyFrames::cells() const {
+  const TetMesh& mesh = model_.object->mesh;
+  return {"Tetrahedron", tets_, vertices_, 4, mesh.tet_count(), mesh.vertex_count()};
+}
+
+XdmfCells BodyFrames::render_cells() const {
+  return {
+      "Triangle", render_triangles_, render_vertices_, 3, model_.render->triangles.rows(), model_.render->tets.size()};
+}
+
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
+                                   const TrajectoryInfo& info)
+    : model_(model),
+      output_(path),
+      file_(create_file(output_)),
+      frames_(std::make_unique<BodyFrames>(file_, "", model, frame, info)) {}
+
+void TrajectoryWriter::finish() {
+  frames_->finish();
   file_.close();
   output_.commit();
   const std::filesystem::path& target = output_.target();
-  const TetMesh& mesh = model_.object->mesh;
-  const XdmfCells body{"Tetrahedron", "/tets", "/vertices", 4, mesh.tet_count(), mesh.vertex_count()};
   write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
-                        xdmf_text(target, model_.asset_name, body, times_));
+                        xdmf_text(target, {{model_.asset_name, frames_->cells()}}, frames_->times()));
   if (!model_.render) return;
-  const XdmfCells surface{"Triangle",
-                          "/render/triangles",
-                          "/render/vertices",
-                          3,
-                          model_.render->triangles.rows(),
-                          model_.render->tets.size()};
   write_file_atomically(target.parent_path() / (target.stem().string() + "_render.xdmf"),
-                        xdmf_text(target, model_.asset_name, surface, times_));
+                        xdmf_text(target, {{model_.asset_name, frames_->render_cells()}}, frames_->times()));
+}
+
+WorldTrajectoryWriter::WorldTrajectoryWriter(const std::filesystem::path& path, const std::vector<NamedBody>& bodies)
+    : output_(path), file_(create_file(output_)) {
+  const NamedBody& first = bodies.front();
+  file_.write_attribute("/", "asset_name", std::string());
+  file_.write_attribute("/", "input_sha256", std::string());
+  file_.write_attribute("/", "bundle", std::string());
+  file_.write_attribute("/", "integrator", first.info.integrator);
+  file_.write_attribute("/", "time_step", first.info.time_step);
+  write_group(file_, group_schema("/bodies"), "/bodies");
+  for (const NamedBody& body : bodies) {
+    const std::string group = fill_name("/bodies/{body}", kBodyPlaceholder, body.name);
+    write_group(file_, group_schema("/bodies/{body}"), group);
+    frames_.push_back(std::make_unique<BodyFrames>(file_, group, body.model, body.frame, body.info));
+    names_.push_back(body.name);
+  }
+}
+
+void WorldTrajectoryWriter::finish() {
+  for (const auto& frames : frames_) frames->finish();
+  file_.close();
+  output_.commit();
+  const std::filesystem::path& target = output_.target();
+  std::vector<XdmfPart> parts;
+  for (std::size_t i = 0; i < frames_.size(); ++i) parts.push_back({names_[i], frames_[i]->cells()});
+  write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
+                        xdmf_text(target, parts, frames_.front()->times()));
+}
+
+double WorldTrajectoryWriter::largest_displacement() const {
+  double largest = 0;
+  for (const auto& frames : frames_) largest = std::max(largest, frames->largest_displacement());
+  return largest;
 }
 
 }  // namespace exmat::runtime

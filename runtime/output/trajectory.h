@@ -8,6 +8,7 @@
 
 #include "common/core/atomic_file.h"
 #include "common/hdf5/hdf5_file.h"
+#include "common/hdf5/xdmf.h"
 #include "common/model/reduced_model.h"
 #include "runtime/sim/step/stepper.h"
 
@@ -29,16 +30,13 @@ struct TrajectoryInfo {
   std::vector<WeightInfo> weights{};
 };
 
-/// Writes the trajectory of a body and an .xdmf beside it, and NAME_render.xdmf where the model holds /render.
-/// docs/bundle_format.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is
-/// left. Two equal runs give the same bytes except /step_time.
-class TrajectoryWriter {
+/// The frames of one body in an open file, below a group: "" for the root, or "/bodies/NAME".
+class BodyFrames {
  public:
-  /// `model` holds /object and the basis, perhaps /render, and outlives the writer, as the frame of the body does.
-  /// Throws WorkError.
-  TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
-                   const TrajectoryInfo& info);
-  ~TrajectoryWriter();
+  /// `model` holds /object and the basis, perhaps /render, and outlives the writer, as the frame of the body does. The
+  /// file outlives it, too. Throws WorkError.
+  BodyFrames(Hdf5File& file, std::string group, const ReducedModel& model, const BodyFrame& frame, TrajectoryInfo info);
+  ~BodyFrames();
 
   /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
   void append(const State& state, const Energies& energies, double step_seconds);
@@ -46,6 +44,12 @@ class TrajectoryWriter {
   /// To be called after the last frame. Throws WorkError.
   void finish();
 
+  /// What an .xdmf shows of it: the tets, or the render mesh.
+  XdmfCells cells() const;
+  XdmfCells render_cells() const;
+
+  /// Of the frames so far [s].
+  const std::vector<double>& times() const { return times_; }
   /// Largest displacement of a vertex in the frames so far [m].
   double largest_displacement() const { return largest_displacement_; }
 
@@ -57,13 +61,67 @@ class TrajectoryWriter {
   const ReducedModel& model_;
   const BodyFrame& frame_;
   TrajectoryInfo info_;
-  AtomicFile output_;
-  Hdf5File file_;
+  std::string group_, tets_, vertices_, render_triangles_, render_vertices_;  // paths
   std::unique_ptr<Datasets> datasets_;
   Eigen::VectorXd rest_masses_;             ///< n_t
   VertexArray displacements_, velocities_;  ///< n x 3
   std::vector<double> times_;
   double largest_displacement_ = 0;
+};
+
+/// Writes the trajectory of a body and an .xdmf beside it, and NAME_render.xdmf where the model holds /render.
+/// docs/bundle_format.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is
+/// left. Two equal runs give the same bytes except /step_time.
+class TrajectoryWriter {
+ public:
+  /// As BodyFrames. Throws WorkError.
+  TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
+                   const TrajectoryInfo& info);
+
+  /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
+  void append(const State& state, const Energies& energies, double step_seconds) {
+    frames_->append(state, energies, step_seconds);
+  }
+
+  /// To be called after the last frame. Throws WorkError.
+  void finish();
+
+  /// Largest displacement of a vertex in the frames so far [m].
+  double largest_displacement() const { return frames_->largest_displacement(); }
+
+ private:
+  const ReducedModel& model_;
+  AtomicFile output_;
+  Hdf5File file_;
+  std::unique_ptr<BodyFrames> frames_;
+};
+
+/// A body of a scene of several.
+struct NamedBody {
+  std::string name;
+  const ReducedModel& model;
+  const BodyFrame& frame;
+  TrajectoryInfo info;
+};
+
+/// Writes the trajectory of several bodies, a group /bodies/NAME for each that holds what the root holds of one body,
+/// and an .xdmf of all of them beside it. Otherwise as TrajectoryWriter.
+class WorldTrajectoryWriter {
+ public:
+  /// One or more bodies, of the same number of frames. Throws WorkError.
+  WorldTrajectoryWriter(const std::filesystem::path& path, const std::vector<NamedBody>& bodies);
+
+  void append(std::size_t body, const State& state, const Energies& energies, double step_seconds) {
+    frames_[body]->append(state, energies, step_seconds);
+  }
+  void finish();
+  double largest_displacement() const;
+
+ private:
+  std::vector<std::string> names_;
+  AtomicFile output_;
+  Hdf5File file_;
+  std::vector<std::unique_ptr<BodyFrames>> frames_;
 };
 
 }  // namespace exmat::runtime

@@ -5,25 +5,10 @@
 #include "common/core/error.h"
 #include "common/core/progress.h"
 #include "common/core/timer.h"
-#include "runtime/output/trajectory.h"
 #include "runtime/scene/state_file.h"
 
 namespace exmat::runtime {
 namespace {
-
-std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
-  if (!config.trajectory) return nullptr;
-  const std::filesystem::path folder = std::filesystem::absolute(*config.trajectory).parent_path();
-  const std::string bundle =
-      std::filesystem::proximate(std::filesystem::absolute(config.bundle), folder).generic_string();
-  TrajectoryInfo info{std::string(name_of(config.integrator)), bundle, config.time_step,
-                      1 + config.steps / config.every};
-  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i) {
-    const ExampleModel& examples = loaded.model->examples[i];
-    if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
-  }
-  return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, *loaded.model->frame, info);
-}
 
 void add_reports(std::span<const StepReport> reports, double seconds, RunSummary& summary) {
   const auto bodies = static_cast<double>(reports.size());
@@ -55,7 +40,26 @@ RunSummary empty_summary(std::int64_t steps, const Bodies& bodies, bool profiled
   return summary;
 }
 
+std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
+  if (!config.trajectory) return nullptr;
+  return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, *loaded.model->frame,
+                                            trajectory_info(loaded, config));
+}
+
 }  // namespace
+
+TrajectoryInfo trajectory_info(const LoadedScene& loaded, const SceneConfig& config) {
+  const std::filesystem::path folder = std::filesystem::absolute(*config.trajectory).parent_path();
+  const std::string bundle =
+      std::filesystem::proximate(std::filesystem::absolute(config.bundle), folder).generic_string();
+  TrajectoryInfo info{std::string(name_of(config.integrator)), bundle, config.time_step,
+                      1 + config.steps / config.every};
+  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i) {
+    const ExampleModel& examples = loaded.model->examples[i];
+    if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
+  }
+  return info;
+}
 
 Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config) {
   return {*loaded.model, loaded.scene, loaded.start, config.instances};

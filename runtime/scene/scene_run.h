@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 
+#include "runtime/output/trajectory.h"
 #include "runtime/scene/bodies.h"
 #include "runtime/scene/samples.h"
 #include "runtime/scene/scene_loader.h"
@@ -39,6 +40,9 @@ struct RunOptions {
 /// if it names one. Throws WorkError where a state becomes non-finite (see require_finite; no trajectory is left) or a
 /// file cannot be written, InputError where the state file does not fit.
 RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOptions& options = {});
+
+/// What the trajectory of a scene says of its run; the scene names one.
+TrajectoryInfo trajectory_info(const LoadedScene& loaded, const SceneConfig& config);
 
 /// The scene's bodies as they start; refers to `loaded`.
 Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config);

@@ -180,7 +180,7 @@ void FullSpaceTrajectory::finish() {
   const TetMesh& mesh = data_.object->mesh;
   const XdmfCells body{"Tetrahedron", "/tets", "/vertices", 4, mesh.tet_count(), mesh.vertex_count()};
   write_file_atomically(std::filesystem::path(output_.target()).replace_extension(".xdmf"),
-                        xdmf_text(output_.target(), data_.asset_name, body, times_));
+                        xdmf_text(output_.target(), {{data_.asset_name, body}}, times_));
 }
 
 FullSpaceSummary write_full_space(const SceneConfig& config, const std::filesystem::path& file, bool baseline) {

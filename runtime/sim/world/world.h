@@ -40,6 +40,7 @@ class World {
   const State& state(int body) const noexcept { return at(body).state; }
   const Model& model(int body) const noexcept { return at(body).model; }
   const StepScene& scene(int body) const noexcept { return at(body).scene; }
+  Workspace& workspace(int body) noexcept { return at(body).workspace; }
   const StepReport& report(int body) const noexcept { return at(body).report; }
 
   /// One step of all bodies by so many threads, >= 1.

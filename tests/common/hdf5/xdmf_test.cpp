@@ -11,7 +11,7 @@ using ::testing::Not;
 
 TEST(Xdmf, NamesCellsAndFramesOfTheFileBesideIt) {
   const XdmfCells cells{"Tetrahedron", "/tets", "/vertices", 4, 7, 11};
-  const std::string text = xdmf_text("some/folder/a.h5", "body", cells, {0, 0.25});
+  const std::string text = xdmf_text("some/folder/a.h5", {{"body", cells}}, {0, 0.25});
   EXPECT_THAT(text, HasSubstr("<Topology TopologyType=\"Tetrahedron\" NumberOfElements=\"7\">"));
   EXPECT_THAT(text, HasSubstr("Dimensions=\"7 4\""));
   EXPECT_THAT(text, HasSubstr(">a.h5:/tets<"));
@@ -22,7 +22,7 @@ TEST(Xdmf, NamesCellsAndFramesOfTheFileBesideIt) {
 }
 
 TEST(Xdmf, EscapesNames) {
-  const std::string text = xdmf_text("a&b.h5", "<body>", {"Triangle", "/t", "/v", 3, 1, 3}, {0});
+  const std::string text = xdmf_text("a&b.h5", {{"<body>", {"Triangle", "/t", "/v", 3, 1, 3}}}, {0});
   EXPECT_THAT(text, HasSubstr("a&amp;b.h5:/t"));
   EXPECT_THAT(text, HasSubstr("Name=\"&lt;body&gt;\""));
 }

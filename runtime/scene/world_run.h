@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "runtime/scene/samples.h"
+#include "runtime/scene/world_loader.h"
+
+namespace exmat::runtime {
+
+/// What a run of several bodies did.
+struct WorldSummary {
+  std::int64_t steps = 0;  ///< of each body
+  int bodies = 0;
+  int threads = 1;
+  double simulated_seconds = 0;
+  Samples step_seconds;       ///< wall clock of a step of all bodies over their number, without output
+  Samples newton_iterations;  ///< most of an island
+  Samples touching_pairs;     ///< of bodies near enough to touch
+  int most_pairs = 0;
+  int largest_island = 0;                      ///< bodies solved together
+  std::int64_t unconverged_islands = 0;        ///< of all steps
+  std::int64_t unconverged_steps = 0;          ///< residual above the tolerance; of all bodies
+  Energies start, end;                         ///< of all bodies
+  double deepest = 0;                          ///< that a vertex is inside another body at the end [m]
+  std::uint64_t state_hash = 0;                ///< of all bodies, at the end, as Bodies::hash
+  std::optional<double> largest_displacement;  ///< over the written frames [m]; only with a trajectory
+};
+
+/// Steps all bodies from their start, and writes the trajectory, if the scene names one. As many threads as OpenMP
+/// gives. Throws WorkError where a state becomes non-finite (no trajectory is left) or a file cannot be written.
+WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config);
+
+}  // namespace exmat::runtime
