@@ -13,6 +13,7 @@ namespace {
 
 constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it normals of the surface say which way is out
 
+constexpr int kLeafTriangles = 4;
 constexpr double kSameWay = 0.5;  // cosine
 
 /// Across the edge that begins at each corner; -1 where there is none or more than one.
@@ -38,7 +39,7 @@ BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray
       triangles_(std::move(triangles)),
       neighbours_(neighbours_of(triangles_)),
       fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
-      tree_(triangles_, rest_, basis_) {
+      tree_(triangles_, rest_, basis_, kLeafTriangles) {
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
   for (std::size_t i = 1; i < fan_starts_.size(); ++i) fan_starts_[i] += fan_starts_[i - 1];
@@ -115,26 +116,29 @@ bool BodySurface::may_be_within(const Eigen::Vector3d& point, double radius, Sur
 
 std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                                const Eigen::Vector3d* facing) const noexcept {
-  const auto distance_to = [&](int node) {
-    const DeformationTree::Ball& around = ball(node, shape);
-    return (point - around.centre).norm() - around.radius;
+  struct Waiting {
+    int node;
+    double bound;  // on the distance
   };
-  int waiting[64];  // halves of a tree of at most 2^32 leaves
+  const auto bound_of = [&](int node) {
+    const DeformationTree::Ball& around = ball(node, shape);
+    return Waiting{node, std::max(0.0, (point - around.centre).norm() - around.radius)};
+  };
+  Waiting waiting[64];  // halves of a tree of at most 2^32 leaves
   int count = 0;
   TrianglePoint best;
   int found = -1;
   double nearest = radius * radius;
-  if (!tree_.empty()) waiting[count++] = 0;
+  if (!tree_.empty()) waiting[count++] = bound_of(0);
   while (count > 0) {
-    const int node = waiting[--count];
-    const double bound = distance_to(node);
-    if (bound > 0 && bound * bound > nearest) continue;
+    const auto [node, bound] = waiting[--count];
+    if (bound * bound > nearest) continue;
     const DeformationTree::Node& branch = tree_.node(node);
     if (!branch.is_leaf) {
-      const int left = node + 1, right = tree_.node(left).next;
-      const bool left_first = distance_to(left) <= distance_to(right);
-      waiting[count++] = left_first ? right : left;
-      waiting[count++] = left_first ? left : right;
+      Waiting near = bound_of(node + 1), far = bound_of(tree_.node(node + 1).next);
+      if (near.bound > far.bound) std::swap(near, far);
+      waiting[count++] = far;
+      waiting[count++] = near;
       continue;
     }
     for (int i = branch.first; i < branch.last; ++i) {

@@ -7,6 +7,7 @@
 namespace exmat::runtime {
 namespace {
 
+constexpr int kLeafVertices = 16;
 constexpr Eigen::Index kFactorColumns = 32;
 
 /// Lower triangle of A += F F^T, F the first `used` columns of `factors`. Eigen keeps its panels on the stack up to r =
@@ -27,7 +28,7 @@ ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_c
 ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   const auto count = static_cast<int>(data.areas.size());
   const VertexArray rest = data.positions.rowwise() - origin.transpose();
-  tree_ = DeformationTree(IndexVector::LinSpaced(count, 0, count - 1), rest, data.basis);
+  tree_ = DeformationTree(IndexVector::LinSpaced(count, 0, count - 1), rest, data.basis, kLeafVertices);
   data_indices_ = tree_.order();
   const bool numbered = data.vertices.size() == count;
   for (const int index : data_indices_)

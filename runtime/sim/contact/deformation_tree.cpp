@@ -7,8 +7,6 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr int kLeafItems = 16;
-
 using Rows = Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>;
 
 /// Largest singular value of each 3 x r block less `mean`.
@@ -47,8 +45,9 @@ struct DeformationTree::Points {
   }
 };
 
-DeformationTree::DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis)
-    : order_(static_cast<std::size_t>(items.rows())) {
+DeformationTree::DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis,
+                                 int leaf_items)
+    : leaf_items_(leaf_items), order_(static_cast<std::size_t>(items.rows())) {
   if (order_.empty()) return;
   std::iota(order_.begin(), order_.end(), 0);
   const Points points{items, rest, basis};
@@ -61,7 +60,7 @@ void DeformationTree::build(const Points& points, int first, int last) {
   nodes_.emplace_back();
   nodes_[at].first = first;
   nodes_[at].last = last;
-  nodes_[at].is_leaf = last - first <= kLeafItems;
+  nodes_[at].is_leaf = last - first <= leaf_items_;
   set_bounds(points, nodes_[at]);
   if (!nodes_[at].is_leaf) {
     VertexArray middles(last - first, 3);

@@ -26,8 +26,9 @@ class DeformationTree {
   };
 
   DeformationTree() = default;
-  /// `items` [m x c] are rows of c ids of points at `rest` [n x 3] about the frame's origin, moved by `basis` [3n x r].
-  DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis);
+  /// `items` [m x c] are rows of c ids of points at `rest` [n x 3] about the frame's origin, moved by `basis` [3n x r];
+  /// leaves hold at most so many.
+  DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis, int leaf_items);
 
   /// Items in the order of the leaves: rows of the matrix that the tree was made of.
   const std::vector<int>& order() const noexcept { return order_; }
@@ -47,6 +48,7 @@ class DeformationTree {
 
  private:
   struct Points;
+  int leaf_items_ = 0;
   void build(const Points& points, int first, int last);
   void set_bounds(const Points& points, Node& node);
 

@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::size_t kSharedIsland = 32;  // bodies; a larger one is shared by the threads
 
+Eigen::Vector3d linear_velocity(const WorldBody& body) { return body.model.frame->velocity(body.state.frame).linear; }
+
 /// The root of a body's tree of touching ones.
 int root_of(std::vector<int>& parents, int body) {
   while (parents[static_cast<std::size_t>(body)] != body) {
@@ -76,9 +78,11 @@ void World::find_pairs(int threads) {
     const BodyPose pose = pose_of(own.model, own.state);
     const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
     const double travel = own.contact().travel_bound(pose, velocity, dt);
-    margins_[i] = kContactMarginSteps * travel + dt * dt * own.scene.gravity.norm();
+    const double straight = dt * velocity.linear.norm();
+    margins_[i] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene.gravity.norm();
     const DeformationTree::Ball ball = own.surface.bound(own.state.q);
-    balls_[i] = {pose.position + pose.rotation * ball.centre, ball.radius + margins_[i]};
+    balls_[i] = {pose.position + pose.rotation * ball.centre,
+                 ball.radius + margins_[i] + kContactMarginSteps * straight};
   }
   overlapping_pairs(balls_, order_, near_);
 }
@@ -107,7 +111,9 @@ void World::gather(int threads) {
     for (const auto& [index, side] : against_[i]) {
       PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
       const int own = pair.body(side);
-      pair.gather(law_, side, at(own), other, margins_[static_cast<std::size_t>(own)] + margins_[i]);
+      const Eigen::Vector3d apart = linear_velocity(at(own)) - linear_velocity(other);
+      const double straight = kContactMarginSteps * other.scene.time_step * apart.norm();
+      pair.gather(law_, side, at(own), other, margins_[static_cast<std::size_t>(own)] + margins_[i] + straight);
     }
   }
 }

@@ -74,7 +74,7 @@ class World {
 
   // Of one step.
   std::vector<DeformationTree::Ball> balls_;
-  std::vector<double> margins_;
+  std::vector<double> margins_;  // how far each may go beyond its centre's straight way [m]
   std::vector<int> order_, parents_, island_of_, place_in_island_;
   std::vector<std::pair<int, int>> near_;
   std::vector<std::unique_ptr<PairContact>> pairs_;

@@ -13,7 +13,7 @@ TEST(DeformationTree, BallsHoldTheirTrianglesAtAnyPose) {
   const test::Bar bar = test::make_bar({.free = true});
   const TetMesh& mesh = bar.model.object->mesh;
   const TriangleArray triangles = surface_triangles(mesh.tets);
-  const DeformationTree tree(triangles, mesh.vertices, bar.basis());
+  const DeformationTree tree(triangles, mesh.vertices, bar.basis(), 8);
   std::vector<int> order = tree.order();
   std::ranges::sort(order);
   for (int i = 0; i < triangles.rows(); ++i) ASSERT_EQ(order[static_cast<std::size_t>(i)], i);
@@ -34,7 +34,7 @@ TEST(DeformationTree, BallsHoldTheirTrianglesAtAnyPose) {
 }
 
 TEST(DeformationTree, OfNothingIsEmpty) {
-  EXPECT_TRUE(DeformationTree(IndexMatrix(0, 1), VertexArray(0, 3), RowMatrix(0, 4)).empty());
+  EXPECT_TRUE(DeformationTree(IndexMatrix(0, 1), VertexArray(0, 3), RowMatrix(0, 4), 8).empty());
 }
 
 }  // namespace
