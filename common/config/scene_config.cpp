@@ -1,6 +1,7 @@
 #include "common/config/scene_config.h"
 
 #include <algorithm>
+#include <cctype>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
@@ -133,6 +134,12 @@ void refuse_members_of_one_body(const Json& json, const std::filesystem::path& f
                       "render meshes are written for scenes of one body"});
 }
 
+void check_name(const std::string& name, const std::filesystem::path& file, const std::string& place) {
+  const auto allowed = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; };
+  if (std::ranges::all_of(name, allowed)) return;
+  throw InputError({file.string(), place + "/name", "letters, digits, _ and -", fmt::format("\"{}\"", name), ""});
+}
+
 std::vector<BodyPlace> read_grid(const Json& grid) {
   const Eigen::Vector3d spacing = read_vector(grid["spacing"]);
   std::vector<BodyPlace> places;
@@ -170,6 +177,7 @@ std::optional<WorldConfig> load_world(const std::filesystem::path& file) {
   for (std::size_t i = 0; i < json["bodies"].size(); ++i) {
     const Json& own = json["bodies"][i];
     const std::string place = fmt::format("/bodies/{}", i);
+    check_name(own["name"], file, place);
     BodiesConfig bodies{own["name"], scene_of(json, own, file, place), read_places(own, file, place)};
     if (std::ranges::find(world.bodies, bodies.name, &BodiesConfig::name) != world.bodies.end())
       throw InputError(

@@ -211,7 +211,7 @@ class BadScene : public ::testing::TestWithParam<BadConfig> {};
 TEST_P(BadScene, IsRefused) { expect_refused(GetParam(), load_scene); }
 
 const BadConfig kBadScenes[] = {
-    {"NoBundle", "{}", "a.json: /bundle: expected a string of at least 1 characters (Bundle that"},
+    {"NoBundle", "{}", "a.json: /: expected bundle or bodies, found neither"},
     {"ZeroTimeStep", scene(R"("time_step": 0)"), "a.json: /time_step: expected a number > 0, found 0"},
     {"NoSteps", scene(R"("steps": 0)"), "a.json: /steps: expected an integer >= 1"},
     {"UnknownIntegrator", scene(R"("integrator": "rk4")"),

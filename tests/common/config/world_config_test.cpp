@@ -1,0 +1,108 @@
+#include <fstream>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/config/config.h"
+#include "common/config/pose_file.h"
+#include "common/core/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace exmat {
+namespace {
+
+using ::testing::HasSubstr;
+
+class WorldConfigTest : public ::testing::Test {
+ protected:
+  std::filesystem::path write(const std::string& name, const std::string& text) const {
+    const std::filesystem::path file = folder_.path() / name;
+    std::ofstream(file) << text;
+    return file;
+  }
+  std::string failure_of(const std::string& text) const {
+    try {
+      load_world(write("a.json", text));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+  std::string refused_poses(const std::string& text) const {
+    try {
+      read_poses(write("p.txt", text));
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  }
+
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(WorldConfigTest, BodiesShareWhatIsNotTheirOwn) {
+  const auto world = load_world(write("w.json", R"({"time_step": 0.002, "steps": 7, "gravity": [0, 0, -1],
+    "contact": {"stiffness": 3e6, "damping": 20, "friction": 0.4},
+    "obstacles": [{"plane": {"normal": [0, 0, 1]}}], "output": {"trajectory": "w.h5", "every": 3},
+    "bodies": [{"name": "a", "bundle": "a.h5", "grid": {"counts": [2, 1, 3], "spacing": [1, 2, 4]}},
+               {"name": "b", "bundle": "b.h5", "body": {"linear_velocity": [1, 0, 0]}}]})"));
+  ASSERT_TRUE(world);
+  EXPECT_EQ(world->time_step, 0.002);
+  EXPECT_EQ(world->steps, 7);
+  EXPECT_EQ(world->every, 3);
+  EXPECT_EQ(*world->trajectory, folder_.path() / "w.h5");
+  EXPECT_EQ(world->contact.stiffness, 3e6);
+  EXPECT_EQ(world->contact.damping, 20);
+  EXPECT_EQ(world->contact.friction, 0.4);
+  ASSERT_EQ(world->bodies.size(), 2u);
+  ASSERT_EQ(world->bodies[0].places.size(), 6u);
+  EXPECT_EQ(world->bodies[0].places[5].position, Eigen::Vector3d(1, 0, 8));
+  ASSERT_EQ(world->bodies[1].places.size(), 1u);
+  for (const BodiesConfig& bodies : world->bodies) {
+    EXPECT_EQ(bodies.scene.gravity, Eigen::Vector3d(0, 0, -1));
+    EXPECT_EQ(bodies.scene.obstacles.size(), 1u);
+    EXPECT_EQ(bodies.scene.time_step, 0.002);
+    EXPECT_TRUE(needs_of(bodies.scene).contact);
+  }
+  EXPECT_EQ(world->bodies[1].scene.bundle, folder_.path() / "b.h5");
+  EXPECT_EQ(*world->bodies[1].scene.body.linear_velocity, Eigen::Vector3d(1, 0, 0));
+}
+
+TEST_F(WorldConfigTest, ASceneOfOneBodyIsNone) { EXPECT_FALSE(load_world(write("s.json", R"({"bundle": "a.h5"})"))); }
+
+TEST_F(WorldConfigTest, MistakesAreNamed) {
+  const std::string body = R"({"name": "a", "bundle": "a.h5"})";
+  EXPECT_THAT(failure_of(R"({"bundle": "a.h5", "bodies": [)" + body + "]}"), HasSubstr("found both"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + "," + body + "]}"), HasSubstr("/bodies/1/name"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "forces": []})"), HasSubstr("/forces"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "instances": 3})"), HasSubstr("grid"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "output": {"render": true}})"), HasSubstr("/output/render"));
+  EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a/b", "bundle": "a.h5"}]})"), HasSubstr("/bodies/0/name"));
+  EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "colour": 1}]})"),
+              HasSubstr("/bodies/0/colour"));
+  EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "poses": "p.txt",
+                            "grid": {"counts": [1, 1, 1], "spacing": [1, 1, 1]}}]})"),
+              HasSubstr("grid or poses"));
+  EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "body": {"orientation": [2, 0, 0, 0]}}]})"),
+              HasSubstr("/bodies/0/body/orientation"));
+  write("one.json", R"({"bodies": [)" + body + "]}");
+  EXPECT_THROW(load_scene(folder_.path() / "one.json"), InputError);
+}
+
+TEST_F(WorldConfigTest, PosesAreLines) {
+  const auto places = read_poses(write("p.txt", "# where\n\n1 2 3\r\n  0.5 0 -1 0 0.6 0 0.8  \n4 5 6"));
+  ASSERT_EQ(places.size(), 3u);
+  EXPECT_EQ(places[0].position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(places[1].orientation.coeffs(), Eigen::Vector4d(0.6, 0, 0.8, 0));
+  EXPECT_EQ(places[2].position, Eigen::Vector3d(4, 5, 6));
+}
+
+TEST_F(WorldConfigTest, BadPosesAreRefusedWithTheirLine) {
+  EXPECT_THAT(refused_poses("1 2 3\n1 2\n"), HasSubstr("line 2"));
+  EXPECT_THAT(refused_poses("1 2 three\n"), HasSubstr("line 1"));
+  EXPECT_THAT(refused_poses("1 2 nan\n"), HasSubstr("finite"));
+  EXPECT_THAT(refused_poses("1 2 3 1 1 0 0\n"), HasSubstr("length 1"));
+  EXPECT_THAT(refused_poses("# nothing\n"), HasSubstr("a line for each body"));
+}
+
+}  // namespace
+}  // namespace exmat

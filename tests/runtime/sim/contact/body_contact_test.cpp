@@ -1,0 +1,143 @@
+#include "runtime/sim/contact/body_contact.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <gtest/gtest.h>
+
+#include "tests/runtime/sim/world/touching_blocks.h"
+
+namespace exmat::runtime {
+namespace {
+
+using test::Blocks;
+
+/// Two overlapping blocks, the vertices of the first against the surface of the second.
+struct Overlap {
+  explicit Overlap(double friction) : contact({1e6, 1e2, friction}) {
+    start_a.position = Eigen::Vector3d(0, 0, 0);
+    start_b.position = Eigen::Vector3d(0.05, 0.03, 0.18);
+    start_b.rotation = Eigen::AngleAxisd(0.2, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+    qa = 0.02 * Eigen::VectorXd::Random(blocks.model->modes());
+    qb = 0.02 * Eigen::VectorXd::Random(blocks.model->modes());
+    va = vb = Eigen::VectorXd::Random(blocks.model->modes());
+    SurfaceShape shape = blocks.surface->surface.make_shape();
+    blocks.surface->surface.place(qb, shape);
+    const TouchingBody a{
+        *blocks.model->contact, *blocks.surface, {start_a, qa}, {FrameVelocity{{0, 0, 1}, {0, 1, 0}}, va}};
+    const TouchingBody b{*blocks.model->contact, *blocks.surface, {start_b, qb}, {FrameVelocity{{1, 0, 0}, {}}, vb}};
+    contact.gather(a, b, 1e-3, 0.01, true, {}, shape, candidates);
+  }
+
+  /// W after the rigid unknowns (translation, rotation about the position) and q of either changed.
+  double potential(const Eigen::VectorXd& da, const Eigen::VectorXd& db) {
+    const auto moved = [](const Placement& placement, const Eigen::VectorXd& d) {
+      Placement result = placement;
+      result.position += d.head<3>();
+      const Eigen::Vector3d turn = d.segment<3>(3);
+      if (turn.norm() > 0)
+        result.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * placement.rotation;
+      return result;
+    };
+    const Eigen::VectorXd qa_moved = qa + da.tail(qa.size()), qb_moved = qb + db.tail(qb.size());
+    return contact.potential(*blocks.model->contact, {moved(start_a, da), qa_moved}, {moved(start_b, db), qb_moved},
+                             candidates);
+  }
+
+  Blocks blocks{1e-3};
+  BodyContact contact;
+  Placement start_a, start_b;
+  Eigen::VectorXd qa, qb, va, vb;
+  BodyCandidates candidates;
+};
+
+TEST(BodyContact, ForcesAreThoseOfThePotentialAndEqualAndOpposite) {
+  Overlap overlap(0.5);
+  const Eigen::Index modes = overlap.qa.size();
+  ContactSums a, b;
+  const auto evaluate = [&] {
+    a.set_zero(modes);
+    b.set_zero(modes);
+    overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, overlap.qa},
+                             {overlap.start_b, overlap.qb}, overlap.candidates, a, b);
+  };
+  evaluate();
+  FrictionChange change;
+  overlap.contact.refresh_friction(overlap.candidates, change);
+  // Slip, so that friction acts.
+  overlap.start_a.position += Eigen::Vector3d(3e-4, -2e-4, 0);
+  evaluate();
+  ASSERT_GT(a.touching, 3);
+  EXPECT_NEAR((a.force + b.force).norm(), 0, 1e-12 * a.force.norm());
+  EXPECT_NEAR(a.potential, overlap.potential(Eigen::VectorXd::Zero(6 + modes), Eigen::VectorXd::Zero(6 + modes)),
+              1e-12 * a.potential);
+  Eigen::VectorXd force_a(6 + modes), force_b(6 + modes);
+  force_a << a.force, a.torque, a.generalised;
+  force_b << b.force, b.torque, b.generalised;
+  const double h = 1e-7, scale = force_a.norm();
+  const Eigen::VectorXd none = Eigen::VectorXd::Zero(6 + modes);
+  for (Eigen::Index i = 0; i < 6 + modes; ++i) {
+    const Eigen::VectorXd d = h * Eigen::VectorXd::Unit(6 + modes, i);
+    // Central differences of a potential of 1e2 J with steps of 1e-7: 1e-7 of rounding beside h^2.
+    EXPECT_NEAR(-(overlap.potential(d, none) - overlap.potential(-d, none)) / (2 * h), force_a[i], 1e-5 * scale) << i;
+    EXPECT_NEAR(-(overlap.potential(none, d) - overlap.potential(none, -d)) / (2 * h), force_b[i], 1e-5 * scale) << i;
+  }
+}
+
+TEST(BodyContact, StiffnessIsTheDerivativeOfTheForces) {
+  Overlap overlap(0);
+  const Eigen::Index modes = overlap.qa.size();
+  const auto force_of_b = [&](const Eigen::VectorXd& qa) {
+    ContactSums a, b;
+    a.set_zero(modes);
+    b.set_zero(modes);
+    overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, qa}, {overlap.start_b, overlap.qb},
+                             overlap.candidates, a, b);
+    Eigen::VectorXd force(6 + modes);
+    force << b.force, b.torque, b.generalised;
+    return force;
+  };
+  force_of_b(overlap.qa);
+  Eigen::MatrixXd columns_a, columns_b;
+  const Eigen::Index used =
+      BodyContact::stiffness_columns(*overlap.blocks.model->contact, 6, 6, {overlap.start_a, overlap.qa},
+                                     {overlap.start_b, overlap.qb}, overlap.candidates, columns_a, columns_b);
+  ASSERT_GT(used, 3);
+  // -d f_b / d q_a = -columns_b columns_a^T: linear but where contacts begin or end.
+  const Eigen::MatrixXd expected = columns_b.leftCols(used) * columns_a.leftCols(used).transpose();
+  const double h = 1e-6;
+  for (Eigen::Index i = 0; i < modes; ++i) {
+    const Eigen::VectorXd d = h * Eigen::VectorXd::Unit(modes, i);
+    const Eigen::VectorXd slope = (force_of_b(overlap.qa + d) - force_of_b(overlap.qa - d)) / (2 * h);
+    EXPECT_NEAR((slope - expected.col(6 + i)).norm(), 0, 1e-6 * expected.norm()) << i;
+  }
+}
+
+TEST(BodyContact, FindsWhatIsNearAndWhatWasInside) {
+  Overlap overlap(0);
+  for (const BodyCandidate& candidate : overlap.candidates.all) EXPECT_LE(candidate.normal.norm(), 1 + 1e-12);
+  const std::size_t all = overlap.candidates.all.size();
+  // Without a past nothing deeper than the margin is looked for; with it, what was inside is found again.
+  SurfaceShape shape = overlap.blocks.surface->surface.make_shape();
+  overlap.blocks.surface->surface.place(overlap.qb, shape);
+  const TouchingBody a{*overlap.blocks.model->contact,
+                       *overlap.blocks.surface,
+                       {overlap.start_a, overlap.qa},
+                       {FrameVelocity{}, overlap.va}};
+  const TouchingBody b{*overlap.blocks.model->contact,
+                       *overlap.blocks.surface,
+                       {overlap.start_b, overlap.qb},
+                       {FrameVelocity{}, overlap.vb}};
+  ContactSums sums;
+  sums.set_zero(overlap.qa.size());
+  overlap.contact.evaluate(a.set, a.pose, b.pose, overlap.candidates, sums, sums);
+  std::vector<HeldBodyContact> held;
+  overlap.contact.commit(a.pose, b.pose, overlap.candidates, held);
+  BodyCandidates near, again;
+  overlap.contact.gather(a, b, 1e-3, 1e-6, false, {}, shape, near);
+  overlap.contact.gather(a, b, 1e-3, 0.01, false, held, shape, again);
+  EXPECT_LT(near.all.size(), all);
+  EXPECT_EQ(again.all.size(), all);
+}
+
+}  // namespace
+}  // namespace exmat::runtime
