@@ -194,6 +194,7 @@ std::optional<WorldConfig> load_world(const std::filesystem::path& file) {
   world.contact.stiffness = contact.value("stiffness", world.contact.stiffness);
   world.contact.damping = contact.value("damping", world.contact.damping);
   world.contact.friction = contact.value("friction", world.contact.friction);
+  world.contact.self = contact.value("self", world.contact.self);
   return world;
 }
 

@@ -124,6 +124,7 @@ struct BodyContactConfig {
   double stiffness = 1e6;  ///< pressure per depth [N/m^3]
   double damping = 0;      ///< pressure per approach velocity [N s/m^3]
   double friction = 0;     ///< Coulomb's coefficient
+  bool self = false;       ///< parts of one body, too
 };
 
 /// Where a body stands beyond what its BodyConfig says.

@@ -37,7 +37,8 @@ LoadedWorld load_world_run(const WorldConfig& config) {
     const TetMesh& mesh = loaded.data.object->mesh;
     kind.surface = std::make_shared<TouchingSurface>(
         *loaded.model->contact,
-        BodySurface::of_tets(mesh.tets, mesh.vertices, loaded.data.modal->basis, loaded.model->frame->origin()));
+        BodySurface::of_tets(mesh.tets, mesh.vertices, loaded.data.modal->basis, loaded.model->frame->origin()),
+        config.contact.self);
     for (std::size_t i = 0; i < bodies.places.size(); ++i) {
       const bool alone = bodies.places.size() == 1;
       world.bodies.push_back({alone ? bodies.name : fmt::format("{}_{}", bodies.name, i), world.kinds.size() - 1,

@@ -31,7 +31,8 @@ TetMesh bar_mesh(const BarOptions& options) {
   Eigen::Index tet = 0;
   for (int i = 0; i < nx; ++i)
     for (int j = 0; j < ny; ++j)
-      for (int k = 0; k < nz; ++k)
+      for (int k = 0; k < nz; ++k) {
+        if (options.slot_start >= 0 && i >= options.slot_start && k == 1) continue;
         for (const auto& order : kAxisOrders) {
           std::array<int, 3> at{i, j, k};
           mesh.tets(tet, 0) = index(at[0], at[1], at[2]);
@@ -44,6 +45,8 @@ TetMesh bar_mesh(const BarOptions& options) {
           if (edges.determinant() < 0) std::swap(mesh.tets(tet, 2), mesh.tets(tet, 3));
           ++tet;
         }
+      }
+  mesh.tets.conservativeResize(tet, 4);
   return mesh;
 }
 

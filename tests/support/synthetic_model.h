@@ -20,6 +20,7 @@ struct BarOptions {
   double density_gradient = 0;  ///< density * (1 + density_gradient * x / length)
   bool free = false;            ///< not clamped: the six rigid modes are left out and /rigid is filled
   bool carried = false;         ///< clamped, and /rigid is filled
+  int slot_start = -1;  ///< cells of the second layer in z from here to the end are left out: a bar with two prongs
   int linear_modes = 8;
   int eigenfunctions = 6;  ///< m
   int examples = 0;        ///< K, the rest pose counted: rest, bend, twist, stretch, then mixtures of them

@@ -52,19 +52,46 @@ std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen
 
 }  // namespace
 
-TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of)
+TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself)
     : surface(std::move(of)), normals(set.vertices(), 3) {
   SurfaceShape shape = surface.make_shape();
   surface.place(Eigen::VectorXd::Zero(surface.modes()), shape);
   for (int i = 0; i < normals.rows(); ++i) {
     const auto hit = surface.nearest(set.rest(i), std::numeric_limits<double>::infinity(), shape);
     normals.row(i) = hit ? hit->normal : Eigen::Vector3d::Zero();
+    places.push_back(hit.value_or(SurfaceHit()));
   }
+  if (!meets_itself) return;
+  VertexArray rest(set.vertices(), 3);
+  RowMatrix basis(3 * set.vertices(), set.modes());
+  for (int i = 0; i < rest.rows(); ++i) {
+    rest.row(i) = set.rest(i);
+    basis.middleRows<3>(3 * i) = set.basis_rows(i);
+  }
+  approach_bounds = surface.approach_bounds(rest, basis);
 }
 
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
                          const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
                          BodyCandidates& candidates) const {
+  gather_near(a, b, time_step, margin, anew, /*own=*/false, held, shape, candidates);
+}
+
+void BodyContact::gather_own(const TouchingBody& body, double time_step, double margin,
+                             const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
+                             BodyCandidates& candidates) const {
+  gather_near(body, body, time_step, margin, /*anew=*/false, /*own=*/true, held, shape, candidates);
+}
+
+bool BodyContact::may_meet_itself(const TouchingBody& body, double time_step) noexcept {
+  const Eigen::VectorXd& bounds = body.touching.approach_bounds;
+  if (bounds.size() == 0) return false;
+  return bounds.dot(body.pose.q.cwiseAbs() + kContactMarginSteps * time_step * body.velocity.v.cwiseAbs()) >= 1;
+}
+
+void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
+                              bool own, const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
+                              BodyCandidates& candidates) const {
   candidates.all.clear();
   const DeformationTree& tree = a.set.tree();
   const double q_norm = a.pose.q.norm();
@@ -77,10 +104,19 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double ti
     const Eigen::Vector3d arm = a.set.world_arm(vertex, a.pose);
     const Eigen::Vector3d offset = a.pose.position + arm - b.pose.position;
     const double depth = anew ? deepest : was_inside ? -last->gap : 0;
-    const Eigen::Vector3d looks =
-        b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
-    const auto hit =
-        nearest_facing(b.touching.surface, b.pose.rotation.transpose() * offset, looks, margin + depth, shape);
+    const Eigen::Vector3d point = b.pose.rotation.transpose() * offset;
+    const auto to_others = [&] {
+      const Eigen::Vector3d looks =
+          b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
+      return nearest_facing(b.touching.surface, point, looks, margin + depth, shape);
+    };
+    const auto to_own = [&] {
+      const Eigen::Vector3d looks =
+          b.touching.surface.normal_of(b.touching.places[static_cast<std::size_t>(vertex)], shape);
+      return b.touching.surface.nearest_approached(point, a.set.rest(vertex), looks, margin + depth, shape);
+    };
+    const auto hit = own ? to_own() : to_others();
+    if (own && hit && hit->distance < 0 && !was_inside) return;
     if (!hit || hit->distance > margin) return;
     BodyCandidate& candidate = candidates.all.emplace_back();
     candidate.vertex = vertex;

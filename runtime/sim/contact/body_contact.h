@@ -32,10 +32,12 @@ struct BodyCandidates {
 
 /// The surface of a body that touches others, and how its vertices look.
 struct TouchingSurface {
-  TouchingSurface(const ContactSet& set, BodySurface of);
+  TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself = false);
 
   BodySurface surface;
-  VertexArray normals;  ///< of the vertices of the set at rest, unit, outward
+  VertexArray normals;              ///< of the vertices of the set at rest, unit, outward
+  std::vector<SurfaceHit> places;   ///< of the vertices of the set on the surface
+  Eigen::VectorXd approach_bounds;  ///< [r] BodySurface::approach_bounds() of them; empty where it never meets itself
 };
 
 /// One body of a pair: what it is, where, and how it moves.
@@ -61,6 +63,14 @@ class BodyContact {
   void gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
               const std::vector<HeldBodyContact>& held, SurfaceShape& shape, BodyCandidates& candidates) const;
 
+  /// The same of a body with itself: vertices that parts of its surface which are farther away at rest have come near
+  /// to from outside. What overlaps at the start never pushes.
+  void gather_own(const TouchingBody& body, double time_step, double margin, const std::vector<HeldBodyContact>& held,
+                  SurfaceShape& shape, BodyCandidates& candidates) const;
+
+  /// Whether parts of the body may have come near to each other within the step: O(r).
+  static bool may_meet_itself(const TouchingBody& body, double time_step) noexcept;
+
   /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone.
   void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
                 ContactSums& sums_a, ContactSums& sums_b) const noexcept;
@@ -82,6 +92,9 @@ class BodyContact {
               std::vector<HeldBodyContact>& held) const;
 
  private:
+  void gather_near(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew, bool own,
+                   const std::vector<HeldBodyContact>& held, SurfaceShape& shape, BodyCandidates& candidates) const;
+
   ContactLaw law_;
 };
 

@@ -1,6 +1,8 @@
 #include "runtime/sim/contact/body_surface.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -13,6 +15,7 @@ namespace {
 
 constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it normals of the surface say which way is out
 
+constexpr double kApproached = 0.5;  // of the distance at rest
 constexpr int kLeafTriangles = 4;
 constexpr double kSameWay = 0.5;  // cosine
 
@@ -114,8 +117,9 @@ bool BodySurface::may_be_within(const Eigen::Vector3d& point, double radius, Sur
   return false;
 }
 
-std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
-                                               const Eigen::Vector3d* facing) const noexcept {
+template <class Accept>
+std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
+                                              const Accept& accepts) const noexcept {
   struct Waiting {
     int node;
     double bound;  // on the distance
@@ -148,10 +152,7 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
                               position(triangles_(triangle, 2), shape));
       if (here.squared_distance > nearest) continue;
       if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
-      if (facing != nullptr) {
-        const Eigen::Vector3d normal = area_normal(triangle, shape);
-        if (normal.dot(*facing) > kSameWay * normal.norm()) continue;
-      }
+      if (!accepts(triangle, here)) continue;
       nearest = here.squared_distance;
       best = here;
       found = triangle;
@@ -166,6 +167,60 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
   if (distance * distance > kNoDistance * kNoDistance * area_normal(found, shape).norm())
     hit.normal = side / distance * away;
   return hit;
+}
+
+std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
+                                               const Eigen::Vector3d* facing) const noexcept {
+  if (facing == nullptr) return search(point, radius, shape, [](int, const TrianglePoint&) { return true; });
+  return search(point, radius, shape,
+                [&](int triangle, const TrianglePoint&) { return !looks_along(triangle, *facing, shape); });
+}
+
+std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
+                                                          const Eigen::Vector3d& facing, double radius,
+                                                          SurfaceShape& shape) const noexcept {
+  return search(point, radius, shape, [&](int triangle, const TrianglePoint& here) {
+    const double at_rest = (rest - rest_of({triangle, here.barycentric})).squaredNorm();
+    return here.squared_distance < kApproached * kApproached * at_rest && !looks_along(triangle, facing, shape);
+  });
+}
+
+Eigen::VectorXd BodySurface::approach_bounds(const VertexArray& rest, const RowMatrix& basis) const {
+  Eigen::VectorXd bounds = Eigen::VectorXd::Zero(modes());
+  for (Eigen::Index i = 0; i < rest.rows(); ++i)
+    for (Eigen::Index t = 0; t < triangles_.rows(); ++t) {
+      const auto corner = [&](int c) -> Eigen::Vector3d { return rest_.row(triangles_(t, c)); };
+      const double distance =
+          std::sqrt(nearest_on_triangle(rest.row(i), corner(0), corner(1), corner(2)).squared_distance);
+      const Eigen::Vector3d first = corner(1) - corner(0), second = corner(2) - corner(0);
+      const bool beside = distance * distance <= kNoDistance * kNoDistance * first.cross(second).norm();
+      Eigen::Matrix<double, 3, 2> edges;
+      edges << first, second;
+      const Eigen::Matrix2d metric = (edges.transpose() * edges).inverse();
+      for (Eigen::Index j = 0; j < modes(); ++j) {
+        const auto moved = [&](int c) -> Eigen::Vector3d { return basis_.block<3, 1>(3 * triangles_(t, c), j); };
+        double ratio = 0;
+        if (beside) {  // the norm of the gradient in the triangle is above that of its singular values
+          Eigen::Matrix<double, 3, 2> change;
+          change << moved(1) - moved(0), moved(2) - moved(0);
+          ratio = std::sqrt((change * metric * change.transpose()).trace());
+        } else {
+          const Eigen::Vector3d own = basis.block<3, 1>(3 * i, j);
+          for (int c = 0; c < 3; ++c) ratio = std::max(ratio, (moved(c) - own).norm() / distance);
+        }
+        bounds[j] = std::max(bounds[j], ratio / (1 - kApproached));
+      }
+    }
+  return bounds;
+}
+
+Eigen::Vector3d BodySurface::normal_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept {
+  return outward(hit.triangle, hit.barycentric, shape).normalized();
+}
+
+bool BodySurface::looks_along(int triangle, const Eigen::Vector3d& facing, SurfaceShape& shape) const noexcept {
+  const Eigen::Vector3d normal = area_normal(triangle, shape);
+  return normal.dot(facing) > kSameWay * normal.norm();
 }
 
 /// Its length is twice the area.

@@ -176,6 +176,7 @@ void IslandProblem::assemble_dense() noexcept {
   for (const WorldBody* const own : bodies_)
     A.block(own->offset, own->offset, own->unknowns(), own->unknowns()) = own->near().newton.hessian;
   for (const PairContact* const pair : pairs_) {
+    if (pair->is_own()) continue;
     const WorldBody &a = first(*pair), &b = second(*pair);
     A.block(b.offset, a.offset, b.unknowns(), a.unknowns()) += pair->coupling().transpose();
   }
@@ -210,6 +211,7 @@ void IslandProblem::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product)
     part.noalias() = own.near().newton.hessian.selfadjointView<Eigen::Lower>() * x.segment(own.offset, own.unknowns());
     for (const auto& [index, side] : incidences_[i]) {
       const PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
+      if (pair.is_own()) continue;
       const WorldBody& other = side == 0 ? second(pair) : first(pair);
       const auto theirs = x.segment(other.offset, other.unknowns());
       if (side == 0)

@@ -5,12 +5,12 @@
 #include "runtime/sim/step/contact_step.h"
 
 namespace exmat::runtime {
-namespace {
-
 TouchingBody touching(const WorldBody& body) {
   return {body.contact(), body.touching, pose_of(body.model, body.state),
           BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
 }
+
+namespace {
 
 /// Columns about world axes become those of the unknowns.
 void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index used, Eigen::MatrixXd& columns) {
@@ -38,11 +38,18 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
                             held_ != nullptr ? held_->held[at] : none, other.shape, candidates_[at]);
 }
 
+void PairContact::gather_own(const ContactLaw& law, WorldBody& body, double margin) {
+  static const std::vector<HeldBodyContact> none;
+  half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction};
+  BodyContact(half_).gather_own(touching(body), body.scene.time_step, margin, held_ != nullptr ? held_->held[0] : none,
+                                body.shape, candidates_[0]);
+}
+
 void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
   sums_[0].set_zero(first.state.q.size());
   sums_[1].set_zero(second.state.q.size());
   const BodyContact contact(half_);
-  contact.evaluate(first.contact(), first.pose(), second.pose(), candidates_[0], sums_[0], sums_[1]);
+  contact.evaluate(first.contact(), first.pose(), second.pose(), candidates_[0], sums_[0], sums_[is_own() ? 0 : 1]);
   contact.evaluate(second.contact(), second.pose(), first.pose(), candidates_[1], sums_[1], sums_[0]);
 }
 
@@ -59,17 +66,19 @@ void PairContact::set_columns(const WorldBody& first, const WorldBody& second) {
     used_[at] = BodyContact::stiffness_columns(own.contact(), own.rigid(), other.rigid(), own.pose(), other.pose(),
                                                candidates_[at], own_columns_[at], other_columns_[at]);
   }
+  if (is_own()) own_columns_[0].leftCols(used_[0]) -= other_columns_[0].leftCols(used_[0]);
 }
 
 void PairContact::add_stiffness(int side, Eigen::MatrixXd& stiffness) const {
   const auto at = static_cast<std::size_t>(side);
   auto lower = stiffness.selfadjointView<Eigen::Lower>();
   if (used_[at] > 0) lower.rankUpdate(own_columns_[at].leftCols(used_[at]));
-  if (used_[1 - at] > 0) lower.rankUpdate(other_columns_[1 - at].leftCols(used_[1 - at]));
+  if (used_[1 - at] > 0 && !is_own()) lower.rankUpdate(other_columns_[1 - at].leftCols(used_[1 - at]));
 }
 
 void PairContact::set_coupling(const WorldBody& first, const Eigen::VectorXd& x_first, const WorldBody& second,
                                const Eigen::VectorXd& x_second) {
+  if (is_own()) return;
   coupling_.setZero(first.unknowns(), second.unknowns());
   to_unknowns(first, x_first, used_[0], own_columns_[0]);
   to_unknowns(second, x_second, used_[0], other_columns_[0]);
@@ -97,7 +106,7 @@ Eigen::Vector3d PairContact::torque_correction(const WorldBody& first, const Eig
     const Eigen::Vector3d between = own.placement.position - other.placement.position - (own_way - other_way);
     for (const BodyCandidate& candidate : candidates_[at].all) {
       const Eigen::Vector3d apart = between + candidate.arm - candidate.surface_arm;
-      sum -= 0.5 * apart.cross(candidate.force);
+      sum -= (is_own() ? 1 : 0.5) * apart.cross(candidate.force);
     }
   }
   return sum;

@@ -9,13 +9,17 @@
 
 namespace exmat::runtime {
 
+/// A body where the step begins.
+TouchingBody touching(const WorldBody& body);
+
 /// What two bodies remember of their contacts from step to step.
 struct HeldPair {
   int first = 0, second = 0;                           ///< bodies, first < second
   std::array<std::vector<HeldBodyContact>, 2> held{};  ///< the first's vertices, the second's vertices
 };
 
-/// Two bodies that may touch in a step: each one's vertices against the other's surface, with half of the law.
+/// Two bodies that may touch in a step, or a body that may touch itself: each one's vertices against the other's
+/// surface, with half of the law.
 class PairContact {
  public:
   /// Bodies and what they remember; nothing is met yet.
@@ -23,11 +27,15 @@ class PairContact {
 
   /// Its bodies are called by these numbers from now on.
   void number(int first, int second) noexcept { bodies_ = {first, second}; }
+  /// Whether it is a body with itself: of the first side alone, and without coupling.
+  bool is_own() const noexcept { return bodies_[0] == bodies_[1]; }
   int body(int side) const noexcept { return bodies_[static_cast<std::size_t>(side)]; }
   bool empty() const noexcept { return candidates_[0].all.empty() && candidates_[1].all.empty(); }
 
   /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
   void gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin);
+
+  void gather_own(const ContactLaw& law, WorldBody& body, double margin);
 
   // At the iterates of the bodies.
 

@@ -10,6 +10,7 @@
 namespace exmat::runtime {
 namespace {
 
+constexpr double kOwnMargin = 1e-3;        // of the body's radius: a part at rest may speed up within a step
 constexpr std::size_t kSharedIsland = 32;  // bodies; a larger one is shared by the threads
 
 Eigen::Vector3d linear_velocity(const WorldBody& body) { return body.model.frame->velocity(body.state.frame).linear; }
@@ -85,6 +86,10 @@ void World::find_pairs(int threads) {
                  ball.radius + margins_[i] + kContactMarginSteps * straight};
   }
   overlapping_pairs(balls_, order_, near_);
+  const std::size_t others = near_.size();
+  for (int i = 0; i < count(); ++i)
+    if (BodyContact::may_meet_itself(touching(at(i)), at(i).scene.time_step)) near_.emplace_back(i, i);
+  if (near_.size() > others) std::ranges::sort(near_);
 }
 
 const HeldPair* World::held_of(int first, int second) const {
@@ -101,7 +106,7 @@ void World::gather(int threads) {
     const auto [first, second] = near_[p];
     pairs_[p]->reset(first, second, held_of(first, second));
     against_[static_cast<std::size_t>(second)].push_back({static_cast<int>(p), 0});
-    against_[static_cast<std::size_t>(first)].push_back({static_cast<int>(p), 1});
+    if (first != second) against_[static_cast<std::size_t>(first)].push_back({static_cast<int>(p), 1});
   }
 #pragma omp parallel for schedule(dynamic, 4) num_threads(threads) if (threads > 1)
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
@@ -110,6 +115,11 @@ void World::gather(int threads) {
     other.surface.place(other.state.q, other.shape);
     for (const auto& [index, side] : against_[i]) {
       PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
+      if (pair.is_own()) {
+        const double way = 2 * other.scene.time_step * other.contact().tree().basis_norm() * other.state.v.norm();
+        pair.gather_own(law_, other, kContactMarginSteps * way + kOwnMargin * balls_[i].radius);
+        continue;
+      }
       const int own = pair.body(side);
       const Eigen::Vector3d apart = linear_velocity(at(own)) - linear_velocity(other);
       const double straight = kContactMarginSteps * other.scene.time_step * apart.norm();
@@ -164,7 +174,7 @@ void World::make_islands() {
     island.pairs.push_back(pairs_[p].get());
     island.pairs.back()->number(place_in_island_[first], place_in_island_[second]);
     island.incidences[static_cast<std::size_t>(place_in_island_[first])].push_back({index, 0});
-    island.incidences[static_cast<std::size_t>(place_in_island_[second])].push_back({index, 1});
+    if (first != second) island.incidences[static_cast<std::size_t>(place_in_island_[second])].push_back({index, 1});
   }
 }
 

@@ -32,7 +32,8 @@ struct WorldReport {
 /// on the number of threads. docs/step_in_detail.md, "Bodies that touch".
 class World {
  public:
-  /// All with the same time step, `law` between any two of them. Models, scenes and surfaces outlive the world.
+  /// All with the same time step, `law` between any two of them and between parts of one whose surface meets itself.
+  /// Models, scenes and surfaces outlive the world.
   World(std::vector<WorldBodyStart> bodies, const ContactLaw& law);
 
   int count() const noexcept { return static_cast<int>(bodies_.size()); }

@@ -110,5 +110,54 @@ TEST(BodySurface, QueriesDoNotAllocate) {
   EXPECT_EQ(counter.count(), 0);
 }
 
+TEST(BodySurface, NothingApproachesItselfWithinTheBounds) {
+  const test::Bar bar = test::make_bar({.cells = {6, 2, 3}, .lengths = {0.6, 0.2, 0.3}, .slot_start = 2});
+  const TetMesh& mesh = bar.model.object->mesh;
+  const BodySurface surface = BodySurface::of_tets(mesh.tets, mesh.vertices, bar.basis(), Eigen::Vector3d::Zero());
+  const TriangleArray triangles = surface_triangles(mesh.tets);
+  const Eigen::VectorXd bounds = surface.approach_bounds(mesh.vertices, bar.basis());
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  SurfaceShape shape = surface.make_shape();
+  double nearest_to_bound = 1;
+  const auto smallest_ratio = [&](const Eigen::VectorXd& q) {  // of distances to those at rest, at points of triangles
+    VertexArray x = mesh.vertices;
+    x.reshaped<Eigen::RowMajor>() += bar.basis() * q;
+    double smallest = 1;
+    for (Eigen::Index v = 0; v < x.rows(); ++v)
+      for (Eigen::Index t = 0; t < triangles.rows(); ++t)
+        for (int a = 0; a <= 4; ++a)
+          for (int b = 0; a + b <= 4; ++b) {
+            const Eigen::Vector3d weights(a / 4.0, b / 4.0, (4 - a - b) / 4.0);
+            Eigen::RowVector3d there = Eigen::RowVector3d::Zero(), at_rest = Eigen::RowVector3d::Zero();
+            for (int c = 0; c < 3; ++c) {
+              there += weights[c] * x.row(triangles(t, c));
+              at_rest += weights[c] * mesh.vertices.row(triangles(t, c));
+            }
+            const double rest = (mesh.vertices.row(v) - at_rest).norm();
+            if (rest > 1e-12) smallest = std::min(smallest, (x.row(v) - there).norm() / rest);
+          }
+    return smallest;
+  };
+  for (int trial = 0; trial < 8; ++trial) {
+    // One mode alone uses its bound up; mixtures stay below.
+    Eigen::VectorXd q = trial < 4
+                            ? Eigen::VectorXd(Eigen::VectorXd::Unit(bar.modes(), trial))
+                            : Eigen::VectorXd(Eigen::VectorXd::NullaryExpr(bar.modes(), [&] { return unit(random); }));
+    q *= 0.999 / bounds.dot(q.cwiseAbs());
+    for (const double sign : {-1.0, 1.0}) {
+      const double ratio = smallest_ratio(sign * q);
+      EXPECT_GE(ratio, 0.5);
+      nearest_to_bound = std::min(nearest_to_bound, ratio);
+      surface.place(sign * q, shape);
+      for (Eigen::Index v = 0; v < mesh.vertices.rows(); v += 7) {
+        const Eigen::Vector3d point = mesh.vertices.row(v).transpose() + bar.basis().middleRows<3>(3 * v) * sign * q;
+        EXPECT_FALSE(surface.nearest_approached(point, mesh.vertices.row(v), Eigen::Vector3d::Zero(), 1, shape));
+      }
+    }
+  }
+  EXPECT_LT(nearest_to_bound, 0.75);  // not idle
+}
+
 }  // namespace
 }  // namespace exmat::runtime

@@ -12,7 +12,7 @@ namespace exmat::runtime::test {
 
 /// Free or clamped blocks of one model, in a world.
 struct Blocks {
-  explicit Blocks(double time_step, const exmat::test::BarOptions& options = free_block())
+  explicit Blocks(double time_step, const exmat::test::BarOptions& options = free_block(), bool meets_itself = false)
       : bar(exmat::test::make_bar(options)) {
     bar.model.contact = exmat::test::surface_contact(bar.model);
     model = build_model(bar.model, {}).model;
@@ -22,7 +22,8 @@ struct Blocks {
     const ObjectData& object = *bar.model.object;
     surface = std::make_shared<TouchingSurface>(
         *model->contact,
-        BodySurface::of_tets(object.mesh.tets, object.mesh.vertices, bar.basis(), model->frame->origin()));
+        BodySurface::of_tets(object.mesh.tets, object.mesh.vertices, bar.basis(), model->frame->origin()),
+        meets_itself);
   }
 
   static exmat::test::BarOptions free_block() {
