@@ -59,7 +59,7 @@ TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool mee
   for (int i = 0; i < normals.rows(); ++i) {
     const auto hit = surface.nearest(set.rest(i), std::numeric_limits<double>::infinity(), shape);
     normals.row(i) = hit ? hit->normal : Eigen::Vector3d::Zero();
-    places.push_back(hit.value_or(SurfaceHit()));
+    if (meets_itself) places.push_back(hit.value_or(SurfaceHit()));
   }
   if (!meets_itself) return;
   VertexArray rest(set.vertices(), 3);
@@ -69,6 +69,12 @@ TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool mee
     basis.middleRows<3>(3 * i) = set.basis_rows(i);
   }
   approach_bounds = surface.approach_bounds(rest, basis);
+}
+
+bool TouchingSurface::may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                      double time_step) const noexcept {
+  if (approach_bounds.size() == 0) return false;
+  return approach_bounds.dot(q.cwiseAbs() + kContactMarginSteps * time_step * v.cwiseAbs()) >= 1;
 }
 
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
@@ -81,12 +87,6 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
                              const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
                              BodyCandidates& candidates) const {
   gather_near(body, body, time_step, margin, /*anew=*/false, /*own=*/true, held, shape, candidates);
-}
-
-bool BodyContact::may_meet_itself(const TouchingBody& body, double time_step) noexcept {
-  const Eigen::VectorXd& bounds = body.touching.approach_bounds;
-  if (bounds.size() == 0) return false;
-  return bounds.dot(body.pose.q.cwiseAbs() + kContactMarginSteps * time_step * body.velocity.v.cwiseAbs()) >= 1;
 }
 
 void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,

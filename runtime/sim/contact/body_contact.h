@@ -34,10 +34,16 @@ struct BodyCandidates {
 struct TouchingSurface {
   TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself = false);
 
+  /// Whether parts of it may have come near to each other at q [r], moving at v [r/s], within a step of `time_step`
+  /// [s]. O(r); never, where it does not meet itself.
+  bool may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step) const noexcept;
+
   BodySurface surface;
-  VertexArray normals;              ///< of the vertices of the set at rest, unit, outward
+  VertexArray normals;  ///< of the vertices of the set at rest, unit, outward
+
+  // Empty where it does not meet itself.
   std::vector<SurfaceHit> places;   ///< of the vertices of the set on the surface
-  Eigen::VectorXd approach_bounds;  ///< [r] BodySurface::approach_bounds() of them; empty where it never meets itself
+  Eigen::VectorXd approach_bounds;  ///< [r] BodySurface::approach_bounds() of them
 };
 
 /// One body of a pair: what it is, where, and how it moves.
@@ -67,9 +73,6 @@ class BodyContact {
   /// to from outside. What overlaps at the start never pushes.
   void gather_own(const TouchingBody& body, double time_step, double margin, const std::vector<HeldBodyContact>& held,
                   SurfaceShape& shape, BodyCandidates& candidates) const;
-
-  /// Whether parts of the body may have come near to each other within the step: O(r).
-  static bool may_meet_itself(const TouchingBody& body, double time_step) noexcept;
 
   /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone.
   void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,

@@ -26,6 +26,7 @@ struct DeformationTree::Points {
   const IndexMatrix& items;
   const VertexArray& rest;
   const RowMatrix& basis;
+  int leaf_items;
 
   /// The points of some items; each once where items are points.
   std::vector<int> of(const std::vector<int>& order, int first, int last) const {
@@ -47,10 +48,10 @@ struct DeformationTree::Points {
 
 DeformationTree::DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis,
                                  int leaf_items)
-    : leaf_items_(leaf_items), order_(static_cast<std::size_t>(items.rows())) {
+    : order_(static_cast<std::size_t>(items.rows())) {
   if (order_.empty()) return;
   std::iota(order_.begin(), order_.end(), 0);
-  const Points points{items, rest, basis};
+  const Points points{items, rest, basis, leaf_items};
   build(points, 0, static_cast<int>(order_.size()));
   basis_norm_ = largest_norm(basis, points.of(order_, 0, static_cast<int>(order_.size())), Rows::Zero(3, basis.cols()));
 }
@@ -60,7 +61,7 @@ void DeformationTree::build(const Points& points, int first, int last) {
   nodes_.emplace_back();
   nodes_[at].first = first;
   nodes_[at].last = last;
-  nodes_[at].is_leaf = last - first <= leaf_items_;
+  nodes_[at].is_leaf = last - first <= points.leaf_items;
   set_bounds(points, nodes_[at]);
   if (!nodes_[at].is_leaf) {
     VertexArray middles(last - first, 3);

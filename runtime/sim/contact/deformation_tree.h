@@ -48,7 +48,6 @@ class DeformationTree {
 
  private:
   struct Points;
-  int leaf_items_ = 0;
   void build(const Points& points, int first, int last);
   void set_bounds(const Points& points, Node& node);
 

@@ -5,12 +5,13 @@
 #include "runtime/sim/step/contact_step.h"
 
 namespace exmat::runtime {
+namespace {
+
+/// A body where the step begins.
 TouchingBody touching(const WorldBody& body) {
   return {body.contact(), body.touching, pose_of(body.model, body.state),
           BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
 }
-
-namespace {
 
 /// Columns about world axes become those of the unknowns.
 void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index used, Eigen::MatrixXd& columns) {
@@ -34,15 +35,13 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
   static const std::vector<HeldBodyContact> none;
   half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction};
   const auto at = static_cast<std::size_t>(side);
-  BodyContact(half_).gather(touching(own), touching(other), own.scene.time_step, margin, own.anew || other.anew,
-                            held_ != nullptr ? held_->held[at] : none, other.shape, candidates_[at]);
-}
-
-void PairContact::gather_own(const ContactLaw& law, WorldBody& body, double margin) {
-  static const std::vector<HeldBodyContact> none;
-  half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction};
-  BodyContact(half_).gather_own(touching(body), body.scene.time_step, margin, held_ != nullptr ? held_->held[0] : none,
-                                body.shape, candidates_[0]);
+  const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
+  const BodyContact contact(half_);
+  if (is_own())
+    contact.gather_own(touching(own), own.scene.time_step, margin, held, other.shape, candidates_[at]);
+  else
+    contact.gather(touching(own), touching(other), own.scene.time_step, margin, own.anew || other.anew, held,
+                   other.shape, candidates_[at]);
 }
 
 void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {

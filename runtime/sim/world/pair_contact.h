@@ -9,9 +9,6 @@
 
 namespace exmat::runtime {
 
-/// A body where the step begins.
-TouchingBody touching(const WorldBody& body);
-
 /// What two bodies remember of their contacts from step to step.
 struct HeldPair {
   int first = 0, second = 0;                           ///< bodies, first < second
@@ -34,8 +31,6 @@ class PairContact {
 
   /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
   void gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin);
-
-  void gather_own(const ContactLaw& law, WorldBody& body, double margin);
 
   // At the iterates of the bodies.
 

@@ -87,8 +87,10 @@ void World::find_pairs(int threads) {
   }
   overlapping_pairs(balls_, order_, near_);
   const std::size_t others = near_.size();
-  for (int i = 0; i < count(); ++i)
-    if (BodyContact::may_meet_itself(touching(at(i)), at(i).scene.time_step)) near_.emplace_back(i, i);
+  for (int i = 0; i < count(); ++i) {
+    const WorldBody& own = at(i);
+    if (own.touching.may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(i, i);
+  }
   if (near_.size() > others) std::ranges::sort(near_);
 }
 
@@ -96,6 +98,17 @@ const HeldPair* World::held_of(int first, int second) const {
   const auto before = [](const HeldPair& a, const std::pair<int, int>& b) { return std::pair(a.first, a.second) < b; };
   const auto found = std::lower_bound(held_.begin(), held_.end(), std::pair(first, second), before);
   return found != held_.end() && found->first == first && found->second == second ? &*found : nullptr;
+}
+
+/// How far apart vertices of one body and the surface of another, or of its own, may be and yet touch in the step [m].
+double World::margin_between(int own, int other) const noexcept {
+  const WorldBody &a = at(own), &b = at(other);
+  if (own == other) {
+    const double way = 2 * b.scene.time_step * b.contact().tree().basis_norm() * b.state.v.norm();
+    return kContactMarginSteps * way + kOwnMargin * balls_[static_cast<std::size_t>(own)].radius;
+  }
+  const double straight = kContactMarginSteps * b.scene.time_step * (linear_velocity(a) - linear_velocity(b)).norm();
+  return margins_[static_cast<std::size_t>(own)] + margins_[static_cast<std::size_t>(other)] + straight;
 }
 
 /// Candidates, the surface of one body at a time: what is computed of its shape serves all that are near.
@@ -115,15 +128,8 @@ void World::gather(int threads) {
     other.surface.place(other.state.q, other.shape);
     for (const auto& [index, side] : against_[i]) {
       PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
-      if (pair.is_own()) {
-        const double way = 2 * other.scene.time_step * other.contact().tree().basis_norm() * other.state.v.norm();
-        pair.gather_own(law_, other, kContactMarginSteps * way + kOwnMargin * balls_[i].radius);
-        continue;
-      }
       const int own = pair.body(side);
-      const Eigen::Vector3d apart = linear_velocity(at(own)) - linear_velocity(other);
-      const double straight = kContactMarginSteps * other.scene.time_step * apart.norm();
-      pair.gather(law_, side, at(own), other, margins_[static_cast<std::size_t>(own)] + margins_[i] + straight);
+      pair.gather(law_, side, at(own), other, margin_between(own, static_cast<int>(i)));
     }
   }
 }

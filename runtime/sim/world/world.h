@@ -56,6 +56,7 @@ class World {
  private:
   WorldBody& at(int body) const noexcept { return *bodies_[static_cast<std::size_t>(body)]; }
   void find_pairs(int threads);
+  double margin_between(int own, int other) const noexcept;
   void gather(int threads);
   void make_islands();
   void remember();

@@ -19,22 +19,18 @@ class WorldConfigTest : public ::testing::Test {
     std::ofstream(file) << text;
     return file;
   }
-  std::string failure_of(const std::string& text) const {
+  /// What a reader says of a file that it refuses; empty where it does not.
+  template <class Read>
+  std::string refusal_of(const Read& read, const std::string& name, const std::string& text) const {
     try {
-      load_world(write("a.json", text));
+      read(write(name, text));
     } catch (const InputError& error) {
       return error.what();
     }
     return "";
   }
-  std::string refused_poses(const std::string& text) const {
-    try {
-      read_poses(write("p.txt", text));
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
-  }
+  std::string failure_of(const std::string& text) const { return refusal_of(load_world, "a.json", text); }
+  std::string refused_poses(const std::string& text) const { return refusal_of(read_poses, "p.txt", text); }
 
   test::TemporaryFolder folder_;
 };
