@@ -47,4 +47,11 @@ void give(Struct from, std::size_t size, Struct* to) noexcept {
   std::memcpy(static_cast<void*>(to), &from, std::min(size, sizeof from));
 }
 
+/// The same of one of an array's, `size` bytes each, which does not begin with its size.
+template <typename Struct>
+void give_entry(const Struct& from, std::size_t size, void* to) noexcept {
+  if (size > sizeof from) std::memset(to, 0, size);
+  std::memcpy(to, &from, std::min(size, sizeof from));
+}
+
 }  // namespace exmat::runtime

@@ -7,58 +7,30 @@
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_obstacles.h"
+#include "runtime/api/body_steps.h"
 #include "runtime/api/handles.h"
 #include "runtime/api/startable_threads.h"
+#include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-/// Only one caller at a time may step a body.
-bool acquire(exmat_body& body) noexcept { return !body.in_use.test_and_set(std::memory_order_acquire); }
-void release(exmat_body& body) noexcept { body.in_use.clear(std::memory_order_release); }
-
-void add(const StepReport& step, exmat_report& sum) noexcept {
-  sum.status |= step.status;
-  sum.newton_iterations += step.newton_iterations;
-  sum.factorisations += step.factorisations;
-  sum.line_search_evaluations += step.line_search_evaluations;
-  sum.projections += step.projections;
-  sum.target_iterations += step.target_iterations;
-  sum.residual = step.residual;
-}
-
 void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcept {
   const Timer timer;
-  body.report = {};
-  body.contacts.clear();
-  while (body.report.steps < steps) {
-    const StepReport report = step(body.model(), body.scene, body.state, workspace);
-    add(report, body.report);
-    if ((report.status & kStepNonFinite) != 0) break;
-    body.contacts.add(report, body.model(), body.state, workspace);
-    ++body.report.steps;
-  }
+  begin_steps(body);
+  while (body.report.steps < steps && !non_finite(body))
+    add_step(step(body.model(), body.scene, body.state, workspace), workspace, body);
   body.report.seconds = timer.seconds();
-}
-
-bool non_finite(const exmat_body& body) noexcept { return (body.report.status & kStepNonFinite) != 0; }
-
-exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept {
-  return fail(EXMAT_NON_FINITE,
-              "%s: %s, step %" PRId64
-              " (t = %g s): NaN or infinity; the body is as it was before. Try a smaller "
-              "time_step (now %g s), smaller loads or example stiffness, or EXMAT_BACKWARD_EULER",
-              function, which, body.state.step + 1, body.state.time + body.scene.time_step, body.scene.time_step);
 }
 
 void put_to_rest(exmat_body& body) noexcept {
   const double time = body.state.time;
   body.state = body.start;  // vectors of the same lengths: no allocation
-  body.report = {};
-  body.contacts.clear();
+  begin_steps(body);
   keep_host_obstacles(time, body);
+  was_put(body);
 }
 
 /// Whether one may step in the scratch of the other.
@@ -68,10 +40,10 @@ bool lends(const exmat_body* lender, const exmat_body& body) noexcept {
 
 }  // namespace
 
-exmat_body::exmat_body(std::shared_ptr<const Source> its_source)
+exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start)
     : source(std::move(its_source)),
       scene(source->loaded.scene),
-      start(source->loaded.start),
+      start(std::move(its_start)),
       workspace(model(), scene),
       drawing(VertexPositions::make_workspace(model().modes())),
       force(Eigen::VectorXd::Zero(model().modes())),
@@ -86,10 +58,21 @@ exmat_status exmat_body_create(const exmat_model* model, exmat_body** body) noex
   EXMAT_REQUIRE(body);
   *body = nullptr;
   EXMAT_REQUIRE(model);
-  return guarded(__func__, [&] { *body = std::make_unique<exmat_body>(model->source).release(); });
+  return guarded(__func__,
+                 [&] { *body = std::make_unique<exmat_body>(model->source, model->source->loaded.start).release(); });
 }
 
-void exmat_body_destroy(exmat_body* body) noexcept { delete body; }
+void exmat_body_destroy(exmat_body* body) noexcept {
+  if (body != nullptr && body->world != nullptr) leave_world(*body);
+  delete body;
+}
+
+exmat_status exmat_body_model(const exmat_body* body, exmat_model** model) noexcept {
+  EXMAT_REQUIRE(model);
+  *model = nullptr;
+  EXMAT_REQUIRE(body);
+  return guarded(__func__, [&] { *model = new exmat_model{body->source}; });
+}
 
 exmat_status exmat_body_reset(exmat_body* body) noexcept {
   EXMAT_REQUIRE(body);
@@ -119,6 +102,8 @@ exmat_status exmat_body_step(exmat_body* body, std::int64_t steps, exmat_report*
   if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
   if (report != nullptr)
     if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
+  if (body->world != nullptr)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body is in a world: exmat_world_step() steps it", __func__);
   if (!acquire(*body)) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps this body", __func__);
   advance(*body, body->workspace, steps);
   const bool finite = !non_finite(*body);
@@ -138,6 +123,10 @@ exmat_status exmat_bodies_step(exmat_body* const* bodies, std::int64_t count, st
   const std::span all(bodies, static_cast<std::size_t>(count));
   const auto null = std::ranges::find(all, nullptr);
   if (null != all.end()) return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is NULL", __func__, null - all.begin());
+  const auto hosted = std::ranges::find_if(all, [](const exmat_body* body) { return body->world != nullptr; });
+  if (hosted != all.end())
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is in a world: exmat_world_step() steps it", __func__,
+                hosted - all.begin());
   const auto taken = std::ranges::find_if(all, [](exmat_body* body) { return !acquire(*body); });
   if (taken != all.end()) {
     std::for_each(all.begin(), taken, [](exmat_body* body) { release(*body); });
@@ -274,6 +263,7 @@ exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
   if (!move_body(body->model(), body->scene, wanted, body->state, body->workspace))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
+  was_put(*body);
   return EXMAT_OK;
 }
 

@@ -22,6 +22,15 @@ void keep_host_obstacles(double time_before, exmat_body& body) noexcept {
   }
 }
 
+void size_for_contact(exmat_body& body) {
+  const std::size_t count = body.scene.obstacles.size();
+  prepare_contacts(body.model(), count, body.state);
+  prepare_contacts(body.model(), count, body.start);
+  body.workspace.near.reset();
+  if (may_touch(body.model(), body.scene)) body.workspace.near.emplace(body.model(), body.scene);
+  body.contacts.prepare(body.model(), count);
+}
+
 }  // namespace exmat::runtime
 
 namespace {
@@ -173,16 +182,6 @@ void forget(std::size_t place, ContactState& contacts) {
     if (contact.obstacle > gone) --contact.obstacle;
 }
 
-/// What is sized by the number of obstacles follows it.
-void resize(exmat_body& body) {
-  const std::size_t count = body.scene.obstacles.size();
-  prepare_contacts(body.model(), count, body.state);
-  prepare_contacts(body.model(), count, body.start);
-  body.workspace.near.reset();
-  if (count > 0) body.workspace.near.emplace(body.model(), body.scene);
-  body.contacts.prepare(body.model(), count);
-}
-
 }  // namespace
 
 exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, std::size_t size) noexcept {
@@ -206,7 +205,7 @@ exmat_status exmat_body_add_obstacle(exmat_body* body, const exmat_obstacle* obs
     body->obstacles.reserve(body->obstacles.size() + 1);
     body->scene.obstacles.push_back(made);
     try {
-      resize(*body);
+      size_for_contact(*body);
     } catch (...) {
       body->scene.obstacles.pop_back();
       throw;
@@ -224,7 +223,7 @@ exmat_status exmat_body_remove_obstacle(exmat_body* body, std::int64_t id) noexc
     body->obstacles.erase(body->obstacles.begin() + offset);
     body->scene.obstacles.erase(body->scene.obstacles.begin() + offset);
     forget(place, body->state.contacts);
-    resize(*body);
+    size_for_contact(*body);
   });
 }
 
@@ -300,8 +299,7 @@ exmat_status exmat_body_read_contacts(const exmat_body* body, exmat_contact* con
     copy(touch.normal, contact.normal);
     copy(touch.force, contact.force);
     contact.depth = touch.depth;
-    std::memset(to, 0, size);
-    std::memcpy(to, &contact, std::min(size, sizeof contact));
+    give_entry(contact, size, to);
     to += size;
   }
   return EXMAT_OK;

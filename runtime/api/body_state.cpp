@@ -6,7 +6,9 @@
 
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_obstacles.h"
+#include "runtime/api/body_steps.h"
 #include "runtime/api/failures.h"
+#include "runtime/api/world_handle.h"
 #include "runtime/scene/bodies.h"
 
 namespace exmat::runtime {
@@ -144,9 +146,9 @@ void set_state(std::span<const double> numbers, exmat_body& body) {
   read_contacts(reader, contacts, body, state.contacts);
   const double time = body.state.time;
   body.state = state;  // into the arrays that are there: they are handed out
-  body.report = {};
-  body.contacts.clear();
+  begin_steps(body);
   keep_host_obstacles(time, body);
+  was_put(body);
 }
 
 }  // namespace exmat::runtime

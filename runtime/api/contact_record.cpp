@@ -22,9 +22,9 @@ void ContactRecord::add(const StepReport& report, const Model& model, const Stat
                         const Workspace& workspace) noexcept {
   ++steps_;
   count_ = 0;
-  if (!workspace.near || obstacles_.empty()) return;
+  const bool touched = report.contacts > 0 || !report.contact_force.isZero(0);
+  if (!workspace.near || !touched) return;
   const ContactWorkspace& contact = workspace.near->contact;
-  if (contact.candidate_count == 0) return;
   body_.force += report.contact_force;
   body_.torque += contact.torque;
   const Eigen::Vector3d centre = model.frame->placement(state.frame).position;

@@ -2,25 +2,19 @@
 
 #include <algorithm>
 #include <cinttypes>
-#include <mutex>
 #include <string>
 
 #include "common/config/config.h"
 #include "common/core/version.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/handles.h"
+#include "runtime/api/reading.h"
 #include "runtime/api/settings.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
-
-/// HDF5 is not made for several threads.
-std::mutex& reading() {
-  static std::mutex mutex;
-  return mutex;
-}
 
 exmat_model* load_model(SceneConfig config) {
   config.trajectory.reset();  // positions are read when they are asked for

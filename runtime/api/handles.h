@@ -35,7 +35,7 @@ struct exmat_points {
 };
 
 struct exmat_body {
-  explicit exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source);
+  exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source, exmat::runtime::State its_start);
 
   const exmat::runtime::Model& model() const { return *source->loaded.model; }
   Eigen::Index modes() const { return state.q.size(); }
@@ -52,6 +52,7 @@ struct exmat_body {
   exmat_report report{};
   exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
+  exmat_world* world = nullptr;  ///< that it is in
 };
 
 // NOLINTEND(readability-identifier-naming)

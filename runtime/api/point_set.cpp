@@ -20,17 +20,6 @@ constexpr std::size_t kWholeBasisAbove = 8;
 /// Distances below this share of the diagonal of the bounding box are 0.
 constexpr double kRelativeRounding = 1e-12;
 
-ReducedModel read_rest(const Source& source, bool basis) {
-  const std::string reason = "points are asked for";
-  const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
-  ReducedModel data = read_bundle(source.bundle, {.groups = groups, .step_only = true, .positions = true});
-  const BundleSummary& summary = source.loaded.summary;
-  if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
-    throw InputError({source.bundle.string(), "/", "the bundle that the model was created from", "another one",
-                      "create the model again"});
-  return data;
-}
-
 RowMatrix rows_of(const Source& source, const Ids& ids) {
   if (ids.size() * kWholeBasisAbove < static_cast<std::size_t>(source.loaded.summary.vertices))
     return read_basis_rows(source.bundle, ids);
@@ -42,6 +31,17 @@ RowMatrix rows_of(const Source& source, const Ids& ids) {
 }
 
 }  // namespace
+
+ReducedModel read_rest(const Source& source, bool basis) {
+  const std::string reason = "points are asked for";
+  const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
+  ReducedModel data = read_bundle(source.bundle, {.groups = groups, .step_only = true, .positions = true});
+  const BundleSummary& summary = source.loaded.summary;
+  if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
+    throw InputError({source.bundle.string(), "/", "the bundle that the model was created from", "another one",
+                      "create the model again"});
+  return data;
+}
 
 PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids) {
   const ReducedModel data = read_rest(source, /*basis=*/false);

@@ -15,6 +15,10 @@ struct Source {
   LoadedScene loaded;
 };
 
+/// The object of a source at rest and, where asked for, its modal basis. Throws InputError, also where the bundle is no
+/// longer the one that was loaded.
+ReducedModel read_rest(const Source& source, bool basis);
+
 /// k material points of a body.
 struct PointSet {
   VertexPositions positions;

@@ -17,6 +17,9 @@ inline constexpr StructSizes kMotionSizes{112, sizeof(exmat_motion)};
 inline constexpr StructSizes kEnergiesSizes{32, sizeof(exmat_energies)};
 inline constexpr StructSizes kObstacleSizes{152, sizeof(exmat_obstacle)};
 inline constexpr StructSizes kContactSizes{96, sizeof(exmat_contact)};
+inline constexpr StructSizes kContactLawSizes{40, sizeof(exmat_contact_law)};
+inline constexpr StructSizes kWorldReportSizes{72, sizeof(exmat_world_report)};
+inline constexpr StructSizes kBodyContactSizes{104, sizeof(exmat_body_contact)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
 
 /// The defaults of a scene file.

@@ -27,6 +27,14 @@ void check_places(const BodiesConfig& bodies, bool constrained) {
 
 }  // namespace
 
+std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, const ReducedModel& data,
+                                                        bool meets_itself) {
+  const TetMesh& mesh = data.object->mesh;
+  return std::make_shared<TouchingSurface>(
+      *model.contact, BodySurface::of_tets(mesh.tets, mesh.vertices, data.modal->basis, model.frame->origin()),
+      meets_itself);
+}
+
 LoadedWorld load_world_run(const WorldConfig& config) {
   LoadedWorld world;
   world.kinds.reserve(config.bodies.size());
@@ -34,11 +42,7 @@ LoadedWorld load_world_run(const WorldConfig& config) {
     LoadedKind& kind = world.kinds.emplace_back(LoadedKind{load_run(bodies.scene), nullptr});
     const LoadedScene& loaded = kind.loaded;
     check_places(bodies, loaded.summary.constrained);
-    const TetMesh& mesh = loaded.data.object->mesh;
-    kind.surface = std::make_shared<TouchingSurface>(
-        *loaded.model->contact,
-        BodySurface::of_tets(mesh.tets, mesh.vertices, loaded.data.modal->basis, loaded.model->frame->origin()),
-        config.contact.self);
+    kind.surface = touching_surface(*loaded.model, loaded.data, config.contact.self);
     for (std::size_t i = 0; i < bodies.places.size(); ++i) {
       const bool alone = bodies.places.size() == 1;
       world.bodies.push_back({alone ? bodies.name : fmt::format("{}_{}", bodies.name, i), world.kinds.size() - 1,

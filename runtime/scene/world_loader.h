@@ -32,6 +32,10 @@ struct LoadedWorld {
 /// places.
 LoadedWorld load_world_run(const WorldConfig& config);
 
+/// The surface of bodies of a model, of what /object and /modal of its bundle hold.
+std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, const ReducedModel& data,
+                                                        bool meets_itself);
+
 /// Its bodies as they start; refers to `loaded`.
 World make_world(const LoadedWorld& loaded, const WorldConfig& config);
 

@@ -93,8 +93,10 @@ class Model {
 
   const exmat_model* get() const noexcept { return handle_.get(); }
 
+  /// Takes it over.
+  explicit Model(exmat_model* model) noexcept : handle_(model) {}
+
  private:
-  explicit Model(exmat_model* model) : handle_(model) {}
   detail::Owner<exmat_model, exmat_model_destroy> handle_;
 };
 
@@ -134,12 +136,15 @@ class Points {
   detail::Owner<exmat_points, exmat_points_destroy> handle_;
 };
 
-class Body {
+/// A body that something else owns: a Body, or a World. Copied as a reference is.
+class BodyRef {
  public:
-  explicit Body(const Model& model) {
-    exmat_body* body = nullptr;
-    detail::check(exmat_body_create(model.get(), &body));
-    handle_.reset(body);
+  explicit BodyRef(exmat_body* body) noexcept : body_(body) {}
+
+  Model model() const {
+    exmat_model* model = nullptr;
+    detail::check(exmat_body_model(get(), &model));
+    return Model(model);
   }
 
   void reset() { detail::check(exmat_body_reset(get())); }
@@ -285,13 +290,39 @@ class Body {
     detail::check(exmat_body_set_state(get(), numbers.data(), detail::length(numbers)));
   }
 
-  exmat_body* get() const noexcept { return handle_.get(); }
+  exmat_body* get() const noexcept { return body_; }
+
+ protected:
+  exmat_body* body_;
+};
+
+class Body : public BodyRef {
+ public:
+  explicit Body(const Model& model) : BodyRef(nullptr) {
+    detail::check(exmat_body_create(model.get(), &body_));
+    handle_.reset(body_);
+  }
+  /// Takes it over.
+  explicit Body(exmat_body* body) noexcept : BodyRef(body), handle_(body) {}
+
+  Body(Body&& other) noexcept : BodyRef(std::exchange(other.body_, nullptr)), handle_(std::move(other.handle_)) {}
+  Body& operator=(Body&& other) noexcept {
+    handle_ = std::move(other.handle_);
+    body_ = std::exchange(other.body_, nullptr);
+    return *this;
+  }
+
+  /// Gives it away.
+  exmat_body* release() noexcept {
+    body_ = nullptr;
+    return handle_.release();
+  }
 
  private:
   detail::Owner<exmat_body, exmat_body_destroy> handle_;
 };
 
-/// Bodies that are stepped together.
+/// Bodies that are stepped together and do not touch each other.
 class Bodies {
  public:
   void add(Body body) {
@@ -312,6 +343,105 @@ class Bodies {
  private:
   std::vector<Body> bodies_;
   std::vector<exmat_body*> handles_;
+};
+
+inline exmat_contact_law default_contact_law() {
+  exmat_contact_law law;
+  detail::check(exmat_contact_law_default(&law, sizeof law));
+  return law;
+}
+
+/// Bodies that touch each other. It owns them.
+class World {
+ public:
+  World() : World(default_contact_law()) {}
+  /// Sets law.size itself.
+  explicit World(exmat_contact_law law) {
+    law.size = sizeof law;
+    exmat_world* world = nullptr;
+    detail::check(exmat_world_create(&law, &world));
+    handle_.reset(world);
+  }
+  /// Of a scene file of several bodies.
+  static World from_scene(const std::string& scene) {
+    exmat_world* world = nullptr;
+    detail::check(exmat_world_create_from_scene(scene.c_str(), &world));
+    return World(world);
+  }
+
+  exmat_contact_law contact_law() const {
+    exmat_contact_law law;
+    law.size = sizeof law;
+    detail::check(exmat_world_read_contact_law(get(), &law));
+    return law;
+  }
+  void set_contact_law(exmat_contact_law law) {
+    law.size = sizeof law;
+    detail::check(exmat_world_set_contact_law(get(), &law));
+  }
+
+  /// Its id.
+  std::int64_t add(Body body) {
+    std::int64_t id = -1;
+    detail::check(exmat_world_add_body(get(), body.get(), &id));
+    body.release();
+    return id;
+  }
+  Body remove(std::int64_t id) {
+    exmat_body* body = nullptr;
+    detail::check(exmat_world_remove_body(get(), id, &body));
+    return Body(body);
+  }
+  std::size_t size() const noexcept { return static_cast<std::size_t>(exmat_world_bodies(get())); }
+  std::vector<std::int64_t> ids() const {
+    std::vector<std::int64_t> ids(size());
+    detail::check(exmat_world_read_body_ids(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
+    return ids;
+  }
+  /// Of an id of ids().
+  BodyRef body(std::int64_t id) const noexcept { return BodyRef(exmat_world_body(get(), id)); }
+  std::string name(std::int64_t id) const { return exmat_world_body_name(get(), id); }
+
+  /// By up to `threads` threads, 0: as many as there are processors.
+  exmat_world_report step(std::int64_t steps = 1, int threads = 0) {
+    exmat_world_report report;
+    report.size = sizeof report;
+    detail::check(exmat_world_step(get(), steps, threads, &report));
+    return report;
+  }
+
+  std::vector<exmat_body_contact> contacts() const {
+    std::vector<exmat_body_contact> contacts(static_cast<std::size_t>(exmat_world_contacts(get())));
+    detail::check(exmat_world_read_contacts(get(), contacts.data(), static_cast<std::int64_t>(contacts.size()),
+                                            sizeof(exmat_body_contact)));
+    return contacts;
+  }
+  exmat_energies energies() const {
+    exmat_energies energies;
+    energies.size = sizeof energies;
+    detail::check(exmat_world_read_energies(get(), &energies));
+    return energies;
+  }
+  std::uint64_t hash() const {
+    std::uint64_t hash = 0;
+    detail::check(exmat_world_hash(get(), &hash));
+    return hash;
+  }
+
+  std::vector<double> state() const {
+    std::vector<double> numbers(static_cast<std::size_t>(exmat_world_state_size(get())));
+    detail::check(exmat_world_read_state(get(), numbers.data(), static_cast<std::int64_t>(numbers.size())));
+    return numbers;
+  }
+  void set_state(std::span<const double> numbers) {
+    detail::check(exmat_world_set_state(get(), numbers.data(), detail::length(numbers)));
+  }
+
+  exmat_world* get() const noexcept { return handle_.get(); }
+
+ private:
+  explicit World(exmat_world* world) : handle_(world) {}
+  detail::Owner<exmat_world, exmat_world_destroy> handle_;
 };
 
 }  // namespace exmat

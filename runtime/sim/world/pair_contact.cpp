@@ -9,7 +9,7 @@ namespace {
 
 /// A body where the step begins.
 TouchingBody touching(const WorldBody& body) {
-  return {body.contact(), body.touching, pose_of(body.model, body.state),
+  return {body.contact(), *body.touching, pose_of(body.model, body.state),
           BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
 }
 
@@ -109,6 +109,14 @@ Eigen::Vector3d PairContact::torque_correction(const WorldBody& first, const Eig
     }
   }
   return sum;
+}
+
+void PairContact::read_touches(int side, const WorldBody& own, int number, int other,
+                               std::vector<BodyTouch>& touches) const {
+  for (const BodyCandidate& candidate : candidates_[static_cast<std::size_t>(side)].all)
+    if (candidate.normal_force > 0)
+      touches.push_back({number, other, own.contact().object_vertex(candidate.vertex), -candidate.gap,
+                         own.placement.position + candidate.arm, candidate.normal, candidate.force});
 }
 
 void PairContact::commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const {

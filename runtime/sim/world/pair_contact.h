@@ -15,6 +15,16 @@ struct HeldPair {
   std::array<std::vector<HeldBodyContact>, 2> held{};  ///< the first's vertices, the second's vertices
 };
 
+/// A vertex of one body that touched the surface of another, or of its own, at the end of a step.
+struct BodyTouch {
+  int body = 0, other = 0;                             ///< numbers in the world
+  int vertex = 0;                                      ///< of the body's object
+  double depth = 0;                                    ///< [m]; negative where damping alone acts
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the vertex, world [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< unit, away from the other
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();     ///< on the body [N]; the other has its negative
+};
+
 /// Two bodies that may touch in a step, or a body that may touch itself: each one's vertices against the other's
 /// surface, with half of the law.
 class PairContact {
@@ -54,6 +64,9 @@ class PairContact {
   /// centres of mass that go on during the step by `way_first` and `way_second` [m].
   Eigen::Vector3d torque_correction(const WorldBody& first, const Eigen::Vector3d& way_first, const WorldBody& second,
                                     const Eigen::Vector3d& way_second) const noexcept;
+
+  /// Adds those of one side's vertices, those of `own`; the numbers are of the world.
+  void read_touches(int side, const WorldBody& own, int number, int other, std::vector<BodyTouch>& touches) const;
 
   /// The contacts alone, into `held`.
   void commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const;

@@ -29,12 +29,63 @@ int root_of(std::vector<int>& parents, int body) {
 
 World::World(std::vector<WorldBodyStart> bodies, const ContactLaw& law) : law_(law) {
   for (WorldBodyStart& body : bodies) {
-    WorldBody& own = *bodies_.emplace_back(std::make_unique<WorldBody>(body.kind, std::move(body.state)));
-    refresh_weights(own.model, own.scene, own.state, own.workspace);
+    Owned& owned = *owned_.emplace_back(std::make_unique<Owned>(body.kind, std::move(body.state)));
+    refresh_weights(*body.kind.model, *body.kind.scene, owned.state, owned.workspace);
+    add(body.kind, owned.state, owned.workspace);
   }
+}
+
+void World::add(const BodyKind& kind, State& state, Workspace& workspace) {
+  bodies_.push_back(std::make_unique<WorldBody>(kind, state, workspace));
+  resize();
+}
+
+void World::resize() {
   balls_.resize(bodies_.size());
   margins_.resize(bodies_.size());
   against_.resize(bodies_.size());
+}
+
+void World::forget(int body) {
+  at(body).anew = true;
+  std::erase_if(held_, [=](const HeldPair& held) { return held.first == body || held.second == body; });
+  for (std::size_t p = 0; p < near_.size(); ++p)
+    if (near_[p].first == body || near_[p].second == body) pairs_[p]->reset(0, 0, nullptr);
+}
+
+void World::remove(int body) {
+  forget(body);
+  bodies_.erase(bodies_.begin() + body);
+  resize();
+  const auto renumber = [=](int& number) { number -= number > body ? 1 : 0; };
+  for (HeldPair& held : held_) {
+    renumber(held.first);
+    renumber(held.second);
+  }
+  std::size_t kept = 0;
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    if (near_[p].first == body || near_[p].second == body) continue;
+    near_[kept] = near_[p];
+    renumber(near_[kept].first);
+    renumber(near_[kept].second);
+    pairs_[kept++].swap(pairs_[p]);
+  }
+  near_.resize(kept);
+}
+
+void World::set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew) {
+  for (int i = 0; i < count(); ++i) at(i).anew = anew[static_cast<std::size_t>(i)];
+  held_ = std::move(held);
+  near_.clear();
+}
+
+void World::read_touches(std::vector<BodyTouch>& touches) const {
+  touches.clear();
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    const auto [first, second] = near_[p];
+    pairs_[p]->read_touches(0, at(first), first, second, touches);
+    pairs_[p]->read_touches(1, at(second), second, first, touches);
+  }
 }
 
 WorldReport World::step(int threads) {
@@ -89,7 +140,7 @@ void World::find_pairs(int threads) {
   const std::size_t others = near_.size();
   for (int i = 0; i < count(); ++i) {
     const WorldBody& own = at(i);
-    if (own.touching.may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(i, i);
+    if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(i, i);
   }
   if (near_.size() > others) std::ranges::sort(near_);
 }

@@ -32,9 +32,21 @@ struct WorldReport {
 /// on the number of threads. docs/step_in_detail.md, "Bodies that touch".
 class World {
  public:
-  /// All with the same time step, `law` between any two of them and between parts of one whose surface meets itself.
-  /// Models, scenes and surfaces outlive the world.
+  /// `law` between any two bodies and between parts of one whose surface meets itself.
+  explicit World(const ContactLaw& law) : law_(law) {}
+  /// Its bodies' states are its own. All with the same time step. Models and scenes outlive the world.
   World(std::vector<WorldBodyStart> bodies, const ContactLaw& law);
+
+  /// Adds a body whose state and scratch are a host's and stay where they are; its number is the last. The time step is
+  /// that of the others.
+  void add(const BodyKind& kind, State& state, Workspace& workspace);
+  /// The numbers after it are one less from now on.
+  void remove(int body);
+  /// To be called where a body was put elsewhere: it has no contacts with others, and what it overlaps now pushes it
+  /// from whatever depth.
+  void forget(int body);
+
+  void set_law(const ContactLaw& law) noexcept { law_ = law; }
 
   int count() const noexcept { return static_cast<int>(bodies_.size()); }
   State& state(int body) noexcept { return at(body).state; }
@@ -49,12 +61,20 @@ class World {
 
   /// Of bodies that touch each other at the end of the last step, in ascending order.
   const std::vector<HeldPair>& held() const noexcept { return held_; }
+  /// Whether no step has led to where a body is.
+  bool is_anew(int body) const noexcept { return at(body).anew; }
+  /// What held() and is_anew() gave of a world of such bodies: it goes on from there.
+  void set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew);
+
+  /// Contacts at the end of the last step, in the order of pairs of bodies and of the vertices of each.
+  void read_touches(std::vector<BodyTouch>& touches) const;
 
   /// Kinetic, elastic and potential energy of all bodies [J].
   Energies energies() const;
 
  private:
   WorldBody& at(int body) const noexcept { return *bodies_[static_cast<std::size_t>(body)]; }
+  void resize();
   void find_pairs(int threads);
   double margin_between(int own, int other) const noexcept;
   void gather(int threads);
@@ -70,6 +90,13 @@ class World {
     NewtonReport newton;
   };
 
+  struct Owned {
+    Owned(const BodyKind& kind, State its_start) : state(std::move(its_start)), workspace(*kind.model, *kind.scene) {}
+    State state;
+    Workspace workspace;
+  };
+
+  std::vector<std::unique_ptr<Owned>> owned_;
   std::vector<std::unique_ptr<WorldBody>> bodies_;
   ContactLaw law_;
   std::vector<HeldPair> held_, next_held_;

@@ -16,23 +16,23 @@ struct BodyKind {
   std::shared_ptr<const TouchingSurface> surface;
 };
 
-/// A body of a World, with its scratch.
+/// A body of a World. Its state and the scratch of its steps are another's.
 struct WorldBody {
-  WorldBody(const BodyKind& kind, State start)
+  WorldBody(const BodyKind& kind, State& its_state, Workspace& its_workspace)
       : model(*kind.model),
         scene(*kind.scene),
-        touching(*kind.surface),
+        touching(kind.surface),
         surface(kind.surface->surface),
-        state(std::move(start)),
-        workspace(model, scene),
+        state(its_state),
+        workspace(its_workspace),
         shape(surface.make_shape()) {}
 
   const Model& model;
   const StepScene& scene;
-  const TouchingSurface& touching;
+  std::shared_ptr<const TouchingSurface> touching;
   const BodySurface& surface;
-  State state;
-  Workspace workspace;
+  State& state;
+  Workspace& workspace;
   SurfaceShape shape;
   StepReport report;
   bool anew = true;  ///< no step has led to where it is: what it overlaps was not watched coming

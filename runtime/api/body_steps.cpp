@@ -1,0 +1,36 @@
+#include "runtime/api/body_steps.h"
+
+#include <cinttypes>
+
+#include "runtime/api/failures.h"
+
+namespace exmat::runtime {
+
+void begin_steps(exmat_body& body) noexcept {
+  body.report = {};
+  body.contacts.clear();
+}
+
+void add_step(const StepReport& step, const Workspace& workspace, exmat_body& body) noexcept {
+  exmat_report& sum = body.report;
+  sum.status |= step.status;
+  sum.newton_iterations += step.newton_iterations;
+  sum.factorisations += step.factorisations;
+  sum.line_search_evaluations += step.line_search_evaluations;
+  sum.projections += step.projections;
+  sum.target_iterations += step.target_iterations;
+  sum.residual = step.residual;
+  if ((step.status & kStepNonFinite) != 0) return;
+  body.contacts.add(step, body.model(), body.state, workspace);
+  ++sum.steps;
+}
+
+exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept {
+  return fail(EXMAT_NON_FINITE,
+              "%s: %s, step %" PRId64
+              " (t = %g s): NaN or infinity; the body is as it was before. Try a smaller "
+              "time_step (now %g s), smaller loads or example stiffness, or EXMAT_BACKWARD_EULER",
+              function, which, body.state.step + 1, body.state.time + body.scene.time_step, body.scene.time_step);
+}
+
+}  // namespace exmat::runtime

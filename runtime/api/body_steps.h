@@ -1,0 +1,22 @@
+#pragma once
+
+#include "runtime/api/handles.h"
+
+namespace exmat::runtime {
+
+// What functions that step bodies share.
+
+/// Only one caller at a time may step a body; whether this one may.
+inline bool acquire(exmat_body& body) noexcept { return !body.in_use.test_and_set(std::memory_order_acquire); }
+inline void release(exmat_body& body) noexcept { body.in_use.clear(std::memory_order_release); }
+
+/// Before the first step of a call.
+void begin_steps(exmat_body& body) noexcept;
+
+/// After each of its steps, which left their sums in `workspace`.
+void add_step(const StepReport& step, const Workspace& workspace, exmat_body& body) noexcept;
+
+inline bool non_finite(const exmat_body& body) noexcept { return (body.report.status & kStepNonFinite) != 0; }
+exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept;
+
+}  // namespace exmat::runtime
