@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   benchmarks::register_free_bodies();
   benchmarks::register_sizes();
   benchmarks::register_instances();
+  benchmarks::register_worlds();
   ::benchmark::RunSpecifiedBenchmarks();
   ::benchmark::Shutdown();
   return 0;

@@ -12,6 +12,7 @@ void register_steps();
 void register_free_bodies();
 void register_sizes();
 void register_instances();
+void register_worlds();
 
 /// A benchmark whose inputs are made when it runs, not when it is registered.
 ::benchmark::internal::Benchmark* add(const std::string& name, std::function<void(::benchmark::State&)> body);

@@ -158,6 +158,8 @@ void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyP
     if (candidate.normal_force > 0) {
       ++sums_a.touching;
       ++sums_b.touching;
+      sums_a.stiffness += candidate.weights[0];
+      sums_b.stiffness += candidate.weights[0];
     }
     sums_a.force += candidate.force;
     sums_a.torque += candidate.arm.cross(candidate.force);

@@ -17,7 +17,8 @@ constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it nor
 
 constexpr double kApproached = 0.5;  // of the distance at rest
 constexpr int kLeafTriangles = 4;
-constexpr double kSameWay = 0.5;  // cosine
+constexpr int kBlockTriangles = 64;  // whose vertices are moved together
+constexpr double kSameWay = 0.5;     // cosine
 
 /// Across the edge that begins at each corner; -1 where there is none or more than one.
 TriangleArray neighbours_of(const TriangleArray& triangles) {
@@ -76,7 +77,9 @@ SurfaceShape BodySurface::make_shape() const {
   shape.positions = rest_;
   shape.position_of.assign(static_cast<std::size_t>(rest_.rows()), 0);
   shape.balls.resize(tree_.nodes().size());
+  shape.boxes.resize(tree_.nodes().size());
   shape.ball_of.assign(tree_.nodes().size(), 0);
+  shape.box_of.assign(tree_.nodes().size(), 0);
   return shape;
 }
 
@@ -105,12 +108,49 @@ Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noe
   return shape.positions.row(vertex);
 }
 
+/// Whether a branch is small enough for the boxes of its own triangles.
+bool BodySurface::is_block(int node) const noexcept {
+  const DeformationTree::Node& branch = tree_.node(node);
+  return branch.last - branch.first <= kBlockTriangles;
+}
+
+/// The boxes of a branch and of those below it; after it come all of them.
+void BodySurface::open_block(int node, SurfaceShape& shape) const noexcept {
+  for (int below = tree_.node(node).next - 1; below >= node; --below) {
+    const DeformationTree::Node& branch = tree_.node(below);
+    Eigen::AlignedBox3d& box = shape.boxes[static_cast<std::size_t>(below)];
+    shape.box_of[static_cast<std::size_t>(below)] = shape.placed;
+    if (!branch.is_leaf) {
+      const int second = tree_.node(below + 1).next;
+      box = shape.boxes[static_cast<std::size_t>(below) + 1].merged(shape.boxes[static_cast<std::size_t>(second)]);
+      continue;
+    }
+    box.setEmpty();
+    for (int i = branch.first; i < branch.last; ++i)
+      for (int c = 0; c < 3; ++c)
+        box.extend(position(triangles_(tree_.order()[static_cast<std::size_t>(i)], c), shape));
+  }
+}
+
+/// A bound on the squared distance from a branch. A block that is not farther away than its ball is opened by
+/// whoever looks into it.
+double BodySurface::squared_bound(int node, const Eigen::Vector3d& point, SurfaceShape& shape) const noexcept {
+  if (shape.box_of[static_cast<std::size_t>(node)] == shape.placed)
+    return shape.boxes[static_cast<std::size_t>(node)].squaredExteriorDistance(point);
+  const DeformationTree::Ball& around = ball(node, shape);
+  const double bound = std::max(0.0, (point - around.centre).norm() - around.radius);
+  return bound * bound;
+}
+
 bool BodySurface::may_be_within(const Eigen::Vector3d& point, double radius, SurfaceShape& shape) const noexcept {
   const auto count = static_cast<int>(tree_.nodes().size());
+  const double square = radius * radius;
   for (int node = 0; node < count;) {
-    const DeformationTree::Ball& around = ball(node, shape);
-    const double reach = radius + around.radius;
-    const bool near = (point - around.centre).squaredNorm() <= reach * reach;
+    bool near = squared_bound(node, point, shape) <= square;
+    if (near && is_block(node) && shape.box_of[static_cast<std::size_t>(node)] != shape.placed) {
+      open_block(node, shape);
+      near = squared_bound(node, point, shape) <= square;
+    }
     if (near && tree_.node(node).is_leaf) return true;
     node = near ? node + 1 : tree_.node(node).next;
   }
@@ -122,12 +162,9 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
                                               const Accept& accepts) const noexcept {
   struct Waiting {
     int node;
-    double bound;  // on the distance
+    double bound;  // on the squared distance
   };
-  const auto bound_of = [&](int node) {
-    const DeformationTree::Ball& around = ball(node, shape);
-    return Waiting{node, std::max(0.0, (point - around.centre).norm() - around.radius)};
-  };
+  const auto bound_of = [&](int node) { return Waiting{node, squared_bound(node, point, shape)}; };
   Waiting waiting[64];  // halves of a tree of at most 2^32 leaves
   int count = 0;
   TrianglePoint best;
@@ -136,7 +173,11 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
   if (!tree_.empty()) waiting[count++] = bound_of(0);
   while (count > 0) {
     const auto [node, bound] = waiting[--count];
-    if (bound * bound > nearest) continue;
+    if (bound > nearest) continue;
+    if (is_block(node) && shape.box_of[static_cast<std::size_t>(node)] != shape.placed) {
+      open_block(node, shape);
+      if (squared_bound(node, point, shape) > nearest) continue;
+    }
     const DeformationTree::Node& branch = tree_.node(node);
     if (!branch.is_leaf) {
       Waiting near = bound_of(node + 1), far = bound_of(tree_.node(node + 1).next);

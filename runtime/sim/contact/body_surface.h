@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <optional>
 #include <vector>
 
@@ -21,15 +22,17 @@ struct SurfaceHit {
 struct SurfaceShape {
   Eigen::VectorXd q;  ///< [r]
   double q_norm = 0;
-  int placed = 0;         ///< times that it was placed
-  VertexArray positions;  ///< k x 3, where `position_of` is `placed` [m]
-  std::vector<DeformationTree::Ball> balls;
-  std::vector<int> position_of, ball_of;
+  int placed = 0;                            ///< times that it was placed
+  VertexArray positions;                     ///< k x 3, where `position_of` is `placed` [m]
+  std::vector<DeformationTree::Ball> balls;  ///< of branches, from their bounds
+  std::vector<Eigen::AlignedBox3d> boxes;    ///< of branches within a block, from the positions
+  std::vector<int> position_of, ball_of, box_of;
 };
 
 /// The closed surface of a reduced body: signed distances to it as it deforms, in the frame of the body. Only what is
-/// near is ever computed. Inside and outside are told apart by angle-weighted normals (Baerentzen and Aanaes 2005). r
-/// modes. No call but the constructor and make_shape() allocates.
+/// near is ever computed: branches of the tree of bounds, and of those near blocks of triangles, with boxes about them
+/// as they are. Inside and outside are told apart by angle-weighted normals (Baerentzen and Aanaes 2005). r modes. No
+/// call but the constructor and make_shape() allocates.
 class BodySurface {
  public:
   BodySurface() = default;
@@ -78,6 +81,9 @@ class BodySurface {
   void basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept;
 
  private:
+  bool is_block(int node) const noexcept;
+  void open_block(int node, SurfaceShape& shape) const noexcept;
+  double squared_bound(int node, const Eigen::Vector3d& point, SurfaceShape& shape) const noexcept;
   template <class Accept>
   std::optional<SurfaceHit> search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                    const Accept& accepts) const noexcept;

@@ -133,7 +133,10 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
     candidate.arm = world_arm(candidate.vertex, pose);
     const Eigen::Vector3d point = pose.position + candidate.arm;
     evaluate_contact(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)], point, candidate);
-    if (candidate.normal_force > 0) ++workspace.touching;
+    if (candidate.normal_force > 0) {
+      ++workspace.touching;
+      workspace.stiffness += candidate.weights[0];
+    }
     if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
     workspace.force += candidate.force;
     workspace.torque += candidate.arm.cross(candidate.force);

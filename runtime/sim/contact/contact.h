@@ -29,13 +29,14 @@ struct ContactSums {
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< sum of (x_i - position) x f_i, world [N m]
   Eigen::VectorXd generalised;                       ///< sum of U_i^T rotation^T f_i [r]
   double potential = 0;                              ///< W [J], f = -dW/dx; none of it without candidates
+  double stiffness = 0;                              ///< of the candidates that touch [N/m]
   int touching = 0;                                  ///< candidates with a normal force
 
   void set_zero(Eigen::Index modes) {
     generalised.setZero(modes);
     force.setZero();
     torque.setZero();
-    potential = 0;
+    potential = stiffness = 0;
     touching = 0;
   }
   void add(const ContactSums& more) noexcept {
@@ -43,6 +44,7 @@ struct ContactSums {
     torque += more.torque;
     generalised += more.generalised;
     potential += more.potential;
+    stiffness += more.stiffness;
     touching += more.touching;
   }
 };

@@ -1,8 +1,14 @@
 #include "runtime/sim/step/contact_problem.h"
 
 #include <cmath>
+#include <limits>
 
 namespace exmat::runtime {
+namespace {
+
+constexpr double kGapRounding = 4 * std::numeric_limits<double>::epsilon();  // of the place of a vertex
+
+}  // namespace
 
 ContactProblem::ContactProblem(const Model& model, const State& state, IncrementalPotential& potential,
                                Workspace& workspace) noexcept
@@ -38,6 +44,7 @@ PotentialEvaluation ContactProblem::evaluate_alone(const Eigen::VectorXd& x, boo
   const PotentialEvaluation alone = first ? potential_.evaluate(near_.q, near_.gradient_q, workspace_.newton.hessian)
                                           : potential_.evaluate(near_.q, near_.gradient_q);
   model_.contact->evaluate(pose, near_.contact);
+  near_.extent = pose.position.norm() + model_.contact->reach();
   return alone;
 }
 
@@ -51,7 +58,9 @@ PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const Poten
   evaluation.potential.value += added;
   evaluation.potential.magnitude += std::abs(added);
   evaluation.force_scale += contact.generalised.norm();
-  evaluation.force_scale += frame_.residual_of(contact.force);
+  // A gap is known to the rounding of where its vertex is: no residual comes below what that makes of its force.
+  const double rounding = kGapRounding * near_.extent * contact.stiffness / potential_.tolerance();
+  evaluation.force_scale += frame_.residual_of(contact.force) + frame_.residual_of({rounding, 0, 0});
   return evaluation;
 }
 

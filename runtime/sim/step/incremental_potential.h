@@ -42,6 +42,8 @@ class IncrementalPotential {
   /// E at the last evaluate().
   double elastic_energy() const noexcept { return elastic_energy_; }
 
+  double tolerance() const noexcept { return scene_.newton.tolerance; }
+
  private:
   void set_offset(const Eigen::VectorXd& q) noexcept;
   double inertia_and_load(const Eigen::VectorXd& q) const noexcept;

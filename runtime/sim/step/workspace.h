@@ -23,6 +23,7 @@ struct ContactProblemWorkspace {
   Eigen::VectorXd x;              ///< 6 + r, or r of a constrained body
   Eigen::VectorXd q, gradient_q;  ///< r
   Eigen::MatrixXd stiffness;      ///< of the contacts, as the unknowns
+  double extent = 0;              ///< how far vertices are from the world's origin, about [m]
 };
 
 /// Scratch of one example force. K examples, d target coordinates.
