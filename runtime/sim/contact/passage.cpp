@@ -1,21 +1,17 @@
 #include "runtime/sim/contact/passage.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
+
+#include "runtime/sim/contact/first_meeting.h"
 
 namespace exmat::runtime {
 namespace {
 
-constexpr int kMostAdvances = 64;
-constexpr double kTouching = 1e-3;      // of the way: near enough for the plane there to be the surface
-constexpr double kLeastAdvance = 1e-3;  // of the way, along a surface that it does not come nearer to
-constexpr double kFast = 0.125;         // of the shortest passage: shorter ways do not pass
-constexpr double kDeep = 0.5;           // of the deepest: from here on it is held to the side that it came in by
-constexpr double kNearest = 1.25;       // of the nearest distance: the way out is the nearest again
-constexpr double kOtherSide = -0.1;     // cosine: more than beside an edge
-constexpr double kSameSide = 0.5;       // cosine
-constexpr double kBegun = 0.5;          // of the depth: a way inward that may end on another side
-constexpr double kBeyond = 1e-3;        // of the way out, to begin outside
+constexpr double kDeep = 0.5;      // of the deepest: from here on it is held to the side that it came in by
+constexpr double kNearest = 1.25;  // of the nearest distance: the way out is the nearest again
+constexpr double kSameSide = 0.5;  // cosine
+constexpr double kBegun = 0.5;     // of the depth: a way inward that may end on another side
+constexpr double kBeyond = 1e-3;   // of the way out, to begin outside
 
 /// Whether a vertex that came in by `side` has left it, where its nearest point is `there`.
 bool has_passed(const SidePlane& side, const SurfacePoint& there, const Eigen::Vector3d& point) {
@@ -50,18 +46,11 @@ bool is_back(const PlacedObstacle& placed, const SurfacePoint& nearest, const Ei
 
 std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::Vector3d& from,
                                      const Eigen::Vector3d& to) noexcept {
-  const Eigen::Vector3d way = to - from;
-  const double length = way.norm();
-  double gone = 0;  // of the length
   int hint = -1;
-  for (int i = 0; i < kMostAdvances && length > 0 && gone <= length; ++i) {
-    const SurfacePoint here = placed.nearest_surface_point(from + gone / length * way, hint);
-    const double approach = -here.normal.dot(way) / length;
-    if (here.distance <= kTouching * length && approach > 0 && here.distance <= approach * (length - gone))
-      return SidePlane{here.point, here.normal};
-    gone += std::max(here.distance, kLeastAdvance * length);
-  }
-  return std::nullopt;
+  const auto met = first_meeting(from, to, [&](const Eigen::Vector3d& point, double /*left*/) {
+    return std::optional(placed.nearest_surface_point(point, hint));
+  });
+  return met ? std::optional(SidePlane{met->point, met->normal}) : std::nullopt;
 }
 
 Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const SurfacePoint& nearest,

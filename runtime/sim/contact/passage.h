@@ -9,6 +9,9 @@ namespace exmat::runtime {
 
 // What keeps fast vertices from passing through: docs/step_in_detail.md, "Fast bodies".
 
+inline constexpr double kFast = 0.125;  ///< of the shortest passage, or of a body's radius: shorter ways pass nothing
+inline constexpr double kOtherSide = -0.1;  ///< cosine of normals that look apart by more than those beside an edge
+
 /// A plane in place of an obstacle's surface, world.
 struct SidePlane {
   Eigen::Vector3d point = Eigen::Vector3d::Zero(), normal = Eigen::Vector3d::UnitZ();  ///< normal: unit, outward
@@ -37,8 +40,7 @@ struct Passage {
   SidePlane side;
 };
 
-/// Where a way from outside first meets the surface, by steps as long as the distance (conservative advancement,
-/// Mirtich 1996): to a thousandth of the way. Nothing where it does not.
+/// Where a way from outside first meets the surface, to a thousandth of the way; nothing where it does not.
 std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::Vector3d& from,
                                      const Eigen::Vector3d& to) noexcept;
 
