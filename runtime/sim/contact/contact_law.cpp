@@ -99,7 +99,7 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
                     double time_step, ContactCandidate& candidate) noexcept {
   const Obstacle& obstacle = *placed.obstacle;
   const VertexWay way{placed.carried(motion.point), motion.predicted, motion.heading};
-  candidate.hint = -1;
+  candidate.hint = NearestHint();
   SurfacePoint surface = placed.nearest_surface_point(way.carried, candidate.hint);
   const Eigen::Vector3d way_out =
       held != nullptr ? Eigen::Vector3d(placed.pose.rotation * held->way_out) : Eigen::Vector3d::Zero();
@@ -128,7 +128,7 @@ void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point
 
 double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
                          const Eigen::Vector3d& point) noexcept {
-  int hint = candidate.hint;
+  NearestHint hint = candidate.hint;
   bool by_plane = false;
   return contact_potential(candidate, felt_surface(placed, candidate.passage, point, hint, by_plane).distance, point);
 }

@@ -63,7 +63,7 @@ struct ContactCandidate {
   Passage passage;                                    ///< of obstacles
 
   // Of the last evaluation.
-  int hint = -1;                                             ///< of nearest_surface_point()
+  NearestHint hint;                                          ///< of nearest_surface_point()
   bool by_plane = false;                                     ///< its surface was the passage's plane
   double gap = 0;                                            ///< [m]
   double normal_force = 0;                                   ///< [N]

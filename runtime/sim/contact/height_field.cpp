@@ -11,6 +11,8 @@ namespace {
 
 constexpr double kNoDistance = 1e-12;  // of a cell: below it the face says which way is out
 
+constexpr double kRounded = 1e-12;  // of a distance, and more
+
 /// The cell of a coordinate, its border belongs to the last.
 int cell_of(double coordinate, double spacing, int cells) {
   return static_cast<int>(std::clamp(coordinate / spacing, 0.0, cells - 0.5));
@@ -73,41 +75,54 @@ double HeightField::squared_distance(int level, int column, int row, const Eigen
   const Level& blocks = levels_[static_cast<std::size_t>(level)];
   const auto at =
       static_cast<std::size_t>(row) * static_cast<std::size_t>(blocks.columns) + static_cast<std::size_t>(column);
-  const double size = std::ldexp(1.0, level);
+  const double size = static_cast<double>(1 << level);
   const double x = beyond(point[0], column * size * spacing_[0], std::min((column + 1) * size * spacing_[0], width_));
   const double y = beyond(point[1], row * size * spacing_[1], std::min((row + 1) * size * spacing_[1], depth_));
   const double z = beyond(point[2], blocks.lowest[at], blocks.highest[at]);
   return x * x + y * y + z * z;
 }
 
-void HeightField::try_cell(int column, int row, const Eigen::Vector3d& point, Found& best) const noexcept {
+TrianglePoint HeightField::nearest_on(int triangle, const Eigen::Vector3d& point) const noexcept {
+  const int cell = triangle / 2, columns = levels_.front().columns;
+  const int column = cell % columns, row = cell / columns;
   const Eigen::Vector3d here = corner(column, row), across = corner(column + 1, row + 1);
-  for (int half = 0; half < 2; ++half) {
-    const TrianglePoint on = half == 0 ? nearest_on_triangle(point, here, corner(column + 1, row), across)
-                                       : nearest_on_triangle(point, here, across, corner(column, row + 1));
-    const int triangle = 2 * (row * levels_.front().columns + column) + half;
-    if (on.squared_distance > best.on.squared_distance) continue;
-    if (on.squared_distance == best.on.squared_distance && best.triangle >= 0 && triangle >= best.triangle) continue;
-    best = {triangle, on};
-  }
+  return triangle % 2 == 0 ? nearest_on_triangle(point, here, corner(column + 1, row), across)
+                           : nearest_on_triangle(point, here, across, corner(column, row + 1));
 }
 
-/// Nearer blocks first; with `any` until something is found.
-void HeightField::search(const Eigen::Vector3d& point, bool any, Found& best) const noexcept {
+/// Of what is within `reach`, nearer blocks first.
+template <HeightField::Search kSearch>
+HeightField::Found HeightField::search(const Eigen::Vector3d& point, double reach) const noexcept {
   struct Waiting {
     int level, column, row;
     double bound;  // on the squared distance
   };
   Waiting waiting[128];  // three of each of at most 31 levels, and four
   int count = 0;
+  Found best;
+  best.on.squared_distance = best.second = reach * reach;
+  const double& limit = kSearch == Search::kTwoNearest ? best.second : best.on.squared_distance;
   const int top = static_cast<int>(levels_.size()) - 1;
   waiting[count++] = {top, 0, 0, squared_distance(top, 0, 0, point)};
   while (count > 0) {
     const Waiting block = waiting[--count];
-    if (block.bound > best.on.squared_distance) continue;
+    if (block.bound > limit) continue;
     if (block.level == 0) {
-      try_cell(block.column, block.row, point, best);
-      if (any && best.triangle >= 0) return;
+      const int first = 2 * (block.row * levels_.front().columns + block.column);
+      for (const int triangle : {first, first + 1}) {
+        const TrianglePoint here = nearest_on(triangle, point);
+        const double square = here.squared_distance;
+        const bool nearer = square < best.on.squared_distance ||
+                            (square == best.on.squared_distance && (best.triangle < 0 || triangle < best.triangle));
+        if (nearer) {
+          if (best.triangle >= 0) best.second = best.on.squared_distance;
+          best.triangle = triangle;
+          best.on = here;
+          if (kSearch == Search::kAny) return best;
+        } else if (square < best.second) {
+          best.second = square;
+        }
+      }
       continue;
     }
     const Level& fine = levels_[static_cast<std::size_t>(block.level) - 1];
@@ -115,12 +130,13 @@ void HeightField::search(const Eigen::Vector3d& point, bool any, Found& best) co
     for (int y = 2 * block.row; y < std::min(2 * block.row + 2, fine.rows); ++y)
       for (int x = 2 * block.column; x < std::min(2 * block.column + 2, fine.columns); ++x) {
         const Waiting child{block.level - 1, x, y, squared_distance(block.level - 1, x, y, point)};
-        if (child.bound > best.on.squared_distance) continue;
+        if (child.bound > limit) continue;
         int place = count++;
         for (; place > start && waiting[place - 1].bound < child.bound; --place) waiting[place] = waiting[place - 1];
         waiting[place] = child;
       }
   }
+  return best;
 }
 
 Eigen::Vector3d HeightField::normal_of(int triangle) const noexcept {
@@ -138,18 +154,30 @@ bool HeightField::is_below(const Eigen::Vector3d& point) const noexcept {
 }
 
 SurfacePoint HeightField::nearest(const Eigen::Vector3d& point) const noexcept {
-  Found best;
-  best.on.squared_distance = std::numeric_limits<double>::infinity();
-  if (!point.allFinite()) return {best.on.squared_distance, Eigen::Vector3d::UnitZ(), point};
-  try_cell(cell_of(point[0], spacing_[0], levels_.front().columns),
-           cell_of(point[1], spacing_[1], levels_.front().rows), point, best);
-  search(point, /*any=*/false, best);
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  if (!point.allFinite()) return {kAnywhere, Eigen::Vector3d::UnitZ(), point};
+  return surface_of(point, search<Search::kNearest>(point, kAnywhere));
+}
+
+SurfacePoint HeightField::nearest(const Eigen::Vector3d& point, NearestHint& hint) const noexcept {
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  if (!point.allFinite()) return {kAnywhere, Eigen::Vector3d::UnitZ(), point};
+  if (hint.triangle >= 0) {
+    const Found same{hint.triangle, nearest_on(hint.triangle, point)};
+    if (hint.holds(point, std::sqrt(same.on.squared_distance))) return surface_of(point, same);
+  }
+  const Found best = search<Search::kTwoNearest>(point, kAnywhere);
+  hint = {best.triangle, (1 - kRounded) * std::sqrt(best.second), point};
+  return surface_of(point, best);
+}
+
+SurfacePoint HeightField::surface_of(const Eigen::Vector3d& point, const Found& found) const noexcept {
   const double side = is_below(point) ? -1 : 1;
-  const double distance = std::sqrt(best.on.squared_distance);
-  SurfacePoint surface{side * distance, Eigen::Vector3d::UnitZ(), best.on.point};
-  const Eigen::Vector3d away = point - best.on.point;
-  const Eigen::Vector3d up = normal_of(best.triangle);
-  const bool within = (best.on.barycentric.array() > 0).all() && side * up.dot(away) >= 0;
+  const double distance = std::sqrt(found.on.squared_distance);
+  SurfacePoint surface{side * distance, Eigen::Vector3d::UnitZ(), found.on.point};
+  const Eigen::Vector3d away = point - found.on.point;
+  const Eigen::Vector3d up = normal_of(found.triangle);
+  const bool within = (found.on.barycentric.array() > 0).all() && side * up.dot(away) >= 0;
   if (within || distance <= kNoDistance * spacing_.maxCoeff())
     surface.normal = up;
   else
@@ -159,11 +187,7 @@ SurfacePoint HeightField::nearest(const Eigen::Vector3d& point) const noexcept {
 
 bool HeightField::may_be_within(const Eigen::Vector3d& point, double radius) const noexcept {
   if (!point.allFinite() || is_below(point)) return true;
-  if (radius < 0) return false;
-  Found near;
-  near.on.squared_distance = radius * radius;
-  search(point, /*any=*/true, near);
-  return near.triangle >= 0;
+  return radius >= 0 && search<Search::kAny>(point, radius).triangle >= 0;
 }
 
 }  // namespace exmat::runtime

@@ -23,6 +23,8 @@ class HeightField {
   const Eigen::Vector2d& spacing() const noexcept { return spacing_; }
 
   SurfacePoint nearest(const Eigen::Vector3d& point) const noexcept;
+  /// The same, at once where the hint of a point nearby holds.
+  SurfacePoint nearest(const Eigen::Vector3d& point, NearestHint& hint) const noexcept;
 
   /// False only where the signed distance is above `radius`.
   bool may_be_within(const Eigen::Vector3d& point, double radius) const noexcept;
@@ -38,13 +40,17 @@ class HeightField {
   struct Found {
     int triangle = -1;  // 2 to a cell
     TrianglePoint on;
+    double second = 0;  // squared distance of the second nearest
   };
   Eigen::Vector3d corner(int column, int row) const noexcept {
     return {column * spacing_[0], row * spacing_[1], heights_(row, column)};
   }
   double squared_distance(int level, int column, int row, const Eigen::Vector3d& point) const noexcept;
-  void try_cell(int column, int row, const Eigen::Vector3d& point, Found& best) const noexcept;
-  void search(const Eigen::Vector3d& point, bool any, Found& best) const noexcept;
+  TrianglePoint nearest_on(int triangle, const Eigen::Vector3d& point) const noexcept;
+  enum class Search { kNearest, kTwoNearest, kAny };
+  template <Search kSearch>
+  Found search(const Eigen::Vector3d& point, double reach) const noexcept;
+  SurfacePoint surface_of(const Eigen::Vector3d& point, const Found& found) const noexcept;
   Eigen::Vector3d normal_of(int triangle) const noexcept;
   bool is_below(const Eigen::Vector3d& point) const noexcept;
 

@@ -7,7 +7,7 @@
 namespace exmat::runtime {
 namespace {
 
-SurfacePoint nearest(const Plane& plane, const Eigen::Vector3d& point, int& /*hint*/) {
+SurfacePoint nearest(const Plane& plane, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
   const double distance = plane.normal.dot(point - plane.point);
   return {distance, plane.normal, point - distance * plane.normal};
 }
@@ -21,11 +21,11 @@ SurfacePoint nearest_on_ball(const Eigen::Vector3d& centre, double radius, const
   return {length - radius, normal, centre + radius * normal};
 }
 
-SurfacePoint nearest(const Sphere& sphere, const Eigen::Vector3d& point, int& /*hint*/) {
+SurfacePoint nearest(const Sphere& sphere, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
   return nearest_on_ball(sphere.centre, sphere.radius, Eigen::Vector3d::UnitZ(), point);
 }
 
-SurfacePoint nearest(const Capsule& capsule, const Eigen::Vector3d& point, int& hint) {
+SurfacePoint nearest(const Capsule& capsule, const Eigen::Vector3d& point, NearestHint& hint) {
   const Eigen::Vector3d axis = capsule.end - capsule.start;
   const double square = axis.squaredNorm();
   if (square == 0) return nearest(Sphere{capsule.start, capsule.radius}, point, hint);
@@ -46,7 +46,7 @@ SurfacePoint nearest_in_axes(const Eigen::Vector3d& half_extents, const Eigen::V
   return surface;
 }
 
-SurfacePoint nearest(const Box& box, const Eigen::Vector3d& point, int& /*hint*/) {
+SurfacePoint nearest(const Box& box, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
   const SurfacePoint local = nearest_in_axes(box.half_extents, box.rotation.transpose() * (point - box.centre));
   return {local.distance, box.rotation * local.normal, box.centre + box.rotation * local.point};
 }
@@ -61,12 +61,12 @@ SurfacePoint from_axes_of(const Placed& shape, const SurfacePoint& local) {
   return {local.distance, shape.rotation * local.normal, shape.position + shape.rotation * local.point};
 }
 
-SurfacePoint nearest(const MeshShape& shape, const Eigen::Vector3d& point, int& hint) {
+SurfacePoint nearest(const MeshShape& shape, const Eigen::Vector3d& point, NearestHint& hint) {
   return from_axes_of(shape, shape.mesh->nearest(in_axes_of(shape, point), hint));
 }
 
-SurfacePoint nearest(const HeightFieldShape& shape, const Eigen::Vector3d& point, int& /*hint*/) {
-  return from_axes_of(shape, shape.field->nearest(in_axes_of(shape, point)));
+SurfacePoint nearest(const HeightFieldShape& shape, const Eigen::Vector3d& point, NearestHint& hint) {
+  return from_axes_of(shape, shape.field->nearest(in_axes_of(shape, point), hint));
 }
 
 bool is_within(const MeshShape& shape, const Eigen::Vector3d& point, double radius) {
@@ -77,7 +77,7 @@ bool is_within(const HeightFieldShape& shape, const Eigen::Vector3d& point, doub
 }
 template <class Solid>
 bool is_within(const Solid& shape, const Eigen::Vector3d& point, double radius) {
-  int hint = -1;
+  NearestHint hint;
   return nearest(shape, point, hint).distance <= radius;
 }
 
@@ -90,12 +90,16 @@ double deepest_in(const HeightFieldShape& /*shape*/) { return std::numeric_limit
 
 }  // namespace
 
-SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point, int& hint) noexcept {
+SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point, NearestHint& hint) noexcept {
   return std::visit([&](const auto& held) { return nearest(held, point, hint); }, shape);
 }
 
 SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point) noexcept {
-  int hint = -1;
+  if (const auto* mesh = std::get_if<MeshShape>(&shape))
+    return from_axes_of(*mesh, mesh->mesh->nearest(in_axes_of(*mesh, point)));
+  if (const auto* ground = std::get_if<HeightFieldShape>(&shape))
+    return from_axes_of(*ground, ground->field->nearest(in_axes_of(*ground, point)));
+  NearestHint hint;
   return nearest_surface_point(shape, point, hint);
 }
 
@@ -122,14 +126,14 @@ bool PlacedObstacle::may_meet(const Eigen::Vector3d& centre, double radius, doub
                        radius + margin + kContactMarginSteps * sweep(centre, radius));
 }
 
-SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point, int& hint) const noexcept {
+SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point, NearestHint& hint) const noexcept {
   const SurfacePoint local = runtime::nearest_surface_point(obstacle->shape, pose.to_frame(point), hint);
   return {local.distance, pose.rotation * local.normal, pose.to_world(local.point)};
 }
 
 SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point) const noexcept {
-  int hint = -1;
-  return nearest_surface_point(point, hint);
+  const SurfacePoint local = runtime::nearest_surface_point(obstacle->shape, pose.to_frame(point));
+  return {local.distance, pose.rotation * local.normal, pose.to_world(local.point)};
 }
 
 double PlacedObstacle::signed_distance(const Eigen::Vector3d& point) const noexcept {

@@ -45,9 +45,8 @@ struct HeightFieldShape {
 };
 using Shape = std::variant<Plane, Sphere, Box, Capsule, MeshShape, HeightFieldShape>;
 
-/// Exact outside and inside. `hint`, -1 at first, is where meshes begin to search and what they find: no part of the
-/// result, but nearby points are found sooner.
-SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point, int& hint) noexcept;
+/// Exact outside and inside. With a hint, of points near each other.
+SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point, NearestHint& hint) noexcept;
 SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point) noexcept;
 
 /// Its distance alone. It is 1-Lipschitz: no point of a ball is nearer than that of its centre minus its radius.
@@ -97,7 +96,7 @@ struct PlacedObstacle {
   bool may_meet(const Eigen::Vector3d& centre, double radius, double margin) const noexcept;
 
   /// As above, world positions.
-  SurfacePoint nearest_surface_point(const Eigen::Vector3d& point, int& hint) const noexcept;
+  SurfacePoint nearest_surface_point(const Eigen::Vector3d& point, NearestHint& hint) const noexcept;
   SurfacePoint nearest_surface_point(const Eigen::Vector3d& point) const noexcept;
   double signed_distance(const Eigen::Vector3d& point) const noexcept;
 };

@@ -46,9 +46,8 @@ bool is_back(const PlacedObstacle& placed, const SurfacePoint& nearest, const Ei
 
 std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::Vector3d& from,
                                      const Eigen::Vector3d& to) noexcept {
-  int hint = -1;
   const auto met = first_meeting(from, to, [&](const Eigen::Vector3d& point, double /*left*/) {
-    return std::optional(placed.nearest_surface_point(point, hint));
+    return std::optional(placed.nearest_surface_point(point));
   });
   return met ? std::optional(SidePlane{met->point, met->normal}) : std::nullopt;
 }
@@ -67,8 +66,8 @@ Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const S
   return entry ? passage_by(placed, *entry, way.predicted) : Passage{};
 }
 
-SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point, int& hint,
-                          bool& by_plane) noexcept {
+SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point,
+                          NearestHint& hint, bool& by_plane) noexcept {
   by_plane = passage.kind == Passage::Kind::kThrough;
   if (by_plane) return passage.side.nearest(point);
   const SurfacePoint nearest = placed.nearest_surface_point(point, hint);

@@ -50,7 +50,7 @@ Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const S
                      const Eigen::Vector3d& way_out) noexcept;
 
 /// What a vertex at `point` feels; `by_plane` says whether it is the side plane.
-SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point, int& hint,
-                          bool& by_plane) noexcept;
+SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point,
+                          NearestHint& hint, bool& by_plane) noexcept;
 
 }  // namespace exmat::runtime

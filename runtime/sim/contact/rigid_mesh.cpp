@@ -13,7 +13,7 @@ namespace {
 
 constexpr int kLeafFaces = 4;
 constexpr double kNoDistance = 1e-12;  // of the size: below it normals of the surface say which way is out
-constexpr int kMostCells = 32;         // along the longest axis
+constexpr int kMostCells = 16;         // along the longest axis
 constexpr double kRounded = 1e-6;      // of a distance in single precision, and more
 
 int corner_of(double u, double v) { return u > 0 ? 0 : v > 0 ? 1 : 2; }
@@ -35,8 +35,7 @@ RigidMesh::RigidMesh(const VertexArray& vertices, const TriangleArray& triangles
   size_ = (nodes_.front().box.high - nodes_.front().box.low).norm();
   set_normals(vertices, triangles, order);
   const Box& all = nodes_.front().box;
-  int hint = -1;
-  is_room_ = thickness_ == 0 && nearest(all.high + (all.high - all.low), hint).distance < 0;
+  is_room_ = thickness_ == 0 && nearest(all.high + (all.high - all.low)).distance < 0;
   sample_cells();
 }
 
@@ -108,61 +107,84 @@ void RigidMesh::sample_cells() {
   cells_low_ = all.low.array() - cell_;
   for (int axis = 0; axis < 3; ++axis)
     cell_counts_[axis] = 2 + static_cast<int>(std::ceil((all.high[axis] - all.low[axis]) / cell_ - kRounded));
-  cell_distances_.reserve(static_cast<std::size_t>(cell_counts_.cast<std::int64_t>().prod()));
-  int hint = -1;
+  cell_distances_.resize(static_cast<std::size_t>(cell_counts_.cast<std::int64_t>().prod()));
+  double deepest = deepest_;
+#pragma omp parallel for schedule(dynamic, 1) reduction(max : deepest)
   for (int z = 0; z < cell_counts_[2]; ++z)
     for (int y = 0; y < cell_counts_[1]; ++y)
       for (int x = 0; x < cell_counts_[0]; ++x) {
         const Eigen::Vector3d middle = cells_low_ + cell_ * Eigen::Vector3d(x + 0.5, y + 0.5, z + 0.5);
-        const double distance = nearest(middle, hint).distance;
-        deepest_ = std::max(deepest_, -distance);
-        cell_distances_.push_back(static_cast<float>(distance));
+        const double distance = nearest(middle).distance;
+        deepest = std::max(deepest, -distance);
+        cell_distances_[static_cast<std::size_t>((z * cell_counts_[1] + y) * cell_counts_[0] + x)] =
+            static_cast<float>(distance);
       }
+  deepest_ = deepest;
 }
 
-void RigidMesh::try_face(int face, const Eigen::Vector3d& point, Found& best) const noexcept {
+TrianglePoint RigidMesh::nearest_on(int face, const Eigen::Vector3d& point) const noexcept {
   const auto& corners = faces_[static_cast<std::size_t>(face)].corners;
-  const TrianglePoint here = nearest_on_triangle(point, corners[0], corners[1], corners[2]);
-  if (here.squared_distance > best.on.squared_distance) return;
-  if (here.squared_distance == best.on.squared_distance && best.face >= 0 && face >= best.face) return;
-  best = {face, here};
+  return nearest_on_triangle(point, corners[0], corners[1], corners[2]);
 }
 
-/// Nearer branches first, until `done` after a leaf.
-template <class Done>
-void RigidMesh::search(const Eigen::Vector3d& point, Found& best, const Done& done) const noexcept {
+/// Of what is within `reach`, nearer branches first.
+template <RigidMesh::Search kSearch>
+RigidMesh::Found RigidMesh::search(const Eigen::Vector3d& point, double reach) const noexcept {
   struct Waiting {
     int node;
     double bound;  // on the squared distance
   };
   Waiting waiting[64];  // halves of a tree of at most 2^32 leaves
   int count = 0;
+  Found best;
+  best.on.squared_distance = best.second = reach * reach;
+  const double& limit = kSearch == Search::kTwoNearest ? best.second : best.on.squared_distance;
   const auto at = [&](int node) -> const Node& { return nodes_[static_cast<std::size_t>(node)]; };
   waiting[count++] = {0, at(0).box.squared_distance(point)};
   while (count > 0) {
     const auto [index, bound] = waiting[--count];
-    if (bound > best.on.squared_distance) continue;
+    if (bound > limit) continue;
     const Node& node = at(index);
     if (node.right > 0) {
       Waiting near{index + 1, at(index + 1).box.squared_distance(point)};
       Waiting far{node.right, at(node.right).box.squared_distance(point)};
       if (near.bound > far.bound) std::swap(near, far);
-      if (far.bound <= best.on.squared_distance) waiting[count++] = far;
-      if (near.bound <= best.on.squared_distance) waiting[count++] = near;
+      if (far.bound <= limit) waiting[count++] = far;
+      if (near.bound <= limit) waiting[count++] = near;
       continue;
     }
-    for (int face = node.first; face < node.last; ++face) try_face(face, point, best);
-    if (done(best)) return;
+    for (int face = node.first; face < node.last; ++face) {
+      const TrianglePoint here = nearest_on(face, point);
+      const double square = here.squared_distance;
+      const bool nearer = square < best.on.squared_distance ||
+                          (square == best.on.squared_distance && (best.face < 0 || face < best.face));
+      if (nearer) {
+        if (best.face >= 0) best.second = best.on.squared_distance;
+        best.face = face;
+        best.on = here;
+        if (kSearch == Search::kAny) return best;
+      } else if (square < best.second) {
+        best.second = square;
+      }
+    }
   }
+  return best;
 }
 
-SurfacePoint RigidMesh::nearest(const Eigen::Vector3d& point, int& hint) const noexcept {
-  Found best;
-  best.on.squared_distance = std::numeric_limits<double>::infinity();
-  if (hint >= 0) try_face(hint, point, best);
-  search(point, best, [](const Found&) { return false; });
-  if (best.face < 0) return {std::numeric_limits<double>::infinity(), Eigen::Vector3d::UnitZ(), point};  // not a number
-  hint = best.face;
+SurfacePoint RigidMesh::nearest(const Eigen::Vector3d& point) const noexcept {
+  const Found best = search<Search::kNearest>(point, std::numeric_limits<double>::infinity());
+  if (best.face < 0) return {best.second, Eigen::Vector3d::UnitZ(), point};  // not a number
+  return surface_of(point, best);
+}
+
+SurfacePoint RigidMesh::nearest(const Eigen::Vector3d& point, NearestHint& hint) const noexcept {
+  if (hint.triangle >= 0) {
+    const Found same{hint.triangle, nearest_on(hint.triangle, point)};
+    if (hint.holds(point, std::sqrt(same.on.squared_distance))) return surface_of(point, same);
+  }
+  const Found best = search<Search::kTwoNearest>(point, std::numeric_limits<double>::infinity());
+  if (best.face < 0) return {best.second, Eigen::Vector3d::UnitZ(), point};  // not a number
+  hint = {best.face, (1 - kRounded) * std::sqrt(best.second), point};
   return surface_of(point, best);
 }
 
@@ -209,14 +231,10 @@ bool RigidMesh::may_be_within(const Eigen::Vector3d& point, double radius) const
     }
   }
   if (reach >= 0) {
-    Found near;
-    near.on.squared_distance = reach * reach;
-    search(point, near, [](const Found& found) { return found.face >= 0; });
-    if (near.face >= 0) return true;
+    if (search<Search::kAny>(point, reach).face >= 0) return true;
     if (thickness_ > 0) return false;
   }
-  int hint = -1;
-  return nearest(point, hint).distance <= radius;
+  return nearest(point).distance <= radius;
 }
 
 }  // namespace exmat::runtime

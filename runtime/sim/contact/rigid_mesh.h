@@ -25,9 +25,9 @@ class RigidMesh {
   /// How far points in it are from its surface at most, to some percent of its size [m].
   double deepest() const noexcept { return deepest_; }
 
-  /// `hint` is a triangle to begin with, or -1, and then the one that was found: from a near one the search is short.
-  /// The result does not depend on it.
-  SurfacePoint nearest(const Eigen::Vector3d& point, int& hint) const noexcept;
+  SurfacePoint nearest(const Eigen::Vector3d& point) const noexcept;
+  /// The same, at once where the hint of a point nearby holds.
+  SurfacePoint nearest(const Eigen::Vector3d& point, NearestHint& hint) const noexcept;
 
   /// False only where the signed distance is above `radius`.
   bool may_be_within(const Eigen::Vector3d& point, double radius) const noexcept;
@@ -52,14 +52,16 @@ class RigidMesh {
   struct Found {
     int face = -1;
     TrianglePoint on;
+    double second = 0;  // squared distance of the second nearest
   };
 
   void build(const std::vector<Box>& boxes, std::vector<int>& order, int first, int last);
   void set_normals(const VertexArray& vertices, const TriangleArray& triangles, const std::vector<int>& order);
   void sample_cells();
-  void try_face(int face, const Eigen::Vector3d& point, Found& best) const noexcept;
-  template <class Done>
-  void search(const Eigen::Vector3d& point, Found& best, const Done& done) const noexcept;
+  TrianglePoint nearest_on(int face, const Eigen::Vector3d& point) const noexcept;
+  enum class Search { kNearest, kTwoNearest, kAny };
+  template <Search kSearch>
+  Found search(const Eigen::Vector3d& point, double reach) const noexcept;
   SurfacePoint surface_of(const Eigen::Vector3d& point, const Found& found) const noexcept;
 
   double thickness_ = 0;

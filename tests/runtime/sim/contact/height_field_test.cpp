@@ -63,9 +63,14 @@ TEST(HeightField, SignedDistanceIsThatOfAllTrianglesAndWhatIsBelow) {
   triangulate(hills(), vertices, triangles);
   const HeightField field(hills(), kSpacing);
   int below = 0;
+  NearestHint hint;
   for (int i = 0; i < 2000; ++i) {
     const Eigen::Vector3d point = random_point(i);
     const SurfacePoint surface = field.nearest(point);
+    for (const double way : {0.0, 1e-4, 1e-2}) {
+      const Eigen::Vector3d beside = point + way * random_vector(3, 7);
+      EXPECT_EQ(field.nearest(beside, hint).distance, field.nearest(beside).distance);
+    }
     EXPECT_NEAR(std::abs(surface.distance), test::distance_to_all(vertices, triangles, point), 1e-14);
     EXPECT_EQ(surface.distance < 0, is_below(vertices, triangles, point)) << i;
     EXPECT_NEAR(surface.normal.norm(), 1, 1e-14);

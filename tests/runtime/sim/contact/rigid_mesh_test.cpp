@@ -34,10 +34,7 @@ Eigen::Vector3d random_point(int i, double reach) {
   return reach * random_vector(3, static_cast<std::uint32_t>(1000 + i));
 }
 
-SurfacePoint nearest(const RigidMesh& mesh, const Eigen::Vector3d& point) {
-  int hint = -1;
-  return mesh.nearest(point, hint);
-}
+SurfacePoint nearest(const RigidMesh& mesh, const Eigen::Vector3d& point) { return mesh.nearest(point); }
 
 TEST(RigidMesh, SignedDistanceIsThatOfAllTrianglesAndTheWindingNumber) {
   const SurfaceMesh ball = dented_ball();
@@ -156,7 +153,8 @@ TEST(RigidMesh, WithAThicknessIsAShellOnBothSides) {
 TEST(RigidMesh, BoundsMissNothingAndHintsChangeNothing) {
   const SurfaceMesh ball = dented_ball(), flat = sheet(4);
   const RigidMesh solid(ball.vertices, ball.triangles, 0), shell(flat.vertices, flat.triangles, 0.2);
-  int excluded = 0, hint = -1;
+  int excluded = 0;
+  NearestHint hint;
   for (int i = 0; i < 3000; ++i) {
     const Eigen::Vector3d point = random_point(i, i % 3 == 0 ? 3.0 : 0.8);
     const double radius = 0.3 * std::abs(random_vector(1, static_cast<std::uint32_t>(i))[0]);
@@ -167,9 +165,12 @@ TEST(RigidMesh, BoundsMissNothingAndHintsChangeNothing) {
       }
       excluded += mesh->may_be_within(point, radius) ? 0 : 1;
     }
-    const SurfacePoint near = solid.nearest(point, hint), alone = nearest(solid, point);
-    EXPECT_EQ(near.distance, alone.distance);
-    EXPECT_EQ(near.normal, alone.normal);
+    for (const double way : {0.0, 1e-4, 1e-2}) {
+      const Eigen::Vector3d beside = point + way * random_point(i + 1, 1);
+      const SurfacePoint near = solid.nearest(beside, hint), alone = nearest(solid, beside);
+      EXPECT_EQ(near.distance, alone.distance);
+      EXPECT_EQ(near.normal, alone.normal);
+    }
   }
   EXPECT_GT(excluded, 3000);
 }
@@ -178,7 +179,7 @@ TEST(RigidMesh, QueriesDoNotAllocate) {
   if (!test::AllocationCounter::works()) GTEST_SKIP();
   const SurfaceMesh ball = dented_ball();
   const RigidMesh mesh(ball.vertices, ball.triangles, 0);
-  int hint = -1;
+  NearestHint hint;
   const test::AllocationCounter allocations;
   mesh.nearest({0.3, 0.2, 0.1}, hint);
   mesh.may_be_within({1, 0, 0}, 0.2);
