@@ -11,13 +11,14 @@
 namespace exmat {
 namespace {
 
-constexpr std::array<const char*, 4> kShapes{"plane", "sphere", "box", "capsule"};
+constexpr std::array<const char*, 6> kShapes{"plane", "sphere", "box", "capsule", "mesh", "height_field"};
 
 const char* shape_name(const Json& json, const std::filesystem::path& file, const std::string& place) {
   std::vector<const char*> named;
   std::ranges::copy_if(kShapes, std::back_inserter(named), [&](const char* name) { return json.contains(name); });
   if (named.size() != 1)
-    throw InputError({file.string(), place, R"(exactly one of "plane", "sphere", "box" and "capsule")",
+    throw InputError({file.string(), place,
+                      R"(exactly one of "plane", "sphere", "box", "capsule", "mesh" and "height_field")",
                       named.empty() ? "none" : fmt::format("\"{}\"", fmt::join(named, "\" and \"")), ""});
   return named.front();
 }
@@ -36,6 +37,43 @@ CapsuleConfig read_capsule(const Json& json) {
   return {read_vector(json["start"]), read_vector(json["end"]), json["radius"]};
 }
 
+MeshConfig read_mesh(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  MeshConfig mesh;
+  mesh.file = resolve_path(file, json["file"]);
+  mesh.scale = json.value("scale", mesh.scale);
+  mesh.thickness = json.value("thickness", mesh.thickness);
+  mesh.position = read_vector_or_zero(json, "position");
+  mesh.orientation = read_orientation(json, file, place);
+  return mesh;
+}
+
+Eigen::MatrixXd read_rows(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  const std::size_t columns = json[0].size();
+  Eigen::MatrixXd rows(std::ssize(json), static_cast<Eigen::Index>(columns));
+  for (std::size_t y = 0; y < json.size(); ++y) {
+    if (json[y].size() != columns)
+      throw InputError({file.string(), fmt::format("{}/{}", place, y),
+                        fmt::format("{} heights, as in the first row", columns), std::to_string(json[y].size()), ""});
+    for (std::size_t x = 0; x < columns; ++x)
+      rows(static_cast<Eigen::Index>(y), static_cast<Eigen::Index>(x)) = json[y][x];
+  }
+  return rows;
+}
+
+HeightFieldConfig read_height_field(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  if (json.contains("file") == json.contains("heights"))
+    throw InputError({file.string(), place, "file or heights", json.contains("file") ? "both" : "neither", ""});
+  HeightFieldConfig field;
+  if (json.contains("file"))
+    field.file = resolve_path(file, json["file"]);
+  else
+    field.heights = read_rows(json["heights"], file, place + "/heights");
+  field.spacing = Eigen::Vector2d(json["spacing"][0], json["spacing"][1]);
+  field.position = read_vector_or_zero(json, "position");
+  field.orientation = read_orientation(json, file, place);
+  return field;
+}
+
 }  // namespace
 
 ObstacleConfig read_obstacle(const Json& json, const std::filesystem::path& file, const std::string& place) {
@@ -49,8 +87,12 @@ ObstacleConfig read_obstacle(const Json& json, const std::filesystem::path& file
     obstacle.shape = read_sphere(shape);
   else if (name == "box")
     obstacle.shape = read_box(shape, file, shape_place);
-  else
+  else if (name == "capsule")
     obstacle.shape = read_capsule(shape);
+  else if (name == "mesh")
+    obstacle.shape = read_mesh(shape, file, shape_place);
+  else
+    obstacle.shape = read_height_field(shape, file, shape_place);
   obstacle.stiffness = json.value("stiffness", obstacle.stiffness);
   obstacle.damping = json.value("damping", obstacle.damping);
   obstacle.friction = json.value("friction", obstacle.friction);

@@ -67,10 +67,23 @@ struct CapsuleConfig {
   Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::Zero();
   double radius = 0;
 };
+struct MeshConfig {
+  std::filesystem::path file;
+  double scale = 1, thickness = 0;  ///< thickness 0: closed
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
+};
+struct HeightFieldConfig {
+  std::optional<std::filesystem::path> file;  ///< of the heights, else `heights`
+  Eigen::MatrixXd heights;
+  Eigen::Vector2d spacing = Eigen::Vector2d::Ones();  ///< along x and y
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
+};
 
 /// What the body may touch; all per area of its surface.
 struct ObstacleConfig {
-  std::variant<PlaneConfig, SphereConfig, BoxConfig, CapsuleConfig> shape;
+  std::variant<PlaneConfig, SphereConfig, BoxConfig, CapsuleConfig, MeshConfig, HeightFieldConfig> shape;
   double stiffness = 1e6;              ///< pressure per depth [N/m^3]
   double damping = 0;                  ///< pressure per approach velocity [N s/m^3]
   double friction = 0;                 ///< Coulomb's coefficient

@@ -13,8 +13,7 @@
 namespace exmat {
 namespace {
 
-void print_cage(const MeshCommandOptions& options, const precompute::SurfaceFile& surface,
-                const precompute::Cage& cage) {
+void print_cage(const MeshCommandOptions& options, const SurfaceFile& surface, const precompute::Cage& cage) {
   const double diagonal = bounding_box_diagonal(surface.mesh.vertices);
   const precompute::Embedding embedding = precompute::embed_points(cage.mesh, surface.mesh.vertices, options.surface);
   const auto length = [&](double metres) {
@@ -38,7 +37,7 @@ void mesh_command(const MeshCommandOptions& options) {
   { const AtomicFile writable(options.mesh); }
   if (std::filesystem::path(options.mesh).extension() != ".msh")
     throw InputError({options.mesh, "", "a mesh to write with the extension .msh", "another", ""});
-  const precompute::SurfaceFile surface = precompute::read_surface_file(options.surface);
+  const SurfaceFile surface = precompute::read_surface_file(options.surface);
   for (const std::string& remark : surface.remarks) log::info(fmt::format("{}: {}", options.surface, remark));
   const precompute::Cage cage = precompute::make_cage(surface.mesh, options.settings, options.surface);
   precompute::write_msh(cage.mesh, options.mesh);

@@ -14,25 +14,34 @@ Eigen::Vector3d VertexContacts::point(int vertex, const Eigen::VectorXd& u) cons
   return rest_.row(vertex).transpose() + u.segment<3>(dofs_[static_cast<std::size_t>(vertex)]);
 }
 
+/// Whether an obstacle goes through the body in the step rather than up to it.
+bool VertexContacts::sweeps(const runtime::PlacedObstacle& placed, const Eigen::VectorXd& u) const {
+  const double limit = runtime::kSweep * runtime::shortest_passage(placed.obstacle->shape);
+  for (int vertex = 0; vertex < vertices(); ++vertex)
+    if (placed.sweep(point(vertex, u), 0) > limit) return true;
+  return false;
+}
+
 VertexContacts::Step VertexContacts::begin(const std::vector<runtime::Obstacle>& obstacles, double end_time,
                                            double time_step, const Eigen::VectorXd& u, const Eigen::VectorXd& v,
                                            double extra, const runtime::ContactState& held) const {
   Step step;
   for (const auto& obstacle : obstacles) step.obstacles.emplace_back(obstacle, end_time, time_step);
+  for (auto& placed : step.obstacles) placed.sweeps = placed.obstacle->motion.moves() && sweeps(placed, u);
   double speed = 0;
   for (const Eigen::Index dof : dofs_) speed = std::max(speed, v.segment<3>(dof).norm());
-  const double margin = runtime::kContactMarginSteps * time_step * speed + extra;
+  const double margin = runtime::kContactMarginSteps * time_step * speed + extra + held.longest_way_out();
   std::size_t next = 0;
   for (int vertex = 0; vertex < vertices(); ++vertex)
     for (std::size_t i = 0; i < obstacles.size(); ++i) {
       const Eigen::Vector3d here = point(vertex, u);
-      if (step.obstacles[i].signed_distance(here) > margin) continue;
+      if (!step.obstacles[i].may_meet(here, 0, margin)) continue;
       runtime::ContactCandidate& candidate = step.candidates.emplace_back();
       candidate.vertex = vertex;
       candidate.obstacle = static_cast<int>(i);
-      const Eigen::Vector3d predicted = here + time_step * v.segment<3>(dofs_[static_cast<std::size_t>(vertex)]);
-      runtime::freeze_contact(step.obstacles[i], here, predicted, areas_[vertex], time_step, candidate);
-      runtime::take_friction(step.obstacles[i], held, next, candidate);
+      const Eigen::Vector3d way = time_step * v.segment<3>(dofs_[static_cast<std::size_t>(vertex)]);
+      runtime::freeze_contact(step.obstacles[i], runtime::find_held(held, next, candidate),
+                              {here, here + way, here + 2 * way}, areas_[vertex], time_step, candidate);
     }
   return step;
 }
@@ -56,8 +65,7 @@ double VertexContacts::potential(const Eigen::VectorXd& u, const Step& step) con
   double sum = 0;
   for (const auto& candidate : step.candidates) {
     const Eigen::Vector3d here = point(candidate.vertex, u);
-    const auto& placed = step.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    sum += runtime::contact_potential(candidate, placed.signed_distance(here), here);
+    sum += runtime::contact_potential(step.obstacles[static_cast<std::size_t>(candidate.obstacle)], candidate, here);
   }
   return sum;
 }

@@ -49,6 +49,7 @@ class VertexContacts {
   void commit(const Eigen::VectorXd& u, const Step& step, runtime::ContactState& held) const;
 
  private:
+  bool sweeps(const runtime::PlacedObstacle& placed, const Eigen::VectorXd& u) const;
   Eigen::Vector3d point(int vertex, const Eigen::VectorXd& u) const;
 
   VertexArray rest_;

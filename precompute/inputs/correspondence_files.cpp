@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "common/core/error.h"
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {

@@ -7,9 +7,9 @@
 #include <string_view>
 
 #include "common/core/error.h"
+#include "common/surface_io/text_input.h"
+#include "common/surface_io/value_cursor.h"
 #include "precompute/mesh_io/gltf_json.h"
-#include "precompute/mesh_io/text_input.h"
-#include "precompute/mesh_io/value_cursor.h"
 
 #define TINYGLTF_IMPLEMENTATION
 #include <tiny_gltf.h>

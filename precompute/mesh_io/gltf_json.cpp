@@ -6,7 +6,7 @@
 #include <set>
 
 #include "common/core/error.h"
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {

@@ -6,11 +6,11 @@
 #include <map>
 #include <set>
 
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/surface_parts.h"
 #include "precompute/mesh_io/gltf_accessor.h"
 #include "precompute/mesh_io/gltf_document.h"
 #include "precompute/mesh_io/gltf_nodes.h"
-#include "precompute/mesh_io/mesh_arrays.h"
-#include "precompute/mesh_io/surface_parts.h"
 
 namespace exmat::precompute {
 namespace {

@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 
 #include "common/core/log.h"
-#include "precompute/mesh_io/mesh_arrays.h"
-#include "precompute/mesh_io/text_input.h"
-#include "precompute/mesh_io/value_cursor.h"
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/text_input.h"
+#include "common/surface_io/value_cursor.h"
 
 namespace exmat::precompute {
 namespace {

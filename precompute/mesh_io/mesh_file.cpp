@@ -1,10 +1,10 @@
 #include "precompute/mesh_io/mesh_file.h"
 
 #include "common/core/error.h"
+#include "common/surface_io/text_input.h"
 #include "precompute/mesh_io/medit_reader.h"
 #include "precompute/mesh_io/msh_reader.h"
 #include "precompute/mesh_io/tetgen_reader.h"
-#include "precompute/mesh_io/text_input.h"
 #include "precompute/mesh_io/veg_reader.h"
 #include "precompute/mesh_io/vtk_reader.h"
 

@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <limits>
 
-#include "precompute/mesh_io/mesh_arrays.h"
+#include "common/surface_io/mesh_arrays.h"
 
 namespace exmat::precompute {
 namespace {
@@ -59,13 +59,6 @@ std::int32_t read_index(const FileLine& line, std::string_view field, std::strin
 }
 
 }  // namespace
-
-double read_real(const FileLine& line, Fields& fields, std::string_view what) {
-  const std::string_view field = fields.next();
-  const auto value = parse_real(field);
-  if (!value) fail_at(line, fmt::format("{}, a finite number", what), quote(field));
-  return *value;
-}
 
 void finish_row(const FileLine& line, Fields& fields, int further) {
   for (int column = 0; column < further; ++column)

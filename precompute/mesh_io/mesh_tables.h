@@ -6,13 +6,10 @@
 #include <vector>
 
 #include "common/mesh/tet_mesh.h"
-#include "precompute/mesh_io/commented_lines.h"
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/commented_lines.h"
+#include "common/surface_io/text_input.h"
 
 namespace exmat::precompute {
-
-/// The next field of a line as a finite number; `what` is for the message, e.g. "a density".
-double read_real(const FileLine& line, Fields& fields, std::string_view what);
 
 /// Passes over the `further` last columns of a row, which must be there and nothing after them.
 void finish_row(const FileLine& line, Fields& fields, int further);

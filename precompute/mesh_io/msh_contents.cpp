@@ -5,7 +5,7 @@
 #include <fmt/format.h>
 #include <limits>
 
-#include "precompute/mesh_io/mesh_arrays.h"
+#include "common/surface_io/mesh_arrays.h"
 
 namespace exmat::precompute {
 namespace {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "precompute/mesh_io/value_cursor.h"
+#include "common/surface_io/value_cursor.h"
 
 namespace exmat::precompute {
 

@@ -7,9 +7,9 @@
 #include <set>
 
 #include "common/core/log.h"
-#include "precompute/mesh_io/mesh_arrays.h"
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/text_input.h"
 #include "precompute/mesh_io/msh_contents.h"
-#include "precompute/mesh_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
+#include "common/surface_io/text_input.h"
+#include "common/surface_io/value_cursor.h"
 #include "precompute/mesh_io/surface_file.h"
-#include "precompute/mesh_io/text_input.h"
-#include "precompute/mesh_io/value_cursor.h"
 
 namespace exmat::precompute {
 namespace {

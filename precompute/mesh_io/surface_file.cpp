@@ -1,11 +1,11 @@
 #include "precompute/mesh_io/surface_file.h"
 
 #include "common/core/error.h"
+#include "common/surface_io/obj_reader.h"
+#include "common/surface_io/ply_reader.h"
+#include "common/surface_io/stl_reader.h"
+#include "common/surface_io/text_input.h"
 #include "precompute/mesh_io/gltf_reader.h"
-#include "precompute/mesh_io/obj_reader.h"
-#include "precompute/mesh_io/ply_reader.h"
-#include "precompute/mesh_io/stl_reader.h"
-#include "precompute/mesh_io/text_input.h"
 
 namespace exmat::precompute {
 
@@ -20,10 +20,5 @@ SurfaceFile read_surface_file(const std::filesystem::path& file) {
 }
 
 SurfaceMesh read_surface(const std::filesystem::path& file) { return std::move(read_surface_file(file).mesh); }
-
-void add_fan(const std::vector<std::int32_t>& polygon, std::vector<std::array<std::int32_t, 3>>& triangles) {
-  for (std::size_t corner = 2; corner < polygon.size(); ++corner)
-    triangles.push_back({polygon[0], polygon[corner - 1], polygon[corner]});
-}
 
 }  // namespace exmat::precompute

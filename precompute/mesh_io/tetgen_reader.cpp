@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "precompute/mesh_io/mesh_arrays.h"
+#include "common/surface_io/mesh_arrays.h"
 #include "precompute/mesh_io/mesh_tables.h"
 
 namespace exmat::precompute {

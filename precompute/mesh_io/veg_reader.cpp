@@ -5,9 +5,9 @@
 #include <string>
 
 #include "common/core/log.h"
-#include "precompute/mesh_io/commented_lines.h"
+#include "common/surface_io/commented_lines.h"
+#include "common/surface_io/text_input.h"
 #include "precompute/mesh_io/mesh_tables.h"
-#include "precompute/mesh_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {

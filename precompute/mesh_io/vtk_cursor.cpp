@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <utility>
 
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/text_input.h"
 
 namespace exmat::precompute {
 namespace {

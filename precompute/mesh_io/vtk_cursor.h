@@ -3,7 +3,7 @@
 #include <array>
 #include <string_view>
 
-#include "precompute/mesh_io/value_cursor.h"
+#include "common/surface_io/value_cursor.h"
 
 namespace exmat::precompute {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "common/core/log.h"
-#include "precompute/mesh_io/mesh_arrays.h"
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/text_input.h"
 #include "precompute/mesh_io/vtk_cursor.h"
 
 namespace exmat::precompute {

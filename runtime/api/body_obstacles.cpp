@@ -87,6 +87,10 @@ Shape shape_of(const exmat_obstacle& obstacle) {
     }
     case EXMAT_CAPSULE:
       return Capsule{point, point + vector_of(obstacle.direction, "direction"), positive(obstacle.radius, "radius")};
+    case EXMAT_MESH:
+    case EXMAT_HEIGHT_FIELD:
+      throw InvalidArgument(
+          fmt::format("obstacle.shape = {}: it is made of arrays: expected exmat_body_add_shape()", obstacle.shape));
     default:
       throw InvalidArgument(fmt::format("obstacle.shape = {}: expected {} to {}", obstacle.shape,
                                         static_cast<int>(EXMAT_PLANE), static_cast<int>(EXMAT_CAPSULE)));
@@ -133,6 +137,17 @@ void describe(const Capsule& capsule, exmat_obstacle& description) {
   copy(capsule.start, description.point);
   copy(Eigen::Vector3d(capsule.end - capsule.start), description.direction);
   description.radius = capsule.radius;
+}
+
+void describe(const MeshShape& mesh, exmat_obstacle& description) {
+  description.shape = EXMAT_MESH;
+  copy(mesh.position, description.point);
+  copy(mesh.rotation, description.orientation);
+}
+void describe(const HeightFieldShape& field, exmat_obstacle& description) {
+  description.shape = EXMAT_HEIGHT_FIELD;
+  copy(field.position, description.point);
+  copy(field.rotation, description.orientation);
 }
 
 exmat_obstacle description_of(const Obstacle& obstacle) {
@@ -182,6 +197,30 @@ void forget(std::size_t place, ContactState& contacts) {
     if (contact.obstacle > gone) --contact.obstacle;
 }
 
+/// Its id.
+std::int64_t add_obstacle(const Obstacle& made, exmat_body& body) {
+  if (!body.model().contact)
+    throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");
+  body.obstacles.reserve(body.obstacles.size() + 1);
+  body.scene.obstacles.push_back(made);
+  try {
+    size_for_contact(body);
+  } catch (...) {
+    body.scene.obstacles.pop_back();
+    throw;
+  }
+  const std::int64_t id = body.next_obstacle++;
+  body.obstacles.push_back({id, true});
+  return id;
+}
+
+Shape placed_shape(const exmat_shape& shape, const exmat_obstacle& obstacle) {
+  const Eigen::Vector3d position = vector_of(obstacle.point, "point");
+  const Eigen::Matrix3d rotation = rotation_of_numbers(obstacle.orientation, "obstacle.orientation").toRotationMatrix();
+  if (shape.mesh) return MeshShape{shape.mesh, position, rotation};
+  return HeightFieldShape{shape.field, position, rotation};
+}
+
 }  // namespace
 
 exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, std::size_t size) noexcept {
@@ -197,21 +236,21 @@ exmat_status exmat_body_add_obstacle(exmat_body* body, const exmat_obstacle* obs
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(obstacle);
   if (const exmat_status status = check_size(__func__, obstacle->size, kObstacleSizes)) return status;
+  return guarded(__func__, [&] { *id = add_obstacle(obstacle_of(*obstacle), *body); });
+}
+
+exmat_status exmat_body_add_shape(exmat_body* body, const exmat_shape* shape, const exmat_obstacle* obstacle,
+                                  std::int64_t* id) noexcept {
+  EXMAT_REQUIRE(id);
+  *id = -1;
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(shape);
+  EXMAT_REQUIRE(obstacle);
+  if (const exmat_status status = check_size(__func__, obstacle->size, kObstacleSizes)) return status;
   return guarded(__func__, [&] {
-    if (!body->model().contact)
-      throw InvalidArgument(
-          "the model knows no contact: expected settings with use_contact, or a scene with obstacles");
-    const Obstacle made = obstacle_of(*obstacle);
-    body->obstacles.reserve(body->obstacles.size() + 1);
-    body->scene.obstacles.push_back(made);
-    try {
-      size_for_contact(*body);
-    } catch (...) {
-      body->scene.obstacles.pop_back();
-      throw;
-    }
-    *id = body->next_obstacle++;
-    body->obstacles.push_back({*id, true});
+    Obstacle made{placed_shape(*shape, *obstacle), {}, 0, 0, 0};
+    set_law(obstacle->stiffness, obstacle->damping, obstacle->friction, made);
+    *id = add_obstacle(made, *body);
   });
 }
 

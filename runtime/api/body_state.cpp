@@ -14,8 +14,8 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kLayout = 1;
-constexpr std::size_t kHeadNumbers = 5, kContactNumbers = 6;
+constexpr double kLayout = 2;
+constexpr std::size_t kHeadNumbers = 5, kContactNumbers = 9;
 constexpr double kMostSteps = 9007199254740992;  // 2^53: whole numbers up to here have all their digits
 
 constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q,          &State::v, &State::q_previous,
@@ -80,6 +80,7 @@ void read_contacts(Reader& reader, std::size_t count, const exmat_body& body, Co
     held.obstacle = static_cast<int>(reader.count("obstacle", static_cast<double>(body.scene.obstacles.size())));
     held.normal_force = reader.number();
     held.anchor = Eigen::Vector3d(reader.take(3).data());
+    held.way_out = Eigen::Vector3d(reader.take(3).data());
   }
 }
 
@@ -109,6 +110,7 @@ std::vector<double> write_state(const exmat_body& body) {
          {static_cast<double>(held.vertex), static_cast<double>(held.obstacle), held.normal_force})
       writer.add(number);
     writer.add_all(held.anchor);
+    writer.add_all(held.way_out);
   }
   return writer.take();
 }

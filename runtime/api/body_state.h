@@ -7,7 +7,7 @@
 
 namespace exmat::runtime {
 
-/// How many numbers write_state() writes: 5, 6 r, the frame's, K + d + 2 for each example force, 6 for each contact.
+/// How many numbers write_state() writes: 5, 6 r, the frame's, K + d + 2 for each example force, 9 for each contact.
 std::size_t state_size(const exmat_body& body);
 
 /// All that the body carries from step to step; state_size() numbers, after 5 that say of what: the layout, the time

@@ -34,6 +34,12 @@ struct exmat_points {
   exmat::runtime::PointSet set;
 };
 
+/// One of the two.
+struct exmat_shape {
+  std::shared_ptr<const exmat::runtime::RigidMesh> mesh{};
+  std::shared_ptr<const exmat::runtime::HeightField> field{};
+};
+
 struct exmat_body {
   exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source, exmat::runtime::State its_start);
 

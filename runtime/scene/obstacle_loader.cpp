@@ -2,9 +2,15 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/mesh/surface_check.h"
+#include "common/surface_io/height_reader.h"
+#include "common/surface_io/plain_surface.h"
 
 namespace exmat::runtime {
 namespace {
@@ -13,6 +19,33 @@ Shape make_shape(const PlaneConfig& plane) { return Plane{plane.point, plane.nor
 Shape make_shape(const SphereConfig& sphere) { return Sphere{sphere.centre, sphere.radius}; }
 Shape make_shape(const BoxConfig& box) { return Box{box.centre, box.half_extents, box.orientation.toRotationMatrix()}; }
 Shape make_shape(const CapsuleConfig& capsule) { return Capsule{capsule.start, capsule.end, capsule.radius}; }
+
+Shape make_shape(const MeshConfig& mesh) {
+  SurfaceMesh surface = std::move(read_plain_surface(mesh.file).mesh);
+  weld(surface.vertices, surface.triangles);
+  const std::string file = mesh.file.string();
+  if (surface.triangles.rows() == 0)
+    throw InputError({file, "", "triangles with corners at three places", "none", "check the file and its scale"});
+  if (mesh.thickness == 0) {
+    if (const SurfaceFaults faults = surface_faults(surface.triangles); faults.any())
+      throw InputError({file, "", "a closed mesh, each edge of two triangles that look the same way out",
+                        faults.words(), "close it and turn its faces outward, or give the obstacle a \"thickness\""});
+    if (enclosed_volume(surface.vertices, surface.triangles) < 0)
+      log::warning(
+          fmt::format("{}: its faces look inward: the obstacle is what is around it, a room; turn the faces if "
+                      "it is to be a solid",
+                      file));
+  }
+  surface.vertices *= mesh.scale;
+  return MeshShape{std::make_shared<RigidMesh>(surface.vertices, surface.triangles, mesh.thickness), mesh.position,
+                   mesh.orientation.toRotationMatrix()};
+}
+
+Shape make_shape(const HeightFieldConfig& field) {
+  RowMatrix heights = field.file ? read_heights(*field.file) : RowMatrix(field.heights);
+  return HeightFieldShape{std::make_shared<HeightField>(std::move(heights), field.spacing), field.position,
+                          field.orientation.toRotationMatrix()};
+}
 
 /// Of the whole body first, then of regions.
 std::vector<const ExampleData*> examples_of(const ReducedModel& data) {

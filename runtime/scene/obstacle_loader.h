@@ -10,6 +10,8 @@ namespace exmat::runtime {
 
 RigidMotion make_motion(const std::vector<KeyframeConfig>& keys);
 
+/// Reads the files of meshes and height fields. Throws InputError where one is not what it is to be: a mesh without
+/// thickness has to be closed.
 std::vector<Obstacle> make_obstacles(const SceneConfig& config);
 
 /// Throws InputError where the scene gives a constrained body a rigid state or a free one a motion.

@@ -44,11 +44,13 @@ OrderedJson to_json(const State& state, const BodyFrame& frame) {
                                 {"target", array_of(examples.target)},
                                 {"has_target", examples.has_target},
                                 {"target_converged", examples.target_converged}});
-  for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count))
+  for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count)) {
     body["contacts"].push_back({{"vertex", held.vertex},
                                 {"obstacle", held.obstacle},
                                 {"normal_force", held.normal_force},
                                 {"anchor", array_of(held.anchor)}});
+    if (!held.way_out.isZero(0)) body["contacts"].back()["way_out"] = array_of(held.way_out);
+  }
   return body;
 }
 
@@ -103,6 +105,8 @@ class BodyReader {
     for (const Json& entry : from) {
       HeldContact held{entry["vertex"], entry["obstacle"], entry["normal_force"],
                        Eigen::Vector3d(entry["anchor"][0], entry["anchor"][1], entry["anchor"][2])};
+      if (entry.contains("way_out"))
+        held.way_out = Eigen::Vector3d(entry["way_out"][0], entry["way_out"][1], entry["way_out"][2]);
       const std::string place = fmt::format("/contacts/{}", contacts.count);
       const Eigen::Index vertices = loaded_.model->contact->vertices();
       if (held.vertex >= vertices) refuse(place, fmt::format("a vertex below {}", vertices), entry["vertex"].dump());

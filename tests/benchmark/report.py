@@ -46,12 +46,12 @@ class Results:
         document = json.loads(path.read_text())
         self.name = document["context"]["instruction_set"]
         runs = [run for run in document["benchmarks"] if run["run_type"] == "iteration"]
-        self.dgemm = max(run["dgemm_gflops"] for run in runs)
+        self.dgemm = max(run.get("dgemm_gflops", 0) for run in runs)
         self.best = {}
         for run in runs:
             real = run["run_name"].endswith("/real_time")
             nanoseconds = run["real_time" if real else "cpu_time"]
-            name = run["run_name"].removesuffix("/real_time")
+            name = re.sub("/iterations:[0-9]+", "", run["run_name"].removesuffix("/real_time"))
             if name not in self.best or nanoseconds < self.best[name]["nanoseconds"]:
                 self.best[name] = run | {"nanoseconds": nanoseconds}
 
@@ -176,6 +176,25 @@ def instances(result):
                  [(f"{count:,}", row.get("threads1", ""), row.get("threads2", "")) for count, row in rows.items()])
 
 
+def worlds(result):
+    cells = {"stacks": "stacks of five", "heap": "stacks that lean on each other"}
+    rows = [("a body on the floor, alone", 1, "", number(result.microseconds("world/alone")), ""),
+            ("two on each other", 2, "2", number(result.microseconds("world/pair") / 2), "")]
+    for kind, words in cells.items():
+        for count in (5, 100, 1000):
+            per_body = [result.microseconds(f"world/{kind}/threads{threads}/{count}") / count for threads in (1, 2)]
+            largest = result.best[f"world/{kind}/threads1/{count}"]["largest_island"]
+            rows.append((words, f"{count:,}", f"{largest:,.0f}", *map(number, per_body)))
+    return table(("", "bodies", "largest island", "1 thread", "2 threads"), rows)
+
+
+def own_contact(result):
+    certificate = 1e3 * result.microseconds("world/certificate")
+    closed, apart, without = (number(result.microseconds(f"world/fork/{name}")) for name in ("closed", "open", "never"))
+    return (f"Whether a body may touch itself is told in {number(certificate)} ns. A fork (r = 20) takes {without} us a step "
+            f"without self-contact, {apart} us with it while its prongs are apart, {closed} us while they press on each other.")
+
+
 def report(results, compiler):
     fastest = results[0]
     return "\n\n".join((
@@ -196,6 +215,10 @@ def report(results, compiler):
         f"### Many bodies ({fastest.name})\n\nMicroseconds of wall clock for a step of one body, r = 20, s = 60, four "
         "examples, table; in parentheses the\nspeed-up over one body alone.",
         instances(fastest),
+        f"### Bodies that touch ({fastest.name})\n\nMicroseconds of wall clock for a step of one body: blocks of r = 20, "
+        "s = 96, 45 vertices on the surface,\nwithout examples, at rest on a floor and on each other.",
+        worlds(fastest),
+        own_contact(fastest),
         "### Kernels\n\nMicroseconds; in parentheses how many times as long as its flops at the DGEMM rate of the same "
         "instruction set.",
         kernels(results),

@@ -1,7 +1,7 @@
 #include <omp.h>
 
 #include "tests/benchmark/register.h"
-#include "tests/runtime/sim/world/touching_blocks.h"
+#include "tests/runtime/sim/world/fork.h"
 
 namespace exmat::benchmarks {
 namespace {
@@ -9,6 +9,7 @@ namespace {
 using runtime::World;
 using runtime::WorldBodyStart;
 using runtime::test::Blocks;
+using runtime::test::Fork;
 
 constexpr double kTimeStep = 2e-3;
 constexpr double kStiffness = 1e7, kDamping = 5e4, kFriction = 0.5;
@@ -34,7 +35,14 @@ void time_world(::benchmark::State& state, const std::vector<WorldBodyStart>& bo
   state.counters["bodies"] = static_cast<double>(world.count());
   state.counters["touching_pairs"] = report.touching_pairs;
   state.counters["largest_island"] = report.largest_island;
-  compare_with_dgemm(state, 0);
+}
+
+/// A fork whose prongs a steady force brings together, from `gap` [m].
+void time_fork(::benchmark::State& state, double gap, double force, bool meets_itself) {
+  const Fork fork(kTimeStep, /*free=*/true, meets_itself, 20);
+  WorldBodyStart body = fork.closed_to(gap, 0);
+  body.state.applied_force[fork.mode] = force * (fork.closing(fork.mode) > 0 ? 1 : -1);
+  time_world(state, {body}, 500, 1);
 }
 
 /// Piles of five on each other, every one displaced a little; far enough apart to be islands of their own or, close
@@ -53,7 +61,7 @@ std::vector<WorldBodyStart> piles(const Blocks& blocks, int count, double spacin
 }  // namespace
 
 void register_worlds() {
-  add("world/certificate/r20", [](::benchmark::State& state) {
+  add("world/certificate", [](::benchmark::State& state) {
     const Blocks blocks = falling_blocks(true);
     const WorldBodyStart body = blocks.body(Eigen::Vector3d::Zero());
     Eigen::VectorXd q = Eigen::VectorXd::Constant(body.state.q.size(), 1e-3);
@@ -62,8 +70,10 @@ void register_worlds() {
       ::benchmark::DoNotOptimize(q.data());
       ::benchmark::DoNotOptimize(may = blocks.surface->may_meet_itself(q, body.state.v, kTimeStep));
     }
-    compare_with_dgemm(state, 0);
   });
+  add("world/fork/never", [](::benchmark::State& state) { time_fork(state, 0.08, 0, false); })->Iterations(2000);
+  add("world/fork/open", [](::benchmark::State& state) { time_fork(state, 0.08, 0, true); })->Iterations(2000);
+  add("world/fork/closed", [](::benchmark::State& state) { time_fork(state, 0.005, 400, true); })->Iterations(2000);
   add("world/alone", [](::benchmark::State& state) {
     const Blocks blocks = falling_blocks();
     time_world(state, {blocks.body({0, 0, 0.001})}, 500, 1);

@@ -17,6 +17,7 @@ import tempfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MESH_IO = "precompute/mesh_io/"
+SURFACE_IO = "common/surface_io/"
 BUNDLE = ["common/bundle/bundle.cpp", "common/bundle/bundle_reader.cpp", "common/hdf5/hdf5_file.cpp",
           "common/bundle/validate.cpp", "common/hdf5/value_checks.cpp"]
 # What is each target's own, by the beginning of the path, and what the mesh readers share.
@@ -26,18 +27,19 @@ SOURCES = {
     "mesh": [MESH_IO + "medit_reader.cpp"],
     "vtk": [MESH_IO + "vtk_"],
     "node": [MESH_IO + "tetgen_reader.cpp"],
-    "obj": [MESH_IO + "obj_reader.cpp"],
-    "ply": [MESH_IO + "ply_reader.cpp"],
-    "stl": [MESH_IO + "stl_reader.cpp"],
+    "obj": [SURFACE_IO + "obj_reader.cpp"],
+    "ply": [SURFACE_IO + "ply_reader.cpp"],
+    "stl": [SURFACE_IO + "stl_reader.cpp"],
     "glb": [MESH_IO + "gltf_"],
     "gltf": [MESH_IO + "gltf_"],
+    "csv": [SURFACE_IO + "height_reader.cpp"],
     "pc2": [MESH_IO + "point_cache_reader.cpp"],
     "json": ["common/config/"],
     "bundle": BUNDLE,
     "bundle_edits": BUNDLE,
 }
-SHARED = [MESH_IO + name for name in ("commented_lines.cpp", "mesh_tables.cpp", "surface_parts.cpp", "text_input.cpp",
-                                      "value_cursor.cpp")]
+SHARED = [MESH_IO + "mesh_tables.cpp"] + [SURFACE_IO + name for name in ("commented_lines.cpp", "surface_parts.cpp",
+                                                                         "text_input.cpp", "value_cursor.cpp")]
 
 
 def replay(program, corpora, folder):

@@ -24,12 +24,12 @@ void require_indices(const Indices& indices, Eigen::Index count) {
   require(indices.size() > 0 && indices.minCoeff() >= 0 && indices.maxCoeff() < count);
 }
 
-void check(const precompute::SurfaceMesh& surface) {
+void check(const SurfaceMesh& surface) {
   require(surface.vertices.allFinite());
   require_indices(surface.triangles, surface.vertices.rows());
 }
 
-void check(const precompute::SurfaceFile& surface) {
+void check(const SurfaceFile& surface) {
   check(surface.mesh);
   const Eigen::Index count = surface.mesh.vertices.rows();
   for (const auto& morph : surface.morphs) require(morph.positions.rows() == count && morph.positions.allFinite());

@@ -15,7 +15,7 @@ TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "te
              "CHANGELOG.md", "CONTRIBUTING.md", "CMakePresets.json", "install-dependencies", "pyproject.toml", "setup.py"}
 # What may include what: from top to bottom, a folder sees itself and those below it.
 LAYERS = {
-    "common": "bundle hdf5 console config model mesh elastic core",
+    "common": "bundle hdf5 console config surface_io model mesh elastic core",
     "runtime": "app export api bench scene output sim/world sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
     "precompute": "app study/sweep study/sources study/stability study/drawing study/measure study/baseline pipeline training examples inputs posing meshing/mesher meshing cache"
                   " full_space alignment render shape_space targets polynomial cubature modes contact mesh_io solvers fem",

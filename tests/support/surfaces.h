@@ -6,14 +6,14 @@
 #include <vector>
 
 #include "common/mesh/geometry.h"
-#include "precompute/mesh_io/surface_file.h"
+#include "common/surface_io/surface.h"
 #include "tests/support/box_mesh.h"
 
 namespace exmat::test {
 
 /// The surface of a mesh, with its own vertices alone.
-inline precompute::SurfaceMesh boundary(const TetMesh& mesh) {
-  precompute::SurfaceMesh surface{{}, surface_triangles(mesh.tets)};
+inline SurfaceMesh boundary(const TetMesh& mesh) {
+  SurfaceMesh surface{{}, surface_triangles(mesh.tets)};
   std::vector<std::int32_t> number(static_cast<std::size_t>(mesh.vertex_count()), -1), kept;
   for (std::int32_t& corner : surface.triangles.reshaped()) {
     std::int32_t& found = number[static_cast<std::size_t>(corner)];
@@ -28,21 +28,21 @@ inline precompute::SurfaceMesh boundary(const TetMesh& mesh) {
 }
 
 /// The surface of a box, one corner at the origin.
-inline precompute::SurfaceMesh box_surface(const std::array<int, 3>& cells, const std::array<double, 3>& lengths) {
+inline SurfaceMesh box_surface(const std::array<int, 3>& cells, const std::array<double, 3>& lengths) {
   return boundary(box_mesh(cells, lengths));
 }
 
 /// A ball's surface about the origin: that of a cube of n^3 cells, blown up.
-inline precompute::SurfaceMesh ball_surface(int n, double radius) {
-  precompute::SurfaceMesh surface = box_surface({n, n, n}, {2, 2, 2});
+inline SurfaceMesh ball_surface(int n, double radius) {
+  SurfaceMesh surface = box_surface({n, n, n}, {2, 2, 2});
   surface.vertices.array() -= 1;
   surface.vertices = radius * surface.vertices.rowwise().normalized();
   return surface;
 }
 
 /// Two surfaces as one.
-inline precompute::SurfaceMesh together(const precompute::SurfaceMesh& a, const precompute::SurfaceMesh& b) {
-  precompute::SurfaceMesh both;
+inline SurfaceMesh together(const SurfaceMesh& a, const SurfaceMesh& b) {
+  SurfaceMesh both;
   both.vertices.resize(a.vertices.rows() + b.vertices.rows(), 3);
   both.vertices << a.vertices, b.vertices;
   both.triangles.resize(a.triangles.rows() + b.triangles.rows(), 3);

@@ -161,6 +161,24 @@ void add_contacts(Cases& cases) {
     }
 }
 
+/// Fast and slow onto meshes and height fields.
+void add_grounds(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth})
+    for (const double stiffness : {1e4, 1e7, 1e10})
+      for (const double velocity : {5.0, 50.0}) {
+        StabilityCase test{.group = "contact", .body = {.free = true}, .time_step = time_step, .gravity = kGravity};
+        test.contact_stiffness = stiffness;
+        test.friction = 0.5;
+        test.velocity = velocity;
+        test.ground = Ground::kMesh;
+        test.extreme = fmt::format("onto a slab of triangles at {:g} m/s, {:g} N/m^3", velocity, stiffness);
+        add(test, cases);
+        test.ground = Ground::kHills;
+        test.extreme = fmt::format("onto a height field at {:g} m/s, {:g} N/m^3", velocity, stiffness);
+        add(test, cases);
+      }
+}
+
 void add_examples(Cases& cases) {
   const auto add_forces = [&](BodyExamples examples, bool table, const std::string& what) {
     for (const bool free : {false, true})
@@ -288,6 +306,7 @@ std::vector<StabilityCase> short_stability_suite() {
   add_starts(cases);
   add_spins(cases);
   add_contacts(cases);
+  add_grounds(cases);
   add_examples(cases);
   add_slivers(cases);
   add_nothing(cases);

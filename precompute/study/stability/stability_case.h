@@ -27,6 +27,8 @@ enum class Ground {
   kNone,
   kPlane,  ///< below it
   kPress,  ///< a plane below and one above that comes down to it, and goes up again
+  kMesh,   ///< a slab of triangles below it, a tenth of L thick
+  kHills,  ///< a height field below it
 };
 
 /// One run. L is the diagonal of the body's bounding box, w_1 its lowest frequency.

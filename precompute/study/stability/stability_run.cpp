@@ -1,10 +1,12 @@
 #include "precompute/study/stability/stability_run.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <random>
 
 #include "common/core/timer.h"
@@ -135,6 +137,47 @@ void Run::add_tip_load() {
   scene_.forces.push_back(load);
 }
 
+/// A slab whose top is at z = 0, cut into triangles.
+runtime::Shape slab_of_triangles(double size, double thickness) {
+  constexpr int kCells = 8;
+  constexpr int kRow = kCells + 1, kLayer = kRow * kRow;
+  VertexArray vertices(2 * kLayer, 3);
+  for (int layer = 0; layer < 2; ++layer)
+    for (int y = 0; y < kRow; ++y)
+      for (int x = 0; x < kRow; ++x)
+        vertices.row(layer * kLayer + y * kRow + x) << size * (2.0 * x / kCells - 1), size * (2.0 * y / kCells - 1),
+            (layer - 1) * thickness;
+  TriangleArray triangles(0, 3);
+  const auto add = [&](int a, int b, int c, int d) {
+    triangles.conservativeResize(triangles.rows() + 2, 3);
+    triangles.bottomRows<2>() << a, b, c, a, c, d;
+  };
+  const auto at = [](int layer, int y, int x) { return layer * kLayer + y * kRow + x; };
+  for (int y = 0; y < kCells; ++y)
+    for (int x = 0; x < kCells; ++x) {
+      add(at(1, y, x), at(1, y, x + 1), at(1, y + 1, x + 1), at(1, y + 1, x));
+      add(at(0, y, x), at(0, y + 1, x), at(0, y + 1, x + 1), at(0, y, x + 1));
+    }
+  for (int i = 0; i < kCells; ++i) {
+    add(at(0, 0, i), at(0, 0, i + 1), at(1, 0, i + 1), at(1, 0, i));
+    add(at(0, kCells, i + 1), at(0, kCells, i), at(1, kCells, i), at(1, kCells, i + 1));
+    add(at(0, i + 1, 0), at(0, i, 0), at(1, i, 0), at(1, i + 1, 0));
+    add(at(0, i, kCells), at(0, i + 1, kCells), at(1, i + 1, kCells), at(1, i, kCells));
+  }
+  return runtime::MeshShape{std::make_shared<runtime::RigidMesh>(vertices, triangles, 0)};
+}
+
+/// Hills of a hundredth of their distance, the highest at z = 0.
+runtime::Shape hills(double size) {
+  constexpr int kPoints = 65;
+  RowMatrix heights(kPoints, kPoints);
+  const double spacing = 2 * size / (kPoints - 1);
+  for (int y = 0; y < kPoints; ++y)
+    for (int x = 0; x < kPoints; ++x) heights(y, x) = 0.04 * spacing * (std::sin(1.5 * x) * std::cos(1.5 * y) - 1);
+  return runtime::HeightFieldShape{std::make_shared<runtime::HeightField>(heights, Eigen::Vector2d(spacing, spacing)),
+                                   Eigen::Vector3d(-size, -size, 0)};
+}
+
 void Run::add_ground() {
   const VertexArray& X = body_.reduced.object->mesh.vertices;
   const double height = X.col(2).maxCoeff();
@@ -143,6 +186,11 @@ void Run::add_ground() {
   ground.stiffness = test_.contact_stiffness;
   ground.damping = 2 * std::sqrt(test_.contact_stiffness * surface_density());  // a vertex of that mass does not bounce
   ground.friction = test_.friction;
+  constexpr double kGroundSizes = 20;
+  if (test_.ground == Ground::kMesh) ground.shape = slab_of_triangles(kGroundSizes * body_.size, 0.1 * body_.size);
+  if (test_.ground == Ground::kHills) ground.shape = hills(kGroundSizes * body_.size);
+  if (test_.ground == Ground::kMesh || test_.ground == Ground::kHills)
+    ground.motion = runtime::RigidMotion({{0, {0, 0, -kClearance}, Eigen::Quaterniond::Identity()}});
   scene_.obstacles.push_back(ground);
   if (test_.ground != Ground::kPress) return;
   runtime::Obstacle press = ground;

@@ -287,17 +287,25 @@ EXMAT_API exmat_status exmat_body_set_example_weights(exmat_body* body, int64_t 
    has to know of contact: use_contact, or a scene with obstacles. Obstacles are each body's own and have a number,
    `id` >= 0, that no later one gets. exmat_body_reset() and states keep the host's where they are. */
 
-enum { EXMAT_PLANE = 0, EXMAT_SPHERE = 1, EXMAT_BOX = 2, EXMAT_CAPSULE = 3 }; /* shape */
+enum {
+  EXMAT_PLANE = 0,
+  EXMAT_SPHERE = 1,
+  EXMAT_BOX = 2,
+  EXMAT_CAPSULE = 3,
+  EXMAT_MESH = 4,        /* these two are made of arrays: exmat_body_add_shape() */
+  EXMAT_HEIGHT_FIELD = 5 /* */
+};                       /* shape */
 
 /* Its shape, in its own frame, which is the world until the obstacle is moved, and its law: pressures on the body's
    surface. Members that the shape does not name are not looked at. */
 typedef struct exmat_obstacle {
   size_t size;     /* sizeof(exmat_obstacle) where the caller was compiled */
-  double point[3]; /* of the plane; centre of sphere and box; where the capsule's axis begins [m]; 0 */
+  double point[3]; /* of the plane; centre of sphere and box; where the capsule's axis begins; origin of the axes of a
+                      shape made of arrays [m]; 0 */
   double
       direction[3]; /* the plane's, away from the solid; from the beginning to the end of the capsule's axis [m]; z */
   double half_extents[3]; /* of the box, > 0 [m]; 1 */
-  double orientation[4];  /* of the box, a quaternion, w first; 1 0 0 0 */
+  double orientation[4];  /* of the box, or of those axes, a quaternion, w first; 1 0 0 0 */
   double radius;          /* of sphere and capsule, > 0 [m]; 1 */
   double stiffness;       /* pressure per depth, > 0 [N/m^3]; 1e6 */
   double damping;         /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
@@ -311,6 +319,29 @@ EXMAT_API exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, size_t s
 
 EXMAT_API exmat_status exmat_body_add_obstacle(exmat_body* body, const exmat_obstacle* obstacle,
                                                int64_t* id) EXMAT_NOEXCEPT;
+/* Meshes and height fields are made of arrays once, which are copied, and any number of obstacles of any bodies share
+   them: a level has one. Immutable; may be destroyed while obstacles are made of it. */
+typedef struct exmat_shape exmat_shape;
+
+/* `vertices` [coordinates = 3k] [m] and `triangles` [corners = 3f], 0-based. Vertices at one place are one. With
+   thickness 0 it is solid: each edge belongs to two triangles, and they look away from the solid; what is open or
+   turned is refused in words. With a thickness > 0 [m] it is a shell about the triangles, on both sides, and may be
+   open. */
+EXMAT_API exmat_status exmat_shape_create_mesh(const double* vertices, int64_t coordinates, const int32_t* triangles,
+                                               int64_t corners, double thickness, exmat_shape** shape) EXMAT_NOEXCEPT;
+
+/* Ground: `heights` [rows x columns] along z [m], row by row, 2 or more of each; `spacing` [2]: of columns along x and
+   of rows along y, > 0 [m]. Solid below, nothing beyond the border. */
+EXMAT_API exmat_status exmat_shape_create_height_field(const double* heights, int64_t rows, int64_t columns,
+                                                       const double* spacing, exmat_shape** shape) EXMAT_NOEXCEPT;
+
+EXMAT_API void exmat_shape_destroy(exmat_shape* shape) EXMAT_NOEXCEPT;
+
+/* As exmat_body_add_obstacle(), of that shape: of `obstacle` its law, point and orientation. Moved, read, changed and
+   removed as others are. */
+EXMAT_API exmat_status exmat_body_add_shape(exmat_body* body, const exmat_shape* shape, const exmat_obstacle* obstacle,
+                                            int64_t* id) EXMAT_NOEXCEPT;
+
 /* What it held by friction is let go. */
 EXMAT_API exmat_status exmat_body_remove_obstacle(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
 
@@ -360,7 +391,7 @@ EXMAT_API exmat_status exmat_body_read_contact_load(const exmat_body* body, int6
    earlier, motion, applied forces, targets, contacts. Bodies of the same bundle, settings or scene, with the same
    obstacles, take it and go on to the last bit, in this version of the library. */
 
-/* How many numbers it has now: the same for all bodies of a model, but for 6 for each contact. Negative where `body` is
+/* How many numbers it has now: the same for all bodies of a model, but for 9 for each contact. Negative where `body` is
    NULL. */
 EXMAT_API int64_t exmat_body_state_size(const exmat_body* body) EXMAT_NOEXCEPT;
 

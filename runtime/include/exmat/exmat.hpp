@@ -136,6 +136,31 @@ class Points {
   detail::Owner<exmat_points, exmat_points_destroy> handle_;
 };
 
+/// A mesh or a height field made of arrays, which any number of obstacles share.
+class Shape {
+ public:
+  /// Closed, or with a thickness > 0 [m] a shell: `vertices` [3k] [m], `triangles` [3f].
+  static Shape mesh(std::span<const double> vertices, std::span<const std::int32_t> triangles, double thickness = 0) {
+    exmat_shape* shape = nullptr;
+    detail::check(exmat_shape_create_mesh(vertices.data(), detail::length(vertices), triangles.data(),
+                                          detail::length(triangles), thickness, &shape));
+    return Shape(shape);
+  }
+  /// `heights` [rows x columns] [m], `spacing` of columns and of rows [m].
+  static Shape height_field(std::span<const double> heights, std::int64_t columns, std::array<double, 2> spacing) {
+    exmat_shape* shape = nullptr;
+    const std::int64_t rows = columns > 0 ? detail::length(heights) / columns : 0;
+    detail::check(exmat_shape_create_height_field(heights.data(), rows, columns, spacing.data(), &shape));
+    return Shape(shape);
+  }
+
+  const exmat_shape* get() const noexcept { return handle_.get(); }
+
+ private:
+  explicit Shape(exmat_shape* shape) : handle_(shape) {}
+  detail::Owner<exmat_shape, exmat_shape_destroy> handle_;
+};
+
 /// A body that something else owns: a Body, or a World. Copied as a reference is.
 class BodyRef {
  public:
@@ -243,6 +268,13 @@ class BodyRef {
     obstacle.size = sizeof obstacle;
     std::int64_t id = -1;
     detail::check(exmat_body_add_obstacle(get(), &obstacle, &id));
+    return id;
+  }
+  /// Of that shape: its law, point and orientation are those of `obstacle`.
+  std::int64_t add_shape(const Shape& shape, exmat_obstacle obstacle) {
+    obstacle.size = sizeof obstacle;
+    std::int64_t id = -1;
+    detail::check(exmat_body_add_shape(get(), shape.get(), &obstacle, &id));
     return id;
   }
   void remove_obstacle(std::int64_t id) { detail::check(exmat_body_remove_obstacle(get(), id)); }

@@ -6,10 +6,15 @@
 #include <limits>
 #include <utility>
 
+#include "runtime/sim/contact/first_meeting.h"
+
 namespace exmat::runtime {
 namespace {
 
 auto rows_of(const BodyCandidates& candidates, std::size_t index) {
+  return candidates.basis.middleRows<3>(3 * static_cast<Eigen::Index>(index));
+}
+auto rows_of(BodyCandidates& candidates, std::size_t index) {
   return candidates.basis.middleRows<3>(3 * static_cast<Eigen::Index>(index));
 }
 
@@ -19,12 +24,11 @@ Eigen::Vector3d surface_arm(const BodyCandidates& candidates, std::size_t index,
   return pose.rotation * moved;
 }
 
-/// One row more, with room for as many again where there is none.
-Eigen::Ref<RowMatrix> append_rows(BodyCandidates& candidates, Eigen::Index modes) {
+/// Three rows more, with room for as many again where there is none.
+void append_rows(BodyCandidates& candidates, Eigen::Index modes) {
   const Eigen::Index needed = 3 * std::ssize(candidates.all);
   if (candidates.basis.cols() != modes) candidates.basis.resize(0, modes);
   if (candidates.basis.rows() < needed) candidates.basis.conservativeResize(2 * needed, modes);
-  return candidates.basis.middleRows(needed - 3, 3);
 }
 
 /// The tangential spring of the last step: as long, and tangential to the surface as it is now.
@@ -48,6 +52,23 @@ std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen
     facing->normal = -facing->normal;
   }
   return facing;
+}
+
+/// The same of a vertex that was inside, and came in by a side that looked the way `side`: where the nearest looks the
+/// other way it has gone through, and what is nearest of the rest is how deep it is.
+std::optional<SurfaceHit> nearest_by_side(const BodySurface& surface, const Eigen::Vector3d& point,
+                                          const Eigen::Vector3d& looks, const Eigen::Vector3d& side, double radius,
+                                          SurfaceShape& shape) {
+  auto hit = nearest_facing(surface, point, looks, radius, shape);
+  if (!hit || hit->normal.dot(side) >= kOtherSide) return hit;
+  const Eigen::Vector3d far_side = -side;
+  auto entry = surface.nearest(point, radius, shape, &far_side);
+  if (!entry) return hit;
+  if (entry->distance > 0) {  // told by a part of the surface alone, as above
+    entry->distance = -entry->distance;
+    entry->normal = -entry->normal;
+  }
+  return entry->normal.dot(side) > 0 ? entry : hit;
 }
 
 }  // namespace
@@ -97,6 +118,7 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
   const double q_norm = a.pose.q.norm();
   double deepest = anew ? 2 * b.touching.surface.bound(b.pose.q).radius : 0;
   for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
+  const double fast = kFast * b.touching.surface.bound(b.pose.q).radius;
   auto last = held.begin();
   const auto test = [&](int vertex) {
     while (last != held.end() && last->vertex < vertex) ++last;
@@ -108,6 +130,7 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
     const auto to_others = [&] {
       const Eigen::Vector3d looks =
           b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
+      if (was_inside) return nearest_by_side(b.touching.surface, point, looks, last->normal, margin + depth, shape);
       return nearest_facing(b.touching.surface, point, looks, margin + depth, shape);
     };
     const auto to_own = [&] {
@@ -120,14 +143,29 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
     if (!hit || hit->distance > margin) return;
     BodyCandidate& candidate = candidates.all.emplace_back();
     candidate.vertex = vertex;
-    candidate.rest = b.touching.surface.rest_of(*hit);
-    b.touching.surface.basis_of(*hit, append_rows(candidates, b.pose.q.size()));
-    const Eigen::Vector3d arm_b = surface_arm(candidates, candidates.all.size() - 1, b.pose);
-    const Eigen::Vector3d own_b =
-        b.pose.rotation * rows_of(candidates, candidates.all.size() - 1).lazyProduct(b.velocity.v).eval();
+    const std::size_t index = candidates.all.size() - 1;
+    append_rows(candidates, b.pose.q.size());
+    const auto set_place = [&](const SurfaceHit& found) {
+      candidate.rest = b.touching.surface.rest_of(found);
+      b.touching.surface.basis_of(found, rows_of(candidates, index));
+      return surface_arm(candidates, index, b.pose);
+    };
+    Eigen::Vector3d arm_b = set_place(*hit);
+    const Eigen::Vector3d own_b = b.pose.rotation * rows_of(candidates, index).lazyProduct(b.velocity.v).eval();
     const Eigen::Vector3d apart = a.set.world_velocity(vertex, arm, a.pose, a.velocity) - b.velocity.at(arm_b) - own_b;
+    SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
+    const double way = time_step * apart.norm();
+    if (!own && !was_inside && hit->distance > 0 && way > std::max(hit->distance, fast)) {
+      const Eigen::Vector3d heading = kContactMarginSteps * time_step * (b.pose.rotation.transpose() * apart);
+      const auto met = first_meeting(point, point + heading, [&](const Eigen::Vector3d& at, double left) {
+        return b.touching.surface.nearest(at, left, shape);
+      });
+      if (!met) return candidates.all.pop_back();
+      arm_b = set_place(*met);
+      surface.normal = b.pose.rotation * met->normal;
+      surface.distance = surface.normal.dot(offset - arm_b);
+    }
     const Eigen::Vector3d place = offset - arm_b;
-    const SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
     freeze_contact(law_, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
     if (!was_inside) return;
     candidate.friction_force = law_.friction * last->normal_force;
@@ -225,6 +263,7 @@ void BodyContact::commit(const BodyPose& a, const BodyPose& b, const BodyCandida
     contact.vertex = candidate.vertex;
     contact.gap = std::min(0.0, candidate.gap);
     contact.normal_force = candidate.normal_force;
+    contact.normal = b.rotation.transpose() * candidate.normal;
     const Eigen::Vector3d place = a.position + candidate.arm - b.position - candidate.surface_arm;
     if (candidate.normal_force > 0)
       contact.stretch = b.rotation.transpose() * held_stretch(law_.friction, place, candidate);

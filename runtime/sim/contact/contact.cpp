@@ -54,18 +54,27 @@ bool ContactSet::body_is_near(const BodyPose& pose, double q_norm, double margin
                               const ContactWorkspace& workspace) const noexcept {
   const DeformationTree::Node& all = tree_.nodes().front();
   const Eigen::Vector3d centre = pose.position + pose.rotation * all.centre;
-  const double radius = all.radius + tree_.basis_norm() * q_norm + margin;
+  const double radius = all.radius + tree_.basis_norm() * q_norm;
   return std::any_of(workspace.obstacles.begin(), workspace.obstacles.end(),
-                     [&](const PlacedObstacle& obstacle) { return obstacle.signed_distance(centre) <= radius; });
+                     [&](const PlacedObstacle& obstacle) { return obstacle.may_meet(centre, radius, margin); });
+}
+
+/// Obstacles that go through the body in the step rather than up to it.
+void ContactSet::find_sweeping(const BodyPose& pose, double q_norm, ContactWorkspace& workspace) const noexcept {
+  for (PlacedObstacle& placed : workspace.obstacles) {
+    if (!placed.obstacle->motion.moves()) continue;
+    const double reach = reach_ + tree_.basis_norm() * q_norm;
+    placed.sweeps = placed.sweep(pose.position, reach) > kSweep * shortest_passage(placed.obstacle->shape);
+  }
 }
 
 bool ContactSet::is_near(int node, const BodyPose& pose, double q_norm, double margin,
                          const ContactWorkspace& workspace) const noexcept {
   const DeformationTree::Ball ball = tree_.ball(node, pose.q, q_norm);
   const Eigen::Vector3d centre = pose.position + pose.rotation * ball.centre;
-  const double radius = ball.radius + margin;
+  const double radius = ball.radius;
   return std::any_of(workspace.obstacles.begin(), workspace.obstacles.end(),
-                     [&](const PlacedObstacle& obstacle) { return obstacle.signed_distance(centre) <= radius; });
+                     [&](const PlacedObstacle& obstacle) { return obstacle.may_meet(centre, radius, margin); });
 }
 
 Eigen::Vector3d ContactSet::world_arm(int vertex, const BodyPose& pose) const noexcept {
@@ -85,7 +94,7 @@ void ContactSet::test_vertices(const DeformationTree::Node& node, const BodyPose
     ++workspace.tested_vertices;
     const Eigen::Vector3d point = pose.position + world_arm(vertex, pose);
     for (std::size_t i = 0; i < workspace.obstacles.size(); ++i) {
-      if (workspace.obstacles[i].signed_distance(point) > margin) continue;
+      if (!workspace.obstacles[i].may_meet(point, 0, margin)) continue;
       ContactCandidate& candidate = workspace.candidates[workspace.candidate_count++];
       candidate.vertex = vertex;
       candidate.obstacle = static_cast<int>(i);
@@ -101,6 +110,7 @@ void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time,
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     workspace.obstacles[i] = PlacedObstacle(obstacles[i], end_time, time_step);
   const double q_norm = pose.q.norm();
+  find_sweeping(pose, q_norm, workspace);
   if (!body_is_near(pose, q_norm, margin, workspace)) return;
   const auto count = static_cast<int>(tree_.nodes().size());
   for (int node = 0; node < count;) {
@@ -112,17 +122,19 @@ void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time,
   }
 }
 
-void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, double time_step, const ContactState& state,
-                        ContactWorkspace& workspace) const noexcept {
+void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected,
+                        double time_step, const ContactState& state, ContactWorkspace& workspace) const noexcept {
   std::size_t next = 0;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     ContactCandidate& candidate = workspace.candidates[i];
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
     const Eigen::Vector3d arm = world_arm(candidate.vertex, pose);
     const Eigen::Vector3d point = pose.position + arm;
-    const Eigen::Vector3d predicted = point + time_step * world_velocity(candidate.vertex, arm, pose, velocity);
-    freeze_contact(placed, point, predicted, areas_[candidate.vertex], time_step, candidate);
-    take_friction(placed, state, next, candidate);
+    const Eigen::Vector3d at = world_velocity(candidate.vertex, arm, pose, velocity);
+    const Eigen::Vector3d predicted = point + time_step * at;
+    const Eigen::Vector3d heading = predicted + time_step * (at + expected.at(arm) - velocity.at(arm));
+    freeze_contact(placed, find_held(state, next, candidate), {point, predicted, heading}, areas_[candidate.vertex],
+                   time_step, candidate);
   }
 }
 
@@ -152,7 +164,7 @@ double ContactSet::potential(const BodyPose& pose, const ContactWorkspace& works
     const ContactCandidate& candidate = workspace.candidates[i];
     const Eigen::Vector3d point = pose.position + world_arm(candidate.vertex, pose);
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    sum += contact_potential(candidate, placed.signed_distance(point), point);
+    sum += contact_potential(placed, candidate, point);
   }
   return sum;
 }

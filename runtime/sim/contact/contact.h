@@ -68,7 +68,7 @@ struct ContactWorkspace : ContactSums {
 /// Contact of a body's surface with obstacles, by the law of contact_law.h. docs/method.md, "Contact".
 ///
 /// One step: gather, freeze, then evaluate, potential and add_stiffness as often as needed, then evaluate at the
-/// accepted pose and commit. An obstacle that is thinner than a vertex moves in one step may be passed through.
+/// accepted pose and commit.
 class ContactSet {
  public:
   ContactSet() = default;
@@ -94,9 +94,10 @@ class ContactSet {
   void gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
               double margin, ContactWorkspace& workspace) const noexcept;
 
-  /// Sets what the step keeps of each candidate, from pose and velocity at its beginning.
-  void freeze(const BodyPose& pose, const BodyVelocity& velocity, double time_step, const ContactState& state,
-              ContactWorkspace& workspace) const noexcept;
+  /// Sets what the step keeps of each candidate, from pose and velocity at its beginning; `expected` is the velocity
+  /// that the loads of the step make of it.
+  void freeze(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected, double time_step,
+              const ContactState& state, ContactWorkspace& workspace) const noexcept;
 
   /// Forces, their sums and stiffness at a pose at the end of the step.
   void evaluate(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
@@ -133,6 +134,7 @@ class ContactSet {
   double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
 
  private:
+  void find_sweeping(const BodyPose& pose, double q_norm, ContactWorkspace& workspace) const noexcept;
   bool is_near(int node, const BodyPose& pose, double q_norm, double margin,
                const ContactWorkspace& workspace) const noexcept;
   bool body_is_near(const BodyPose& pose, double q_norm, double margin,

@@ -82,22 +82,34 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
   candidate.friction_force = 0;
 }
 
-void freeze_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const Eigen::Vector3d& predicted,
-                    double area, double time_step, ContactCandidate& candidate) noexcept {
-  const Obstacle& obstacle = *placed.obstacle;
-  const Eigen::Vector3d carried = placed.carried(point);
-  freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction}, placed.nearest_surface_point(carried),
-                 carried, predicted, area, time_step, candidate);
+double ContactState::longest_way_out() const noexcept {
+  double longest = 0;
+  for (std::size_t i = 0; i < count; ++i) longest = std::max(longest, held[i].way_out.squaredNorm());
+  return std::sqrt(longest);
 }
 
-void take_friction(const PlacedObstacle& placed, const ContactState& state, std::size_t& next,
-                   ContactCandidate& candidate) noexcept {
+const HeldContact* find_held(const ContactState& state, std::size_t& next, const ContactCandidate& candidate) noexcept {
   while (next < state.count && precedes(state.held[next], candidate)) ++next;
-  if (next == state.count) return;
+  if (next == state.count) return nullptr;
   const HeldContact& held = state.held[next];
-  if (held.vertex != candidate.vertex || held.obstacle != candidate.obstacle) return;
-  candidate.anchor = placed.pose.to_world(held.anchor);
-  candidate.friction_force = placed.obstacle->friction * held.normal_force;
+  return held.vertex == candidate.vertex && held.obstacle == candidate.obstacle ? &held : nullptr;
+}
+
+void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const VertexMotion& motion, double area,
+                    double time_step, ContactCandidate& candidate) noexcept {
+  const Obstacle& obstacle = *placed.obstacle;
+  const VertexWay way{placed.carried(motion.point), motion.predicted, motion.heading};
+  candidate.hint = NearestHint();
+  SurfacePoint surface = placed.nearest_surface_point(way.carried, candidate.hint);
+  const Eigen::Vector3d way_out =
+      held != nullptr ? Eigen::Vector3d(placed.pose.rotation * held->way_out) : Eigen::Vector3d::Zero();
+  candidate.passage = find_passage(placed, way, surface, way_out);
+  if (candidate.passage.kind == Passage::Kind::kThrough) surface = candidate.passage.side.nearest(way.carried);
+  freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction}, surface, way.carried, motion.predicted,
+                 area, time_step, candidate);
+  if (held == nullptr) return;
+  candidate.anchor = placed.pose.to_world(held->anchor);
+  candidate.friction_force = obstacle.friction * held->normal_force;
 }
 
 void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept {
@@ -110,7 +122,15 @@ void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
 
 void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
                       ContactCandidate& candidate) noexcept {
-  evaluate_contact(placed.nearest_surface_point(point), point, candidate);
+  const SurfacePoint surface = felt_surface(placed, candidate.passage, point, candidate.hint, candidate.by_plane);
+  evaluate_contact(surface, point, candidate);
+}
+
+double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
+                         const Eigen::Vector3d& point) noexcept {
+  NearestHint hint = candidate.hint;
+  bool by_plane = false;
+  return contact_potential(candidate, felt_surface(placed, candidate.passage, point, hint, by_plane).distance, point);
 }
 
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept {
@@ -148,12 +168,15 @@ Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point,
 
 void hold_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const ContactCandidate& candidate,
                   ContactState& state) noexcept {
-  if (candidate.normal_force <= 0) return;
+  const bool is_beyond = candidate.by_plane && candidate.gap < 0;
+  if (candidate.normal_force <= 0 && !is_beyond) return;
   HeldContact& held = state.held[state.count++];
   held.vertex = candidate.vertex;
   held.obstacle = candidate.obstacle;
   held.normal_force = candidate.normal_force;
   held.anchor = placed.pose.to_frame(point - held_stretch(placed.obstacle->friction, point, candidate));
+  held.way_out.setZero();
+  if (is_beyond) held.way_out = placed.pose.rotation.transpose() * (-candidate.gap * candidate.passage.side.normal);
 }
 
 }  // namespace exmat::runtime

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "runtime/sim/contact/obstacle.h"
+#include "runtime/sim/contact/passage.h"
 
 namespace exmat::runtime {
 
@@ -21,9 +21,8 @@ namespace exmat::runtime {
 // lambda is the normal force at the end of the last step, or at the last refresh_friction(). Both forces are minus the
 // gradient of a potential of the positions x at the end of the step, whatever the integrator.
 
-inline constexpr double kContactMarginSteps = 2;  ///< way of a vertex that candidates are looked for in
-inline constexpr int kFrictionRounds = 3;         ///< solutions of one step for the normal forces of friction
-inline constexpr double kSameFriction = 0.05;     ///< relative change of friction that needs no further one
+inline constexpr int kFrictionRounds = 3;      ///< solutions of one step for the normal forces of friction
+inline constexpr double kSameFriction = 0.05;  ///< relative change of friction that needs no further one
 
 /// Of a pair of surfaces, per area.
 struct ContactLaw {
@@ -37,12 +36,17 @@ struct HeldContact {
   int vertex = 0, obstacle = 0;
   double normal_force = 0;                           ///< at the end of the last step [N]
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the obstacle [m]
+  /// To the surface that it came in by, where that is not the nearest; else 0. Frame of the obstacle [m].
+  Eigen::Vector3d way_out = Eigen::Vector3d::Zero();
 };
 
 /// The contacts of a State: the first `count` of `held`, in order of vertex and obstacle.
 struct ContactState {
   std::vector<HeldContact> held;
   std::size_t count = 0;
+
+  /// How far the farthest of them is from the surface that it came in by, where that is not the nearest [m].
+  double longest_way_out() const noexcept;
 };
 
 /// A vertex that may touch an obstacle in this step.
@@ -56,8 +60,11 @@ struct ContactCandidate {
   double stiffness = 0;                               ///< kappa = area * stiffness [N/m]
   double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
+  Passage passage;                                    ///< of obstacles
 
   // Of the last evaluation.
+  NearestHint hint;                                          ///< of nearest_surface_point()
+  bool by_plane = false;                                     ///< its surface was the passage's plane
   double gap = 0;                                            ///< [m]
   double normal_force = 0;                                   ///< [N]
   Eigen::Vector3d arm = Eigen::Vector3d::Zero();             ///< x - position [m]
@@ -67,20 +74,26 @@ struct ContactCandidate {
   Eigen::Vector3d weights = Eigen::Vector3d::Zero();         ///< w_i >= 0 [N/m]
 };
 
-/// Sets what a step keeps of a candidate whose vertex, of the share `area` of the surface [m^2], is at `point` where
-/// the step begins and would be at `predicted` at its end.
-void freeze_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const Eigen::Vector3d& predicted,
-                    double area, double time_step, ContactCandidate& candidate) noexcept;
+/// What the vertex of a candidate remembers, or null. Candidates come in order; `next`, 0 before the first one, is
+/// where the search in `state` goes on.
+const HeldContact* find_held(const ContactState& state, std::size_t& next, const ContactCandidate& candidate) noexcept;
+
+/// Where a vertex begins a step, and where its velocity leads.
+struct VertexMotion {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< where the step begins, world [m]
+  Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< a step on
+  Eigen::Vector3d heading = Eigen::Vector3d::Zero();    ///< farther than it may go: two steps on
+};
+
+/// Sets what a step keeps of a candidate, whose vertex has the share `area` of the surface [m^2]; friction and anchor
+/// are those of `held`, if the vertex touched.
+void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const VertexMotion& motion, double area,
+                    double time_step, ContactCandidate& candidate) noexcept;
 
 /// The same for a vertex that is `carried` to `surface`, its nearest point there; `predicted` is where it would be.
 void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Eigen::Vector3d& carried,
                     const Eigen::Vector3d& predicted, double area, double time_step,
                     ContactCandidate& candidate) noexcept;
-
-/// Then friction and anchor of the last step, if the vertex touched. Candidates come in order; `next`, 0 before the
-/// first one, is where the search in `state` goes on.
-void take_friction(const PlacedObstacle& placed, const ContactState& state, std::size_t& next,
-                   ContactCandidate& candidate) noexcept;
 
 /// Force and stiffness of the vertex at `point` at the end of the step.
 void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
@@ -90,6 +103,10 @@ void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
 
 /// W [J] of the vertex at `point` whose distance is `gap` [m].
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;
+
+/// The same of the vertex at `point` of an obstacle's candidate; leaves the last evaluation as it is.
+double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
+                         const Eigen::Vector3d& point) noexcept;
 
 /// How much friction has changed by taking lambda anew.
 struct FrictionChange {

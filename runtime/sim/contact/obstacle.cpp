@@ -2,11 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <limits>
 
 namespace exmat::runtime {
 namespace {
 
-SurfacePoint nearest(const Plane& plane, const Eigen::Vector3d& point) {
+SurfacePoint nearest(const Plane& plane, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
   const double distance = plane.normal.dot(point - plane.point);
   return {distance, plane.normal, point - distance * plane.normal};
 }
@@ -20,14 +21,14 @@ SurfacePoint nearest_on_ball(const Eigen::Vector3d& centre, double radius, const
   return {length - radius, normal, centre + radius * normal};
 }
 
-SurfacePoint nearest(const Sphere& sphere, const Eigen::Vector3d& point) {
+SurfacePoint nearest(const Sphere& sphere, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
   return nearest_on_ball(sphere.centre, sphere.radius, Eigen::Vector3d::UnitZ(), point);
 }
 
-SurfacePoint nearest(const Capsule& capsule, const Eigen::Vector3d& point) {
+SurfacePoint nearest(const Capsule& capsule, const Eigen::Vector3d& point, NearestHint& hint) {
   const Eigen::Vector3d axis = capsule.end - capsule.start;
   const double square = axis.squaredNorm();
-  if (square == 0) return nearest(Sphere{capsule.start, capsule.radius}, point);
+  if (square == 0) return nearest(Sphere{capsule.start, capsule.radius}, point, hint);
   const double along = std::clamp(axis.dot(point - capsule.start) / square, 0.0, 1.0);
   return nearest_on_ball(capsule.start + along * axis, capsule.radius, axis.unitOrthogonal(), point);
 }
@@ -45,19 +46,89 @@ SurfacePoint nearest_in_axes(const Eigen::Vector3d& half_extents, const Eigen::V
   return surface;
 }
 
-SurfacePoint nearest(const Box& box, const Eigen::Vector3d& point) {
+SurfacePoint nearest(const Box& box, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
   const SurfacePoint local = nearest_in_axes(box.half_extents, box.rotation.transpose() * (point - box.centre));
   return {local.distance, box.rotation * local.normal, box.centre + box.rotation * local.point};
 }
 
+/// A point in a shape's own axes, and back.
+template <class Placed>
+Eigen::Vector3d in_axes_of(const Placed& shape, const Eigen::Vector3d& point) {
+  return shape.rotation.transpose() * (point - shape.position);
+}
+template <class Placed>
+SurfacePoint from_axes_of(const Placed& shape, const SurfacePoint& local) {
+  return {local.distance, shape.rotation * local.normal, shape.position + shape.rotation * local.point};
+}
+
+SurfacePoint nearest(const MeshShape& shape, const Eigen::Vector3d& point, NearestHint& hint) {
+  return from_axes_of(shape, shape.mesh->nearest(in_axes_of(shape, point), hint));
+}
+
+SurfacePoint nearest(const HeightFieldShape& shape, const Eigen::Vector3d& point, NearestHint& hint) {
+  return from_axes_of(shape, shape.field->nearest(in_axes_of(shape, point), hint));
+}
+
+bool is_within(const MeshShape& shape, const Eigen::Vector3d& point, double radius) {
+  return shape.mesh->may_be_within(in_axes_of(shape, point), radius);
+}
+bool is_within(const HeightFieldShape& shape, const Eigen::Vector3d& point, double radius) {
+  return shape.field->may_be_within(in_axes_of(shape, point), radius);
+}
+template <class Solid>
+bool is_within(const Solid& shape, const Eigen::Vector3d& point, double radius) {
+  NearestHint hint;
+  return nearest(shape, point, hint).distance <= radius;
+}
+
+double deepest_in(const Plane& /*plane*/) { return std::numeric_limits<double>::infinity(); }
+double deepest_in(const Sphere& sphere) { return sphere.radius; }
+double deepest_in(const Box& box) { return box.half_extents.minCoeff(); }
+double deepest_in(const Capsule& capsule) { return capsule.radius; }
+double deepest_in(const MeshShape& shape) { return shape.mesh->deepest(); }
+double deepest_in(const HeightFieldShape& /*shape*/) { return std::numeric_limits<double>::infinity(); }
+
 }  // namespace
 
+SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point, NearestHint& hint) noexcept {
+  return std::visit([&](const auto& held) { return nearest(held, point, hint); }, shape);
+}
+
 SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point) noexcept {
-  return std::visit([&point](const auto& held) { return nearest(held, point); }, shape);
+  if (const auto* mesh = std::get_if<MeshShape>(&shape))
+    return from_axes_of(*mesh, mesh->mesh->nearest(in_axes_of(*mesh, point)));
+  if (const auto* ground = std::get_if<HeightFieldShape>(&shape))
+    return from_axes_of(*ground, ground->field->nearest(in_axes_of(*ground, point)));
+  NearestHint hint;
+  return nearest_surface_point(shape, point, hint);
 }
 
 double signed_distance(const Shape& shape, const Eigen::Vector3d& point) noexcept {
   return nearest_surface_point(shape, point).distance;
+}
+
+bool may_be_within(const Shape& shape, const Eigen::Vector3d& point, double radius) noexcept {
+  return std::visit([&](const auto& held) { return is_within(held, point, radius); }, shape);
+}
+
+double deepest(const Shape& shape) noexcept {
+  return std::visit([](const auto& held) { return deepest_in(held); }, shape);
+}
+
+double shortest_passage(const Shape& shape) noexcept {
+  const bool is_known = !std::holds_alternative<MeshShape>(shape) && !std::holds_alternative<HeightFieldShape>(shape);
+  return is_known ? 2 * deepest(shape) : 0;
+}
+
+bool PlacedObstacle::may_meet(const Eigen::Vector3d& centre, double radius, double margin) const noexcept {
+  if (!sweeps) return may_be_within(obstacle->shape, pose.to_frame(centre), radius + margin);
+  return may_be_within(obstacle->shape, start.to_frame(centre),
+                       radius + margin + kContactMarginSteps * sweep(centre, radius));
+}
+
+SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point, NearestHint& hint) const noexcept {
+  const SurfacePoint local = runtime::nearest_surface_point(obstacle->shape, pose.to_frame(point), hint);
+  return {local.distance, pose.rotation * local.normal, pose.to_world(local.point)};
 }
 
 SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point) const noexcept {

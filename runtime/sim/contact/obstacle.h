@@ -1,11 +1,18 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <variant>
 
+#include "runtime/sim/contact/height_field.h"
+#include "runtime/sim/contact/rigid_mesh.h"
+#include "runtime/sim/contact/surface_point.h"
 #include "runtime/sim/frame/motion.h"
 
 namespace exmat::runtime {
+
+inline constexpr double kContactMarginSteps = 2;  ///< way of a vertex that candidates are looked for in
+inline constexpr double kSweep = 0.5;             ///< of the thickness: an obstacle that goes farther in a step sweeps
 
 // Shapes in the frame of their obstacle [m].
 
@@ -26,21 +33,33 @@ struct Capsule {
   Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::UnitZ();  ///< of its axis
   double radius = 1;                                                                ///< > 0
 };
-using Shape = std::variant<Plane, Sphere, Box, Capsule>;
-
-/// The point of a surface nearest to a given one.
-struct SurfacePoint {
-  double distance = 0;                                ///< to the given point, negative inside [m]
-  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< unit, outward: the gradient of the distance; where there is
-                                                      ///< none (edges, centres), the same one of several each time
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+struct MeshShape {
+  std::shared_ptr<const RigidMesh> mesh;                   ///< in axes of its own; any number of obstacles share it
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< of these axes' origin
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of these axes
 };
+struct HeightFieldShape {
+  std::shared_ptr<const HeightField> field;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+};
+using Shape = std::variant<Plane, Sphere, Box, Capsule, MeshShape, HeightFieldShape>;
 
-/// Exact outside and inside.
+/// Exact outside and inside. With a hint, of points near each other.
+SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point, NearestHint& hint) noexcept;
 SurfacePoint nearest_surface_point(const Shape& shape, const Eigen::Vector3d& point) noexcept;
 
 /// Its distance alone. It is 1-Lipschitz: no point of a ball is nearer than that of its centre minus its radius.
 double signed_distance(const Shape& shape, const Eigen::Vector3d& point) noexcept;
+
+/// False only where it is above `radius`.
+bool may_be_within(const Shape& shape, const Eigen::Vector3d& point, double radius) noexcept;
+
+/// How far any point in it is from its surface at most; infinite of a half space and of ground [m].
+double deepest(const Shape& shape) noexcept;
+
+/// The shortest way that may lead through it: 0 where it is not known, as of meshes [m].
+double shortest_passage(const Shape& shape) noexcept;
 
 /// What a body may touch. Per area of the body's surface, so that results do not depend on its tessellation.
 struct Obstacle {
@@ -55,15 +74,29 @@ struct Obstacle {
 struct PlacedObstacle {
   const Obstacle* obstacle = nullptr;
   MotionSample start, pose;  ///< at the beginning and at the end
+  double turn = 0;           ///< bound on how far its points move beside each other in the step, over how far apart
+  bool sweeps = false;       ///< it goes so far in the step that the way to it counts, not where it ends alone
 
   PlacedObstacle() = default;
   PlacedObstacle(const Obstacle& placed, double end_time, double time_step) noexcept
-      : obstacle(&placed), start(placed.motion.sample(end_time - time_step)), pose(placed.motion.sample(end_time)) {}
+      : obstacle(&placed), start(placed.motion.sample(end_time - time_step)), pose(placed.motion.sample(end_time)) {
+    if (placed.motion.moves()) turn = (pose.rotation - start.rotation).norm();
+  }
 
   /// Where its material point at this world position goes in the step.
   Eigen::Vector3d carried(const Eigen::Vector3d& point) const noexcept { return pose.to_world(start.to_frame(point)); }
 
+  /// How far its material points in a ball go in the step, at most [m].
+  double sweep(const Eigen::Vector3d& centre, double radius) const noexcept {
+    return (carried(centre) - centre).norm() + turn * radius;
+  }
+
+  /// Whether anything in a ball at the beginning of the step, which moves by no more than half of `margin` in it, may
+  /// touch the obstacle in the step.
+  bool may_meet(const Eigen::Vector3d& centre, double radius, double margin) const noexcept;
+
   /// As above, world positions.
+  SurfacePoint nearest_surface_point(const Eigen::Vector3d& point, NearestHint& hint) const noexcept;
   SurfacePoint nearest_surface_point(const Eigen::Vector3d& point) const noexcept;
   double signed_distance(const Eigen::Vector3d& point) const noexcept;
 };

@@ -44,11 +44,14 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
   const ContactSet& set = *model.contact;
   const double dt = scene.time_step;
   const double travel = std::max(set.travel_bound(pose, velocity, dt), set.travel_bound(pose, expected, dt));
-  const double margin = kContactMarginSteps * travel + dt * dt * scene.gravity.norm();
+  const double margin =
+      kContactMarginSteps * travel + dt * dt * scene.gravity.norm() + state.contacts.longest_way_out();
   ContactWorkspace& contact = workspace.near->contact;
   set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
   if (contact.candidate_count == 0) return false;
-  set.freeze(pose, velocity, dt, state.contacts, contact);
+  FrameVelocity loaded = expected;
+  loaded.linear += dt * scene.gravity;
+  set.freeze(pose, velocity, loaded, dt, state.contacts, contact);
   return true;
 }
 
@@ -78,6 +81,7 @@ void carry_contacts(const StepScene& scene, const Placement& from, const Placeme
     HeldContact& held = state.contacts.held[i];
     const MotionSample pose = scene.obstacles[static_cast<std::size_t>(held.obstacle)].motion.sample(state.time);
     held.anchor = pose.to_frame(to.position + turn * (pose.to_world(held.anchor) - from.position));
+    held.way_out.setZero();
   }
 }
 

@@ -22,7 +22,6 @@ namespace exmat::benchmarks {
 namespace {
 
 using precompute::Cage;
-using precompute::SurfaceMesh;
 
 // A map of space about the middle of a surface: along one axis, towards another.
 struct Map {

@@ -242,11 +242,26 @@ const BadConfig kBadScenes[] = {
     {"UnknownMember", scene(R"("gravitiy": [0, 0, 0])"),
      "a.json: /gravitiy; unknown member \"gravitiy\"; did you mean \"gravity\"?"},
     {"NoShape", obstacle(R"("friction": 1)"),
-     "a.json: /obstacles/0: expected exactly one of \"plane\", \"sphere\", \"box\" and \"capsule\", found none"},
+     "a.json: /obstacles/0: expected exactly one of \"plane\", \"sphere\", \"box\", \"capsule\", \"mesh\" and "
+     "\"height_field\", "
+     "found none"},
     {"TwoShapes", obstacle(R"("plane": {"normal": [0, 1, 0]}, "box": {"half_extents": [1, 1, 1]})"),
-     "a.json: /obstacles/0: expected exactly one of \"plane\", \"sphere\", \"box\" and \"capsule\", found \"plane\" "
-     "and "
-     "\"box\""},
+     "a.json: /obstacles/0: expected exactly one of \"plane\", \"sphere\", \"box\", \"capsule\", \"mesh\" and "
+     "\"height_field\", "
+     "found \"plane\" and \"box\""},
+    {"MeshWithoutFile", obstacle(R"("mesh": {"scale": 2})"), "a.json: /obstacles/0/mesh/file: expected a string"},
+    {"MeshOfNoSize", obstacle(R"("mesh": {"file": "a.obj", "scale": 0})"),
+     "a.json: /obstacles/0/mesh/scale: expected a number > 0, found 0"},
+    {"NegativeThickness", obstacle(R"("mesh": {"file": "a.obj", "thickness": -1})"),
+     "a.json: /obstacles/0/mesh/thickness: expected a number >= 0, found -1"},
+    {"HeightsTwice", obstacle(R"("height_field": {"file": "a.csv", "heights": [[0, 0], [0, 0]], "spacing": [1, 1]})"),
+     "a.json: /obstacles/0/height_field: expected file or heights, found both"},
+    {"NoHeights", obstacle(R"("height_field": {"spacing": [1, 1]})"),
+     "a.json: /obstacles/0/height_field: expected file or heights, found neither"},
+    {"UnequalRows", obstacle(R"("height_field": {"heights": [[0, 0], [0, 0, 0]], "spacing": [1, 1]})"),
+     "a.json: /obstacles/0/height_field/heights/1: expected 2 heights, as in the first row, found 3"},
+    {"NoSpacing", obstacle(R"("height_field": {"heights": [[0, 0], [0, 0]], "spacing": [1, 0]})"),
+     "a.json: /obstacles/0/height_field/spacing/1: expected a number > 0, found 0"},
     {"UnknownShape", obstacle(R"("spere": {"radius": 1})"),
      "a.json: /obstacles/0/spere; unknown member \"spere\"; did you mean \"sphere\"?"},
     {"NoNormal", obstacle(R"("plane": {"normal": [0, 0, 0]})"),

@@ -199,6 +199,33 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.every, 2);
 }
 
+TEST(LoadScene, ReadsMeshesAndHeightFields) {
+  const TemporaryFolder folder;
+  const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5", "obstacles": [
+    {"mesh": {"file": "a/level.obj", "scale": 0.01, "position": [1, 2, 3], "orientation": [0, 1, 0, 0],
+              "thickness": 0.1}, "friction": 0.5},
+    {"mesh": {"file": "rock.ply"}},
+    {"height_field": {"file": "hills.csv", "spacing": [0.5, 0.25], "position": [0, 0, -1]}},
+    {"height_field": {"heights": [[0, 1, 2], [3, 4, 5]], "spacing": [1, 1]}}]})");
+  ASSERT_EQ(scene.obstacles.size(), 4u);
+  const auto& level = std::get<MeshConfig>(scene.obstacles[0].shape);
+  EXPECT_EQ(level.file, folder / "a/level.obj");
+  EXPECT_EQ(level.scale, 0.01);
+  EXPECT_EQ(level.thickness, 0.1);
+  EXPECT_EQ(level.position, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(level.orientation.x(), 1);
+  const auto& rock = std::get<MeshConfig>(scene.obstacles[1].shape);
+  EXPECT_EQ(rock.scale, 1);
+  EXPECT_EQ(rock.thickness, 0);
+  const auto& hills = std::get<HeightFieldConfig>(scene.obstacles[2].shape);
+  EXPECT_EQ(hills.file, folder / "hills.csv");
+  EXPECT_EQ(hills.spacing, Eigen::Vector2d(0.5, 0.25));
+  EXPECT_EQ(hills.position, Eigen::Vector3d(0, 0, -1));
+  const auto& steps = std::get<HeightFieldConfig>(scene.obstacles[3].shape);
+  EXPECT_FALSE(steps.file);
+  EXPECT_EQ(steps.heights, (Eigen::MatrixXd(2, 3) << 0, 1, 2, 3, 4, 5).finished());
+}
+
 TEST(LoadScene, ReadsObstacles) {
   const TemporaryFolder folder;
   const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5", "obstacles": [

@@ -236,6 +236,95 @@ TEST_F(ApiContactTest, WhatWasAddedIsRead) {
   EXPECT_EQ(found.friction, 0.7);
 }
 
+/// A table of 2 x 2 x 0.2 m whose top is at z = 0.
+Shape table_mesh() {
+  const std::vector<double> vertices{-1, -1, -0.2, 1, -1, -0.2, -1, 1, -0.2, 1, 1, -0.2,
+                                     -1, -1, 0,    1, -1, 0,    -1, 1, 0,    1, 1, 0};
+  const std::vector<std::int32_t> triangles{0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
+                                            2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+  return Shape::mesh(vertices, triangles);
+}
+
+// The same block on a box, on its mesh and on flat ground of heights; the handle may go before the obstacles.
+TEST_F(ApiContactTest, MeshesAndHeightFieldsCarryAsABoxDoes) {
+  const Model model = this->model();
+  Body on_box(model), on_mesh(model), on_heights(model), on_shell(model);
+  exmat_obstacle law = floor();
+  law.shape = EXMAT_BOX;
+  law.point[2] = -0.1;
+  law.half_extents[0] = law.half_extents[1] = 1;
+  law.half_extents[2] = 0.1;
+  on_box.add_obstacle(law);
+  law = floor();
+  std::int64_t id = -1;
+  {
+    const Shape mesh = table_mesh();
+    id = on_mesh.add_shape(mesh, law);
+    const std::vector<double> heights(9, 0.5);
+    law.point[0] = law.point[1] = -1;
+    law.point[2] = -0.5;
+    on_heights.add_shape(Shape::height_field(heights, 3, {1, 1}), law);
+    law = floor();
+    law.point[2] = -0.05;
+    const std::vector<double> corners{-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
+    const std::vector<std::int32_t> sheet{0, 1, 2, 0, 2, 3};
+    on_shell.add_shape(Shape::mesh(corners, sheet, 0.1), law);
+  }
+  for (Body* body : {&on_box, &on_mesh, &on_heights, &on_shell}) {
+    body->step(400);
+    EXPECT_GT(body->contacts().size(), 3u);
+  }
+  for (Body* body : {&on_mesh, &on_heights, &on_shell})
+    for (int axis = 0; axis < 3; ++axis)
+      EXPECT_NEAR(body->motion().position[axis], on_box.motion().position[axis], 1e-9);
+  EXPECT_EQ(on_mesh.obstacle(id).shape, EXMAT_MESH);
+  EXPECT_EQ(on_mesh.obstacle(id).friction, 0.5);
+  exmat_motion up = at(0, 0, 0);
+  up.linear_velocity[2] = 0.5;
+  on_mesh.move_obstacle(id, up);
+  on_mesh.step(100);
+  EXPECT_NEAR(on_mesh.motion().position[2] - on_box.motion().position[2], 100 * kTimeStep * 0.5, 2e-3);
+  on_mesh.remove_obstacle(id);
+  on_mesh.step(10);
+  EXPECT_TRUE(on_mesh.contacts().empty());
+}
+
+TEST_F(ApiContactTest, WrongShapesAreRefusedInWords) {
+  exmat_shape* shape = nullptr;
+  const std::vector<double> corners{0, 0, 0, 1, 0, 0, 0, 1, 0};
+  const auto refused = [&](const std::vector<double>& vertices, const std::vector<std::int32_t>& triangles,
+                           double thickness) {
+    EXPECT_EQ(exmat_shape_create_mesh(vertices.data(), std::ssize(vertices), triangles.data(), std::ssize(triangles),
+                                      thickness, &shape),
+              EXMAT_INVALID_ARGUMENT);
+    EXPECT_EQ(shape, nullptr);
+    return std::string(exmat_last_error());
+  };
+  EXPECT_THAT(refused(corners, {0, 1, 2}, 0),
+              AllOf(HasSubstr("3 edges of one triangle alone"), HasSubstr("thickness")));
+  EXPECT_THAT(refused(corners, {0, 1, 3}, 1), HasSubstr("triangles[2] = 3: expected a vertex, 0 to 2"));
+  EXPECT_THAT(refused(corners, {0, 1, 1}, 1), HasSubstr("triangles: expected some"));
+  EXPECT_THAT(refused(corners, {0, 1}, 1), HasSubstr("corners = 2"));
+  EXPECT_THAT(refused({0, 0}, {0, 1, 2}, 1), HasSubstr("coordinates = 2"));
+  EXPECT_THAT(refused({0, 0, NAN, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, 1), HasSubstr("vertices: expected finite numbers"));
+  EXPECT_THAT(refused(corners, {0, 1, 2}, -1), HasSubstr("thickness = -1"));
+  const std::array<double, 2> spacing{1, 0};
+  EXPECT_EQ(exmat_shape_create_height_field(corners.data(), 3, 3, spacing.data(), &shape), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("spacing"));
+  EXPECT_EQ(exmat_shape_create_height_field(corners.data(), 1, 9, spacing.data(), &shape), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("1 rows"));
+  Body body(model());
+  exmat_obstacle obstacle = floor();
+  obstacle.shape = EXMAT_MESH;
+  std::int64_t id = 0;
+  EXPECT_EQ(exmat_body_add_obstacle(body.get(), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_body_add_shape()"));
+  obstacle.friction = -1;
+  EXPECT_EQ(exmat_body_add_shape(body.get(), table_mesh().get(), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("obstacle.friction"));
+  EXPECT_TRUE(body.obstacle_ids().empty());
+}
+
 TEST_F(ApiContactTest, WrongObstaclesAreRefusedInWords) {
   const Model model = this->model();
   Body body(model);

@@ -1,4 +1,4 @@
-#include "precompute/mesh_io/stl_reader.h"
+#include "common/surface_io/stl_reader.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,10 +1,14 @@
 #include "runtime/scene/obstacle_loader.h"
 
+#include <array>
+#include <fmt/format.h>
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/core/error.h"
+#include "common/core/log.h"
+#include "tests/support/temporary_folder.h"
 
 namespace exmat::runtime {
 namespace {
@@ -36,6 +40,83 @@ ReducedModel with_examples() {
   set.examples[1].name = "bend";
   set.examples[1].pose = Eigen::Vector3d(1, 2, 4);
   return data;
+}
+
+/// A cube of 2 m about the origin, in .obj quads; without its last face where `open`, with it turned where `turned`.
+std::string cube(bool open, bool turned = false, bool inward = false) {
+  std::string text;
+  for (int i = 0; i < 8; ++i) text += fmt::format("v {} {} {}\n", i & 1 ? 1 : -1, i & 2 ? 1 : -1, i & 4 ? 1 : -1);
+  const std::array<std::array<int, 4>, 6> faces{
+      {{1, 3, 4, 2}, {5, 6, 8, 7}, {1, 2, 6, 5}, {3, 7, 8, 4}, {1, 5, 7, 3}, {2, 4, 8, 6}}};
+  for (std::size_t f = 0; f < (open ? 5 : 6); ++f) {
+    std::array<int, 4> face = faces[f];
+    if (inward || (turned && f == 5)) std::ranges::reverse(face);
+    text += fmt::format("f {} {} {} {}\n", face[0], face[1], face[2], face[3]);
+  }
+  return text;
+}
+
+std::vector<Obstacle> with_mesh(const std::filesystem::path& file, double scale, double thickness) {
+  SceneConfig scene = config();
+  MeshConfig mesh;
+  mesh.file = file;
+  mesh.scale = scale;
+  mesh.thickness = thickness;
+  mesh.position = Eigen::Vector3d(0, 0, 5);
+  mesh.orientation = Eigen::Quaterniond(Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()));
+  scene.obstacles.push_back({mesh, 1e6, 0, 0, {}});
+  return make_obstacles(scene);
+}
+
+TEST(ObstacleLoader, MakesMeshes) {
+  const test::TemporaryFolder folder;
+  const Shape mesh = with_mesh(folder.write("a.obj", cube(false)), 0.5, 0).front().shape;
+  const Box box{{0, 0, 5},
+                Eigen::Vector3d::Constant(0.5),
+                Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix()};
+  for (const Eigen::Vector3d& point : {Eigen::Vector3d(1, 2, 3), {0.1, 0.2, 5.3}, {-0.4, 0.3, 4.7}, {0, 0, 7}})
+    EXPECT_NEAR(signed_distance(mesh, point), signed_distance(box, point), 1e-14);
+}
+
+TEST(ObstacleLoader, RefusesMeshesThatAreNotClosedUnlessTheyAreShells) {
+  const test::TemporaryFolder folder;
+  EXPECT_THAT(refusal([&] { with_mesh(folder.write("a.obj", cube(true)), 1, 0); }),
+              ::testing::AllOf(HasSubstr("a.obj: expected a closed mesh"), HasSubstr("4 edges of one triangle alone"),
+                               HasSubstr("\"thickness\"")));
+  EXPECT_THAT(refusal([&] { with_mesh(folder.write("b.obj", cube(false, true)), 1, 0); }),
+              HasSubstr("4 edges whose two triangles look opposite ways"));
+  const Shape shell = with_mesh(folder.path("a.obj"), 1, 0.2).front().shape;
+  EXPECT_NEAR(signed_distance(shell, Eigen::Vector3d(0, 0, 5)), 0.9, 1e-14);
+  EXPECT_THAT(refusal([&] { with_mesh(folder.path("none.obj"), 1, 0); }), HasSubstr("none.obj"));
+  EXPECT_THAT(refusal([&] { with_mesh(folder.path("a.glb"), 1, 0); }), HasSubstr(".obj, .ply or .stl"));
+  EXPECT_THAT(refusal([&] { with_mesh(folder.write("flat.obj", "v 0 0 0\nv 0 0 0\nv 1 0 0\nf 1 2 3\n"), 1, 1); }),
+              HasSubstr("triangles with corners at three places, found none"));
+}
+
+TEST(ObstacleLoader, WarnsOfFacesThatLookInward) {
+  const test::TemporaryFolder folder;
+  std::string warned;
+  const log::Sink former = log::set_sink([&](log::Level, std::string_view message) { warned += message; });
+  const Shape room = with_mesh(folder.write("room.obj", cube(false, false, true)), 1, 0).front().shape;
+  log::set_sink(former);
+  EXPECT_THAT(warned, HasSubstr("room.obj: its faces look inward"));
+  EXPECT_NEAR(signed_distance(room, Eigen::Vector3d(0, 0, 5)), 1, 1e-14);
+}
+
+TEST(ObstacleLoader, MakesHeightFieldsOfAFileOrOfTheScene) {
+  const test::TemporaryFolder folder;
+  SceneConfig scene = config();
+  HeightFieldConfig field;
+  field.spacing = Eigen::Vector2d(2, 1);
+  field.position = Eigen::Vector3d(0, 0, 1);
+  field.heights = (Eigen::MatrixXd(2, 2) << 1, 1, 1, 1).finished();
+  scene.obstacles.push_back({field, 1e6, 0, 0, {}});
+  field.file = folder.write("a.csv", "1,1,1\n1,1,1\n");
+  scene.obstacles.push_back({field, 1e6, 0, 0, {}});
+  const std::vector<Obstacle> obstacles = make_obstacles(scene);
+  EXPECT_NEAR(signed_distance(obstacles[0].shape, Eigen::Vector3d(1, 0.5, 5)), 3, 1e-15);
+  EXPECT_NEAR(signed_distance(obstacles[0].shape, Eigen::Vector3d(5, 0.5, 2)), 3, 1e-15);
+  EXPECT_NEAR(signed_distance(obstacles[1].shape, Eigen::Vector3d(3, 0.5, 1.5)), -0.5, 1e-15);
 }
 
 TEST(ObstacleLoader, MakesObstacles) {

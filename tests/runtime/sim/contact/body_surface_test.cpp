@@ -3,13 +3,12 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <gtest/gtest.h>
-#include <numbers>
 #include <random>
 
 #include "common/mesh/geometry.h"
-#include "runtime/sim/contact/nearest_on_triangle.h"
 #include "runtime/sim/contact/obstacle.h"
 #include "tests/support/allocation_counter.h"
+#include "tests/support/mesh_distance.h"
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::runtime {
@@ -31,18 +30,6 @@ struct Surface {
   BodySurface surface;
 };
 
-/// Solid angle of the surface over 4 pi: 1 inside, 0 outside (van Oosterom and Strackee 1983).
-double winding_number(const VertexArray& x, const TriangleArray& triangles, const Eigen::Vector3d& p) {
-  double sum = 0;
-  for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
-    const Eigen::Vector3d a = x.row(triangles(t, 0)).transpose() - p, b = x.row(triangles(t, 1)).transpose() - p,
-                          c = x.row(triangles(t, 2)).transpose() - p;
-    sum += 2 * std::atan2(a.dot(b.cross(c)), a.norm() * b.norm() * c.norm() + a.dot(b) * c.norm() +
-                                                 b.dot(c) * a.norm() + c.dot(a) * b.norm());
-  }
-  return sum / (4 * std::numbers::pi);
-}
-
 TEST(BodySurface, SignedDistanceIsThatOfAllTrianglesAndTheWindingNumber) {
   Surface body;
   SurfaceShape shape = body.surface.make_shape();
@@ -57,15 +44,11 @@ TEST(BodySurface, SignedDistanceIsThatOfAllTrianglesAndTheWindingNumber) {
     for (int i = 0; i < 300; ++i) {
       const Eigen::Vector3d p = Eigen::Vector3d(0.5, 0.12, 0.12) +
                                 Eigen::Vector3d(0.7 * unit(random), 0.3 * unit(random), 0.3 * unit(random));
-      double nearest = std::numeric_limits<double>::infinity();
-      for (Eigen::Index t = 0; t < body.triangles.rows(); ++t)
-        nearest = std::min(nearest, nearest_on_triangle(p, x.row(body.triangles(t, 0)), x.row(body.triangles(t, 1)),
-                                                        x.row(body.triangles(t, 2)))
-                                        .squared_distance);
+      const double nearest = test::distance_to_all(x, body.triangles, p);
       const auto hit = body.surface.nearest(p, 10, shape);
       ASSERT_TRUE(hit);
-      EXPECT_NEAR(std::abs(hit->distance), std::sqrt(nearest), 1e-12);
-      EXPECT_EQ(hit->distance<0, winding_number(x, body.triangles, p)> 0.5) << p.transpose();
+      EXPECT_NEAR(std::abs(hit->distance), nearest, 1e-12);
+      EXPECT_EQ(hit->distance<0, test::winding_number(x, body.triangles, p)> 0.5) << p.transpose();
       inside += hit->distance < 0;
       // Its material point is where it says.
       RowMatrix rows(3, q.size());

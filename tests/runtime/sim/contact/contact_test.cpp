@@ -67,7 +67,7 @@ struct Scenario {
   void begin() {
     for (int pass = 0; pass < 2; ++pass) {
       set.gather(obstacles, kTime, kTimeStep, pose(), 0.05, workspace);
-      set.freeze(pose(), velocity(), kTimeStep, state, workspace);
+      set.freeze(pose(), velocity(), velocity(), kTimeStep, state, workspace);
       set.evaluate(pose(), workspace);
       if (pass == 0) set.commit(pose(), workspace, state);
     }
@@ -336,7 +336,7 @@ class Particle {
     const double margin = 2 * set.travel_bound(pose(position), speed(velocity), kStep) + kStep * kStep * gravity.norm();
     time += kStep;
     set.gather(obstacles, time, kStep, pose(start), margin, workspace);
-    set.freeze(pose(start), speed(velocity), kStep, state, workspace);
+    set.freeze(pose(start), speed(velocity), speed(velocity), kStep, state, workspace);
     Eigen::Vector3d x = start;
     for (int iteration = 0; iteration < 30; ++iteration) {
       set.evaluate(pose(x), workspace);

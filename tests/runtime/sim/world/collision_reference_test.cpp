@@ -1,13 +1,14 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
-#include <numbers>
 
 #include "tests/runtime/sim/world/touching_blocks.h"
+#include "tests/support/mesh_distance.h"
 
 namespace exmat::runtime {
 namespace {
 
 using exmat::test::Bar;
+using exmat::test::winding_number;
 using test::Blocks;
 
 /// The nearest point of a triangle to p, by the regions of its plane (Ericson, Real-Time Collision Detection, 5.1.5).
@@ -81,11 +82,12 @@ class FullCollision {
   void push(const Eigen::VectorXd& a, const Eigen::VectorXd& b, Eigen::VectorXd& force_a,
             Eigen::VectorXd& force_b) const {
     const TriangleArray& triangles = bar_.model.object->surface;
+    const VertexArray surface = Eigen::Map<const VertexArray>(b.data(), b.size() / 3, 3);
     Eigen::AlignedBox3d box;
     for (Eigen::Index i = 0; i < b.size(); i += 3) box.extend(b.segment<3>(i));
     for (Eigen::Index i = 0; i < areas_.size(); ++i) {
       const Eigen::Vector3d p = a.segment<3>(3 * i);
-      if (areas_[i] <= 0 || !box.contains(p) || winding_number(b, p) < 0.5) continue;
+      if (areas_[i] <= 0 || !box.contains(p) || winding_number(surface, triangles, p) < 0.5) continue;
       double nearest = std::numeric_limits<double>::infinity();
       Eigen::Vector3d shares = Eigen::Vector3d::Zero(), way = Eigen::Vector3d::Zero();
       Eigen::Index hit = 0;
@@ -108,19 +110,6 @@ class FullCollision {
     Eigen::Matrix3d corners;
     for (int k = 0; k < 3; ++k) corners.col(k) = x.segment<3>(3 * bar_.model.object->surface(triangle, k));
     return corners;
-  }
-
-  double winding_number(const Eigen::VectorXd& x, const Eigen::Vector3d& p) const {
-    double sum = 0;
-    for (Eigen::Index t = 0; t < bar_.model.object->surface.rows(); ++t) {
-      const Eigen::Matrix3d from = corners_of(x, t).colwise() - p;
-      const Eigen::Vector3d lengths = from.colwise().norm();
-      const double volume = from.col(0).dot(from.col(1).cross(from.col(2)));
-      const double below = lengths.prod() + from.col(0).dot(from.col(1)) * lengths[2] +
-                           from.col(1).dot(from.col(2)) * lengths[0] + from.col(2).dot(from.col(0)) * lengths[1];
-      sum += 2 * std::atan2(volume, below);
-    }
-    return sum / (4 * std::numbers::pi);
   }
 
   const Bar& bar_;

@@ -1,6 +1,6 @@
-#include "precompute/mesh_io/mesh_arrays.h"
+#include "common/surface_io/mesh_arrays.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 template <typename Array, typename Row>
@@ -29,4 +29,4 @@ std::map<std::string, std::vector<std::int32_t>> region_sets(const std::vector<s
   return sets;
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

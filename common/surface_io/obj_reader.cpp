@@ -1,17 +1,16 @@
-#include "precompute/mesh_io/obj_reader.h"
+#include "common/surface_io/obj_reader.h"
 
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
 #include <string>
 
-#include "precompute/mesh_io/commented_lines.h"
-#include "precompute/mesh_io/mesh_arrays.h"
-#include "precompute/mesh_io/mesh_tables.h"
-#include "precompute/mesh_io/surface_parts.h"
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/commented_lines.h"
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/surface_parts.h"
+#include "common/surface_io/text_input.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 std::vector<std::string> words(std::string_view text) {
@@ -139,4 +138,4 @@ std::int32_t ObjReader::read_corner(const FileLine& line, std::string_view field
 
 SurfaceFile read_obj(const std::filesystem::path& file) { return ObjReader(file).read(); }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

@@ -1,4 +1,4 @@
-#include "precompute/mesh_io/value_cursor.h"
+#include "common/surface_io/value_cursor.h"
 
 #include <algorithm>
 #include <array>
@@ -8,9 +8,9 @@
 #include <limits>
 
 #include "common/core/error.h"
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/text_input.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r";
@@ -207,4 +207,4 @@ void ValueCursor::check_count(std::uint64_t count, std::string_view what, std::s
     fail(fmt::format("at most {} {}, which the rest of the file can hold", limit, what), fmt::format("{}", count));
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

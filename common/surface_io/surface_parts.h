@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-#include "precompute/mesh_io/surface_file.h"
+#include "common/surface_io/surface.h"
 
-namespace exmat::precompute {
+namespace exmat {
 
 /// Gathers the parts that a surface's file names, while it is read.
 class SurfaceParts {
@@ -30,4 +30,4 @@ class SurfaceParts {
   std::map<std::string, Part> parts_;
 };
 
-}  // namespace exmat::precompute
+}  // namespace exmat

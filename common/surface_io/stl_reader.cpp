@@ -1,4 +1,4 @@
-#include "precompute/mesh_io/stl_reader.h"
+#include "common/surface_io/stl_reader.h"
 
 #include <algorithm>
 #include <array>
@@ -7,12 +7,12 @@
 #include <string>
 #include <unordered_map>
 
-#include "precompute/mesh_io/mesh_arrays.h"
-#include "precompute/mesh_io/surface_parts.h"
-#include "precompute/mesh_io/text_input.h"
-#include "precompute/mesh_io/value_cursor.h"
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/surface_parts.h"
+#include "common/surface_io/text_input.h"
+#include "common/surface_io/value_cursor.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 constexpr std::size_t kHeaderBytes = 80, kCountBytes = 4, kTriangleBytes = 50;
@@ -153,4 +153,4 @@ SurfaceFile read_stl(const std::filesystem::path& file) {
   return surface;
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

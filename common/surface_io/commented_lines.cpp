@@ -1,11 +1,11 @@
-#include "precompute/mesh_io/commented_lines.h"
+#include "common/surface_io/commented_lines.h"
 
 #include <algorithm>
+#include <fmt/format.h>
 
 #include "common/core/error.h"
-#include "precompute/mesh_io/text_input.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 // Files that include each other in a fan would otherwise grow without bound.
@@ -21,6 +21,13 @@ std::string_view without_comment(std::string_view line) { return trimmed(line.su
 
 void fail_at(const FileLine& line, const std::string& expected, const std::string& found, const std::string& advice) {
   throw InputError({line.file->string(), "line " + std::to_string(line.number), expected, found, advice});
+}
+
+double read_real(const FileLine& line, Fields& fields, std::string_view what) {
+  const std::string_view field = fields.next();
+  const auto value = parse_real(field);
+  if (!value) fail_at(line, fmt::format("{}, a finite number", what), quote(field));
+  return *value;
 }
 
 CommentedLines::CommentedLines(const std::filesystem::path& file, std::string kind, std::string_view include)
@@ -87,4 +94,4 @@ void CommentedLines::open_include(const FileLine& line) {
   open(path);
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

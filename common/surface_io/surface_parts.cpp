@@ -1,8 +1,8 @@
-#include "precompute/mesh_io/surface_parts.h"
+#include "common/surface_io/surface_parts.h"
 
 #include <fmt/format.h>
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 // Flags for each byte of the file, and for small files in any case.
@@ -36,4 +36,4 @@ void SurfaceParts::finish(SurfaceFile& surface, std::size_t file_bytes) const {
   }
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

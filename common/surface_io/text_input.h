@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace exmat::precompute {
+namespace exmat {
 
 /// The bytes of a regular, non-empty file. Throws InputError that says `expected` where it is missing, unreadable or
 /// empty.
@@ -36,4 +36,4 @@ std::string_view trimmed(std::string_view text);
 /// For a message: in quotes, shortened, printable; "the end of the line" where it is empty.
 std::string quote(std::string_view text);
 
-}  // namespace exmat::precompute
+}  // namespace exmat

@@ -4,7 +4,7 @@
 #include <string>
 #include <string_view>
 
-namespace exmat::precompute {
+namespace exmat {
 
 /// A type of number of a file that names them.
 struct NumberType {
@@ -87,4 +87,4 @@ class ValueCursor {
   bool swap_ = false;
 };
 
-}  // namespace exmat::precompute
+}  // namespace exmat

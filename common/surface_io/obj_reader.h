@@ -1,8 +1,8 @@
 #pragma once
 
-#include "precompute/mesh_io/surface_file.h"
+#include "common/surface_io/surface.h"
 
-namespace exmat::precompute {
+namespace exmat {
 
 /// Reads the vertices and faces of a Wavefront .obj file (paulbourke.net/dataformats/obj). Indices count from 1, or
 /// backwards from the last vertex before them where they are negative. Parts are what `o`, `g` (each of its names) and
@@ -10,4 +10,4 @@ namespace exmat::precompute {
 /// line, expected and found.
 SurfaceFile read_obj(const std::filesystem::path& file);
 
-}  // namespace exmat::precompute
+}  // namespace exmat

@@ -1,4 +1,4 @@
-#include "precompute/mesh_io/ply_reader.h"
+#include "common/surface_io/ply_reader.h"
 
 #include <algorithm>
 #include <array>
@@ -9,11 +9,11 @@
 #include <string>
 #include <utility>
 
-#include "precompute/mesh_io/mesh_arrays.h"
-#include "precompute/mesh_io/text_input.h"
-#include "precompute/mesh_io/value_cursor.h"
+#include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/text_input.h"
+#include "common/surface_io/value_cursor.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 using Kind = NumberType::Kind;
@@ -252,4 +252,4 @@ SurfaceFile read_ply(const std::filesystem::path& file) {
   return surface;
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

@@ -7,7 +7,9 @@
 #include <string_view>
 #include <vector>
 
-namespace exmat::precompute {
+#include "common/surface_io/text_input.h"
+
+namespace exmat {
 
 /// A line without its comment and the blanks around it. Views stay valid as long as the CommentedLines.
 struct FileLine {
@@ -19,6 +21,9 @@ struct FileLine {
 /// Throws the InputError of one line.
 [[noreturn]] void fail_at(const FileLine& line, const std::string& expected, const std::string& found,
                           const std::string& advice = "");
+
+/// The next field of a line as a finite number; `what` is for the message, e.g. "a density".
+double read_real(const FileLine& line, Fields& fields, std::string_view what);
 
 /// The lines of a text file that hold more than a comment, which '#' begins. With an `include` keyword, the lines of
 /// the files that such lines name stand in their place; paths are relative to the file that names them.
@@ -55,4 +60,4 @@ class CommentedLines {
   std::optional<FileLine> current_;
 };
 
-}  // namespace exmat::precompute
+}  // namespace exmat

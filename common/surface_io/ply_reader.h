@@ -1,8 +1,8 @@
 #pragma once
 
-#include "precompute/mesh_io/surface_file.h"
+#include "common/surface_io/surface.h"
 
-namespace exmat::precompute {
+namespace exmat {
 
 /// Reads the vertices and faces of a .ply file, text or binary in either byte order (Turk 1994, "The PLY polygon file
 /// format"). Colours are the properties red, green and blue of the vertices, integers in parts of the largest of their
@@ -10,4 +10,4 @@ namespace exmat::precompute {
 /// InputError with file, line or byte, expected and found.
 SurfaceFile read_ply(const std::filesystem::path& file);
 
-}  // namespace exmat::precompute
+}  // namespace exmat

@@ -1,4 +1,4 @@
-#include "precompute/mesh_io/text_input.h"
+#include "common/surface_io/text_input.h"
 
 #include <algorithm>
 #include <cerrno>
@@ -9,7 +9,7 @@
 
 #include "common/core/error.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\n\v\f";
@@ -80,4 +80,4 @@ std::string quote(std::string_view text) {
   return "'" + shown + (text.size() > kLongest ? "...'" : "'");
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat
