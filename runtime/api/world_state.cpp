@@ -12,11 +12,11 @@ using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 // The state of a world: how many bodies; of each its number of numbers, whether it is anew, and these; how many pairs;
-// of each its bodies, how many vertices of either touch, and six numbers for each.
+// of each its bodies, how many vertices of either touch, and nine numbers for each.
 
 namespace {
 
-constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 4, kContactNumbers = 6;
+constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 4, kContactNumbers = 9;
 
 std::size_t size_of(const exmat_world& world) {
   std::size_t size = kHeadNumbers;
@@ -35,6 +35,7 @@ void write_contacts(const HeldPair& pair, std::vector<double>& numbers) {
       for (const double number : {static_cast<double>(held.vertex), held.gap, held.normal_force})
         numbers.push_back(number);
       numbers.insert(numbers.end(), held.stretch.begin(), held.stretch.end());
+      numbers.insert(numbers.end(), held.normal.begin(), held.normal.end());
     }
 }
 
@@ -84,6 +85,7 @@ std::vector<HeldBodyContact> read_contacts(Reader& reader, std::size_t count, co
     held.gap = reader.take(1).front();
     held.normal_force = reader.take(1).front();
     held.stretch = Eigen::Vector3d(reader.take(3).data());
+    held.normal = Eigen::Vector3d(reader.take(3).data());
   }
   return contacts;
 }

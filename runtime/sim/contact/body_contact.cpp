@@ -18,6 +18,11 @@ auto rows_of(BodyCandidates& candidates, std::size_t index) {
   return candidates.basis.middleRows<3>(3 * static_cast<Eigen::Index>(index));
 }
 
+/// Of the last evaluation, the vertex from y [m].
+Eigen::Vector3d place_of(const BodyPose& a, const BodyPose& b, const BodyCandidate& candidate) {
+  return a.position + candidate.arm - b.position - candidate.surface_arm;
+}
+
 /// y - position, world.
 Eigen::Vector3d surface_arm(const BodyCandidates& candidates, std::size_t index, const BodyPose& pose) {
   const Eigen::Vector3d moved = candidates.all[index].rest + rows_of(candidates, index).lazyProduct(pose.q);
@@ -183,13 +188,17 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
   }
 }
 
-void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
-                           ContactSums& sums_a, ContactSums& sums_b) const noexcept {
+void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way,
+                           BodyCandidates& candidates, ContactSums& sums_a, ContactSums& sums_b) const noexcept {
   for (std::size_t i = 0; i < candidates.all.size(); ++i) {
     BodyCandidate& candidate = candidates.all[i];
+    if (candidate.clearance > way) {
+      leave_untouched(way, candidate);
+      continue;
+    }
     candidate.arm = set.world_arm(candidate.vertex, a);
     candidate.surface_arm = surface_arm(candidates, i, b);
-    const Eigen::Vector3d place = a.position + candidate.arm - b.position - candidate.surface_arm;
+    const Eigen::Vector3d place = place_of(a, b, candidate);
     const double gap = candidate.normal.dot(place);
     evaluate_contact(SurfacePoint{gap, candidate.normal, Eigen::Vector3d::Zero()}, place, candidate);
     if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
@@ -211,11 +220,17 @@ void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyP
   }
 }
 
-double BodyContact::potential(const ContactSet& set, const BodyPose& a, const BodyPose& b,
+void BodyContact::set_clearances(const BodyPose& a, const BodyPose& b, BodyCandidates& candidates) const noexcept {
+  for (BodyCandidate& candidate : candidates.all)
+    candidate.clearance = clearance_of(candidate, place_of(a, b, candidate));
+}
+
+double BodyContact::potential(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way,
                               const BodyCandidates& candidates) const noexcept {
   double sum = 0;
   for (std::size_t i = 0; i < candidates.all.size(); ++i) {
     const BodyCandidate& candidate = candidates.all[i];
+    if (candidate.clearance > way) continue;
     const Eigen::Vector3d place =
         a.position + set.world_arm(candidate.vertex, a) - b.position - surface_arm(candidates, i, b);
     sum += contact_potential(candidate, candidate.normal.dot(place), place);
@@ -264,7 +279,7 @@ void BodyContact::commit(const BodyPose& a, const BodyPose& b, const BodyCandida
     contact.gap = std::min(0.0, candidate.gap);
     contact.normal_force = candidate.normal_force;
     contact.normal = b.rotation.transpose() * candidate.normal;
-    const Eigen::Vector3d place = a.position + candidate.arm - b.position - candidate.surface_arm;
+    const Eigen::Vector3d place = place_of(a, b, candidate);
     if (candidate.normal_force > 0)
       contact.stretch = b.rotation.transpose() * held_stretch(law_.friction, place, candidate);
   }

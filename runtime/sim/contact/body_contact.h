@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "runtime/sim/contact/body_surface.h"
@@ -29,6 +30,10 @@ struct BodyCandidate : ContactCandidate {
 struct BodyCandidates {
   std::vector<BodyCandidate> all;
   RowMatrix basis;  ///< 3 of `all` x r and more, rows of the basis at each y
+  /// The poses of the first evaluation after gather(), a's and b's, which clearances are about.
+  bool has_first = false;
+  std::array<Placement, 2> first{};
+  std::array<Eigen::VectorXd, 2> first_q{};
 };
 
 /// The surface of a body that touches others, and how its vertices look.
@@ -75,12 +80,16 @@ class BodyContact {
   void gather_own(const TouchingBody& body, double time_step, double margin, const std::vector<HeldBodyContact>& held,
                   SurfaceShape& shape, BodyCandidates& candidates) const;
 
-  /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone.
-  void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, BodyCandidates& candidates,
+  /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone. `way`:
+  /// how far vertices and surface have gone, at most, from where they were when set_clearances() was called [m].
+  void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way, BodyCandidates& candidates,
                 ContactSums& sums_a, ContactSums& sums_b) const noexcept;
 
+  /// After the first evaluation: vertices that touch nothing are not looked at as long as they cannot have come near.
+  void set_clearances(const BodyPose& a, const BodyPose& b, BodyCandidates& candidates) const noexcept;
+
   /// W alone [J].
-  double potential(const ContactSet& set, const BodyPose& a, const BodyPose& b,
+  double potential(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way,
                    const BodyCandidates& candidates) const noexcept;
 
   void refresh_friction(BodyCandidates& candidates, FrictionChange& change) const noexcept;

@@ -43,7 +43,8 @@ BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray
       triangles_(std::move(triangles)),
       neighbours_(neighbours_of(triangles_)),
       fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
-      tree_(triangles_, rest_, basis_, kLeafTriangles) {
+      tree_(triangles_, rest_, basis_, kLeafTriangles),
+      reach_(rest.rows() > 0 ? rest_.rowwise().norm().maxCoeff() : 0) {
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
   for (std::size_t i = 1; i < fan_starts_.size(); ++i) fan_starts_[i] += fan_starts_[i - 1];

@@ -47,6 +47,9 @@ class BodySurface {
   Eigen::Index modes() const noexcept { return basis_.cols(); }
   Eigen::Index triangles() const noexcept { return triangles_.rows(); }
 
+  double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
+  double basis_norm() const noexcept { return tree_.basis_norm(); }
+
   SurfaceShape make_shape() const;
   void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;
 
@@ -100,6 +103,7 @@ class BodySurface {
   TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
   std::vector<int> fan_starts_, fans_;  // triangles of each vertex
   DeformationTree tree_;                // of the triangles
+  double reach_ = 0;
 };
 
 }  // namespace exmat::runtime

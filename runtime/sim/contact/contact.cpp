@@ -16,11 +16,26 @@ void add_factors(const Eigen::MatrixXd& factors, Eigen::Index used, Eigen::Matri
   if (used > 0) A.selfadjointView<Eigen::Lower>().rankUpdate(factors.topLeftCorner(A.rows(), used));
 }
 
+/// Whether the distance that a candidate feels changes by no more than its vertex goes: not by a side plane, nor over
+/// the border of ground.
+bool has_steady_distance(const PlacedObstacle& placed, const ContactCandidate& candidate) {
+  return candidate.passage.kind == Passage::Kind::kNearest &&
+         !std::holds_alternative<HeightFieldShape>(placed.obstacle->shape);
+}
+
 }  // namespace
+
+double way_bound(double reach, double basis_norm, const BodyPose& pose, const Placement& from,
+                 const Eigen::VectorXd& from_q) noexcept {
+  return (pose.position - from.position).norm() +
+         (pose.rotation - from.rotation).norm() * (reach + basis_norm * pose.q.norm()) +
+         basis_norm * (pose.q - from_q).norm();
+}
 
 ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_count)
     : obstacles(obstacle_count),
       candidates(obstacle_count * static_cast<std::size_t>(set.vertices())),
+      first_q(set.modes()),
       factors(Eigen::MatrixXd::Zero(6 + set.modes(), kFactorColumns)) {
   set_zero(set.modes());
 }
@@ -92,12 +107,14 @@ void ContactSet::test_vertices(const DeformationTree::Node& node, const BodyPose
                                ContactWorkspace& workspace) const noexcept {
   for (int vertex = node.first; vertex < node.last; ++vertex) {
     ++workspace.tested_vertices;
-    const Eigen::Vector3d point = pose.position + world_arm(vertex, pose);
+    const Eigen::Vector3d arm = world_arm(vertex, pose);
+    const Eigen::Vector3d point = pose.position + arm;
     for (std::size_t i = 0; i < workspace.obstacles.size(); ++i) {
       if (!workspace.obstacles[i].may_meet(point, 0, margin)) continue;
       ContactCandidate& candidate = workspace.candidates[workspace.candidate_count++];
       candidate.vertex = vertex;
       candidate.obstacle = static_cast<int>(i);
+      candidate.arm = arm;
     }
   }
 }
@@ -125,10 +142,11 @@ void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time,
 void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected,
                         double time_step, const ContactState& state, ContactWorkspace& workspace) const noexcept {
   std::size_t next = 0;
+  workspace.has_first = false;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     ContactCandidate& candidate = workspace.candidates[i];
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    const Eigen::Vector3d arm = world_arm(candidate.vertex, pose);
+    const Eigen::Vector3d arm = candidate.arm;
     const Eigen::Vector3d point = pose.position + arm;
     const Eigen::Vector3d at = world_velocity(candidate.vertex, arm, pose, velocity);
     const Eigen::Vector3d predicted = point + time_step * at;
@@ -140,11 +158,24 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, cons
 
 void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) const noexcept {
   workspace.set_zero(modes());
+  const bool is_first = !workspace.has_first;
+  if (is_first) {
+    workspace.has_first = true;
+    workspace.first = pose;
+    workspace.first_q = pose.q;
+  }
+  const double way = is_first ? 0 : way_bound(reach_, tree_.basis_norm(), pose, workspace.first, workspace.first_q);
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     ContactCandidate& candidate = workspace.candidates[i];
+    if (candidate.clearance > way) {
+      leave_untouched(way, candidate);
+      continue;
+    }
     candidate.arm = world_arm(candidate.vertex, pose);
     const Eigen::Vector3d point = pose.position + candidate.arm;
-    evaluate_contact(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)], point, candidate);
+    const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
+    evaluate_contact(placed, point, candidate);
+    if (is_first && has_steady_distance(placed, candidate)) candidate.clearance = clearance_of(candidate, point);
     if (candidate.normal_force > 0) {
       ++workspace.touching;
       workspace.stiffness += candidate.weights[0];
@@ -160,8 +191,11 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
 
 double ContactSet::potential(const BodyPose& pose, const ContactWorkspace& workspace) const noexcept {
   double sum = 0;
+  const double way =
+      workspace.has_first ? way_bound(reach_, tree_.basis_norm(), pose, workspace.first, workspace.first_q) : 0;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     const ContactCandidate& candidate = workspace.candidates[i];
+    if (candidate.clearance > way) continue;
     const Eigen::Vector3d point = pose.position + world_arm(candidate.vertex, pose);
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
     sum += contact_potential(placed, candidate, point);

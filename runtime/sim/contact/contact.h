@@ -21,6 +21,11 @@ struct BodyVelocity : FrameVelocity {
   const Eigen::VectorXd& v;  ///< [r]
 };
 
+/// Bound on how far a point of a body is at one pose from where it is at another [m]: one that is at most `reach` [m]
+/// from the frame's origin at rest, and moved by q by at most `basis_norm` |q|.
+double way_bound(double reach, double basis_norm, const BodyPose& pose, const Placement& from,
+                 const Eigen::VectorXd& from_q) noexcept;
+
 class ContactSet;
 
 /// What contacts do to a body, of one evaluation.
@@ -62,6 +67,11 @@ struct ContactWorkspace : ContactSums {
   int visited_nodes = 0;
   int tested_vertices = 0;
 
+  /// The pose of the first evaluation after freeze(), which clearances are about.
+  bool has_first = false;
+  Placement first;
+  Eigen::VectorXd first_q;
+
   Eigen::MatrixXd factors;  ///< (6 + r) x some columns
 };
 
@@ -89,12 +99,12 @@ class ContactSet {
   /// Bound on how far a vertex goes in `time_step` at this velocity [m].
   double travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept;
 
-  /// Finds the candidates: vertices of this pose, that of the beginning or near, at most `margin` [m] away from the
+  /// Finds the candidates: vertices of this pose, that of the beginning, at most `margin` [m] away from the
   /// obstacles as they are at `end_time` [s]. Costs O(obstacles + r) where the whole body is farther away.
   void gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
               double margin, ContactWorkspace& workspace) const noexcept;
 
-  /// Sets what the step keeps of each candidate, from pose and velocity at its beginning; `expected` is the velocity
+  /// After gather() at the same pose: sets what the step keeps of each candidate; `expected` is the velocity
   /// that the loads of the step make of it.
   void freeze(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected, double time_step,
               const ContactState& state, ContactWorkspace& workspace) const noexcept;

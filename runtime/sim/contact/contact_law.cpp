@@ -77,6 +77,7 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
   const double predicted_gap = surface.distance + surface.normal.dot(predicted - carried);
   const bool touches = std::min(surface.distance, predicted_gap) < 0;
   candidate.normal = surface.normal;
+  candidate.clearance = -1;
   candidate.stiffness = law.stiffness * area;
   candidate.damping = touches ? law.damping / (law.stiffness * time_step) : 0;
   candidate.friction_force = 0;
@@ -118,6 +119,19 @@ void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
   candidate.normal_force = 0;
   evaluate_normal(candidate, surface, point);
   evaluate_friction(candidate, point);
+}
+
+double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept {
+  if (candidate.normal_force > 0 || candidate.friction_force > 0) return -1;
+  // Distances change by no more than the way, and what damping adds to the depth by no more than its share of it.
+  return std::min(candidate.gap, -damped_depth(candidate, candidate.gap, point) / (1 + candidate.damping));
+}
+
+void leave_untouched(double way, ContactCandidate& candidate) noexcept {
+  candidate.force.setZero();
+  candidate.weights.setZero();
+  candidate.normal_force = 0;
+  candidate.gap = candidate.clearance - way;
 }
 
 void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,

@@ -62,6 +62,10 @@ struct ContactCandidate {
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
   Passage passage;                                    ///< of obstacles
 
+  /// How far its vertex may go from where it was at the first evaluation without being touched [m]; negative: it has to
+  /// be looked at.
+  double clearance = -1;
+
   // Of the last evaluation.
   NearestHint hint;                                          ///< of nearest_surface_point()
   bool by_plane = false;                                     ///< its surface was the passage's plane
@@ -100,6 +104,12 @@ void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point
 
 /// The same where `surface` is its nearest point of what it may touch.
 void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
+
+/// After the first evaluation: how far the vertex may go from there and still feel nothing.
+double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept;
+
+/// The last evaluation of a vertex that has gone no farther than `way` [m] from the first, less than its clearance.
+void leave_untouched(double way, ContactCandidate& candidate) noexcept;
 
 /// W [J] of the vertex at `point` whose distance is `gap` [m].
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;

@@ -121,12 +121,14 @@ double shortest_passage(const Shape& shape) noexcept {
 }
 
 bool PlacedObstacle::may_meet(const Eigen::Vector3d& centre, double radius, double margin) const noexcept {
+  if (is_fixed) return may_be_within(obstacle->shape, centre, radius + margin);
   if (!sweeps) return may_be_within(obstacle->shape, pose.to_frame(centre), radius + margin);
   return may_be_within(obstacle->shape, start.to_frame(centre),
                        radius + margin + kContactMarginSteps * sweep(centre, radius));
 }
 
 SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point, NearestHint& hint) const noexcept {
+  if (is_fixed) return runtime::nearest_surface_point(obstacle->shape, point, hint);
   const SurfacePoint local = runtime::nearest_surface_point(obstacle->shape, pose.to_frame(point), hint);
   return {local.distance, pose.rotation * local.normal, pose.to_world(local.point)};
 }

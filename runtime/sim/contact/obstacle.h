@@ -76,15 +76,19 @@ struct PlacedObstacle {
   MotionSample start, pose;  ///< at the beginning and at the end
   double turn = 0;           ///< bound on how far its points move beside each other in the step, over how far apart
   bool sweeps = false;       ///< it goes so far in the step that the way to it counts, not where it ends alone
+  bool is_fixed = false;     ///< its frame is the world's
 
   PlacedObstacle() = default;
   PlacedObstacle(const Obstacle& placed, double end_time, double time_step) noexcept
       : obstacle(&placed), start(placed.motion.sample(end_time - time_step)), pose(placed.motion.sample(end_time)) {
     if (placed.motion.moves()) turn = (pose.rotation - start.rotation).norm();
+    is_fixed = !placed.motion.moves() && pose.position.isZero(0) && pose.rotation.isIdentity(0);
   }
 
   /// Where its material point at this world position goes in the step.
-  Eigen::Vector3d carried(const Eigen::Vector3d& point) const noexcept { return pose.to_world(start.to_frame(point)); }
+  Eigen::Vector3d carried(const Eigen::Vector3d& point) const noexcept {
+    return is_fixed ? point : pose.to_world(start.to_frame(point));
+  }
 
   /// How far its material points in a ball go in the step, at most [m].
   double sweep(const Eigen::Vector3d& centre, double radius) const noexcept {

@@ -28,6 +28,7 @@ void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index u
 void PairContact::reset(int first, int second, const HeldPair* held) {
   bodies_ = {first, second};
   held_ = held;
+  has_first_ = false;
   for (BodyCandidates& candidates : candidates_) candidates.all.clear();
 }
 
@@ -44,18 +45,34 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
                    other.shape, candidates_[at]);
 }
 
+double PairContact::way_since_first(const WorldBody& first, const WorldBody& second) const noexcept {
+  return first.way_bound(first_[0], first_q_[0]) + second.way_bound(first_[1], first_q_[1]);
+}
+
 void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
   sums_[0].set_zero(first.state.q.size());
   sums_[1].set_zero(second.state.q.size());
+  const bool is_first = !has_first_;
+  if (is_first) {
+    has_first_ = true;
+    first_ = {first.placement, second.placement};
+    first_q_ = {first.near().q, second.near().q};
+  }
+  const double way = is_first ? 0 : way_since_first(first, second);
   const BodyContact contact(half_);
-  contact.evaluate(first.contact(), first.pose(), second.pose(), candidates_[0], sums_[0], sums_[is_own() ? 0 : 1]);
-  contact.evaluate(second.contact(), second.pose(), first.pose(), candidates_[1], sums_[1], sums_[0]);
+  contact.evaluate(first.contact(), first.pose(), second.pose(), way, candidates_[0], sums_[0],
+                   sums_[is_own() ? 0 : 1]);
+  contact.evaluate(second.contact(), second.pose(), first.pose(), way, candidates_[1], sums_[1], sums_[0]);
+  if (!is_first) return;
+  contact.set_clearances(first.pose(), second.pose(), candidates_[0]);
+  contact.set_clearances(second.pose(), first.pose(), candidates_[1]);
 }
 
 double PairContact::potential(const WorldBody& first, const WorldBody& second) const noexcept {
   const BodyContact contact(half_);
-  return contact.potential(first.contact(), first.pose(), second.pose(), candidates_[0]) +
-         contact.potential(second.contact(), second.pose(), first.pose(), candidates_[1]);
+  const double way = way_since_first(first, second);
+  return contact.potential(first.contact(), first.pose(), second.pose(), way, candidates_[0]) +
+         contact.potential(second.contact(), second.pose(), first.pose(), way, candidates_[1]);
 }
 
 void PairContact::set_columns(const WorldBody& first, const WorldBody& second) {

@@ -72,9 +72,16 @@ class PairContact {
   void commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const;
 
  private:
+  /// How far vertices of one and the surface of the other may have gone from where they were at the first evaluation
+  /// [m].
+  double way_since_first(const WorldBody& first, const WorldBody& second) const noexcept;
+
   std::array<int, 2> bodies_{};
   const HeldPair* held_ = nullptr;
   ContactLaw half_;
+  bool has_first_ = false;  // evaluation; where the bodies were in it
+  std::array<Placement, 2> first_{};
+  std::array<Eigen::VectorXd, 2> first_q_;
   std::array<BodyCandidates, 2> candidates_;  // vertices of the first, of the second
   std::array<ContactSums, 2> sums_;           // of the first, of the second
   // Columns of the candidates of each, of the side's body and of the other.

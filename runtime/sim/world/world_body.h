@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 
@@ -49,6 +50,11 @@ struct WorldBody {
   int rigid() const noexcept { return static_cast<int>(model.frame->rigid_unknowns()); }
   Eigen::Index unknowns() const noexcept { return near().x.size(); }
   BodyPose pose() const noexcept { return {placement, near().q}; }  ///< at the iterate
+  /// Bound on how far its vertices and its surface are from where they were at another pose [m].
+  double way_bound(const Placement& from, const Eigen::VectorXd& from_q) const noexcept {
+    return runtime::way_bound(std::max(contact().reach(), surface.reach()),
+                              std::max(contact().tree().basis_norm(), surface.basis_norm()), pose(), from, from_q);
+  }
 };
 
 }  // namespace exmat::runtime
