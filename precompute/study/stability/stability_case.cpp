@@ -161,11 +161,13 @@ void add_contacts(Cases& cases) {
     }
 }
 
-/// Fast and slow onto meshes and height fields.
+/// Onto meshes and height fields, at 1/30 s also faster than they are thick; what is as stiff as 1e10 N/m^3 then turns
+/// by more than a radian in a step, on planes as well.
 void add_grounds(Cases& cases) {
   for (const double time_step : {1e-3, kThirtieth})
     for (const double stiffness : {1e4, 1e7, 1e10})
       for (const double velocity : {5.0, 50.0}) {
+        if (velocity > 5 && (time_step < kThirtieth || stiffness > 1e7)) continue;
         StabilityCase test{.group = "contact", .body = {.free = true}, .time_step = time_step, .gravity = kGravity};
         test.contact_stiffness = stiffness;
         test.friction = 0.5;

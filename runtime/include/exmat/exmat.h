@@ -287,14 +287,8 @@ EXMAT_API exmat_status exmat_body_set_example_weights(exmat_body* body, int64_t 
    has to know of contact: use_contact, or a scene with obstacles. Obstacles are each body's own and have a number,
    `id` >= 0, that no later one gets. exmat_body_reset() and states keep the host's where they are. */
 
-enum {
-  EXMAT_PLANE = 0,
-  EXMAT_SPHERE = 1,
-  EXMAT_BOX = 2,
-  EXMAT_CAPSULE = 3,
-  EXMAT_MESH = 4,        /* these two are made of arrays: exmat_body_add_shape() */
-  EXMAT_HEIGHT_FIELD = 5 /* */
-};                       /* shape */
+/* Shapes. The last two are made of arrays: exmat_body_add_shape(). */
+enum { EXMAT_PLANE = 0, EXMAT_SPHERE = 1, EXMAT_BOX = 2, EXMAT_CAPSULE = 3, EXMAT_MESH = 4, EXMAT_HEIGHT_FIELD = 5 };
 
 /* Its shape, in its own frame, which is the world until the obstacle is moved, and its law: pressures on the body's
    surface. Members that the shape does not name are not looked at. */

@@ -3,6 +3,7 @@
 #ifndef EXMAT_EXMAT_HPP
 #define EXMAT_EXMAT_HPP
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <memory>

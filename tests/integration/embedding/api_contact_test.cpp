@@ -289,6 +289,30 @@ TEST_F(ApiContactTest, MeshesAndHeightFieldsCarryAsABoxDoes) {
   EXPECT_TRUE(on_mesh.contacts().empty());
 }
 
+// Half way through a thin shell the state knows which way is out.
+TEST_F(ApiContactTest, AStateRemembersTheSideThatABodyCameInBy) {
+  const Model model = this->model();
+  const std::vector<double> corners{-2, -2, -0.3, 2, -2, -0.3, 2, 2, -0.3, -2, 2, -0.3};
+  const std::vector<std::int32_t> sheet{0, 1, 2, 0, 2, 3};
+  const Shape shell = Shape::mesh(corners, sheet, 0.02);
+  exmat_obstacle law = floor(0);
+  law.stiffness = 1e6;
+  law.damping = 0;
+  Body body(model), other(model);
+  body.add_shape(shell, law);
+  other.add_shape(shell, law);
+  exmat_motion fall = at(0, 0, 0);
+  fall.linear_velocity[2] = -50;
+  body.set_motion(fall);
+  body.step(8);
+  EXPECT_LT(body.motion().position[2], -0.35);  // its lower side is beyond the shell
+  other.set_state(body.state());
+  body.step(200);
+  other.step(200);
+  EXPECT_GT(body.motion().position[2], -0.3);
+  EXPECT_EQ(body.state(), other.state());
+}
+
 TEST_F(ApiContactTest, WrongShapesAreRefusedInWords) {
   exmat_shape* shape = nullptr;
   const std::vector<double> corners{0, 0, 0, 1, 0, 0, 0, 1, 0};

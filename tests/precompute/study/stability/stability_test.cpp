@@ -73,6 +73,8 @@ TEST(Stability, SuiteReachesEveryExtreme) {
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.spin == 1000; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.examples.stiffness == 1e10; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.contact_stiffness == 1e10; }));
+  EXPECT_TRUE(any([](const StabilityCase& test) { return test.ground == Ground::kMesh && test.velocity == 50; }));
+  EXPECT_TRUE(any([](const StabilityCase& test) { return test.ground == Ground::kHills && test.velocity == 50; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.damping == 0 && test.gravity == 0; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.body.examples == BodyExamples::kNearDuplicates; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.body.examples == BodyExamples::kRestAlone; }));
