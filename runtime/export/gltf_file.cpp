@@ -53,7 +53,8 @@ class GltfWriter {
     model_.materials.push_back(material);
   }
 
-  void add_mesh(const DrawnKind& kind) {
+  /// `has_weights`: the mesh, not its nodes.
+  void add_mesh(const DrawnKind& kind, bool has_weights) {
     const auto& [surface, normals, targets] = kind;
     tinygltf::Primitive primitive;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
@@ -71,8 +72,10 @@ class GltfWriter {
     tinygltf::Mesh& mesh = model_.meshes.emplace_back();
     mesh.name = surface.name;
     mesh.primitives.push_back(std::move(primitive));
-    mesh.weights.assign(static_cast<std::size_t>(targets.displacements.cols()), 0.0);
-    set_first(targets.weights, mesh.weights);
+    if (has_weights) {
+      mesh.weights.assign(static_cast<std::size_t>(targets.displacements.cols()), 0.0);
+      set_first(targets.weights, mesh.weights);
+    }
     mesh.extras = tinygltf::Value(std::map<std::string, tinygltf::Value>{{"targetNames", tinygltf::Value(names)}});
   }
 
@@ -226,7 +229,7 @@ class GltfWriter {
 std::int64_t write_gltf(const std::filesystem::path& target, const std::vector<DrawnKind>& kinds,
                         const std::vector<DrawnBody>& bodies, UpAxis up) {
   GltfWriter writer(target.string());
-  for (const DrawnKind& kind : kinds) writer.add_mesh(kind);
+  for (const DrawnKind& kind : kinds) writer.add_mesh(kind, bodies.size() == 1);
   writer.add_nodes(kinds, bodies, up);
   if (bodies.front().motion) writer.add_animations(kinds, bodies);
   return writer.write(target);

@@ -49,6 +49,13 @@ class World {
 
   /// Of bodies that touch each other at the end of the last step, in ascending order.
   const std::vector<HeldPair>& held() const noexcept { return held_; }
+  /// Whether no step has led to where a body is.
+  bool is_anew(int body) const noexcept { return at(body).anew; }
+  /// What held() and is_anew() gave of a world of such bodies: it goes on from there.
+  void set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew);
+
+  /// Times the stages of steps, on the wall clock, if set; kOther stays what it is.
+  void set_profile(WorldProfile* profile) noexcept { profile_ = profile; }
 
   /// Kinetic, elastic and potential energy of all bodies [J].
   Energies energies() const;
@@ -58,6 +65,8 @@ class World {
   void find_pairs(int threads);
   double margin_between(int own, int other) const noexcept;
   void gather(int threads);
+  void step_single_bodies(int threads);
+  void step_islands(int threads);
   void make_islands();
   void remember();
   const HeldPair* held_of(int first, int second) const;
@@ -73,6 +82,7 @@ class World {
   std::vector<std::unique_ptr<WorldBody>> bodies_;
   ContactLaw law_;
   std::vector<HeldPair> held_, next_held_;
+  WorldProfile* profile_ = nullptr;
 
   // Of one step.
   std::vector<DeformationTree::Ball> balls_;
