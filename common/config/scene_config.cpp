@@ -7,6 +7,7 @@
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/config/json_values.h"
+#include "common/config/keys_reader.h"
 #include "common/config/motion_reader.h"
 #include "common/config/obstacle_reader.h"
 #include "common/config/pose_file.h"
@@ -16,12 +17,10 @@
 namespace exmat {
 namespace {
 
-ExampleForceConfig read_example_force(const Json& json) {
+ExampleForceConfig read_example_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
   ExampleForceConfig config;
+  read_example_settings(json, file, place, config);
   config.law = choice_or(json, "force", config.law);
-  config.stiffness = json["stiffness"];
-  config.damping = json.value("damping", config.damping);
-  config.bias = json.value("bias", config.bias);
   config.target = choice_or(json, "target", config.target);
   config.target_iterations = json.value("target_iterations", config.target_iterations);
   config.energy_reference = choice_or(json, "energy_reference", config.energy_reference);
@@ -32,7 +31,8 @@ std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::f
                                                   const std::string& place) {
   std::vector<RegionForceConfig> regions;
   for (std::size_t i = 0; i < json.size(); ++i) {
-    RegionForceConfig region{json[i]["name"], read_example_force(json[i])};
+    RegionForceConfig region{json[i]["name"],
+                             read_example_force(json[i], file, fmt::format("{}/regions/{}", place, i))};
     if (std::ranges::find(regions, region.name, &RegionForceConfig::name) != regions.end())
       throw InputError({file.string(), fmt::format("{}/regions/{}/name", place, i), "each region once",
                         fmt::format("\"{}\" again", region.name), ""});
@@ -78,6 +78,12 @@ BodyConfig read_body(const Json& json, const std::filesystem::path& file, const 
   return body;
 }
 
+void read_gravity(const Json& json, const std::filesystem::path& file, const std::string& place, SceneConfig& scene) {
+  if (!json.contains("gravity")) return;
+  scene.gravity_keys = read_keys(json["gravity"], file, place + "/gravity");
+  scene.gravity = read_strongest(json["gravity"], scene.gravity_keys);
+}
+
 /// Of the members of a scene of one body, those of `own` from `place` of the file.
 SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem::path& file, const std::string& place) {
   SceneConfig scene;
@@ -86,7 +92,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   scene.bundle = resolve_path(file, own["bundle"]);
   scene.time_step = shared.value("time_step", scene.time_step);
   scene.steps = shared.value("steps", scene.steps);
-  if (shared.contains("gravity")) scene.gravity = read_vector(shared["gravity"]);
+  read_gravity(own.contains("gravity") ? own : shared, file, own.contains("gravity") ? place : "", scene);
   scene.integrator = choice_or(shared, "integrator", scene.integrator);
   scene.internal_force = choice_or(own, "internal_force", scene.internal_force);
   const Json damping = member_or(shared, "damping", Json::object());
@@ -95,7 +101,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   const Json newton = member_or(shared, "newton", Json::object());
   scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
   scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
-  if (own.contains("examples")) scene.examples = read_example_force(own["examples"]);
+  if (own.contains("examples")) scene.examples = read_example_force(own["examples"], file, place + "/examples");
   scene.regions = read_region_forces(member_or(own, "regions", Json::array()), file, place);
   const Json forces = member_or(own, "forces", Json::array());
   for (std::size_t i = 0; i < forces.size(); ++i)
@@ -164,7 +170,8 @@ SceneConfig load_scene(const std::filesystem::path& file) {
   const Json json = read_scene(file);
   if (json.contains("bodies"))
     throw InputError({file.string(), "/bodies", "a scene of one body, by \"bundle\"", "one of several",
-                      "exmat-runtime run steps scenes of several bodies"});
+                      "run and bench of exmat-runtime step scenes of several; what is asked for here takes one of the "
+                      "bodies as a scene of its own, with the \"bundle\" and members of that body at the root"});
   return scene_of(json, json, file, "");
 }
 

@@ -22,6 +22,25 @@ struct VertexForceConfig {
   double end = std::numeric_limits<double>::infinity();  ///< [s]
 };
 
+/// Keys of a setting that changes in time; none of one that does not. Before the first and after the last it has their
+/// values.
+struct KeysConfig {
+  std::vector<double> times;            ///< ascending [s]
+  std::vector<Eigen::VectorXd> values;  ///< of one size, that of the setting
+  Interpolation interpolation = Interpolation::kLinear;
+
+  bool empty() const { return times.empty(); }
+};
+
+/// Of an example force.
+struct ExampleKeysConfig {
+  KeysConfig stiffness, damping, bias, weights;
+
+  bool empty() const { return stiffness.empty() && damping.empty() && bias.empty() && weights.empty(); }
+};
+
+/// Settings that have keys stand here with the value of the key that is strongest: the largest, of a bias the smallest,
+/// of weights the first.
 struct ExampleForceConfig {
   ExampleForceLaw law = ExampleForceLaw::kLinear;
   double stiffness = 0;  ///< kappa >= 0 [1/s^2]; of an elastic force its factor e >= 0
@@ -30,6 +49,8 @@ struct ExampleForceConfig {
   TargetSource target = TargetSource::kAuto;
   int target_iterations = 4;  ///< most Newton iterations of `solve` in one step; the next step carries on
   EnergyReference energy_reference = EnergyReference::kExample;
+  std::optional<Eigen::VectorXd> weights;  ///< [K] in place of those of the shape
+  ExampleKeysConfig keys;
 };
 
 /// The example force of one region of the bundle.
@@ -112,7 +133,8 @@ struct SceneConfig {
   std::filesystem::path bundle;
   double time_step = 0.001;  ///< [s]
   std::int64_t steps = 1000;
-  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]
+  Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; with keys the largest
+  KeysConfig gravity_keys;
   Integrator integrator = Integrator::kBdf2;
   ForceMethod internal_force = ForceMethod::kAuto;  ///< auto: the bundle's choice
   double mass_damping = 0;                          ///< alpha [1/s]
@@ -131,6 +153,9 @@ struct SceneConfig {
   std::int64_t every = 10;
   bool render = false;  ///< the trajectory holds the render mesh
 };
+
+/// Where a scene has keys of a setting: its JSON pointer; empty where it has none.
+std::string place_of_keys(const SceneConfig& scene);
 
 /// How bodies touch each other; all per area of their surfaces.
 struct BodyContactConfig {

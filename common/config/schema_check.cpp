@@ -92,15 +92,27 @@ std::string range_of(const Json& schema, const char* least, const char* most, co
   return parts.empty() ? "" : fmt::format(" of {} {}", fmt::join(parts, " and "), unit);
 }
 
-std::string expectation(const Json& schema) {
-  if (schema.contains("enum")) return list(schema["enum"], " or ");
-  const std::string type = schema.at("type");
+std::string expectation(const Json& schema, const std::string& type) {
   if (type == "string") return fmt::format("a string{}", range_of(schema, "minLength", "maxLength", "characters"));
   if (type == "integer") return fmt::format("an integer{}", range_of(schema));
   if (type == "number") return fmt::format("a number{}", range_of(schema));
   if (type == "boolean") return "true or false";
   if (type == "array") return fmt::format("an array{}", range_of(schema, "minItems", "maxItems", "elements"));
   return schema.contains("minProperties") ? fmt::format("exactly one of {}", member_names(schema)) : "an object";
+}
+
+/// One, or several in an array.
+std::vector<std::string> types_of(const Json& schema) {
+  const Json& types = schema.at("type");
+  if (types.is_string()) return {types.get<std::string>()};
+  return types.get<std::vector<std::string>>();
+}
+
+std::string expectation(const Json& schema) {
+  if (schema.contains("enum")) return list(schema["enum"], " or ");
+  std::vector<std::string> each;
+  for (const std::string& type : types_of(schema)) each.push_back(expectation(schema, type));
+  return fmt::format("{}", fmt::join(each, ", or "));
 }
 
 class FaultFinder {
@@ -125,10 +137,11 @@ class FaultFinder {
   }
 
   static bool has_type(const Json& schema, const Json& value) {
-    const std::string type = schema.at("type");
-    if (type == "integer") return value.is_number_integer();
-    if (type == "number") return value.is_number();
-    return type == value.type_name();
+    return std::ranges::any_of(types_of(schema), [&](const std::string& type) {
+      if (type == "integer") return value.is_number_integer();
+      if (type == "number") return value.is_number();
+      return type == value.type_name();
+    });
   }
 
   static std::optional<Complaint> mismatch(const Json& schema, const Json& value, const Json::json_pointer& place) {

@@ -45,6 +45,11 @@ enum class ExampleForceLaw { kLinear, kElastic };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<ExampleForceLaw>{"linear", "elastic"};
 
+/// What a setting is between its keys: the value of the last one, or on the line to the next.
+enum class Interpolation { kLinear, kStep };
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<Interpolation>{"linear", "step"};
+
 /// Lambda of the descriptors (docs/method.md, "Shape space"): the eigenvalues, or ones.
 enum class Weighting { kEigenvalue, kNone };
 template <>

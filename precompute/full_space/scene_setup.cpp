@@ -10,6 +10,17 @@ namespace {
 
 void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
   const std::string file = config.file.string();
+  if (const std::string keys = place_of_keys(config); !keys.empty())
+    throw InputError({file, keys, "a value: the full-space reference takes no keys", "keys",
+                      "measure scenes with the values between the keys, one by one"});
+  const auto require_no_weights = [&](const std::string& member, const ExampleForceConfig& force) {
+    if (force.weights)
+      throw InputError({file, member + "/weights",
+                        "no given weights: the full-space reference takes those of the shape", "some", ""});
+  };
+  if (config.examples) require_no_weights("/examples", *config.examples);
+  for (std::size_t i = 0; i < config.regions.size(); ++i)
+    require_no_weights("/regions/" + std::to_string(i), config.regions[i].force);
   if (!config.body.motion.empty())
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
   const auto require_part = [&](bool needed, bool there, const char* group) {

@@ -6,6 +6,7 @@
 #include "runtime/app/loading_log.h"
 #include "runtime/app/print.h"
 #include "runtime/bench/bench.h"
+#include "runtime/bench/world_bench.h"
 
 namespace exmat::runtime {
 namespace {
@@ -53,9 +54,50 @@ void print_rates(const BenchResult& result) {
   print("state hash", fmt::format("{:016x}", result.state_hash));
 }
 
+void print_world(const WorldBenchResult& result) {
+  for (const WorldBenchResult::Kind& kind : result.kinds)
+    print(kind.name.c_str(),
+          fmt::format("{}, r = {}, s = {}, {} vertices against {} triangles",
+                      kind.bodies == 1 ? std::string("a body") : fmt::format("{} bodies", kind.bodies), kind.modes,
+                      kind.elements, kind.vertices, kind.triangles));
+  print("integrator", fmt::format("{}, time step {:g} s", result.integrator, result.time_step));
+  print("steps", fmt::format("{} from rest, {} times", result.steps, result.rounds));
+  print("bodies, threads", fmt::format("{}, {}", result.bodies, result.threads));
+  print("instruction set", result.instruction_set);
+  fmt::print("\n{:<16} {:>10} {:>10} {:>10} {:>8}\n", "a body's step", "median us", "95 % us", "mean us", "share %");
+  const auto print_row = [&](std::string_view name, const Samples& seconds) {
+    fmt::print("{:<16} {:>10.2f} {:>10.2f} {:>10.2f} {:>8.1f}\n", name, 1e6 * seconds.quantile(0.5),
+               1e6 * seconds.quantile(0.95), 1e6 * seconds.mean(), 100 * seconds.mean() / result.step_seconds.mean());
+  };
+  for (std::size_t stage = 0; stage < kWorldStageNames.size(); ++stage)
+    print_row(kWorldStageNames[stage], result.stages[stage]);
+  print_row("whole step", result.step_seconds);
+  fmt::print("\n");
+  print("touching pairs", fmt::format("{:.1f} a step, at most {}", result.touching_pairs, result.most_pairs));
+  print("islands", fmt::format("{:.1f} a step, the largest of {} bodies", result.islands, result.largest_island));
+  print("unconverged islands", std::to_string(result.unconverged_islands));
+  print("Newton iterations", fmt::format("{:.2f} a step", result.newton_iterations));
+  print("steps per second", fmt::format("{:.0f} over all bodies", result.steps_per_second()));
+  print("real-time factor", fmt::format("{:.2f}", result.real_time_factor()));
+  print("state hash", fmt::format("{:016x}", result.state_hash));
+}
+
+void bench_world(WorldConfig config, const BenchCommandOptions& options) {
+  config.trajectory.reset();
+  for (BodiesConfig& bodies : config.bodies) bodies.scene.trajectory.reset();
+  const LoadedWorld loaded = load_world_run(config);
+  log_loaded(loaded, config);
+  const WorldBenchResult result = bench(loaded, config, {.steps = options.steps});
+  if (options.json)
+    fmt::print("{}\n", to_json(result).dump(2));
+  else
+    print_world(result);
+}
+
 }  // namespace
 
 void bench_command(const BenchCommandOptions& options) {
+  if (std::optional<WorldConfig> world = load_world(options.scene)) return bench_world(std::move(*world), options);
   SceneConfig config = load_scene(options.scene);
   config.trajectory.reset();
   const LoadedScene loaded = load_run(config);

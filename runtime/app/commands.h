@@ -26,6 +26,7 @@ struct ExportOptions {
   std::filesystem::path trajectory;  ///< empty: a bundle without motion
   std::filesystem::path output;
   std::optional<std::filesystem::path> bundle;  ///< instead of the one that the trajectory names
+  std::optional<std::string> body;              ///< alone, of a trajectory of several
   bool mesh = false;                            ///< the tet mesh, not the render mesh
   std::optional<double> frame_rate;             ///< [1/s]
   std::optional<std::int64_t> targets;          ///< morph targets, >= 1

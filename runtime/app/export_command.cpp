@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <fmt/format.h>
+#include <map>
 #include <numbers>
 
 #include "common/bundle/bundle.h"
@@ -31,7 +32,7 @@ void require_trajectory(const ExportOptions& options) {
 void export_point_cache(const ExportOptions& options) {
   require_trajectory(options);
   const PointCacheSummary summary =
-      write_point_cache(options.trajectory, options.output, {options.mesh, options.frame_rate});
+      write_point_cache(options.trajectory, options.output, {options.mesh, options.frame_rate, options.body});
   print("point cache", options.output.string());
   print("points", fmt::format("{} of {}", summary.points, summary.dataset));
   print("samples", fmt::format("{}, {:g} frames apart", summary.samples, summary.sample_rate));
@@ -39,10 +40,11 @@ void export_point_cache(const ExportOptions& options) {
 
 void export_usd(const ExportOptions& options) {
   require_trajectory(options);
-  UsdOptions usd{.mesh = options.mesh, .up = options.up};
+  UsdOptions usd{.mesh = options.mesh, .up = options.up, .body = options.body};
   if (options.frame_rate) usd.frame_rate = *options.frame_rate;
   const UsdSummary summary = write_usd(options.trajectory, options.output, usd);
   print("scene description", options.output.string());
+  if (summary.bodies > 1) print("bodies", fmt::format("{}", summary.bodies));
   print("points", fmt::format("{} of {}", summary.points, summary.dataset));
   print("samples", fmt::format("{}, {:g} time codes a second", summary.samples, usd.frame_rate));
   print("size", fmt::format("{:.3g} MB", static_cast<double>(summary.bytes) / kMegabyte));
@@ -78,44 +80,122 @@ void print_error(const MorphError& error, const DrawnSurface& surface) {
   print("error of normals", fmt::format("RMS {:.2g} degrees", error.normal_rms / kDegree));
 }
 
-void export_gltf(const ExportOptions& options) {
-  if (options.frame_rate) refuse_option(options, "--frame-rate with an output .pc2 or .usda", ".glb");
-  std::optional<BodyMotion> motion;
-  std::filesystem::path bundle;
+/// What a .glb holds: bodies, and what those of one bundle share.
+struct Drawing {
+  std::vector<DrawnKind> kinds;
+  std::vector<RowMatrix> reduced;  ///< of each kind: q of all frames of its bodies, one body after the other
+  std::vector<DrawnBody> bodies;
+};
+
+DrawnKind read_kind(const ExportOptions& options, const std::filesystem::path& bundle) {
+  DrawnKind kind{read_drawn_surface(bundle, options.mesh), {}, {}};
+  if (options.targets && *options.targets > kind.surface.mode_count())
+    refuse_option(options, fmt::format("at most {} targets, as the bundle has modes", kind.surface.mode_count()),
+                  fmt::format("{}", *options.targets));
+  return kind;
+}
+
+/// Its body as it is selected.
+void add_body(const ExportOptions& options, const std::string& name, TrajectoryReader& trajectory,
+              std::map<std::string, std::size_t>& kinds, Drawing& drawing) {
+  BodyMotion motion = read_body_motion(trajectory);
+  const auto [known, is_new] =
+      kinds.try_emplace(trajectory.text("bundle") + '\n' + trajectory.text("input_sha256"), drawing.kinds.size());
+  if (is_new) {
+    drawing.kinds.push_back(read_kind(options, bundle_of(options, trajectory)));
+  }
+  const DrawnSurface& surface = drawing.kinds[known->second].surface;
+  if (motion.reduced.cols() != surface.mode_count())
+    trajectory.refuse("/reduced", fmt::format("{} columns", surface.mode_count()),
+                      fmt::format("{}", motion.reduced.cols()));
+  drawing.bodies.push_back({name.empty() ? surface.name : name, known->second, {}, std::move(motion)});
+}
+
+/// q of all frames of a kind's bodies, one body after the other.
+RowMatrix reduced_of(const Drawing& drawing, std::size_t kind) {
+  Eigen::Index rows = 0;
+  for (const DrawnBody& body : drawing.bodies)
+    if (body.motion && body.kind == kind) rows += body.motion->frames();
+  RowMatrix reduced(rows, drawing.kinds[kind].surface.mode_count());
+  rows = 0;
+  for (const DrawnBody& body : drawing.bodies) {
+    if (!body.motion || body.kind != kind) continue;
+    reduced.middleRows(rows, body.motion->frames()) = body.motion->reduced;
+    rows += body.motion->frames();
+  }
+  return reduced;
+}
+
+/// Morph targets of each kind for the motions of all its bodies, and the weights of each body.
+void find_targets(const ExportOptions& options, Drawing& drawing) {
+  std::vector<Eigen::Index> used(drawing.kinds.size(), 0);
+  for (std::size_t i = 0; i < drawing.kinds.size(); ++i) {
+    DrawnKind& kind = drawing.kinds[i];
+    drawing.reduced.push_back(reduced_of(drawing, i));
+    const VertexNormals normals(kind.surface.vertices, kind.surface.triangles);
+    kind.normals = normals.at(kind.surface.vertices);
+    kind.targets = drawing.bodies.front().motion
+                       ? targets_of_motion(kind.surface, normals, drawing.reduced[i], options.targets)
+                       : modes_as_targets(kind.surface, normals);
+  }
+  for (DrawnBody& body : drawing.bodies) {
+    if (!body.motion) continue;
+    body.weights = drawing.kinds[body.kind].targets.weights.middleRows(used[body.kind], body.motion->frames());
+    used[body.kind] += body.motion->frames();
+  }
+}
+
+Drawing read_drawing(const ExportOptions& options) {
+  Drawing drawing;
   if (options.trajectory.empty()) {
     if (!options.bundle) refuse_option(options, "a trajectory, or a bundle by --bundle", "neither");
+    if (options.body) refuse_option(options, "a trajectory, a body of which --body names", "none");
     if (options.targets) refuse_option(options, "a trajectory, whose components --targets takes", "none");
-    bundle = *options.bundle;
-  } else {
-    TrajectoryReader trajectory(options.trajectory);
-    motion = read_body_motion(trajectory);
-    bundle = bundle_of(options, trajectory);
+    drawing.kinds.push_back(read_kind(options, *options.bundle));
+    drawing.bodies.push_back({drawing.kinds.front().surface.name, 0, {}, {}});
+    return drawing;
   }
-  const DrawnSurface surface = read_drawn_surface(bundle, options.mesh);
-  if (motion && motion->reduced.cols() != surface.mode_count())
-    throw InputError({options.trajectory.string(), "/reduced", fmt::format("{} columns", surface.mode_count()),
-                      fmt::format("{}", motion->reduced.cols()), ""});
-  if (options.targets && *options.targets > surface.mode_count())
-    refuse_option(options, fmt::format("at most {} targets, as the bundle has modes", surface.mode_count()),
-                  fmt::format("{}", *options.targets));
-  const VertexNormals normals(surface.vertices, surface.triangles);
-  const MorphTargets targets = motion ? targets_of_motion(surface, normals, motion->reduced, options.targets)
-                                      : modes_as_targets(surface, normals);
-  const std::int64_t bytes =
-      write_gltf(options.output, surface, normals.at(surface.vertices), targets, motion, options.up);
+  TrajectoryReader trajectory(options.trajectory);
+  std::map<std::string, std::size_t> kinds;
+  std::vector<std::string> names = trajectory.bodies();
+  if (options.body) names = {*options.body};
+  for (const std::string& name : names) {
+    trajectory.select(name);
+    add_body(options, name, trajectory, kinds, drawing);
+  }
+  if (names.empty()) add_body(options, "", trajectory, kinds, drawing);
+  return drawing;
+}
+
+void export_gltf(const ExportOptions& options) {
+  if (options.frame_rate) refuse_option(options, "--frame-rate with an output .pc2 or .usda", ".glb");
+  Drawing drawing = read_drawing(options);
+  find_targets(options, drawing);
+  const std::int64_t bytes = write_gltf(options.output, drawing.kinds, drawing.bodies, options.up);
   print("glTF", options.output.string());
-  print_targets(targets, surface);
+  if (drawing.bodies.size() > 1)
+    print("bodies", fmt::format("{} of {} meshes", drawing.bodies.size(), drawing.kinds.size()));
+  std::int64_t cached = 0;
+  for (const DrawnBody& body : drawing.bodies)
+    if (body.motion) cached += 12 * drawing.kinds[body.kind].surface.vertex_count() * body.motion->frames();
+  for (std::size_t i = 0; i < drawing.kinds.size(); ++i) {
+    const DrawnKind& kind = drawing.kinds[i];
+    print_targets(kind.targets, kind.surface);
+    if (cached == 0) continue;
+    const VertexNormals normals(kind.surface.vertices, kind.surface.triangles);
+    print_error(error_of(kind.targets, kind.surface, normals, drawing.reduced[i]), kind.surface);
+  }
   const auto megabytes = static_cast<double>(bytes) / kMegabyte;
-  if (!motion) {
+  if (!drawing.bodies.front().motion) {
     print("weights", "q [kg^(1/2) m], as exmat_body_reduced() gives it");
     print("size", fmt::format("{:.3g} MB", megabytes));
     return;
   }
-  const double cache = static_cast<double>(12 * surface.vertex_count() * motion->frames()) / kMegabyte;
+  const BodyMotion& motion = *drawing.bodies.front().motion;
   print("frames",
-        fmt::format("{}, {:g} to {:g} s", motion->frames(), motion->times[0], motion->times[motion->frames() - 1]));
-  print_error(error_of(targets, surface, normals, motion->reduced), surface);
-  print("size", fmt::format("{:.3g} MB; as a point cache {:.3g} MB", megabytes, cache));
+        fmt::format("{}, {:g} to {:g} s", motion.frames(), motion.times[0], motion.times[motion.frames() - 1]));
+  print("size",
+        fmt::format("{:.3g} MB; as a point cache {:.3g} MB", megabytes, static_cast<double>(cached) / kMegabyte));
 }
 
 }  // namespace

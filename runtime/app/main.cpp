@@ -44,6 +44,7 @@ int main(int argc, char** argv) {
   export_command.add_option("-o,--output", export_options.output, "File to write (.glb, .usda or .pc2)")->required();
   export_command.add_option("--bundle", export_options.bundle,
                             "Bundle whose modes become morph targets of a .glb, instead of the one that was stepped");
+  export_command.add_option("--body", export_options.body, "The body alone, of a trajectory of several");
   export_command
       .add_option("--targets", export_options.targets,
                   "Morph targets of a .glb, by principal components of the motion; default: one for each mode")

@@ -1,7 +1,6 @@
 #include <fmt/format.h>
 
 #include "common/config/config.h"
-#include "common/core/error.h"
 #include "common/core/log.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
@@ -42,14 +41,28 @@ void print_summary(const RunSummary& summary, const LoadedScene& loaded, const S
   if (config.trajectory) print("trajectory", config.trajectory->string());
 }
 
+void print_stage_heading() {
+  fmt::print("\n{:<22} {:>12} {:>12} {:>12}\n", "stage", "mean us", "median us", "95 % us");
+}
+
+void print_stage(std::string_view name, const Samples& seconds) {
+  fmt::print("{:<22} {:>12.2f} {:>12.2f} {:>12.2f}\n", name, 1e6 * seconds.mean(), 1e6 * seconds.quantile(0.5),
+             1e6 * seconds.quantile(0.95));
+}
+
 void print_profile(const RunSummary& summary) {
   if (!summary.stage_seconds) return;
-  fmt::print("\n{:<22} {:>12} {:>12} {:>12}\n", "stage", "mean us", "median us", "95 % us");
-  for (std::size_t stage = 0; stage < kStageNames.size(); ++stage) {
-    const Samples& seconds = (*summary.stage_seconds)[stage];
-    fmt::print("{:<22} {:>12.2f} {:>12.2f} {:>12.2f}\n", kStageNames[stage], 1e6 * seconds.mean(),
-               1e6 * seconds.quantile(0.5), 1e6 * seconds.quantile(0.95));
-  }
+  print_stage_heading();
+  for (std::size_t stage = 0; stage < kStageNames.size(); ++stage)
+    print_stage(kStageNames[stage], (*summary.stage_seconds)[stage]);
+}
+
+void print_profile(const WorldSummary& summary) {
+  if (!summary.stage_seconds) return;
+  print_stage_heading();
+  for (std::size_t stage = 0; stage < kWorldStageNames.size(); ++stage)
+    print_stage(kWorldStageNames[stage], summary.stage_seconds->step[stage]);
+  print_stage("output", summary.stage_seconds->output);
 }
 
 void print_world(const WorldSummary& summary, const WorldConfig& config) {
@@ -80,27 +93,19 @@ void print_world(const WorldSummary& summary, const WorldConfig& config) {
 }
 
 void run_world(WorldConfig config, const RunCommandOptions& options) {
-  if (options.run.from_state || options.run.dump_state || options.run.profiled)
-    throw InputError(
-        {config.file.string(), "/bodies", "a scene of one body for --profile and state files", "one of several", ""});
   if (options.trajectory) config.trajectory = options.trajectory;
   if (options.steps) config.steps = *options.steps;
   const LoadedWorld loaded = load_world_run(config);
-  for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
-    const LoadedScene& kind = loaded.kinds[i].loaded;
-    log::info(fmt::format(
-        "{}: {} of r = {} modes, {} vertices against {} triangles", config.bodies[i].name,
-        config.bodies[i].places.size() == 1 ? std::string("a body")
-                                            : fmt::format("{} bodies", config.bodies[i].places.size()),
-        kind.model->modes(), kind.model->contact->vertices(), loaded.kinds[i].surface->surface.triangles()));
-  }
-  const WorldSummary summary = run(loaded, config);
+  log_loaded(loaded, config);
+  const WorldSummary summary = run(loaded, config, options.run);
   if (summary.unconverged_islands > 0)
     log::warning(
         fmt::format("{} solutions of bodies that touch did not reach the tolerance; a smaller time_step or "
                     "contact stiffness may help",
                     summary.unconverged_islands));
   print_world(summary, config);
+  if (options.run.dump_state) print("state", options.run.dump_state->string());
+  print_profile(summary);
 }
 
 }  // namespace

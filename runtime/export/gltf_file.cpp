@@ -43,18 +43,19 @@ class GltfWriter {
     model_.asset.version = "2.0";
     model_.asset.generator = fmt::format("exmat-runtime {}", version());
     model_.buffers.emplace_back();
-    model_.scenes.emplace_back().nodes = {0};
+    model_.scenes.emplace_back();
     model_.defaultScene = 0;
-  }
-
-  void add_mesh(const DrawnSurface& surface, const VertexArray& normals, const MorphTargets& targets) {
     tinygltf::Material material;
     material.name = "material";
     material.doubleSided = true;
     material.pbrMetallicRoughness.metallicFactor = 0;
     material.pbrMetallicRoughness.roughnessFactor = 0.6;
     model_.materials.push_back(material);
+  }
 
+  /// `has_weights`: the mesh, not its nodes.
+  void add_mesh(const DrawnKind& kind, bool has_weights) {
+    const auto& [surface, normals, targets] = kind;
     tinygltf::Primitive primitive;
     primitive.mode = TINYGLTF_MODE_TRIANGLES;
     primitive.material = 0;
@@ -71,47 +72,47 @@ class GltfWriter {
     tinygltf::Mesh& mesh = model_.meshes.emplace_back();
     mesh.name = surface.name;
     mesh.primitives.push_back(std::move(primitive));
-    mesh.weights.assign(static_cast<std::size_t>(targets.displacements.cols()), 0.0);
-    for (Eigen::Index k = 0; targets.weights.rows() > 0 && k < targets.weights.cols(); ++k)
-      mesh.weights[static_cast<std::size_t>(k)] = targets.weights(0, k);
+    if (has_weights) {
+      mesh.weights.assign(static_cast<std::size_t>(targets.displacements.cols()), 0.0);
+      set_first(targets.weights, mesh.weights);
+    }
     mesh.extras = tinygltf::Value(std::map<std::string, tinygltf::Value>{{"targetNames", tinygltf::Value(names)}});
   }
 
-  void add_nodes(const DrawnSurface& surface, UpAxis up) {
+  void add_nodes(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies, UpAxis up) {
     if (up == UpAxis::kZ) {
       tinygltf::Node& upright = model_.nodes.emplace_back();
       upright.name = "y up";
       upright.rotation = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
-      upright.children = {1};
     }
-    body_ = static_cast<int>(model_.nodes.size());
-    tinygltf::Node& body = model_.nodes.emplace_back();
-    body.name = surface.name;
-    body.mesh = 0;
-    body.translation = {surface.origin.x(), surface.origin.y(), surface.origin.z()};
+    first_body_ = static_cast<int>(model_.nodes.size());
+    std::vector<int> nodes;
+    for (const DrawnBody& drawn : bodies) {
+      const Eigen::Vector3d& origin = kinds[drawn.kind].surface.origin;
+      nodes.push_back(static_cast<int>(model_.nodes.size()));
+      tinygltf::Node& body = model_.nodes.emplace_back();
+      body.name = drawn.name;
+      body.mesh = static_cast<int>(drawn.kind);
+      body.translation = {origin.x(), origin.y(), origin.z()};
+      if (bodies.size() == 1 || drawn.weights.rows() == 0) continue;
+      body.weights.resize(static_cast<std::size_t>(drawn.weights.cols()));
+      set_first(drawn.weights, body.weights);
+    }
+    if (up == UpAxis::kZ) model_.nodes.front().children = std::exchange(nodes, {0});
+    model_.scenes.front().nodes = nodes;
   }
 
-  void add_animation(const DrawnSurface& surface, const MorphTargets& targets, const BodyMotion& motion) {
-    const FloatMatrix times = motion.times.cast<float>();
-    for (Eigen::Index frame = 1; frame < times.size(); ++frame)
-      if (!(times(frame) > times(frame - 1)))
-        throw InputError({file_, "", "frames at different times in single precision, as glTF has them",
-                          fmt::format("frames {} and {} at {:.9g} s", frame - 1, frame, motion.times[frame]),
-                          "write fewer frames (output.every of the scene)"});
-    input_ = add_floats(times, TINYGLTF_TYPE_SCALAR, kOther, true);
+  void add_animations(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies) {
+    const Eigen::VectorXd& times = bodies.front().motion->times;
+    add_times(times);
     tinygltf::Animation& animation = model_.animations.emplace_back();
     animation.name = "motion";
-    const RowMatrix places = motion.positions.rowwise() + surface.origin.transpose();
-    const RowMatrix& turns = motion.orientations;
-    if (!motion.positions.isZero(0))
-      add_channel(animation, "translation", add_floats(places.cast<float>(), TINYGLTF_TYPE_VEC3, kOther));
-    if (!turns.rightCols(3).isZero(0)) {
-      FloatMatrix quaternions(turns.rows(), 4);
-      quaternions << turns.rightCols(3).cast<float>(), turns.leftCols(1).cast<float>();
-      add_channel(animation, "rotation", add_floats(quaternions, TINYGLTF_TYPE_VEC4, kOther));
+    for (std::size_t i = 0; i < bodies.size(); ++i) {
+      if (bodies[i].motion->times != times)
+        throw InputError({file_, "", "frames of all bodies at the same times",
+                          fmt::format("others of {}", bodies[i].name), "is this a trajectory of one run?"});
+      add_channels(kinds[bodies[i].kind].surface, bodies[i], first_body_ + static_cast<int>(i), animation);
     }
-    const FloatMatrix weights = targets.weights.cast<float>().reshaped<Eigen::RowMajor>();
-    add_channel(animation, "weights", add_floats(weights, TINYGLTF_TYPE_SCALAR, kOther));
   }
 
   std::int64_t write(const std::filesystem::path& target) {
@@ -130,17 +131,47 @@ class GltfWriter {
   static constexpr int kOther = 0, kVertices = TINYGLTF_TARGET_ARRAY_BUFFER,
                        kIndices = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
 
-  int add_channel(tinygltf::Animation& animation, const char* path, int output) {
+  /// Those of the first frame, where there is one.
+  static void set_first(const RowMatrix& weights, std::vector<double>& first) {
+    for (Eigen::Index k = 0; weights.rows() > 0 && k < weights.cols(); ++k)
+      first[static_cast<std::size_t>(k)] = weights(0, k);
+  }
+
+  void add_times(const Eigen::VectorXd& seconds) {
+    const FloatMatrix times = seconds.cast<float>();
+    for (Eigen::Index frame = 1; frame < times.size(); ++frame)
+      if (!(times(frame) > times(frame - 1)))
+        throw InputError({file_, "", "frames at different times in single precision, as glTF has them",
+                          fmt::format("frames {} and {} at {:.9g} s", frame - 1, frame, seconds[frame]),
+                          "write fewer frames (output.every of the scene)"});
+    input_ = add_floats(times, TINYGLTF_TYPE_SCALAR, kOther, true);
+  }
+
+  void add_channels(const DrawnSurface& surface, const DrawnBody& drawn, int node, tinygltf::Animation& animation) {
+    const BodyMotion& motion = *drawn.motion;
+    const RowMatrix places = motion.positions.rowwise() + surface.origin.transpose();
+    const RowMatrix& turns = motion.orientations;
+    if (!motion.positions.isZero(0))
+      add_channel(animation, node, "translation", add_floats(places.cast<float>(), TINYGLTF_TYPE_VEC3, kOther));
+    if (!turns.rightCols(3).isZero(0)) {
+      FloatMatrix quaternions(turns.rows(), 4);
+      quaternions << turns.rightCols(3).cast<float>(), turns.leftCols(1).cast<float>();
+      add_channel(animation, node, "rotation", add_floats(quaternions, TINYGLTF_TYPE_VEC4, kOther));
+    }
+    const FloatMatrix weights = drawn.weights.cast<float>().reshaped<Eigen::RowMajor>();
+    add_channel(animation, node, "weights", add_floats(weights, TINYGLTF_TYPE_SCALAR, kOther));
+  }
+
+  void add_channel(tinygltf::Animation& animation, int node, const char* path, int output) {
     tinygltf::AnimationSampler sampler;
     sampler.input = input_;
     sampler.output = output;
     tinygltf::AnimationChannel channel;
     channel.sampler = static_cast<int>(animation.samplers.size());
-    channel.target_node = body_;
+    channel.target_node = node;
     channel.target_path = path;
     animation.samplers.push_back(sampler);
     animation.channels.push_back(channel);
-    return channel.sampler;
   }
 
   template <typename Array>
@@ -189,18 +220,18 @@ class GltfWriter {
 
   std::string file_;
   tinygltf::Model model_;
-  int body_ = 0;   // node
-  int input_ = 0;  // accessor of the times
+  int first_body_ = 0;  // node
+  int input_ = 0;       // accessor of the times
 };
 
 }  // namespace
 
-std::int64_t write_gltf(const std::filesystem::path& target, const DrawnSurface& surface, const VertexArray& normals,
-                        const MorphTargets& targets, const std::optional<BodyMotion>& motion, UpAxis up) {
+std::int64_t write_gltf(const std::filesystem::path& target, const std::vector<DrawnKind>& kinds,
+                        const std::vector<DrawnBody>& bodies, UpAxis up) {
   GltfWriter writer(target.string());
-  writer.add_mesh(surface, normals, targets);
-  writer.add_nodes(surface, up);
-  if (motion) writer.add_animation(surface, targets, *motion);
+  for (const DrawnKind& kind : kinds) writer.add_mesh(kind, bodies.size() == 1);
+  writer.add_nodes(kinds, bodies, up);
+  if (bodies.front().motion) writer.add_animations(kinds, bodies);
   return writer.write(target);
 }
 

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
+#include <vector>
 
 #include "runtime/export/body_motion.h"
 #include "runtime/export/drawn_surface.h"
@@ -13,11 +15,26 @@ namespace exmat::runtime {
 /// Which axis of the object points up.
 enum class UpAxis { kY, kZ };
 
-/// Writes a surface with morph targets as binary glTF 2.0, in single precision: one mesh, on one node. With a `motion`
-/// an animation of the node and of the weights, linear between its frames. Z up becomes glTF's y up by a node above it.
-/// Returns the bytes written. Throws InputError (frames too close for single precision, more than the format holds) and
-/// WorkError; `target` is then as it was.
-std::int64_t write_gltf(const std::filesystem::path& target, const DrawnSurface& surface, const VertexArray& normals,
-                        const MorphTargets& targets, const std::optional<BodyMotion>& motion, UpAxis up);
+/// What is drawn of all bodies of one bundle: one mesh.
+struct DrawnKind {
+  DrawnSurface surface;
+  VertexArray normals;   ///< v x 3, at rest
+  MorphTargets targets;  ///< their weights are those of the bodies, one body after the other
+};
+
+/// A body: a node with that mesh.
+struct DrawnBody {
+  std::string name;
+  std::size_t kind = 0;
+  RowMatrix weights;                 ///< F x N; none without a motion
+  std::optional<BodyMotion> motion;  ///< at the same times as the others
+};
+
+/// Writes surfaces with morph targets as binary glTF 2.0, in single precision: a mesh for each kind, a node for each
+/// body. With motions an animation of the nodes and of their weights, linear between frames. Z up becomes glTF's y up
+/// by a node above all. Returns the bytes written. Throws InputError (frames too close for single precision or at other
+/// times than those of the other bodies, more than the format holds) and WorkError; `target` is then as it was.
+std::int64_t write_gltf(const std::filesystem::path& target, const std::vector<DrawnKind>& kinds,
+                        const std::vector<DrawnBody>& bodies, UpAxis up);
 
 }  // namespace exmat::runtime

@@ -3,6 +3,7 @@
 #include <bit>
 #include <cerrno>
 #include <cstring>
+#include <fmt/format.h>
 #include <fstream>
 #include <system_error>
 #include <vector>
@@ -59,6 +60,10 @@ class ValueWriter {
 PointCacheSummary write_point_cache(const std::filesystem::path& trajectory, const std::filesystem::path& target,
                                     const PointCacheOptions& options) {
   TrajectoryReader reader(trajectory);
+  if (options.body) reader.select(*options.body);
+  if (const auto bodies = reader.bodies(); !options.body && !bodies.empty())
+    reader.refuse("/bodies", "one body: a point cache holds no more", fmt::format("{} bodies", bodies.size()),
+                  fmt::format("write a file for each: --body {}, and so on", bodies.front()));
   PointCacheSummary summary{reader.open_positions(options.mesh), reader.points(), reader.samples()};
   if (options.frame_rate && reader.samples() > 1) summary.sample_rate = spacing(reader) * *options.frame_rate;
 

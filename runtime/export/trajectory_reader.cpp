@@ -1,8 +1,10 @@
 #include "runtime/export/trajectory_reader.h"
 
+#include <algorithm>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <limits>
+#include <span>
 
 #include "common/bundle/file_schemas.h"
 #include "common/core/error.h"
@@ -39,22 +41,43 @@ void resize(Array& array, const std::vector<std::int64_t>& sizes) {
 
 TrajectoryReader::TrajectoryReader(const std::filesystem::path& trajectory) : file_(open(trajectory)) {}
 
+std::vector<std::string> TrajectoryReader::bodies() const {
+  return file_.has_group("/bodies") ? file_.list("/bodies") : std::vector<std::string>{};
+}
+
+void TrajectoryReader::select(const std::string& body) {
+  const std::vector<std::string> names = bodies();
+  if (std::ranges::find(names, body) == names.end()) {
+    constexpr std::size_t kShown = 20;
+    const auto shown = std::span(names).first(std::min(names.size(), kShown));
+    refuse("/bodies", fmt::format("a body \"{}\"", body),
+           names.empty() ? "a trajectory of one body" : fmt::format("{} bodies", names.size()),
+           names.empty() ? "leave out --body"
+                         : fmt::format("it has {}{}", fmt::join(shown, ", "), names.size() > kShown ? ", ..." : ""));
+  }
+  group_ = fill_name("/bodies/{body}", kBodyPlaceholder, body);
+  sizes_ = {};
+  positions_.clear();
+}
+
 std::string TrajectoryReader::text(const std::string& attribute) const {
-  if (!file_.has_attribute("/", attribute)) return {};
-  const AttributeValue value = file_.read_attribute("/", attribute);
+  const std::string object = group_.empty() ? "/" : group_;
+  if (!file_.has_attribute(object, attribute)) return {};
+  const AttributeValue value = file_.read_attribute(object, attribute);
   const auto* text = std::get_if<std::string>(&value);
-  if (text == nullptr) refuse("/@" + attribute, "a string", "another type");
+  if (text == nullptr) refuse(group_ + "/@" + attribute, "a string", "another type");
   return *text;
 }
 
 Hdf5Dataset TrajectoryReader::open_dataset(const std::string& path) {
   const DatasetSchema& schema = trajectory_schema().dataset(path);
-  Hdf5Dataset dataset = file_.open_dataset(path);
+  Hdf5Dataset dataset = file_.open_dataset(group_ + path);
   const auto text = [&] { return fmt::format("{} of {}", dataset.type_name(), fmt::join(dataset.sizes(), " x ")); };
   if (dataset.type() != schema.type)
-    refuse(path, fmt::format("{} of {}", name_of(schema.type), schema.dims_text), text());
-  if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), path)) refuse(path, *expected, text());
-  if (dataset.element_count() == 0) refuse(path, "some elements", text());
+    refuse(group_ + path, fmt::format("{} of {}", name_of(schema.type), schema.dims_text), text());
+  if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), group_ + path))
+    refuse(group_ + path, *expected, text());
+  if (dataset.element_count() == 0) refuse(group_ + path, "some elements", text());
   dataset.check_storage();
   return dataset;
 }
@@ -74,7 +97,7 @@ void TrajectoryReader::read_all(const std::string& path, Array& array) {
   resize(array, dataset.sizes());
   dataset.read(array.data(), schema.type);
   if (const auto fault = check_values(schema, dataset.sizes(), array.data(), sizes_))
-    refuse(path, fault->expected, fault->found);
+    refuse(group_ + path, fault->expected, fault->found);
   check_sum(dataset, crc32_of(std::as_bytes(std::span(array.data(), static_cast<std::size_t>(array.size())))));
 }
 
@@ -99,13 +122,14 @@ TriangleArray TrajectoryReader::triangles(bool mesh) {
 
 const std::string& TrajectoryReader::open_positions(bool mesh) {
   positions_.clear();
-  positions_.push_back(open_dataset(!mesh && has("/render/vertices") ? "/render/vertices" : "/vertices"));
+  positions_path_ = !mesh && has("/render/vertices") ? "/render/vertices" : "/vertices";
+  positions_.push_back(open_dataset(positions_path_));
   for (const std::int64_t size : {samples(), points()})
     if (size > std::numeric_limits<std::int32_t>::max())
       refuse(positions_.front().path(), "as many frames and points as a 32-bit number counts", fmt::format("{}", size));
   next_ = 0;
   crc_ = 0;
-  return positions_.front().path();
+  return positions_path_;
 }
 
 void TrajectoryReader::read_next(std::vector<float>& frame) {
@@ -114,7 +138,7 @@ void TrajectoryReader::read_next(std::vector<float>& frame) {
   dataset.read_rows(next_++, 1, frame.data(), ElementType::kFloat32);
   crc_ = crc32_of(std::as_bytes(std::span(frame)), crc_);
   const std::int64_t sizes[] = {points(), 3};
-  if (const auto fault = check_values(trajectory_schema().dataset(dataset.path()), sizes, frame.data(), {}))
+  if (const auto fault = check_values(trajectory_schema().dataset(positions_path_), sizes, frame.data(), {}))
     refuse(fmt::format("{}, frame {}", dataset.path(), next_ - 1), fault->expected, fault->found);
 }
 

@@ -17,16 +17,22 @@ class TrajectoryReader {
  public:
   explicit TrajectoryReader(const std::filesystem::path& trajectory);
 
+  /// Names of the bodies of a scene of several, in ascending order; none of a scene of one body.
+  std::vector<std::string> bodies() const;
+  /// What follows is read of this body of several.
+  void select(const std::string& body);
+
   const std::string& name() const { return file_.name(); }
-  bool has(const std::string& dataset) const { return file_.has_dataset(dataset); }
-  /// An attribute of the root; empty where the trajectory is older than it.
+  bool has(const std::string& dataset) const { return file_.has_dataset(group_ + dataset); }
+  /// An attribute of the run, or of the body; empty where the trajectory is older than it.
   std::string text(const std::string& attribute) const;
   /// All rows of a dataset of numbers, F x columns.
   RowMatrix read(const std::string& dataset);
   /// Of the render mesh, or the boundary of the tets.
   TriangleArray triangles(bool mesh);
 
-  /// The dataset that positions are read from: of the render mesh where there is one, of the tets with `mesh`.
+  /// The dataset below the body's group that positions are read from: of the render mesh where there is one, of the
+  /// tets with `mesh`.
   const std::string& open_positions(bool mesh);
   std::int64_t samples() const { return positions_.front().sizes()[0]; }
   std::int64_t points() const { return positions_.front().sizes()[1]; }
@@ -45,8 +51,10 @@ class TrajectoryReader {
   void read_all(const std::string& path, Array& array);
 
   Hdf5File file_;
+  std::string group_;  ///< of the body; empty: the root
   SymbolSizes sizes_;
   std::vector<Hdf5Dataset> positions_;  ///< the open one
+  std::string positions_path_;          ///< its path below the group
   std::int64_t next_ = 0;               ///< frame
   std::uint32_t crc_ = 0;               ///< of the frames before it
 };

@@ -8,13 +8,15 @@
 
 namespace exmat::runtime {
 
-Bodies::Bodies(const Model& model, const StepScene& scene, State start, int count)
+Bodies::Bodies(const Model& model, StepScene scene, State start, int count, SceneKeys keys)
     : model_(model),
-      scene_(scene),
+      scene_(std::move(scene)),
+      keys_(std::move(keys)),
       start_(std::move(start)),
       reports_(static_cast<std::size_t>(count)),
-      threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene}, {}}) {
-  refresh_weights(model, scene, start_, threads_.front().workspace);
+      threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene_}, {}}) {
+  keys_.apply_start(model, scene_);
+  refresh_weights(model, scene_, start_, threads_.front().workspace);
   states_.assign(reports_.size(), start_);
 }
 
@@ -47,6 +49,7 @@ void Bodies::step_share(int thread) noexcept {
 
 std::span<const StepReport> Bodies::step() noexcept {
   const int threads = this->threads();
+  keys_.apply(model_, states_.front().step, scene_);
   if (threads == 1) {
     step_share(0);
     return reports_;

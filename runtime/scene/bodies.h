@@ -7,6 +7,7 @@
 
 #include "common/core/fnv_hash.h"
 #include "runtime/scene/step_work.h"
+#include "runtime/sim/step/scene_keys.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -18,12 +19,14 @@ void add_to_hash(const Model& model, const State& state, FnvHash& hash);
 /// one Workspace for each thread: no body depends on another, nor on the number of threads.
 class Bodies {
  public:
-  /// Refers to model and scene as long as it lives; count >= 1. As many threads as OpenMP gives, at most one for each
-  /// body.
-  Bodies(const Model& model, const StepScene& scene, State start, int count);
+  /// Refers to the model as long as it lives; count >= 1. The keys change the scene in time. As many threads as OpenMP
+  /// gives, at most one for each body.
+  Bodies(const Model& model, StepScene scene, State start, int count, SceneKeys keys = {});
 
   int count() const { return static_cast<int>(states_.size()); }
   int threads() const { return static_cast<int>(threads_.size()); }
+  /// As the last step read it.
+  const StepScene& scene() const { return scene_; }
   State& operator[](int body) { return states_[static_cast<std::size_t>(body)]; }
   const State& operator[](int body) const { return states_[static_cast<std::size_t>(body)]; }
 
@@ -58,7 +61,8 @@ class Bodies {
   void step_share(int thread) noexcept;
 
   const Model& model_;
-  const StepScene& scene_;
+  StepScene scene_;
+  SceneKeys keys_;
   State start_;
   std::vector<State> states_;
   std::vector<StepReport> reports_;

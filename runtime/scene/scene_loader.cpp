@@ -7,6 +7,7 @@
 
 #include "common/config/config.h"
 #include "common/core/error.h"
+#include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/sim/step/stepper.h"
 
@@ -114,8 +115,10 @@ ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConf
 }
 
 ExampleSettings example_settings(const ExampleForceConfig& config) {
-  return {config.stiffness, config.damping, config.bias, config.target_iterations,
-          config.law == ExampleForceLaw::kElastic};
+  ExampleSettings settings{config.stiffness, config.damping, config.bias, config.target_iterations,
+                           config.law == ExampleForceLaw::kElastic};
+  if (config.weights) settings.given_weights = *config.weights;
+  return settings;
 }
 
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
@@ -186,8 +189,10 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
     return;
   }
   const Eigen::Index modes = examples.filter.matrix().rows();
-  plan.push_back(owner +
-                 fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias));
+  plan.push_back(
+      owner + (settings.given_weights.size() > 0
+                   ? fmt::format("weights: K = {} examples, given", examples.weights.examples())
+                   : fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias)));
   plan.push_back(owner + describe_target(examples, settings));
   if (settings.elastic)
     plan.push_back(owner + fmt::format("example_force: elastic, s = {} elements", examples.elasticity->elements()));
@@ -218,6 +223,7 @@ LoadedScene load_run(const SceneConfig& config) {
   const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   loaded.model = prepare(config, loaded.data);
+  loaded.keys = make_keys(config, *loaded.model);
   loaded.scene = step_scene(config, loaded);
   loaded.start = start_state(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
@@ -245,6 +251,7 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   };
   for (std::size_t i = 0; i < scene.examples.size(); ++i) describe_examples(model.examples[i], scene.examples[i], plan);
   if (scene.examples.empty()) left_out("weights, target, example_force", "the scene names no examples");
+  for (std::string& line : describe_keys(loaded.keys, model)) plan.push_back(std::move(line));
   plan.push_back(model.internal_force.polynomial() ? std::string("internal_force: exact polynomial")
                                                    : fmt::format("internal_force: cubature, s = {} elements",
                                                                  model.internal_force.cubature().elements()));

@@ -7,6 +7,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/scene_config.h"
 #include "runtime/sim/step/scene.h"
+#include "runtime/sim/step/scene_keys.h"
 #include "runtime/sim/step/state.h"
 
 namespace exmat::runtime {
@@ -14,8 +15,9 @@ namespace exmat::runtime {
 /// A scene ready to step, and how it came to be.
 struct LoadedScene {
   std::unique_ptr<const Model> model;
-  StepScene scene;
-  State start;  ///< where every body begins
+  StepScene scene;  ///< settings with keys as strong as they ever are
+  SceneKeys keys;   ///< of what changes in time: to be applied to a copy of the scene before each step
+  State start;      ///< where every body begins
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;  ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;  ///< datasets that were read, in order

@@ -62,7 +62,7 @@ TrajectoryInfo trajectory_info(const LoadedScene& loaded, const SceneConfig& con
 }
 
 Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config) {
-  return {*loaded.model, loaded.scene, loaded.start, config.instances};
+  return {*loaded.model, loaded.scene, loaded.start, config.instances, loaded.keys};
 }
 
 void require_finite(const Bodies& bodies, const SceneConfig& config) {
@@ -85,7 +85,7 @@ RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOp
   RunSummary summary = empty_summary(config.steps, bodies, options.profiled);
   const auto trajectory = open_trajectory(loaded, config);
   const auto append = [&](double seconds) {
-    trajectory->append(shown, energies(*loaded.model, loaded.scene, shown), seconds);
+    trajectory->append(shown, energies(*loaded.model, bodies.scene(), shown), seconds);
   };
   if (trajectory) append(0);
 
@@ -111,7 +111,7 @@ RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOp
   }
   if (options.dump_state) write_states(bodies, loaded, *options.dump_state);
   summary.simulated_seconds = static_cast<double>(config.steps) * config.time_step;
-  summary.energies = energies(*loaded.model, loaded.scene, shown);
+  summary.energies = energies(*loaded.model, bodies.scene(), shown);
   summary.state_hash = bodies.hash();
   return summary;
 }

@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -10,6 +9,7 @@
 #include "common/core/atomic_file.h"
 #include "common/core/error.h"
 #include "common/hdf5/hdf5_file.h"
+#include "runtime/scene/state_json.h"
 
 namespace exmat::runtime {
 namespace {
@@ -17,110 +17,7 @@ namespace {
 using Json = nlohmann::json;
 using OrderedJson = nlohmann::ordered_json;
 
-std::vector<double> array_of(const auto& numbers) { return {numbers.begin(), numbers.end()}; }
-
-// The members of a State that are arrays [r] of a file's body.
-struct ModeArray {
-  const char* name;
-  Eigen::VectorXd State::*member;
-};
-constexpr ModeArray kModeArrays[] = {{"reduced", &State::q},
-                                     {"reduced_velocity", &State::v},
-                                     {"reduced_before", &State::q_previous},
-                                     {"reduced_velocity_before", &State::v_previous},
-                                     {"acceleration", &State::a},
-                                     {"applied_force", &State::applied_force}};
-
-OrderedJson to_json(const State& state, const BodyFrame& frame) {
-  OrderedJson body{{"step", state.step},
-                   {"elastic_energy", state.elastic_energy},
-                   {"begins_anew", state.begins_anew},
-                   {"frame", frame.numbers(state.frame)},
-                   {"examples", OrderedJson::array()},
-                   {"contacts", OrderedJson::array()}};
-  for (const auto& [name, member] : kModeArrays) body[name] = array_of(state.*member);
-  for (const ExampleState& examples : state.examples)
-    body["examples"].push_back({{"weights", array_of(examples.weights)},
-                                {"target", array_of(examples.target)},
-                                {"has_target", examples.has_target},
-                                {"target_converged", examples.target_converged}});
-  for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count)) {
-    body["contacts"].push_back({{"vertex", held.vertex},
-                                {"obstacle", held.obstacle},
-                                {"normal_force", held.normal_force},
-                                {"anchor", array_of(held.anchor)}});
-    if (!held.way_out.isZero(0)) body["contacts"].back()["way_out"] = array_of(held.way_out);
-  }
-  return body;
-}
-
-// One body of a file.
-class BodyReader {
- public:
-  BodyReader(const std::filesystem::path& file, std::string place, const Json& body, const LoadedScene& loaded)
-      : file_(file), place_(std::move(place)), body_(body), loaded_(loaded) {}
-
-  /// `state` is one of the same model and scene.
-  void read(State& state) const {
-    for (const auto& [name, member] : kModeArrays) read_array(name, body_[name], state.*member);
-    state.step = body_["step"];
-    state.time = static_cast<double>(state.step) * loaded_.scene.time_step;
-    state.elastic_energy = body_["elastic_energy"];
-    state.begins_anew = body_["begins_anew"];
-    const BodyFrame& frame = *loaded_.model->frame;
-    const std::vector<double> numbers = body_["frame"];
-    require_count("/frame", numbers.size(), frame.numbers(state.frame).size());
-    frame.set_numbers(numbers, state.frame);
-    require_count("/examples", body_["examples"].size(), state.examples.size());
-    for (std::size_t i = 0; i < state.examples.size(); ++i) read_examples(i, state.examples[i]);
-    read_contacts(state.contacts);
-  }
-
- private:
-  [[noreturn]] void refuse(const std::string& place, std::string expected, std::string found) const {
-    throw InputError({file_.string(), place_ + place, std::move(expected), std::move(found),
-                      "take the scene that the state was written with"});
-  }
-  void require_count(const std::string& place, std::size_t found, std::size_t expected) const {
-    if (found != expected) refuse(place, fmt::format("{} entries", expected), fmt::format("{}", found));
-  }
-  void read_array(const std::string& name, const Json& numbers, Eigen::VectorXd& array) const {
-    require_count("/" + name, numbers.size(), static_cast<std::size_t>(array.size()));
-    for (Eigen::Index i = 0; i < array.size(); ++i) array[i] = numbers[static_cast<std::size_t>(i)];
-  }
-  void read_examples(std::size_t index, ExampleState& examples) const {
-    const Json& from = body_["examples"][index];
-    const std::string name = fmt::format("examples/{}/", index);
-    read_array(name + "weights", from["weights"], examples.weights);
-    read_array(name + "target", from["target"], examples.target);
-    examples.has_target = from["has_target"];
-    examples.target_converged = from["target_converged"];
-  }
-  void read_contacts(ContactState& contacts) const {
-    const Json& from = body_["contacts"];
-    const std::size_t obstacles = loaded_.scene.obstacles.size();
-    if (from.size() > contacts.held.size())
-      refuse("/contacts", fmt::format("at most {} contacts", contacts.held.size()), fmt::format("{}", from.size()));
-    contacts.count = 0;
-    for (const Json& entry : from) {
-      HeldContact held{entry["vertex"], entry["obstacle"], entry["normal_force"],
-                       Eigen::Vector3d(entry["anchor"][0], entry["anchor"][1], entry["anchor"][2])};
-      if (entry.contains("way_out"))
-        held.way_out = Eigen::Vector3d(entry["way_out"][0], entry["way_out"][1], entry["way_out"][2]);
-      const std::string place = fmt::format("/contacts/{}", contacts.count);
-      const Eigen::Index vertices = loaded_.model->contact->vertices();
-      if (held.vertex >= vertices) refuse(place, fmt::format("a vertex below {}", vertices), entry["vertex"].dump());
-      if (static_cast<std::size_t>(held.obstacle) >= obstacles)
-        refuse(place, fmt::format("an obstacle below {}", obstacles), entry["obstacle"].dump());
-      contacts.held[contacts.count++] = held;
-    }
-  }
-
-  const std::filesystem::path& file_;
-  std::string place_;
-  const Json& body_;
-  const LoadedScene& loaded_;
-};
+constexpr int kOfOneKind = 1;  // version of files without what bodies remember of each other
 
 void check_run(const std::filesystem::path& file, const Json& document, const LoadedScene& loaded,
                const Bodies& bodies) {
@@ -128,6 +25,8 @@ void check_run(const std::filesystem::path& file, const Json& document, const Lo
     throw InputError({file.string(), place, std::move(expected), std::move(found),
                       "take the bundle and the scene that the state was written with"});
   };
+  if (document["format_version"] != kOfOneKind || !document.contains("bundle_input_sha256"))
+    refuse("/format_version", "a state of a scene of one body", "one of several");
   const std::string bundle = document["bundle_input_sha256"];
   if (bundle != loaded.summary.input_sha256)
     refuse("/bundle_input_sha256", "\"" + loaded.summary.input_sha256 + "\", that of the scene's bundle",
@@ -144,12 +43,12 @@ void check_run(const std::filesystem::path& file, const Json& document, const Lo
 
 void write_states(const Bodies& bodies, const LoadedScene& loaded, const std::filesystem::path& file) {
   OrderedJson document{{"format", "exmat-state"},
-                       {"format_version", 1},
+                       {"format_version", kOfOneKind},
                        {"program", generator_name()},
                        {"bundle_input_sha256", loaded.summary.input_sha256},
                        {"time_step", loaded.scene.time_step},
                        {"bodies", OrderedJson::array()}};
-  for (int i = 0; i < bodies.count(); ++i) document["bodies"].push_back(to_json(bodies[i], *loaded.model->frame));
+  for (int i = 0; i < bodies.count(); ++i) document["bodies"].push_back(state_to_json(bodies[i], *loaded.model->frame));
   write_file_atomically(file, document.dump(1) + "\n");
 }
 
@@ -159,7 +58,7 @@ void read_states(const std::filesystem::path& file, const LoadedScene& loaded, B
   check_run(file, document, loaded, bodies);
   std::vector<State> states(static_cast<std::size_t>(bodies.count()), bodies[0]);
   for (std::size_t i = 0; i < states.size(); ++i)
-    BodyReader(file, fmt::format("/bodies/{}", i), document["bodies"][i], loaded).read(states[i]);
+    read_state(file, fmt::format("/bodies/{}", i), document["bodies"][i], loaded, states[i]);
   for (int i = 0; i < bodies.count(); ++i) bodies[i] = std::move(states[static_cast<std::size_t>(i)]);
 }
 

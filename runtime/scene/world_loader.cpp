@@ -52,11 +52,12 @@ LoadedWorld load_world_run(const WorldConfig& config) {
   return world;
 }
 
-World make_world(const LoadedWorld& loaded, const WorldConfig& config) {
+World make_world(const LoadedWorld& loaded, const WorldConfig& config, std::span<const StepScene> scenes) {
   std::vector<WorldBodyStart> bodies;
   for (const LoadedBody& body : loaded.bodies) {
     const LoadedKind& kind = loaded.kinds[body.kind];
-    bodies.push_back({{kind.loaded.model.get(), &kind.loaded.scene, kind.surface}, body.start});
+    const StepScene& scene = scenes.empty() ? kind.loaded.scene : scenes[body.kind];
+    bodies.push_back({{kind.loaded.model.get(), &scene, kind.surface}, body.start});
   }
   return {std::move(bodies), {config.contact.stiffness, config.contact.damping, config.contact.friction}};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -36,7 +37,7 @@ LoadedWorld load_world_run(const WorldConfig& config);
 std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, const ReducedModel& data,
                                                         bool meets_itself);
 
-/// Its bodies as they start; refers to `loaded`.
-World make_world(const LoadedWorld& loaded, const WorldConfig& config);
+/// Its bodies as they start; refers to `loaded`, and to `scenes` of its kinds in place of those that it holds.
+World make_world(const LoadedWorld& loaded, const WorldConfig& config, std::span<const StepScene> scenes = {});
 
 }  // namespace exmat::runtime

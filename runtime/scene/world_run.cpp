@@ -1,16 +1,12 @@
 #include "runtime/scene/world_run.h"
 
 #include <algorithm>
-#include <fmt/format.h>
-#include <omp.h>
 
-#include "common/core/error.h"
-#include "common/core/fnv_hash.h"
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/output/trajectory.h"
-#include "runtime/scene/bodies.h"
-#include "runtime/scene/scene_run.h"
+#include "runtime/scene/world_bodies.h"
+#include "runtime/scene/world_state_file.h"
 
 namespace exmat::runtime {
 namespace {
@@ -26,19 +22,6 @@ std::unique_ptr<WorldTrajectoryWriter> open_trajectory(const LoadedWorld& loaded
     bodies.push_back({body.name, kind.data, *kind.model->frame, trajectory_info(kind, scene)});
   }
   return std::make_unique<WorldTrajectoryWriter>(*config.trajectory, bodies);
-}
-
-void require_finite(const World& world, const LoadedWorld& loaded, const WorldConfig& config) {
-  for (int i = 0; i < world.count(); ++i) {
-    if (!(world.report(i).status & kStepNonFinite)) continue;
-    const State& state = world.state(i);
-    throw WorkError(
-        fmt::format("{}: step {} (t = {:g} s), body {}: the state is no longer finite; try a smaller time_step (now "
-                    "{:g} s), smaller "
-                    "loads, contact or example stiffness. No trajectory was written",
-                    config.file.string(), state.step + 1, state.time + config.time_step,
-                    loaded.bodies[static_cast<std::size_t>(i)].name, config.time_step));
-  }
 }
 
 double deepest_of(const World& world) {
@@ -61,15 +44,37 @@ void add(const WorldReport& report, const World& world, double seconds, WorldSum
     if (world.report(i).status & kStepUnconverged) ++summary.unconverged_steps;
 }
 
+void add_profile(const WorldProfile& profile, double whole, double output, int bodies, WorldStageSamples& stages) {
+  double staged = 0;
+  for (std::size_t stage = 0; stage < kWorldStageNames.size(); ++stage) {
+    if (stage == static_cast<std::size_t>(WorldStage::kOther)) continue;
+    staged += profile.seconds[stage];
+    stages.step[stage].add(profile.seconds[stage] / bodies);
+  }
+  stages.step[static_cast<std::size_t>(WorldStage::kOther)].add(std::max(0.0, whole - staged) / bodies);
+  stages.output.add(output / bodies);
+}
+
+WorldSummary empty_summary(std::int64_t steps, const WorldBodies& bodies, bool profiled) {
+  WorldSummary summary;
+  summary.bodies = bodies.count();
+  summary.threads = bodies.threads();
+  summary.step_seconds = summary.newton_iterations = summary.touching_pairs = Samples(steps);
+  summary.start = bodies.world().energies();
+  if (!profiled) return summary;
+  WorldStageSamples& stages = summary.stage_seconds.emplace();
+  stages.step.fill(Samples(steps));
+  stages.output = Samples(steps);
+  return summary;
+}
+
 }  // namespace
 
-WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config) {
-  World world = make_world(loaded, config);
-  WorldSummary summary;
-  summary.bodies = world.count();
-  summary.threads = std::min(omp_get_max_threads(), omp_get_num_procs());
-  summary.step_seconds = summary.newton_iterations = summary.touching_pairs = Samples(config.steps);
-  summary.start = world.energies();
+WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOptions& options) {
+  WorldBodies bodies(loaded, config);
+  const World& world = bodies.world();
+  if (options.from_state) bodies.take_up(read_world_state(*options.from_state, loaded, config));
+  WorldSummary summary = empty_summary(config.steps, bodies, options.profiled);
   const auto trajectory = open_trajectory(loaded, config);
   const auto append = [&](double seconds) {
     for (int i = 0; i < world.count(); ++i)
@@ -77,26 +82,37 @@ WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config) {
                          energies(world.model(i), world.scene(i), world.state(i)), seconds);
   };
   if (trajectory) append(0);
+  WorldMemory before;  // the step, for the state file of one that fails
   Progress progress("steps", config.steps);
   while (summary.steps < config.steps) {
+    if (options.dump_state) bodies.remember(before);
+    WorldProfile profile;
+    bodies.set_profile(options.profiled ? &profile : nullptr);
     const Timer timer;
-    const WorldReport report = world.step(summary.threads);
+    const WorldReport report = bodies.step();
     const double seconds = timer.seconds();
-    require_finite(world, loaded, config);
+    if (options.dump_state && !bodies.is_finite()) write_world_state(before, loaded, config, *options.dump_state);
+    bodies.require_finite();
     add(report, world, seconds, summary);
-    if (trajectory && summary.steps % config.every == 0) append(seconds / world.count());
+    const Timer output;
+    const bool written = trajectory && summary.steps % config.every == 0;
+    if (written) append(seconds / world.count());
+    if (options.profiled)
+      add_profile(profile, seconds, written ? output.seconds() : 0, world.count(), *summary.stage_seconds);
     progress.advance();
   }
   if (trajectory) {
     trajectory->finish();
     summary.largest_displacement = trajectory->largest_displacement();
   }
+  if (options.dump_state) {
+    bodies.remember(before);
+    write_world_state(before, loaded, config, *options.dump_state);
+  }
   summary.simulated_seconds = static_cast<double>(config.steps) * config.time_step;
   summary.end = world.energies();
   summary.deepest = deepest_of(world);
-  FnvHash hash;
-  for (int i = 0; i < world.count(); ++i) add_to_hash(world.model(i), world.state(i), hash);
-  summary.state_hash = hash.value();
+  summary.state_hash = bodies.hash();
   return summary;
 }
 

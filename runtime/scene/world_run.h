@@ -1,12 +1,20 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 
 #include "runtime/scene/samples.h"
+#include "runtime/scene/scene_run.h"
 #include "runtime/scene/world_loader.h"
 
 namespace exmat::runtime {
+
+/// Of the stages of the steps of several bodies, on the wall clock, over the number of bodies.
+struct WorldStageSamples {
+  std::array<Samples, kWorldStageNames.size()> step;
+  Samples output;  ///< of each step: 0 where it wrote no frame
+};
 
 /// What a run of several bodies did.
 struct WorldSummary {
@@ -18,17 +26,19 @@ struct WorldSummary {
   Samples newton_iterations;  ///< most of an island
   Samples touching_pairs;     ///< of bodies near enough to touch
   int most_pairs = 0;
-  int largest_island = 0;                      ///< bodies solved together
-  std::int64_t unconverged_islands = 0;        ///< of all steps
-  std::int64_t unconverged_steps = 0;          ///< residual above the tolerance; of all bodies
-  Energies start, end;                         ///< of all bodies
-  double deepest = 0;                          ///< that a vertex is inside another body at the end [m]
-  std::uint64_t state_hash = 0;                ///< of all bodies, at the end, as Bodies::hash
-  std::optional<double> largest_displacement;  ///< over the written frames [m]; only with a trajectory
+  int largest_island = 0;                          ///< bodies solved together
+  std::int64_t unconverged_islands = 0;            ///< of all steps
+  std::int64_t unconverged_steps = 0;              ///< residual above the tolerance; of all bodies
+  Energies start, end;                             ///< of all bodies
+  double deepest = 0;                              ///< that a vertex is inside another body at the end [m]
+  std::uint64_t state_hash = 0;                    ///< of all bodies, at the end, as Bodies::hash
+  std::optional<double> largest_displacement;      ///< over the written frames [m]; only with a trajectory
+  std::optional<WorldStageSamples> stage_seconds;  ///< only if asked for
 };
 
-/// Steps all bodies from their start, and writes the trajectory, if the scene names one. As many threads as OpenMP
-/// gives. Throws WorkError where a state becomes non-finite (no trajectory is left) or a file cannot be written.
-WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config);
+/// Steps all bodies from their start or from a state file, and writes the trajectory, if the scene names one. As many
+/// threads as OpenMP gives. Throws WorkError where a state becomes non-finite (no trajectory is left) or a file cannot
+/// be written, InputError where the state file does not fit.
+WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOptions& options = {});
 
 }  // namespace exmat::runtime

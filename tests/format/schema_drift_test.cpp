@@ -210,7 +210,8 @@ TEST(FileSchemaText, IsRefusedWithAnUnknownTypeUseOrConstraint) {
 
 // JSON Schemas: every object closed, every member described, every optional member with a default.
 void check_closed(const Json& schema, const std::string& place) {
-  if (schema.value("type", "") != "object") {
+  const Json type = schema.value("type", Json());
+  if (type != "object" && !(type.is_array() && std::find(type.begin(), type.end(), "object") != type.end())) {
     if (schema.contains("items")) check_closed(schema["items"], place + "/items");
     return;
   }

@@ -92,7 +92,7 @@ class Export(unittest.TestCase):
             asset = {"name": name, "object": {"mesh": "bar.veg", "render_mesh": "tube.obj", **more,
                                               "material": {"youngs_modulus": 2e5, "poisson_ratio": 0.4, "density": 1000}},
                      "basis": {"size": 8, "linear_modes": 4, "training": "none"}, "cubature": {"elements": 16, "training_poses": 20},
-                     "needs": ["rigid", "render"], "examples": []}
+                     "needs": ["rigid", "render", "contact"], "examples": []}
             (cls.folder / f"{name}.json").write_text(json.dumps(asset))
             cls.call(PRECOMPUTE, "bundle", f"{name}.json", "-o", f"{name}.h5")
         cls.run_scene("clamped", {"gravity": [0, 0, -9.81]})
@@ -101,6 +101,14 @@ class Export(unittest.TestCase):
         half = np.sqrt(0.5)
         cls.run_scene("clamped", {"body": {"motion": [{"time": 0}, {"time": 0.5, "position": [0, 2, 0], "orientation": [half, 0, half, 0]},
                                                       {"time": 2, "position": [1, 0, 0]}]}}, "carried")
+
+        several = {"time_step": 0.01, "steps": 60, "gravity": [0, -1, 0], "output": {"trajectory": "several_run.h5", "every": 5}, "bodies": [
+            {"name": "thrown-one", "bundle": "free.h5", "body": {"position": [0, 9, 0], "angular_velocity": [1, 4, 9]}},
+            {"name": "held", "bundle": "clamped.h5"},
+            {"name": "drop", "bundle": "free.h5", "body": {"position": [0, 1.1, 0.2], "orientation": [0.8, 0, 0.6, 0]},
+             "grid": {"counts": [1, 2, 1], "spacing": [0, 2, 0]}}]}
+        (cls.folder / "several.json").write_text(json.dumps(several))
+        cls.call(RUNTIME, "run", "several.json")
 
     @classmethod
     def call(cls, *words):
@@ -127,7 +135,12 @@ class Export(unittest.TestCase):
             return {key: f[key][:] for key in ("time", "vertices", "render/vertices", "reduced")}
 
     def frames(self, file, times):
-        """Points at times, by VTK."""
+        """Points of the one body at times, by VTK."""
+        (body,) = self.frames_of_bodies(file, times)
+        return body
+
+    def frames_of_bodies(self, file, times):
+        """Points of each body at times, by VTK, in the order of the nodes."""
         reader = vtk.vtkGLTFReader()
         reader.SetFileName(str(self.folder / file))
         reader.ApplyDeformationsToGeometryOn()
@@ -141,8 +154,12 @@ class Export(unittest.TestCase):
             reader.Update()
             iterator = reader.GetOutput().NewIterator()
             iterator.InitTraversal()
-            frames.append(vtk_to_numpy(iterator.GetCurrentDataObject().GetPoints().GetData()).astype(float))
-        return np.array(frames)
+            bodies = []
+            while not iterator.IsDoneWithTraversal():
+                bodies.append(vtk_to_numpy(iterator.GetCurrentDataObject().GetPoints().GetData()).astype(float))
+                iterator.GoToNextItem()
+            frames.append(bodies)
+        return [np.array(body) for body in zip(*frames)]
 
     def check(self, name, within=WITHIN, file="motion.glb"):
         run = self.trajectory(name)
@@ -207,6 +224,70 @@ class Export(unittest.TestCase):
         pairs = np.linalg.norm(drawn[0][:, None] - run["vertices"][0][None], axis=2).argmin(1)
         self.assertEqual(len(set(pairs)), 9 * 9 - 7)  # all but those inside
         self.assertLess(np.abs(drawn - run["vertices"][:, pairs]).max(), WITHIN)
+
+    NAMES = ["drop_0", "drop_1", "held", "thrown-one"]  # in ascending order
+
+    def positions_of_several(self):
+        with h5py.File(self.folder / "several_run.h5") as f:
+            return f[f"bodies/{self.NAMES[0]}/time"][:], [f[f"bodies/{name}/vertices"][:] for name in self.NAMES]
+
+    def check_drawn(self, drawn, expected):
+        """The surface of the tets, its vertices in another order."""
+        pairs = np.linalg.norm(drawn[0][:, None] - expected[0][None], axis=2).argmin(1)
+        self.assertEqual(len(set(pairs)), 9 * 9 - 7)  # all but those inside
+        self.assertLess(np.abs(drawn - expected[:, pairs]).max(), 3 * WITHIN)  # up to 12 m away
+
+    def test_several_bodies_are_nodes_of_one_file(self):
+        printed = self.export("several_run.h5", "-o", "motion.glb", "--mesh")
+        self.assertRegex(printed, r"bodies +4 of 2 meshes")
+        document, _ = contents(self.folder / "motion.glb")
+        self.assertEqual([node["name"] for node in document["nodes"]], self.NAMES)
+        self.assertEqual([node["mesh"] for node in document["nodes"]], [0, 0, 1, 0])
+        self.assertEqual(document["scenes"][0]["nodes"], [0, 1, 2, 3])
+        self.assertEqual([mesh["name"] for mesh in document["meshes"]], ["free", "clamped"])
+        times, expected = self.positions_of_several()
+        drawn = self.frames_of_bodies("motion.glb", times)
+        self.assertEqual(len(drawn), 4)
+        for body, positions in zip(drawn, expected):
+            self.check_drawn(body, positions)
+        self.export("several_run.h5", "-o", "upright.glb", "--mesh", "--up", "z", "--targets", "3")
+        document, _ = contents(self.folder / "upright.glb")
+        self.assertEqual(document["scenes"][0]["nodes"], [0])
+        self.assertEqual(document["nodes"][0]["children"], [1, 2, 3, 4])
+        self.assertEqual([len(node["weights"]) for node in document["nodes"][1:]], [3] * 4)
+
+    def test_one_body_of_several(self):
+        times, expected = self.positions_of_several()
+        self.export("several_run.h5", "-o", "motion.glb", "--mesh", "--body", "drop_1")
+        document, _ = contents(self.folder / "motion.glb")
+        self.assertEqual([node["name"] for node in document["nodes"]], ["drop_1"])
+        self.check_drawn(self.frames("motion.glb", times), expected[1])
+        self.export("several_run.h5", "-o", "motion.pc2", "--body", "drop_1")
+        data = (self.folder / "motion.pc2").read_bytes()
+        np.testing.assert_array_equal(np.frombuffer(data[32:], "<f4").reshape(expected[1].shape), expected[1])
+        for words, message in ((["-o", "a.pc2"], "write a file for each: --body drop_0, and so on"),
+                               (["-o", "a.glb", "--body", "nobody"], "it has drop_0, drop_1, held, thrown-one"),
+                               (["-o", "a.usda", "--body", "nobody"], "/bodies: expected a body \"nobody\"")):
+            self.assertIn(message, self.refused("several_run.h5", *words))
+        self.assertIn("leave out --body", self.refused("free_run.h5", "-o", "a.glb", "--body", "drop_1"))
+
+    def test_usd_of_several_bodies(self):
+        printed = self.export("several_run.h5", "-o", "motion.usda")
+        self.assertRegex(printed, r"bodies +4")
+        text = (self.folder / "motion.usda").read_text()
+        self.assertIn('defaultPrim = "bodies"', text)
+        self.assertEqual(text.count("faceVertexIndices"), 1)  # the same mesh of tets
+        self.assertEqual(text.count("inherits = </triangles_0>"), 4)
+        self.assertEqual(text.count("{"), text.count("}"))
+        self.assertEqual(re.findall(r'    def Mesh "(.*?)"', text), ["drop_0", "drop_1", "held", "thrown_one"])
+        times, expected = self.positions_of_several()
+        samples = re.findall(r"points.timeSamples = \{\n(.*?)\n +\}", text, re.S)
+        self.assertEqual(len(samples), 4)
+        for body, positions in zip(samples, expected):
+            found = np.array([re.findall(r"[-+.\de]+", line.split(":")[1]) for line in body.splitlines()], np.float32)
+            np.testing.assert_array_equal(found.reshape(positions.shape), positions)
+        self.export("several_run.h5", "-o", "motion.usda", "--body", "held")
+        self.assertIn('defaultPrim = "body"', (self.folder / "motion.usda").read_text())
 
     def test_modes_without_a_motion(self):
         printed = self.export("--bundle", "clamped.h5", "-o", "modes.glb")

@@ -127,6 +127,9 @@ std::string target_of(const runtime::LoadedScene& loaded) {
 }
 
 ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& times) {
+  if (const std::string keys = place_of_keys(config); !keys.empty())
+    throw InputError({config.file.string(), keys, "a value: studies take no keys", "keys",
+                      "measure scenes with the values between the keys, one by one"});
   const runtime::LoadedScene loaded = runtime::load_run(config);
   runtime::State state = loaded.start;
   runtime::Workspace workspace(*loaded.model, loaded.scene);

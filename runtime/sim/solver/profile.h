@@ -11,16 +11,28 @@ enum class Stage { kWeights, kTarget, kInternalForce, kSolve, kContact, kOutput 
 inline constexpr std::array<std::string_view, 6> kStageNames{"weights", "target",  "internal_force",
                                                              "solve",   "contact", "output"};
 
+/// Of a step of a World; other: what is left of it.
+enum class WorldStage { kBroadPhase, kCandidates, kSingleBodies, kIslands, kOther };
+
+inline constexpr std::array<std::string_view, 5> kWorldStageNames{"broad_phase", "candidates", "single_bodies",
+                                                                  "islands", "other"};
+
 /// Time and floating-point operations of each stage; adds up until the caller sets it to zero.
-struct Profile {
-  std::array<double, kStageNames.size()> seconds{};
-  std::array<double, kStageNames.size()> flops{};
+template <typename StageOf, std::size_t kCount>
+struct StageProfile {
+  using Stages = StageOf;
+  std::array<double, kCount> seconds{};
+  std::array<double, kCount> flops{};
 };
+using Profile = StageProfile<Stage, kStageNames.size()>;
+using WorldProfile = StageProfile<WorldStage, kWorldStageNames.size()>;
 
 /// Adds the time of its own life and `flops` to one stage; without a profile it does not look at the clock.
+template <typename AnyProfile>
 class StageTimer {
  public:
-  StageTimer(Profile* profile, Stage stage, double flops = 0) noexcept : profile_(profile), stage_(stage) {
+  StageTimer(AnyProfile* profile, typename AnyProfile::Stages stage, double flops = 0) noexcept
+      : profile_(profile), stage_(stage) {
     if (profile_ == nullptr) return;
     profile_->flops[static_cast<std::size_t>(stage_)] += flops;
     start_ = Clock::now();
@@ -34,8 +46,8 @@ class StageTimer {
 
  private:
   using Clock = std::chrono::steady_clock;
-  Profile* profile_;
-  Stage stage_;
+  AnyProfile* profile_;
+  typename AnyProfile::Stages stage_;
   Clock::time_point start_;
 };
 

@@ -29,9 +29,9 @@ Integrator integrator_of_step(const Model& model, const StepScene& scene, const 
 }
 
 /// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with, or in which
-/// the accelerations of the frame jump.
+/// a setting of the scene or the accelerations of the frame jump.
 bool begins_anew(const Model& model, const StepScene& scene, const State& state, double midpoint) {
-  if (state.begins_anew) return true;
+  if (state.begins_anew || scene.begins_anew) return true;
   for (const ScriptedForce& force : scene.forces)
     if (force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step)) return true;
   return model.frame->jumps(scene, midpoint - scene.time_step, midpoint);

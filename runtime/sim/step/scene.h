@@ -35,6 +35,7 @@ struct StepScene : WorldLoads {
   std::vector<Obstacle> obstacles;
   bool meets_bodies = false;              ///< whether the body is one of a World, whose bodies touch each other
   std::vector<ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, example forces
+  bool begins_anew = false;  ///< something of it has jumped since the last step, which is no smooth past then
 };
 
 /// Whether these examples exert a force; weights and targets of those that do not are left out.

@@ -94,21 +94,8 @@ WorldReport World::step(int threads) {
   make_islands();
   WorldReport report;
   report.pairs = static_cast<int>(near_.size());
-  const auto is_large = [](const Island& island) { return island.bodies.size() > kSharedIsland; };
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (island_of_[i] >= 0) continue;
-    WorldBody& own = *bodies_[i];
-    own.report = runtime::step(own.model, own.scene, own.state, own.workspace);
-  }
-  const auto solve = [](Island& island, int own_threads) {
-    island.newton = step_island(island.bodies, island.pairs, island.incidences, own_threads, island.workspace);
-  };
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
-  for (std::size_t i = 0; i < island_count_; ++i)
-    if (!is_large(*islands_[i])) solve(*islands_[i], 1);
-  for (std::size_t i = 0; i < island_count_; ++i)
-    if (is_large(*islands_[i])) solve(*islands_[i], threads);
+  step_single_bodies(threads);
+  step_islands(threads);
   for (std::size_t i = 0; i < island_count_; ++i) {
     const Island& island = *islands_[i];
     ++report.islands;
@@ -121,8 +108,32 @@ WorldReport World::step(int threads) {
   return report;
 }
 
+void World::step_single_bodies(int threads) {
+  const StageTimer timer(profile_, WorldStage::kSingleBodies);
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    if (island_of_[i] >= 0) continue;
+    WorldBody& own = *bodies_[i];
+    own.report = runtime::step(own.model, own.scene, own.state, own.workspace);
+  }
+}
+
+void World::step_islands(int threads) {
+  const StageTimer timer(profile_, WorldStage::kIslands);
+  const auto is_large = [](const Island& island) { return island.bodies.size() > kSharedIsland; };
+  const auto solve = [](Island& island, int own_threads) {
+    island.newton = step_island(island.bodies, island.pairs, island.incidences, own_threads, island.workspace);
+  };
+#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
+  for (std::size_t i = 0; i < island_count_; ++i)
+    if (!is_large(*islands_[i])) solve(*islands_[i], 1);
+  for (std::size_t i = 0; i < island_count_; ++i)
+    if (is_large(*islands_[i])) solve(*islands_[i], threads);
+}
+
 /// Pairs of bodies whose bounds, wider by how far they may go, overlap.
 void World::find_pairs(int threads) {
+  const StageTimer timer(profile_, WorldStage::kBroadPhase);
 #pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     WorldBody& own = *bodies_[i];
@@ -164,6 +175,7 @@ double World::margin_between(int own, int other) const noexcept {
 
 /// Candidates, the surface of one body at a time: what is computed of its shape serves all that are near.
 void World::gather(int threads) {
+  const StageTimer timer(profile_, WorldStage::kCandidates);
   while (pairs_.size() < near_.size()) pairs_.push_back(std::make_unique<PairContact>());
   for (std::vector<Incidence>& pairs : against_) pairs.clear();
   for (std::size_t p = 0; p < near_.size(); ++p) {

@@ -69,6 +69,9 @@ class World {
   /// Contacts at the end of the last step, in the order of pairs of bodies and of the vertices of each.
   void read_touches(std::vector<BodyTouch>& touches) const;
 
+  /// Times the stages of steps, on the wall clock, if set; kOther stays what it is.
+  void set_profile(WorldProfile* profile) noexcept { profile_ = profile; }
+
   /// Kinetic, elastic and potential energy of all bodies [J].
   Energies energies() const;
 
@@ -78,6 +81,8 @@ class World {
   void find_pairs(int threads);
   double margin_between(int own, int other) const noexcept;
   void gather(int threads);
+  void step_single_bodies(int threads);
+  void step_islands(int threads);
   void make_islands();
   void remember();
   const HeldPair* held_of(int first, int second) const;
@@ -100,6 +105,7 @@ class World {
   std::vector<std::unique_ptr<WorldBody>> bodies_;
   ContactLaw law_;
   std::vector<HeldPair> held_, next_held_;
+  WorldProfile* profile_ = nullptr;
 
   // Of one step.
   std::vector<DeformationTree::Ball> balls_;

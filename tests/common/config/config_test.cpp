@@ -226,6 +226,35 @@ TEST(LoadScene, ReadsMeshesAndHeightFields) {
   EXPECT_EQ(steps.heights, (Eigen::MatrixXd(2, 3) << 0, 1, 2, 3, 4, 5).finished());
 }
 
+TEST(LoadScene, ReadsKeys) {
+  const TemporaryFolder folder;
+  const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5",
+    "gravity": {"keys": [{"time": -1, "value": [0, 0, 0]}, {"time": 2, "value": [0, -9.81, 0]}], "interpolation": "step"},
+    "examples": {"stiffness": {"keys": [{"time": 0, "value": 0}, {"time": 1, "value": 400}, {"time": 2, "value": 3}]},
+                 "damping": {"keys": [{"time": 0.5, "value": 2}], "interpolation": "linear"},
+                 "weights": {"keys": [{"time": 0, "value": [1, 0]}, {"time": 1, "value": [0.5, 0.5]}]}},
+    "regions": [{"name": "arm", "stiffness": 5, "bias": {"keys": [{"time": 0, "value": 1}, {"time": 3, "value": 0.25}]}},
+                {"name": "leg", "stiffness": 5, "weights": [0.25, 0.75]}]})");
+  EXPECT_THAT(scene.gravity_keys.times, ElementsAre(-1, 2));
+  EXPECT_EQ(scene.gravity_keys.values[1], Eigen::Vector3d(0, -9.81, 0));
+  EXPECT_EQ(scene.gravity_keys.interpolation, Interpolation::kStep);
+  EXPECT_EQ(scene.gravity, Eigen::Vector3d(0, -9.81, 0)) << "the strongest";
+  const ExampleKeysConfig& keys = scene.examples->keys;
+  EXPECT_THAT(keys.stiffness.times, ElementsAre(0, 1, 2));
+  EXPECT_EQ(keys.stiffness.values[2][0], 3);
+  EXPECT_EQ(keys.stiffness.interpolation, Interpolation::kLinear);
+  EXPECT_EQ(scene.examples->stiffness, 400) << "the strongest";
+  EXPECT_EQ(scene.examples->damping, 2);
+  EXPECT_EQ(keys.weights.values[1], Eigen::Vector2d(0.5, 0.5));
+  EXPECT_EQ(*scene.examples->weights, Eigen::Vector2d(1, 0));
+  EXPECT_TRUE(keys.bias.empty());
+  EXPECT_EQ(scene.regions[0].force.keys.bias.times.size(), 2u);
+  EXPECT_EQ(scene.regions[0].force.bias, 0.25);
+  EXPECT_EQ(*scene.regions[1].force.weights, Eigen::Vector2d(0.25, 0.75));
+  EXPECT_TRUE(scene.regions[1].force.keys.empty());
+  EXPECT_EQ(place_of_keys(scene), "/gravity");
+}
+
 TEST(LoadScene, ReadsObstacles) {
   const TemporaryFolder folder;
   const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5", "obstacles": [

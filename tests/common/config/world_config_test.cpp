@@ -63,6 +63,19 @@ TEST_F(WorldConfigTest, BodiesShareWhatIsNotTheirOwn) {
   EXPECT_EQ(*world->bodies[1].scene.body.linear_velocity, Eigen::Vector3d(1, 0, 0));
 }
 
+TEST_F(WorldConfigTest, ABodyMayHaveItsOwnGravityAndKeys) {
+  const auto world = load_world(write("w.json", R"({"gravity": {"keys": [{"time": 2, "value": [0, 0, -1]}]},
+    "bodies": [{"name": "a", "bundle": "a.h5"}, {"name": "b", "bundle": "b.h5", "gravity": [1, 0, 0],
+      "examples": {"stiffness": {"keys": [{"time": 0, "value": 7}]}}}]})"));
+  EXPECT_EQ(world->bodies[0].scene.gravity_keys.times.size(), 1u);
+  EXPECT_EQ(world->bodies[1].scene.gravity, Eigen::Vector3d(1, 0, 0));
+  EXPECT_TRUE(world->bodies[1].scene.gravity_keys.empty());
+  EXPECT_EQ(place_of_keys(world->bodies[1].scene), "/bodies/1/examples");
+  EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "gravity": {"keys": [
+      {"time": 1, "value": [0, 0, 0]}, {"time": 0, "value": [0, 0, 0]}]}}]})"),
+              HasSubstr("/bodies/0/gravity/keys/1/time"));
+}
+
 TEST_F(WorldConfigTest, ASceneOfOneBodyIsNone) { EXPECT_FALSE(load_world(write("s.json", R"({"bundle": "a.h5"})"))); }
 
 TEST_F(WorldConfigTest, MistakesAreNamed) {
@@ -81,7 +94,8 @@ TEST_F(WorldConfigTest, MistakesAreNamed) {
   EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "body": {"orientation": [2, 0, 0, 0]}}]})"),
               HasSubstr("/bodies/0/body/orientation"));
   write("one.json", R"({"bodies": [)" + body + "]}");
-  EXPECT_THROW(load_scene(folder_.path() / "one.json"), InputError);
+  EXPECT_THAT(refusal_of(load_scene, "one.json", R"({"bodies": [)" + body + "]}"),
+              HasSubstr("takes one of the bodies as a scene of its own"));
 }
 
 TEST_F(WorldConfigTest, PosesAreLines) {

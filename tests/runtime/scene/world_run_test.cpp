@@ -3,11 +3,13 @@
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
 
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "common/hdf5/hdf5_file.h"
+#include "runtime/scene/world_state_file.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -80,6 +82,73 @@ TEST_F(WorldRunTest, ABodyWithFixedVerticesHasOnePlace) {
     EXPECT_THAT(error.what(), HasSubstr("/bodies/0"));
     EXPECT_THAT(error.what(), HasSubstr("one place"));
   }
+}
+
+// The bits of all bodies and of what pairs remember: of 60 steps in one run, and in two with a file between them,
+// before and after the blocks have met.
+TEST_F(WorldRunTest, ARunThatIsTakenUpIsTheWholeRunToTheLastBit) {
+  const std::string floor =
+      R"(, "obstacles": [{"plane": {"point": [0, 0, -0.4], "normal": [0, 0, 1]}, "friction": 0.3}])";
+  WorldConfig config = world(kTwoKinds, floor);
+  const LoadedWorld loaded = load_world_run(config);
+  const std::uint64_t whole = run(loaded, config).state_hash;
+  const auto state = folder_.path() / "state.json";
+  std::size_t pairs = 0;
+  for (const int first : {1, 20, 45}) {
+    config.steps = first;
+    run(loaded, config, {.dump_state = state});
+    pairs = std::max(pairs, nlohmann::json::parse(test::read_file(state))["pairs"].size());
+    config.steps = 60 - first;
+    EXPECT_EQ(run(loaded, config, {.from_state = state}).state_hash, whole) << first;
+  }
+  EXPECT_GE(pairs, 1U) << "some touch where a run is taken up";
+  const WorldMemory memory = read_world_state(state, loaded, config);
+  write_world_state(memory, loaded, config, folder_.path() / "again.json");
+  EXPECT_EQ(test::read_file(folder_.path() / "again.json"), test::read_file(state));
+}
+
+TEST_F(WorldRunTest, AStateFileThatDoesNotFitIsRefusedWithThePlace) {
+  WorldConfig config = world(kTwoKinds);
+  config.steps = 45;
+  const LoadedWorld loaded = load_world_run(config);
+  const auto state = folder_.path() / "state.json";
+  run(loaded, config, {.dump_state = state});
+  const auto good = nlohmann::json::parse(test::read_file(state));
+  const auto refusal = [&](const char* pointer, const nlohmann::json& value) -> std::string {
+    nlohmann::json bad = good;
+    bad[nlohmann::json::json_pointer(pointer)] = value;
+    test::write_file(state, bad.dump());
+    try {
+      read_world_state(state, loaded, config);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "none";
+  };
+  EXPECT_THAT(refusal("/format_version", 1), HasSubstr("state.json: /format_version: expected a state of a scene of"));
+  EXPECT_THAT(refusal("/time_step", 0.1), HasSubstr("state.json: /time_step: expected 0.002"));
+  EXPECT_THAT(refusal("/bodies/3", good["bodies"][0]), HasSubstr("state.json: /bodies: expected 3"));
+  EXPECT_THAT(refusal("/bodies/1/name", "shelf"), HasSubstr("state.json: /bodies/1/name: expected \"block_0\""));
+  EXPECT_THAT(refusal("/bodies/1/bundle_input_sha256", "b"), HasSubstr("/bodies/1/bundle_input_sha256: expected"));
+  EXPECT_THAT(refusal("/bodies/1/step", 7), HasSubstr("/bodies/1/step: expected 45"));
+  EXPECT_THAT(refusal("/bodies/1/reduced", nlohmann::json::array({1.0})), HasSubstr("/bodies/1/reduced: expected"));
+  ASSERT_FALSE(good["pairs"].empty());
+  EXPECT_THAT(refusal("/pairs/0/second", 9), HasSubstr("/pairs/0/second: expected a body below 3"));
+  EXPECT_THAT(refusal("/pairs/0/first", 2), HasSubstr("/pairs/0/second: expected at least 2"));
+  const auto vertex =
+      nlohmann::json{{"vertex", 100000}, {"gap", 0}, {"normal_force", 0}, {"stretch", {0, 0, 0}}, {"side", {0, 0, 1}}};
+  EXPECT_THAT(refusal("/pairs/0/first_vertices", nlohmann::json::array({vertex})),
+              HasSubstr("/first_vertices/0/vertex: expected vertices"));
+  EXPECT_THAT(refusal("/pairs/0/deepest", 1), HasSubstr("unknown member"));
+}
+
+TEST_F(WorldRunTest, StagesOfARunAddUpToItsSteps) {
+  WorldConfig config = world(kTwoKinds);
+  const WorldSummary summary = run(load_world_run(config), config, {.profiled = true});
+  double sum = 0;
+  for (const Samples& stage : summary.stage_seconds->step) sum += stage.mean();
+  EXPECT_NEAR(sum, summary.step_seconds.mean(), 1e-12);
+  EXPECT_GT(summary.stage_seconds->step[static_cast<std::size_t>(WorldStage::kIslands)].mean(), 0);
 }
 
 }  // namespace

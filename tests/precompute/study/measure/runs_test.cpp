@@ -199,5 +199,16 @@ TEST_F(Runs, StopAtNumbersThatAreNotFinite) {
   EXPECT_THROW(run_reduced(config, {0.1}), WorkError);
 }
 
+TEST_F(Runs, TakeNoKeysAndNoGivenWeights) {
+  make({.cells = {2, 1, 1}, .examples = 3});
+  SceneConfig config = scene();
+  config.gravity_keys = {{0}, {config.gravity}};
+  EXPECT_THROW(run_reduced(config, {0.1}), InputError);
+  EXPECT_THROW(run_full_space(config, bar_.model, {0.1}), InputError);
+  config.gravity_keys = {};
+  config.examples.emplace().weights = Eigen::Vector3d::UnitX();
+  EXPECT_THROW(run_full_space(config, bar_.model, {0.1}), InputError);
+}
+
 }  // namespace
 }  // namespace exmat::precompute

@@ -1,0 +1,126 @@
+#include "runtime/scene/state_json.h"
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <vector>
+
+#include "common/core/error.h"
+
+namespace exmat::runtime {
+namespace {
+
+using Json = nlohmann::json;
+using OrderedJson = nlohmann::ordered_json;
+
+// The members of a State that are arrays [r] of a file's body.
+struct ModeArray {
+  const char* name;
+  Eigen::VectorXd State::*member;
+};
+constexpr ModeArray kModeArrays[] = {{"reduced", &State::q},
+                                     {"reduced_velocity", &State::v},
+                                     {"reduced_before", &State::q_previous},
+                                     {"reduced_velocity_before", &State::v_previous},
+                                     {"acceleration", &State::a},
+                                     {"applied_force", &State::applied_force}};
+
+// One body of a file.
+class BodyReader {
+ public:
+  BodyReader(const std::filesystem::path& file, std::string place, const Json& body, const LoadedScene& loaded)
+      : file_(file), place_(std::move(place)), body_(body), loaded_(loaded) {}
+
+  /// `state` is one of the same model and scene.
+  void read(State& state) const {
+    for (const auto& [name, member] : kModeArrays) read_array(name, body_[name], state.*member);
+    state.step = body_["step"];
+    state.time = static_cast<double>(state.step) * loaded_.scene.time_step;
+    state.elastic_energy = body_["elastic_energy"];
+    state.begins_anew = body_["begins_anew"];
+    const BodyFrame& frame = *loaded_.model->frame;
+    const std::vector<double> numbers = body_["frame"];
+    require_count("/frame", numbers.size(), frame.numbers(state.frame).size());
+    frame.set_numbers(numbers, state.frame);
+    require_count("/examples", body_["examples"].size(), state.examples.size());
+    for (std::size_t i = 0; i < state.examples.size(); ++i) read_examples(i, state.examples[i]);
+    read_contacts(state.contacts);
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& place, std::string expected, std::string found) const {
+    throw InputError({file_.string(), place_ + place, std::move(expected), std::move(found),
+                      "take the scene that the state was written with"});
+  }
+  void require_count(const std::string& place, std::size_t found, std::size_t expected) const {
+    if (found != expected) refuse(place, fmt::format("{} entries", expected), fmt::format("{}", found));
+  }
+  void read_array(const std::string& name, const Json& numbers, Eigen::VectorXd& array) const {
+    require_count("/" + name, numbers.size(), static_cast<std::size_t>(array.size()));
+    for (Eigen::Index i = 0; i < array.size(); ++i) array[i] = numbers[static_cast<std::size_t>(i)];
+  }
+  void read_examples(std::size_t index, ExampleState& examples) const {
+    const Json& from = body_["examples"][index];
+    const std::string name = fmt::format("examples/{}/", index);
+    read_array(name + "weights", from["weights"], examples.weights);
+    read_array(name + "target", from["target"], examples.target);
+    examples.has_target = from["has_target"];
+    examples.target_converged = from["target_converged"];
+  }
+  void read_contacts(ContactState& contacts) const {
+    const Json& from = body_["contacts"];
+    const std::size_t obstacles = loaded_.scene.obstacles.size();
+    if (from.size() > contacts.held.size())
+      refuse("/contacts", fmt::format("at most {} contacts", contacts.held.size()), fmt::format("{}", from.size()));
+    contacts.count = 0;
+    for (const Json& entry : from) {
+      HeldContact held{entry["vertex"], entry["obstacle"], entry["normal_force"], vector_of(entry["anchor"])};
+      if (entry.contains("way_out")) held.way_out = vector_of(entry["way_out"]);
+      const std::string place = fmt::format("/contacts/{}", contacts.count);
+      const Eigen::Index vertices = loaded_.model->contact->vertices();
+      if (held.vertex >= vertices) refuse(place, fmt::format("a vertex below {}", vertices), entry["vertex"].dump());
+      if (static_cast<std::size_t>(held.obstacle) >= obstacles)
+        refuse(place, fmt::format("an obstacle below {}", obstacles), entry["obstacle"].dump());
+      contacts.held[contacts.count++] = held;
+    }
+  }
+
+  const std::filesystem::path& file_;
+  std::string place_;
+  const Json& body_;
+  const LoadedScene& loaded_;
+};
+
+}  // namespace
+
+Eigen::Vector3d vector_of(const Json& numbers) { return Eigen::Vector3d(numbers[0], numbers[1], numbers[2]); }
+
+OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
+  OrderedJson body{{"step", state.step},
+                   {"elastic_energy", state.elastic_energy},
+                   {"begins_anew", state.begins_anew},
+                   {"frame", frame.numbers(state.frame)},
+                   {"examples", OrderedJson::array()},
+                   {"contacts", OrderedJson::array()}};
+  for (const auto& [name, member] : kModeArrays) body[name] = array_of(state.*member);
+  for (const ExampleState& examples : state.examples)
+    body["examples"].push_back({{"weights", array_of(examples.weights)},
+                                {"target", array_of(examples.target)},
+                                {"has_target", examples.has_target},
+                                {"target_converged", examples.target_converged}});
+  for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count)) {
+    body["contacts"].push_back({{"vertex", held.vertex},
+                                {"obstacle", held.obstacle},
+                                {"normal_force", held.normal_force},
+                                {"anchor", array_of(held.anchor)}});
+    if (!held.way_out.isZero(0)) body["contacts"].back()["way_out"] = array_of(held.way_out);
+  }
+  return body;
+}
+
+void read_state(const std::filesystem::path& file, const std::string& place, const Json& body,
+                const LoadedScene& loaded, State& state) {
+  BodyReader(file, place, body, loaded).read(state);
+}
+
+}  // namespace exmat::runtime
