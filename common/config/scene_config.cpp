@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
@@ -16,12 +17,26 @@
 namespace exmat {
 namespace {
 
-ExampleForceConfig read_example_force(const Json& json) {
+Eigen::VectorXd read_numbers(const Json& json) {
+  const auto numbers = json.get<std::vector<double>>();
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
+}
+
+Eigen::VectorXd read_weights(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  constexpr double kSumTolerance = 1e-9;
+  Eigen::VectorXd weights = read_numbers(json);
+  if (std::abs(weights.sum() - 1) <= kSumTolerance) return weights;
+  throw InputError({file.string(), place + "/weights", "numbers that add up to 1", fmt::format("{:.9g}", weights.sum()),
+                    "divide each by their sum"});
+}
+
+ExampleForceConfig read_example_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
   ExampleForceConfig config;
   config.law = choice_or(json, "force", config.law);
   config.stiffness = json["stiffness"];
   config.damping = json.value("damping", config.damping);
   config.bias = json.value("bias", config.bias);
+  if (json.contains("weights")) config.weights = read_weights(json["weights"], file, place);
   config.target = choice_or(json, "target", config.target);
   config.target_iterations = json.value("target_iterations", config.target_iterations);
   config.energy_reference = choice_or(json, "energy_reference", config.energy_reference);
@@ -32,7 +47,8 @@ std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::f
                                                   const std::string& place) {
   std::vector<RegionForceConfig> regions;
   for (std::size_t i = 0; i < json.size(); ++i) {
-    RegionForceConfig region{json[i]["name"], read_example_force(json[i])};
+    RegionForceConfig region{json[i]["name"],
+                             read_example_force(json[i], file, fmt::format("{}/regions/{}", place, i))};
     if (std::ranges::find(regions, region.name, &RegionForceConfig::name) != regions.end())
       throw InputError({file.string(), fmt::format("{}/regions/{}/name", place, i), "each region once",
                         fmt::format("\"{}\" again", region.name), ""});
@@ -57,11 +73,6 @@ VertexForceConfig read_vertex_force(const Json& json, const std::filesystem::pat
 
 std::optional<Eigen::Vector3d> optional_vector(const Json& json, const char* name) {
   return json.contains(name) ? std::optional(read_vector(json[name])) : std::nullopt;
-}
-
-Eigen::VectorXd read_numbers(const Json& json) {
-  const auto numbers = json.get<std::vector<double>>();
-  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
 }
 
 BodyConfig read_body(const Json& json, const std::filesystem::path& file, const std::string& place) {
@@ -95,7 +106,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   const Json newton = member_or(shared, "newton", Json::object());
   scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
   scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
-  if (own.contains("examples")) scene.examples = read_example_force(own["examples"]);
+  if (own.contains("examples")) scene.examples = read_example_force(own["examples"], file, place + "/examples");
   scene.regions = read_region_forces(member_or(own, "regions", Json::array()), file, place);
   const Json forces = member_or(own, "forces", Json::array());
   for (std::size_t i = 0; i < forces.size(); ++i)
@@ -112,11 +123,15 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   return scene;
 }
 
-Json read_scene(const std::filesystem::path& file) {
-  Json json = read_json(file);
+void check_scene(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "scene", file);
   if (json.contains("bundle") == json.contains("bodies"))
     throw InputError({file.string(), "/", "bundle or bodies", json.contains("bundle") ? "both" : "neither", ""});
+}
+
+Json read_scene(const std::filesystem::path& file) {
+  Json json = read_json(file);
+  check_scene(json, file);
   return json;
 }
 
@@ -160,13 +175,15 @@ std::vector<BodyPlace> read_places(const Json& own, const std::filesystem::path&
 
 }  // namespace
 
-SceneConfig load_scene(const std::filesystem::path& file) {
-  const Json json = read_scene(file);
+SceneConfig scene_of(const Json& json, const std::filesystem::path& file) {
+  check_scene(json, file);
   if (json.contains("bodies"))
     throw InputError({file.string(), "/bodies", "a scene of one body, by \"bundle\"", "one of several",
                       "exmat-runtime run steps scenes of several bodies"});
   return scene_of(json, json, file, "");
 }
+
+SceneConfig load_scene(const std::filesystem::path& file) { return scene_of(read_json(file), file); }
 
 std::optional<WorldConfig> load_world(const std::filesystem::path& file) {
   const Json json = read_scene(file);

@@ -24,9 +24,10 @@ struct VertexForceConfig {
 
 struct ExampleForceConfig {
   ExampleForceLaw law = ExampleForceLaw::kLinear;
-  double stiffness = 0;  ///< kappa >= 0 [1/s^2]; of an elastic force its factor e >= 0
-  double damping = 0;    ///< c_kappa >= 0 [1/s]
-  double bias = 1;       ///< in [0, 1]
+  double stiffness = 0;                      ///< kappa >= 0 [1/s^2]; of an elastic force its factor e >= 0
+  double damping = 0;                        ///< c_kappa >= 0 [1/s]
+  double bias = 1;                           ///< in [0, 1]
+  std::optional<Eigen::VectorXd> weights{};  ///< K >= 0 of sum 1, instead of those of the shape
   TargetSource target = TargetSource::kAuto;
   int target_iterations = 4;  ///< most Newton iterations of `solve` in one step; the next step carries on
   EnergyReference energy_reference = EnergyReference::kExample;

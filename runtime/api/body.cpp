@@ -33,6 +33,8 @@ void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcep
   const Timer timer;
   body.report = {};
   body.contacts.clear();
+  body.profile = {};
+  workspace.profile = body.profiled ? &body.profile : nullptr;
   while (body.report.steps < steps) {
     const StepReport report = step(body.model(), body.scene, body.state, workspace);
     add(report, body.report);
@@ -40,6 +42,7 @@ void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcep
     body.contacts.add(report, body.model(), body.state, workspace);
     ++body.report.steps;
   }
+  workspace.profile = nullptr;
   body.report.seconds = timer.seconds();
 }
 

@@ -8,6 +8,7 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/contact_record.h"
+#include "runtime/api/drawn_surface.h"
 #include "runtime/api/point_set.h"
 #include "runtime/sim/step/stepper.h"
 
@@ -34,6 +35,11 @@ struct exmat_points {
   exmat::runtime::PointSet set;
 };
 
+struct exmat_surface {
+  exmat_points points;
+  exmat::runtime::DrawnSurface drawn;
+};
+
 struct exmat_body {
   explicit exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source);
 
@@ -51,6 +57,8 @@ struct exmat_body {
   std::size_t frame_numbers;  ///< of the frame's state
   exmat_report report{};
   exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
+  bool profiled = false;
+  exmat::runtime::Profile profile;  ///< of the last call that stepped it, where it is profiled
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
 };
 

@@ -17,6 +17,8 @@ inline constexpr StructSizes kMotionSizes{112, sizeof(exmat_motion)};
 inline constexpr StructSizes kEnergiesSizes{32, sizeof(exmat_energies)};
 inline constexpr StructSizes kObstacleSizes{152, sizeof(exmat_obstacle)};
 inline constexpr StructSizes kContactSizes{96, sizeof(exmat_contact)};
+inline constexpr StructSizes kBundleInfoSizes{72, sizeof(exmat_bundle_info)};
+inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
 
 /// The defaults of a scene file.

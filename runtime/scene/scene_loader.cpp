@@ -34,6 +34,16 @@ void check_regions(const SceneConfig& config, const BundleSummary& summary) {
   }
 }
 
+/// Given weights are one for each example.
+void check_weights(const SceneConfig& config, const ExampleForceConfig& force, const std::string& owner,
+                   std::int64_t examples) {
+  if (!force.weights || force.weights->size() == examples) return;
+  throw InputError(
+      {config.file.string(), fmt::format("{}/{}/weights", config.place, owner),
+       fmt::format("{} numbers, one for each example of {}, the rest pose first", examples, config.bundle.string()),
+       std::to_string(force.weights->size()), ""});
+}
+
 /// A table of targets where the scene insists on one. `owner` is the member of the scene, `group` that of the bundle.
 void check_table(const SceneConfig& config, const ExampleForceConfig& force, const std::string& owner,
                  const std::string& group, bool has_targets, EnergyReference energy_reference) {
@@ -53,11 +63,14 @@ void check_methods(const SceneConfig& config, const BundleSummary& summary) {
   if (config.internal_force == ForceMethod::kPolynomial && !summary.has_polynomial)
     throw InputError({bundle, "/polynomial", "this group, since the scene asks for it by internal_force", "none",
                       "precompute the asset with internal_force \"polynomial\", or let the scene say \"auto\""});
-  if (config.examples)
+  if (config.examples) {
+    check_weights(config, *config.examples, "examples", summary.examples);
     check_table(config, *config.examples, "examples", "/targets", summary.has_targets, summary.energy_reference);
+  }
   for (std::size_t i = 0; i < config.regions.size(); ++i) {
     const auto& [name, force] = config.regions[i];
     const RegionSummary& region = *std::ranges::find(summary.regions, name, &RegionSummary::name);
+    check_weights(config, force, fmt::format("regions/{}", i), region.examples);
     check_table(config, force, fmt::format("regions[{}]", i), fmt::format("/regions/{}/targets", name),
                 region.has_targets, region.energy_reference);
   }
@@ -114,8 +127,12 @@ ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConf
 }
 
 ExampleSettings example_settings(const ExampleForceConfig& config) {
-  return {config.stiffness, config.damping, config.bias, config.target_iterations,
-          config.law == ExampleForceLaw::kElastic};
+  return {config.stiffness,
+          config.damping,
+          config.bias,
+          config.target_iterations,
+          config.law == ExampleForceLaw::kElastic,
+          config.weights.value_or(Eigen::VectorXd())};
 }
 
 StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
@@ -152,6 +169,17 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   return state;
 }
 
+std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
+  std::vector<std::vector<NamedPose>> all;
+  for (const ExampleModel& force : loaded.model->examples) {
+    const auto region = std::ranges::find(loaded.data.regions, force.region, &RegionData::name);
+    const ExampleSet& set = force.region.empty() ? *loaded.data.examples : region->examples;
+    std::vector<NamedPose>& poses = all.emplace_back();
+    for (const ExampleData& example : set.examples) poses.push_back({example.name, example.pose});
+  }
+  return all;
+}
+
 std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedModel& data) {
   ModelOptions options;
   options.examples = config.examples.has_value();
@@ -186,8 +214,10 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
     return;
   }
   const Eigen::Index modes = examples.filter.matrix().rows();
-  plan.push_back(owner +
-                 fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias));
+  plan.push_back(
+      owner + (settings.given_weights.size() > 0
+                   ? fmt::format("weights: K = {} examples, given", examples.weights.examples())
+                   : fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias)));
   plan.push_back(owner + describe_target(examples, settings));
   if (settings.elastic)
     plan.push_back(owner + fmt::format("example_force: elastic, s = {} elements", examples.elasticity->elements()));
@@ -221,6 +251,8 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.scene = step_scene(config, loaded);
   loaded.start = start_state(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
+  loaded.poses = named_poses(loaded);
+  loaded.element_weights = loaded.data.cubature->weights;
   // The model holds its own, prepared for stepping.
   loaded.data.cubature.reset();
   loaded.data.examples.reset();
