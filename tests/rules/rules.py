@@ -16,7 +16,8 @@ TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "te
 # What may include what: from top to bottom, a folder sees itself and those below it.
 LAYERS = {
     "common": "bundle hdf5 console config model mesh elastic core",
-    "runtime": "app export api bench scene output sim/world sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
+    "runtime": "viewer/app viewer/panels viewer/script viewer/studio viewer/recording viewer/drawing viewer/simulation viewer/scene viewer/view"
+               " app export api bench scene output sim/world sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
     "precompute": "app study/sweep study/sources study/stability study/drawing study/measure study/baseline pipeline training examples inputs posing meshing/mesher meshing cache"
                   " full_space alignment render shape_space targets polynomial cubature modes contact mesh_io solvers fem",
 }
@@ -139,6 +140,19 @@ def python_module(root):
                 yield f"{name}:{number}: includes {header}"
 
 
+def viewer(root):
+    """The viewer sees the public interface, what reads JSON and writes files, and its own libraries: what it can do, any program can. OpenGL,
+    GLFW and Dear ImGui are seen there alone; what its tests run without a picture is without them."""
+    graphics = re.compile(r"epoxy/|GLFW/|imgui|backends/imgui|stb/")
+    shown = ("runtime/viewer/app/", "runtime/viewer/panels/", "runtime/viewer/drawing/", "runtime/viewer/recording/")
+    for name, path in sources(root):
+        inside = name.startswith("runtime/viewer/")
+        for number, header in includes(path):
+            own = header.startswith(("runtime/viewer/", "common/config/", "common/core/", "common/console/"))
+            if (inside and OWN.match(header) and not own) or (graphics.match(header) and not name.startswith(shown)):
+                yield f"{name}:{number}: includes {header}"
+
+
 def length(root):
     """Sources are short enough to be known."""
     for name, path in sources(root, ("common", "precompute", "runtime", "tests")):
@@ -175,7 +189,7 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, python_module, length, mirrored_tests, references, top_level,
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, python_module, viewer, length, mirrored_tests, references, top_level,
                                         formatting)}
 
 

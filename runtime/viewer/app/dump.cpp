@@ -18,13 +18,13 @@ void dump(const Snapshot& snapshot, const Studio& studio, const PictureSize& pic
           const std::filesystem::path& file) {
   const Camera& camera = studio.camera();
   OrderedJson json{{"time", snapshot.time},
-            {"steps", snapshot.steps},
-            {"picture", {picture.width, picture.height}},
-            {"camera",
-             {{"position", numbers(camera.position())},
-              {"target", numbers(camera.target())},
-              {"up", numbers(camera.up())},
-              {"field_of_view", camera.field_of_view()}}}};
+                   {"steps", snapshot.steps},
+                   {"picture", {picture.width, picture.height}},
+                   {"camera",
+                    {{"position", numbers(camera.position())},
+                     {"target", numbers(camera.target())},
+                     {"up", numbers(camera.up())},
+                     {"field_of_view", camera.field_of_view()}}}};
   for (std::size_t i = 0; i < snapshot.bodies.size(); ++i) {
     const BodySnapshot& body = snapshot.bodies[i];
     json["bodies"].push_back({{"offset", numbers(studio.offsets()[i])},

@@ -15,9 +15,9 @@ Eigen::Vector2d pixel_of(const ImVec2& mouse) { return {mouse.x - 0.5, mouse.y -
 
 }  // namespace
 
-void Hand::act(Studio& studio, const Bounds& bounds, const PictureSize& picture) {
+void Hand::act(Studio& studio, const PictureSize& picture) {
   use_mouse(studio, picture);
-  if (!ImGui::GetIO().WantTextInput) use_keys(studio, bounds, picture);
+  if (!ImGui::GetIO().WantTextInput) use_keys(studio);
 }
 
 void Hand::use_mouse(Studio& studio, const PictureSize& picture) {
@@ -30,7 +30,8 @@ void Hand::use_mouse(Studio& studio, const PictureSize& picture) {
       mode_ = Mode::kPan;
     if (io.MouseWheel != 0) studio.camera().zoom(std::pow(kZoomPerNotch, io.MouseWheel));
   }
-  const double right = static_cast<double>(io.MouseDelta.x) / picture.height, up = -static_cast<double>(io.MouseDelta.y) / picture.height;
+  const double right = static_cast<double>(io.MouseDelta.x) / picture.height,
+               up = -static_cast<double>(io.MouseDelta.y) / picture.height;
   if (mode_ == Mode::kOrbit) studio.camera().orbit(right, -up);
   if (mode_ == Mode::kPan) studio.camera().pan(-right, -up);
   if (mode_ == Mode::kDrag) studio.drag(pixel, picture);
@@ -40,7 +41,7 @@ void Hand::use_mouse(Studio& studio, const PictureSize& picture) {
   mode_ = Mode::kNone;
 }
 
-void Hand::use_keys(Studio& studio, const Bounds& bounds, const PictureSize& picture) {
+void Hand::use_keys(Studio& studio) {
   const ImGuiIO& io = ImGui::GetIO();
   const auto pressed = [](int key) { return ImGui::IsKeyPressed(key); };
   Look& look = studio.look();
@@ -53,11 +54,14 @@ void Hand::use_keys(Studio& studio, const Bounds& bounds, const PictureSize& pic
   if (pressed(GLFW_KEY_R)) studio.reset();
   if (pressed(GLFW_KEY_MINUS) || pressed(GLFW_KEY_KP_SUBTRACT)) runner.set_speed(runner.speed() / kSpeedPerKey);
   if (pressed(GLFW_KEY_EQUAL) || pressed(GLFW_KEY_KP_ADD)) runner.set_speed(runner.speed() * kSpeedPerKey);
-  if (pressed(GLFW_KEY_F)) studio.camera().frame(bounds, picture);
+  if (pressed(GLFW_KEY_F)) studio.frame_next = true;
   if (pressed(GLFW_KEY_C)) look.colouring = static_cast<Colouring>((static_cast<int>(look.colouring) + 1) % 4);
   if (pressed(GLFW_KEY_W)) look.wireframe = !look.wireframe;
   if (pressed(GLFW_KEY_E)) look.elements = !look.elements;
-  if (pressed(GLFW_KEY_X)) look.examples = !look.examples;
+  if (pressed(GLFW_KEY_X)) {
+    look.examples = !look.examples;
+    studio.frame_next = true;
+  }
   if (pressed(GLFW_KEY_T)) look.targets = !look.targets;
   if (pressed(GLFW_KEY_G)) toggle_gravity(studio);
   if (pressed(GLFW_KEY_H)) studio.interface = !studio.interface;
@@ -69,11 +73,7 @@ void Hand::use_keys(Studio& studio, const Bounds& bounds, const PictureSize& pic
 void Hand::toggle_gravity(Studio& studio) {
   Settings settings = studio.settings(0);
   const bool on = std::ranges::any_of(settings.gravity, [](double part) { return part != 0; });
-  if (on)
-    gravity_ = settings.gravity;
-  else
-    for (std::size_t i = 0; i < 3; ++i)
-      gravity_[i] = std::hypot(gravity_[0], gravity_[1], gravity_[2]) == 0 ? 0 : gravity_[i];
+  if (on) gravity_ = settings.gravity;
   settings.gravity = on ? std::array<double, 3>{} : gravity_;
   studio.apply(0, settings);
 }

@@ -7,13 +7,13 @@ namespace exmat::viewer {
 /// Mouse and keys of the current ImGui frame become what they ask for.
 class Hand {
  public:
-  void act(Studio& studio, const Bounds& bounds, const PictureSize& picture);
+  void act(Studio& studio, const PictureSize& picture);
 
  private:
   enum class Mode { kNone, kDrag, kOrbit, kPan };
 
   void use_mouse(Studio& studio, const PictureSize& picture);
-  void use_keys(Studio& studio, const Bounds& bounds, const PictureSize& picture);
+  void use_keys(Studio& studio);
   void toggle_gravity(Studio& studio);
 
   Mode mode_ = Mode::kNone;

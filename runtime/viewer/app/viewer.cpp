@@ -64,14 +64,33 @@ class Show {
 
   void begin(double seconds) { interface_.begin(canvas_->size(), seconds); }
 
-  /// Throws WorkError where GL has noted an error.
-  std::shared_ptr<const Snapshot> draw(double frame_seconds) {
-    studio_.runner().set_request(studio_.look().request());
+  /// What plots show, of a picture that need not be drawn.
+  std::shared_ptr<const Snapshot> note() {
+    if (studio_.look().request() != request_) {
+      request_ = studio_.look().request();
+      studio_.runner().set_request(request_);
+      studio_.runner().refresh();
+    }
     std::shared_ptr<const Snapshot> snapshot = studio_.runner().latest();
-    drawing_.draw(*snapshot, studio_.camera(), studio_.look(), *canvas_);
-    interface_.draw(*snapshot, studio_.runner().take_times(), drawing_, studio_, canvas_->size(), frame_seconds);
-    if (const std::string error = take_gl_error(); !error.empty()) throw WorkError(error);
+    interface_.note(*snapshot, studio_.runner().take_times());
     return snapshot;
+  }
+
+  /// Throws WorkError where GL has noted an error.
+  void draw(const Snapshot& snapshot, double seconds, double frame_seconds) {
+    drawing_.draw(snapshot, studio_.camera(), studio_.look(), *canvas_);
+    if (studio_.frame_next) {
+      studio_.frame(drawing_.bounds(), canvas_->size(), interface_.scale());
+      drawing_.draw(snapshot, studio_.camera(), studio_.look(), *canvas_);
+    }
+    // The panels find their sizes by being drawn; the first times are not looked at.
+    for (; unsettled_ > 0; --unsettled_) {
+      interface_.draw(snapshot, drawing_, studio_, canvas_->size(), frame_seconds);
+      canvas_->resolve();
+      interface_.begin(canvas_->size(), seconds);
+    }
+    interface_.draw(snapshot, drawing_, studio_, canvas_->size(), frame_seconds);
+    if (const std::string error = take_gl_error(); !error.empty()) throw WorkError(error);
   }
 
  private:
@@ -80,6 +99,8 @@ class Show {
   std::optional<Canvas> canvas_;
   SceneDrawing drawing_;
   Interface interface_;
+  SnapshotRequest request_;
+  int unsettled_ = 3;
 };
 
 /// In real time, until the window is closed.
@@ -94,9 +115,9 @@ void run_window(Show& show, Studio& studio) {
     frame_seconds += 0.1 * (seconds - frame_seconds);
     show.fit_window();
     show.begin(seconds);
-    hand.act(studio, show.drawing().bounds(), show.canvas().size());
+    hand.act(studio, show.canvas().size());
     if (studio.runner().paused()) studio.runner().refresh();
-    show.draw(frame_seconds);
+    show.draw(*show.note(), seconds, frame_seconds);
     studio.pass(seconds);
     show.canvas().show(show.window().size());
     show.window().show_next();
@@ -137,12 +158,13 @@ void run_by_itself(const Options& options, Show& show, Studio& studio) {
     if (frame > 0) studio.runner().advance(1 / frame_rate);
     if (player) player->play(frame / frame_rate);
     studio.runner().refresh();
+    snapshot = show.note();
     measured.simulation += seconds_since(begin);
     const bool last = frame == frames;
     if (!recording && !options.time && !last) continue;
     begin = Clock::now();
     show.begin(1 / frame_rate);
-    snapshot = show.draw(0);
+    show.draw(*snapshot, 1 / frame_rate, 0);
     if (options.time) glFinish();
     measured.drawing += seconds_since(begin);
     ++measured.pictures;
@@ -168,17 +190,6 @@ void run(const Options& options) {
   Studio studio(simulation);
   studio.interface = !options.hide_interface;
   Show show(options, studio);
-  studio.camera().frame(
-      [&] {
-        Bounds bounds;
-        for (std::size_t i = 0; i < simulation.bodies(); ++i) {
-          const std::vector<float> points = simulation.positions(i);
-          for (std::size_t j = 0; j + 2 < points.size(); j += 3)
-            bounds.add(Eigen::Map<const Eigen::Vector3f>(points.data() + j).cast<double>() + simulation.offset(i));
-        }
-        return bounds;
-      }(),
-      show.canvas().size());
   if (options.by_itself())
     run_by_itself(options, show, studio);
   else

@@ -3,11 +3,17 @@
 #include <algorithm>
 
 namespace exmat::viewer {
+namespace {
+
+constexpr Colour kClay{0.890F, 0.690F, 0.500F};
+
+}  // namespace
 
 Colour body_colour(std::size_t body) {
-  constexpr float kGrey = 0.88F, kShare = 0.62F;
+  constexpr float kWhite = 0.97F, kShare = 0.58F;
+  if (body == 0) return kClay;
   Colour colour = kPalette[body % kPalette.size()];
-  for (float& part : colour) part = kShare * part + (1 - kShare) * kGrey;
+  for (float& part : colour) part = kShare * part + (1 - kShare) * kWhite;
   return colour;
 }
 

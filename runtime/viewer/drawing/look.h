@@ -26,7 +26,7 @@ inline constexpr std::array<Colour, 7> kPalette{{{0.902F, 0.624F, 0.000F},
                                                  {0.800F, 0.475F, 0.655F},
                                                  {0.941F, 0.894F, 0.259F}}};
 
-/// Of a body by its number: the palette, lighter and greyer.
+/// Of a body by its number: clay, then the palette, lighter.
 Colour body_colour(std::size_t body);
 
 /// The scale of fields at 0 to 1, as the shader has it.

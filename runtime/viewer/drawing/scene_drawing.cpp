@@ -85,7 +85,7 @@ SceneDrawing::SceneDrawing(std::vector<std::shared_ptr<const BodyShape>> kinds, 
       dot_buffer_(make_buffer()) {
   if (software) {
     shadow_size_ = 1024;
-    shadow_samples_ = 10;
+    shadow_samples_ = 16;
   }
   shadow_map_ = make_shadow_map(shadow_size_, shadow_target_);
   for (const auto& kind : kinds_) {

@@ -36,7 +36,7 @@ void SceneDrawing::set_light(const Program& program, const Frame& frame) const {
   program.set("light", std::span<const float, 3>(vector_of(light_)));
   program.set("up", std::span<const float, 3>(vector_of(up_)));
   program.set_matrix("to_light", frame.to_light.data());
-  program.set("softness", 0.011F);
+  program.set("softness", 0.016F);
   program.set("samples", shadow_samples_);
   program.set_texture("shadow", 7, GL_TEXTURE_2D, shadow_map_.get());
 }

@@ -122,11 +122,11 @@ vec3 shaded(vec3 base, vec3 at, vec3 n) {
   float towards = dot(n, light);
   float direct = max(towards, 0.0) * lit(at, n);
   float sky = 0.5 + 0.5 * dot(n, up);
-  vec3 ambient = mix(vec3(0.30, 0.29, 0.29), vec3(0.50, 0.53, 0.58), sky);
+  vec3 ambient = mix(vec3(0.36, 0.34, 0.33), vec3(0.55, 0.57, 0.61), sky);
   float rim = pow(1.0 - max(dot(n, v), 0.0), 3.0);
   vec3 h = normalize(light + v);
   float gloss = 0.06 * pow(max(dot(n, h), 0.0), 24.0) * step(0.0, towards);
-  return base * (ambient + 0.72 * direct * vec3(1.0, 0.97, 0.92)) + vec3(gloss + 0.05 * rim * sky);
+  return base * (ambient + 0.62 * direct * vec3(1.0, 0.97, 0.92)) + vec3(gloss + 0.05 * rim * sky);
 }
 vec3 shown(vec3 linear) { return pow(clamp(linear, 0.0, 1.0), vec3(1.0 / 2.2)); }
 )";
@@ -188,7 +188,7 @@ void main() {
   vec2 width = max(fwidth(at), vec2(1e-6));
   vec2 line = abs(fract(at - 0.5) - 0.5) / width;
   float grid = (1.0 - min(min(line.x, line.y), 1.0)) * clamp(0.4 / max(width.x, width.y), 0.0, 1.0);
-  float dark = 0.42 * (1.0 - lit(world, up));
+  float dark = 0.30 * (1.0 - lit(world, up));
   float opacity = fade * max(dark, 0.10 * grid);
   if (opacity < 0.002) discard;
   pixel = vec4(0.13, 0.15, 0.20, opacity);

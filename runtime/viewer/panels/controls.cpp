@@ -223,7 +223,9 @@ void Controls::draw_view(Studio& studio) {
     ImGui::Checkbox(second, &b);
   };
   pair("surface", look.surface, "wireframe", look.wireframe);
+  const bool examples = look.examples;
   pair("examples", look.examples, "target", look.targets);
+  if (look.examples != examples) studio.frame_next = true;
   pair("elements", look.elements, "floor", look.floor);
 }
 

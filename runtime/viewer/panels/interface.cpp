@@ -34,9 +34,8 @@ void Interface::begin(const PictureSize& picture, double seconds) {
   ImGui::NewFrame();
 }
 
-void Interface::draw(const Snapshot& snapshot, const StepTimes& times, const SceneDrawing& drawing, Studio& studio,
-                     const PictureSize& picture, double frame_seconds) {
-  history_.add(snapshot, times);
+void Interface::draw(const Snapshot& snapshot, const SceneDrawing& drawing, Studio& studio, const PictureSize& picture,
+                     double frame_seconds) {
   draw_overlay(style_, snapshot, drawing, studio, picture);
   if (studio.interface) {
     controls_.draw(style_, snapshot, studio);

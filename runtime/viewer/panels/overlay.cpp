@@ -34,7 +34,7 @@ void draw_grips(const Style& style, const Snapshot& snapshot, Studio& studio, co
     list.AddCircle(at(*target), 7 * s, IM_COL32(213, 94, 0, 255), 0, 2 * s);
     const ImVec2 hand = at(*target);
     if (studio.interface)
-      text_beside(list, {hand.x + 14 * s, hand.y - 8 * s}, fmt::format("{:.3g} N", grip.force.norm()), style);
+      text_beside(list, {hand.x + 14 * s, hand.y - 8 * s}, with_unit(grip.force.norm(), "N"), style);
   }
 }
 

@@ -53,7 +53,7 @@ void heading(const Style& style, const std::string& text) {
   ImGui::PopFont();
 }
 
-std::string joules(float value) { return fmt::format("{:.3g} J", value); }
+std::string joules(float value) { return with_unit(value, "J"); }
 
 void draw_weights(const Style& style, const History& history, const BodyShape& shape, const Settings& settings) {
   for (std::size_t i = 0; i < history.weights.size() && i < settings.forces.size(); ++i) {
@@ -106,10 +106,9 @@ void draw_times(const Style& style, const Snapshot& snapshot, const History& his
   ImGui::Text("%.1f Newton iterations", stages.newton_iterations);
 }
 
-void draw_status(const Style& style, const Snapshot& snapshot, const History& history, const Studio& studio,
-                 double frame_seconds) {
+void draw_status(const Style& style, const Snapshot& snapshot, const History& history, double frame_seconds) {
   heading(style, "Now");
-  if (studio.dragging() && !snapshot.grips.empty()) ImGui::Text("hand: %.3g N", snapshot.grips.back().force.norm());
+  if (!snapshot.grips.empty()) ImGui::Text("hand: %s", with_unit(snapshot.grips.back().force.norm(), "N").c_str());
   if (frame_seconds > 0) ImGui::Text("%.0f pictures a second, %.2f x real time", 1 / frame_seconds, snapshot.speed);
   std::size_t contacts = 0;
   for (const BodySnapshot& body : snapshot.bodies) contacts += body.contacts.size();
@@ -132,7 +131,7 @@ void draw_plots(const Style& style, const Snapshot& snapshot, const History& his
   ImGui::Begin("##plots", nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_NoSavedSettings);
-  draw_status(style, snapshot, history, studio, frame_seconds);
+  draw_status(style, snapshot, history, frame_seconds);
   draw_weights(style, history, *shapes.front(), studio.settings(0));
   draw_energies(style, history);
   draw_times(style, snapshot, history);

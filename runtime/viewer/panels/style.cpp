@@ -1,6 +1,10 @@
 #include "runtime/viewer/panels/style.h"
 
+#include <algorithm>
+#include <array>
+#include <cmath>
 #include <filesystem>
+#include <fmt/format.h>
 
 namespace exmat::viewer {
 namespace {
@@ -33,7 +37,7 @@ void set_colours(ImGuiStyle& style) {
   colours[ImGuiCol_FrameBg] = grey(0.30F, 0.10F);
   colours[ImGuiCol_FrameBgHovered] = pale;
   colours[ImGuiCol_FrameBgActive] = middle;
-  colours[ImGuiCol_SliderGrab] = {0.000F, 0.447F, 0.698F, 0.75F};
+  colours[ImGuiCol_SliderGrab] = {0.000F, 0.447F, 0.698F, 0.40F};
   colours[ImGuiCol_SliderGrabActive] = blue;
   colours[ImGuiCol_CheckMark] = blue;
   colours[ImGuiCol_Button] = grey(0.30F, 0.12F);
@@ -68,6 +72,17 @@ Style make_style(float scale) {
   all.WindowBorderSize = 1;
   all.ScaleAllSizes(scale);
   return style;
+}
+
+std::string with_unit(double value, const char* unit) {
+  constexpr std::array<const char*, 7> kPrefixes{"u", "m", "", "k", "M", "G", "T"};
+  constexpr int kPlain = 2;
+  const double size = std::abs(value);
+  if (!(size >= 1e-9)) return fmt::format("0 {}", unit);
+  const int thousands = std::clamp(static_cast<int>(std::floor(std::log10(size * 1.0005) / 3)), -kPlain, 4);
+  const double shown = value / std::pow(1000, thousands);
+  const int whole = std::abs(shown) >= 99.95 ? 0 : std::abs(shown) >= 9.995 ? 1 : 2;
+  return fmt::format("{:.{}f} {}{}", shown, whole, kPrefixes[static_cast<std::size_t>(thousands + kPlain)], unit);
 }
 
 ImU32 colour_of(const Colour& colour, float opacity) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <imgui.h>
+#include <string>
 
 #include "runtime/viewer/drawing/look.h"
 
@@ -15,6 +16,9 @@ struct Style {
 
 /// For the current ImGui context.
 Style make_style(float scale);
+
+/// Three digits with a prefix: 333 kN.
+std::string with_unit(double value, const char* unit);
 
 /// 0 to 1 in sRGB.
 ImU32 colour_of(const Colour& colour, float opacity = 1);

@@ -108,6 +108,10 @@ void ScriptPlayer::act(const Script::Action& action) {
   }
   if (what.contains("set")) set(what["set"]);
   if (what.contains("show")) show(what["show"]);
+  if (what.value("frame", false)) {
+    studio_.frame_next = true;
+    sight_.reset();
+  }
   if (what.contains("camera")) aim(what["camera"], action.time);
   if (what.contains("grab")) grab(what["grab"]);
   if (what.contains("move")) {
@@ -208,6 +212,7 @@ void ScriptPlayer::aim(const Json& camera, double time) {
   Camera& now = studio_.camera();
   const double duration = camera.value("duration", 0.0);
   now.set_field_of_view(camera.value("field_of_view", Camera::kFieldOfView));
+  studio_.frame_next = false;
   sight_ = Sight{{time, duration, now.position(), vector_of(camera["position"]) - now.position()},
                  {time, duration, now.target(), vector_of(camera["target"]) - now.target()}};
 }

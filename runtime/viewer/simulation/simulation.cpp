@@ -55,7 +55,8 @@ Simulation::Simulation(std::vector<SceneDocument> documents, int surface_kind) :
   const int instances = documents.front().instances();
   for (SceneDocument& document : documents) kinds_.push_back(make_kind(std::move(document), surface_kind));
   for (std::size_t kind = 0; kind < kinds_.size(); ++kind)
-    slots_.resize(slots_.size() + static_cast<std::size_t>(kind == 0 ? instances : 1), Slot{kind, Eigen::Vector3d::Zero()});
+    slots_.resize(slots_.size() + static_cast<std::size_t>(kind == 0 ? instances : 1),
+                  Slot{kind, Eigen::Vector3d::Zero()});
   place_side_by_side();
   make_bodies();
 }

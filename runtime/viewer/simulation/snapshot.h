@@ -17,6 +17,8 @@ enum class Colouring { kPlain, kDisplacement, kStrainEnergy, kContactForce };
 struct SnapshotRequest {
   Colouring colouring = Colouring::kPlain;
   bool elements = false, targets = false;
+
+  bool operator==(const SnapshotRequest&) const = default;
 };
 
 /// One body at one moment.

@@ -9,6 +9,7 @@ namespace exmat::viewer {
 namespace {
 
 constexpr double kMessageSeconds = 6;
+constexpr double kPanels = 570;  // pixels that they take of the width
 
 Eigen::Vector3d up_of(const Settings& settings) {
   const Eigen::Vector3d gravity(settings.gravity.data());
@@ -20,7 +21,6 @@ Eigen::Vector3d position_of(const exmat_motion& motion) { return Eigen::Vector3d
 }  // namespace
 
 Studio::Studio(Simulation& simulation) : runner_(simulation), has_contact_(simulation.has_contact()) {
-  Bounds bounds;
   for (std::size_t kind = 0; kind < simulation.kinds(); ++kind) {
     shapes_.push_back(simulation.shape(kind));
     settings_.push_back(simulation.settings(kind));
@@ -28,12 +28,8 @@ Studio::Studio(Simulation& simulation) : runner_(simulation), has_contact_(simul
   for (std::size_t body = 0; body < simulation.bodies(); ++body) {
     kinds_.push_back(simulation.kind_of(body));
     offsets_.push_back(simulation.offset(body));
-    const std::vector<float> points = simulation.positions(body);
-    for (std::size_t i = 0; i + 2 < points.size(); i += 3)
-      bounds.add(Eigen::Map<const Eigen::Vector3f>(points.data() + i).cast<double>() + offsets_.back());
   }
   camera_.set_up(up_of(settings_.front()));
-  camera_.frame(bounds, PictureSize{});
 }
 
 void Studio::apply(std::size_t kind, const Settings& settings) {
@@ -151,6 +147,13 @@ void Studio::save_scene(const std::filesystem::path& file) {
   } catch (const std::exception& error) {
     say(error.what());
   }
+}
+
+void Studio::frame(const Bounds& bounds, const PictureSize& picture, double scale) {
+  PictureSize left = picture;
+  if (interface) left.width = std::max(picture.width - static_cast<int>(kPanels * scale), picture.width / 4);
+  camera_.frame(bounds, left);
+  frame_next = false;
 }
 
 void Studio::say(std::string message) {

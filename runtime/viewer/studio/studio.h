@@ -62,8 +62,12 @@ class Studio {
   void say(std::string message);
   void pass(double seconds);
 
+  /// All of `bounds` in what the panels leave of the picture; `scale` is that of the interface.
+  void frame(const Bounds& bounds, const PictureSize& picture, double scale);
+
   bool interface = true, help = false;
-  bool end = false;  ///< the window is to be closed
+  bool frame_next = true;  ///< all is to be in the next picture
+  bool end = false;        ///< the window is to be closed
 
  private:
   struct Drag {

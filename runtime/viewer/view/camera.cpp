@@ -54,7 +54,7 @@ void Camera::frame(const Bounds& bounds, const PictureSize& picture) {
   if (bounds.empty()) return;
   target_ = bounds.centre();
   const double narrow = std::atan(std::tan(0.5 * field_of_view_) * std::min(1.0, picture.aspect()));
-  distance_ = std::max(0.46 * bounds.diagonal() / std::sin(narrow), 1e-6);
+  distance_ = std::max(0.5 * bounds.diagonal() / std::sin(narrow), 1e-6);
 }
 
 Eigen::Matrix4d Camera::view() const {

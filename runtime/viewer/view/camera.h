@@ -82,7 +82,7 @@ class Camera {
   Eigen::Matrix3d base() const;  ///< columns: two horizontal axes and up
 
   Eigen::Vector3d up_ = Eigen::Vector3d::UnitZ(), target_ = Eigen::Vector3d::Zero();
-  double turn_ = 0.6, rise_ = 0.3, distance_ = 3;
+  double turn_ = -0.95, rise_ = 0.24, distance_ = 3;
   double field_of_view_ = kFieldOfView;
 };
 
