@@ -10,6 +10,7 @@
 #include "runtime/api/contact_record.h"
 #include "runtime/api/drawn_surface.h"
 #include "runtime/api/point_set.h"
+#include "runtime/capacity/load_capacity.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -38,6 +39,11 @@ struct exmat_points {
 struct exmat_surface {
   exmat_points points;
   exmat::runtime::DrawnSurface drawn;
+};
+
+struct exmat_capacity {
+  std::shared_ptr<const exmat::runtime::Source> source;
+  exmat::runtime::LoadCapacity capacity;
 };
 
 struct exmat_body {

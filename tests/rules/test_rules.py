@@ -152,7 +152,7 @@ class Linking(unittest.TestCase):
         self.assertEqual(self.faults(library), [])
         self.assertEqual(self.foreign_symbols(library), [])
         symbols = subprocess.run(["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True).stdout
-        header = (ROOT / "runtime/include/exmat/exmat.h").read_text()
+        header = "".join(path.read_text() for path in sorted((ROOT / "runtime/include/exmat").glob("*.h")))
         for name in re.findall(r"\b(exmat_[a-z_]+)\(", rules.without_comments_and_strings(header)):
             self.assertRegex(symbols, rf" T {name}\b")
 

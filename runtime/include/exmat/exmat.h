@@ -362,91 +362,6 @@ EXMAT_API exmat_status exmat_body_read_contacts(const exmat_body* body, exmat_co
 EXMAT_API exmat_status exmat_body_read_contact_load(const exmat_body* body, int64_t id, double* force,
                                                     double* torque) EXMAT_NOEXCEPT;
 
-/* ---- what to draw ---------------------------------------------------------------------------------------------- */
-
-/* What a bundle holds, before a model is made of it. */
-typedef struct exmat_bundle_info {
-  size_t size;                       /* sizeof(exmat_bundle_info), set by the caller */
-  int64_t modes, vertices, elements; /* r, n, cubature elements */
-  int64_t examples, regions;         /* K of the whole body, the rest pose among them, or 0; number of regions */
-  int64_t render_vertices;           /* of the render mesh; 0 where there is none */
-  int32_t constrained, contact;      /* 1: it has fixed vertices; its bodies can touch */
-  int32_t polynomial, targets;       /* 1: it has the exact polynomial; a table of targets of the whole body */
-} exmat_bundle_info;
-EXMAT_API exmat_status exmat_bundle_read_info(const char* bundle_path, exmat_bundle_info* info) EXMAT_NOEXCEPT;
-
-/* The name of its region 0 <= region < exmat_bundle_info.regions, with a terminating 0, into `name` [bytes]. */
-EXMAT_API exmat_status exmat_bundle_read_region_name(const char* bundle_path, int64_t region, char* name,
-                                                     int64_t bytes) EXMAT_NOEXCEPT;
-
-/* Triangles that are drawn, and their points. A point is at placement (X + U q): X and U are read once, q and the
-   placement before each frame; what draws may do the sum itself, on a GPU. */
-typedef struct exmat_surface exmat_surface;
-
-/* Of the tets' boundary, of the render mesh, or of this where the bundle has one and else of that. */
-enum { EXMAT_SURFACE_AUTO = 0, EXMAT_SURFACE_OBJECT = 1, EXMAT_SURFACE_RENDER = 2 };
-EXMAT_API exmat_status exmat_surface_create(const exmat_model* model, int32_t kind,
-                                            exmat_surface** surface) EXMAT_NOEXCEPT;
-EXMAT_API void exmat_surface_destroy(exmat_surface* surface) EXMAT_NOEXCEPT;
-
-/* EXMAT_SURFACE_OBJECT or EXMAT_SURFACE_RENDER; negative where `surface` is NULL. */
-EXMAT_API int32_t exmat_surface_kind(const exmat_surface* surface) EXMAT_NOEXCEPT;
-/* f; negative where `surface` is NULL. And three of its points of each, outward, into `triangles` [count = 3f]. */
-EXMAT_API int64_t exmat_surface_triangles(const exmat_surface* surface) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_surface_read_triangles(const exmat_surface* surface, int32_t* triangles,
-                                                    int64_t count) EXMAT_NOEXCEPT;
-/* Its points, to be read and pushed; they belong to the surface and are not destroyed. NULL where `surface` is NULL. */
-EXMAT_API const exmat_points* exmat_surface_points(const exmat_surface* surface) EXMAT_NOEXCEPT;
-/* Which vertex of the object each of the k points is, of the object's boundary; of a render mesh the vertex of the
-   boundary that is nearest to it at rest. `vertices` [count = k]. */
-EXMAT_API exmat_status exmat_surface_read_vertices(const exmat_surface* surface, int64_t* vertices,
-                                                   int64_t count) EXMAT_NOEXCEPT;
-
-/* k points on triangles of a surface, one on each of `triangles` [count = k], k >= 1, at the corners' `shares`
-   [3 count], which add up to 1. Reads no file. */
-EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surface, const int64_t* triangles,
-                                                      const double* shares, int64_t count,
-                                                      exmat_points** points) EXMAT_NOEXCEPT;
-
-/* The centroids of the s cubature elements, and how many tets each stands for: `weights` [count = s], or NULL. */
-EXMAT_API int64_t exmat_model_elements(const exmat_model* model) EXMAT_NOEXCEPT; /* s */
-EXMAT_API exmat_status exmat_model_read_element_weights(const exmat_model* model, double* weights,
-                                                        int64_t count) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_points_create_elements(const exmat_model* model, exmat_points** points) EXMAT_NOEXCEPT;
-
-/* X `rest` [coordinates = 3k] [m], and U `rows` [count = 3k r] [kg^-1/2]; not of
-   exmat_points_create_all_vertices(). */
-EXMAT_API exmat_status exmat_points_read_rest(const exmat_points* points, double* rest,
-                                              int64_t coordinates) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_points_read_basis(const exmat_points* points, float* rows, int64_t count) EXMAT_NOEXCEPT;
-
-/* `placement` [12]: three rows of four numbers, the rotation R and the shift t of x = R (X + U q) + t. */
-EXMAT_API exmat_status exmat_body_read_placement(const exmat_body* body, double* placement) EXMAT_NOEXCEPT;
-
-/* Elastic energy per volume at rest [J/m^3] at the points of the surface [count = k]: of the tet of a point, of a
-   vertex the mean of its tets by volume. */
-EXMAT_API exmat_status exmat_body_read_energy_density(const exmat_body* body, exmat_surface* surface, float* density,
-                                                      int64_t count) EXMAT_NOEXCEPT;
-
-/* Of the whole body (region -1) or of a region: name of an example, NULL where there is none such; its pose as reduced
-   coordinates `q` [modes = r]. */
-EXMAT_API const char* exmat_model_example_name(const exmat_model* model, int64_t region,
-                                               int64_t example) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_model_read_example_pose(const exmat_model* model, int64_t region, int64_t example,
-                                                     double* q, int64_t modes) EXMAT_NOEXCEPT;
-/* The target of the last step as far as the modes see it: the reduced coordinates `q` [modes = r] that the linear
-   example force draws to. Of an elastic force that before the first step, and where no example force acts, 0. */
-EXMAT_API exmat_status exmat_body_read_target(const exmat_body* body, int64_t region, double* q,
-                                              int64_t modes) EXMAT_NOEXCEPT;
-
-/* Where the time of the last call that stepped the body went, of one that is profiled; sums over its steps [s]. */
-typedef struct exmat_profile {
-  size_t size; /* sizeof(exmat_profile), set by the caller */
-  double weights, target, internal_force, solve, contact;
-} exmat_profile;
-EXMAT_API exmat_status exmat_body_set_profiled(exmat_body* body, int32_t profiled) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_body_read_profile(const exmat_body* body, exmat_profile* profile) EXMAT_NOEXCEPT;
-
 /* ---- states ---------------------------------------------------------------------------------------------------- */
 
 /* A state is all that a body carries from step to step, as numbers: steps, displacement and velocity now and one step
@@ -472,5 +387,7 @@ EXMAT_API exmat_status exmat_bodies_hash(exmat_body* const* bodies, int64_t coun
 #endif
 
 /* NOLINTEND(readability-identifier-naming) */
+
+#include "exmat/drawing.h"
 
 #endif

@@ -39,6 +39,9 @@ void dump(const Snapshot& snapshot, const Studio& studio, const PictureSize& pic
                              {"point", numbers(grip.point)},
                              {"target", numbers(grip.target)},
                              {"force", numbers(grip.force)}});
+  const LostWork& lost = studio.lost_work();
+  if (lost.hand) json["lost_work"]["hand"] = *lost.hand;
+  if (lost.contact) json["lost_work"]["contact"] = *lost.contact;
   json["obstacles"] = OrderedJson::array();
   for (const ObstacleSnapshot& obstacle : snapshot.obstacles)
     json["obstacles"].push_back(

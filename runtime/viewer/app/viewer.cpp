@@ -119,6 +119,7 @@ void run_window(Show& show, Studio& studio) {
     if (studio.runner().paused()) studio.runner().refresh();
     show.draw(*show.note(), seconds, frame_seconds);
     studio.pass(seconds);
+    if (studio.interface) studio.measure_lost_work(seconds);
     show.canvas().show(show.window().size());
     show.window().show_next();
   }
@@ -162,6 +163,7 @@ void run_by_itself(const Options& options, Show& show, Studio& studio) {
     measured.simulation += seconds_since(begin);
     const bool last = frame == frames;
     if (!recording && !options.time && !last) continue;
+    if (studio.interface || options.dump) studio.measure_lost_work_now();
     begin = Clock::now();
     show.begin(1 / frame_rate);
     show.draw(*snapshot, 1 / frame_rate, 0);

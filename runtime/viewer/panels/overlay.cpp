@@ -68,9 +68,9 @@ void draw_scale(const Style& style, float most, Colouring colouring, const Pictu
     const ImVec2 size = style.text->CalcTextSizeA(style.text->FontSize, 1e6F, 0, text.c_str());
     list.AddText(style.text, style.text->FontSize, {from.x + share * (width - size.x), y}, ink, text.c_str());
   };
-  write(fmt::format("{} [{}]", name, unit), 0.5F, from.y - 20 * s);
+  write(name, 0.5F, from.y - 20 * s);
   write("0", 0, from.y + height + 3 * s);
-  write(fmt::format("{:.2g}", most), 1, from.y + height + 3 * s);
+  write(with_unit(most, unit), 1, from.y + height + 3 * s);
 }
 
 }  // namespace

@@ -119,6 +119,49 @@ void draw_status(const Style& style, const Snapshot& snapshot, const History& hi
   if (!snapshot.failure.empty()) ImGui::TextWrapped("stopped: %s", snapshot.failure.c_str());
 }
 
+/// From green to red: in between by way of yellow, so that lightness tells, too.
+ImU32 warning_colour(double share) {
+  constexpr std::array<Colour, 3> kStops{{{0.00F, 0.50F, 0.38F}, {0.93F, 0.72F, 0.16F}, {0.76F, 0.20F, 0.02F}}};
+  const float at = 2 * std::clamp(static_cast<float>(share), 0.0F, 1.0F);
+  const std::size_t first = at < 1 ? 0 : 1;
+  const float rest = at - static_cast<float>(first);
+  Colour colour{};
+  for (std::size_t i = 0; i < 3; ++i) colour[i] = (1 - rest) * kStops[first][i] + rest * kStops[first + 1][i];
+  return colour_of(colour);
+}
+
+void draw_lost(const Style& style, const char* what, double lost) {
+  constexpr double kLittle = 0.15, kMuch = 0.45;
+  const ImVec2 at = ImGui::GetCursorScreenPos();
+  const ImVec2 size{ImGui::GetContentRegionAvail().x, 10 * style.scale};
+  ImDrawList* const list = ImGui::GetWindowDrawList();
+  list->AddRectFilled(at, {at.x + size.x, at.y + size.y}, IM_COL32(40, 50, 70, 24), 3 * style.scale);
+  list->AddRectFilled(at, {at.x + size.x * static_cast<float>(std::max(lost, 0.01)), at.y + size.y},
+                      warning_colour(lost), 3 * style.scale);
+  ImGui::Dummy(size);
+  const std::string share = fmt::format("{:.0f} %", 100 * lost);
+  const std::string text =
+      lost < kLittle ? fmt::format("The basis answers this {}: {} of its work is lost.", what, share)
+      : lost < kMuch
+          ? fmt::format("The basis answers this {} in part: {} of its work is lost.", what, share)
+          : fmt::format(
+                "This {} needs modes that the basis has not: {} of its work is lost. Add it to the asset's training.",
+                what, share);
+  ImGui::TextWrapped("%s", text.c_str());
+}
+
+void draw_basis(const Style& style, const Studio& studio) {
+  const LostWork& lost = studio.lost_work();
+  if (!lost.measured) {
+    heading(style, "The basis");
+    ImGui::TextWrapped("What it loses is not measured: the mesh is too large.");
+  }
+  if (!lost.hand && !lost.contact) return;
+  heading(style, "The basis");
+  if (lost.hand) draw_lost(style, "push", *lost.hand);
+  if (lost.contact) draw_lost(style, "contact", *lost.contact);
+}
+
 }  // namespace
 
 void draw_plots(const Style& style, const Snapshot& snapshot, const History& history, const Studio& studio,
@@ -132,6 +175,7 @@ void draw_plots(const Style& style, const Snapshot& snapshot, const History& his
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_NoSavedSettings);
   draw_status(style, snapshot, history, frame_seconds);
+  draw_basis(style, studio);
   draw_weights(style, history, *shapes.front(), studio.settings(0));
   draw_energies(style, history);
   draw_times(style, snapshot, history);

@@ -53,6 +53,10 @@ void Grip::follow(Body& held) {
   force_.setZero();
 }
 
+double Grip::lost(const Capacity& capacity, const Body& held) const {
+  return capacity.lost(held, points_, std::array{force_.x(), force_.y(), force_.z()});
+}
+
 void Grip::pull(double time_step, double strength, Body& held) {
   const Eigen::Vector3d before = point_, hand_before = hand_;
   point_ = read_point(held);

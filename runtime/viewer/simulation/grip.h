@@ -31,6 +31,9 @@ class Grip {
   /// Pulls at the body for one step; `strength` scales the spring.
   void pull(double time_step, double strength, Body& held);
 
+  /// Of the work of its force, by what the body cannot answer.
+  double lost(const Capacity& capacity, const Body& held) const;
+
  private:
   Eigen::Vector3d read_point(Body& held) const;
 

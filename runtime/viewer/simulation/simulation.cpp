@@ -10,6 +10,9 @@ namespace {
 constexpr double kObstacleDelay = 0.06;  // [s] of an obstacle that is moved by hand
 constexpr double kArrived = 1e-9;        // of the distance that it has to go [m]
 
+constexpr std::size_t kMostMeasured = 6000;  // vertices of a body whose load capacity is found while it moves
+constexpr double kHandSize = 0.06;           // radius over the body's size
+
 std::int32_t integrator_of(const std::string& name) {
   return name == "newmark" ? EXMAT_NEWMARK : name == "backward_euler" ? EXMAT_BACKWARD_EULER : EXMAT_BDF2;
 }
@@ -67,8 +70,8 @@ Simulation::Kind Simulation::make_kind(SceneDocument document, int surface_kind)
   auto shape = std::make_shared<const BodyShape>(make_shape(model, *surface));
   Settings settings = document.settings();
   fill_weights(model, settings);
-  return {std::move(document), std::move(settings),     std::move(model),
-          std::move(surface),  std::optional<Points>(), std::move(shape)};
+  return {std::move(document),     std::move(settings), std::move(model), std::move(surface),
+          std::optional<Points>(), std::move(shape),    nullptr};
 }
 
 void Simulation::place_side_by_side() {
@@ -137,7 +140,8 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
     document.set(own);
     Model model = Model::from_text(document.text(), document.path().string(), has_contact_);
     auto surface = std::make_unique<Surface>(model, surface_kind_);
-    kinds.push_back({std::move(document), own, std::move(model), std::move(surface), std::nullopt, kinds_[i].shape});
+    kinds.push_back(
+        {std::move(document), own, std::move(model), std::move(surface), std::nullopt, kinds_[i].shape, nullptr});
   }
   struct Motion {
     std::vector<double> q, v;
@@ -298,6 +302,26 @@ void Simulation::move_obstacle(std::size_t obstacle, const Eigen::Vector3d& posi
 void Simulation::set_obstacle_law(std::size_t obstacle, double stiffness, double damping, double friction) {
   for (std::size_t i = 0; i < bodies_.size(); ++i)
     bodies_[i].set_obstacle_law(obstacles_[obstacle].id, stiffness, damping, friction);
+}
+
+LostWork Simulation::lost_work() {
+  LostWork lost;
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    const bool held = std::ranges::any_of(grips_, [&](const Grip& grip) { return grip.body() == i; });
+    const bool touched = exmat_body_contacts(bodies_[i].get()) > 0;
+    if (!held && !touched) continue;
+    Kind& kind = kinds_[slots_[i].kind];
+    if (kind.model.vertices() > kMostMeasured) {
+      lost.measured = false;
+      continue;
+    }
+    if (!kind.capacity)
+      kind.capacity = std::make_unique<Capacity>(kind.model, kHandSize * kind.shape->bounds.diagonal());
+    for (const Grip& grip : grips_)
+      if (grip.body() == i) lost.hand = std::max(lost.hand.value_or(0), grip.lost(*kind.capacity, bodies_[i]));
+    if (touched) lost.contact = std::max(lost.contact.value_or(0), kind.capacity->contact_lost(bodies_[i]));
+  }
+  return lost;
 }
 
 void Simulation::save_scene(const std::filesystem::path& file) const {

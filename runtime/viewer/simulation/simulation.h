@@ -67,6 +67,9 @@ class Simulation {
 
   Snapshot snapshot(const SnapshotRequest& request);
 
+  /// Of what holds and touches bodies now. Makes what that takes when it is first asked for.
+  LostWork lost_work();
+
   /// Writes what would be run again by exmat-runtime. Throws WorkError.
   void save_scene(const std::filesystem::path& file) const;
 
@@ -78,6 +81,7 @@ class Simulation {
     std::unique_ptr<Surface> surface;
     std::optional<Points> elements;
     std::shared_ptr<const BodyShape> shape;
+    std::unique_ptr<Capacity> capacity;
   };
   struct Slot {
     std::size_t kind = 0;

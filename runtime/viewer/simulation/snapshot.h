@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -57,6 +58,12 @@ struct StepTimes {
   std::uint32_t status = 0;  ///< bits of all of them
 
   StepTimes& operator+=(const StepTimes& more);
+};
+
+/// What the basis loses of the work of forces, in [0, 1].
+struct LostWork {
+  std::optional<double> hand, contact;  ///< the most of any body; none where there is no such force
+  bool measured = true;                 ///< false: the mesh is too large to be measured while it moves
 };
 
 /// All that is drawn, at one moment.

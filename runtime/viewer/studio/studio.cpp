@@ -9,7 +9,8 @@ namespace exmat::viewer {
 namespace {
 
 constexpr double kMessageSeconds = 6;
-constexpr double kPanels = 570;  // pixels that they take of the width
+constexpr double kBetweenMeasurements = 0.12;  // [s] of lost work
+constexpr double kPanels = 570;                // pixels that they take of the width
 
 Eigen::Vector3d up_of(const Settings& settings) {
   const Eigen::Vector3d gravity(settings.gravity.data());
@@ -154,6 +155,16 @@ void Studio::frame(const Bounds& bounds, const PictureSize& picture, double scal
   if (interface) left.width = std::max(picture.width - static_cast<int>(kPanels * scale), picture.width / 4);
   camera_.frame(bounds, left);
   frame_next = false;
+}
+
+void Studio::measure_lost_work(double seconds) {
+  lost_seconds_ += seconds;
+  if (lost_seconds_ > kBetweenMeasurements) measure_lost_work_now();
+}
+
+void Studio::measure_lost_work_now() {
+  lost_seconds_ = 0;
+  lost_ = runner_.with([](Simulation& simulation) { return simulation.lost_work(); });
 }
 
 void Studio::say(std::string message) {

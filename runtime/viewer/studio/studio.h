@@ -57,6 +57,11 @@ class Studio {
   void remove_obstacle(std::size_t obstacle);
   void save_scene(const std::filesystem::path& file);
 
+  /// Measured now and then: `seconds` since the last picture, or at once.
+  void measure_lost_work(double seconds);
+  void measure_lost_work_now();
+  const LostWork& lost_work() const { return lost_; }
+
   /// Something that the user should read, and for how long still [s].
   const std::string& message() const { return message_; }
   void say(std::string message);
@@ -86,6 +91,8 @@ class Studio {
   Camera camera_;
   Look look_;
   std::optional<Drag> drag_;
+  LostWork lost_;
+  double lost_seconds_ = 0;  ///< since it was measured
   std::string message_;
   double message_seconds_ = 0;
 };

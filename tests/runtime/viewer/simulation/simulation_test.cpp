@@ -84,6 +84,19 @@ TEST_F(Simulations, AreSetBackToTheirStart) {
   EXPECT_EQ(simulation.hash(), once);
 }
 
+TEST_F(Simulations, SayWhatTheBasisLosesOfAPush) {
+  Simulation simulation = make();
+  EXPECT_FALSE(simulation.lost_work().hand);
+  const int hand = simulation.grab(0, tip(simulation));
+  simulation.move_grip(hand, simulation.snapshot({}).grips[0].point + Eigen::Vector3d(0, 0, 0.05));
+  simulation.advance(100);
+  const LostWork lost = simulation.lost_work();
+  EXPECT_TRUE(lost.measured);
+  EXPECT_GT(lost.hand.value(), 0);
+  EXPECT_LT(lost.hand.value(), 1);
+  EXPECT_FALSE(lost.contact);
+}
+
 // A held point goes to the hand and stays there: what the spring lacks of it is the body's own force over its
 // stiffness.
 TEST_F(Simulations, FollowAHandAndLetGo) {
