@@ -21,6 +21,9 @@ std::optional<WorldConfig> load_world(const std::filesystem::path& file);
 /// Of the content of an ASSET.json; `file` is for messages, and paths are relative to it. Throws as load_asset.
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
 
+/// Likewise of the content of a SCENE.json of one body. Throws as load_scene.
+SceneConfig scene_of(const Json& json, const std::filesystem::path& file);
+
 /// What a scene needs of its bundle.
 Needs needs_of(const SceneConfig& scene);
 

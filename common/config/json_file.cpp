@@ -129,8 +129,10 @@ std::string read_text(const std::filesystem::path& file, const std::string& what
 }
 
 nlohmann::json read_json(const std::filesystem::path& file) {
-  const std::string text = read_text(file, "a JSON file");
-  const std::string name = file.string();
+  return parse_json(read_text(file, "a JSON file"), file.string());
+}
+
+nlohmann::json parse_json(const std::string& text, const std::string& name) {
   StructureCheck check(name, text);
   Json::sax_parse(text, &check);
   return Json::parse(text);

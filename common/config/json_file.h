@@ -10,6 +10,9 @@ namespace exmat {
 /// repeated member, more than 64 nested levels, numbers beyond double, control characters in strings.
 nlohmann::json read_json(const std::filesystem::path& file);
 
+/// The same of a text; `name` is for messages.
+nlohmann::json parse_json(const std::string& text, const std::string& name);
+
 /// Text of a file. Throws InputError where it cannot be read; `what` says in the message what it should be ("a text
 /// file").
 std::string read_text(const std::filesystem::path& file, const std::string& what);

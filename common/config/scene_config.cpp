@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
@@ -118,11 +119,15 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   return scene;
 }
 
-Json read_scene(const std::filesystem::path& file) {
-  Json json = read_json(file);
+void check_scene(const Json& json, const std::filesystem::path& file) {
   check_against_schema(json, "scene", file);
   if (json.contains("bundle") == json.contains("bodies"))
     throw InputError({file.string(), "/", "bundle or bodies", json.contains("bundle") ? "both" : "neither", ""});
+}
+
+Json read_scene(const std::filesystem::path& file) {
+  Json json = read_json(file);
+  check_scene(json, file);
   return json;
 }
 
@@ -166,14 +171,16 @@ std::vector<BodyPlace> read_places(const Json& own, const std::filesystem::path&
 
 }  // namespace
 
-SceneConfig load_scene(const std::filesystem::path& file) {
-  const Json json = read_scene(file);
+SceneConfig scene_of(const Json& json, const std::filesystem::path& file) {
+  check_scene(json, file);
   if (json.contains("bodies"))
     throw InputError({file.string(), "/bodies", "a scene of one body, by \"bundle\"", "one of several",
                       "run and bench of exmat-runtime step scenes of several; what is asked for here takes one of the "
                       "bodies as a scene of its own, with the \"bundle\" and members of that body at the root"});
   return scene_of(json, json, file, "");
 }
+
+SceneConfig load_scene(const std::filesystem::path& file) { return scene_of(read_json(file), file); }
 
 std::optional<WorldConfig> load_world(const std::filesystem::path& file) {
   const Json json = read_scene(file);

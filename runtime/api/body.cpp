@@ -20,8 +20,13 @@ namespace {
 void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcept {
   const Timer timer;
   begin_steps(body);
-  while (body.report.steps < steps && !non_finite(body))
+  body.profile = {};
+  workspace.profile = body.profiled ? &body.profile : nullptr;
+  while (body.report.steps < steps && !non_finite(body)) {
+    apply_keys(body);
     add_step(step(body.model(), body.scene, body.state, workspace), workspace, body);
+  }
+  workspace.profile = nullptr;
   body.report.seconds = timer.seconds();
 }
 
@@ -48,6 +53,7 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start
       drawing(VertexPositions::make_workspace(model().modes())),
       force(Eigen::VectorXd::Zero(model().modes())),
       frame_numbers(model().frame->numbers(start.frame).size()) {
+  source->loaded.keys.apply_start(model(), scene);
   refresh_weights(model(), scene, start, workspace);
   state = start;
   for (std::size_t i = 0; i < scene.obstacles.size(); ++i) obstacles.push_back({next_obstacle++, false});

@@ -2,6 +2,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <span>
+#include <utility>
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
@@ -52,6 +53,25 @@ exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) noe
   if (!all_finite(gravity, 3)) return fail(EXMAT_INVALID_ARGUMENT, "%s: gravity: expected finite numbers", __func__);
   body->scene.gravity = Eigen::Map<const Eigen::Vector3d>(gravity);
   body->scene.gravity_force.noalias() = body->model().gravity_load.transpose() * body->scene.gravity;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_damping(exmat_body* body, double alpha, double beta) noexcept {
+  EXMAT_REQUIRE(body);
+  for (const auto& [name, factor] : {std::pair("alpha", alpha), std::pair("beta", beta)})
+    if (!is_factor(factor))
+      return fail(EXMAT_INVALID_ARGUMENT, "%s: %s = %g: expected a finite number >= 0", __func__, name, factor);
+  body->scene.mass_damping = alpha;
+  body->scene.stiffness_damping = beta;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_set_integrator(exmat_body* body, std::int32_t integrator) noexcept {
+  EXMAT_REQUIRE(body);
+  if (integrator < EXMAT_BDF2 || integrator > EXMAT_NEWMARK)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: integrator = %" PRId32 ": expected 0 to 2", __func__, integrator);
+  body->scene.integrator = static_cast<Integrator>(integrator);
+  body->state.begins_anew = true;
   return EXMAT_OK;
 }
 

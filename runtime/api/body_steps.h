@@ -13,6 +13,11 @@ inline void release(exmat_body& body) noexcept { body.in_use.clear(std::memory_o
 /// Before the first step of a call.
 void begin_steps(exmat_body& body) noexcept;
 
+/// Before each of its steps: what its scene keys in time.
+inline void apply_keys(exmat_body& body) noexcept {
+  body.source->loaded.keys.apply(body.model(), body.state.step, body.scene);
+}
+
 /// After each of its steps, which left their sums in `workspace`.
 void add_step(const StepReport& step, const Workspace& workspace, exmat_body& body) noexcept;
 

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/config/config.h"
+#include "common/config/json_file.h"
 #include "common/core/version.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/handles.h"
@@ -58,6 +59,22 @@ exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model**
   return guarded(__func__, [&] {
     const std::lock_guard lock(reading());
     *model = load_model(load_scene(scene_path));
+  });
+}
+
+exmat_status exmat_model_create_from_text(const char* scene, const char* path, std::int32_t use_contact,
+                                          exmat_model** model) noexcept {
+  EXMAT_REQUIRE(model);
+  *model = nullptr;
+  EXMAT_REQUIRE(scene);
+  EXMAT_REQUIRE(path);
+  if (use_contact != 0 && use_contact != 1)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", __func__, use_contact);
+  return guarded(__func__, [&] {
+    const std::lock_guard lock(reading());
+    SceneConfig config = exmat::scene_of(parse_json(scene, path), path);
+    config.meets_others = use_contact == 1;
+    *model = load_model(std::move(config));
   });
 }
 

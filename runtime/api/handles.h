@@ -8,7 +8,9 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/contact_record.h"
+#include "runtime/api/drawn_surface.h"
 #include "runtime/api/point_set.h"
+#include "runtime/capacity/load_capacity.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -40,6 +42,16 @@ struct exmat_shape {
   std::shared_ptr<const exmat::runtime::HeightField> field{};
 };
 
+struct exmat_surface {
+  exmat_points points;
+  exmat::runtime::DrawnSurface drawn;
+};
+
+struct exmat_capacity {
+  std::shared_ptr<const exmat::runtime::Source> source;
+  exmat::runtime::LoadCapacity capacity;
+};
+
 struct exmat_body {
   exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source, exmat::runtime::State its_start);
 
@@ -57,6 +69,8 @@ struct exmat_body {
   std::size_t frame_numbers;  ///< of the frame's state
   exmat_report report{};
   exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
+  bool profiled = false;
+  exmat::runtime::Profile profile;  ///< of the last call that stepped it, where it is profiled
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
   exmat_world* world = nullptr;  ///< that it is in
 };

@@ -32,15 +32,49 @@ RowMatrix rows_of(const Source& source, const Ids& ids) {
 
 }  // namespace
 
-ReducedModel read_rest(const Source& source, bool basis) {
-  const std::string reason = "points are asked for";
-  const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
-  ReducedModel data = read_bundle(source.bundle, {.groups = groups, .step_only = true, .positions = true});
+void require_same_bundle(const Source& source, const ReducedModel& data) {
   const BundleSummary& summary = source.loaded.summary;
   if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
     throw InputError({source.bundle.string(), "/", "the bundle that the model was created from", "another one",
                       "create the model again"});
+}
+
+ReducedModel read_rest(const Source& source, bool basis) {
+  const std::string reason = "points are asked for";
+  const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
+  ReducedModel data = read_bundle(source.bundle, {.groups = groups, .step_only = true, .positions = true});
+  require_same_bundle(source, data);
   return data;
+}
+
+PointSet embedded_points(const RowMatrix& basis, const VertexArray& rest, const Eigen::Ref<const IndexMatrix>& corners,
+                         const Eigen::Ref<const RowMatrix>& shares) {
+  PointSet points;
+  points.basis_rows.setZero(3 * rest.rows(), basis.cols());
+  for (Eigen::Index i = 0; i < rest.rows(); ++i)
+    for (Eigen::Index c = 0; c < corners.cols(); ++c)
+      points.basis_rows.middleRows<3>(3 * i) += shares(i, c) * basis.middleRows<3>(3 * corners(i, c));
+  points.positions = VertexPositions(rest, points.basis_rows);
+  points.rest = rest;
+  points.distances = Eigen::VectorXd::Zero(rest.rows());
+  return points;
+}
+
+PointSet read_elements(const Source& source) {
+  const std::string reason = "points are asked for";
+  const std::vector<LedgerEntry> groups{
+      {"object", true, 0, reason}, {"modal", true, 0, reason}, {"cubature", true, 0, reason}};
+  const ReducedModel data = read_bundle(source.bundle, {.groups = groups});
+  require_same_bundle(source, data);
+  const TetMesh& mesh = data.object->mesh;
+  const IndexVector& elements = data.cubature->elements;
+  IndexMatrix corners(elements.size(), 4);
+  VertexArray rest(elements.size(), 3);
+  for (Eigen::Index j = 0; j < elements.size(); ++j) {
+    corners.row(j) = mesh.tets.row(elements[j]);
+    rest.row(j) = tet_positions(mesh, elements[j]).colwise().mean();
+  }
+  return embedded_points(data.modal->basis, rest, corners, RowMatrix::Constant(elements.size(), 4, 0.25));
 }
 
 PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids) {

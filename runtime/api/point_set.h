@@ -32,5 +32,14 @@ struct PointSet {
 PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids);
 PointSet read_all_vertices(const Source& source);
 PointSet read_points_at(const Source& source, const VertexArray& points);
+/// The centroids of the cubature elements.
+PointSet read_elements(const Source& source);
+
+/// Throws InputError where `data` is not of the bundle that was loaded.
+void require_same_bundle(const Source& source, const ReducedModel& data);
+
+/// Points at shares of vertices of the object: `corners` [k x 4] with `shares` [k x 4], at `rest` [k x 3] at rest.
+PointSet embedded_points(const RowMatrix& basis, const VertexArray& rest, const Eigen::Ref<const IndexMatrix>& corners,
+                         const Eigen::Ref<const RowMatrix>& shares);
 
 }  // namespace exmat::runtime

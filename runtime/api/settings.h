@@ -20,6 +20,8 @@ inline constexpr StructSizes kContactSizes{96, sizeof(exmat_contact)};
 inline constexpr StructSizes kContactLawSizes{40, sizeof(exmat_contact_law)};
 inline constexpr StructSizes kWorldReportSizes{72, sizeof(exmat_world_report)};
 inline constexpr StructSizes kBodyContactSizes{104, sizeof(exmat_body_contact)};
+inline constexpr StructSizes kBundleInfoSizes{72, sizeof(exmat_bundle_info)};
+inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
 
 /// The defaults of a scene file.

@@ -71,6 +71,7 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
   exmat_world_report report{};
   for (const auto& member : world.members) begin_steps(*member.body);
   while (report.steps < steps && failed_of(world) == nullptr) {
+    for (const auto& member : world.members) apply_keys(*member.body);
     add(world.world.step(threads), report);
     for (int i = 0; i < world.world.count(); ++i)
       add_step(world.world.report(i), world.world.workspace(i), *world.members[static_cast<std::size_t>(i)].body);

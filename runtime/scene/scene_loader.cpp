@@ -54,8 +54,9 @@ void check_methods(const SceneConfig& config, const BundleSummary& summary) {
   if (config.internal_force == ForceMethod::kPolynomial && !summary.has_polynomial)
     throw InputError({bundle, "/polynomial", "this group, since the scene asks for it by internal_force", "none",
                       "precompute the asset with internal_force \"polynomial\", or let the scene say \"auto\""});
-  if (config.examples)
+  if (config.examples) {
     check_table(config, *config.examples, "examples", "/targets", summary.has_targets, summary.energy_reference);
+  }
   for (std::size_t i = 0; i < config.regions.size(); ++i) {
     const auto& [name, force] = config.regions[i];
     const RegionSummary& region = *std::ranges::find(summary.regions, name, &RegionSummary::name);
@@ -155,6 +156,17 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   return state;
 }
 
+std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
+  std::vector<std::vector<NamedPose>> all;
+  for (const ExampleModel& force : loaded.model->examples) {
+    const auto region = std::ranges::find(loaded.data.regions, force.region, &RegionData::name);
+    const ExampleSet& set = force.region.empty() ? *loaded.data.examples : region->examples;
+    std::vector<NamedPose>& poses = all.emplace_back();
+    for (const ExampleData& example : set.examples) poses.push_back({example.name, example.pose});
+  }
+  return all;
+}
+
 std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedModel& data) {
   ModelOptions options;
   options.examples = config.examples.has_value();
@@ -227,6 +239,8 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.scene = step_scene(config, loaded);
   loaded.start = start_state(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
+  loaded.poses = named_poses(loaded);
+  loaded.element_weights = loaded.data.cubature->weights;
   // The model holds its own, prepared for stepping.
   loaded.data.cubature.reset();
   loaded.data.examples.reset();

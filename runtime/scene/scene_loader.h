@@ -12,6 +12,12 @@
 
 namespace exmat::runtime {
 
+/// An example, as it can be shown.
+struct NamedPose {
+  std::string name;
+  Eigen::VectorXd pose;  ///< r
+};
+
 /// A scene ready to step, and how it came to be.
 struct LoadedScene {
   std::unique_ptr<const Model> model;
@@ -19,9 +25,11 @@ struct LoadedScene {
   SceneKeys keys;   ///< of what changes in time: to be applied to a copy of the scene before each step
   State start;      ///< where every body begins
   BundleSummary summary;
-  std::vector<LedgerEntry> ledger;  ///< groups in and out, bytes as read
-  std::vector<ReadRecord> records;  ///< datasets that were read, in order
-  ReducedModel data;                ///< /object and /modal, complete only if the scene writes positions, and /render
+  std::vector<LedgerEntry> ledger;            ///< groups in and out, bytes as read
+  std::vector<ReadRecord> records;            ///< datasets that were read, in order
+  std::vector<std::vector<NamedPose>> poses;  ///< of each example force of the model
+  Eigen::VectorXd element_weights;            ///< s, of the cubature
+  ReducedModel data;  ///< /object and /modal, complete only if the scene writes positions, and /render
 };
 
 /// Reads of the bundle what the scene needs, no more: positions only if it writes a trajectory. Throws InputError: a

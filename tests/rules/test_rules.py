@@ -50,6 +50,9 @@ PLANTED = [
     ("public_headers", "runtime/include/exmat/x.h", "#include <vector>\n"),
     ("direction", "runtime/python/x.cpp", '#include "runtime/sim/step/state.h"\n'),
     ("python_module", "runtime/python/x.cpp", "#include <fmt/format.h>\n"),
+    ("viewer", "runtime/viewer/app/x.cpp", '#include "runtime/sim/step/state.h"\n'),
+    ("viewer", "runtime/viewer/view/x.cpp", "#include <epoxy/gl.h>\n"),
+    ("viewer", "runtime/app/x.cpp", "#include <imgui.h>\n"),
     ("length", "common/core/x.cpp", "// line\n" * 501),
     ("mirrored_tests", "tests/runtime/sim/nowhere/x_test.cpp", "\n"),
     ("references", "common/core/x.h", "/// As method.md, section 3, says.\n"),
@@ -132,7 +135,7 @@ class Linking(unittest.TestCase):
     @staticmethod
     def faults(program):
         libraries = subprocess.run(["ldd", str(program)], capture_output=True, text=True, check=True).stdout
-        found = [name for name in ("mpi", "petsc", "slepc", "mumps") if name in libraries.lower()]
+        found = [name for name in ("mpi", "petsc", "slepc", "mumps", "glfw", "epoxy", "libgl.") if name in libraries.lower()]
         return found + ([] if "libhdf5_serial" in libraries else ["no serial HDF5"])
 
     @staticmethod
@@ -149,7 +152,7 @@ class Linking(unittest.TestCase):
         self.assertEqual(self.faults(library), [])
         self.assertEqual(self.foreign_symbols(library), [])
         symbols = subprocess.run(["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True).stdout
-        header = (ROOT / "runtime/include/exmat/exmat.h").read_text()
+        header = "".join(path.read_text() for path in sorted((ROOT / "runtime/include/exmat").glob("*.h")))
         for name in re.findall(r"\b(exmat_[a-z_]+)\(", rules.without_comments_and_strings(header)):
             self.assertRegex(symbols, rf" T {name}\b")
 

@@ -93,6 +93,11 @@ EXMAT_API exmat_status exmat_model_create(const char* bundle_path, const exmat_s
 /* Of a scene file, its scripted forces included. Its steps, instances and output are not the model's business. */
 EXMAT_API exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) EXMAT_NOEXCEPT;
 
+/* The same of the text of a scene file; `path` names it in messages, and names in it are relative to that path's
+   folder. `use_contact` 1: bodies can touch obstacles of exmat_body_add_obstacle() also where the scene has none. */
+EXMAT_API exmat_status exmat_model_create_from_text(const char* scene, const char* path, int32_t use_contact,
+                                                    exmat_model** model) EXMAT_NOEXCEPT;
+
 EXMAT_API void exmat_model_destroy(exmat_model* model) EXMAT_NOEXCEPT;
 
 /* Negative where `model` is NULL. */
@@ -258,11 +263,18 @@ EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
 
 /* ---- settings of one body -------------------------------------------------------------------------------------- */
 
-/* Of the body, instead of the model's, until set again; exmat_body_reset() keeps them. A state does not hold them. They
+/* Of the body, instead of the model's, until set again; exmat_body_reset() keeps them. What the scene keys in time, its
+   keys set again before each step. A state does not hold them. They
    may change between any two steps; after an abrupt change exmat_body_restart_integrator() keeps impulses exact. */
 
 /* `gravity` [3], world [m/s^2]. */
 EXMAT_API exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) EXMAT_NOEXCEPT;
+
+/* Rayleigh damping: alpha >= 0 [1/s] of the mass, beta >= 0 [s] of the stiffness. */
+EXMAT_API exmat_status exmat_body_set_damping(exmat_body* body, double alpha, double beta) EXMAT_NOEXCEPT;
+
+/* EXMAT_BDF2, ...; the next step takes nothing from the ones before but position and velocity. */
+EXMAT_API exmat_status exmat_body_set_integrator(exmat_body* body, int32_t integrator) EXMAT_NOEXCEPT;
 
 /* Of examples. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model has to have that
    example force: use_examples, or the scene. */
@@ -501,5 +513,7 @@ EXMAT_API exmat_status exmat_world_set_state(exmat_world* world, const double* n
 #endif
 
 /* NOLINTEND(readability-identifier-naming) */
+
+#include "exmat/drawing.h"
 
 #endif

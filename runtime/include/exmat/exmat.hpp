@@ -78,6 +78,13 @@ class Model {
     return Model(model);
   }
 
+  /// Of the text of a scene file; `path` names it.
+  static Model from_text(const std::string& scene, const std::string& path, bool use_contact = false) {
+    exmat_model* model = nullptr;
+    detail::check(exmat_model_create_from_text(scene.c_str(), path.c_str(), use_contact ? 1 : 0, &model));
+    return Model(model);
+  }
+
   std::size_t modes() const noexcept { return static_cast<std::size_t>(exmat_model_modes(get())); }
   std::size_t vertices() const noexcept { return static_cast<std::size_t>(exmat_model_vertices(get())); }
   std::size_t examples() const noexcept { return static_cast<std::size_t>(exmat_model_examples(get())); }
@@ -88,6 +95,24 @@ class Model {
   }
   std::string region_name(std::size_t region) const {
     return exmat_model_region_name(get(), static_cast<std::int64_t>(region));
+  }
+  /// Of the whole body, -1, or of a region.
+  std::string example_name(std::int64_t region, std::size_t example) const {
+    const char* name = exmat_model_example_name(get(), region, static_cast<std::int64_t>(example));
+    return name != nullptr ? name : "";
+  }
+  /// [r]
+  std::vector<double> example_pose(std::int64_t region, std::size_t example) const {
+    std::vector<double> q(modes());
+    detail::check(exmat_model_read_example_pose(get(), region, static_cast<std::int64_t>(example), q.data(),
+                                                static_cast<std::int64_t>(q.size())));
+    return q;
+  }
+  /// [s], of the cubature elements.
+  std::vector<double> element_weights() const {
+    std::vector<double> weights(static_cast<std::size_t>(exmat_model_elements(get())));
+    detail::check(exmat_model_read_element_weights(get(), weights.data(), static_cast<std::int64_t>(weights.size())));
+    return weights;
   }
   double time_step() const noexcept { return exmat_model_time_step(get()); }
   std::string input_sha256() const { return exmat_model_input_sha256(get()); }
@@ -100,6 +125,8 @@ class Model {
  private:
   detail::Owner<exmat_model, exmat_model_destroy> handle_;
 };
+
+class Surface;
 
 /// k material points of a model's body.
 class Points {
@@ -122,7 +149,29 @@ class Points {
     return Points(points);
   }
 
+  /// On `triangles` [k] of a surface, with the `shares` [3k] of their corners.
+  static Points on_surface(const Surface& surface, std::span<const std::int64_t> triangles,
+                           std::span<const double> shares);
+  /// Centroids of the cubature elements.
+  static Points elements(const Model& model) {
+    exmat_points* points = nullptr;
+    detail::check(exmat_points_create_elements(model.get(), &points));
+    return Points(points);
+  }
+
   std::size_t size() const noexcept { return static_cast<std::size_t>(exmat_points_count(get())); }
+  /// [3k] X, at rest.
+  std::vector<double> rest() const {
+    std::vector<double> xyz(3 * size());
+    detail::check(exmat_points_read_rest(get(), xyz.data(), static_cast<std::int64_t>(xyz.size())));
+    return xyz;
+  }
+  /// [3k x r] U, of a model with so many modes.
+  std::vector<float> basis(std::size_t modes) const {
+    std::vector<float> rows(3 * size() * modes);
+    detail::check(exmat_points_read_basis(get(), rows.data(), static_cast<std::int64_t>(rows.size())));
+    return rows;
+  }
   /// [k], from the object at rest.
   std::vector<double> distances() const {
     std::vector<double> distances(size());
@@ -216,6 +265,24 @@ class BodyRef {
   void read_positions(const Points& points, std::span<float> xyz) {
     detail::check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
   }
+  void read_positions(const Surface& surface, std::span<float> xyz);
+  /// [12] three rows of a rotation and a shift.
+  void read_placement(std::span<double, 12> placement) const {
+    detail::check(exmat_body_read_placement(get(), placement.data()));
+  }
+  /// `density` [k] [J/m^3].
+  void read_energy_density(Surface& surface, std::span<float> density) const;
+  /// `q` [r].
+  void read_target(std::span<double> q, std::int64_t region = -1) const {
+    detail::check(exmat_body_read_target(get(), region, q.data(), detail::length(q)));
+  }
+  void set_profiled(bool profiled) { detail::check(exmat_body_set_profiled(get(), profiled ? 1 : 0)); }
+  exmat_profile profile() const {
+    exmat_profile profile;
+    profile.size = sizeof profile;
+    detail::check(exmat_body_read_profile(get(), &profile));
+    return profile;
+  }
   /// `q` [r].
   void read_displacement(std::span<double> q) const {
     detail::check(exmat_body_read_reduced(get(), q.data(), nullptr, detail::length(q)));
@@ -249,6 +316,8 @@ class BodyRef {
   std::span<const double> weights(std::size_t examples) const noexcept { return {exmat_body_weights(get()), examples}; }
 
   void set_gravity(std::span<const double, 3> gravity) { detail::check(exmat_body_set_gravity(get(), gravity.data())); }
+  void set_damping(double alpha, double beta) { detail::check(exmat_body_set_damping(get(), alpha, beta)); }
+  void set_integrator(std::int32_t integrator) { detail::check(exmat_body_set_integrator(get(), integrator)); }
   /// `region` -1: the whole body.
   void set_example_stiffness(double kappa, std::int64_t region = -1) {
     detail::check(exmat_body_set_example_stiffness(get(), region, kappa));
@@ -372,6 +441,11 @@ class Bodies {
   void step(std::int64_t steps = 1, int threads = 0) {
     detail::check(exmat_bodies_step(handles_.data(), static_cast<std::int64_t>(handles_.size()), steps, threads));
   }
+  std::uint64_t hash() const {
+    std::uint64_t hash = 0;
+    detail::check(exmat_bodies_hash(handles_.data(), static_cast<std::int64_t>(handles_.size()), &hash));
+    return hash;
+  }
 
  private:
   std::vector<Body> bodies_;
@@ -478,5 +552,7 @@ class World {
 };
 
 }  // namespace exmat
+
+#include "exmat/drawing.hpp"
 
 #endif

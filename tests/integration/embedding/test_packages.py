@@ -12,6 +12,7 @@ from pathlib import Path
 BUILD = Path(sys.argv.pop(1)).resolve()
 PYTHON = (BUILD / "python/exmat").is_dir()
 OFFLINE = (BUILD / "bin/exmat-precompute").exists()
+VIEWER = (BUILD / "bin/exmat-viewer").exists()
 MESHING = (BUILD / "lib/exmat/exmat-mesher.so").exists()
 
 
@@ -40,7 +41,8 @@ class Packages(unittest.TestCase):
         return {str(path.relative_to(root)) for path in root.rglob("*") if not path.is_dir()}
 
     def test_one_for_each_stage(self):
-        built = {"exmat-runtime": True, "exmat-precompute": OFFLINE, "exmat-meshing": MESHING, "python3-exmat": PYTHON}
+        built = {"exmat-runtime": True, "exmat-precompute": OFFLINE, "exmat-meshing": MESHING, "exmat-viewer": VIEWER,
+                 "python3-exmat": PYTHON}
         self.assertEqual(set(self.packages), {name for name, is_built in built.items() if is_built})
 
     def test_the_run_time_needs_neither_mpi_nor_petsc(self):
@@ -76,6 +78,19 @@ class Packages(unittest.TestCase):
         self.assertIn("mesher: none", output_of(str(alone), "--version"))
         beside = output_of("env", f"EXMAT_MESHER_FOLDER={root / 'usr/lib/exmat'}", str(alone), "--version")
         self.assertIn("mesher: CGAL", beside)
+
+    @unittest.skipUnless(VIEWER, "built without the viewer")
+    def test_the_viewer_is_its_program_on_the_run_times_library(self):
+        depends = self.depends("exmat-viewer")
+        self.assertIn("exmat-runtime (= ", depends)
+        self.assertIn("libglfw3", depends)
+        for window in ("libglfw", "libepoxy", "libGL"):
+            self.assertNotIn(window, self.depends("exmat-runtime"))
+        root, library = self.unpacked("exmat-viewer"), next(self.unpacked("exmat-runtime").rglob("libexmat_runtime.so.*"))
+        self.assertEqual(self.files(root), {"usr/bin/exmat-viewer", "usr/share/doc/exmat-viewer/copyright"})
+        found = subprocess.run([str(root / "usr/bin/exmat-viewer"), "--version"], capture_output=True, text=True, check=True,
+                               env={"LD_LIBRARY_PATH": str(library.parent)}).stdout
+        self.assertIn("exmat-viewer", found)
 
     @unittest.skipUnless(PYTHON, "built without the Python package")
     def test_the_python_package_runs_on_the_run_times_library(self):

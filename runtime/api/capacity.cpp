@@ -1,0 +1,76 @@
+#include <cmath>
+
+#include "common/bundle/bundle.h"
+#include "exmat/exmat.h"
+#include "runtime/api/arguments.h"
+#include "runtime/api/handles.h"
+#include "runtime/api/reading.h"
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+ReducedModel read_object(const Source& source) {
+  const std::string reason = "load capacity is asked for";
+  ReducedModel data = read_bundle(source.bundle, {.groups = {{"object", true, 0, reason}, {"modal", true, 0, reason}}});
+  require_same_bundle(source, data);
+  return data;
+}
+
+}  // namespace
+
+exmat_status exmat_capacity_create(const exmat_model* model, double spread, exmat_capacity** capacity) noexcept {
+  EXMAT_REQUIRE(capacity);
+  *capacity = nullptr;
+  EXMAT_REQUIRE(model);
+  if (!(spread >= 0 && std::isfinite(spread)))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: spread = %g: expected a finite number >= 0", __func__, spread);
+  return guarded(__func__, [&] {
+    const ReducedModel data = [&] {
+      const std::lock_guard lock(reading());
+      return read_object(*model->source);
+    }();
+    *capacity = new exmat_capacity{model->source, LoadCapacity(data, spread)};
+  });
+}
+
+void exmat_capacity_destroy(exmat_capacity* capacity) noexcept { delete capacity; }
+
+double exmat_capacity_time_scale(const exmat_capacity* capacity) noexcept {
+  return capacity != nullptr ? capacity->capacity.time_scale() : -1;
+}
+
+exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, const exmat_body* body,
+                                      const exmat_points* points, const double* forces, std::int64_t coordinates,
+                                      double* lost) noexcept {
+  EXMAT_REQUIRE(capacity);
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  EXMAT_REQUIRE(forces);
+  EXMAT_REQUIRE(lost);
+  if (points->source != body->source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
+  EXMAT_REQUIRE_LENGTH(coordinates, points->set.rest.size());
+  if (!all_finite(forces, coordinates))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
+  return guarded(__func__, [&] {
+    const Placement placement = body->model().frame->placement(body->state.frame);
+    const VertexArray own = Eigen::Map<const VertexArray>(forces, coordinates / 3, 3) * placement.rotation;
+    *lost = capacity->capacity.lost_share(capacity->capacity.spread_load(points->set.rest, own));
+  });
+}
+
+exmat_status exmat_capacity_read_contact_lost(const exmat_capacity* capacity, const exmat_body* body,
+                                              double* lost) noexcept {
+  EXMAT_REQUIRE(capacity);
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(lost);
+  return guarded(__func__, [&] {
+    const Placement placement = body->model().frame->placement(body->state.frame);
+    Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * body->source->loaded.summary.vertices);
+    for (const ContactRecord::Touch& touch : body->contacts.touches())
+      load.segment<3>(3 * static_cast<Eigen::Index>(touch.vertex)) += placement.rotation.transpose() * touch.force;
+    *lost = capacity->capacity.lost_share(load);
+  });
+}

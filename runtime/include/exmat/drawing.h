@@ -1,0 +1,134 @@
+/*
+ * What programs need to draw bodies by themselves, and to look inside: surfaces and points on them, cubature elements,
+ * energies, targets, times, load capacity. A part of exmat.h, which includes it and says what all of it has in common.
+ */
+#ifndef EXMAT_DRAWING_H
+#define EXMAT_DRAWING_H
+
+#include "exmat/exmat.h"
+
+/* NOLINTBEGIN(readability-identifier-naming): names of a C library */
+
+#ifdef __cplusplus
+extern "C" {
+#endif
+
+/* ---- what to draw ---------------------------------------------------------------------------------------------- */
+
+/* What a bundle holds, before a model is made of it. */
+typedef struct exmat_bundle_info {
+  size_t size;                       /* sizeof(exmat_bundle_info), set by the caller */
+  int64_t modes, vertices, elements; /* r, n, cubature elements */
+  int64_t examples, regions;         /* K of the whole body, the rest pose among them, or 0; number of regions */
+  int64_t render_vertices;           /* of the render mesh; 0 where there is none */
+  int32_t constrained, contact;      /* 1: it has fixed vertices; its bodies can touch */
+  int32_t polynomial, targets;       /* 1: it has the exact polynomial; a table of targets of the whole body */
+} exmat_bundle_info;
+EXMAT_API exmat_status exmat_bundle_read_info(const char* bundle_path, exmat_bundle_info* info) EXMAT_NOEXCEPT;
+
+/* The name of its region 0 <= region < exmat_bundle_info.regions, with a terminating 0, into `name` [bytes]. */
+EXMAT_API exmat_status exmat_bundle_read_region_name(const char* bundle_path, int64_t region, char* name,
+                                                     int64_t bytes) EXMAT_NOEXCEPT;
+
+/* Triangles that are drawn, and their points. A point is at placement (X + U q): X and U are read once, q and the
+   placement before each frame; what draws may do the sum itself, on a GPU. */
+typedef struct exmat_surface exmat_surface;
+
+/* Of the tets' boundary, of the render mesh, or of this where the bundle has one and else of that. */
+enum { EXMAT_SURFACE_AUTO = 0, EXMAT_SURFACE_OBJECT = 1, EXMAT_SURFACE_RENDER = 2 };
+EXMAT_API exmat_status exmat_surface_create(const exmat_model* model, int32_t kind,
+                                            exmat_surface** surface) EXMAT_NOEXCEPT;
+EXMAT_API void exmat_surface_destroy(exmat_surface* surface) EXMAT_NOEXCEPT;
+
+/* EXMAT_SURFACE_OBJECT or EXMAT_SURFACE_RENDER; negative where `surface` is NULL. */
+EXMAT_API int32_t exmat_surface_kind(const exmat_surface* surface) EXMAT_NOEXCEPT;
+/* f; negative where `surface` is NULL. And three of its points of each, outward, into `triangles` [count = 3f]. */
+EXMAT_API int64_t exmat_surface_triangles(const exmat_surface* surface) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_surface_read_triangles(const exmat_surface* surface, int32_t* triangles,
+                                                    int64_t count) EXMAT_NOEXCEPT;
+/* Its points, to be read and pushed; they belong to the surface and are not destroyed. NULL where `surface` is NULL. */
+EXMAT_API const exmat_points* exmat_surface_points(const exmat_surface* surface) EXMAT_NOEXCEPT;
+/* Which vertex of the object each of the k points is, of the object's boundary; of a render mesh the vertex of the
+   boundary that is nearest to it at rest. `vertices` [count = k]. */
+EXMAT_API exmat_status exmat_surface_read_vertices(const exmat_surface* surface, int64_t* vertices,
+                                                   int64_t count) EXMAT_NOEXCEPT;
+
+/* k points on triangles of a surface, one on each of `triangles` [count = k], k >= 1, at the corners' `shares`
+   [3 count], which add up to 1. Reads no file. */
+EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surface, const int64_t* triangles,
+                                                      const double* shares, int64_t count,
+                                                      exmat_points** points) EXMAT_NOEXCEPT;
+
+/* The centroids of the s cubature elements, and how many tets each stands for: `weights` [count = s], or NULL. */
+EXMAT_API int64_t exmat_model_elements(const exmat_model* model) EXMAT_NOEXCEPT; /* s */
+EXMAT_API exmat_status exmat_model_read_element_weights(const exmat_model* model, double* weights,
+                                                        int64_t count) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_points_create_elements(const exmat_model* model, exmat_points** points) EXMAT_NOEXCEPT;
+
+/* X `rest` [coordinates = 3k] [m], and U `rows` [count = 3k r] [kg^-1/2]; not of
+   exmat_points_create_all_vertices(). */
+EXMAT_API exmat_status exmat_points_read_rest(const exmat_points* points, double* rest,
+                                              int64_t coordinates) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_points_read_basis(const exmat_points* points, float* rows, int64_t count) EXMAT_NOEXCEPT;
+
+/* `placement` [12]: three rows of four numbers, the rotation R and the shift t of x = R (X + U q) + t. */
+EXMAT_API exmat_status exmat_body_read_placement(const exmat_body* body, double* placement) EXMAT_NOEXCEPT;
+
+/* Elastic energy per volume at rest [J/m^3] at the points of the surface [count = k]: of the tet of a point, of a
+   vertex the mean of its tets by volume. */
+EXMAT_API exmat_status exmat_body_read_energy_density(const exmat_body* body, exmat_surface* surface, float* density,
+                                                      int64_t count) EXMAT_NOEXCEPT;
+
+/* Of the whole body (region -1) or of a region: name of an example, NULL where there is none such; its pose as reduced
+   coordinates `q` [modes = r]. */
+EXMAT_API const char* exmat_model_example_name(const exmat_model* model, int64_t region,
+                                               int64_t example) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_model_read_example_pose(const exmat_model* model, int64_t region, int64_t example,
+                                                     double* q, int64_t modes) EXMAT_NOEXCEPT;
+/* The target of the last step as far as the modes see it: the reduced coordinates `q` [modes = r] that the linear
+   example force draws to. Of an elastic force that before the first step, and where no example force acts, 0. */
+EXMAT_API exmat_status exmat_body_read_target(const exmat_body* body, int64_t region, double* q,
+                                              int64_t modes) EXMAT_NOEXCEPT;
+
+/* Where the time of the last call that stepped the body went, of one that is profiled; sums over its steps [s]. */
+typedef struct exmat_profile {
+  size_t size; /* sizeof(exmat_profile), set by the caller */
+  double weights, target, internal_force, solve, contact;
+} exmat_profile;
+EXMAT_API exmat_status exmat_body_set_profiled(exmat_body* body, int32_t profiled) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_profile(const exmat_body* body, exmat_profile* profile) EXMAT_NOEXCEPT;
+
+/* ---- load capacity ---------------------------------------------------------------------------------------------- */
+
+/* How much of a force the modes of a model can answer: the share of its work that they lose, beside the same mesh with
+   all degrees of freedom, both about the rest shape, in a time of the body's slowest vibration (docs/method.md). Made
+   of what the bundle holds of the object; factorises a matrix of all degrees of freedom: seconds from some ten thousand
+   vertices on. Immutable: any number of threads may use it. */
+typedef struct exmat_capacity exmat_capacity;
+
+/* `spread` >= 0 [m]: a force acts on the surface within that distance of its point, at the nearest vertex where there
+   is none. A force on a single point is lost the more, the finer the mesh is. */
+EXMAT_API exmat_status exmat_capacity_create(const exmat_model* model, double spread,
+                                             exmat_capacity** capacity) EXMAT_NOEXCEPT;
+EXMAT_API void exmat_capacity_destroy(exmat_capacity* capacity) EXMAT_NOEXCEPT;
+
+/* The time that work is compared in [s]; negative where `capacity` is NULL. */
+EXMAT_API double exmat_capacity_time_scale(const exmat_capacity* capacity) EXMAT_NOEXCEPT;
+
+/* `lost` in [0, 1]: of `forces` [coordinates = 3k] [N], world, on points of the same model. 0 where there is no force.
+ */
+EXMAT_API exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, const exmat_body* body,
+                                                const exmat_points* points, const double* forces, int64_t coordinates,
+                                                double* lost) EXMAT_NOEXCEPT;
+
+/* The same of the contact forces at the end of the body's last step, which are not spread. */
+EXMAT_API exmat_status exmat_capacity_read_contact_lost(const exmat_capacity* capacity, const exmat_body* body,
+                                                        double* lost) EXMAT_NOEXCEPT;
+
+#ifdef __cplusplus
+}
+#endif
+
+/* NOLINTEND(readability-identifier-naming) */
+
+#endif

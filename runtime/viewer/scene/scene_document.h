@@ -1,0 +1,60 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "exmat/exmat.hpp"
+#include "runtime/viewer/scene/settings.h"
+
+namespace exmat::viewer {
+
+using Json = nlohmann::json;
+
+/// An obstacle as it stands, to be saved.
+struct PlacedObstacle {
+  std::int64_t number = -1;  ///< among those of the scene; -1: added by hand
+  bool moved = false;        ///< by hand: it stands where `motion` says
+  exmat_obstacle obstacle{};
+  exmat_motion motion{};
+};
+
+/// A scene file, or what a bundle without one is shown by, and what was changed in it.
+class SceneDocument {
+ public:
+  /// A SCENE.json or a BUNDLE.h5. Throws InputError; a scene of several kinds of bodies is refused.
+  static SceneDocument open(const std::filesystem::path& file);
+
+  /// The same settings for another bundle: what names parts of the first one is left out.
+  SceneDocument with_bundle(const std::filesystem::path& bundle) const;
+
+  /// What names in it are relative to.
+  const std::filesystem::path& path() const { return path_; }
+  std::filesystem::path bundle() const;
+  bool is_scene_file() const { return is_scene_; }
+  const Json& json() const { return json_; }
+  std::string text() const { return json_.dump(); }
+
+  std::int64_t steps() const { return json_.value("steps", std::int64_t{1000}); }
+  int instances() const { return json_.value("instances", 1); }
+  bool has_scripted_motion() const;
+
+  Settings settings() const;
+  void set(const Settings& settings);
+
+  /// With this many steps and with the obstacles as they stand, to be run from `file`: names are relative to it. Throws
+  /// WorkError where it cannot be written.
+  void save(const std::filesystem::path& file, std::int64_t steps, std::span<const PlacedObstacle> obstacles) const;
+
+ private:
+  SceneDocument(std::filesystem::path path, Json json, bool is_scene)
+      : path_(std::move(path)), json_(std::move(json)), is_scene_(is_scene) {}
+
+  std::filesystem::path path_;
+  Json json_;
+  bool is_scene_ = false;
+};
+
+}  // namespace exmat::viewer

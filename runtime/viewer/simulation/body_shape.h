@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "exmat/exmat.hpp"
+#include "runtime/viewer/view/camera.h"
+
+namespace exmat::viewer {
+
+/// An example as it is shown.
+struct ShownExample {
+  std::string region;  ///< empty: of the whole body
+  std::string name;
+  std::vector<float> pose;  ///< r
+};
+
+/// What is drawn of bodies of one kind, whatever they do. k points, f triangles, r modes, s elements.
+struct BodyShape {
+  std::size_t modes = 0;
+  std::vector<double> rest;             ///< 3k
+  std::vector<float> basis;             ///< 3k x r
+  std::vector<std::int32_t> triangles;  ///< 3f
+  std::vector<std::int64_t> vertices;   ///< k, of the object
+  bool render_mesh = false;
+  std::vector<float> element_sizes;  ///< s, of the cubature: cube roots of weights, the largest 1
+  std::vector<ShownExample> examples;
+  Bounds bounds;    ///< at rest
+  double mass = 0;  ///< of a free body [kg]; 0 of one with fixed vertices
+};
+
+/// Of a model and its surface.
+BodyShape make_shape(const Model& model, const Surface& surface);
+
+}  // namespace exmat::viewer

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "exmat/exmat.hpp"
+#include "runtime/viewer/simulation/body_shape.h"
+#include "runtime/viewer/view/picking.h"
+
+namespace exmat::viewer {
+
+/// A damped spring from a point of a body's surface to where a hand is.
+class Grip {
+ public:
+  /// At a place of the surface of `body`, which is not moved by that.
+  Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surface, const SurfaceHit& place, Body& held);
+
+  int id() const { return id_; }
+  std::size_t body() const { return body_; }
+  const SurfaceHit& place() const { return place_; }
+  const Eigen::Vector3d& point() const { return point_; }
+  const Eigen::Vector3d& target() const { return target_; }
+  const Eigen::Vector3d& force() const { return force_; }
+
+  /// Where the hand is, world [m].
+  void set_target(const Eigen::Vector3d& target) { target_ = target; }
+
+  /// After the body was put elsewhere: where it is held stays, and the hand goes there.
+  void follow(Body& held);
+
+  /// Pulls at the body for one step; `strength` scales the spring.
+  void pull(double time_step, double strength, Body& held);
+
+  /// Of the work of its force, by what the body cannot answer.
+  double lost(const Capacity& capacity, const Body& held) const;
+
+ private:
+  Eigen::Vector3d read_point(Body& held) const;
+
+  int id_;
+  std::size_t body_;
+  SurfaceHit place_;
+  Points points_;
+  double effective_mass_;                  ///< of the point alone [kg]
+  double longest_;                         ///< that the spring gets [m]
+  Eigen::Vector3d point_, target_, hand_;  ///< hand: the target, smoothed
+  Eigen::Vector3d force_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace exmat::viewer

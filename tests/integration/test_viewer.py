@@ -1,0 +1,226 @@
+#!/usr/bin/python3
+"""The viewer without a screen: what is in its pictures, beside what the bundle says should be there.
+
+Usage: test_viewer.py FOLDER_OF_PROGRAMS [FOLDER]    (Debian: xvfb libgl1-mesa-dri python3-h5py python3-pil python3-numpy)
+
+FOLDER holds scenes of the examples with their bundles, as their tests leave them; each is opened.
+"""
+import itertools
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+import h5py
+import numpy as np
+from PIL import Image, ImageDraw, ImageFilter
+
+PROGRAMS = Path(sys.argv[1]).resolve()
+EXAMPLES = Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else None
+sys.argv = sys.argv[:1]
+VIEWER, RUNTIME, PRECOMPUTE = (PROGRAMS / name for name in ("exmat-viewer", "exmat-runtime", "exmat-precompute"))
+WITHIN = 2  # pixels
+SIZE = (480, 270)
+
+
+def bar():
+    """A .veg file: 8 x 2 x 2 cubes of six tets each, 4 m long, and the vertices at x = 0."""
+    number = {place: k + 1 for k, place in enumerate(itertools.product(range(9), range(3), range(3)))}
+    tets = []
+    for cell in itertools.product(range(8), range(2), range(2)):
+        for order in itertools.permutations(range(3)):
+            place, path = list(cell), [number[cell]]
+            for axis in order:
+                place[axis] += 1
+                path.append(number[tuple(place)])
+            tets.append(path)
+    lines = ["*VERTICES", f"{len(number)} 3 0 0"] + [f"{k} {0.5 * x} {0.5 * y} {0.5 * z}" for (x, y, z), k in number.items()]
+    lines += ["*ELEMENTS", "TET", f"{len(tets)} 4 0"] + [" ".join(map(str, [k + 1, *tet])) for k, tet in enumerate(tets)]
+    return "\n".join(lines) + "\n", [k - 1 for (x, _, _), k in number.items() if x == 0]
+
+
+def projected(points, camera):
+    """Pixels of points [n x 3], by a pinhole."""
+    eye, target = np.array(camera["position"]), np.array(camera["target"])
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, camera["up"])
+    right /= np.linalg.norm(right)
+    way = np.asarray(points) - eye
+    depth = way @ forward
+    focal = 0.5 * SIZE[1] / np.tan(0.5 * camera["field_of_view"])
+    return np.stack([0.5 * SIZE[0] + focal * (way @ right) / depth, 0.5 * SIZE[1] - focal * (way @ np.cross(right, forward)) / depth], axis=1)
+
+
+class Viewer(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        read, write = os.pipe()
+        cls.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "640x480x24"], pass_fds=[write],
+                                      stderr=subprocess.DEVNULL)
+        os.close(write)
+        with os.fdopen(read) as pipe:
+            cls.display = f":{pipe.readline().strip()}"
+        cls.addClassCleanup(cls.server.wait)
+        cls.addClassCleanup(cls.server.terminate)
+        cls.folder = Path(tempfile.mkdtemp())
+        cls.addClassCleanup(shutil.rmtree, cls.folder, True)
+        mesh, fixed = bar()
+        (cls.folder / "bar.veg").write_text(mesh)
+        asset = {"name": "bar", "object": {"mesh": "bar.veg", "fixed": {"ids": fixed},
+                                           "material": {"model": "stvk", "youngs_modulus": 1e5, "poisson_ratio": 0.3, "density": 1000}},
+                 "basis": {"size": 12, "training": "none"}, "needs": ["contact"]}
+        (cls.folder / "asset.json").write_text(json.dumps(asset))
+        subprocess.run([PRECOMPUTE, "bundle", cls.folder / "asset.json", "-o", cls.folder / "bar.h5", "--log-level", "warning"], check=True,
+                       capture_output=True)
+        cls.write("scene.json", {"bundle": "bar.h5", "damping": {"mass": 2, "stiffness": 0.02}})
+
+    @classmethod
+    def write(cls, name, content):
+        (cls.folder / name).write_text(json.dumps(content))
+        return cls.folder / name
+
+    def view(self, *arguments, status=0, **environment):
+        """What it prints, of a run that ends with this status."""
+        result = subprocess.run([VIEWER, *map(str, arguments)], capture_output=True, text=True,
+                                env={**os.environ, "DISPLAY": self.display, "LIBGL_ALWAYS_SOFTWARE": "1", **environment})
+        self.assertEqual(result.returncode, status, result.stdout + result.stderr)
+        return result.stdout if status == 0 else result.stderr
+
+    def picture(self, script, name, *arguments):
+        file = self.folder / f"{name}.png"
+        self.view(self.folder / "scene.json", "--script", self.write(f"{name}.json", script), "--screenshot", file, "--dump",
+                  self.folder / f"{name}_dump.json", "--size", f"{SIZE[0]}x{SIZE[1]}", "--hide-interface", *arguments)
+        return Image.open(file).convert("RGB"), json.loads((self.folder / f"{name}_dump.json").read_text())
+
+    def expected_mask(self, dump):
+        """Where the bundle's surface is, posed and projected here."""
+        with h5py.File(self.folder / "bar.h5") as bundle:
+            points = bundle["object/vertices"][:] + bundle["modal/basis"][:] @ np.array(dump["bodies"][0]["reduced"])
+            triangles = bundle["object/surface"][:]
+        pixels = projected(points, dump["camera"])
+        mask = Image.new("L", SIZE)
+        draw = ImageDraw.Draw(mask)
+        for triangle in triangles:
+            draw.polygon([tuple(pixels[k] - 0.5) for k in triangle], fill=255)
+        return mask
+
+    def assertSameArea(self, found, expected):
+        """Neither has anything further than WITHIN from the other."""
+        grow = ImageFilter.MaxFilter(2 * WITHIN + 1)
+        for one, other in ((found, expected), (expected, found)):
+            outside = (np.array(one) > 0) & (np.array(other.filter(grow)) == 0)
+            self.assertEqual(int(outside.sum()), 0)
+
+    def test_draws_bodies_where_the_library_has_them(self):
+        camera = {"position": [6, -9, 5], "target": [2, 0.5, 0.5], "field_of_view": 0.6}
+        start = {"time": 0, "camera": camera, "show": {"floor": False}}
+        empty, _ = self.picture({"actions": [{**start, "show": {"floor": False, "surface": False}}]}, "empty")
+        drag = [{**start, "grab": {"hand": "tip", "point": [4, 0.5, 1]}}, {"time": 0, "move": {"hand": "tip", "by": [-0.4, 0.6, 1], "duration": 1}}]
+        masks = []
+        for name, actions in (("rest", [start]), ("dragged", drag)):
+            picture, dump = self.picture({"actions": actions}, name)
+            change = np.abs(np.array(picture).astype(int) - np.array(empty)).max(axis=2) > 12
+            if name == "dragged":  # but for the hand, which is drawn over it
+                hand = projected([dump["hands"][0]["point"], dump["hands"][0]["target"]], dump["camera"])
+                y, x = np.mgrid[:SIZE[1], :SIZE[0]]
+                near = np.min([np.hypot(x - hx, y - hy) for hx, hy in hand], axis=0) < 14
+            else:
+                near = np.zeros(change.shape, bool)
+            expected = np.array(self.expected_mask(dump))
+            change[near] = expected[near] > 0
+            masks.append(change)
+            self.assertSameArea(Image.fromarray((255 * change).astype(np.uint8)), Image.fromarray(expected))
+        moved = json.loads((self.folder / "dragged_dump.json").read_text())["hands"][0]
+        self.assertLess(np.linalg.norm(np.subtract(moved["point"], moved["target"])), 0.3)
+        self.assertGreater((masks[0] != masks[1]).sum(), 1000)
+
+    def test_saved_settings_are_a_scene_that_runs_to_the_same_state(self):
+        script = self.write("set.json", {"frame_rate": 50, "actions": [
+            {"time": 0, "set": {"gravity": [0, 0, -9.81], "mass_damping": 0.3, "stiffness_damping": 0.001, "integrator": "backward_euler"}}]})
+        saved = self.folder / "saved.json"
+        printed = self.view(self.folder / "scene.json", "--script", script, "--frames", 20, "--save-scene", saved)
+        self.assertIn("steps 400", printed)
+        run = subprocess.run([RUNTIME, "run", saved], capture_output=True, text=True, check=True).stdout
+        found = re.search("state hash ([0-9a-f]{16})", printed).group(1)
+        self.assertEqual(re.search("state hash +([0-9a-f]{16})", run).group(1), found)
+        self.assertNotIn(found, self.view(self.folder / "scene.json", "--frames", 20, "--frame-rate", 50))
+
+    def test_the_same_script_makes_the_same_pictures(self):
+        script = self.write("twice.json", {"actions": [{"time": 0, "grab": {"hand": "a", "point": [4, 0, 0]}, "show": {"colour": "strain_energy", "elements": True}},
+                                                       {"time": 0, "move": {"hand": "a", "by": [0, 1, 0], "duration": 0.1}}]})
+        for folder in ("one", "two"):
+            self.view(self.folder / "scene.json", "--script", script, "--frames", 3, "--record", self.folder / folder, "--size", "160x90",
+                      "--hide-interface")
+        pictures = sorted(path.name for path in (self.folder / "one").iterdir())
+        self.assertEqual(pictures, [f"{i:05}.png" for i in range(4)])
+        for name in pictures:
+            self.assertEqual((self.folder / "one" / name).read_bytes(), (self.folder / "two" / name).read_bytes())
+        self.assertNotEqual((self.folder / "one/00000.png").read_bytes(), (self.folder / "one/00003.png").read_bytes())
+
+    def test_opens_bundles_alone_and_many_bodies(self):
+        many = self.write("many.json", {"bundle": "bar.h5", "gravity": [0, 0, -1], "instances": 5,
+                                        "obstacles": [{"plane": {"point": [0, 0, -1], "normal": [0, 0, 1]}},
+                                                      {"sphere": {"center": [3, 0.5, -1], "radius": 0.4}}, {"box": {"half_extents": [0.1, 0.2, 0.3]}},
+                                                      {"capsule": {"start": [0, 2, 0], "end": [1, 2, 0], "radius": 0.2}}]})
+        shown = self.write("all.json", {"actions": [{"time": 0, "show": {"colour": "contact_force", "wireframe": True, "elements": True, "targets": True,
+                                                                         "examples": True, "help": True}}, {"time": 0.1}]})
+        for files in ([self.folder / "bar.h5"], [many], [self.folder / "scene.json", self.folder / "bar.h5"]):
+            self.view(*files, "--script", shown, "--screenshot", self.folder / "x.png", "--size", "320x180")
+
+    @unittest.skipUnless(EXAMPLES and EXAMPLES.is_dir(), "no scenes of examples")
+    def test_opens_the_scenes_of_the_examples(self):
+        for scene in sorted(EXAMPLES.glob("*/scene*.json")):
+            content = json.loads(scene.read_text())
+            bundle = scene.parent / content.get("bundle", "")
+            if "bodies" in content:
+                self.assertIn("/bodies", self.view(scene, "--frames", 0, status=2))
+            elif bundle.is_file():
+                with self.subTest(scene=scene.parent.name):
+                    self.view(scene, "--frames", 2, "--screenshot", self.folder / "x.png", "--size", "160x90")
+
+    @unittest.skipUnless(shutil.which("ffmpeg"), "there is no ffmpeg")
+    def test_records_movies(self):
+        for name, start in (("m.gif", b"GIF89a"), ("m.mp4", b"\0\0\0")):
+            self.view(self.folder / "scene.json", "--frames", 3, "--record", self.folder / name, "--size", "160x90")
+            self.assertTrue((self.folder / name).read_bytes().startswith(start))
+
+    def test_says_what_is_missing(self):
+        scene = self.folder / "scene.json"
+        self.assertIn("xvfb-run", self.view(scene, "--frames", 1, status=1, DISPLAY=""))
+        self.assertRegex(self.view(scene, "--frames", 1, status=1, MESA_GL_VERSION_OVERRIDE="2.1"), "OpenGL 3.3 is needed, found 2.1")
+        self.assertIn("ffmpeg", self.view(scene, "--record", self.folder / "m.mp4", status=2, PATH="/nonexistent"))
+        self.assertIn("a folder, or a movie", self.view(scene, "--record", self.folder / "m.avi", status=2))
+        self.assertIn("there is no such file", self.view(self.folder / "none.json", "--frames", 1, status=2))
+        bad = self.write("bad.json", {"actions": [{"time": 0, "grab": {"hand": "a"}}]})
+        self.assertIn("/actions/0/grab", self.view(scene, "--script", bad, status=2))
+
+    def test_memory_does_not_grow(self):
+        most = []
+        for frames in (20, 200):
+            folder = self.folder / f"frames_{frames}"
+            process = subprocess.Popen([VIEWER, self.folder / "scene.json", "--frames", str(frames), "--record", folder, "--size", "96x64",
+                                        "--hide-interface"], env={**os.environ, "DISPLAY": self.display}, stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.DEVNULL)
+            _, status, usage = os.wait4(process.pid, 0)
+            process.returncode = status
+            self.assertEqual(status, 0)
+            most.append(usage.ru_maxrss)
+        self.assertLess(most[1] - most[0], 6000)  # kB
+
+    def test_a_window_runs_until_it_is_ended(self):
+        process = subprocess.Popen([VIEWER, self.folder / "scene.json", "--size", "320x240"], env={**os.environ, "DISPLAY": self.display},
+                                   stderr=subprocess.DEVNULL)
+        time.sleep(2)
+        self.assertIsNone(process.poll())
+        process.terminate()
+        process.wait(20)
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
