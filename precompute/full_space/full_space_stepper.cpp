@@ -163,9 +163,8 @@ void Stepper::update_targets(const Eigen::VectorXd& q) {
 ExampleState Stepper::next_target(std::size_t group, const Eigen::VectorXd& u) {
   const ExampleState& former = state_.examples[group];
   ExampleState next = former;
-  const runtime::ExampleSettings& settings = scene_.examples[group];
-  next.weights = settings.given_weights.size() > 0 ? settings.given_weights : model_.examples[group].weights(u);
-  if (settings.given_weights.size() == 0) runtime::apply_example_bias(settings.bias, next.weights);
+  next.weights = model_.examples[group].weights(u);
+  runtime::apply_example_bias(scene_.examples[group].bias, next.weights);
   if (!former.has_target) next.target = start_target(group, next.weights);
   next.has_target = true;
   next.target_converged = former.has_target && former.target_converged && next.weights == former.weights;

@@ -56,8 +56,7 @@ FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::
     scene.examples.push_back({.stiffness = force.stiffness,
                               .damping = force.damping,
                               .bias = force.bias,
-                              .elastic = force.law == ExampleForceLaw::kElastic,
-                              .given_weights = force.weights.value_or(Eigen::VectorXd())});
+                              .elastic = force.law == ExampleForceLaw::kElastic});
   };
   if (config.examples) add(*config.examples);
   for (const RegionForceConfig& region : config.regions) add(region.force);

@@ -151,6 +151,17 @@ class Viewer(unittest.TestCase):
         self.assertEqual(re.search("state hash +([0-9a-f]{16})", run).group(1), found)
         self.assertNotIn(found, self.view(self.folder / "scene.json", "--frames", 20, "--frame-rate", 50))
 
+    def test_lost_work_of_a_hand_is_that_of_the_same_force_in_a_scene(self):
+        """The hand is smaller than the bar's edges: what it holds is a vertex."""
+        _, dump = self.picture({"actions": [{"time": 0, "grab": {"hand": "a", "point": [4, 0.5, 1]}},
+                                            {"time": 0, "move": {"hand": "a", "by": [0, 0, 0.2], "duration": 0.1}}]}, "lost")
+        vertex = 9 * 8 + 3 * 1 + 2
+        scene = self.write("pushed.json", {"bundle": "bar.h5", "steps": 1, "forces": [{"vertices": {"ids": [vertex]}, "force": dump["hands"][0]["force"]}]})
+        printed = subprocess.run([RUNTIME, "run", scene, "--load-capacity"], capture_output=True, text=True, check=True).stdout
+        found = float(re.search("lost work, force 0 +([0-9.]+) %", printed).group(1)) / 100
+        self.assertAlmostEqual(dump["lost_work"]["hand"], found, delta=0.001)
+        self.assertTrue(0.01 < found < 0.99)
+
     def test_the_same_script_makes_the_same_pictures(self):
         script = self.write("twice.json", {"actions": [{"time": 0, "grab": {"hand": "a", "point": [4, 0, 0]}, "show": {"colour": "strain_energy", "elements": True}},
                                                        {"time": 0, "move": {"hand": "a", "by": [0, 1, 0], "duration": 0.1}}]})
