@@ -24,7 +24,8 @@ std::string SurfaceFaults::words() const {
   add(turned, "whose two triangles look opposite ways");
   add(crowded, "of more than two triangles");
   if (text.empty()) return "a closed surface";
-  return text + ", the first between vertices " + std::to_string(first[0]) + " and " + std::to_string(first[1]);
+  return text + ", the first between vertices " + std::to_string(first[0]) + " and " + std::to_string(first[1]) +
+         ", from 0";
 }
 
 SurfaceFaults surface_faults(const TriangleArray& triangles) {

@@ -17,7 +17,7 @@ struct SurfaceFaults {
   std::array<std::int32_t, 2> first{-1, -1};  ///< vertices of the first of all these edges
 
   bool any() const { return open + turned + crowded > 0; }
-  /// "an open surface: 3 edges belong to one triangle alone, the first from vertex 0 to 1" and the like.
+  /// "3 edges of one triangle alone, the first between vertices 0 and 1, from 0" and the like.
   std::string words() const;
 };
 SurfaceFaults surface_faults(const TriangleArray& triangles);
