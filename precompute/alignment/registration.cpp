@@ -16,6 +16,7 @@ constexpr double kFirstWeight = 20, kLastWeight = 400;
 constexpr double kLastWeightOfSteps = 80;  // of a staircase
 // Over the two-way Chamfer squared, which surfaces that agree have: the weight that a relaxed body has.
 constexpr double kAgreement = 1e-3, kLeastWeight = 4, kNoChamfer = 1e-12;
+constexpr double kMostApart = 5;    // times that Chamfer squared: beyond, the pose is taken back rather
 constexpr double kPairWeight = 20;  // of pairs given, whatever the round
 constexpr Eigen::Index kCornersOfATet = 4;
 constexpr double kPointToPoint = 0.1;    // beside point-to-plane
@@ -191,9 +192,12 @@ Registered Registration::refine(const VertexArray& start) const {
 
 VertexArray Registration::relaxed(const Registered& registered) const {
   const double last = std::clamp(kAgreement / std::max(registered.chamfer, kNoChamfer), kLeastWeight, last_weight_);
-  VertexArray positions = registered.positions;
-  for (int k = 1; k <= kRelaxingRounds; ++k)
-    round(last_weight_ * std::pow(last / last_weight_, k / static_cast<double>(kRelaxingRounds)), positions);
+  VertexArray positions = registered.positions, next = positions;
+  for (int k = 1; k <= kRelaxingRounds; ++k) {
+    round(last_weight_ * std::pow(last / last_weight_, k / static_cast<double>(kRelaxingRounds)), next);
+    if (two_way_chamfer(moved_surface(next), fixed_) > kMostApart * registered.chamfer + kNoChamfer) break;
+    positions = next;
+  }
   return positions;
 }
 

@@ -52,7 +52,8 @@ class Registration {
   Registered refine(const VertexArray& start) const;
 
   /// Of a body that is registered: as near to the surface as the two surfaces agree, and no nearer, the weight let down
-  /// to 1e-3 / Chamfer^2. What tessellations have wrong is followed before; here the body's stiffness evens it out.
+  /// to 1e-3 / Chamfer^2 while that grows fivefold at most. What tessellations have wrong is followed before; here the
+  /// body's stiffness evens it out.
   VertexArray relaxed(const Registered& registered) const;
 
   Registered assess(const VertexArray& positions) const;
