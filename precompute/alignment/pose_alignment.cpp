@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
 #include "common/mesh/geometry.h"
@@ -17,18 +18,15 @@ namespace exmat::precompute {
 namespace {
 
 constexpr Eigen::Index kTreeFunctions = 20, kStartFunctions = 30;
-constexpr std::size_t kTreeMaps = 12;
-constexpr std::size_t kPolished = 6;
-constexpr double kMostInverted = 0.2;      // of a start's volume
-constexpr std::size_t kLeastPolished = 3;  // though they turn more inside out
-constexpr double kMirrorLike = 0.45;       // of a start's volume turned inside out: a mirror image rather
+constexpr std::size_t kTreeMaps = 24;
+constexpr std::size_t kEntrants = 12, kPolished = 6;  // maps whose registration is begun; those that are gone on with
 // Turns of the whole pose that it may begin with in a shared frame [rad].
 constexpr double kLeastTurned = 0.15, kMostTurned = 1.4;
-constexpr std::size_t kTurnedStarts = 2;
-constexpr double kCompeting = 1.4;           // times the least F
-constexpr double kCompetingFloor = 0.003;    // added to it: below, fits differ by their tessellation alone
-constexpr double kSamePose = 0.25;           // difference of displacements, relative to the larger
-constexpr double kSameStart = 0.1;           // difference of starts, relative to the body's size
+constexpr std::size_t kTurnedStarts = 2, kAnyTurns = 4;  // in a shared frame, in another one
+constexpr double kCompeting = 1.4;                       // times the least F
+constexpr double kCompetingFloor = 0.003;                // added to it: below, fits differ by their tessellation alone
+constexpr double kSamePose = 0.25;                       // difference of displacements, relative to the larger
+constexpr double kSameStart = 0.1;                       // difference of starts, relative to the body's size
 constexpr double kNoPose = 0.03;             // a displacement from rest, relative to the body's size, that is none
 constexpr double kClearlyFarther = 1.2;      // times the displacement of the pose that is taken
 constexpr Eigen::Index kFewLandmarks = 100;  // more pairs than this are a dense map
@@ -48,7 +46,7 @@ struct Start {
   std::string name;
   VertexArray positions;
   double J = 0;
-  double inverted = 0;  // share of the volume that it turns inside out
+  bool sure = false;  // gone on with, however it begins
 };
 
 // A registered pose, and the displacement of the rest example to it in the frame of the rest.
@@ -86,13 +84,12 @@ class PoseAligner {
   }
 
   std::vector<Start> mapped_starts();
-  std::vector<Start> upright(std::vector<Start> starts) const;
-  std::vector<Start> sure_starts() const;
+  std::vector<Start> starts_in_space() const;
   void add_map(const std::string& name, const Eigen::MatrixXd& map, std::vector<Start>& starts);
   Eigen::MatrixXd spatial_map(const VertexArray& rest_positions) const;
   void add_landmark_starts(std::vector<Start>& starts) const;
   void add_turned_starts(std::vector<Start>& starts) const;
-  std::vector<Start> best_distinct(std::vector<Start> starts) const;
+  std::vector<Start> distinct(std::vector<Start> starts) const;
   Fit fit(const std::string& start, Registered registered) const;
   std::vector<Fit> polish(const std::vector<Start>& starts) const;
   bool same_pose(const Fit& a, const Fit& b) const;
@@ -112,7 +109,6 @@ class PoseAligner {
   double size_;
   Registration registration_;
   ZoomOut zoom_out_;
-  std::vector<Start> sure_starts_;
   // Of the starts that turn the body inside out, the best as a map: what a mirror image would begin with.
   VertexArray reflected_start_;
   double reflected_score_ = std::numeric_limits<double>::infinity();
@@ -131,7 +127,7 @@ void PoseAligner::add_map(const std::string& name, const Eigen::MatrixXd& map, s
   const MapScore score = score_map(registration_.arap(), map, carried);
 #pragma omp critical(exmat_pose_starts)
   {
-    starts.push_back({name, carried, score.total(), score.inverted});
+    starts.push_back({name, carried, score.total()});
     if (score.inverted > 0.5 && score.orthogonality < reflected_score_) {
       reflected_score_ = score.orthogonality;
       reflected_start_ = carried;
@@ -172,24 +168,7 @@ std::vector<Start> PoseAligner::mapped_starts() {
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t k = 0; k < maps.size(); ++k) refined[k] = maps[k].zoom ? zoom_out_.refine(maps[k].map) : maps[k].map;
   for (std::size_t k = 0; k < maps.size(); ++k) add_map(maps[k].name, refined[k], starts);
-  return upright(std::move(starts));
-}
-
-// Those that turn little of the body inside out. Where there is nothing else to begin with, those that turn the least.
-std::vector<Start> PoseAligner::upright(std::vector<Start> starts) const {
   std::ranges::stable_sort(starts, {}, &Start::J);
-  std::size_t kept = 0;
-  const bool none_else = sure_starts_.empty();
-  std::vector<Start> result;
-  double most = kMirrorLike;
-  if (none_else && !starts.empty())
-    most = std::max(most, std::ranges::min_element(starts, {}, &Start::inverted)->inverted);
-  for (Start& start : starts) {
-    if (start.inverted > (kept < kLeastPolished ? most : kMostInverted)) continue;
-    ++kept;
-    result.push_back(std::move(start));
-  }
-  starts = std::move(result);
   return starts;
 }
 
@@ -218,40 +197,42 @@ PointPairs PoseAligner::pairs() const {
 
 void PoseAligner::add_landmark_starts(std::vector<Start>& starts) const {
   const Eigen::Index functions = has_dense_map() ? kStartFunctions : 0;
-  starts.push_back({"correspondences", laid_over(pairs(), std::min(functions, this->functions(rest_))), 0});
+  starts.push_back({"correspondences", laid_over(pairs(), std::min(functions, this->functions(rest_))), 0, true});
 }
 
-// Starts that are polished whatever their score.
-std::vector<Start> PoseAligner::sure_starts() const {
+// Starts that need no map.
+std::vector<Start> PoseAligner::starts_in_space() const {
   std::vector<Start> starts;
   if (has_landmarks()) add_landmark_starts(starts);
-  if (!hints_.free_frame && !hints_.landmarks_alone) {
-    starts.push_back({"rest", rest_.mesh.vertices, 0});
+  if (!hints_.landmarks_alone) {
+    starts.push_back({"rest", rest_.mesh.vertices, 0, true});
     add_turned_starts(starts);
   }
   return starts;
 }
 
-// A pose that is held at one end is turned as a whole, though its frame is the object's.
+// A pose that is held at one end is turned as a whole, though its frame is the object's. In another frame any turn may
+// be right.
 void PoseAligner::add_turned_starts(std::vector<Start>& starts) const {
   const RigidFitter fitter(body_surface(rest_.basis, rest_.mesh.tets), body_surface(pose_.basis, pose_.mesh.tets));
+  const bool any = hints_.free_frame;
   std::size_t added = 0;
   for (const RigidFit& fit : fitter.fits(false)) {
     const double turn = Eigen::AngleAxisd(fit.rotation).angle();
-    if (turn > kMostTurned || turn < kLeastTurned || added == kTurnedStarts) continue;
+    if ((!any && turn > kMostTurned) || turn < kLeastTurned || added == (any ? kAnyTurns : kTurnedStarts)) continue;
     starts.push_back({"turned", rest_.mesh.vertices * fit.rotation.transpose(), 0});
     ++added;
   }
 }
 
-std::vector<Start> PoseAligner::best_distinct(std::vector<Start> starts) const {
-  std::stable_sort(starts.begin(), starts.end(), [](const Start& a, const Start& b) { return a.J < b.J; });
+// The first of each.
+std::vector<Start> PoseAligner::distinct(std::vector<Start> starts) const {
   std::vector<Start> best;
   for (Start& start : starts) {
     const bool is_new = std::ranges::none_of(best, [&](const Start& other) {
       return norm(centred(start.positions - other.positions)) < kSameStart * size_;
     });
-    if (is_new && best.size() < kPolished) best.push_back(std::move(start));
+    if (is_new) best.push_back(std::move(start));
   }
   return best;
 }
@@ -265,10 +246,22 @@ Fit PoseAligner::fit(const std::string& start, Registered registered) const {
   return {start, std::move(registered), std::move(displacement), size};
 }
 
+// All are begun. Those that are sure and the best of the others are gone on with.
 std::vector<Fit> PoseAligner::polish(const std::vector<Start>& starts) const {
-  std::vector<Fit> fits(starts.size());
+  std::vector<Registered> begun(starts.size());
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t k = 0; k < starts.size(); ++k) fits[k] = fit(starts[k].name, registration_.run(starts[k].positions));
+  for (std::size_t k = 0; k < starts.size(); ++k) begun[k] = registration_.begin(starts[k].positions);
+  std::vector<std::size_t> order(starts.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::stable_sort(order, {}, [&](std::size_t k) { return begun[k].objective(); });
+  std::vector<std::size_t> kept;
+  std::size_t others = 0;
+  for (const std::size_t k : order)
+    if (starts[k].sure || others++ < kPolished) kept.push_back(k);
+  std::vector<Fit> fits(kept.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    fits[i] = fit(starts[kept[i]].name, registration_.finish(begun[kept[i]].positions));
   return fits;
 }
 
@@ -395,16 +388,20 @@ Registered PoseAligner::settle(const VertexArray& positions) const {
 }
 
 PoseAlignment PoseAligner::align() {
-  sure_starts_ = sure_starts();
-  std::vector<Start> starts = best_distinct(mapped_starts());
-  for (Start& sure : sure_starts_) starts.push_back(std::move(sure));
+  std::vector<Start> starts = distinct(mapped_starts());
+  if (starts.size() > kEntrants) starts.resize(kEntrants);
+  for (Start& start : starts_in_space()) starts.push_back(std::move(start));
   std::vector<Fit> poses = distinct_poses(polish(starts));
   if (!has_landmarks()) {
     for (Fit& copy : symmetric_copies(choose(poses))) poses.push_back(std::move(copy));
     poses = distinct_poses(std::move(poses));
   }
   const Fit& chosen = choose(poses);
-  return result(fit(chosen.start, settle(chosen.registered.positions)), poses);
+  const Registered settled = settle(chosen.registered.positions);
+  PoseAlignment alignment = result(fit(chosen.start, settled), poses);
+  // A body of revolution slips, and would turn back.
+  if (!symmetry_.of_revolution) alignment.positions = Registration(rest_.mesh, pose_.mesh).relaxed(settled);
+  return alignment;
 }
 
 // The vertex that weighs most in each row.

@@ -10,11 +10,14 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr int kRounds = 25, kRefiningRounds = 8;
+constexpr int kRounds = 25, kOpeningRounds = 8, kRefiningRounds = 8, kRelaxingRounds = 8;
 constexpr int kStepsPerRound = 2;  // local and global
 constexpr double kFirstWeight = 20, kLastWeight = 400;
 constexpr double kLastWeightOfSteps = 80;  // of a staircase
-constexpr double kPairWeight = 20;         // of pairs given, whatever the round
+// Over the two-way Chamfer squared, which surfaces that agree have: the weight that a relaxed body has.
+constexpr double kAgreement = 1e-3, kLeastWeight = 4, kNoChamfer = 1e-12;
+constexpr double kMostApart = 5;    // times that Chamfer squared: beyond, the pose is taken back rather
+constexpr double kPairWeight = 20;  // of pairs given, whatever the round
 constexpr Eigen::Index kCornersOfATet = 4;
 constexpr double kPointToPoint = 0.1;    // beside point-to-plane
 constexpr int kFactors = 4;              // weights between the first and the last that are factored
@@ -86,7 +89,7 @@ Registration::Registration(const TetMesh& moving, const TetMesh& fixed, PointPai
 
 const CholeskyFactor& Registration::preconditioner(double weight) const {
   const double step = std::log(kLastWeight / kFirstWeight) / (kFactors - 1);
-  const auto index = std::lround(std::log(weight / kFirstWeight) / step);
+  const auto index = std::max(0L, std::lround(std::log(weight / kFirstWeight) / step));
   return factors_[static_cast<std::size_t>(index)];
 }
 
@@ -158,10 +161,26 @@ void Registration::round(double weight, VertexArray& positions) const {
   }
 }
 
+void Registration::rounds(int first, int end, VertexArray& positions) const {
+  for (int k = first; k < end; ++k)
+    round(kFirstWeight * std::pow(last_weight_ / kFirstWeight, k / (kRounds - 1.0)), positions);
+}
+
+Registered Registration::begin(const VertexArray& start) const {
+  VertexArray positions = start;
+  rounds(0, kOpeningRounds, positions);
+  return assess(positions);
+}
+
+Registered Registration::finish(const VertexArray& begun) const {
+  VertexArray positions = begun;
+  rounds(kOpeningRounds, kRounds, positions);
+  return assess(positions);
+}
+
 Registered Registration::run(const VertexArray& start) const {
   VertexArray positions = start;
-  for (int k = 0; k < kRounds; ++k)
-    round(kFirstWeight * std::pow(last_weight_ / kFirstWeight, k / (kRounds - 1.0)), positions);
+  rounds(0, kRounds, positions);
   return assess(positions);
 }
 
@@ -169,6 +188,17 @@ Registered Registration::refine(const VertexArray& start) const {
   VertexArray positions = start;
   for (int k = 0; k < kRefiningRounds; ++k) round(last_weight_, positions);
   return assess(positions);
+}
+
+VertexArray Registration::relaxed(const Registered& registered) const {
+  const double last = std::clamp(kAgreement / std::max(registered.chamfer, kNoChamfer), kLeastWeight, last_weight_);
+  VertexArray positions = registered.positions, next = positions;
+  for (int k = 1; k <= kRelaxingRounds; ++k) {
+    round(last_weight_ * std::pow(last / last_weight_, k / static_cast<double>(kRelaxingRounds)), next);
+    if (two_way_chamfer(moved_surface(next), fixed_) > kMostApart * registered.chamfer + kNoChamfer) break;
+    positions = next;
+  }
+  return positions;
 }
 
 Registered Registration::assess(const VertexArray& positions) const {

@@ -7,7 +7,6 @@
 #include <set>
 
 #include "common/mesh/geometry.h"
-#include "common/mesh/nearest_point.h"
 #include "precompute/alignment/surface_tree.h"
 #include "tests/support/articulated_bodies.h"
 
@@ -88,6 +87,49 @@ TetMesh body_centred(const Eigen::AlignedBox3d& box, double cell, const Wanted& 
     if (volumes[t] < 0) std::swap(mesh.tets(t, 0), mesh.tets(t, 1));
   return cut(mesh, wanted);
 }
+
+// Which points a mesh covers: its tets by the cells of a grid that their boxes touch.
+class Cover {
+ public:
+  Cover(const TetMesh& mesh, double cell) : mesh_(mesh), cell_(cell) {
+    for (const auto x : mesh.vertices.rowwise()) box_.extend(Vector3d(x.transpose()));
+    cells_ = (box_.sizes() / cell).array().floor().cast<Eigen::Index>() + 1;
+    tets_.resize(static_cast<std::size_t>(cells_.prod()));
+    for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+      const auto x = tet_positions(mesh, t);
+      const Place low = place(x.colwise().minCoeff().transpose()), high = place(x.colwise().maxCoeff().transpose());
+      for (Eigen::Index i = low[0]; i <= high[0]; ++i)
+        for (Eigen::Index j = low[1]; j <= high[1]; ++j)
+          for (Eigen::Index k = low[2]; k <= high[2]; ++k) tets_[number({i, j, k})].push_back(t);
+    }
+  }
+
+  bool operator()(const Vector3d& x) const {
+    if (!box_.contains(x)) return false;
+    return std::ranges::any_of(tets_[number(place(x))], [&](Eigen::Index t) { return holds(t, x); });
+  }
+
+ private:
+  using Place = Eigen::Array<Eigen::Index, 3, 1>;
+
+  Place place(const Vector3d& x) const { return ((x - box_.min()) / cell_).array().floor().cast<Eigen::Index>(); }
+  std::size_t number(const Place& at) const {
+    return static_cast<std::size_t>((at[0] * cells_[1] + at[1]) * cells_[2] + at[2]);
+  }
+  bool holds(Eigen::Index tet, const Vector3d& point) const {
+    const auto x = tet_positions(mesh_, tet);
+    Eigen::Matrix3d edges;
+    for (int k = 0; k < 3; ++k) edges.col(k) = (x.row(k + 1) - x.row(0)).transpose();
+    const Vector3d weights = edges.partialPivLu().solve(point - x.row(0).transpose());
+    return weights.minCoeff() >= 0 && weights.sum() <= 1;
+  }
+
+  const TetMesh& mesh_;
+  double cell_;
+  Eigen::AlignedBox3d box_;
+  Place cells_;
+  std::vector<std::vector<Eigen::Index>> tets_;
+};
 
 TetMesh of_tets(const TetMesh& mesh, const std::vector<bool>& kept) {
   Eigen::Index at = 0;
@@ -180,13 +222,12 @@ TetMesh fine_solid(const PosableBody& body) {
 
 TetMesh meshed(const PosableBody& body, const Pose& pose, const Meshing& meshing) {
   const TetMesh solid = posed(fine_solid(body), pose);
-  const NearestPointSearch inside(solid);
+  const Cover wanted(solid, meshing.cell);
   std::mt19937 generator(meshing.seed);
   const auto random = [&] { return static_cast<double>(generator()) / 4294967295.0; };
   Eigen::AlignedBox3d box;
   for (const auto x : solid.vertices.rowwise()) box.extend(Vector3d(x.transpose()));
   box.min() -= meshing.cell * Vector3d(random(), random(), random());
-  const Wanted wanted = [&](const Vector3d& x) { return inside.nearest(x).distance <= 0; };
   TetMesh mesh =
       meshing.kind == TetKind::kCubes ? cubes(box, meshing.cell, wanted) : body_centred(box, meshing.cell, wanted);
   const auto bite = [&](const Vector3d& place) {
