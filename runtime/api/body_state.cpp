@@ -1,13 +1,13 @@
 #include "runtime/api/body_state.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
 
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_obstacles.h"
 #include "runtime/api/body_steps.h"
 #include "runtime/api/failures.h"
+#include "runtime/api/number_reader.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/scene/bodies.h"
 
@@ -31,36 +31,6 @@ class Writer {
   std::vector<double> numbers_;
 };
 
-/// There are as many numbers as are read.
-class Reader {
- public:
-  explicit Reader(std::span<const double> numbers) : numbers_(numbers) {}
-
-  double number() { return take(1).front(); }
-  void read(Eigen::VectorXd& array) { std::ranges::copy(take(static_cast<std::size_t>(array.size())), array.begin()); }
-  std::span<const double> take(std::size_t count) {
-    const auto taken = numbers_.first(count);
-    numbers_ = numbers_.subspan(count);
-    return taken;
-  }
-  bool flag(const char* name) {
-    const double found = number();
-    if (found != 0 && found != 1)
-      throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected 0 or 1", name, found));
-    return found == 1;
-  }
-  /// A whole number below `end`.
-  double count(const char* name, double end) {
-    const double found = number();
-    if (!(found >= 0 && found < end && found == std::floor(found)))
-      throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected a whole number below {:g}", name, found, end));
-    return found;
-  }
-
- private:
-  std::span<const double> numbers_;
-};
-
 std::size_t contact_count(const exmat_body& body) { return body.state.contacts.count; }
 
 std::size_t size_without_contacts(const exmat_body& body) {
@@ -71,7 +41,7 @@ std::size_t size_without_contacts(const exmat_body& body) {
   return size;
 }
 
-void read_contacts(Reader& reader, std::size_t count, const exmat_body& body, ContactState& contacts) {
+void read_contacts(NumberReader& reader, std::size_t count, const exmat_body& body, ContactState& contacts) {
   if (count > contacts.held.size())
     throw InvalidArgument(fmt::format("numbers: {} contacts: expected at most {}", count, contacts.held.size()));
   contacts.count = count;
@@ -79,8 +49,8 @@ void read_contacts(Reader& reader, std::size_t count, const exmat_body& body, Co
     held.vertex = static_cast<int>(reader.count("vertex", static_cast<double>(body.model().contact->vertices())));
     held.obstacle = static_cast<int>(reader.count("obstacle", static_cast<double>(body.scene.obstacles.size())));
     held.normal_force = reader.number();
-    held.anchor = Eigen::Vector3d(reader.take(3).data());
-    held.way_out = Eigen::Vector3d(reader.take(3).data());
+    held.anchor = reader.vector();
+    held.way_out = reader.vector();
   }
 }
 
@@ -121,7 +91,7 @@ void set_state(std::span<const double> numbers, exmat_body& body) {
     throw InvalidArgument(fmt::format("count = {}: expected {} and {} for each contact: is it of another model?",
                                       numbers.size(), least, kContactNumbers));
   if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
-  Reader reader(numbers);
+  NumberReader reader(numbers);
   if (const double layout = reader.number(); layout != kLayout)
     throw InvalidArgument(
         fmt::format("numbers: layout {:g}: expected {:g}; is it of another version?", layout, kLayout));

@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <cinttypes>
-#include <cmath>
 #include <fmt/format.h>
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_state.h"
+#include "runtime/api/number_reader.h"
 #include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
@@ -52,45 +52,22 @@ std::vector<double> write_world(const exmat_world& world) {
   return numbers;
 }
 
-class Reader {
- public:
-  explicit Reader(std::span<const double> numbers) : numbers_(numbers) {}
-
-  std::span<const double> take(std::size_t count) {
-    if (count > numbers_.size()) throw InvalidArgument("numbers: they end early: are they of a world of other bodies?");
-    const auto taken = numbers_.first(count);
-    numbers_ = numbers_.subspan(count);
-    return taken;
-  }
-  /// A whole number below `end`.
-  std::size_t count(const char* name, std::size_t end) {
-    const double found = take(1).front();
-    if (!(found >= 0 && found < static_cast<double>(end) && found == std::floor(found)))
-      throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected a whole number below {}", name, found, end));
-    return static_cast<std::size_t>(found);
-  }
-  std::size_t left() const { return numbers_.size(); }
-
- private:
-  std::span<const double> numbers_;
-};
-
-std::vector<HeldBodyContact> read_contacts(Reader& reader, std::size_t count, const exmat_body& body) {
+std::vector<HeldBodyContact> read_contacts(NumberReader& reader, std::size_t count, const exmat_body& body) {
   std::vector<HeldBodyContact> contacts(count);
   int last = -1;
   for (HeldBodyContact& held : contacts) {
     held.vertex = static_cast<int>(reader.count("vertex", static_cast<std::size_t>(body.model().contact->vertices())));
     if (held.vertex <= last) throw InvalidArgument("numbers: expected vertices of a contact in ascending order");
     last = held.vertex;
-    held.gap = reader.take(1).front();
-    held.normal_force = reader.take(1).front();
-    held.stretch = Eigen::Vector3d(reader.take(3).data());
-    held.normal = Eigen::Vector3d(reader.take(3).data());
+    held.gap = reader.number();
+    held.normal_force = reader.number();
+    held.stretch = reader.vector();
+    held.normal = reader.vector();
   }
   return contacts;
 }
 
-std::vector<HeldPair> read_pairs(Reader& reader, const exmat_world& world) {
+std::vector<HeldPair> read_pairs(NumberReader& reader, const exmat_world& world) {
   const std::size_t bodies = world.members.size();
   std::vector<HeldPair> pairs(reader.count("pairs", reader.left()));
   for (HeldPair& pair : pairs) {
@@ -118,13 +95,13 @@ struct ReadState {
 
 ReadState read(std::span<const double> numbers, const exmat_world& world) {
   if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
-  Reader reader(numbers);
+  NumberReader reader(numbers);
   ReadState state;
   if (const std::size_t bodies = reader.count("bodies", numbers.size() + 1); bodies != world.members.size())
     throw InvalidArgument(fmt::format("numbers: {} bodies: expected {}", bodies, world.members.size()));
   for (std::size_t i = 0; i < world.members.size(); ++i) {
     const std::size_t size = reader.count("numbers of a body", numbers.size());
-    state.anew.push_back(reader.count("anew", 2) == 1);
+    state.anew.push_back(reader.flag("anew"));
     state.bodies.push_back(reader.take(size));
   }
   state.held = read_pairs(reader, world);
