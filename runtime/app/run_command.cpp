@@ -54,7 +54,7 @@ void print_load_capacity(const SceneConfig& config) {
   for (std::size_t i = 0; i < config.forces.size(); ++i) {
     Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * vertices);
     for (const std::int64_t vertex : config.forces[i].vertices) load.segment<3>(3 * vertex) += config.forces[i].force;
-    print(fmt::format("lost work, force {}", i),
+    print(fmt::format("lost work, force {}", i).c_str(),
           fmt::format("{:.1f} % (the basis cannot answer it)", 100 * capacity.lost_share(load)));
   }
 }
