@@ -166,7 +166,7 @@ TEST(LoadScene, ReadsEveryMember) {
     "bundle": "car.h5", "time_step": 0.01, "steps": 20, "gravity": [0, -0.98, 0], "integrator": "newmark",
     "internal_force": "polynomial", "instances": 1000,
     "damping": {"mass": 0.02, "stiffness": 0.003}, "newton": {"max_iterations": 5, "tolerance": 1e-8},
-    "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "weights": [0.25, 0.75], "target": "table", "target_iterations": 7,
+    "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "target": "table", "target_iterations": 7,
                  "force": "linear", "energy_reference": "rest"},
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
                {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]}],
@@ -182,7 +182,6 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.examples->stiffness, 400);
   EXPECT_EQ(scene.examples->damping, 2);
   EXPECT_EQ(scene.examples->bias, 0.6);
-  EXPECT_THAT(scene.examples->weights.value(), ElementsAre(0.25, 0.75));
   EXPECT_EQ(scene.examples->target, TargetSource::kTable);
   EXPECT_EQ(scene.examples->target_iterations, 7);
   EXPECT_EQ(scene.examples->energy_reference, EnergyReference::kRest);

@@ -39,7 +39,7 @@ struct Overlap {
       return result;
     };
     const Eigen::VectorXd qa_moved = qa + da.tail(qa.size()), qb_moved = qb + db.tail(qb.size());
-    return contact.potential(*blocks.model->contact, {moved(start_a, da), qa_moved}, {moved(start_b, db), qb_moved},
+    return contact.potential(*blocks.model->contact, {moved(start_a, da), qa_moved}, {moved(start_b, db), qb_moved}, 0,
                              candidates);
   }
 
@@ -58,7 +58,7 @@ TEST(BodyContact, ForcesAreThoseOfThePotentialAndEqualAndOpposite) {
     a.set_zero(modes);
     b.set_zero(modes);
     overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, overlap.qa},
-                             {overlap.start_b, overlap.qb}, overlap.candidates, a, b);
+                             {overlap.start_b, overlap.qb}, 0, overlap.candidates, a, b);
   };
   evaluate();
   FrictionChange change;
@@ -90,7 +90,7 @@ TEST(BodyContact, StiffnessIsTheDerivativeOfTheForces) {
     ContactSums a, b;
     a.set_zero(modes);
     b.set_zero(modes);
-    overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, qa}, {overlap.start_b, overlap.qb},
+    overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, qa}, {overlap.start_b, overlap.qb}, 0,
                              overlap.candidates, a, b);
     Eigen::VectorXd force(6 + modes);
     force << b.force, b.torque, b.generalised;
@@ -129,7 +129,7 @@ TEST(BodyContact, FindsWhatIsNearAndWhatWasInside) {
                        {FrameVelocity{}, overlap.vb}};
   ContactSums sums;
   sums.set_zero(overlap.qa.size());
-  overlap.contact.evaluate(a.set, a.pose, b.pose, overlap.candidates, sums, sums);
+  overlap.contact.evaluate(a.set, a.pose, b.pose, 0, overlap.candidates, sums, sums);
   std::vector<HeldBodyContact> held;
   overlap.contact.commit(a.pose, b.pose, overlap.candidates, held);
   BodyCandidates near, again;
