@@ -99,6 +99,7 @@ class PoseAligner {
   const Fit& choose(const std::vector<Fit>& poses) const;
   Registered turn_to_landmarks(VertexArray positions) const;
   Registered settle(const VertexArray& positions) const;
+  double change_of_volume() const;
   std::optional<double> mirror_residual(double misfit) const;
   PoseAlignment result(const Fit& taken, const std::vector<Fit>& poses) const;
 
@@ -333,7 +334,7 @@ PoseAlignment PoseAligner::result(const Fit& taken, const std::vector<Fit>& pose
   const double J = MapScore{orthogonality_defect(map_of_points(rest_, pose_, points, size)), registered.distortion,
                             registered.inverted}
                        .total();
-  const double grown = std::abs(std::log(tet_volumes(pose_.mesh).sum() / tet_volumes(rest_.mesh).sum()));
+  const double grown = change_of_volume();
   alignment.doubt = kDoubtOfMap * (J + kDoubtOfResidual * alignment.residual) +
                     kDoubtOfLandmarks * alignment.missed_landmarks +
                     kDoubtOfVolume * std::max(0.0, grown - std::log1p(kVolumeOfPoses));
@@ -387,6 +388,10 @@ Registered PoseAligner::settle(const VertexArray& positions) const {
   return registration_.refine(positions);
 }
 
+double PoseAligner::change_of_volume() const {
+  return std::abs(std::log(tet_volumes(pose_.mesh).sum() / tet_volumes(rest_.mesh).sum()));
+}
+
 PoseAlignment PoseAligner::align() {
   std::vector<Start> starts = distinct(mapped_starts());
   if (starts.size() > kEntrants) starts.resize(kEntrants);
@@ -399,8 +404,9 @@ PoseAlignment PoseAligner::align() {
   const Fit& chosen = choose(poses);
   const Registered settled = settle(chosen.registered.positions);
   PoseAlignment alignment = result(fit(chosen.start, settled), poses);
-  // A body of revolution slips, and would turn back.
-  if (!symmetry_.of_revolution) alignment.positions = Registration(rest_.mesh, pose_.mesh).relaxed(settled);
+  // A body of revolution slips, and would turn back; one that grows would shrink.
+  if (!symmetry_.of_revolution && change_of_volume() <= std::log1p(kVolumeOfPoses))
+    alignment.positions = Registration(rest_.mesh, pose_.mesh).relaxed(settled);
   return alignment;
 }
 
