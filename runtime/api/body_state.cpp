@@ -7,7 +7,7 @@
 #include "runtime/api/body_obstacles.h"
 #include "runtime/api/body_steps.h"
 #include "runtime/api/failures.h"
-#include "runtime/api/number_reader.h"
+#include "runtime/api/state_numbers.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/scene/bodies.h"
 
@@ -41,7 +41,7 @@ std::size_t size_without_contacts(const exmat_body& body) {
   return size;
 }
 
-void read_contacts(NumberReader& reader, std::size_t count, const exmat_body& body, ContactState& contacts) {
+void read_contacts(StateNumbers& reader, std::size_t count, const exmat_body& body, ContactState& contacts) {
   if (count > contacts.held.size())
     throw InvalidArgument(fmt::format("numbers: {} contacts: expected at most {}", count, contacts.held.size()));
   contacts.count = count;
@@ -91,7 +91,7 @@ void set_state(std::span<const double> numbers, exmat_body& body) {
     throw InvalidArgument(fmt::format("count = {}: expected {} and {} for each contact: is it of another model?",
                                       numbers.size(), least, kContactNumbers));
   if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
-  NumberReader reader(numbers);
+  StateNumbers reader(numbers);
   if (const double layout = reader.number(); layout != kLayout)
     throw InvalidArgument(
         fmt::format("numbers: layout {:g}: expected {:g}; is it of another version?", layout, kLayout));

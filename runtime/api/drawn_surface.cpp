@@ -64,7 +64,7 @@ ReadSurface surface_of_object(const ReducedModel& data) {
   const ObjectData& object = *data.object;
   const RowMatrix& basis = data.modal->basis;
   ReadSurface surface;
-  DrawnSurface& drawn = surface.drawn;
+  ModelSurface& drawn = surface.drawn;
   drawn.vertices = vertices_of(object.surface);
   drawn.triangles = object.surface.unaryExpr([&](std::int32_t id) { return place_in(drawn.vertices, id); });
   VertexArray rest(drawn.vertices.size(), 3);

@@ -42,7 +42,7 @@ class DensityField {
 };
 
 /// Triangles that are drawn, beside their points.
-struct DrawnSurface {
+struct ModelSurface {
   bool render = false;      ///< a render mesh, not the boundary of the tets
   TriangleArray triangles;  ///< f x 3, of the points
   IndexVector vertices;     ///< k, of the object: the point itself, or the nearest to it at rest
@@ -50,7 +50,7 @@ struct DrawnSurface {
 };
 
 struct ReadSurface {
-  DrawnSurface drawn;
+  ModelSurface drawn;
   PointSet points;
 };
 

@@ -44,7 +44,7 @@ struct exmat_shape {
 
 struct exmat_surface {
   exmat_points points;
-  exmat::runtime::DrawnSurface drawn;
+  exmat::runtime::ModelSurface drawn;
 };
 
 struct exmat_capacity {

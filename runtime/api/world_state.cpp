@@ -5,7 +5,7 @@
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_state.h"
-#include "runtime/api/number_reader.h"
+#include "runtime/api/state_numbers.h"
 #include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
@@ -52,7 +52,7 @@ std::vector<double> write_world(const exmat_world& world) {
   return numbers;
 }
 
-std::vector<HeldBodyContact> read_contacts(NumberReader& reader, std::size_t count, const exmat_body& body) {
+std::vector<HeldBodyContact> read_contacts(StateNumbers& reader, std::size_t count, const exmat_body& body) {
   std::vector<HeldBodyContact> contacts(count);
   int last = -1;
   for (HeldBodyContact& held : contacts) {
@@ -67,7 +67,7 @@ std::vector<HeldBodyContact> read_contacts(NumberReader& reader, std::size_t cou
   return contacts;
 }
 
-std::vector<HeldPair> read_pairs(NumberReader& reader, const exmat_world& world) {
+std::vector<HeldPair> read_pairs(StateNumbers& reader, const exmat_world& world) {
   const std::size_t bodies = world.members.size();
   std::vector<HeldPair> pairs(reader.count("pairs", reader.left()));
   for (HeldPair& pair : pairs) {
@@ -95,7 +95,7 @@ struct ReadState {
 
 ReadState read(std::span<const double> numbers, const exmat_world& world) {
   if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
-  NumberReader reader(numbers);
+  StateNumbers reader(numbers);
   ReadState state;
   if (const std::size_t bodies = reader.count("bodies", numbers.size() + 1); bodies != world.members.size())
     throw InvalidArgument(fmt::format("numbers: {} bodies: expected {}", bodies, world.members.size()));

@@ -218,13 +218,15 @@ void ScriptPlayer::aim(const Json& camera, double time) {
 }
 
 void ScriptPlayer::move(double time) {
-  for (auto& [name, hand] : hands_) {
+  for (auto& named : hands_) {
+    auto& hand = named.second;
     if (!hand.way) continue;
     hand.at = hand.way->at(time);
     studio_.runner().with([&](Simulation& simulation) { simulation.move_grip(hand.grip, hand.at); });
   }
-  for (const auto& [number, way] : obstacles_)
-    studio_.runner().with([&](Simulation& simulation) { simulation.move_obstacle(number, way.at(time)); });
+  for (const auto& numbered : obstacles_)
+    studio_.runner().with(
+        [&](Simulation& simulation) { simulation.move_obstacle(numbered.first, numbered.second.at(time)); });
   if (!sight_) return;
   studio_.camera().look(sight_->position.at(time), sight_->target.at(time));
   if (time >= sight_->position.start + sight_->position.duration) sight_.reset();

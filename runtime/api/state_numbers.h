@@ -11,9 +11,9 @@
 namespace exmat::runtime {
 
 /// The numbers of a state, from the first on. Throws InvalidArgument where they are not what is asked for.
-class NumberReader {
+class StateNumbers {
  public:
-  explicit NumberReader(std::span<const double> numbers) : numbers_(numbers) {}
+  explicit StateNumbers(std::span<const double> numbers) : numbers_(numbers) {}
 
   std::size_t left() const { return numbers_.size(); }
 
