@@ -49,8 +49,8 @@ struct ExampleForceConfig {
   TargetSource target = TargetSource::kAuto;
   int target_iterations = 4;  ///< most Newton iterations of `solve` in one step; the next step carries on
   EnergyReference energy_reference = EnergyReference::kExample;
-  std::optional<Eigen::VectorXd> weights;  ///< [K] in place of those of the shape
-  ExampleKeysConfig keys;
+  std::optional<Eigen::VectorXd> weights{};  ///< [K] in place of those of the shape
+  ExampleKeysConfig keys{};
 };
 
 /// The example force of one region of the bundle.

@@ -187,9 +187,11 @@ def worlds(result):
             ("two on each other", 2, "2", number(result.microseconds("world/pair") / 2), "")]
     for kind, words in cells.items():
         for count in (5, 100, 1000):
-            per_body = [result.microseconds(f"world/{kind}/threads{threads}/{count}") / count for threads in (1, 2)]
-            largest = result.best[f"world/{kind}/threads1/{count}"]["largest_island"]
-            rows.append((words, f"{count:,}", f"{largest:,.0f}", *map(number, per_body)))
+            names = [f"world/{kind}/threads{threads}/{count}" for threads in (1, 2)]
+            if names[0] not in result.best:
+                continue
+            per_body = [number(result.microseconds(name) / count) if name in result.best else "" for name in names]
+            rows.append((words, f"{count:,}", f"{result.best[names[0]]['largest_island']:,.0f}", *per_body))
     return table(("", "bodies", "largest island", "1 thread", "2 threads"), rows)
 
 
