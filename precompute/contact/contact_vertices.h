@@ -10,8 +10,8 @@ namespace exmat::precompute {
 /// n shares of the surface: a third of the area of each triangle at a vertex, 0 inside [m^2].
 Eigen::VectorXd vertex_areas(const ObjectData& object);
 
-/// Most contact vertices where an asset does not say how many: of 1,314 and 2,354 they rest as high as all, to 0.2 %,
-/// and a landing does not cost what the surface has.
+/// Most contact vertices where an asset does not say how many: a landing changes as little as by half the time step
+/// (tests/benchmark/contact_sample.py), and does not cost what the surface has.
 inline constexpr int kContactVertices = 1000;
 
 /// Group /contact: the surface vertices that are not fixed and `may_touch` [n], of these `count`, or kContactVertices,
