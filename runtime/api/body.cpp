@@ -1,7 +1,9 @@
 #include <algorithm>
+#include <array>
 #include <cinttypes>
 #include <omp.h>
 #include <span>
+#include <utility>
 
 #include "common/core/timer.h"
 #include "exmat/exmat.h"
@@ -38,9 +40,62 @@ void put_to_rest(exmat_body& body) noexcept {
   was_put(body);
 }
 
+/// Whether two bodies may step side by side, and each in the scratch of the first.
+bool are_alike(const exmat_body& first, const exmat_body& body) noexcept {
+  return first.source == body.source && !body.profiled &&
+         body.obstacles.size() == body.source->loaded.scene.obstacles.size() &&
+         can_step_side_by_side(body.model(), body.scene);
+}
+
+/// As advance(), for at most kLanes bodies that are alike.
+void advance_side_by_side(std::span<exmat_body* const> bodies, LaneWorkspace& workspace, std::int64_t steps) noexcept {
+  const Timer timer;
+  std::array<LaneBody, kLanes> lanes;
+  std::array<exmat_body*, kLanes> running;
+  std::array<StepReport, kLanes> reports;
+  for (exmat_body* body : bodies) begin_steps(*body);
+  for (std::int64_t n = 0; n < steps; ++n) {
+    std::size_t count = 0;
+    for (exmat_body* body : bodies) {
+      if (non_finite(*body)) continue;
+      apply_keys(*body);
+      lanes[count] = {&body->scene, &body->state};
+      running[count++] = body;
+    }
+    reports.fill({});
+    step_side_by_side(running.front()->model(), {lanes.data(), count}, workspace, {reports.data(), count});
+    for (std::size_t lane = 0; lane < count; ++lane) add_step(reports[lane], workspace.body(lane), *running[lane]);
+  }
+  for (exmat_body* body : bodies) body->report.seconds = timer.seconds() / static_cast<double>(bodies.size());
+}
+
 /// Whether one may step in the scratch of the other.
 bool lends(const exmat_body* lender, const exmat_body& body) noexcept {
   return lender != nullptr && lender->source == body.source && lender->obstacles.size() == body.obstacles.size();
+}
+
+/// At most kLanes bodies, side by side as far as they follow each other and are alike. `lender` is one whose scratch is
+/// in the cache, or null.
+void advance_group(std::span<exmat_body* const> group, exmat_body*& lender, std::int64_t steps) noexcept {
+  while (!group.empty()) {
+    exmat_body& first = *group.front();
+    std::size_t count = 0;
+    while (count < group.size() && are_alike(first, *group[count])) ++count;
+    std::unique_ptr<LaneWorkspace> workspace;
+    if (std::cmp_greater_equal(count, kFewestLanes))
+      workspace = first.source->lanes->take(first.model(), first.source->loaded.scene);
+    if (workspace) {
+      advance_side_by_side(group.first(count), *workspace, steps);
+      first.source->lanes->give_back(std::move(workspace));
+    } else {
+      count = std::max<std::size_t>(count, 1);
+      for (exmat_body* body : group.first(count)) {
+        if (!lends(lender, *body)) lender = body;
+        advance(*body, lender->workspace, steps);
+      }
+    }
+    group = group.subspan(count);
+  }
 }
 
 }  // namespace
@@ -145,10 +200,10 @@ exmat_status exmat_bodies_step(exmat_body* const* bodies, std::int64_t count, st
   {
     exmat_body* lender = nullptr;  // of this thread: bodies of one model share the scratch that is in its cache
 #pragma omp for schedule(dynamic)
-    for (std::int64_t i = 0; i < count; ++i) {
-      if (!lends(lender, *bodies[i])) lender = bodies[i];
-      advance(*bodies[i], lender->workspace, steps);
-    }
+    for (std::int64_t first = 0; first < count; first += kLanes)
+      advance_group(all.subspan(static_cast<std::size_t>(first),
+                                static_cast<std::size_t>(std::min<std::int64_t>(kLanes, count - first))),
+                    lender, steps);
   }
   exmat_status status = EXMAT_OK;
   const auto failed = std::ranges::find_if(all, [](const exmat_body* body) { return non_finite(*body); });

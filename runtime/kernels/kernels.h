@@ -22,6 +22,7 @@ struct ElementArrays {
   std::ptrdiff_t stride = 0;           ///< padded(r)
   const double* by_mode = nullptr;     ///< panels x r x 9 x kLanes: gradients and forces of a panel at once
   const double* by_element = nullptr;  ///< padded(s) x 9 x stride: stiffness
+  std::ptrdiff_t count = 0;            ///< s
 };
 
 /// Energy of a panel's elements as a function of their displacement gradients H = F - I. Weighted: c_j Psi.
@@ -58,6 +59,24 @@ struct ElementScratch {
 };
 
 inline constexpr std::ptrdiff_t kGemmMultiple = 24;
+
+// kLanes bodies side by side: vectors are r x kLanes, a body in each lane; symmetric matrices the lower triangle of
+// blocks of kLaneBlock x kLaneBlock by rows, each block by rows, a body in each lane. Blocks on the diagonal are whole,
+// only their lower triangles are read. Rows are padded to lane_rows(r).
+inline constexpr std::ptrdiff_t kLaneBlock = 4;
+constexpr std::ptrdiff_t lane_rows(std::ptrdiff_t modes) { return (modes + kLaneBlock - 1) / kLaneBlock * kLaneBlock; }
+/// Doubles of a symmetric matrix of each body.
+constexpr std::ptrdiff_t lane_triangle(std::ptrdiff_t modes) {
+  return lane_rows(modes) * (lane_rows(modes) + kLaneBlock) / 2 * kLanes;
+}
+/// Where the entry of row i and column j <= i is, of the first lane.
+constexpr std::ptrdiff_t lane_entry(std::ptrdiff_t i, std::ptrdiff_t j) {
+  const std::ptrdiff_t row = i / kLaneBlock, column = j / kLaneBlock;
+  return ((row * (row + 1) / 2 + column) * kLaneBlock * kLaneBlock + i % kLaneBlock * kLaneBlock + j % kLaneBlock) *
+         kLanes;
+}
+/// Doubles of scratch of lanes_force_and_stiffness().
+constexpr std::ptrdiff_t lane_scratch(std::ptrdiff_t modes) { return 2 * 9 * lane_rows(modes) * kLanes; }
 
 struct Kernels {
   const char* name;
@@ -96,6 +115,21 @@ struct Kernels {
   /// positions [16 blocks] = rest + basis q in single precision; basis: blocks x r x 16.
   void (*positions)(const float* rest, const float* basis, std::ptrdiff_t blocks, std::ptrdiff_t modes, const float* q,
                     float* positions);
+
+  // Of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies [kLanes].
+  void (*lanes_energy)(const ElementArrays&, const ElementLaw&, const double* q, double* energy);
+  void (*lanes_force)(const ElementArrays&, const ElementLaw&, const double* q, double* energy, double* force);
+  /// scratch: lane_scratch(r).
+  void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
+                                    double* energy, double* force, double* stiffness);
+  /// L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
+  void (*lanes_cholesky)(const double* A, std::ptrdiff_t n, double* L);
+  void (*lanes_cholesky_solve)(const double* L, std::ptrdiff_t n, double* x);
+  /// y = A x, A of each body.
+  void (*lanes_symmetric_product)(const double* A, std::ptrdiff_t n, const double* x, double* y);
+  /// y = A x, the same A [rows x columns] for all, rows `outer` apart.
+  void (*lanes_matrix_product)(const double* A, std::ptrdiff_t rows, std::ptrdiff_t columns, std::ptrdiff_t outer,
+                               const double* x, double* y);
 };
 
 enum class InstructionSet { kPortable, kAvx2, kAvx512 };

@@ -412,6 +412,8 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
   }
 }
 
+#include "runtime/kernels/lanes_isa.inl"
+
 }  // namespace
 
 extern const Kernels EXMAT_SIMD_KERNELS;
@@ -426,6 +428,13 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  cholesky,
                                  cholesky_solve,
                                  gemm,
-                                 positions};
+                                 positions,
+                                 lanes_energy,
+                                 lanes_force,
+                                 lanes_force_and_stiffness,
+                                 lanes_cholesky,
+                                 lanes_cholesky_solve,
+                                 lanes_symmetric_product,
+                                 lanes_matrix_product};
 
 }  // namespace exmat::runtime

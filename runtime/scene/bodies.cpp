@@ -1,6 +1,7 @@
 #include "runtime/scene/bodies.h"
 
 #include <algorithm>
+#include <array>
 #include <omp.h>
 #include <utility>
 
@@ -16,7 +17,7 @@ Bodies::Bodies(const Model& model, StepScene scene, State start, int count, Scen
       reports_(static_cast<std::size_t>(count)),
       threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene_}, {}}) {
   keys_.apply_start(model, scene_);
-  refresh_weights(model, scene_, start_, threads_.front().workspace);
+  refresh_weights(model, scene_, start_, threads_.front().workspace.body(0));
   states_.assign(reports_.size(), start_);
 }
 
@@ -30,26 +31,34 @@ void Bodies::restart() {
   for (State& state : states_) state = start_;
 }
 
-/// The bodies of one thread: a contiguous share, which depends on the number of threads and on nothing else.
+/// The groups of one thread: a contiguous share, which depends on the number of threads and on nothing else.
 void Bodies::step_share(int thread) noexcept {
-  auto& [workspace, measured] = threads_[static_cast<std::size_t>(thread)];
-  const std::size_t first = states_.size() * static_cast<std::size_t>(thread) / threads_.size();
-  const std::size_t last = states_.size() * static_cast<std::size_t>(thread + 1) / threads_.size();
-  for (std::size_t body = first; body < last; ++body) {
-    if (workspace.profile == nullptr) {
-      reports_[body] = runtime::step(model_, scene_, states_[body], workspace);
-      continue;
-    }
-    const Timer timer;
-    reports_[body] = runtime::step(model_, scene_, states_[body], workspace);
-    measured.seconds += timer.seconds();
-    measured.work += step_work(model_, scene_, reports_[body]);
+  const std::size_t size = side_by_side_ ? kLanes : 1, groups = (states_.size() + size - 1) / size;
+  const std::size_t first = groups * static_cast<std::size_t>(thread) / threads_.size();
+  const std::size_t last = groups * static_cast<std::size_t>(thread + 1) / threads_.size();
+  for (std::size_t group = first; group < last; ++group)
+    step_group(group * size, std::min((group + 1) * size, states_.size()), threads_[static_cast<std::size_t>(thread)]);
+}
+
+void Bodies::step_group(std::size_t first, std::size_t last, Thread& thread) noexcept {
+  const Timer timer;
+  if (side_by_side_) {
+    std::array<LaneBody, kLanes> bodies;
+    for (std::size_t body = first; body < last; ++body) bodies[body - first] = {&scene_, &states_[body]};
+    step_side_by_side(model_, {bodies.data(), last - first}, thread.workspace,
+                      std::span(reports_).subspan(first, last - first));
+  } else {
+    reports_[first] = runtime::step(model_, scene_, states_[first], thread.workspace.body(0));
   }
+  if (thread.workspace.body(0).profile == nullptr) return;
+  thread.measured.seconds += timer.seconds();
+  for (std::size_t body = first; body < last; ++body) thread.measured.work += step_work(model_, scene_, reports_[body]);
 }
 
 std::span<const StepReport> Bodies::step() noexcept {
   const int threads = this->threads();
   keys_.apply(model_, states_.front().step, scene_);
+  side_by_side_ = count() >= kFewestLanes && can_step_side_by_side(model_, scene_);
   if (threads == 1) {
     step_share(0);
     return reports_;
@@ -72,7 +81,7 @@ std::uint64_t Bodies::hash() const {
 }
 
 void Bodies::set_profiled(bool profiled) {
-  for (Thread& thread : threads_) thread.workspace.profile = profiled ? &thread.measured.profile : nullptr;
+  for (Thread& thread : threads_) thread.workspace.set_profile(profiled ? &thread.measured.profile : nullptr);
 }
 
 Bodies::Measured Bodies::take_measured() {

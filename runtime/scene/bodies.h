@@ -7,6 +7,7 @@
 
 #include "common/core/fnv_hash.h"
 #include "runtime/scene/step_work.h"
+#include "runtime/sim/lanes/lane_step.h"
 #include "runtime/sim/step/scene_keys.h"
 #include "runtime/sim/step/stepper.h"
 
@@ -15,8 +16,9 @@ namespace exmat::runtime {
 /// Adds the bits of q and v of a body, of a free one also where it is and its momenta.
 void add_to_hash(const Model& model, const State& state, FnvHash& hash);
 
-/// N bodies of one model in one scene, stepped together from the same start. OpenMP over the bodies in fixed shares,
-/// one Workspace for each thread: no body depends on another, nor on the number of threads.
+/// N bodies of one model in one scene, stepped together from the same start: kLanes at a time side by side where that
+/// can be. OpenMP over these groups in fixed shares, scratch for each thread: no body depends on another, nor on the
+/// number of threads.
 class Bodies {
  public:
   /// Refers to the model as long as it lives; count >= 1. The keys change the scene in time. As many threads as OpenMP
@@ -55,10 +57,11 @@ class Bodies {
 
  private:
   struct alignas(128) Thread {  // no cache line of two threads
-    Workspace workspace;
+    LaneWorkspace workspace;
     Measured measured;
   };
   void step_share(int thread) noexcept;
+  void step_group(std::size_t first, std::size_t last, Thread& thread) noexcept;
 
   const Model& model_;
   StepScene scene_;
@@ -67,6 +70,7 @@ class Bodies {
   std::vector<State> states_;
   std::vector<StepReport> reports_;
   std::vector<Thread> threads_;
+  bool side_by_side_ = false;  ///< in this step
 };
 
 }  // namespace exmat::runtime

@@ -188,7 +188,9 @@ EXMAT_API exmat_status exmat_body_step(exmat_body* body, int64_t steps, exmat_re
 
 /* The same for `count` different bodies, of any models, by up to `threads` threads (0: as many as there are
    processors), and never more than there are bodies and processors, or than the system lets start. Each body is stepped
-   by one of them: the results do not depend on their number. EXMAT_NON_FINITE names the first such body; the others
+   by one of them: the results do not depend on their number. Bodies of one model that follow each other are stepped
+   eight at a time, side by side in the lanes of registers: their results are those of exmat_body_step() to rounding, as
+   sums are taken in another order. EXMAT_NON_FINITE names the first such body; the others
    have taken all their steps. */
 EXMAT_API exmat_status exmat_bodies_step(exmat_body* const* bodies, int64_t count, int64_t steps,
                                          int32_t threads) EXMAT_NOEXCEPT;

@@ -84,7 +84,7 @@ ElementPotential::Workspace ElementPotential::make_workspace() const {
 }
 
 ElementArrays ElementPotential::arrays() const noexcept {
-  return {panels(), modes_, padded(modes_), by_mode_.data(), by_element_.data()};
+  return {panels(), modes_, padded(modes_), by_mode_.data(), by_element_.data(), elements_};
 }
 
 double ElementPotential::energy(const ElementLaw& law, const Eigen::VectorXd& x) const noexcept {

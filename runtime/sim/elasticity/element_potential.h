@@ -54,6 +54,18 @@ class ElementPotential {
   void stiffness(const ElementLaw& law, const Eigen::VectorXd& x, Tangent tangent, Workspace& workspace,
                  Eigen::MatrixXd& stiffness) const noexcept;
 
+  /// Of kLanes bodies side by side, by a law of one material: see Kernels.
+  void lanes_energy(const ElementLaw& law, const double* x, double* energy) const noexcept {
+    kernels().lanes_energy(arrays(), law, x, energy);
+  }
+  void lanes_force(const ElementLaw& law, const double* x, double* energy, double* force) const noexcept {
+    kernels().lanes_force(arrays(), law, x, energy, force);
+  }
+  void lanes_force_and_stiffness(const ElementLaw& law, const double* x, double* scratch, double* energy, double* force,
+                                 double* stiffness) const noexcept {
+    kernels().lanes_force_and_stiffness(arrays(), law, x, scratch, energy, force, stiffness);
+  }
+
   /// Floating-point operations: products with B, and half of the symmetric product B^T (D B). docs/step_in_detail.md,
   /// "Inner loops".
   double force_flops() const { return 36.0 * static_cast<double>(elements_ * modes_); }

@@ -62,6 +62,17 @@ class ReducedElasticity {
     return potential_.force_and_stiffness(law(), q, workspace, force, stiffness);
   }
 
+  /// The same of kLanes bodies side by side (kernels.h): energies [kLanes], q and forces [r x kLanes], stiffness of
+  /// lane_triangle(r) doubles; `scratch` lane_scratch(r).
+  void lanes_energy(const double* q, double* energy) const noexcept { potential_.lanes_energy(law(), q, energy); }
+  void lanes_force(const double* q, double* energy, double* force) const noexcept {
+    potential_.lanes_force(law(), q, energy, force);
+  }
+  void lanes_force_and_stiffness(const double* q, double* scratch, double* energy, double* force,
+                                 double* stiffness) const noexcept {
+    potential_.lanes_force_and_stiffness(law(), q, scratch, energy, force, stiffness);
+  }
+
  private:
   ElementLaw law() const noexcept;
 

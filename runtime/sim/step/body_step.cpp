@@ -148,13 +148,16 @@ void BodyStep::begin(bool touches_others) noexcept {
 
 bool BodyStep::prepare() noexcept {
   choose_first_iterate(scene_, state_, potential_, workspace_, report_);
-  if (!workspace_.q.allFinite()) return false;
-  if (runs_examples(scene_)) {
-    update_targets(model_, scene_, state_, workspace_.q, workspace_, report_);
-    if (report_.status & kStepNonFinite) return false;
-    prepare_example_forces(scene_, workspace_);
-  }
+  if (!workspace_.q.allFinite() || !find_targets()) return false;
   potential_.prepare();
+  return true;
+}
+
+bool BodyStep::find_targets() noexcept {
+  if (!runs_examples(scene_)) return true;
+  update_targets(model_, scene_, state_, workspace_.q, workspace_, report_);
+  if (report_.status & kStepNonFinite) return false;
+  prepare_example_forces(scene_, workspace_);
   return true;
 }
 

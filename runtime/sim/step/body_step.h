@@ -21,6 +21,12 @@ class BodyStep {
   /// The first iterate, targets and example forces. False where numbers are not finite.
   bool prepare() noexcept;
 
+  /// Targets and example forces alone, at the first iterate in the workspace. False where numbers are not finite.
+  bool find_targets() noexcept;
+
+  /// Whether it is one near obstacles or bodies, after begin().
+  bool is_near() const noexcept { return near_; }
+
   /// prepare() and Newton's method; q at the end of the step into the workspace.
   NewtonReport solve() noexcept;
 

@@ -10,7 +10,6 @@ namespace {
 
 constexpr double kSmallRatio = 0.1;  // of inertia: beyond it a factorisation costs less than the terms of a series
 constexpr double kGyroscopicError = 1e-5;  // of a direction, by the terms that are left out
-constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();  // of trace(K) |q|
 
 bool has_skew_forces(const Model& model, const StepScene& scene) noexcept {
   for (std::size_t i = 0; i < scene.examples.size(); ++i)

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <limits>
 
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/step/state.h"
@@ -41,6 +42,11 @@ class IncrementalPotential {
 
   /// E at the last evaluate().
   double elastic_energy() const noexcept { return elastic_energy_; }
+  /// Of a solution that was found elsewhere.
+  void set_elastic_energy(double energy) noexcept { elastic_energy_ = energy; }
+
+  /// Of internal forces, over trace(K) |q|.
+  static constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();
 
   double tolerance() const noexcept { return scene_.newton.tolerance; }
 

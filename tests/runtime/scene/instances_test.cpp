@@ -76,7 +76,9 @@ TEST_P(InstancesTest, StatesAreTheSameWithOneThreadAndTwoAfterTenThousandSteps) 
 
 TEST_P(InstancesTest, ThreadsMayOutnumberCores) { EXPECT_EQ(hash_after(50, 1), hash_after(50, kBodies)); }
 
+// By cubature side by side, where sums have another order: 1e-13 of a step, 50 of which follow each other.
 TEST_P(InstancesTest, EachBodyMovesAsIfAlone) {
+  const double rounding = can_step_side_by_side(*model_, scene_) ? 50 * 1e-13 : 0;
   const ThreadCount limited(2);
   Bodies bodies = make_bodies();
   push(bodies, scene_);
@@ -87,10 +89,10 @@ TEST_P(InstancesTest, EachBodyMovesAsIfAlone) {
     refresh_weights(*model_, scene_, alone, workspace);
     alone.applied_force = bodies[body].applied_force;
     for (int i = 0; i < 50; ++i) step(*model_, scene_, alone, workspace);
-    EXPECT_EQ(alone.q, bodies[body].q) << body;
-    EXPECT_EQ(alone.v, bodies[body].v) << body;
+    EXPECT_LE((alone.q - bodies[body].q).norm(), rounding * alone.q.norm()) << body;
+    EXPECT_LE((alone.v - bodies[body].v).norm(), rounding * alone.v.norm()) << body;
     if (!scene_.examples.empty()) {
-      EXPECT_EQ(alone.examples[0].weights, bodies[body].examples[0].weights) << body;
+      EXPECT_LE((alone.examples[0].weights - bodies[body].examples[0].weights).norm(), rounding) << body;
     }
     if (body > 0) {
       EXPECT_NE(bodies[body].q, bodies[body - 1].q);

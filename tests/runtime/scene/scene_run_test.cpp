@@ -401,10 +401,12 @@ TEST_F(SceneRunTest, TheTrajectoryOfManyBodiesIsThatOfTheFirst) {
   }
   const RunSummary& one = summaries[1];
   const RunSummary& many = summaries[7];
-  EXPECT_EQ(reduced[7], reduced[1]);
+  ASSERT_EQ(reduced[7].size(), reduced[1].size());
+  const double rounding = one.steps * 1e-13;  // seven step side by side, where sums have another order
+  for (std::size_t i = 0; i < reduced[1].size(); ++i) EXPECT_NEAR(reduced[7][i], reduced[1][i], rounding) << i;
   EXPECT_EQ(many.bodies, 7);
   EXPECT_EQ(many.steps, one.steps) << "of each body";
-  EXPECT_EQ(many.energies.elastic, one.energies.elastic);
+  EXPECT_NEAR(many.energies.elastic, one.energies.elastic, rounding * one.energies.elastic);
   EXPECT_EQ(many.newton_iterations.mean(), one.newton_iterations.mean());
   EXPECT_NE(many.state_hash, one.state_hash);
   EXPECT_GT((*many.stage_seconds)[static_cast<std::size_t>(Stage::kOutput)].mean(), 0);

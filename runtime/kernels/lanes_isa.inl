@@ -1,0 +1,358 @@
+// Part of kernels_isa.inl, which includes this file: kLanes bodies of one model side by side, a number of each in each
+// lane. Constants of the model are read once for all of them, and nothing is summed across lanes: a body's numbers do
+// not depend on the others'. One register's bodies at a time, at their first lane.
+
+constexpr Index kBlock = kLaneBlock;
+constexpr Index kBlockNumbers = kBlock * kBlock * kLanes;
+constexpr Index kBlockColumns = kWidth == 8 ? kBlock : 2;  // what the registers hold at once
+
+inline Index block_start(Index row, Index column) { return (row * (row + 1) / 2 + column) * kBlockNumbers; }
+inline Index in_block(Index m, Index n) { return (m * kBlock + n) * kLanes; }
+
+/// H = B q of one element.
+inline void lanes_gradient(const double* B, Index stride, Index modes, const double* q, Vec* H) {
+  for (Index i = 0; i < 9; ++i) H[i] = zero();
+  for (Index c = 0; c < modes; ++c) {
+    const Vec x = load(q + c * kLanes);
+#pragma GCC unroll 9
+    for (Index i = 0; i < 9; ++i) H[i] += x * B[i * stride + c];
+  }
+}
+
+/// force += B^T P of one element.
+inline void lanes_add_force(const double* B, Index stride, Index modes, const Vec* P, double* force) {
+  for (Index c = 0; c < modes; ++c) {
+    Vec even = load(force + c * kLanes), odd = zero();
+#pragma GCC unroll 4
+    for (Index i = 0; i < 8; i += 2) {
+      even += P[i] * B[i * stride + c];
+      odd += P[i + 1] * B[(i + 1) * stride + c];
+    }
+    store(force + c * kLanes, even + odd + P[8] * B[8 * stride + c]);
+  }
+}
+
+/// product [9 x rows x kLanes] = D B of one element, the first `modes` columns.
+inline void lanes_tangent_product(const double* tangent, const double* B, Index stride, Index modes, Index rows,
+                                  double* product) {
+#pragma GCC unroll 9
+  for (Index i = 0; i < 9; ++i) {
+    Vec D[9];
+#pragma GCC unroll 9
+    for (Index k = 0; k < 9; ++k) D[k] = load(tangent + triangle_entry<9>(i, k) * kLanes);
+    for (Index c = 0; c < modes; ++c) {
+      Vec even = D[0] * B[c], odd = D[1] * B[stride + c];
+#pragma GCC unroll 7
+      for (Index k = 2; k < 9; ++k) (k % 2 == 0 ? even : odd) += D[k] * B[k * stride + c];
+      store(product + (i * rows + c) * kLanes, even + odd);
+    }
+  }
+}
+
+/// kBlockColumns columns, from `first` on, of a block of the stiffness += B^T (D B) over `depth` rows, those of B
+/// `stride` and those of D B `rows` numbers apart; only the first `count` rows of the block, of a diagonal one the
+/// lower triangle.
+template <bool diagonal, Index count, Index first>
+inline void lanes_add_columns(const double* B, Index stride, const double* product, Index rows, Index depth,
+                              double* block) {
+  constexpr auto wanted = [](Index m, Index n) { return !diagonal || first + n <= m; };
+  Vec sums[count][kBlockColumns];
+#pragma GCC unroll 4
+  for (Index m = 0; m < count; ++m)
+#pragma GCC unroll 4
+    for (Index n = 0; n < kBlockColumns; ++n)
+      if (wanted(m, n)) sums[m][n] = load(block + in_block(m, first + n));
+  for (Index k = 0; k < depth; ++k) {
+    Vec right[kBlockColumns];
+#pragma GCC unroll 4
+    for (Index n = 0; n < kBlockColumns; ++n)
+      if (wanted(count - 1, n)) right[n] = load(product + (k * rows + first + n) * kLanes);
+#pragma GCC unroll 4
+    for (Index m = 0; m < count; ++m) {
+      const double left = B[k * stride + m];
+#pragma GCC unroll 4
+      for (Index n = 0; n < kBlockColumns; ++n)
+        if (wanted(m, n)) sums[m][n] += right[n] * left;
+    }
+  }
+#pragma GCC unroll 4
+  for (Index m = 0; m < count; ++m)
+#pragma GCC unroll 4
+    for (Index n = 0; n < kBlockColumns; ++n)
+      if (wanted(m, n)) store(block + in_block(m, first + n), sums[m][n]);
+}
+
+template <bool diagonal, Index count>
+inline void lanes_add_block(const double* B, Index stride, const double* product, Index rows, Index depth,
+                            double* block) {
+  lanes_add_columns<diagonal, count, 0>(B, stride, product, rows, depth, block);
+  if constexpr (kBlockColumns < kBlock && (!diagonal || count > kBlockColumns))
+    lanes_add_columns<diagonal, count, kBlock - kBlockColumns>(B, stride, product, rows, depth, block);
+}
+
+/// One row of blocks of the stiffness, `count` rows of it.
+template <Index count>
+inline void lanes_add_row(const double* B, Index stride, const double* product, Index rows, Index depth, Index row,
+                          double* stiffness) {
+  for (Index column = 0; column < row; ++column)
+    lanes_add_block<false, count>(B, stride, product + kBlock * column * kLanes, rows, depth,
+                                  stiffness + block_start(row, column));
+  lanes_add_block<true, count>(B, stride, product + kBlock * row * kLanes, rows, depth,
+                               stiffness + block_start(row, row));
+}
+
+/// Stiffness += B^T (D B) over `depth` rows.
+inline void lanes_add_stiffness(const double* B, Index stride, const double* product, Index modes, Index depth,
+                                double* stiffness) {
+  const Index rows = lane_rows(modes), whole = modes / kBlock;
+  for (Index row = 0; row < whole; ++row)
+    lanes_add_row<kBlock>(B + kBlock * row, stride, product, rows, depth, row, stiffness);
+  const double* const last = B + kBlock * whole;
+  if (modes % kBlock == 1) lanes_add_row<1>(last, stride, product, rows, depth, whole, stiffness);
+  if (modes % kBlock == 2) lanes_add_row<2>(last, stride, product, rows, depth, whole, stiffness);
+  if (modes % kBlock == 3) lanes_add_row<3>(last, stride, product, rows, depth, whole, stiffness);
+}
+
+inline void lanes_clear(double* numbers, Index count) {
+  for (Index i = 0; i < count; ++i) store(numbers + i * kLanes, zero());
+}
+
+constexpr Index kElementsAtOnce = 2;  // their B and D B stay in the first-level cache
+
+/// `product` [kElementsAtOnce x 9 x rows x kLanes].
+template <Want want, class Law>
+inline void lanes_evaluate(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
+                           double* energy, double* force, double* stiffness) {
+  alignas(kAlignment) double tangent[kTangentNumbers * kLanes];
+  const Index stride = elements.stride, rows = lane_rows(elements.modes);
+  Vec total = zero();
+  if constexpr (want != Want::kEnergy) lanes_clear(force, elements.modes);
+  if constexpr (want == Want::kStiffness) lanes_clear(stiffness, lane_triangle(elements.modes) / kLanes);
+  for (Index first = 0; first < elements.count; first += kElementsAtOnce) {
+    const Index count = elements.count - first < kElementsAtOnce ? elements.count - first : kElementsAtOnce;
+    const double* const block = elements.by_element + first * 9 * stride;
+    for (Index e = 0; e < count; ++e) {
+      const double* const B = block + e * 9 * stride;
+      Vec H[9], P[9];
+      lanes_gradient(B, stride, elements.modes, q, H);
+      clear_result<want>(P, tangent);
+      const Law material{zero() + law.mu[first + e], zero() + law.lambda[first + e]};
+      total += material.template evaluate<want>(H, P, tangent);
+      if constexpr (want != Want::kEnergy) lanes_add_force(B, stride, elements.modes, P, force);
+      if constexpr (want == Want::kStiffness)
+        lanes_tangent_product(tangent, B, stride, elements.modes, rows, product + e * 9 * rows * kLanes);
+    }
+    if constexpr (want == Want::kStiffness)
+      lanes_add_stiffness(block, stride, product, elements.modes, 9 * count, stiffness);
+  }
+  store(energy, total);
+}
+
+template <Want want>
+inline void lanes_evaluate_parts(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
+                                 double* energy, double* force, double* stiffness) {
+  for (Index at = 0; at < kLanes; at += kWidth) {
+    const auto work = [&]<class Law>() {
+      lanes_evaluate<want, Law>(elements, law, q + at, product, energy + at, force + at, stiffness + at);
+    };
+    switch (law.kind) {
+      case ElementLaw::Kind::kStableNeoHookean:
+        work.template operator()<StableNeoHookean>();
+        break;
+      case ElementLaw::Kind::kCorotational:
+        work.template operator()<Corotational>();
+        break;
+      default:
+        work.template operator()<StVenantKirchhoff>();
+    }
+  }
+}
+
+void lanes_energy(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy) {
+  double none[kLanes];
+  lanes_evaluate_parts<Want::kEnergy>(elements, law, q, none, energy, none, none);
+}
+
+void lanes_force(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy, double* force) {
+  double none[kLanes];
+  lanes_evaluate_parts<Want::kForce>(elements, law, q, none, energy, force, none);
+}
+
+void lanes_force_and_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
+                               double* energy, double* force, double* stiffness) {
+  lanes_evaluate_parts<Want::kStiffness>(elements, law, q, product, energy, force, stiffness);
+}
+
+/// block -= left right^T of two blocks of a factor.
+inline void lanes_subtract(const double* left, const double* right, double* block) {
+#pragma GCC unroll 2
+  for (Index first = 0; first < kBlock; first += kBlockColumns) {
+    Vec sums[kBlock][kBlockColumns];
+#pragma GCC unroll 4
+    for (Index m = 0; m < kBlock; ++m)
+#pragma GCC unroll 4
+      for (Index n = 0; n < kBlockColumns; ++n) sums[m][n] = load(block + in_block(m, first + n));
+#pragma GCC unroll 4
+    for (Index k = 0; k < kBlock; ++k) {
+      Vec r[kBlockColumns];
+#pragma GCC unroll 4
+      for (Index n = 0; n < kBlockColumns; ++n) r[n] = load(right + in_block(first + n, k));
+#pragma GCC unroll 4
+      for (Index m = 0; m < kBlock; ++m) {
+        const Vec l = load(left + in_block(m, k));
+#pragma GCC unroll 4
+        for (Index n = 0; n < kBlockColumns; ++n) sums[m][n] -= l * r[n];
+      }
+    }
+#pragma GCC unroll 4
+    for (Index m = 0; m < kBlock; ++m)
+#pragma GCC unroll 4
+      for (Index n = 0; n < kBlockColumns; ++n) store(block + in_block(m, first + n), sums[m][n]);
+  }
+}
+
+/// Factor of a diagonal block, the diagonal its inverse; only `count` rows are there. Lanes that fail become NaN.
+inline void lanes_factor_block(double* block, Index count) {
+  for (Index j = 0; j < count; ++j) {
+    Vec pivot = load(block + in_block(j, j));
+    pivot = select(pivot > 0.0, pivot, zero() + __builtin_nan(""));
+    const Vec inverse = 1.0 / square_root(pivot);
+    store(block + in_block(j, j), inverse);
+    for (Index i = j + 1; i < count; ++i) store(block + in_block(i, j), load(block + in_block(i, j)) * inverse);
+    for (Index k = j + 1; k < count; ++k) {
+      const Vec right = load(block + in_block(k, j));
+      for (Index i = k; i < count; ++i)
+        store(block + in_block(i, k), load(block + in_block(i, k)) - load(block + in_block(i, j)) * right);
+    }
+  }
+}
+
+/// block <- block L^-T of the factored diagonal block L.
+inline void lanes_solve_block(const double* L, double* block) {
+  Vec b[kBlock][kBlock];
+#pragma GCC unroll 4
+  for (Index m = 0; m < kBlock; ++m)
+#pragma GCC unroll 4
+    for (Index n = 0; n < kBlock; ++n) b[m][n] = load(block + in_block(m, n));
+#pragma GCC unroll 4
+  for (Index j = 0; j < kBlock; ++j) {
+    const Vec inverse = load(L + in_block(j, j));
+#pragma GCC unroll 4
+    for (Index m = 0; m < kBlock; ++m) b[m][j] *= inverse;
+#pragma GCC unroll 4
+    for (Index k = j + 1; k < kBlock; ++k) {
+      const Vec l = load(L + in_block(k, j));
+#pragma GCC unroll 4
+      for (Index m = 0; m < kBlock; ++m) b[m][k] -= b[m][j] * l;
+    }
+  }
+#pragma GCC unroll 4
+  for (Index m = 0; m < kBlock; ++m)
+#pragma GCC unroll 4
+    for (Index n = 0; n < kBlock; ++n) store(block + in_block(m, n), b[m][n]);
+}
+
+void lanes_cholesky(const double* A, Index n, double* L) {
+  const Index blocks = lane_rows(n) / kBlock;
+  for (Index i = 0; i < lane_triangle(n); i += kWidth) store(L + i, load(A + i));
+  for (Index at = 0; at < kLanes; at += kWidth)
+    for (Index column = 0; column < blocks; ++column)
+      for (Index row = column; row < blocks; ++row) {
+        double* const block = L + block_start(row, column) + at;
+        for (Index k = 0; k < column; ++k)
+          lanes_subtract(L + block_start(row, k) + at, L + block_start(column, k) + at, block);
+        if (row > column)
+          lanes_solve_block(L + block_start(column, column) + at, block);
+        else
+          lanes_factor_block(block, n - kBlock * row < kBlock ? n - kBlock * row : kBlock);
+      }
+}
+
+void lanes_cholesky_solve(const double* L, Index n, double* x) {
+  const Index blocks = lane_rows(n) / kBlock;
+  for (Index at = 0; at < kLanes; at += kWidth) {
+    double* const own = x + at;
+    for (Index row = 0; row < blocks; ++row) {
+      const Index count = n - kBlock * row < kBlock ? n - kBlock * row : kBlock;
+      Vec here[kBlock];
+      for (Index m = 0; m < count; ++m) here[m] = load(own + (kBlock * row + m) * kLanes);
+      for (Index column = 0; column < row; ++column) {
+        const double* const block = L + block_start(row, column) + at;
+        for (Index k = 0; k < kBlock; ++k) {
+          const Vec known = load(own + (kBlock * column + k) * kLanes);
+          for (Index m = 0; m < count; ++m) here[m] -= load(block + in_block(m, k)) * known;
+        }
+      }
+      const double* const block = L + block_start(row, row) + at;
+      for (Index m = 0; m < count; ++m) {
+        for (Index k = 0; k < m; ++k) here[m] -= load(block + in_block(m, k)) * here[k];
+        here[m] *= load(block + in_block(m, m));
+        store(own + (kBlock * row + m) * kLanes, here[m]);
+      }
+    }
+    for (Index row = blocks - 1; row >= 0; --row) {
+      const Index count = n - kBlock * row < kBlock ? n - kBlock * row : kBlock;
+      Vec here[kBlock];
+      for (Index m = 0; m < count; ++m) here[m] = load(own + (kBlock * row + m) * kLanes);
+      for (Index below = row + 1; below < blocks; ++below) {
+        const double* const block = L + block_start(below, row) + at;
+        const Index known_count = n - kBlock * below < kBlock ? n - kBlock * below : kBlock;
+        for (Index k = 0; k < known_count; ++k) {
+          const Vec known = load(own + (kBlock * below + k) * kLanes);
+          for (Index m = 0; m < count; ++m) here[m] -= load(block + in_block(k, m)) * known;
+        }
+      }
+      const double* const block = L + block_start(row, row) + at;
+      for (Index m = count - 1; m >= 0; --m) {
+        for (Index k = m + 1; k < count; ++k) here[m] -= load(block + in_block(k, m)) * here[k];
+        here[m] *= load(block + in_block(m, m));
+        store(own + (kBlock * row + m) * kLanes, here[m]);
+      }
+    }
+  }
+}
+
+void lanes_symmetric_product(const double* A, Index n, const double* x, double* y) {
+  const Index blocks = lane_rows(n) / kBlock;
+  lanes_clear(y, n);
+  for (Index at = 0; at < kLanes; at += kWidth)
+    for (Index row = 0; row < blocks; ++row) {
+      const Index count = n - kBlock * row < kBlock ? n - kBlock * row : kBlock;
+      for (Index m = 0; m < count; ++m) {
+        const Index i = kBlock * row + m;
+        const Vec here = load(x + i * kLanes + at);
+        Vec sum = load(y + i * kLanes + at);
+        for (Index column = 0; column < row; ++column) {
+          const double* const block = A + block_start(row, column) + at;
+          for (Index k = 0; k < kBlock; ++k) {
+            const Index j = kBlock * column + k;
+            const Vec a = load(block + in_block(m, k));
+            sum += a * load(x + j * kLanes + at);
+            store(y + j * kLanes + at, load(y + j * kLanes + at) + a * here);
+          }
+        }
+        const double* const block = A + block_start(row, row) + at;
+        for (Index k = 0; k < m; ++k) {
+          const Index j = kBlock * row + k;
+          const Vec a = load(block + in_block(m, k));
+          sum += a * load(x + j * kLanes + at);
+          store(y + j * kLanes + at, load(y + j * kLanes + at) + a * here);
+        }
+        store(y + i * kLanes + at, sum + load(block + in_block(m, m)) * here);
+      }
+    }
+}
+
+void lanes_matrix_product(const double* A, Index rows, Index columns, Index outer, const double* x, double* y) {
+  for (Index at = 0; at < kLanes; at += kWidth)
+    for (Index i = 0; i < rows; ++i) {
+      Vec even = zero(), odd = zero();
+      Index c = 0;
+      for (; c + 1 < columns; c += 2) {
+        even += load(x + c * kLanes + at) * A[i * outer + c];
+        odd += load(x + (c + 1) * kLanes + at) * A[i * outer + c + 1];
+      }
+      if (c < columns) even += load(x + c * kLanes + at) * A[i * outer + c];
+      store(y + i * kLanes + at, even + odd);
+    }
+}

@@ -1,0 +1,242 @@
+#include "runtime/sim/lanes/lane_step.h"
+
+#include <Eigen/Geometry>
+#include <gtest/gtest.h>
+#include <vector>
+
+#include "tests/support/allocation_counter.h"
+#include "tests/support/random.h"
+#include "tests/support/scenes.h"
+
+// Steps of bodies side by side against the steps of the same bodies one by one.
+
+namespace exmat::runtime {
+namespace {
+
+using test::Bar;
+using test::BarOptions;
+
+/// Bodies of one model, each in its own pose, under loads and settings of its own.
+struct Crowd {
+  std::vector<StepScene> scenes;
+  std::vector<State> states;
+
+  std::vector<LaneBody> bodies() {
+    std::vector<LaneBody> found;
+    for (std::size_t i = 0; i < states.size(); ++i) found.push_back({&scenes[i], &states[i]});
+    return found;
+  }
+};
+
+struct Kind {
+  BarOptions bar;
+  ModelOptions model;
+  Integrator integrator = Integrator::kBdf2;
+  double tolerance = 1e-11;
+};
+
+Eigen::VectorXd pose(const Bar& bar, double amplitude, std::uint32_t seed) {
+  Eigen::VectorXd q = test::random_vector(bar.modes(), seed);
+  for (Eigen::Index i = 0; i < q.size(); ++i) q[i] /= static_cast<double>((i + 1) * (i + 1));
+  return amplitude * bar.length / (bar.basis() * q).lpNorm<Eigen::Infinity>() * q;
+}
+
+Crowd make_crowd(const Bar& bar, const Model& model, const Kind& kind, std::size_t count) {
+  Crowd crowd;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double share = static_cast<double>(i + 1) / static_cast<double>(count);
+    StepScene scene = free_scene(model, kind.integrator, 0.002);
+    scene.newton.tolerance = kind.tolerance;
+    scene.mass_damping = 0.3 * share;
+    scene.stiffness_damping = i % 3 == 0 ? 0 : 0.002;
+    scene.gravity = Eigen::Vector3d(0.5 - share, -2 * share, 1);
+    scene.gravity_force = gravity_force(model, scene.gravity);
+    if (!model.examples.empty()) {
+      scene.examples = {ExampleSettings{300 * share, 2, 0.5 + 0.5 * share}};
+      if (i % 4 == 3) scene.examples.front().given_weights = Eigen::Vector3d(0.2, 0.5, 0.3);
+    }
+    const auto seed = static_cast<std::uint32_t>(i);
+    const Eigen::VectorXd q = pose(bar, 0.1 * share, seed);
+    State state = make_state(model, q, 5 * pose(bar, 0.1, seed + 100));
+    Workspace workspace(model, scene);
+    state.elastic_energy = model.internal_force.energy(q, workspace.elasticity);
+    FrameMotion motion;
+    motion.position = Eigen::Vector3d(1, 2, 3);
+    motion.linear_velocity = Eigen::Vector3d(1, -2, 0.5);
+    motion.angular_velocity = 4 * share * Eigen::Vector3d(0.3, 0.9, 0.2);
+    set_motion(model, motion, state);
+    crowd.scenes.push_back(scene);
+    crowd.states.push_back(state);
+  }
+  return crowd;
+}
+
+void step_each(const Model& model, Crowd& crowd, std::vector<StepReport>& reports) {
+  Workspace workspace(model, crowd.scenes.front());
+  for (std::size_t i = 0; i < crowd.states.size(); ++i)
+    reports[i] = step(model, crowd.scenes[i], crowd.states[i], workspace);
+}
+
+double difference(const Model& model, const State& a, const State& b) {
+  const auto of_frame = [&](const State& state) -> Eigen::VectorXd { return model.frame->coordinates(state.frame); };
+  const Eigen::VectorXd own = of_frame(a), others = of_frame(b);
+  double frame = own.size() == 0 ? 0 : (own - others).norm() / (1 + own.norm());
+  return std::max({(a.q - b.q).norm() / a.q.norm(), (a.v - b.v).norm() / (a.v.norm() + a.q.norm()), frame});
+}
+
+std::vector<std::pair<std::string, Kind>> kinds() {
+  std::vector<std::pair<std::string, Kind>> found;
+  for (const bool free : {false, true}) {
+    const std::string name = free ? "free" : "clamped";
+    found.push_back({name, {.bar = {.free = free}}});
+    found.push_back({name + "_newmark", {.bar = {.free = free}, .integrator = Integrator::kNewmark}});
+    found.push_back({name + "_euler", {.bar = {.free = free}, .integrator = Integrator::kBackwardEuler}});
+    found.push_back({name + "_examples", {.bar = {.free = free, .examples = 3}}});
+    found.push_back({name + "_table", {.bar = {.free = free, .examples = 3}, .model = {.target_table = true}}});
+    found.push_back({name + "_neo_hookean", {.bar = {.material = MaterialModel::kStableNeoHookean, .free = free}}});
+    found.push_back({name + "_corotational", {.bar = {.material = MaterialModel::kCorotational, .free = free}}});
+  }
+  return found;
+}
+
+// 1,000 steps of 10 bodies: a full group, and two that are too few. Newton's tolerance is near rounding; what remains
+// is the order of sums.
+TEST(LaneStep, MovesBodiesAsOneByOne) {
+  for (const auto& [name, kind] : kinds()) {
+    const Bar bar = full_bar(kind.bar);
+    const auto model = prepared(bar, kind.model);
+    Crowd lanes = make_crowd(bar, *model, kind, 10), each = lanes;
+    ASSERT_TRUE(can_step_side_by_side(*model, lanes.scenes.front()));
+    LaneWorkspace workspace(*model, lanes.scenes.front());
+    std::vector<StepReport> reports(10), expected(10);
+    int iterations = 0, factorisations = 0;
+    for (int n = 0; n < 1000; ++n) {
+      const auto bodies = lanes.bodies();
+      step_side_by_side(*model, std::span(bodies).first(8), workspace, std::span(reports).first(8));
+      step_side_by_side(*model, std::span(bodies).last(2), workspace, std::span(reports).last(2));
+      step_each(*model, each, expected);
+      for (std::size_t i = 0; i < 10; ++i) {
+        ASSERT_EQ(reports[i].status & ~kStepStagnated, 0U) << name << ", body " << i << ", step " << n;
+        iterations += reports[i].newton_iterations - expected[i].newton_iterations;
+        factorisations += reports[i].factorisations - expected[i].factorisations;
+      }
+    }
+    for (std::size_t i = 0; i < 10; ++i) {
+      EXPECT_LE(difference(*model, each.states[i], lanes.states[i]), i < 8 ? 1e-10 : 0) << name << ", body " << i;
+      EXPECT_NEAR(lanes.states[i].elastic_energy, each.states[i].elastic_energy, 1e-9 * each.states[i].elastic_energy);
+      EXPECT_GT(lanes.states[i].q.norm(), 1e-3 * bar.length) << name << ": it does not move";
+    }
+    // The same work, but for residuals that rounding lets pass or not.
+    EXPECT_LE(std::abs(iterations), 200) << name;
+    EXPECT_LE(std::abs(factorisations), 100) << name;
+  }
+}
+
+TEST(LaneStep, NoBodyDependsOnTheOthers) {
+  const Kind kind{.bar = {.free = true, .examples = 3}};
+  const Bar bar = test::make_bar(kind.bar);
+  const auto model = prepared(bar);
+  const Crowd crowd = make_crowd(bar, *model, kind, 8);
+  Crowd all = crowd;
+  LaneWorkspace workspace(*model, crowd.scenes.front());
+  std::vector<StepReport> reports(8);
+  for (int n = 0; n < 50; ++n) step_side_by_side(*model, all.bodies(), workspace, reports);
+  // Five of them, in another order.
+  const std::array<std::size_t, 5> chosen{6, 0, 7, 3, 2};
+  Crowd few;
+  for (const std::size_t i : chosen) {
+    few.scenes.push_back(crowd.scenes[i]);
+    few.states.push_back(crowd.states[i]);
+  }
+  for (int n = 0; n < 50; ++n) step_side_by_side(*model, few.bodies(), workspace, std::span(reports).first(5));
+  for (std::size_t k = 0; k < chosen.size(); ++k)
+    EXPECT_EQ(difference(*model, all.states[chosen[k]], few.states[k]), 0) << k;
+}
+
+// What Newton's method needs more for: a body pushed flat so that Hessians are indefinite, and one without a number.
+TEST(LaneStep, ABodyThatNeedsMoreStepsByItself) {
+  const Kind kind{.tolerance = 1e-9};
+  const Bar bar = test::make_bar();
+  const auto model = prepared(bar);
+  Crowd lanes = make_crowd(bar, *model, kind, 6);
+  for (StepScene& scene : lanes.scenes) scene.time_step = 0.02;
+  lanes.states[2].q = pose(bar, 3, 7);
+  lanes.states[2].elastic_energy = model->internal_force.cubature().energy(lanes.states[2].q);
+  lanes.states[4].v.setConstant(std::numeric_limits<double>::infinity());
+  Crowd each = lanes;
+  LaneWorkspace workspace(*model, lanes.scenes.front());
+  std::vector<StepReport> reports(6), expected(6);
+  int harder = 0;
+  for (int n = 0; n < 30; ++n) {
+    step_side_by_side(*model, lanes.bodies(), workspace, reports);
+    step_each(*model, each, expected);
+    harder += expected[2].projections + expected[2].line_search_evaluations;
+    EXPECT_EQ(reports[4].status, kStepNonFinite);
+  }
+  EXPECT_GT(harder, 0);
+  for (const std::size_t i : {0U, 1U, 2U, 3U, 5U})
+    EXPECT_LE(difference(*model, each.states[i], lanes.states[i]), 1e-7) << i;
+}
+
+// Near an obstacle each has the bits of its own step.
+TEST(LaneStep, BodiesNearObstaclesStepByThemselves) {
+  Bar bar = test::make_bar({.free = true});
+  bar.model.contact = test::surface_contact(bar.model);
+  const auto model = prepared(bar);
+  const Kind kind{};
+  Crowd lanes = make_crowd(bar, *model, kind, 8);
+  for (StepScene& scene : lanes.scenes) {
+    Obstacle floor;
+    floor.shape = Plane{Eigen::Vector3d(0, 0, 0), Eigen::Vector3d::UnitZ()};
+    floor.stiffness = 1e6;
+    scene.obstacles = {floor};
+    scene.gravity = Eigen::Vector3d(0, 0, -9.81);
+    scene.gravity_force = gravity_force(*model, scene.gravity);
+  }
+  for (State& state : lanes.states) {
+    FrameMotion motion = model->frame->motion(state.frame);
+    motion.position[2] = 0.05;
+    set_motion(*model, motion, state);
+    prepare_contacts(*model, 1, state);
+  }
+  Crowd each = lanes;
+  LaneWorkspace workspace(*model, lanes.scenes.front());
+  std::vector<StepReport> reports(8), expected(8);
+  int contacts = 0;
+  for (int n = 0; n < 40; ++n) {
+    step_side_by_side(*model, lanes.bodies(), workspace, reports);
+    step_each(*model, each, expected);
+    for (std::size_t i = 0; i < 8; ++i) contacts += expected[i].contacts;
+  }
+  EXPECT_GT(contacts, 0);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_LE(difference(*model, each.states[i], lanes.states[i]), 1e-9) << i;
+}
+
+TEST(LaneStep, IsForWhatItKnows) {
+  const Bar bar = full_bar({.density_gradient = 2, .examples = 3});
+  const auto cubature = prepared(bar), polynomial = prepared(bar, {.polynomial = true});
+  StepScene scene = free_scene(*cubature, Integrator::kBdf2, 0.01);
+  EXPECT_TRUE(can_step_side_by_side(*cubature, scene));
+  EXPECT_FALSE(can_step_side_by_side(*polynomial, scene));
+  scene.examples = {ExampleSettings{100, 0, 1}};
+  EXPECT_FALSE(can_step_side_by_side(*cubature, scene)) << "the filter is not symmetric";
+  scene.examples = {ExampleSettings{0, 0, 1}};
+  EXPECT_TRUE(can_step_side_by_side(*cubature, scene)) << "it does not act";
+}
+
+TEST(LaneStep, AllocatesNothing) {
+  const Kind kind{.bar = {.free = true, .examples = 3}};
+  const Bar bar = test::make_bar(kind.bar);
+  const auto model = prepared(bar);
+  Crowd crowd = make_crowd(bar, *model, kind, 8);
+  const auto bodies = crowd.bodies();
+  LaneWorkspace workspace(*model, crowd.scenes.front());
+  std::vector<StepReport> reports(8);
+  step_side_by_side(*model, bodies, workspace, reports);
+  const test::AllocationCounter allocations;
+  for (int n = 0; n < 20; ++n) step_side_by_side(*model, bodies, workspace, reports);
+  EXPECT_EQ(allocations.count(), 0);
+}
+
+}  // namespace
+}  // namespace exmat::runtime
