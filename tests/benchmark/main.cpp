@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   benchmarks::register_steps();
   benchmarks::register_free_bodies();
   benchmarks::register_sizes();
-  benchmarks::register_instances();
+  benchmarks::register_crowds();
   benchmarks::register_worlds();
   ::benchmark::RunSpecifiedBenchmarks();
   ::benchmark::Shutdown();

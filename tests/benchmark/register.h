@@ -11,7 +11,7 @@ void register_kernels();
 void register_steps();
 void register_free_bodies();
 void register_sizes();
-void register_instances();
+void register_crowds();
 void register_worlds();
 
 /// A benchmark whose inputs are made when it runs, not when it is registered.

@@ -13,6 +13,7 @@ from pathlib import Path
 
 SETS = ("avx512", "avx2", "portable")  # the fastest first; the first one that the machine has runs everything
 REPETITIONS = 5
+WORLD_REPETITIONS = CROWD_REPETITIONS = 3
 KERNELS = {
     "force_and_stiffness": "force and stiffness", "force": "force", "energy": "energy",
     "polynomial": "polynomial (force and stiffness)", "cholesky": "Cholesky", "solve": "solve",
@@ -30,7 +31,7 @@ def run(program, results):
         output.unlink(missing_ok=True)
         command = [str(program), f"--benchmark_out={output}", "--benchmark_out_format=json", "--benchmark_min_time=0.1",
                    f"--benchmark_repetitions={REPETITIONS}", "--benchmark_enable_random_interleaving=true",
-                   "--benchmark_filter=" + ("-^world/" if first else "^kernel/")]
+                   "--benchmark_filter=" + ("-^(world|crowd)/" if first else "^kernel/")]
         subprocess.run(command, check=True, env=os.environ | {"EXMAT_SIMD": name})
         if json.loads(output.read_text())["context"]["instruction_set"] == name:
             first = False
@@ -38,10 +39,10 @@ def run(program, results):
             output.unlink()
 
 
-def run_worlds(program, output):
+def run_some(program, output, kind, repetitions):
     output.parent.mkdir(parents=True, exist_ok=True)
-    subprocess.run([str(program), f"--benchmark_out={output}", "--benchmark_out_format=json", "--benchmark_filter=^world/",
-                    "--benchmark_repetitions=3", "--benchmark_enable_random_interleaving=true"], check=True)
+    subprocess.run([str(program), f"--benchmark_out={output}", "--benchmark_out_format=json", f"--benchmark_filter=^{kind}/", "--benchmark_min_time=0.2",
+                    f"--benchmark_repetitions={repetitions}", "--benchmark_enable_random_interleaving=true"], check=True)
 
 
 class Results:
@@ -169,16 +170,26 @@ def sizes(result):
     return table(("tets", "a step [us]", "over the smallest", "bytes read at load"), rows)
 
 
-def instances(result):
-    found = sorted((int(count), threads) for _, threads, count in
-                   (name.split("/") for name in result.best if name.startswith("instances/")))
-    one = result.microseconds("instances/threads1/1")
-    rows = {}
-    for count, threads in found:
-        per_body = result.microseconds(f"instances/{threads}/{count}") / count
-        rows.setdefault(count, {})[threads] = f"{number(per_body)} ({one / per_body:.2f})"
-    return table(("bodies", "1 thread", "2 threads"),
-                 [(f"{count:,}", row.get("threads1", ""), row.get("threads2", "")) for count, row in rows.items()])
+def crowds(result):
+    """A row for each number of bodies, a column for each model and number of threads; and the ratios of the largest."""
+    found = [name.split("/")[1:] for name in result.best if name.startswith("crowd/")]
+    rows = []
+    for kind in dict.fromkeys(name[0] for name in found):
+        for count in sorted({int(name[4]) for name in found}):
+            cells = []
+            for modes, elements in dict.fromkeys((name[1], name[2]) for name in found):
+                for threads in ("threads1", "threads2"):
+                    name = "/".join(("crowd", kind, modes, elements, threads, str(count)))
+                    cells.append(f"{number(result.microseconds(name) / count)} ({number(result.ratio(name))})" if name in result.best else "")
+            rows.append((kind, f"{count:,}", *cells))
+    titles = [f"r = {modes[1:]}, s = {elements[1:]}, {threads}" for modes, elements in dict.fromkeys((name[1], name[2]) for name in found)
+              for threads in ("1 thread", "2")]
+    return table(("", "bodies", *titles), rows)
+
+
+def report_crowds(result):
+    return (f"Microseconds of wall clock for a step of one body, the best of {CROWD_REPETITIONS} ({result.name}), four examples, table, 1 ms; each is thrown by\n"
+            "a speed of its own, free ones turn. In parentheses how many times as long as its flops at the DGEMM rate of one thread.\n\n" + crowds(result))
 
 
 def worlds(result):
@@ -204,7 +215,7 @@ def own_contact(result):
 
 def report_worlds(result):
     return "\n\n".join((
-        f"Microseconds of wall clock for a step of one body, the best of three ({result.name}): blocks of r = 20, s = 96, 45 "
+        f"Microseconds of wall clock for a step of one body, the best of {WORLD_REPETITIONS} ({result.name}): blocks of r = 20, s = 96, 45 "
         "vertices on the surface, without examples,\nat rest on a floor and on each other, 2 ms.",
         worlds(result), own_contact(result)))
 
@@ -226,9 +237,6 @@ def report(results, compiler):
         f"### Size of the mesh ({fastest.name})\n\nThe same reduced model (r = 20, s = 60, four examples, table) in "
         "bundles of meshes that differ in size alone,\nloaded as `exmat-runtime run` does without a trajectory.",
         sizes(fastest),
-        f"### Many bodies ({fastest.name})\n\nMicroseconds of wall clock for a step of one body, r = 20, s = 60, four "
-        "examples, table; in parentheses the\nspeed-up over one body alone.",
-        instances(fastest),
         "### Kernels\n\nMicroseconds; in parentheses how many times as long as its flops at the DGEMM rate of the same "
         "instruction set.",
         kernels(results),
@@ -251,12 +259,15 @@ def main():
     parser.add_argument("--page", type=Path, required=True)
     parser.add_argument("--compiler", default="unknown")
     parser.add_argument("--worlds", action="store_true", help="of bodies that touch, instead of all else")
+    parser.add_argument("--crowds", action="store_true", help="of many bodies, likewise")
     options = parser.parse_args()
-    if options.worlds:
-        output = options.results / "worlds.json"
+    for name, wanted, repetitions, write in (("world", options.worlds, WORLD_REPETITIONS, report_worlds), ("crowd", options.crowds, CROWD_REPETITIONS, report_crowds)):
+        if not wanted:
+            continue
+        output = options.results / f"{name}s.json"
         if options.run:
-            run_worlds(options.run, output)
-        put(options.page, "worlds", report_worlds(Results(output)))
+            run_some(options.run, output, name, repetitions)
+        put(options.page, f"{name}s", write(Results(output)))
         return
     if options.run:
         run(options.run, options.results)

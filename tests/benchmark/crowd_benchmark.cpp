@@ -1,0 +1,75 @@
+#include <algorithm>
+#include <fmt/format.h>
+#include <numeric>
+#include <omp.h>
+
+#include "runtime/scene/bodies.h"
+#include "tests/benchmark/models.h"
+#include "tests/benchmark/register.h"
+
+namespace exmat::benchmarks {
+namespace {
+
+constexpr int kCycle = 100;  // steps, then all start anew
+
+/// Each thrown by a speed of its own, and turning where it is free.
+void start_apart(const runtime::Model& model, runtime::Bodies& bodies) {
+  bodies.restart();
+  for (int body = 0; body < bodies.count(); ++body) {
+    runtime::State& state = bodies[body];
+    const double own = static_cast<double>(body % 97) / 97;
+    for (Eigen::Index c = 0; c < std::min<Eigen::Index>(4, model.modes()); ++c) state.v[c] = 0.3 * own - 0.1;
+    state.begins_anew = true;
+    runtime::FrameMotion motion;
+    motion.angular_velocity = Eigen::Vector3d(0, 2 - own, own);
+    runtime::set_motion(model, motion, state);
+  }
+}
+
+/// Of a body's step, of the mean of a few bodies.
+double flops_of_a_step(const runtime::Model& model, const runtime::StepScene& scene, int count) {
+  runtime::Bodies bodies(model, scene, make_state(model), count);
+  start_apart(model, bodies);
+  bodies.set_profiled(true);
+  for (int step = 0; step < kCycle; ++step) bodies.step();
+  const auto [seconds, profile, work] = bodies.take_measured();
+  const double counted = std::accumulate(profile.flops.begin(), profile.flops.end(), 0.0);
+  return (counted + work.weights_flops + work.target_flops + work.other_flops) / kCycle / count;
+}
+
+void time_crowd(::benchmark::State& state, int modes, int elements, bool free, int threads, int count) {
+  omp_set_num_threads(threads);
+  const auto model = prepare(bar_model(modes, elements, free), Target::kTable, false);
+  const runtime::StepScene scene = swing(*model, Target::kTable);
+  const double flops = flops_of_a_step(*model, scene, std::min(count, 96));
+  runtime::Bodies bodies(*model, scene, make_state(*model), count);
+  std::int64_t steps = 0;
+  for (auto _ : state) {
+    if (steps++ % kCycle == 0) {
+      state.PauseTiming();
+      start_apart(*model, bodies);
+      state.ResumeTiming();
+    }
+    bodies.step();
+  }
+  state.counters["bodies"] = count;
+  compare_with_dgemm(state, flops * count);
+}
+
+}  // namespace
+
+void register_crowds() {
+  for (const bool free : {false, true})
+    for (const auto& [modes, elements] : {std::pair{20, 23}, {20, 60}, {30, 60}})
+      for (const int threads : {1, 2})
+        for (const int count : {1, 8, 100, 1000, 10000, 100000}) {
+          if (threads > count) continue;
+          add(fmt::format("crowd/{}/r{}/s{}/threads{}/{}", free ? "free" : "clamped", modes, elements, threads, count),
+              [modes = modes, elements = elements, free, threads, count](::benchmark::State& state) {
+                time_crowd(state, modes, elements, free, threads, count);
+              })
+              ->UseRealTime();
+        }
+}
+
+}  // namespace exmat::benchmarks
