@@ -279,17 +279,19 @@ class LaneStep {
       each([&](std::size_t l, Eigen::Index) {
         if (state_[l] != Hessian::kFactorised) add_frame_stiffness(l);
       });
-    kernels().lanes_cholesky(hessian, modes, workspace_.new_factor_.data());
+    // Where all need one, none is to be kept.
+    AlignedArray& factor = any(Hessian::kFactorised) ? workspace_.new_factor_ : workspace_.factor_;
+    kernels().lanes_cholesky(hessian, modes, factor.data());
     each([&](std::size_t l, Eigen::Index lane) {
       if (state_[l] == Hessian::kFactorised) return;
       ++reports_[l].factorisations;
-      const double last = entry(workspace_.new_factor_, modes - 1, modes - 1)[lane];
+      const double last = entry(factor, modes - 1, modes - 1)[lane];
       if (!std::isfinite(last)) {
         alone_[l] = true;
         return;
       }
-      for (std::ptrdiff_t i = lane; i < lane_triangle(modes); i += kLanes)
-        workspace_.factor_[i] = workspace_.new_factor_[i];
+      if (&factor == &workspace_.factor_) return;
+      for (std::ptrdiff_t i = lane; i < lane_triangle(modes); i += kLanes) workspace_.factor_[i] = factor[i];
     });
   }
 
