@@ -329,6 +329,41 @@ TEST_F(ApiTest, AnyNumberOfThreadsGivesTheSameBits) {
   for (const int threads : {0, 2, 3, 20}) EXPECT_EQ(hash(threads), alone) << threads << " threads";
 }
 
+// Nine of one model, eight of them in lanes, one of which stops; then two of another, too few; and five in lanes again.
+TEST_F(ApiTest, BodiesSideBySideMoveAsEachByItself) {
+  const Model damped = model(), plain(files_.bundle());
+  const std::array<std::int64_t, 1> ids{files_.tip()};
+  constexpr int kCount = 16, kStopped = 4;
+  const auto push = [&](Body& body, int i, const Model& its) {
+    body.apply_forces(Points::vertices(its, ids), std::array{0.05 * i, i == kStopped ? 1e300 : 1.0, 0.0});
+  };
+  const auto model_of = [&](int i) -> const Model& { return i == 9 || i == 10 ? plain : damped; };
+  for (const int threads : {1, 2}) {
+    Bodies bodies;
+    for (int i = 0; i < kCount; ++i) {
+      bodies.add(Body(model_of(i)));
+      push(bodies[bodies.size() - 1], i, model_of(i));
+    }
+    EXPECT_THROW(bodies.step(40, threads), Error);
+    for (int i = 0; i < kCount; ++i) {
+      const Body& together = bodies[static_cast<std::size_t>(i)];
+      if (i == kStopped) {
+        EXPECT_NE(together.report().status & EXMAT_STEP_NON_FINITE, 0u);
+        EXPECT_EQ(together.report().steps, 0);
+        continue;
+      }
+      Body alone(model_of(i));
+      push(alone, i, model_of(i));
+      alone.step(40);
+      EXPECT_EQ(together.report().steps, 40);
+      EXPECT_EQ(together.report().newton_iterations, alone.report().newton_iterations) << i;
+      const Eigen::VectorXd q = displacement(alone, damped.modes());
+      // 1e-13 of each step in lanes.
+      EXPECT_LE((displacement(together, damped.modes()) - q).norm(), 40 * 1e-13 * q.norm()) << i;
+    }
+  }
+}
+
 TEST_F(ApiTest, ANonFiniteStepLeavesItsBodyAndStopsNoOther) {
   const Model model = this->model();
   const std::array<std::int64_t, 1> ids{files_.tip()};
