@@ -23,6 +23,8 @@ AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
 
 /// Likewise of the content of a SCENE.json of one body. Throws as load_scene.
 SceneConfig scene_of(const Json& json, const std::filesystem::path& file);
+/// Likewise, as load_world().
+std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::path& file);
 
 /// What a scene needs of its bundle.
 Needs needs_of(const SceneConfig& scene);

@@ -125,12 +125,6 @@ void check_scene(const Json& json, const std::filesystem::path& file) {
     throw InputError({file.string(), "/", "bundle or bodies", json.contains("bundle") ? "both" : "neither", ""});
 }
 
-Json read_scene(const std::filesystem::path& file) {
-  Json json = read_json(file);
-  check_scene(json, file);
-  return json;
-}
-
 /// Members that a scene of several bodies has elsewhere, or not at all.
 void refuse_members_of_one_body(const Json& json, const std::filesystem::path& file) {
   for (const char* name : {"internal_force", "examples", "regions", "forces", "body"})
@@ -182,8 +176,10 @@ SceneConfig scene_of(const Json& json, const std::filesystem::path& file) {
 
 SceneConfig load_scene(const std::filesystem::path& file) { return scene_of(read_json(file), file); }
 
-std::optional<WorldConfig> load_world(const std::filesystem::path& file) {
-  const Json json = read_scene(file);
+std::optional<WorldConfig> load_world(const std::filesystem::path& file) { return world_of(read_json(file), file); }
+
+std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::path& file) {
+  check_scene(json, file);
   if (!json.contains("bodies")) return std::nullopt;
   refuse_members_of_one_body(json, file);
   WorldConfig world;

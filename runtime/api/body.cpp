@@ -29,12 +29,14 @@ void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcep
     add_step(step(body.model(), body.scene, body.state, workspace), workspace, body);
   }
   workspace.profile = nullptr;
+  measure_lost_work(body);
   body.report.seconds = timer.seconds();
 }
 
 void put_to_rest(exmat_body& body) noexcept {
   const double time = body.state.time;
   body.state = body.start;  // vectors of the same lengths: no allocation
+  body.load.setZero();
   begin_steps(body);
   keep_host_obstacles(time, body);
   was_put(body);
@@ -256,13 +258,18 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
     return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
   body->state.applied_force += sum;
   frame.apply(total, torque, body->state.frame);
-  return EXMAT_OK;
+  if (!body->capacity) return EXMAT_OK;
+  return guarded(__func__, [&] {
+    const Eigen::Map<const VertexArray> world(forces, coordinates / 3, 3);
+    add_load(points->set, world * placement.rotation, *body);
+  });
 }
 
 exmat_status exmat_body_clear_forces(exmat_body* body) noexcept {
   EXMAT_REQUIRE(body);
   body->state.applied_force.setZero();
   body->model().frame->clear_forces(body->state.frame);
+  body->load.setZero();
   return EXMAT_OK;
 }
 

@@ -7,7 +7,7 @@
 namespace exmat::runtime {
 
 void begin_steps(exmat_body& body) noexcept {
-  body.report = {};
+  body.report = empty_report();
   body.contacts.clear();
 }
 

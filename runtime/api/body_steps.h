@@ -21,6 +21,12 @@ inline void apply_keys(exmat_body& body) noexcept {
 /// After each of its steps, which left their sums in `workspace`.
 void add_step(const StepReport& step, const Workspace& workspace, exmat_body& body) noexcept;
 
+/// After the last step of a call: the lost work of a body that has a capacity.
+void measure_lost_work(exmat_body& body) noexcept;
+
+/// Of such a body: remembers `forces` [k x 3] that were applied to points, in its own frame.
+void add_load(const PointSet& points, const VertexArray& forces, exmat_body& body);
+
 inline bool non_finite(const exmat_body& body) noexcept { return (body.report.status & kStepNonFinite) != 0; }
 exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept;
 

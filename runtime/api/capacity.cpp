@@ -3,8 +3,9 @@
 #include "common/bundle/bundle.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
-#include "runtime/api/handles.h"
+#include "runtime/api/body_steps.h"
 #include "runtime/api/reading.h"
+#include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -18,7 +19,38 @@ ReducedModel read_object(const Source& source) {
   return data;
 }
 
+/// [3n] on the vertices of a body at the end of its last step, in its own frame.
+Eigen::VectorXd contact_load(const exmat_body& body) {
+  const Eigen::Matrix3d to_own = body.model().frame->placement(body.state.frame).rotation.transpose();
+  Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * body.source->loaded.summary.vertices);
+  for (const ContactRecord::Touch& touch : body.contacts.touches())
+    load.segment<3>(3 * static_cast<Eigen::Index>(touch.vertex)) += to_own * touch.force;
+  if (body.world == nullptr) return load;
+  for (const exmat_body_contact& contact : body.world->contacts)
+    if (exmat_world_body(body.world, contact.body) == &body)
+      load.segment<3>(3 * contact.vertex) += to_own * Eigen::Vector3d(contact.force);
+  return load;
+}
+
 }  // namespace
+
+namespace exmat::runtime {
+
+void measure_lost_work(exmat_body& body) noexcept {
+  if (!body.capacity) return;
+  try {
+    body.report.lost_applied = body.capacity->lost_share(body.load);
+    body.report.lost_contact = body.capacity->lost_share(contact_load(body));
+  } catch (const std::exception&) {  // no memory for it: not measured
+    body.report.lost_applied = body.report.lost_contact = -1;
+  }
+}
+
+void add_load(const PointSet& points, const VertexArray& forces, exmat_body& body) {
+  if (body.capacity) body.load += body.capacity->spread_load(points.rest, forces);
+}
+
+}  // namespace exmat::runtime
 
 exmat_status exmat_capacity_create(const exmat_model* model, double spread, exmat_capacity** capacity) noexcept {
   EXMAT_REQUIRE(capacity);
@@ -31,14 +63,14 @@ exmat_status exmat_capacity_create(const exmat_model* model, double spread, exma
       const std::lock_guard lock(reading());
       return read_object(*model->source);
     }();
-    *capacity = new exmat_capacity{model->source, LoadCapacity(data, spread)};
+    *capacity = new exmat_capacity{model->source, std::make_shared<const LoadCapacity>(data, spread)};
   });
 }
 
 void exmat_capacity_destroy(exmat_capacity* capacity) noexcept { delete capacity; }
 
 double exmat_capacity_time_scale(const exmat_capacity* capacity) noexcept {
-  return capacity != nullptr ? capacity->capacity.time_scale() : -1;
+  return capacity != nullptr ? capacity->capacity->time_scale() : -1;
 }
 
 exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, const exmat_body* body,
@@ -57,7 +89,7 @@ exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, const exma
   return guarded(__func__, [&] {
     const Placement placement = body->model().frame->placement(body->state.frame);
     const VertexArray own = Eigen::Map<const VertexArray>(forces, coordinates / 3, 3) * placement.rotation;
-    *lost = capacity->capacity.lost_share(capacity->capacity.spread_load(points->set.rest, own));
+    *lost = capacity->capacity->lost_share(capacity->capacity->spread_load(points->set.rest, own));
   });
 }
 
@@ -66,11 +98,17 @@ exmat_status exmat_capacity_read_contact_lost(const exmat_capacity* capacity, co
   EXMAT_REQUIRE(capacity);
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(lost);
+  return guarded(__func__, [&] { *lost = capacity->capacity->lost_share(contact_load(*body)); });
+}
+
+exmat_status exmat_body_set_capacity(exmat_body* body, const exmat_capacity* capacity) noexcept {
+  EXMAT_REQUIRE(body);
+  if (capacity != nullptr && capacity->source != body->source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the capacity is that of another model", __func__);
   return guarded(__func__, [&] {
-    const Placement placement = body->model().frame->placement(body->state.frame);
-    Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * body->source->loaded.summary.vertices);
-    for (const ContactRecord::Touch& touch : body->contacts.touches())
-      load.segment<3>(3 * static_cast<Eigen::Index>(touch.vertex)) += placement.rotation.transpose() * touch.force;
-    *lost = capacity->capacity.lost_share(load);
+    Eigen::VectorXd load;
+    if (capacity != nullptr) load = Eigen::VectorXd::Zero(3 * body->source->loaded.summary.vertices);
+    body->load = std::move(load);
+    body->capacity = capacity != nullptr ? capacity->capacity : nullptr;
   });
 }

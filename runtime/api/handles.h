@@ -21,6 +21,13 @@ struct HostedObstacle {
   bool hosted = false;  ///< added or moved by the host, not by the scene
 };
 
+/// Of no steps, and nothing measured.
+inline exmat_report empty_report() noexcept {
+  exmat_report report{};
+  report.lost_applied = report.lost_contact = -1;
+  return report;
+}
+
 }  // namespace exmat::runtime
 
 // What the handles of the C API point to. NOLINTBEGIN(readability-identifier-naming): their names are the API's.
@@ -49,7 +56,7 @@ struct exmat_surface {
 
 struct exmat_capacity {
   std::shared_ptr<const exmat::runtime::Source> source;
-  exmat::runtime::LoadCapacity capacity;
+  std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;
 };
 
 struct exmat_body {
@@ -67,12 +74,14 @@ struct exmat_body {
   exmat::runtime::VertexPositions::Workspace drawing;
   Eigen::VectorXd force;      ///< r
   std::size_t frame_numbers;  ///< of the frame's state
-  exmat_report report{};
+  exmat_report report = exmat::runtime::empty_report();
   exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
   bool profiled = false;
   exmat::runtime::Profile profile;  ///< of the last call that stepped it, where it is profiled
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
-  exmat_world* world = nullptr;  ///< that it is in
+  exmat_world* world = nullptr;                                  ///< that it is in
+  std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< where reports hold lost work
+  Eigen::VectorXd load;                                          ///< 3n applied forces, there alone; the body's frame
 };
 
 // NOLINTEND(readability-identifier-naming)

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "common/config/config.h"
+#include "common/config/json_file.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_obstacles.h"
@@ -113,8 +114,7 @@ void check_joins(const exmat_world& world, const exmat_body& body) {
         fmt::format("the body's time step is {:g} s: expected that of the world, {:g} s", body.scene.time_step, step));
 }
 
-std::unique_ptr<exmat_world> load(const char* path) {
-  const std::optional<WorldConfig> config = load_world(path);
+std::unique_ptr<exmat_world> load(const std::optional<WorldConfig>& config, const char* path) {
   if (!config)
     throw InputError({path, "/", "a scene of several \"bodies\"", "one of a single \"bundle\"",
                       "exmat_model_create_from_scene() takes it"});
@@ -163,7 +163,18 @@ exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world**
   EXMAT_REQUIRE(scene_path);
   return guarded(__func__, [&] {
     const std::lock_guard lock(reading());
-    *world = load(scene_path).release();
+    *world = load(load_world(scene_path), scene_path).release();
+  });
+}
+
+exmat_status exmat_world_create_from_text(const char* scene, const char* path, exmat_world** world) noexcept {
+  EXMAT_REQUIRE(world);
+  *world = nullptr;
+  EXMAT_REQUIRE(scene);
+  EXMAT_REQUIRE(path);
+  return guarded(__func__, [&] {
+    const std::lock_guard lock(reading());
+    *world = load(world_of(parse_json(scene, path), path), path).release();
   });
 }
 

@@ -78,6 +78,7 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
   }
   if (failed_of(world) != nullptr) --report.steps;
   keep_contacts(world);
+  for (const auto& member : world.members) measure_lost_work(*member.body);
   report.seconds = timer.seconds();
   for (const auto& member : world.members) member.body->report.seconds = report.seconds;
   return report;

@@ -71,6 +71,14 @@ EXMAT_API exmat_status exmat_points_read_rest(const exmat_points* points, double
                                               int64_t coordinates) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_points_read_basis(const exmat_points* points, float* rows, int64_t count) EXMAT_NOEXCEPT;
 
+/* The triangles of an obstacle of a body that is made of arrays, EXMAT_MESH or EXMAT_HEIGHT_FIELD: f, 0 of other
+   shapes, negative where `body` is NULL or has no such obstacle. And the three corners of each into `corners`
+   [coordinates = 9f] [m], outward, in the obstacle's frame, which its motion moves. Of a
+   shell they are its middle. */
+EXMAT_API int64_t exmat_body_obstacle_triangles(const exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_obstacle_triangles(const exmat_body* body, int64_t id, double* corners,
+                                                          int64_t coordinates) EXMAT_NOEXCEPT;
+
 /* `placement` [12]: three rows of four numbers, the rotation R and the shift t of x = R (X + U q) + t. */
 EXMAT_API exmat_status exmat_body_read_placement(const exmat_body* body, double* placement) EXMAT_NOEXCEPT;
 
@@ -121,9 +129,15 @@ EXMAT_API exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, 
                                                 const exmat_points* points, const double* forces, int64_t coordinates,
                                                 double* lost) EXMAT_NOEXCEPT;
 
-/* The same of the contact forces at the end of the body's last step, which are not spread. */
+/* The same of the contact forces at the end of the body's last step, which are not spread: those on its vertices, by
+   obstacles and by other bodies of its world. */
 EXMAT_API exmat_status exmat_capacity_read_contact_lost(const exmat_capacity* capacity, const exmat_body* body,
                                                         double* lost) EXMAT_NOEXCEPT;
+
+/* From now on reports of the body hold its lost work: a solution with all degrees of freedom at the end of each call
+   that steps it, which allocates. Of applied forces those that are applied from now on count. `capacity` is of the same
+   model and may be destroyed while the body has it; NULL: no longer. */
+EXMAT_API exmat_status exmat_body_set_capacity(exmat_body* body, const exmat_capacity* capacity) EXMAT_NOEXCEPT;
 
 #ifdef __cplusplus
 }

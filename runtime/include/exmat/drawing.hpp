@@ -117,6 +117,10 @@ class Capacity {
   detail::Owner<exmat_capacity, exmat_capacity_destroy> handle_;
 };
 
+inline void BodyRef::set_capacity(const Capacity* capacity) {
+  detail::check(exmat_body_set_capacity(get(), capacity != nullptr ? capacity->get() : nullptr));
+}
+
 }  // namespace exmat
 
 #endif

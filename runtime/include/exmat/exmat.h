@@ -181,6 +181,9 @@ typedef struct exmat_report {
   int64_t target_iterations;
   double residual; /* of the equation of motion at the end of the last step [kg^1/2 m/s^2] */
   double seconds;  /* wall clock */
+  /* Lost work, in [0, 1], of the applied forces and of contacts as they are at the end of the call; negative where it
+     is not measured: exmat_body_set_capacity(). */
+  double lost_applied, lost_contact;
 } exmat_report;
 
 /* Takes `steps` >= 0 steps, fewer with EXMAT_NON_FINITE. `report` may be NULL. */

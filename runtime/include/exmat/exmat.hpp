@@ -127,6 +127,7 @@ class Model {
 };
 
 class Surface;
+class Capacity;
 
 /// k material points of a model's body.
 class Points {
@@ -372,12 +373,21 @@ class BodyRef {
     detail::check(exmat_body_read_obstacle(get(), id, nullptr, &motion));
     return motion;
   }
+  /// [9f], three corners of each triangle of a mesh or of ground, in the obstacle's frame; empty of other shapes.
+  std::vector<double> obstacle_triangles(std::int64_t id) const {
+    const std::int64_t triangles = exmat_body_obstacle_triangles(get(), id);
+    std::vector<double> corners(9 * static_cast<std::size_t>(triangles > 0 ? triangles : 0));
+    detail::check(exmat_body_read_obstacle_triangles(get(), id, corners.data(), detail::length(corners)));
+    return corners;
+  }
   std::vector<exmat_contact> contacts() const {
     std::vector<exmat_contact> contacts(static_cast<std::size_t>(exmat_body_contacts(get())));
     detail::check(exmat_body_read_contacts(get(), contacts.data(), static_cast<std::int64_t>(contacts.size()),
                                            sizeof(exmat_contact)));
     return contacts;
   }
+  /// Reports hold lost work from now on; null: no longer.
+  void set_capacity(const Capacity* capacity);
   /// On an obstacle, or, -1, on the body; force and torque [3] each, either may be null.
   void read_contact_load(std::int64_t id, double* force, double* torque) const {
     detail::check(exmat_body_read_contact_load(get(), id, force, torque));

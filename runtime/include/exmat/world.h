@@ -38,6 +38,11 @@ EXMAT_API exmat_status exmat_world_create(const exmat_contact_law* law, exmat_wo
 /* Of a scene file with "bodies": all of them, where they start. Ids are 0, 1, ... in its order. */
 EXMAT_API exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world** world) EXMAT_NOEXCEPT;
 
+/* The same of the text of a scene file; `path` names it in messages, and names in it are relative to that path's
+   folder. */
+EXMAT_API exmat_status exmat_world_create_from_text(const char* scene, const char* path,
+                                                    exmat_world** world) EXMAT_NOEXCEPT;
+
 /* With the bodies that are in it. */
 EXMAT_API void exmat_world_destroy(exmat_world* world) EXMAT_NOEXCEPT;
 

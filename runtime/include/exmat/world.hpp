@@ -35,6 +35,12 @@ class World {
     detail::check(exmat_world_create_from_scene(scene.c_str(), &world));
     return World(world);
   }
+  /// Of the text of such a file, which `path` names.
+  static World from_text(const std::string& scene, const std::string& path) {
+    exmat_world* world = nullptr;
+    detail::check(exmat_world_create_from_text(scene.c_str(), path.c_str(), &world));
+    return World(world);
+  }
 
   exmat_contact_law contact_law() const {
     exmat_contact_law law;

@@ -82,12 +82,17 @@ double HeightField::squared_distance(int level, int column, int row, const Eigen
   return x * x + y * y + z * z;
 }
 
-TrianglePoint HeightField::nearest_on(int triangle, const Eigen::Vector3d& point) const noexcept {
-  const int cell = triangle / 2, columns = levels_.front().columns;
+std::array<Eigen::Vector3d, 3> HeightField::corners(Eigen::Index triangle) const noexcept {
+  const auto cell = static_cast<int>(triangle / 2), columns = levels_.front().columns;
   const int column = cell % columns, row = cell / columns;
   const Eigen::Vector3d here = corner(column, row), across = corner(column + 1, row + 1);
-  return triangle % 2 == 0 ? nearest_on_triangle(point, here, corner(column + 1, row), across)
-                           : nearest_on_triangle(point, here, across, corner(column, row + 1));
+  if (triangle % 2 == 0) return {here, corner(column + 1, row), across};
+  return {here, across, corner(column, row + 1)};
+}
+
+TrianglePoint HeightField::nearest_on(int triangle, const Eigen::Vector3d& point) const noexcept {
+  const auto [a, b, c] = corners(triangle);
+  return nearest_on_triangle(point, a, b, c);
 }
 
 /// Of what is within `reach`, nearer blocks first.

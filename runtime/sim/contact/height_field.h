@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -21,6 +22,10 @@ class HeightField {
 
   const RowMatrix& heights() const noexcept { return heights_; }
   const Eigen::Vector2d& spacing() const noexcept { return spacing_; }
+
+  int triangles() const noexcept { return 2 * levels_.front().columns * levels_.front().rows; }
+  /// Of a triangle, 0 <= triangle < triangles(), counter-clockwise from above.
+  std::array<Eigen::Vector3d, 3> corners(Eigen::Index triangle) const noexcept;
 
   SurfacePoint nearest(const Eigen::Vector3d& point) const noexcept;
   /// The same, at once where the hint of a point nearby holds.

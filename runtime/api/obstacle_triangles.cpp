@@ -1,0 +1,61 @@
+#include <algorithm>
+#include <cinttypes>
+
+#include "exmat/exmat.h"
+#include "runtime/api/arguments.h"
+#include "runtime/api/handles.h"
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+// Triangles of obstacles that are made of arrays.
+
+namespace {
+
+/// Null where the body has none of that number.
+const Obstacle* obstacle_of(const exmat_body& body, std::int64_t id) noexcept {
+  const auto found = std::ranges::find(body.obstacles, id, &HostedObstacle::id);
+  if (found == body.obstacles.end()) return nullptr;
+  return &body.scene.obstacles[static_cast<std::size_t>(found - body.obstacles.begin())];
+}
+
+std::int64_t count_of(const Shape& shape) noexcept {
+  if (const auto* const mesh = std::get_if<MeshShape>(&shape)) return mesh->mesh->triangles();
+  if (const auto* const field = std::get_if<HeightFieldShape>(&shape)) return field->field->triangles();
+  return 0;
+}
+
+/// Corners of all of them, from its own axes into the obstacle's frame.
+template <typename Triangles>
+void write_corners(const Triangles& from, const Eigen::Vector3d& position, const Eigen::Matrix3d& rotation,
+                   double* corners) noexcept {
+  for (Eigen::Index triangle = 0; triangle < from.triangles(); ++triangle)
+    for (const Eigen::Vector3d& corner : from.corners(triangle)) {
+      Eigen::Map<Eigen::Vector3d>(corners).noalias() = position + rotation * corner;
+      corners += 3;
+    }
+}
+
+}  // namespace
+
+std::int64_t exmat_body_obstacle_triangles(const exmat_body* body, std::int64_t id) noexcept {
+  const Obstacle* const obstacle = body != nullptr ? obstacle_of(*body, id) : nullptr;
+  return obstacle != nullptr ? count_of(obstacle->shape) : -1;
+}
+
+exmat_status exmat_body_read_obstacle_triangles(const exmat_body* body, std::int64_t id, double* corners,
+                                                std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(body);
+  const Obstacle* const obstacle = obstacle_of(*body, id);
+  if (obstacle == nullptr)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such obstacle", __func__, id);
+  const std::int64_t count = count_of(obstacle->shape);
+  EXMAT_REQUIRE_LENGTH(coordinates, 9 * count);
+  if (count == 0) return EXMAT_OK;
+  EXMAT_REQUIRE(corners);
+  if (const auto* const mesh = std::get_if<MeshShape>(&obstacle->shape))
+    write_corners(*mesh->mesh, mesh->position, mesh->rotation, corners);
+  if (const auto* const field = std::get_if<HeightFieldShape>(&obstacle->shape))
+    write_corners(*field->field, field->position, field->rotation, corners);
+  return EXMAT_OK;
+}
