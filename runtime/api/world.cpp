@@ -133,6 +133,7 @@ std::unique_ptr<exmat_world> load(const std::optional<WorldConfig>& config, cons
     auto made = std::make_unique<exmat_body>(sources[body.kind], std::move(body.start));
     join(*world, loaded.kinds[body.kind].surface, std::move(body.name), *made);
     static_cast<void>(made.release());
+    world->members.back().kind = static_cast<std::int64_t>(body.kind);
   }
   return world;
 }
@@ -244,4 +245,9 @@ exmat_body* exmat_world_body(const exmat_world* world, std::int64_t id) noexcept
 const char* exmat_world_body_name(const exmat_world* world, std::int64_t id) noexcept {
   const exmat_world::Member* member = world != nullptr ? member_of(*world, id) : nullptr;
   return member != nullptr ? member->name.c_str() : nullptr;
+}
+
+std::int64_t exmat_world_body_kind(const exmat_world* world, std::int64_t id) noexcept {
+  const exmat_world::Member* member = world != nullptr ? member_of(*world, id) : nullptr;
+  return member != nullptr ? member->kind : -1;
 }

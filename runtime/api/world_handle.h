@@ -14,6 +14,7 @@ struct exmat_world {
     std::int64_t id = 0;
     std::string name;
     std::unique_ptr<exmat_body> body;
+    std::int64_t kind = -1;  ///< in the scene
   };
 
   exmat_world(const exmat::runtime::ContactLaw& its_law, bool meets_itself)

@@ -14,7 +14,7 @@ struct RunCommandOptions {
   std::optional<std::filesystem::path> trajectory;  ///< instead of the scene's
   std::optional<std::int64_t> steps;                ///< instead of the scene's
   RunOptions run;
-  bool load_capacity = false;  ///< print what the basis loses of the scripted forces
+  bool load_capacity = false;  ///< print what the basis loses of forces and contacts of any mesh
 };
 
 struct BenchCommandOptions {

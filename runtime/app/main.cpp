@@ -25,7 +25,7 @@ int main(int argc, char** argv) {
   run.add_option("--steps", options.steps, "Number of steps, instead of the scene's")->check(step_range);
   run.add_flag("--profile", options.run.profiled, "Print the time of each stage");
   run.add_flag("--load-capacity", options.load_capacity,
-               "Print how much of the scene's forces the basis cannot answer");
+               "Print how much of forces and contacts the basis cannot answer, also of a large mesh");
   run.add_option("--from-state", options.run.from_state, "Begin at the state of this file, which --dump-state wrote");
   run.add_option("--dump-state", options.run.dump_state,
                  "File for the state at the end, or before a step that fails: the run goes on from it to the last bit");

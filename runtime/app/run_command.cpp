@@ -1,13 +1,12 @@
 #include <fmt/format.h>
 
-#include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
+#include "runtime/app/lost_work.h"
 #include "runtime/app/print.h"
-#include "runtime/capacity/load_capacity.h"
 #include "runtime/scene/scene_run.h"
 #include "runtime/scene/world_run.h"
 
@@ -53,21 +52,6 @@ void print_stage(std::string_view name, const Samples& seconds) {
              1e6 * seconds.quantile(0.95));
 }
 
-/// The share of the work of each scripted force that the basis loses, about the rest shape.
-void print_load_capacity(const SceneConfig& config) {
-  if (config.forces.empty()) return print("lost work", "the scene names no forces");
-  const std::string reason = "load capacity is asked for";
-  const LoadCapacity capacity(
-      read_bundle(config.bundle, {.groups = {{"object", true, 0, reason}, {"modal", true, 0, reason}}}), 0);
-  const Eigen::Index vertices = summarise_bundle(config.bundle).vertices;
-  for (std::size_t i = 0; i < config.forces.size(); ++i) {
-    Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * vertices);
-    for (const std::int64_t vertex : config.forces[i].vertices) load.segment<3>(3 * vertex) += config.forces[i].force;
-    print(fmt::format("lost work, force {}", i).c_str(),
-          fmt::format("{:.1f} % (the basis cannot answer it)", 100 * capacity.lost_share(load)));
-  }
-}
-
 void print_profile(const RunSummary& summary) {
   if (!summary.stage_seconds) return;
   print_stage_heading();
@@ -110,21 +94,25 @@ void print_world(const WorldSummary& summary, const WorldConfig& config) {
   if (config.trajectory) print("trajectory", config.trajectory->string());
 }
 
+RunOptions run_options(const RunCommandOptions& options) {
+  RunOptions run = options.run;
+  run.keeps_contacts = true;
+  return run;
+}
+
 void run_world(WorldConfig config, const RunCommandOptions& options) {
-  if (options.load_capacity)
-    throw InputError({config.file.string(), "/bodies", "a scene of one body for --load-capacity", "one of several",
-                      "take one of the bodies as a scene of its own"});
   if (options.trajectory) config.trajectory = options.trajectory;
   if (options.steps) config.steps = *options.steps;
   const LoadedWorld loaded = load_world_run(config);
   log_loaded(loaded, config);
-  const WorldSummary summary = run(loaded, config, options.run);
+  const WorldSummary summary = run(loaded, config, run_options(options));
   if (summary.unconverged_islands > 0)
     log::warning(
         fmt::format("{} solutions of bodies that touch did not reach the tolerance; a smaller time_step or "
                     "contact stiffness may help",
                     summary.unconverged_islands));
   print_world(summary, config);
+  print_lost_work(summary, loaded, config, options.load_capacity);
   if (options.run.dump_state) print("state", options.run.dump_state->string());
   print_profile(summary);
 }
@@ -138,14 +126,14 @@ void run_command(const RunCommandOptions& options) {
   if (options.steps) config.steps = *options.steps;
   const LoadedScene loaded = load_run(config);
   log_loaded(loaded, config);
-  const RunSummary summary = run(loaded, config, options.run);
+  const RunSummary summary = run(loaded, config, run_options(options));
   if (summary.unconverged_steps > 0)
     log::warning(
         fmt::format("{} of {} steps did not reach the tolerance {:g} (target included); a smaller time_step or more "
                     "newton.max_iterations may help",
                     summary.unconverged_steps, summary.steps * summary.bodies, config.newton.tolerance));
   print_summary(summary, loaded, config);
-  if (options.load_capacity) print_load_capacity(config);
+  print_lost_work(summary, config, options.load_capacity);
   if (options.run.dump_state) print("state", options.run.dump_state->string());
   print_profile(summary);
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/core/timer.h"
+#include "runtime/scene/contact_load.h"
 
 namespace exmat::runtime {
 
@@ -72,6 +73,10 @@ std::optional<int> Bodies::first_non_finite() const {
   for (int body = 0; body < count(); ++body)
     if ((reports_[static_cast<std::size_t>(body)].status & kStepNonFinite) != 0) return body;
   return std::nullopt;
+}
+
+void Bodies::add_contact_load(Eigen::VectorXd& load) const {
+  runtime::add_contact_load(model_, states_.front(), threads_.front().workspace, load);
 }
 
 std::uint64_t Bodies::hash() const {

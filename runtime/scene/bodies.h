@@ -41,6 +41,9 @@ class Bodies {
   /// The first body that the last step left because of a number that is not finite.
   std::optional<int> first_non_finite() const;
 
+  /// Of a single body: what obstacles pressed it by in the last step, as add_contact_load().
+  void add_contact_load(Eigen::VectorXd& load) const;
+
   /// FNV-1a over all bodies, in order, by add_to_hash().
   std::uint64_t hash() const;
 

@@ -40,6 +40,15 @@ RunSummary empty_summary(std::int64_t steps, const Bodies& bodies, bool profiled
   return summary;
 }
 
+void keep_hardest(const Bodies& bodies, const StepReport& report, Eigen::Index vertices, HardestContact& hardest) {
+  const double force = report.contact_force.norm();
+  if (bodies.count() > 1 || !(force > hardest.force)) return;
+  hardest.force = force;
+  hardest.time = bodies[0].time;
+  hardest.load.setZero(3 * vertices);
+  bodies.add_contact_load(hardest.load);
+}
+
 std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
   if (!config.trajectory) return nullptr;
   return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, *loaded.model->frame,
@@ -97,6 +106,7 @@ RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOp
     if (options.dump_state && bodies.first_non_finite()) write_states(bodies, loaded, *options.dump_state);
     require_finite(bodies, config);
     add_reports(reports, seconds, summary);
+    if (options.keeps_contacts) keep_hardest(bodies, reports.front(), loaded.summary.vertices, summary.hardest_contact);
     Profile output;
     if (trajectory && (shown.step - first) % config.every == 0) {
       const StageTimer stage(options.profiled ? &output : nullptr, Stage::kOutput);

@@ -12,6 +12,13 @@
 
 namespace exmat::runtime {
 
+/// The contacts of a body when they pressed it most.
+struct HardestContact {
+  double force = 0;      ///< their sum [N]; 0: nothing touched
+  double time = 0;       ///< [s]
+  Eigen::VectorXd load;  ///< [3n] in the body's own frame
+};
+
 /// What a run did.
 struct RunSummary {
   std::int64_t steps = 0;  ///< of each body
@@ -26,12 +33,14 @@ struct RunSummary {
   Energies energies;                           ///< of the first body, at the end
   std::uint64_t state_hash = 0;                ///< of all bodies, at the end; see Bodies::hash
   std::optional<double> largest_displacement;  ///< over the written frames [m]; only with a trajectory
+  HardestContact hardest_contact;              ///< with obstacles, of a single body; only if asked for
   /// Per step of a body, as the threads' clocks add up; output per frame. Only if asked for.
   std::optional<std::array<Samples, kStageNames.size()>> stage_seconds;
 };
 
 struct RunOptions {
   bool profiled = false;                              ///< measure each stage
+  bool keeps_contacts = false;                        ///< remember the hardest, or of several bodies those of the end
   std::optional<std::filesystem::path> from_state{};  ///< a state file to begin at, instead of the scene's start
   std::optional<std::filesystem::path> dump_state{};  ///< a state file to write at the end, or before a bad step
 };

@@ -5,6 +5,7 @@
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/output/trajectory.h"
+#include "runtime/scene/contact_load.h"
 #include "runtime/scene/world_bodies.h"
 #include "runtime/scene/world_state_file.h"
 
@@ -68,6 +69,23 @@ WorldSummary empty_summary(std::int64_t steps, const WorldBodies& bodies, bool p
   return summary;
 }
 
+std::vector<PressedBody> most_pressed_of(const LoadedWorld& loaded, const World& world) {
+  std::vector<BodyTouch> touches;
+  world.read_touches(touches);
+  std::vector<PressedBody> most(loaded.kinds.size());
+  for (int i = 0; i < world.count(); ++i) {
+    const std::size_t kind = loaded.bodies[static_cast<std::size_t>(i)].kind;
+    Eigen::VectorXd load = Eigen::VectorXd::Zero(3 * loaded.kinds[kind].loaded.summary.vertices);
+    add_contact_load(world.model(i), world.state(i), world.workspace(i), load);
+    const Eigen::Matrix3d to_own = world.model(i).frame->placement(world.state(i).frame).rotation.transpose();
+    for (const BodyTouch& touch : touches)
+      if (touch.body == i) load.segment<3>(3 * static_cast<Eigen::Index>(touch.vertex)) += to_own * touch.force;
+    const double force = load.reshaped(3, load.size() / 3).colwise().norm().sum();
+    if (force > most[kind].force) most[kind] = {i, force, std::move(load)};
+  }
+  return most;
+}
+
 }  // namespace
 
 WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOptions& options) {
@@ -112,6 +130,7 @@ WorldSummary run(const LoadedWorld& loaded, const WorldConfig& config, const Run
   summary.simulated_seconds = static_cast<double>(config.steps) * config.time_step;
   summary.end = world.energies();
   summary.deepest = deepest_of(world);
+  if (options.keeps_contacts) summary.most_pressed = most_pressed_of(loaded, world);
   summary.state_hash = bodies.hash();
   return summary;
 }

@@ -16,6 +16,13 @@ struct WorldStageSamples {
   Samples output;  ///< of each step: 0 where it wrote no frame
 };
 
+/// What presses the body of a kind at the end that is pressed most, by obstacles and by other bodies.
+struct PressedBody {
+  int body = -1;         ///< -1: nothing touches any
+  double force = 0;      ///< sum of the forces on vertices [N]
+  Eigen::VectorXd load;  ///< [3n] in the body's own frame
+};
+
 /// What a run of several bodies did.
 struct WorldSummary {
   std::int64_t steps = 0;  ///< of each body
@@ -33,6 +40,7 @@ struct WorldSummary {
   double deepest = 0;                              ///< that a vertex is inside another body at the end [m]
   std::uint64_t state_hash = 0;                    ///< of all bodies, at the end, as Bodies::hash
   std::optional<double> largest_displacement;      ///< over the written frames [m]; only with a trajectory
+  std::vector<PressedBody> most_pressed;           ///< of each kind; only if asked for
   std::optional<WorldStageSamples> stage_seconds;  ///< only if asked for
 };
 

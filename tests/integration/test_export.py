@@ -10,7 +10,6 @@ import json
 import re
 import shutil
 import struct
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -21,28 +20,14 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
+from programs import bar, call, write_json
+
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 KEPT = Path(sys.argv.pop()) if "--keep" in sys.argv else None
 sys.argv = sys.argv[:1]
 PRECOMPUTE, RUNTIME = PROGRAMS / "exmat-precompute", PROGRAMS / "exmat-runtime"
 SIZE = np.linalg.norm([4, 1, 1])
 WITHIN = 1e-5 * SIZE  # single precision at coordinates up to 10 m: 1e-6 m
-
-
-def bar():
-    """Text of a .veg file: 8 x 2 x 2 cubes of six tets each, 4 m long."""
-    number = {place: k + 1 for k, place in enumerate(itertools.product(range(9), range(3), range(3)))}
-    tets = []
-    for cell in itertools.product(range(8), range(2), range(2)):
-        for order in itertools.permutations(range(3)):
-            place, path = list(cell), [number[cell]]
-            for axis in order:
-                place[axis] += 1
-                path.append(number[tuple(place)])
-            tets.append(path)
-    lines = ["*VERTICES", f"{len(number)} 3 0 0"] + [f"{k} {0.5 * x} {0.5 * y} {0.5 * z}" for (x, y, z), k in number.items()]
-    lines += ["*ELEMENTS", "TET", f"{len(tets)} 4 0"] + [" ".join(map(str, [k + 1, *tet])) for k, tet in enumerate(tets)]
-    return "\n".join(lines) + "\n", [k for (x, _, _), k in number.items() if x == 0]
 
 
 def tube():
@@ -87,13 +72,13 @@ class Export(unittest.TestCase):
         mesh, clamp = bar()
         (cls.folder / "bar.veg").write_text(mesh)
         (cls.folder / "tube.obj").write_text(tube())
-        (cls.folder / "end.txt").write_text("\n".join(map(str, clamp)))
+        (cls.folder / "end.txt").write_text("\n".join(str(k + 1) for k in clamp))
         for name, more in (("free", {}), ("clamped", {"fixed": {"file": "end.txt"}})):
             asset = {"name": name, "object": {"mesh": "bar.veg", "render_mesh": "tube.obj", **more,
                                               "material": {"youngs_modulus": 2e5, "poisson_ratio": 0.4, "density": 1000}},
                      "basis": {"size": 8, "linear_modes": 4, "training": "none"}, "cubature": {"elements": 16, "training_poses": 20},
                      "needs": ["rigid", "render", "contact"], "examples": []}
-            (cls.folder / f"{name}.json").write_text(json.dumps(asset))
+            write_json(cls.folder / f"{name}.json", asset)
             cls.call(PRECOMPUTE, "bundle", f"{name}.json", "-o", f"{name}.h5")
         cls.run_scene("clamped", {"gravity": [0, 0, -9.81]})
         cls.run_scene("free", {"gravity": [0, -9.81, 0], "body": {"position": [2, 1, -1], "orientation": [0.8, 0, 0.6, 0],
@@ -107,21 +92,19 @@ class Export(unittest.TestCase):
             {"name": "held", "bundle": "clamped.h5"},
             {"name": "drop", "bundle": "free.h5", "body": {"position": [0, 1.1, 0.2], "orientation": [0.8, 0, 0.6, 0]},
              "grid": {"counts": [1, 2, 1], "spacing": [0, 2, 0]}}]}
-        (cls.folder / "several.json").write_text(json.dumps(several))
+        write_json(cls.folder / "several.json", several)
         cls.call(RUNTIME, "run", "several.json")
 
     @classmethod
-    def call(cls, *words):
-        done = subprocess.run(words, cwd=cls.folder, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        return done.stdout
+    def call(cls, *words, status=0):
+        return call(*words, status=status, cwd=cls.folder)
 
     @classmethod
     def run_scene(cls, bundle, members, name=None):
         name = name or bundle
         scene = {"bundle": f"{bundle}.h5", "time_step": 0.01, "steps": 100, **members,
                  "output": {"trajectory": f"{name}_run.h5", "every": 5, "render": True}}
-        (cls.folder / f"{name}_scene.json").write_text(json.dumps(scene))
+        write_json(cls.folder / f"{name}_scene.json", scene)
         cls.call(RUNTIME, "run", f"{name}_scene.json")
 
     def export(self, *words):
@@ -329,10 +312,9 @@ class Export(unittest.TestCase):
 
     def refused(self, *words, status=2):
         before = set(self.folder.iterdir())
-        done = subprocess.run([RUNTIME, "export", *words], cwd=self.folder, capture_output=True, text=True)
-        self.assertEqual(done.returncode, status, done.stderr)
+        message = self.call(RUNTIME, "export", *words, status=status)
         self.assertEqual(set(self.folder.iterdir()), before)
-        return done.stderr
+        return message
 
     def test_what_cannot_be_is_refused_in_words(self):
         run = "free_run.h5"
@@ -354,8 +336,7 @@ class Export(unittest.TestCase):
         self.assertIn("name it by --bundle BUNDLE.h5", self.refused("elsewhere/lost.h5", "-o", "a.glb"))
         self.export("elsewhere/lost.h5", "--bundle", "free.h5", "-o", "motion.glb")
         self.check("free")
-        done = subprocess.run([RUNTIME, "export", self.folder / "free_run.h5", "-o", self.folder / "motion.glb"], cwd="/", capture_output=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
+        call(RUNTIME, "export", self.folder / "free_run.h5", "-o", self.folder / "motion.glb", cwd="/")
 
     def test_damage_is_found(self):
         damaged = self.folder / "damaged.h5"

@@ -5,7 +5,6 @@ Usage: test_viewer.py FOLDER_OF_PROGRAMS [FOLDER]    (Debian: xvfb libgl1-mesa-d
 
 FOLDER holds scenes of the examples with their bundles, as their tests leave them; each is opened.
 """
-import itertools
 import json
 import os
 import re
@@ -21,28 +20,14 @@ import h5py
 import numpy as np
 from PIL import Image, ImageDraw, ImageFilter
 
+from programs import bar, call, write_json
+
 PROGRAMS = Path(sys.argv[1]).resolve()
 EXAMPLES = Path(sys.argv[2]).resolve() if len(sys.argv) > 2 else None
 sys.argv = sys.argv[:1]
 VIEWER, RUNTIME, PRECOMPUTE = (PROGRAMS / name for name in ("exmat-viewer", "exmat-runtime", "exmat-precompute"))
 WITHIN = 2  # pixels
 SIZE = (480, 270)
-
-
-def bar():
-    """A .veg file: 8 x 2 x 2 cubes of six tets each, 4 m long, and the vertices at x = 0."""
-    number = {place: k + 1 for k, place in enumerate(itertools.product(range(9), range(3), range(3)))}
-    tets = []
-    for cell in itertools.product(range(8), range(2), range(2)):
-        for order in itertools.permutations(range(3)):
-            place, path = list(cell), [number[cell]]
-            for axis in order:
-                place[axis] += 1
-                path.append(number[tuple(place)])
-            tets.append(path)
-    lines = ["*VERTICES", f"{len(number)} 3 0 0"] + [f"{k} {0.5 * x} {0.5 * y} {0.5 * z}" for (x, y, z), k in number.items()]
-    lines += ["*ELEMENTS", "TET", f"{len(tets)} 4 0"] + [" ".join(map(str, [k + 1, *tet])) for k, tet in enumerate(tets)]
-    return "\n".join(lines) + "\n", [k - 1 for (x, _, _), k in number.items() if x == 0]
 
 
 def projected(points, camera):
@@ -72,25 +57,20 @@ class Viewer(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.folder, True)
         mesh, fixed = bar()
         (cls.folder / "bar.veg").write_text(mesh)
-        asset = {"name": "bar", "object": {"mesh": "bar.veg", "fixed": {"ids": fixed},
-                                           "material": {"model": "stvk", "youngs_modulus": 1e5, "poisson_ratio": 0.3, "density": 1000}},
-                 "basis": {"size": 12, "training": "none"}, "needs": ["contact"]}
-        (cls.folder / "asset.json").write_text(json.dumps(asset))
-        subprocess.run([PRECOMPUTE, "bundle", cls.folder / "asset.json", "-o", cls.folder / "bar.h5", "--log-level", "warning"], check=True,
-                       capture_output=True)
+        for name, more in (("bar", {"fixed": {"ids": fixed}}), ("free", {})):
+            asset = {"name": name, "object": {"mesh": "bar.veg", **more,
+                                              "material": {"model": "stvk", "youngs_modulus": 1e5, "poisson_ratio": 0.3, "density": 1000}},
+                     "basis": {"size": 12, "training": "none"}, "needs": ["contact", "rigid"] if name == "free" else ["contact"]}
+            call(PRECOMPUTE, "bundle", cls.write(f"{name}_asset.json", asset), "-o", cls.folder / f"{name}.h5", "--log-level", "warning")
         cls.write("scene.json", {"bundle": "bar.h5", "damping": {"mass": 2, "stiffness": 0.02}})
 
     @classmethod
     def write(cls, name, content):
-        (cls.folder / name).write_text(json.dumps(content))
-        return cls.folder / name
+        return write_json(cls.folder / name, content)
 
     def view(self, *arguments, status=0, **environment):
         """What it prints, of a run that ends with this status."""
-        result = subprocess.run([VIEWER, *map(str, arguments)], capture_output=True, text=True,
-                                env={**os.environ, "DISPLAY": self.display, "LIBGL_ALWAYS_SOFTWARE": "1", **environment})
-        self.assertEqual(result.returncode, status, result.stdout + result.stderr)
-        return result.stdout if status == 0 else result.stderr
+        return call(VIEWER, *arguments, status=status, env={**os.environ, "DISPLAY": self.display, "LIBGL_ALWAYS_SOFTWARE": "1", **environment})
 
     def picture(self, script, name, *arguments):
         file = self.folder / f"{name}.png"
@@ -98,16 +78,19 @@ class Viewer(unittest.TestCase):
                   self.folder / f"{name}_dump.json", "--size", f"{SIZE[0]}x{SIZE[1]}", "--hide-interface", *arguments)
         return Image.open(file).convert("RGB"), json.loads((self.folder / f"{name}_dump.json").read_text())
 
-    def expected_mask(self, dump):
-        """Where the bundle's surface is, posed and projected here."""
-        with h5py.File(self.folder / "bar.h5") as bundle:
-            points = bundle["object/vertices"][:] + bundle["modal/basis"][:] @ np.array(dump["bodies"][0]["reduced"])
-            triangles = bundle["object/surface"][:]
-        pixels = projected(points, dump["camera"])
+    def expected_mask(self, dump, bundle="bar.h5", bodies=None, triangles=()):
+        """Where surfaces of bodies are, posed and projected here, and other triangles [f x 3 x 3]."""
+        with h5py.File(self.folder / bundle) as file:
+            rest, basis, surface = (file[name][:] for name in ("object/vertices", "modal/basis", "object/surface"))
         mask = Image.new("L", SIZE)
         draw = ImageDraw.Draw(mask)
-        for triangle in triangles:
-            draw.polygon([tuple(pixels[k] - 0.5) for k in triangle], fill=255)
+        corners = list(triangles)
+        for body in dump["bodies"] if bodies is None else [dump["bodies"][k] for k in bodies]:
+            placement = np.array(body["placement"]).reshape(3, 4)
+            points = (rest + (basis @ np.array(body["reduced"])).reshape(rest.shape)) @ placement[:, :3].T + placement[:, 3]
+            corners += list(points[surface])
+        for pixels in (projected(corner, dump["camera"]) for corner in corners):
+            draw.polygon([tuple(pixel - 0.5) for pixel in pixels], fill=255)
         return mask
 
     def assertSameArea(self, found, expected):
@@ -140,15 +123,86 @@ class Viewer(unittest.TestCase):
         self.assertLess(np.linalg.norm(np.subtract(moved["point"], moved["target"])), 0.3)
         self.assertGreater((masks[0] != masks[1]).sum(), 1000)
 
+    def assertSameHash(self, one, other):
+        hashes = [re.search("state hash +([0-9a-f]{16})", text).group(1) for text in (one, other)]
+        self.assertEqual(*hashes)
+        return hashes[0]
+
+    def world(self):
+        """Two free bars that fall, one of its own kind, onto the floor and a pyramid."""
+        (self.folder / "pyramid.obj").write_text("v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 1 1 1\n"
+                                                 "f 4 3 2 1\nf 1 2 5\nf 2 3 5\nf 3 4 5\nf 4 1 5\n")
+        law = {"stiffness": 2e5, "damping": 2e3}
+        return self.write("world.json", {
+            "time_step": 0.002, "gravity": [0, 0, -9.81], "damping": {"mass": 1, "stiffness": 0.01}, "contact": {**law, "friction": 0.3},
+            "obstacles": [{"plane": {"point": [0, 0, -1], "normal": [0, 0, 1]}, **law},
+                          {"mesh": {"file": "pyramid.obj", "position": [1, -4, -1]}, **law}],
+            "bodies": [{"name": "low", "bundle": "free.h5"}, {"name": "high", "bundle": "free.h5", "body": {"position": [0.4, 0.1, 1.3]}}]})
+
+    def test_bodies_that_touch_are_drawn_held_and_saved(self):
+        camera = {"position": [9, -14, 7], "target": [2, -0.5, 0.5], "field_of_view": 0.6}
+        start = {"time": 0, "camera": camera, "show": {"floor": False}}
+        hidden = self.write("hidden.json", {"actions": [{**start, "show": {"floor": False, "surface": False}}]})
+        drag = self.write("held.json", {"frame_rate": 50, "actions": [
+            {**start, "grab": {"hand": "a", "point": [4, 0.5, 1], "body": 1}, "set": {"bodies": "high", "gravity": [0, 0, -5]}},
+            {"time": 0, "move": {"hand": "a", "by": [0, 0.3, 2.5], "duration": 0.6}, "move_obstacle": {"obstacle": 1, "by": [-2, 0, 0.5], "duration": 0.4}},
+            {"time": 0.7}]})
+        common = ("--size", f"{SIZE[0]}x{SIZE[1]}", "--hide-interface")
+        self.view(self.world(), "--script", hidden, "--screenshot", self.folder / "hidden.png", *common)
+        self.view(self.world(), "--script", drag, "--screenshot", self.folder / "held.png", "--dump", self.folder / "held_dump.json", *common)
+        dump = json.loads((self.folder / "held_dump.json").read_text())
+        hand, obstacle = dump["hands"][0], np.array(dump["obstacles"][1]["position"])
+        self.assertEqual(hand["body"], 1)
+        self.assertLess(np.linalg.norm(np.subtract(hand["point"], hand["target"])), 0.6)
+        np.testing.assert_allclose(obstacle, [-2, 0, 0.5], atol=1e-2)
+        self.assertGreater(dump["bodies"][1]["placement"][11] - dump["bodies"][0]["placement"][11], 1)
+        place = np.array([1, -4, -1])
+        base = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 1]]) + place
+        pyramid = base[[[0, 3, 2], [0, 2, 1], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]]
+        empty = self.expected_mask(dump, bodies=[], triangles=pyramid)
+        expected = np.array(self.expected_mask(dump, "free.h5", triangles=pyramid + obstacle)) > 0
+        pictures = [np.array(Image.open(self.folder / f"{name}.png").convert("RGB")).astype(int) for name in ("held", "hidden")]
+        change = np.abs(pictures[0] - pictures[1]).max(axis=2) > 12
+        hand_pixels = projected([hand["point"], hand["target"]], dump["camera"])
+        y, x = np.mgrid[:SIZE[1], :SIZE[0]]
+        left_out = (np.min([np.hypot(x - hx, y - hy) for hx, hy in hand_pixels], axis=0) < 14) | (np.array(empty.filter(ImageFilter.MaxFilter(5))) > 0)
+        change[left_out] = expected[left_out]
+        self.assertSameArea(Image.fromarray((255 * change).astype(np.uint8)), Image.fromarray((255 * expected).astype(np.uint8)))
+
+    def test_bodies_that_touch_are_saved_as_a_scene_that_runs_to_the_same_state(self):
+        script = self.write("world_set.json", {"frame_rate": 50, "actions": [
+            {"time": 0, "set": {"gravity": [0, 0, -7], "mass_damping": 0.3}}, {"time": 0, "set": {"bodies": "high", "stiffness_damping": 0.005}}]})
+        (self.folder / "other").mkdir(exist_ok=True)
+        saved = self.folder / "other/world_saved.json"
+        printed = self.view(self.world(), "--script", script, "--frames", 20, "--save-scene", saved)
+        self.assertIn("steps 200", printed)
+        found = self.assertSameHash(printed, call(RUNTIME, "run", saved))
+        self.assertNotIn(found, self.view(self.world(), "--frames", 20, "--frame-rate", 50))
+        thrown = self.write("thrown.json", {"frame_rate": 50, "actions": [{"time": 0, "throw": {"body": 1, "velocity": [0, 0, 4]}}, {"time": 0.1}]})
+        self.view(self.world(), "--script", thrown, "--dump", self.folder / "thrown_dump.json")
+        low, high = json.loads((self.folder / "thrown_dump.json").read_text())["bodies"]
+        self.assertGreater(high["placement"][11] - low["placement"][11], 1.5)
+        self.assertIn("add it to \"bodies\"", self.view(self.world(), self.folder / "bar.h5", "--frames", 1, status=2))
+        wrong = self.write("wrong.json", {"actions": [{"time": 0, "set": {"bodies": "none", "gravity": [0, 0, 0]}}]})
+        self.assertIn("low, high", self.view(self.world(), "--script", wrong, status=2))
+
+    def test_runs_say_what_the_basis_loses_of_contacts(self):
+        printed = call(RUNTIME, "run", self.world(), "--steps", "150")
+        for body in ("low", "high"):
+            self.assertTrue(0 <= float(re.search(f"lost work, {body} +([0-9.]+) % of", printed).group(1)) <= 100)
+        scene = self.write("dropped.json", {"bundle": "free.h5", "time_step": 0.002, "gravity": [0, 0, -9.81], "steps": 100,
+                                            "obstacles": [{"plane": {"point": [0, 0, -0.1], "normal": [0, 0, 1]}, "stiffness": 2e5}]})
+        self.assertRegex(call(RUNTIME, "run", scene), "lost work, contact +[0-9.]+ % at 0.[0-9]+ s, when it is [0-9.e+]+ N")
+        self.assertNotIn("lost work", call(RUNTIME, "run", self.write("still.json", {"bundle": "free.h5", "steps": 5})))
+        self.assertIn("nothing touched", call(RUNTIME, "run", self.folder / "still.json", "--load-capacity"))
+
     def test_saved_settings_are_a_scene_that_runs_to_the_same_state(self):
         script = self.write("set.json", {"frame_rate": 50, "actions": [
             {"time": 0, "set": {"gravity": [0, 0, -9.81], "mass_damping": 0.3, "stiffness_damping": 0.001, "integrator": "backward_euler"}}]})
         saved = self.folder / "saved.json"
         printed = self.view(self.folder / "scene.json", "--script", script, "--frames", 20, "--save-scene", saved)
         self.assertIn("steps 400", printed)
-        run = subprocess.run([RUNTIME, "run", saved], capture_output=True, text=True, check=True).stdout
-        found = re.search("state hash ([0-9a-f]{16})", printed).group(1)
-        self.assertEqual(re.search("state hash +([0-9a-f]{16})", run).group(1), found)
+        found = self.assertSameHash(printed, call(RUNTIME, "run", saved))
         self.assertNotIn(found, self.view(self.folder / "scene.json", "--frames", 20, "--frame-rate", 50))
 
     def test_lost_work_of_a_hand_is_that_of_the_same_force_in_a_scene(self):
@@ -157,7 +211,7 @@ class Viewer(unittest.TestCase):
                                             {"time": 0, "move": {"hand": "a", "by": [0, 0, 0.2], "duration": 0.1}}]}, "lost")
         vertex = 9 * 8 + 3 * 1 + 2
         scene = self.write("pushed.json", {"bundle": "bar.h5", "steps": 1, "forces": [{"vertices": {"ids": [vertex]}, "force": dump["hands"][0]["force"]}]})
-        printed = subprocess.run([RUNTIME, "run", scene, "--load-capacity"], capture_output=True, text=True, check=True).stdout
+        printed = call(RUNTIME, "run", scene)
         found = float(re.search("lost work, force 0 +([0-9.]+) %", printed).group(1)) / 100
         self.assertAlmostEqual(dump["lost_work"]["hand"], found, delta=0.001)
         self.assertTrue(0.01 < found < 0.99)
@@ -188,10 +242,7 @@ class Viewer(unittest.TestCase):
     def test_opens_the_scenes_of_the_examples(self):
         for scene in sorted(EXAMPLES.glob("*/scene*.json")):
             content = json.loads(scene.read_text())
-            bundle = scene.parent / content.get("bundle", "")
-            if "bodies" in content:
-                self.assertIn("/bodies", self.view(scene, "--frames", 0, status=2))
-            elif bundle.is_file():
+            if all((scene.parent / kind["bundle"]).is_file() for kind in content.get("bodies", [content])):
                 with self.subTest(scene=scene.parent.name):
                     self.view(scene, "--frames", 2, "--screenshot", self.folder / "x.png", "--size", "160x90")
 

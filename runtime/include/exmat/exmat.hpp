@@ -377,7 +377,8 @@ class BodyRef {
   std::vector<double> obstacle_triangles(std::int64_t id) const {
     const std::int64_t triangles = exmat_body_obstacle_triangles(get(), id);
     std::vector<double> corners(9 * static_cast<std::size_t>(triangles > 0 ? triangles : 0));
-    detail::check(exmat_body_read_obstacle_triangles(get(), id, corners.data(), detail::length(corners)));
+    detail::check(
+        exmat_body_read_obstacle_triangles(get(), id, corners.data(), static_cast<std::int64_t>(corners.size())));
     return corners;
   }
   std::vector<exmat_contact> contacts() const {

@@ -65,6 +65,9 @@ EXMAT_API exmat_status exmat_world_read_body_ids(const exmat_world* world, int64
    several: "teddy_12"; "" of a body that was added. */
 EXMAT_API exmat_body* exmat_world_body(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
 EXMAT_API const char* exmat_world_body_name(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
+/* Of a body of a scene its place among the scene's "bodies", 0-based: those of one place have one model. Negative of a
+   body that was added, and where there is none. */
+EXMAT_API int64_t exmat_world_body_kind(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
 
 /* What the steps of one call did. */
 typedef struct exmat_world_report {

@@ -74,6 +74,7 @@ class World {
   /// Of an id of ids().
   BodyRef body(std::int64_t id) const noexcept { return BodyRef(exmat_world_body(get(), id)); }
   std::string name(std::int64_t id) const { return exmat_world_body_name(get(), id); }
+  std::int64_t kind(std::int64_t id) const noexcept { return exmat_world_body_kind(get(), id); }
 
   /// By up to `threads` threads, 0: as many as there are processors.
   exmat_world_report step(std::int64_t steps = 1, int threads = 0) {

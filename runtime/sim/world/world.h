@@ -54,6 +54,7 @@ class World {
   const Model& model(int body) const noexcept { return at(body).model; }
   const StepScene& scene(int body) const noexcept { return at(body).scene; }
   Workspace& workspace(int body) noexcept { return at(body).workspace; }
+  const Workspace& workspace(int body) const noexcept { return at(body).workspace; }
   const StepReport& report(int body) const noexcept { return at(body).report; }
 
   /// One step of all bodies by so many threads, >= 1.

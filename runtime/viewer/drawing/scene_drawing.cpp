@@ -186,6 +186,12 @@ void SceneDrawing::find_floor(const Snapshot& snapshot, const Eigen::Vector3d& u
   double least = 1e300;
   for (const auto& kind : kinds_)
     least = std::min(least, std::min(kind->bounds.least.dot(up), kind->bounds.most.dot(up)));
+  // Below ground and meshes that are of the scene.
+  if (std::ranges::any_of(snapshot.obstacles, [](const auto& obstacle) { return !obstacle.corners->empty(); })) {
+    const Eigen::Vector3d half = 0.5 * (lit_bounds_.most - lit_bounds_.least);
+    floor_point_ = std::min(least, lit_bounds_.centre().dot(up) - half.cwiseAbs().dot(up.cwiseAbs())) * up;
+    return;
+  }
   const bool falls = std::ranges::any_of(kinds_, [](const auto& kind) { return kind->mass > 0; });
   floor_point_ = (least - (falls ? 1.0 : 0.16) * size_) * up;
 }
@@ -243,8 +249,10 @@ SceneDrawing::Solid& SceneDrawing::solid_of(const ObstacleSnapshot& obstacle) {
   const auto found = solids_.find(obstacle.id);
   if (found != solids_.end() && std::memcmp(&found->second.first, &obstacle.obstacle, sizeof(exmat_obstacle)) == 0)
     return found->second.second;
+  const double sheet = std::max(0.7 * size_, 0.6 * bounds_.diagonal());
   const auto made = solids_.insert_or_assign(
-      obstacle.id, std::pair(obstacle.obstacle, make_solid(make_obstacle(obstacle.obstacle, 0.7 * size_))));
+      obstacle.id,
+      std::pair(obstacle.obstacle, make_solid(make_obstacle(obstacle.obstacle, *obstacle.corners, sheet))));
   return made.first->second.second;
 }
 

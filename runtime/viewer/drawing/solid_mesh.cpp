@@ -82,7 +82,20 @@ SolidMesh make_sheet(const Eigen::Vector3d& point, const Eigen::Vector3d& normal
   return mesh;
 }
 
-SolidMesh make_obstacle(const exmat_obstacle& obstacle, double sheet) {
+SolidMesh make_triangles(std::span<const double> corners) {
+  SolidMesh mesh;
+  for (std::size_t i = 0; i + 8 < corners.size(); i += 9) {
+    const auto corner = [&](std::size_t c) { return Eigen::Vector3d(corners.data() + i + 3 * c); };
+    const Eigen::Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).stableNormalized();
+    for (std::size_t c = 0; c < 3; ++c) {
+      mesh.indices.push_back(static_cast<std::uint32_t>(mesh.points.size() / 6));
+      add_point(corner(c), normal, mesh);
+    }
+  }
+  return mesh;
+}
+
+SolidMesh make_obstacle(const exmat_obstacle& obstacle, std::span<const double> corners, double sheet) {
   const Eigen::Vector3d point(obstacle.point), direction(obstacle.direction);
   switch (obstacle.shape) {
     case EXMAT_SPHERE:
@@ -97,7 +110,7 @@ SolidMesh make_obstacle(const exmat_obstacle& obstacle, double sheet) {
     case EXMAT_PLANE:
       return make_sheet(point, direction, sheet);
     default:
-      return {};  // meshes and ground are known to the library alone
+      return make_triangles(corners);
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "exmat/exmat.h"
@@ -20,7 +21,10 @@ SolidMesh make_capsule(const Eigen::Vector3d& start, const Eigen::Vector3d& axis
 /// A piece of a plane of so many metres in each direction.
 SolidMesh make_sheet(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, double half);
 
-/// In the obstacle's frame; a sheet of the given size of a plane.
-SolidMesh make_obstacle(const exmat_obstacle& obstacle, double sheet);
+/// Of three corners of each triangle [9f], flat.
+SolidMesh make_triangles(std::span<const double> corners);
+
+/// In the obstacle's frame; a sheet of the given size of a plane, `corners` [9f] of a mesh or of ground.
+SolidMesh make_obstacle(const exmat_obstacle& obstacle, std::span<const double> corners, double sheet);
 
 }  // namespace exmat::viewer

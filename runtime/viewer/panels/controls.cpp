@@ -145,9 +145,13 @@ void Controls::draw_run(const Style& style, const Snapshot& snapshot, Studio& st
 void Controls::draw_kind(Studio& studio) {
   if (studio.shapes().size() < 2) return;
   label("settings of");
-  if (!ImGui::BeginCombo("##kind", fmt::format("kind {}", kind_ + 1).c_str())) return;
-  for (std::size_t i = 0; i < studio.shapes().size(); ++i)
-    if (ImGui::Selectable(fmt::format("kind {}", i + 1).c_str(), i == kind_)) kind_ = i;
+  const std::vector<std::string>& names = studio.kind_names();
+  if (!ImGui::BeginCombo("##kind", names[kind_].c_str())) return;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    ImGui::PushID(static_cast<int>(i));
+    if (ImGui::Selectable(names[i].c_str(), i == kind_)) kind_ = i;
+    ImGui::PopID();
+  }
   ImGui::EndCombo();
 }
 
@@ -185,9 +189,9 @@ void Controls::draw_world(const Style& style, const Snapshot& snapshot, Settings
     ImGui::PopStyleColor();
     return;
   }
-  constexpr std::array<const char*, 4> kShapes{"plane", "sphere", "box", "capsule"};
+  constexpr std::array<const char*, 6> kShapes{"plane", "sphere", "box", "capsule", "mesh", "ground"};
   ImGui::TextUnformatted("add");
-  for (std::int32_t shape = 0; shape < 4; ++shape) {
+  for (std::int32_t shape = EXMAT_PLANE; shape <= EXMAT_CAPSULE; ++shape) {
     ImGui::SameLine(0, 4 * style.scale);
     if (ImGui::SmallButton(kShapes[static_cast<std::size_t>(shape)])) studio.add_obstacle(shape);
   }

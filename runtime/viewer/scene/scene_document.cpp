@@ -106,10 +106,28 @@ Json obstacle_json(const PlacedObstacle& placed, const Json& scene) {
   return json;
 }
 
-std::string relative(const std::filesystem::path& file, const std::filesystem::path& from,
-                     const std::filesystem::path& to) {
-  const std::filesystem::path whole = std::filesystem::absolute(from.parent_path() / file);
-  return std::filesystem::proximate(whole, std::filesystem::absolute(to).parent_path()).generic_string();
+/// The member that names a file in `from`'s folder, as seen from that of `to`.
+void make_relative(Json& json, const char* member, const std::filesystem::path& from, const std::filesystem::path& to) {
+  if (!json.contains(member)) return;
+  const std::filesystem::path whole = std::filesystem::absolute(from.parent_path() / json[member].get<std::string>());
+  json[member] = std::filesystem::proximate(whole, std::filesystem::absolute(to).parent_path()).generic_string();
+}
+
+/// Of a scene of one body, or of an entry of "bodies".
+void make_body_relative(Json& json, const std::filesystem::path& from, const std::filesystem::path& to) {
+  make_relative(json, "bundle", from, to);
+  make_relative(json, "poses", from, to);
+  if (!json.contains("forces")) return;
+  for (Json& force : json["forces"]) make_relative(force["vertices"], "file", from, to);
+}
+
+void make_obstacle_relative(Json& json, const std::filesystem::path& from, const std::filesystem::path& to) {
+  for (const char* shape : {"mesh", "height_field"})
+    if (json.contains(shape)) make_relative(json[shape], "file", from, to);
+}
+
+bool moves_by_script(const Json& json) {
+  return json.contains("forces") || (json.contains("body") && json["body"].contains("motion"));
 }
 
 }  // namespace
@@ -126,14 +144,15 @@ SceneDocument SceneDocument::open(const std::filesystem::path& file) {
   if (is_bundle(file)) return {file, scene_of_bundle(file), false};
   Json json = read_json(file);
   check_against_schema(json, "scene", file);
-  if (json.contains("bodies"))
-    throw InputError({file.string(), "/bodies", "a scene of one body, by \"bundle\"", "one of several",
-                      "exmat-runtime run steps it and exmat-runtime export draws it elsewhere"});
-  if (!json.contains("bundle")) throw InputError({file.string(), "/bundle", "a bundle", "none", ""});
+  if (!json.contains("bundle") && !json.contains("bodies"))
+    throw InputError({file.string(), "/", "bundle or bodies", "neither", ""});
   return {file, std::move(json), true};
 }
 
 SceneDocument SceneDocument::with_bundle(const std::filesystem::path& bundle) const {
+  if (is_world())
+    throw InputError({bundle.string(), "", "no other bundle beside a scene of several bodies", "one",
+                      "its bodies touch each other: add it to \"bodies\" of " + path_.string()});
   SceneDocument other(bundle, scene_of_bundle(bundle), false);
   Json& json = other.json_;
   for (const char* name : {"time_step", "gravity", "integrator", "damping", "newton", "obstacles"})
@@ -145,34 +164,44 @@ SceneDocument SceneDocument::with_bundle(const std::filesystem::path& bundle) co
   return other;
 }
 
-std::filesystem::path SceneDocument::bundle() const { return path_.parent_path() / json_["bundle"].get<std::string>(); }
+std::string SceneDocument::kind_name(std::size_t kind) const {
+  return is_world() ? of_kind(kind)["name"].get<std::string>() : bundle().stem().string();
+}
+
+std::filesystem::path SceneDocument::bundle(std::size_t kind) const {
+  return path_.parent_path() / of_kind(kind)["bundle"].get<std::string>();
+}
 
 bool SceneDocument::has_scripted_motion() const {
-  if (json_.contains("forces") || (json_.contains("body") && json_["body"].contains("motion"))) return true;
+  for (std::size_t kind = 0; kind < kinds(); ++kind)
+    if (moves_by_script(of_kind(kind))) return true;
   if (!json_.contains("obstacles")) return false;
   return std::ranges::any_of(json_["obstacles"], [](const Json& obstacle) { return obstacle.contains("motion"); });
 }
 
-Settings SceneDocument::settings() const {
+Settings SceneDocument::settings(std::size_t kind) const {
+  const Json& own = of_kind(kind);
   Settings settings;
+  settings.own_gravity = is_world() && own.contains("gravity");
   settings.time_step = json_.value("time_step", settings.time_step);
-  settings.gravity = value_of(json_, "gravity", settings.gravity);
+  settings.gravity = value_of(settings.own_gravity ? own : json_, "gravity", settings.gravity);
   if (json_.contains("damping")) {
     settings.mass_damping = json_["damping"].value("mass", 0.0);
     settings.stiffness_damping = json_["damping"].value("stiffness", 0.0);
   }
   settings.integrator = json_.value("integrator", settings.integrator);
-  settings.internal_force = json_.value("internal_force", settings.internal_force);
-  if (json_.contains("examples")) settings.forces.push_back(force_of(json_["examples"]));
-  if (json_.contains("regions"))
-    for (const Json& region : json_["regions"]) settings.forces.push_back(force_of(region));
+  settings.internal_force = own.value("internal_force", settings.internal_force);
+  if (own.contains("examples")) settings.forces.push_back(force_of(own["examples"]));
+  if (own.contains("regions"))
+    for (const Json& region : own["regions"]) settings.forces.push_back(force_of(region));
   return settings;
 }
 
-void SceneDocument::set(const Settings& settings) {
+void SceneDocument::set(const Settings& settings, std::size_t kind) {
+  Json& own = of_kind(kind);
   const Settings fallback;
   put(json_, "time_step", settings.time_step, fallback.time_step);
-  put(json_, "gravity", settings.gravity, fallback.gravity);
+  put(settings.own_gravity ? own : json_, "gravity", settings.gravity, fallback.gravity);
   if (!json_.contains("damping") && (settings.mass_damping > 0 || settings.stiffness_damping > 0))
     json_["damping"] = Json::object();
   if (json_.contains("damping")) {
@@ -180,23 +209,25 @@ void SceneDocument::set(const Settings& settings) {
     put(json_["damping"], "stiffness", settings.stiffness_damping, 0.0);
   }
   put(json_, "integrator", settings.integrator, fallback.integrator);
-  put(json_, "internal_force", settings.internal_force, fallback.internal_force);
+  put(own, "internal_force", settings.internal_force, fallback.internal_force);
   std::size_t region = 0;
   for (const ForceSettings& force : settings.forces)
-    put_force(force.region.empty() ? json_["examples"] : json_["regions"][region++], force);
+    put_force(force.region.empty() ? own["examples"] : own["regions"][region++], force);
 }
 
 void SceneDocument::save(const std::filesystem::path& file, std::int64_t steps,
                          std::span<const PlacedObstacle> obstacles) const {
   Json json = json_;
   json["steps"] = std::max<std::int64_t>(steps, 1);
-  json["bundle"] = relative(json_["bundle"].get<std::string>(), path_, file);
-  if (json.contains("forces"))
-    for (Json& force : json["forces"])
-      if (force["vertices"].contains("file"))
-        force["vertices"]["file"] = relative(force["vertices"]["file"].get<std::string>(), path_, file);
+  if (is_world())
+    for (Json& body : json["bodies"]) make_body_relative(body, path_, file);
+  else
+    make_body_relative(json, path_, file);
   json.erase("obstacles");
-  for (const PlacedObstacle& placed : obstacles) json["obstacles"].push_back(obstacle_json(placed, json_));
+  for (const PlacedObstacle& placed : obstacles) {
+    json["obstacles"].push_back(obstacle_json(placed, json_));
+    make_obstacle_relative(json["obstacles"].back(), path_, file);
+  }
   check_against_schema(json, "scene", file);
   write_file_atomically(file, json.dump(2) + "\n");
 }

@@ -24,16 +24,23 @@ struct PlacedObstacle {
 /// A scene file, or what a bundle without one is shown by, and what was changed in it.
 class SceneDocument {
  public:
-  /// A SCENE.json or a BUNDLE.h5. Throws InputError; a scene of several kinds of bodies is refused.
+  /// A SCENE.json or a BUNDLE.h5. Throws InputError.
   static SceneDocument open(const std::filesystem::path& file);
 
-  /// The same settings for another bundle: what names parts of the first one is left out.
+  /// The same settings for another bundle: what names parts of the first one is left out. Throws InputError where this
+  /// is a scene of several kinds of bodies, which touch each other.
   SceneDocument with_bundle(const std::filesystem::path& bundle) const;
 
   /// What names in it are relative to.
   const std::filesystem::path& path() const { return path_; }
-  std::filesystem::path bundle() const;
   bool is_scene_file() const { return is_scene_; }
+  /// Of bodies that touch each other.
+  bool is_world() const { return json_.contains("bodies"); }
+  /// Kinds of bodies; 1 where it is no world.
+  std::size_t kinds() const { return is_world() ? json_["bodies"].size() : 1; }
+  /// Of its bodies, or of its bundle.
+  std::string kind_name(std::size_t kind) const;
+  std::filesystem::path bundle(std::size_t kind = 0) const;
   const Json& json() const { return json_; }
   std::string text() const { return json_.dump(); }
 
@@ -41,8 +48,8 @@ class SceneDocument {
   int instances() const { return json_.value("instances", 1); }
   bool has_scripted_motion() const;
 
-  Settings settings() const;
-  void set(const Settings& settings);
+  Settings settings(std::size_t kind = 0) const;
+  void set(const Settings& settings, std::size_t kind = 0);
 
   /// With this many steps and with the obstacles as they stand, to be run from `file`: names are relative to it. Throws
   /// WorkError where it cannot be written.
@@ -51,6 +58,9 @@ class SceneDocument {
  private:
   SceneDocument(std::filesystem::path path, Json json, bool is_scene)
       : path_(std::move(path)), json_(std::move(json)), is_scene_(is_scene) {}
+  /// What the settings of a kind stand in.
+  const Json& of_kind(std::size_t kind) const { return is_world() ? json_["bodies"][kind] : json_; }
+  Json& of_kind(std::size_t kind) { return is_world() ? json_["bodies"][kind] : json_; }
 
   std::filesystem::path path_;
   Json json_;

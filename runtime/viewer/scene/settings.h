@@ -25,6 +25,7 @@ struct ForceSettings {
 struct Settings {
   double time_step = 0.001;  ///< [s]
   std::array<double, 3> gravity{};
+  bool own_gravity = false;                        ///< gravity is that of these bodies alone, not of the scene
   double mass_damping = 0, stiffness_damping = 0;  ///< alpha [1/s], beta [s]
   std::string integrator = "bdf2";
   std::string internal_force = "auto";

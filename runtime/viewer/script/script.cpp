@@ -1,8 +1,11 @@
 #include "runtime/viewer/script/script.h"
 
 #include <algorithm>
+#include <array>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <set>
+#include <string_view>
 
 #include "common/config/json_file.h"
 #include "common/core/error.h"
@@ -16,11 +19,19 @@ Eigen::Vector3d vector_of(const Json& json) {
   return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
 }
 
+// What goes on for a while, and for how long [s] where the script does not say.
+constexpr std::array<std::pair<const char*, double>, 3> kGoingOn{
+    {{"move", 0.5}, {"move_obstacle", 0.5}, {"camera", 0}}};
+
+double duration_of(const Json& what, const char* name) {
+  const auto is_it = [&](const auto& entry) { return std::string_view(entry.first) == name; };
+  return what[name].value("duration", std::ranges::find_if(kGoingOn, is_it)->second);
+}
+
 double end_of(const Json& what) {
   double end = what["time"];
-  for (const char* name : {"move", "move_obstacle", "camera"})
-    if (what.contains(name))
-      end = std::max(end, what["time"].get<double>() + what[name].value("duration", name[0] == 'm' ? 0.5 : 0.0));
+  for (const auto& entry : kGoingOn)
+    if (what.contains(entry.first)) end = std::max(end, what["time"].get<double>() + duration_of(what, entry.first));
   return end;
 }
 
@@ -112,11 +123,11 @@ void ScriptPlayer::act(const Script::Action& action) {
     studio_.frame_next = true;
     sight_.reset();
   }
-  if (what.contains("camera")) aim(what["camera"], action.time);
+  if (what.contains("camera")) aim(what["camera"], action.time, duration_of(what, "camera"));
   if (what.contains("grab")) grab(what["grab"]);
   if (what.contains("move")) {
     Hand& hand = hands_.at(what["move"]["hand"]);
-    hand.way = Way{action.time, what["move"].value("duration", 0.5), hand.at, vector_of(what["move"]["by"])};
+    hand.way = Way{action.time, duration_of(what, "move"), hand.at, vector_of(what["move"]["by"])};
   }
   if (what.contains("release")) {
     const auto hand = hands_.find(what["release"].get<std::string>());
@@ -137,7 +148,7 @@ void ScriptPlayer::act(const Script::Action& action) {
     if (number >= snapshot.obstacles.size())
       throw InputError({script_.file.string(), action.place + "/move_obstacle/obstacle",
                         fmt::format("one of {} obstacles", snapshot.obstacles.size()), std::to_string(number), ""});
-    obstacles_[number] = Way{action.time, moved.value("duration", 0.5),
+    obstacles_[number] = Way{action.time, duration_of(what, "move_obstacle"),
                              Eigen::Vector3d(snapshot.obstacles[number].motion.position), vector_of(moved["by"])};
   }
   if (what.contains("step")) studio_.runner().step(what["step"]);
@@ -154,7 +165,13 @@ void ScriptPlayer::grab(const Json& grab) {
 }
 
 void ScriptPlayer::set(const Json& set) {
-  Settings settings = studio_.settings(0);
+  const std::vector<std::string>& names = studio_.kind_names();
+  const std::string name = set.value("bodies", names.front());
+  const auto kind = static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+  if (kind == names.size())
+    throw InputError({script_.file.string(), "/actions", fmt::format("bodies of the scene: {}", fmt::join(names, ", ")),
+                      '"' + name + '"', ""});
+  Settings settings = studio_.settings(kind);
   take(set, "gravity", settings.gravity);
   take(set, "time_step", settings.time_step);
   take(set, "mass_damping", settings.mass_damping);
@@ -180,8 +197,8 @@ void ScriptPlayer::set(const Json& set) {
       if (force->given) force->weights = set["weights"].get<std::vector<double>>();
     }
   }
-  studio_.apply(0, settings);
-  if (!studio_.message().empty() && studio_.settings(0) != settings)
+  studio_.apply(kind, settings);
+  if (!studio_.message().empty() && studio_.settings(kind) != settings)
     throw InputError({script_.file.string(), "/actions", "settings that can be set", studio_.message(), ""});
   if (set.contains("strength"))
     studio_.runner().with([&](Simulation& simulation) { simulation.set_strength(set["strength"]); });
@@ -208,9 +225,8 @@ void ScriptPlayer::show(const Json& show) {
   if (colour == "contact_force") look.colouring = Colouring::kContactForce;
 }
 
-void ScriptPlayer::aim(const Json& camera, double time) {
+void ScriptPlayer::aim(const Json& camera, double time, double duration) {
   Camera& now = studio_.camera();
-  const double duration = camera.value("duration", 0.0);
   now.set_field_of_view(camera.value("field_of_view", Camera::kFieldOfView));
   studio_.frame_next = false;
   sight_ = Sight{{time, duration, now.position(), vector_of(camera["position"]) - now.position()},

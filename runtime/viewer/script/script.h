@@ -57,7 +57,7 @@ class ScriptPlayer {
   void grab(const nlohmann::json& grab);
   void set(const nlohmann::json& set);
   void show(const nlohmann::json& show);
-  void aim(const nlohmann::json& camera, double time);
+  void aim(const nlohmann::json& camera, double time, double duration);
   void move(double time);
 
   Script script_;

@@ -32,7 +32,7 @@ double effective_mass(const Points& points, const BodyShape& shape) {
 }  // namespace
 
 Grip::Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surface, const SurfaceHit& place,
-           Body& held)
+           BodyRef& held)
     : id_(id),
       body_(body),
       place_(place),
@@ -53,11 +53,11 @@ void Grip::follow(Body& held) {
   force_.setZero();
 }
 
-double Grip::lost(const Capacity& capacity, const Body& held) const {
+double Grip::lost(const Capacity& capacity, const BodyRef& held) const {
   return capacity.lost(held, points_, std::array{force_.x(), force_.y(), force_.z()});
 }
 
-void Grip::pull(double time_step, double strength, Body& held) {
+void Grip::pull(double time_step, double strength, BodyRef& held) {
   const Eigen::Vector3d before = point_, hand_before = hand_;
   point_ = read_point(held);
   hand_ += (1 - std::exp(-time_step / kHandDelay)) * (target_ - hand_);

@@ -13,7 +13,8 @@ namespace exmat::viewer {
 class Grip {
  public:
   /// At a place of the surface of `body`, which is not moved by that.
-  Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surface, const SurfaceHit& place, Body& held);
+  Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surface, const SurfaceHit& place,
+       BodyRef& held);
 
   int id() const { return id_; }
   std::size_t body() const { return body_; }
@@ -26,16 +27,16 @@ class Grip {
   void set_target(const Eigen::Vector3d& target) { target_ = target; }
 
   /// After the body was put elsewhere: where it is held stays, and the hand goes there.
-  void follow(Body& held);
+  void follow(BodyRef& held);
 
   /// Pulls at the body for one step; `strength` scales the spring.
-  void pull(double time_step, double strength, Body& held);
+  void pull(double time_step, double strength, BodyRef& held);
 
   /// Of the work of its force, by what the body cannot answer.
-  double lost(const Capacity& capacity, const Body& held) const;
+  double lost(const Capacity& capacity, const BodyRef& held) const;
 
  private:
-  Eigen::Vector3d read_point(Body& held) const;
+  Eigen::Vector3d read_point(BodyRef& held) const;
 
   int id_;
   std::size_t body_;

@@ -11,6 +11,7 @@ constexpr double kObstacleDelay = 0.06;  // [s] of an obstacle that is moved by 
 constexpr double kArrived = 1e-9;        // of the distance that it has to go [m]
 
 constexpr std::size_t kMostMeasured = 6000;  // vertices of a body whose load capacity is found while it moves
+constexpr std::size_t kMostTouched = 4;      // bodies whose contacts are
 constexpr double kHandSize = 0.06;           // radius over the body's size
 
 std::int32_t integrator_of(const std::string& name) {
@@ -30,7 +31,7 @@ exmat_motion motion_at(const Eigen::Vector3d& position, const exmat_motion& turn
 
 Settings with_shared(Settings own, const Settings& shared) {
   own.time_step = shared.time_step;
-  own.gravity = shared.gravity;
+  if (!own.own_gravity && !shared.own_gravity) own.gravity = shared.gravity;
   own.mass_damping = shared.mass_damping;
   own.stiffness_damping = shared.stiffness_damping;
   own.integrator = shared.integrator;
@@ -52,26 +53,77 @@ void fill_weights(const Model& model, Settings& settings) {
 
 }  // namespace
 
-Simulation::Simulation(std::vector<SceneDocument> documents, int surface_kind) : surface_kind_(surface_kind) {
-  has_contact_ = std::ranges::all_of(
-      documents, [](const SceneDocument& document) { return bundle_info(document.bundle().string()).contact == 1; });
-  const int instances = documents.front().instances();
-  for (SceneDocument& document : documents) kinds_.push_back(make_kind(std::move(document), surface_kind));
-  for (std::size_t kind = 0; kind < kinds_.size(); ++kind)
-    slots_.resize(slots_.size() + static_cast<std::size_t>(kind == 0 ? instances : 1),
-                  Slot{kind, Eigen::Vector3d::Zero()});
-  place_side_by_side();
-  make_bodies();
+Simulation::Simulation(std::vector<SceneDocument> documents, int surface_kind)
+    : surface_kind_(surface_kind), documents_(std::move(documents)) {
+  has_contact_ = std::ranges::all_of(documents_, [](const SceneDocument& document) {
+    return document.is_world() || bundle_info(document.bundle().string()).contact == 1;
+  });
+  take(make(documents_));
 }
 
-Simulation::Kind Simulation::make_kind(SceneDocument document, int surface_kind) const {
-  Model model = Model::from_text(document.text(), document.path().string(), has_contact_);
-  auto surface = std::make_unique<Surface>(model, surface_kind);
-  auto shape = std::make_shared<const BodyShape>(make_shape(model, *surface));
-  Settings settings = document.settings();
+Simulation::Made Simulation::make(const std::vector<SceneDocument>& documents) const {
+  return documents.front().is_world() ? make_world(documents.front()) : make_apart(documents);
+}
+
+Simulation::Made Simulation::make_world(const SceneDocument& document) const {
+  World world = World::from_text(document.text(), document.path().string());
+  Made made;
+  for (const std::int64_t id : world.ids()) {
+    const auto kind = static_cast<std::size_t>(world.kind(id));
+    if (kind == made.kinds.size()) made.kinds.push_back(make_kind(document, kind, kind, world.body(id).model()));
+    made.slots.push_back({kind, Eigen::Vector3d::Zero()});
+  }
+  made.bodies = SteppedBodies(std::move(world));
+  return made;
+}
+
+Simulation::Made Simulation::make_apart(const std::vector<SceneDocument>& documents) const {
+  Made made;
+  Bodies bodies;
+  for (std::size_t i = 0; i < documents.size(); ++i) {
+    const SceneDocument& document = documents[i];
+    made.kinds.push_back(
+        make_kind(document, 0, i, Model::from_text(document.text(), document.path().string(), has_contact_)));
+    made.kinds.back().document = i;
+    for (int instance = 0; instance < (i == 0 ? document.instances() : 1); ++instance) {
+      made.slots.push_back({i, Eigen::Vector3d::Zero()});
+      bodies.add(Body(made.kinds.back().model));
+    }
+  }
+  made.bodies = SteppedBodies(std::move(bodies));
+  return made;
+}
+
+/// Its shape is that of the kind of this number before, where there was one: bundles stay.
+Simulation::Kind Simulation::make_kind(const SceneDocument& document, std::size_t of_document, std::size_t number,
+                                       Model model) const {
+  auto surface = std::make_unique<Surface>(model, surface_kind_);
+  auto shape =
+      number < kinds_.size() ? kinds_[number].shape : std::make_shared<const BodyShape>(make_shape(model, *surface));
+  Settings settings = document.settings(of_document);
   fill_weights(model, settings);
-  return {std::move(document),     std::move(settings), std::move(model), std::move(surface),
-          std::optional<Points>(), std::move(shape),    nullptr};
+  return {0,
+          of_document,
+          document.kind_name(of_document),
+          std::move(settings),
+          std::move(model),
+          std::move(surface),
+          std::nullopt,
+          std::move(shape),
+          nullptr};
+}
+
+void Simulation::take(Made made) {
+  kinds_ = std::move(made.kinds);
+  slots_ = std::move(made.slots);
+  bodies_ = std::move(made.bodies);
+  if (!bodies_.is_world()) place_side_by_side();
+  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].set_profiled(true);
+  obstacles_.clear();
+  std::int64_t number = 0;
+  for (const std::int64_t id : bodies_[0].obstacle_ids())
+    obstacles_.push_back({id, number++, false, std::nullopt,
+                          std::make_shared<const std::vector<double>>(bodies_[0].obstacle_triangles(id))});
 }
 
 void Simulation::place_side_by_side() {
@@ -89,19 +141,6 @@ void Simulation::place_side_by_side() {
   }
 }
 
-void Simulation::make_bodies() {
-  Bodies bodies;
-  for (const Slot& slot : slots_) {
-    Body body(kinds_[slot.kind].model);
-    body.set_profiled(true);
-    bodies.add(std::move(body));
-  }
-  bodies_ = std::move(bodies);
-  obstacles_.clear();
-  std::int64_t number = 0;
-  for (const std::int64_t id : bodies_[0].obstacle_ids()) obstacles_.push_back({id, number++, false, std::nullopt});
-}
-
 // ---- settings -------------------------------------------------------------------------------------------------------
 
 void Simulation::apply(std::size_t kind, const Settings& settings) {
@@ -115,7 +154,7 @@ void Simulation::apply_live(std::size_t kind, const Settings& settings) {
   const Settings& before = kinds_[kind].settings;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     if (slots_[i].kind != kind) continue;
-    Body& body = bodies_[i];
+    BodyRef& body = bodies_[i];
     body.set_gravity(settings.gravity);
     body.set_damping(settings.mass_damping, settings.stiffness_damping);
     if (settings.integrator != before.integrator) body.set_integrator(integrator_of(settings.integrator));
@@ -129,20 +168,21 @@ void Simulation::apply_live(std::size_t kind, const Settings& settings) {
     }
   }
   kinds_[kind].settings = settings;
-  kinds_[kind].document.set(settings);
+  put(settings, kinds_[kind], documents_);
+}
+
+void Simulation::put(const Settings& settings, const Kind& kind, std::vector<SceneDocument>& documents) const {
+  documents[kind.document].set(settings, kind.of_document);
 }
 
 void Simulation::rebuild(std::size_t kind, const Settings& settings) {
-  std::vector<Kind> kinds;
+  std::vector<SceneDocument> documents = documents_;
+  std::vector<Settings> all;
   for (std::size_t i = 0; i < kinds_.size(); ++i) {
-    SceneDocument document = kinds_[i].document;
-    const Settings own = i == kind ? settings : with_shared(kinds_[i].settings, settings);
-    document.set(own);
-    Model model = Model::from_text(document.text(), document.path().string(), has_contact_);
-    auto surface = std::make_unique<Surface>(model, surface_kind_);
-    kinds.push_back(
-        {std::move(document), own, std::move(model), std::move(surface), std::nullopt, kinds_[i].shape, nullptr});
+    all.push_back(i == kind ? settings : with_shared(kinds_[i].settings, settings));
+    put(all.back(), kinds_[i], documents);
   }
+  Made made = make(documents);
   struct Motion {
     std::vector<double> q, v;
     exmat_motion motion;
@@ -159,10 +199,10 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
   std::vector<std::pair<exmat_obstacle, exmat_motion>> stood;
   for (const MovedObstacle& obstacle : obstacles)
     stood.emplace_back(bodies_[0].obstacle(obstacle.id), bodies_[0].obstacle_motion(obstacle.id));
-  const bool goes_on = !kinds.front().document.has_scripted_motion();
-  kinds_ = std::move(kinds);
+  const bool goes_on = std::ranges::none_of(documents, &SceneDocument::has_scripted_motion);
   grips_.clear();
-  make_bodies();
+  documents_ = std::move(documents);
+  take(std::move(made));
   steps_ = 0;
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
     if (obstacles[i].of_scene < 0) add_obstacle(stood[i].first);
@@ -175,7 +215,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
     bodies_[i].set_reduced(motions[i].q, motions[i].v);
     if (kinds_[slots_[i].kind].shape->mass > 0) bodies_[i].set_motion(motions[i].motion);
   }
-  for (std::size_t i = 0; i < kinds_.size(); ++i) apply_live(i, kinds_[i].settings);
+  for (std::size_t i = 0; i < kinds_.size(); ++i) apply_live(i, all[i]);
 }
 
 void Simulation::reset() {
@@ -286,7 +326,7 @@ bool Simulation::throw_body(std::size_t body, const Eigen::Vector3d& velocity, c
 void Simulation::add_obstacle(const exmat_obstacle& obstacle) {
   std::int64_t id = 0;
   for (std::size_t i = 0; i < bodies_.size(); ++i) id = bodies_[i].add_obstacle(obstacle);
-  obstacles_.push_back({id, -1, false, std::nullopt});
+  obstacles_.push_back({id, -1, false, std::nullopt, std::make_shared<const std::vector<double>>()});
 }
 
 void Simulation::remove_obstacle(std::size_t obstacle) {
@@ -304,23 +344,41 @@ void Simulation::set_obstacle_law(std::size_t obstacle, double stiffness, double
     bodies_[i].set_obstacle_law(obstacles_[obstacle].id, stiffness, damping, friction);
 }
 
+/// Bodies that something touches, those with the largest forces first, no more than are measured.
+std::vector<std::size_t> Simulation::most_touched() const {
+  const std::vector<std::vector<exmat_contact>> contacts = bodies_.contacts();
+  std::vector<std::pair<double, std::size_t>> touched;
+  for (std::size_t i = 0; i < contacts.size(); ++i) {
+    double force = 0;
+    for (const exmat_contact& contact : contacts[i])
+      force += std::hypot(contact.force[0], contact.force[1], contact.force[2]);
+    if (force > 0) touched.emplace_back(-force, i);
+  }
+  std::ranges::sort(touched);
+  touched.resize(std::min(touched.size(), kMostTouched));
+  std::vector<std::size_t> bodies;
+  for (const auto& entry : touched) bodies.push_back(entry.second);
+  return bodies;
+}
+
 LostWork Simulation::lost_work() {
   LostWork lost;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    const bool held = std::ranges::any_of(grips_, [&](const Grip& grip) { return grip.body() == i; });
-    const bool touched = exmat_body_contacts(bodies_[i].get()) > 0;
-    if (!held && !touched) continue;
-    Kind& kind = kinds_[slots_[i].kind];
+  const auto capacity_of = [&](std::size_t body) -> const Capacity* {
+    Kind& kind = kinds_[slots_[body].kind];
     if (kind.model.vertices() > kMostMeasured) {
       lost.measured = false;
-      continue;
+      return nullptr;
     }
     if (!kind.capacity)
       kind.capacity = std::make_unique<Capacity>(kind.model, kHandSize * kind.shape->bounds.diagonal());
-    for (const Grip& grip : grips_)
-      if (grip.body() == i) lost.hand = std::max(lost.hand.value_or(0), grip.lost(*kind.capacity, bodies_[i]));
-    if (touched) lost.contact = std::max(lost.contact.value_or(0), kind.capacity->contact_lost(bodies_[i]));
-  }
+    return kind.capacity.get();
+  };
+  for (const Grip& grip : grips_)
+    if (const Capacity* const capacity = capacity_of(grip.body()))
+      lost.hand = std::max(lost.hand.value_or(0), grip.lost(*capacity, bodies_[grip.body()]));
+  for (const std::size_t body : most_touched())
+    if (const Capacity* const capacity = capacity_of(body))
+      lost.contact = std::max(lost.contact.value_or(0), capacity->contact_lost(bodies_[body]));
   return lost;
 }
 
@@ -329,7 +387,8 @@ void Simulation::save_scene(const std::filesystem::path& file) const {
   for (const MovedObstacle& moved : obstacles_)
     placed.push_back(
         {moved.of_scene, moved.moved, bodies_[0].obstacle(moved.id), bodies_[0].obstacle_motion(moved.id)});
-  kinds_.front().document.save(file, steps_ > 0 ? steps_ : kinds_.front().document.steps(), placed);
+  const SceneDocument& document = documents_.front();
+  document.save(file, steps_ > 0 ? steps_ : document.steps(), placed);
 }
 
 }  // namespace exmat::viewer

@@ -11,13 +11,15 @@
 #include "runtime/viewer/scene/scene_document.h"
 #include "runtime/viewer/simulation/grip.h"
 #include "runtime/viewer/simulation/snapshot.h"
+#include "runtime/viewer/simulation/stepped_bodies.h"
 
 namespace exmat::viewer {
 
 /// The bodies of a scene, what holds them and what they touch. For one thread at a time.
 class Simulation {
  public:
-  /// One kind of bodies for each document, the first with its instances, side by side. Throws exmat::Error.
+  /// The bodies of a scene of several; else one kind for each document, the first with its instances, side by side.
+  /// Throws exmat::Error.
   Simulation(std::vector<SceneDocument> documents, int surface_kind);
 
   std::size_t kinds() const { return kinds_.size(); }
@@ -26,12 +28,15 @@ class Simulation {
   /// How far from its place a body is drawn, so that bodies of one place stand side by side.
   const Eigen::Vector3d& offset(std::size_t body) const { return slots_[body].offset; }
   std::shared_ptr<const BodyShape> shape(std::size_t kind) const { return kinds_[kind].shape; }
-  const SceneDocument& document(std::size_t kind) const { return kinds_[kind].document; }
+  const std::string& kind_name(std::size_t kind) const { return kinds_[kind].name; }
+  /// Whether bodies touch each other.
+  bool is_world() const { return bodies_.is_world(); }
   bool has_contact() const { return has_contact_; }
 
   const Settings& settings(std::size_t kind) const { return kinds_[kind].settings; }
-  /// From now on; gravity, damping, integrator and time step of all kinds. Where the model has to be made anew, shape
-  /// and motion go on, unless something moves by a script. Throws exmat::Error, and nothing has changed.
+  /// From now on; damping, integrator and time step of all kinds, and gravity of those without their own. Where the
+  /// model has to be made anew, shape and motion go on, unless something moves by a script. Throws exmat::Error, and
+  /// nothing has changed.
   void apply(std::size_t kind, const Settings& settings);
 
   /// All back to the start; obstacles of the scene, too.
@@ -75,7 +80,8 @@ class Simulation {
 
  private:
   struct Kind {
-    SceneDocument document;
+    std::size_t document = 0, of_document = 0;  ///< which of its kinds it is
+    std::string name;
     Settings settings;
     Model model;
     std::unique_ptr<Surface> surface;
@@ -92,11 +98,20 @@ class Simulation {
     std::int64_t of_scene = -1;  ///< its number there
     bool moved = false;
     std::optional<Eigen::Vector3d> target;
+    std::shared_ptr<const std::vector<double>> corners;  ///< 9f, of a mesh or of ground
+  };
+  struct Made {
+    std::vector<Kind> kinds;
+    std::vector<Slot> slots;
+    SteppedBodies bodies;
   };
 
-  Kind make_kind(SceneDocument document, int surface_kind) const;
+  Made make(const std::vector<SceneDocument>& documents) const;
+  Made make_world(const SceneDocument& document) const;
+  Made make_apart(const std::vector<SceneDocument>& documents) const;
+  Kind make_kind(const SceneDocument& document, std::size_t of_document, std::size_t number, Model model) const;
+  void take(Made made);
   void place_side_by_side();
-  void make_bodies();
   void rebuild(std::size_t kind, const Settings& settings);
   void apply_live(std::size_t kind, const Settings& settings);
   bool is_held() const;
@@ -104,13 +119,16 @@ class Simulation {
   void move_obstacles();
   bool step(std::int64_t steps);
   void add_times(std::int64_t steps, double seconds);
+  void put(const Settings& settings, const Kind& kind, std::vector<SceneDocument>& documents) const;
+  std::vector<std::size_t> most_touched() const;
   BodySnapshot body_snapshot(std::size_t body, const SnapshotRequest& request);
 
   int surface_kind_;
   bool has_contact_ = false;
+  std::vector<SceneDocument> documents_;
   std::vector<Kind> kinds_;
   std::vector<Slot> slots_;
-  Bodies bodies_;
+  SteppedBodies bodies_;
   std::vector<MovedObstacle> obstacles_;
   std::vector<Grip> grips_;
   int next_grip_ = 1;

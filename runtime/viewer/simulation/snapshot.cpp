@@ -47,7 +47,7 @@ std::vector<float> Simulation::positions(std::size_t body) {
 
 BodySnapshot Simulation::body_snapshot(std::size_t index, const SnapshotRequest& request) {
   Kind& kind = kinds_[slots_[index].kind];
-  Body& body = bodies_[index];
+  BodyRef& body = bodies_[index];
   const std::size_t modes = kind.shape->modes;
   BodySnapshot snapshot;
   std::vector<double> q(modes);
@@ -59,12 +59,10 @@ BodySnapshot Simulation::body_snapshot(std::size_t index, const SnapshotRequest&
                          [](double number) { return static_cast<float>(number); });
   snapshot.energies = body.energies();
   snapshot.motion = body.motion();
-  snapshot.contacts = body.contacts();
   if (request.colouring == Colouring::kStrainEnergy) {
     snapshot.field.resize(kind.shape->vertices.size());
     body.read_energy_density(*kind.surface, snapshot.field);
   }
-  if (request.colouring == Colouring::kContactForce) snapshot.field = contact_field(*kind.shape, snapshot.contacts);
   if (request.elements) {
     if (!kind.elements) kind.elements = Points::elements(kind.model);
     snapshot.elements.resize(3 * kind.elements->size());
@@ -90,13 +88,20 @@ Snapshot Simulation::snapshot(const SnapshotRequest& request) {
   snapshot.steps = steps_;
   snapshot.time = time();
   snapshot.time_step = time_step();
-  for (std::size_t i = 0; i < bodies_.size(); ++i) snapshot.bodies.push_back(body_snapshot(i, request));
+  std::vector<std::vector<exmat_contact>> contacts = bodies_.contacts();
+  for (std::size_t i = 0; i < bodies_.size(); ++i) {
+    BodySnapshot& body = snapshot.bodies.emplace_back(body_snapshot(i, request));
+    body.contacts = std::move(contacts[i]);
+    if (request.colouring == Colouring::kContactForce)
+      body.field = contact_field(*kinds_[slots_[i].kind].shape, body.contacts);
+  }
   for (const Grip& grip : grips_) {
     const Eigen::Vector3d& offset = slots_[grip.body()].offset;
     snapshot.grips.push_back({grip.id(), grip.body(), grip.point() + offset, grip.target() + offset, grip.force()});
   }
   for (const MovedObstacle& moved : obstacles_)
-    snapshot.obstacles.push_back({moved.id, bodies_[0].obstacle(moved.id), bodies_[0].obstacle_motion(moved.id)});
+    snapshot.obstacles.push_back(
+        {moved.id, bodies_[0].obstacle(moved.id), bodies_[0].obstacle_motion(moved.id), moved.corners});
   snapshot.times = times_;
   times_ = {};
   snapshot.failure = failure_;

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -30,7 +31,7 @@ struct BodySnapshot {
   std::vector<float> elements;               ///< 3s, world [m]; where asked for
   std::vector<std::vector<double>> weights;  ///< of each example force
   std::vector<std::vector<float>> targets;   ///< likewise, r; where asked for
-  std::vector<exmat_contact> contacts;
+  std::vector<exmat_contact> contacts;       ///< also with other bodies: of obstacle -1
   exmat_energies energies{};
   exmat_motion motion{};
 };
@@ -47,6 +48,7 @@ struct ObstacleSnapshot {
   std::int64_t id = 0;
   exmat_obstacle obstacle{};
   exmat_motion motion{};
+  std::shared_ptr<const std::vector<double>> corners;  ///< 9f, of a mesh or of ground; never null
 };
 
 /// Time of steps since the last snapshot.

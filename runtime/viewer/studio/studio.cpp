@@ -25,6 +25,7 @@ Studio::Studio(Simulation& simulation) : runner_(simulation), has_contact_(simul
   for (std::size_t kind = 0; kind < simulation.kinds(); ++kind) {
     shapes_.push_back(simulation.shape(kind));
     settings_.push_back(simulation.settings(kind));
+    kind_names_.push_back(simulation.kind_name(kind));
   }
   for (std::size_t body = 0; body < simulation.bodies(); ++body) {
     kinds_.push_back(simulation.kind_of(body));
@@ -65,7 +66,8 @@ std::optional<Pick> Studio::pick(const Eigen::Vector2d& pixel, const PictureSize
     }
     const Snapshot snapshot = simulation.snapshot({});
     for (std::size_t i = 0; i < snapshot.obstacles.size(); ++i) {
-      const auto hit = obstacle_hit(ray, snapshot.obstacles[i].obstacle, snapshot.obstacles[i].motion);
+      const ObstacleSnapshot& obstacle = snapshot.obstacles[i];
+      const auto hit = obstacle_hit(ray, obstacle.obstacle, *obstacle.corners, obstacle.motion);
       if (!hit || *hit >= distance) continue;
       distance = *hit;
       nearest = Pick{Pick::What::kObstacle, i, {}, ray.at(distance)};

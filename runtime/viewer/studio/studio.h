@@ -33,6 +33,7 @@ class Studio {
   const std::vector<std::size_t>& kinds_of_bodies() const { return kinds_; }
   const std::vector<Eigen::Vector3d>& offsets() const { return offsets_; }
   bool has_contact() const { return has_contact_; }
+  const std::vector<std::string>& kind_names() const { return kind_names_; }
 
   /// As last set.
   const Settings& settings(std::size_t kind) const { return settings_[kind]; }
@@ -87,6 +88,7 @@ class Studio {
   std::vector<std::size_t> kinds_;
   std::vector<Eigen::Vector3d> offsets_;
   std::vector<Settings> settings_;
+  std::vector<std::string> kind_names_;
   bool has_contact_ = false;
   Camera camera_;
   Look look_;

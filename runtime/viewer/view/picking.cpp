@@ -102,6 +102,15 @@ std::optional<double> capsule_hit(const Ray& ray, const Eigen::Vector3d& start, 
   return distance > 0 && along >= 0 && along <= length ? nearer(found, distance) : found;
 }
 
+std::optional<double> triangles_hit(const Ray& ray, std::span<const double> corners) {
+  std::optional<double> first;
+  for (std::size_t i = 0; i + 8 < corners.size(); i += 9) {
+    const auto corner = [&](std::size_t c) { return Eigen::Vector3d(corners.data() + i + 3 * c); };
+    if (const auto found = hit(ray, corner(0), corner(1), corner(2))) first = nearer(first, found->distance);
+  }
+  return first;
+}
+
 }  // namespace
 
 std::optional<SurfaceHit> first_hit(const Ray& ray, std::span<const float> points,
@@ -130,7 +139,8 @@ SurfaceHit nearest_place(const Eigen::Vector3d& point, std::span<const double> p
   return nearest;
 }
 
-std::optional<double> obstacle_hit(const Ray& ray, const exmat_obstacle& obstacle, const exmat_motion& motion) {
+std::optional<double> obstacle_hit(const Ray& ray, const exmat_obstacle& obstacle, std::span<const double> corners,
+                                   const exmat_motion& motion) {
   const Eigen::Quaterniond turn(motion.orientation[0], motion.orientation[1], motion.orientation[2],
                                 motion.orientation[3]);
   const Eigen::Quaterniond back = turn.conjugate();
@@ -148,7 +158,7 @@ std::optional<double> obstacle_hit(const Ray& ray, const exmat_obstacle& obstacl
                      Eigen::Vector3d(obstacle.half_extents));
     }
     default:
-      return std::nullopt;
+      return triangles_hit(own, corners);
   }
 }
 

@@ -25,7 +25,8 @@ std::optional<SurfaceHit> first_hit(const Ray& ray, std::span<const float> point
 SurfaceHit nearest_place(const Eigen::Vector3d& point, std::span<const double> points,
                          std::span<const std::int32_t> triangles);
 
-/// Where the ray enters a sphere, box or capsule, in the world at `motion`; none of planes.
-std::optional<double> obstacle_hit(const Ray& ray, const exmat_obstacle& obstacle, const exmat_motion& motion);
+/// Where the ray enters an obstacle, in the world at `motion`; none of planes. `corners` [9f] of a mesh or of ground.
+std::optional<double> obstacle_hit(const Ray& ray, const exmat_obstacle& obstacle, std::span<const double> corners,
+                                   const exmat_motion& motion);
 
 }  // namespace exmat::viewer

@@ -88,11 +88,17 @@ TEST_F(ApiWorldTest, AWorldOfASceneAndOneOfItsHostAreThatOfARunBitForBit) {
   World of_scene = World::from_scene(scene);
   ASSERT_THAT(of_scene.ids(), ::testing::ElementsAre(0, 1, 2, 3));
   EXPECT_EQ(of_scene.name(2), "block_2");
+  EXPECT_EQ(of_scene.kind(3), 0);
+  EXPECT_EQ(of_scene.kind(4), -1);
   const exmat_world_report report = of_scene.step(150, 1);
   EXPECT_EQ(report.steps, 150);
   EXPECT_EQ(report.unconverged_islands, expected.unconverged_islands);
   EXPECT_EQ(report.largest_island, expected.largest_island);
   EXPECT_EQ(of_scene.hash(), expected.state_hash);
+
+  World of_text = World::from_text(read_file(scene), files_.folder() / "elsewhere.json");
+  of_text.step(150);
+  EXPECT_EQ(of_text.hash(), expected.state_hash);
 
   const Model model = this->model(9.81);
   World of_host(law());
@@ -105,7 +111,7 @@ TEST_F(ApiWorldTest, AWorldOfASceneAndOneOfItsHostAreThatOfARunBitForBit) {
     body.set_motion(
         at(Eigen::Vector3d(0, 0, 0.02) + config.bodies.front().places[static_cast<std::size_t>(id)].position));
     body.add_obstacle(floor);
-    of_host.add(std::move(body));
+    EXPECT_EQ(of_host.kind(of_host.add(std::move(body))), -1);
   }
   for (int i = 0; i < 15; ++i) of_host.step(10, 2);
   EXPECT_EQ(of_host.hash(), expected.state_hash);

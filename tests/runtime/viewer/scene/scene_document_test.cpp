@@ -1,16 +1,12 @@
 #include "runtime/viewer/scene/scene_document.h"
 
-#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/config/config.h"
-#include "common/core/error.h"
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::viewer {
 namespace {
-
-using ::testing::HasSubstr;
 
 constexpr const char* kScene = R"({
   "bundle": "sub/bar.h5", "gravity": [0, 0, -1], "damping": {"mass": 2},
@@ -72,13 +68,32 @@ TEST_F(Documents, AreSavedAsScenesOfTheRunTime) {
   EXPECT_EQ(std::get<CapsuleConfig>(saved.obstacles[1].shape).end, Eigen::Vector3d(0, 0, 1));
 }
 
-TEST_F(Documents, OfSeveralBodiesAreRefusedWithAdvice) {
-  try {
-    SceneDocument::open(folder_.write("many.json", R"({"bodies": [{"name": "a", "bundle": "a.h5"}]})"));
-    FAIL();
-  } catch (const InputError& error) {
-    EXPECT_THAT(error.what(), HasSubstr("exmat-runtime run"));
-  }
+TEST_F(Documents, OfSeveralBodiesAreSavedAsScenesOfTheRunTime) {
+  SceneDocument scene = SceneDocument::open(folder_.write("many.json", R"({
+    "bodies": [{"name": "a", "bundle": "sub/a.h5", "poses": "sub/a.txt"},
+               {"name": "b", "bundle": "sub/b.h5", "gravity": [0, 0, -2], "examples": {"stiffness": 5}}],
+    "gravity": [0, 0, -1]})"));
+  ASSERT_EQ(scene.kinds(), 2U);
+  EXPECT_EQ(scene.kind_name(1), "b");
+  EXPECT_EQ(scene.bundle(1), folder_ / "sub/b.h5");
+  EXPECT_EQ(scene.settings(0).gravity[2], -1);
+  Settings settings = scene.settings(1);
+  EXPECT_EQ(settings.gravity[2], -2);
+  settings.gravity[2] = -3;
+  settings.stiffness_damping = 0.5;
+  settings.forces[0].stiffness = 6;
+  scene.set(settings, 1);
+  std::filesystem::create_directories(folder_ / "other");
+  std::filesystem::create_directories(folder_ / "sub");
+  folder_.write("sub/a.txt", "1 2 3\n4 5 6\n");
+  scene.save(folder_ / "other/saved.json", 7, {});
+  const WorldConfig saved = load_world(folder_ / "other/saved.json").value();
+  EXPECT_EQ(saved.steps, 7);
+  EXPECT_EQ(saved.bodies[0].places.size(), 2U);
+  EXPECT_EQ(saved.bodies[0].scene.gravity, Eigen::Vector3d(0, 0, -1));
+  EXPECT_EQ(saved.bodies[1].scene.gravity, Eigen::Vector3d(0, 0, -3));
+  EXPECT_EQ(saved.bodies[1].scene.examples->stiffness, 6);
+  EXPECT_EQ(saved.bodies[0].scene.stiffness_damping, 0.5);
 }
 
 TEST(Settings, ThatNeedAnotherModelAreKnown) {

@@ -62,17 +62,23 @@ TEST(Picking, FindsObstaclesWhereTheyStand) {
   obstacle.radius = 0.3;
   const Ray ray{{5, 0.1, 0.2}, Eigen::Vector3d(-1, 0, 0)};
   obstacle.shape = EXMAT_SPHERE;
-  EXPECT_NEAR((ray.at(*obstacle_hit(ray, obstacle, motion)) - Eigen::Vector3d(0.5, 0, 0)).norm(), 0.3, 1e-12);
+  EXPECT_NEAR((ray.at(*obstacle_hit(ray, obstacle, {}, motion)) - Eigen::Vector3d(0.5, 0, 0)).norm(), 0.3, 1e-12);
   obstacle.shape = EXMAT_BOX;
   obstacle.half_extents[1] = 0.25;
-  EXPECT_NEAR(ray.at(*obstacle_hit(ray, obstacle, motion)).x(), 0.75, 1e-12);
+  EXPECT_NEAR(ray.at(*obstacle_hit(ray, obstacle, {}, motion)).x(), 0.75, 1e-12);
   obstacle.shape = EXMAT_CAPSULE;
   obstacle.direction[0] = 2;
   obstacle.direction[2] = 0;
-  const Eigen::Vector3d on = ray.at(*obstacle_hit(ray, obstacle, motion));
+  const Eigen::Vector3d on = ray.at(*obstacle_hit(ray, obstacle, {}, motion));
   EXPECT_NEAR(away(on, {0.5, 0, 0}, {0, 2, 0}), 0.3, 1e-12);
+  // The face x = 2 of a box by two triangles, before it is turned and moved: y = 2 in the world.
+  obstacle.shape = EXMAT_MESH;
+  const std::array<double, 18> face{2, -1, -1, 2, 1, -1, 2, 1, 1, 2, -1, -1, 2, 1, 1, 2, -1, 1};
+  const Ray across{{0.4, 9, -0.3}, Eigen::Vector3d(0, -1, 0)};
+  EXPECT_NEAR(obstacle_hit(across, obstacle, face, motion).value(), 7, 1e-12);
+  EXPECT_FALSE(obstacle_hit(ray, obstacle, face, motion));
   obstacle.shape = EXMAT_PLANE;
-  EXPECT_FALSE(obstacle_hit(ray, obstacle, motion));
+  EXPECT_FALSE(obstacle_hit(ray, obstacle, {}, motion));
 }
 
 }  // namespace
