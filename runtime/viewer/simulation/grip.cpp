@@ -42,13 +42,13 @@ Grip::Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surf
   follow(held);
 }
 
-Eigen::Vector3d Grip::read_point(Body& held) const {
+Eigen::Vector3d Grip::read_point(BodyRef& held) const {
   std::array<float, 3> xyz{};
   held.read_positions(points_, xyz);
   return Eigen::Map<const Eigen::Vector3f>(xyz.data()).cast<double>();
 }
 
-void Grip::follow(Body& held) {
+void Grip::follow(BodyRef& held) {
   point_ = target_ = hand_ = read_point(held);
   force_.setZero();
 }
