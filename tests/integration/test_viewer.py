@@ -187,7 +187,7 @@ class Viewer(unittest.TestCase):
         self.assertIn("low, high", self.view(self.world(), "--script", wrong, status=2))
 
     def test_runs_say_what_the_basis_loses_of_contacts(self):
-        printed = call(RUNTIME, "run", self.world(), "--steps", "150")
+        printed = call(RUNTIME, "run", self.world(), "--steps", "400")
         for body in ("low", "high"):
             self.assertTrue(0 <= float(re.search(f"lost work, {body} +([0-9.]+) % of", printed).group(1)) <= 100)
         scene = self.write("dropped.json", {"bundle": "free.h5", "time_step": 0.002, "gravity": [0, 0, -9.81], "steps": 100,

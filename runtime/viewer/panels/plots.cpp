@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <ranges>
 #include <string>
 
 namespace exmat::viewer {
@@ -78,12 +79,12 @@ void draw_energies(const Style& style, const History& history) {
   for (std::size_t i = 0; i < kNames.size(); ++i) key(style, i, kNames[i], joules(history.energies.line(i).back()));
 }
 
-/// Stages beside each other, against the time that a step may take in real time.
-void draw_times(const Style& style, const Snapshot& snapshot, const History& history) {
-  const StageTimes& stages = history.stages;
-  heading(style, "A step");
-  const auto bodies = static_cast<float>(snapshot.bodies.size());
-  const float budget = 1e6F * static_cast<float>(snapshot.time_step) / bodies;
+/// Stages beside each other; nothing of bodies that touch each other, whose stages are not told apart.
+void draw_stages(const Style& style, const StageTimes& stages) {
+  constexpr float kNone = 0.005F;  // us
+  const std::size_t rest = StageTimes::kStages - 1;
+  if (std::ranges::none_of(stages.microseconds | std::views::take(rest), [](float time) { return time > kNone; }))
+    return;
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const ImVec2 size{ImGui::GetContentRegionAvail().x, 12 * style.scale};
   ImDrawList* const list = ImGui::GetWindowDrawList();
@@ -97,8 +98,17 @@ void draw_times(const Style& style, const Snapshot& snapshot, const History& his
   }
   ImGui::Dummy(size);
   for (std::size_t i = 0; i < StageTimes::kStages; ++i)
-    if (stages.microseconds[i] > 0.005F)
+    if (stages.microseconds[i] > kNone)
       key(style, i, StageTimes::kNames[i], fmt::format("{:.1f} us", stages.microseconds[i]));
+}
+
+/// Against the time that a step may take in real time.
+void draw_times(const Style& style, const Snapshot& snapshot, const History& history) {
+  const StageTimes& stages = history.stages;
+  heading(style, "A step");
+  const auto bodies = static_cast<float>(snapshot.bodies.size());
+  const float budget = 1e6F * static_cast<float>(snapshot.time_step) / bodies;
+  draw_stages(style, stages);
   ImGui::Text("%.1f us of %.0f us: %.1f %%", stages.total, budget, 100 * stages.total / budget);
   if (ImGui::IsItemHovered())
     ImGui::SetTooltip(
