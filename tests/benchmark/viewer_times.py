@@ -3,7 +3,7 @@
 
 Usage: xvfb-run -a viewer_times.py FOLDER_OF_PROGRAMS SCENE.json ...    [--rounds N]
 
-Prints rows of the table of docs/viewer.md, each the best of N runs (5) of 30 pictures of 1280 x 720 with the interface.
+Prints rows of the table of docs/viewer.md, each the best of N runs (5) of 12 pictures of 1280 x 720 with the interface.
 Bodies: the most `instances` of a scene whose steps fit into a sixtieth of a second, found by bisection, without drawing.
 """
 import argparse
@@ -13,15 +13,15 @@ import subprocess
 import tempfile
 from pathlib import Path
 
-PICTURES = 30
+PICTURES = 12
 FRAME = 1e3 / 60  # ms
 
 
-def measured(viewer, scene, rounds, *options):
+def measured(viewer, scene, rounds, size="1280x720", *options):
     """Triangles, and the least ms of steps and of drawing."""
     best = {}
     for _ in range(rounds):
-        words = [viewer, scene, "--frames", PICTURES, "--size", "1280x720", "--log-level", "error", *options]
+        words = [viewer, scene, "--frames", PICTURES, "--size", size, "--time", "--log-level", "error", *options]
         printed = subprocess.run(list(map(str, words)), capture_output=True, text=True, check=True).stdout
         for name, number in re.findall(r"^(triangles|bodies|simulation|drawing) ([0-9.]+)", printed, re.M):
             best[name] = min(best.get(name, float("inf")), float(number))
@@ -41,10 +41,10 @@ def most_bodies(viewer, scene, folder, of_one, rounds):
     def fits(count):
         copy = folder / "many.json"
         copy.write_text(json.dumps({**content, "instances": count}))
-        return measured(viewer, copy, rounds, "--time", "--hide-interface", "--size", "64x64")["simulation"] <= FRAME
+        return measured(viewer, copy, rounds, "64x64", "--hide-interface")["simulation"] <= FRAME
 
     least, most = 0, max(2, int(4 * FRAME / of_one))
-    while most - least > max(1, least // 20):
+    while most - least > max(1, least // 10):
         middle = (least + most) // 2
         least, most = (middle, most) if fits(middle) else (least, middle)
     return least
@@ -61,7 +61,7 @@ def main():
     with tempfile.TemporaryDirectory() as folder:
         for scene in arguments.scenes:
             scene = scene.resolve()
-            best = measured(viewer, scene, arguments.rounds, "--time")
+            best = measured(viewer, scene, arguments.rounds)
             bodies = most_bodies(viewer, scene, Path(folder), best["simulation"], max(1, arguments.rounds // 2))
             print(f"| {scene.parent.name} | {int(best['triangles']):,} | {best['simulation']:.2f} ms | {best['drawing']:.0f} ms | {bodies} |", flush=True)
 

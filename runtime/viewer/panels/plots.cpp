@@ -149,7 +149,7 @@ void draw_lost(const Style& style, const char* what, double lost) {
   list->AddRectFilled(at, {at.x + size.x * static_cast<float>(std::max(lost, 0.01)), at.y + size.y},
                       warning_colour(lost), 3 * style.scale);
   ImGui::Dummy(size);
-  const std::string share = fmt::format("{:.0f} %", 100 * lost);
+  const std::string share = fmt::format("{:.0f}\u00a0%", 100 * lost);
   const std::string text =
       lost < kLittle ? fmt::format("The basis answers this {}: {} of its work is lost.", what, share)
       : lost < kMuch

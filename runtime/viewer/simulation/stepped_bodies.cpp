@@ -1,6 +1,7 @@
 #include "runtime/viewer/simulation/stepped_bodies.h"
 
 #include <algorithm>
+#include <thread>
 #include <utility>
 
 namespace exmat::viewer {
@@ -17,6 +18,12 @@ exmat_contact as_with_obstacle(const exmat_body_contact& contact) {
   return found;
 }
 
+/// One processor is left to what draws: threads that wait for each other in each step must not wait for it.
+int threads_of_steps() {
+  static const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()) - 1);
+  return threads;
+}
+
 }  // namespace
 
 SteppedBodies::SteppedBodies(Bodies bodies) : apart_(std::move(bodies)) {
@@ -29,9 +36,9 @@ SteppedBodies::SteppedBodies(World world) : world_(std::move(world)) {
 
 void SteppedBodies::step(std::int64_t steps) {
   if (world_)
-    world_->step(steps);
+    world_->step(steps, threads_of_steps());
   else
-    apart_.step(steps);
+    apart_.step(steps, threads_of_steps());
 }
 
 std::uint64_t SteppedBodies::hash() const { return world_ ? world_->hash() : apart_.hash(); }

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <gtest/gtest.h>
 
 #include "common/bundle/bundle.h"
@@ -44,7 +45,7 @@ class WorldSimulations : public ::testing::Test {
   /// By the library alone.
   static std::uint64_t hash_of(const std::filesystem::path& scene, std::int64_t steps) {
     World world = World::from_scene(scene.string());
-    world.step(steps);
+    world.step(steps, 1);
     return world.hash();
   }
 
@@ -65,6 +66,8 @@ TEST_F(WorldSimulations, StepAsTheLibraryDoesAndGoBackToTheirStart) {
   for (const BodySnapshot& body : snapshot.bodies)
     between += static_cast<std::size_t>(std::ranges::count(body.contacts, -1, &exmat_contact::obstacle));
   EXPECT_GT(between, 3U);
+  const std::vector<float> pressed = simulation.snapshot({.colouring = Colouring::kContactForce}).bodies[0].field;
+  EXPECT_GT(std::ranges::count_if(pressed, [](float force) { return force > 0; }), 3);
   EXPECT_EQ(snapshot.obstacles.at(1).corners->size(), 9U * 4);
   EXPECT_TRUE(simulation.lost_work().contact);
   simulation.reset();
