@@ -5,6 +5,7 @@
 
 #include "common/core/error.h"
 #include "common/core/progress.h"
+#include "precompute/study/stability/stability_world.h"
 
 namespace exmat::precompute {
 namespace {
@@ -17,6 +18,7 @@ void build_bodies(BodyStore& bodies, std::vector<StabilityRun>& runs) {
   for (StabilityRun& run : runs) {
     try {
       bodies.get(run.test.body);
+      if (run.test.company == Company::kCarried) bodies.get(carried_spec(run.test));
     } catch (const InputError& error) {
       run.refusal = error.what();
     } catch (const WorkError& error) {
@@ -25,6 +27,13 @@ void build_bodies(BodyStore& bodies, std::vector<StabilityRun>& runs) {
     progress.advance();
   }
   omp_set_num_threads(threads);
+}
+
+StabilityResult result_of(const StabilityCase& test, const BodyStore& bodies, const StabilityOptions& options) {
+  const StudyBody& body = bodies.at(test.body);
+  if (test.company == Company::kNone) return run_case(test, body, options.most_steps, options.policy);
+  const StudyBody* const carried = test.company == Company::kCarried ? &bodies.at(carried_spec(test)) : nullptr;
+  return run_world_case(test, body, carried, options.most_steps);
 }
 
 }  // namespace
@@ -39,8 +48,7 @@ std::vector<StabilityRun> run_stability(std::vector<StabilityCase> cases, const 
 #pragma omp parallel for schedule(dynamic) num_threads(jobs)
   for (std::size_t i = 0; i < runs.size(); ++i) {
     StabilityRun& run = runs[i];
-    if (run.refusal.empty())
-      run.result = run_case(run.test, bodies.at(run.test.body), options.most_steps, options.policy);
+    if (run.refusal.empty()) run.result = result_of(run.test, bodies, options);
 #pragma omp critical
     progress.advance();
   }

@@ -25,6 +25,7 @@ constexpr double kLengths[3] = {1.0, 0.25, 0.2};  // [m]
 constexpr std::array<int, 3> kCells{8, 2, 2};
 constexpr double kFlatLayer = 1.54e-3;                       // thickness of the cells of slivers [m]
 constexpr double kBend = 1.2, kTwist = 1.0, kNearly = 1e-7;  // [rad]
+constexpr const char* kRegion = "outer";
 constexpr int kModes = 12, kLinearModes = 8, kElements = 24, kEigenfunctions = 8, kTrainingPoses = 60;
 
 // Along an axis of the bar; slivers have a third layer of cells in the middle of z.
@@ -77,13 +78,25 @@ AssetConfig asset_of(const BodySpec& spec) {
   asset.cubature_elements = kElements;
   asset.training_poses = kTrainingPoses;
   asset.internal_force = spec.polynomial ? ForceMethod::kPolynomial : ForceMethod::kCubature;
+  if (spec.region) {
+    const BoxSelection outer{{0.5 * kLengths[0] - 1e-6, -1, -1}, {2 * kLengths[0], 1, 1}};
+    RegionConfig& region = asset.regions.emplace_back();
+    region.name = kRegion;
+    region.vertices = outer;
+    region.example_vertices = outer;
+    for (const auto& [name, pose] : example_meshes(spec.examples, stability_mesh(spec.slivers)))
+      region.examples.push_back(name);
+  }
   return asset;
 }
 
 Needs needs_of(const BodySpec& spec) {
   Needs needs;
-  needs.examples = spec.examples != BodyExamples::kNone;
+  needs.examples = spec.examples != BodyExamples::kNone && !spec.region;
   needs.targets = spec.target_table;
+  needs.carried = spec.carried;
+  needs.target_elasticity = spec.elastic;
+  needs.energy_reference = spec.energy_reference;
   needs.internal_force = spec.polynomial ? ForceMethod::kPolynomial : ForceMethod::kCubature;
   return needs;
 }
@@ -134,9 +147,13 @@ std::unique_ptr<StudyBody> build(const BodySpec& spec, const std::filesystem::pa
   BuildReport report;
   body->reduced = build_reduced_model(asset, needs_of(spec), report);
   runtime::ModelOptions options;
-  options.examples = spec.examples != BodyExamples::kNone;
+  options.examples = spec.examples != BodyExamples::kNone && !spec.region;
   options.target_table = body->reduced.targets.has_value();
   options.polynomial = spec.polynomial;
+  options.carried = spec.carried;
+  options.elastic = spec.elastic;
+  options.energy_reference = spec.energy_reference;
+  if (spec.region) options.regions.push_back({.region = kRegion, .target_table = spec.target_table});
   runtime::ModelResult result = runtime::build_model(body->reduced, options);
   if (!result.model) throw InputError(std::move(result.complaint));
   body->model = std::move(result.model);

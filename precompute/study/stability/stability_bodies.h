@@ -20,7 +20,7 @@ enum class BodyExamples {
   kRestAlone,       ///< one example: the rest pose
 };
 
-/// A bar of 1 x 0.25 x 0.2 m along x, clamped at x = 0 or free, in 160 tets: five to a cell.
+/// A bar of 1 x 0.25 x 0.2 m along x, clamped at x = 0, carried there or free, in 160 tets: five to a cell.
 struct BodySpec {
   MaterialModel material = MaterialModel::kStVenantKirchhoff;
   double youngs_modulus = 1e6;  ///< [Pa]
@@ -31,6 +31,10 @@ struct BodySpec {
   BodyExamples examples = BodyExamples::kNone;
   bool target_table = false;  ///< targets from a table, else solved for
   bool polynomial = false;    ///< internal force by the exact polynomial, of stvk alone
+  bool carried = false;       ///< clamped, and a motion may carry it
+  bool region = false;        ///< the examples are those of its outer half alone
+  bool elastic = false;       ///< what an elastic example force takes
+  EnergyReference energy_reference = EnergyReference::kExample;
 
   auto operator<=>(const BodySpec&) const = default;
 };

@@ -161,7 +161,7 @@ void add_contacts(Cases& cases) {
     }
 }
 
-/// Onto meshes and height fields, at 1/30 s also faster than they are thick; what is as stiff as 1e10 N/m^3 then turns
+/// Onto obstacles of all shapes, at 1/30 s also faster than they are thick; what is as stiff as 1e10 N/m^3 then turns
 /// by more than a radian in a step, on planes as well.
 void add_grounds(Cases& cases) {
   for (const double time_step : {1e-3, kThirtieth})
@@ -172,12 +172,15 @@ void add_grounds(Cases& cases) {
         test.contact_stiffness = stiffness;
         test.friction = 0.5;
         test.velocity = velocity;
-        test.ground = Ground::kMesh;
-        test.extreme = fmt::format("onto a slab of triangles at {:g} m/s, {:g} N/m^3", velocity, stiffness);
-        add(test, cases);
-        test.ground = Ground::kHills;
-        test.extreme = fmt::format("onto a height field at {:g} m/s, {:g} N/m^3", velocity, stiffness);
-        add(test, cases);
+        for (const auto& [ground, name] : {std::pair(Ground::kMesh, "a slab of triangles"),
+                                           {Ground::kHills, "a height field"},
+                                           {Ground::kBox, "a box"},
+                                           {Ground::kSphere, "a sphere"},
+                                           {Ground::kCapsule, "a capsule"}}) {
+          test.ground = ground;
+          test.extreme = fmt::format("onto {} at {:g} m/s, {:g} N/m^3", name, velocity, stiffness);
+          add(test, cases);
+        }
       }
 }
 
@@ -200,6 +203,114 @@ void add_examples(Cases& cases) {
   add_forces(BodyExamples::kNearDuplicates, false, "examples that differ by 1e-7 rad");
   add_forces(BodyExamples::kDuplicates, false, "the same example twice");
   add_forces(BodyExamples::kRestAlone, false, "the rest pose alone");
+  // Elastic ones, whose stiffness is a factor on that of the material, and those of a region.
+  for (const bool free : {false, true})
+    for (const double time_step : {1e-3, kThirtieth})
+      for (const double size : {1.0, 1e3}) {
+        StabilityCase test{.group = "examples", .time_step = time_step};
+        test.start = Start::kImpulse;
+        test.impulse = kDown;
+        test.body = {.free = free, .examples = BodyExamples::kBendAndTwist, .elastic = true};
+        test.examples = {.stiffness = size, .damping = 2, .bias = 0.5, .elastic = true};
+        for (const EnergyReference reference : {EnergyReference::kExample, EnergyReference::kRest}) {
+          test.body.energy_reference = reference;
+          test.extreme = fmt::format("elastic, energy relative to the {}, factor {:g}", name_of(reference), size);
+          add(test, cases);
+        }
+        test.body = {.free = free, .examples = BodyExamples::kBendAndTwist, .region = true};
+        test.examples = {.stiffness = size == 1 ? 1e3 : 1e10, .damping = 2, .bias = 0.5};
+        test.extreme = fmt::format("of a region, kappa {:g} 1/s^2", test.examples.stiffness);
+        add(test, cases);
+      }
+}
+
+/// Free bodies that are pulled to a pose while they touch the ground.
+void add_examples_on_ground(const std::vector<double>& time_steps, const std::vector<double>& stiffnesses,
+                            const std::vector<double>& kappas, Cases& cases) {
+  for (const double time_step : time_steps)
+    for (const double stiffness : stiffnesses)
+      for (const double kappa : kappas) {
+        StabilityCase test{.group = "examples on the ground", .time_step = time_step, .gravity = kGravity};
+        test.body = {.free = true, .examples = BodyExamples::kBendAndTwist, .target_table = true};
+        test.examples = {.stiffness = kappa, .damping = 2, .bias = 0.5};
+        test.velocity = 5;
+        test.ground = Ground::kPlane;
+        test.contact_stiffness = stiffness;
+        test.friction = 0.5;
+        test.extreme = fmt::format("kappa {:g} 1/s^2, contact stiffness {:g} N/m^3", kappa, stiffness);
+        add(test, cases);
+      }
+}
+
+/// Bodies on bodies: of all that is exact of one body it is asked of all together. Newmark's method takes backward
+/// Euler's steps where bodies touch.
+void add_worlds(const std::vector<double>& time_steps, const std::vector<double>& stiffnesses, bool all_integrators,
+                Cases& cases) {
+  for (const double time_step : time_steps)
+    for (const double stiffness : stiffnesses) {
+      StabilityCase test{.group = "bodies", .time_step = time_step};
+      test.contact_stiffness = stiffness;
+      test.friction = 0.5;
+      const auto add_company = [&](Company company, const std::string& what) {
+        test.company = company;
+        test.extreme = fmt::format("{}, contact stiffness {:g} N/m^3", what, stiffness);
+        if (all_integrators)
+          add(test, cases);
+        else
+          cases.push_back(test);
+      };
+      test.body.free = true;
+      test.velocity = 5;
+      add_company(Company::kPair, "two that meet at 5 m/s");
+      test.velocity = 50;
+      add_company(Company::kPair, "two that meet at 50 m/s");
+      test.velocity = 0;
+      add_company(Company::kCarried, "one that is swung through another");
+      test.gravity = kGravity;
+      test.ground = Ground::kPlane;
+      test.velocity = 2;
+      add_company(Company::kPile, "a pile of three");
+      test.body.examples = BodyExamples::kBendAndTwist;
+      test.body.target_table = true;
+      test.examples = {.stiffness = 1e4, .damping = 2, .bias = 0.5};
+      add_company(Company::kPile, "a pile of three that are pulled to poses");
+      test.body.examples = BodyExamples::kNone;
+      test.body.target_table = false;
+      test.gravity = test.velocity = 0;
+      test.ground = Ground::kNone;
+      test.reach = 1;
+      test.start = Start::kTangled;
+      for (const bool free : {false, true}) {
+        test.body.free = free;
+        add_company(Company::kItself, "touches itself, random coordinates, displaced by L");
+      }
+    }
+}
+
+/// The exact force in place of that of elements.
+void add_polynomial(Cases& cases) {
+  for (const double time_step : {1e-3, kThirtieth})
+    for (const bool free : {false, true}) {
+      StabilityCase test{.group = "polynomial", .body = {.free = free, .polynomial = true}, .time_step = time_step};
+      test.extreme = "100 times the load that bends it by L/10";
+      test.tip_load = 10 * kDown;
+      add(test, cases);
+      test.tip_load.setZero();
+      for (const auto& [start, name] : {std::pair(Start::kFlattened, "compressed into a plane"),
+                                        {Start::kInverted, "inverted"},
+                                        {Start::kTangled, "random coordinates"}}) {
+        test.start = start;
+        test.reach = 10;
+        test.extreme = name;
+        add(test, cases);
+      }
+      test.start = Start::kRest;
+      test.gravity = kGravity;
+      test.ground = Ground::kPress;
+      test.contact_stiffness = 1e10;
+      test.extreme = "pressed flat, contact stiffness 1e10 N/m^3";
+      add(test, cases);
+    }
 }
 
 void add_slivers(Cases& cases) {
@@ -282,6 +393,15 @@ const std::vector<KnownLimit>& known_limits() {
        "the turn of such a step is not resolved; forces of the rotation have no potential, and the search ends early, "
        "where it ends at its start in every step from then on: the body turns on in the shape that it has",
        kUnconverged},
+      {"bodies-turn", Check::kEnergy,
+       [](const StabilityCase& test, const StudyBody& body) {
+         return test.company == Company::kPair && test.velocity * test.time_step > 0.7 * body.size &&
+                test.contact_stiffness >= 1e8;
+       },
+       1, "bodies that come nearer by their size in a step and meet stiffly off their centres",
+       "they turn by several radians in a step, which is not resolved, while they are in each other: what the contacts "
+       "hold comes back as more than it was",
+       "none; a smaller time_step"},
       {"corotational-kink", Check::kSolved,
        [](const StabilityCase& test, const StudyBody&) {
          return test.body.material == MaterialModel::kCorotational && test.tip_load.norm() > 0;
@@ -310,6 +430,9 @@ std::vector<StabilityCase> short_stability_suite() {
   add_contacts(cases);
   add_grounds(cases);
   add_examples(cases);
+  add_examples_on_ground({1e-3, kThirtieth}, {1e4, 1e10}, {1e3, 1e10}, cases);
+  add_worlds({1e-3, kThirtieth}, {1e4, 1e10}, /*all_integrators=*/false, cases);
+  add_polynomial(cases);
   add_slivers(cases);
   add_nothing(cases);
   return cases;
@@ -319,7 +442,10 @@ std::vector<StabilityCase> long_stability_suite() {
   Cases cases;
   add_product(cases);
   for (StabilityCase& test : short_stability_suite())
-    if (test.group != "stiffness") cases.push_back(std::move(test));
+    if (test.group != "stiffness" && test.group != "examples on the ground" && test.group != "bodies")
+      cases.push_back(std::move(test));
+  add_examples_on_ground({1e-4, 1e-3, kSixtieth, kThirtieth}, {1e4, 1e6, 1e8, 1e10}, {1e3, 1e6, 1e10}, cases);
+  add_worlds({1e-4, 1e-3, kSixtieth, kThirtieth}, {1e4, 1e6, 1e8, 1e10}, /*all_integrators=*/true, cases);
   return cases;
 }
 

@@ -25,10 +25,22 @@ enum class Start {
 /// What a body may touch.
 enum class Ground {
   kNone,
-  kPlane,  ///< below it
-  kPress,  ///< a plane below and one above that comes down to it, and goes up again
-  kMesh,   ///< a slab of triangles below it, a tenth of L thick
-  kHills,  ///< a height field below it
+  kPlane,    ///< below it
+  kPress,    ///< a plane below and one above that comes down to it, and goes up again
+  kMesh,     ///< a slab of triangles below it, a tenth of L thick
+  kHills,    ///< a height field below it
+  kSphere,   ///< one of radius 2 L below it
+  kCapsule,  ///< one of radius 2 L, which lies across it, below it
+  kBox,      ///< a box a tenth of L thick below it
+};
+
+/// What else there is, and touches it.
+enum class Company {
+  kNone,
+  kPile,     ///< two more of its kind, across each other above it
+  kPair,     ///< another that it meets head on, off the centre
+  kCarried,  ///< one that a motion swings through it, and back
+  kItself,   ///< parts of its own surface
 };
 
 /// One run. L is the diagonal of the body's bounding box, w_1 its lowest frequency.
@@ -52,6 +64,7 @@ struct StabilityCase {
   double stiffness_damping = 0;         ///< beta w_1
   runtime::ExampleSettings examples{};  ///< of a body with examples
   Ground ground = Ground::kNone;
+  Company company = Company::kNone;
   double contact_stiffness = 1e6;  ///< [N/m^3]
   double friction = 0;
 };

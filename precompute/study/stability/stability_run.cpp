@@ -70,12 +70,14 @@ class Run {
   }
   /// Whether the body ends up in a rotation about another axis than a principal one, which bends it for ever.
   bool tumbles() const {
-    return test_.body.free && ((test_.spin > 0 && !test_.principal_axis) || !scene_.forces.empty());
+    return test_.body.free && ((test_.spin > 0 && !test_.principal_axis) || !scene_.forces.empty() || rocks());
   }
+  /// Whether the ground is round: a bar rocks on it for long.
+  bool rocks() const { return test_.ground == Ground::kSphere || test_.ground == Ground::kCapsule; }
   /// Whether the run stays in the range where displacements are below so many L in linear elasticity.
   bool small(double sizes) const;
   bool conservative() const;
-  void judge(Check check, double value, double limit);
+  void judge(Check check, double value, double limit) { precompute::judge(test_, body_, check, value, limit, result_); }
   void judge_all();
 
   const StabilityCase& test_;
@@ -100,7 +102,7 @@ void Run::make_scene() {
   scene_.stiffness_damping = test_.stiffness_damping / body_.lowest_frequency;
   scene_.gravity = Eigen::Vector3d(0, 0, -test_.gravity);
   scene_.gravity_force = runtime::gravity_force(model_, scene_.gravity);
-  if (!model_.examples.empty()) scene_.examples.push_back(test_.examples);
+  scene_.examples.assign(model_.examples.size(), test_.examples);
   if (test_.tip_load.norm() > 0) add_tip_load();
   if (test_.ground != Ground::kNone) add_ground();
 }
@@ -187,6 +189,18 @@ void Run::add_ground() {
   ground.damping = 2 * std::sqrt(test_.contact_stiffness * surface_density());  // a vertex of that mass does not bounce
   ground.friction = test_.friction;
   constexpr double kGroundSizes = 20;
+  const Eigen::Vector3d below(0.5 * X.col(0).maxCoeff(), 0.5 * X.col(1).maxCoeff(), -kClearance);
+  const double radius = 2 * body_.size;
+  if (test_.ground == Ground::kSphere)
+    ground.shape = runtime::Sphere{below - radius * Eigen::Vector3d::UnitZ(), radius};
+  if (test_.ground == Ground::kCapsule) {
+    const Eigen::Vector3d axis = below - radius * Eigen::Vector3d::UnitZ(), along(0, kGroundSizes * body_.size, 0);
+    ground.shape = runtime::Capsule{axis - along, axis + along, radius};
+  }
+  if (test_.ground == Ground::kBox) {
+    const double half = kGroundSizes * body_.size, thick = 0.05 * body_.size;
+    ground.shape = runtime::Box{below - thick * Eigen::Vector3d::UnitZ(), {half, half, thick}};
+  }
   if (test_.ground == Ground::kMesh) ground.shape = slab_of_triangles(kGroundSizes * body_.size, 0.1 * body_.size);
   if (test_.ground == Ground::kHills) ground.shape = hills(kGroundSizes * body_.size);
   if (test_.ground == Ground::kMesh || test_.ground == Ground::kHills)
@@ -358,25 +372,13 @@ void Run::step_all() {
   result_.seconds = timer.seconds();
 }
 
-void Run::judge(Check check, double value, double limit) {
-  CheckResult& result = result_[check];
-  result = {value <= limit ? Verdict::kPass : Verdict::kFail, value, limit, {}};
-  if (result.verdict == Verdict::kPass) return;
-  for (const KnownLimit& known : known_limits()) {
-    if (known.check != check || !(value <= known.most) || !known.covers(test_, body_)) continue;
-    result.verdict = Verdict::kKnownLimit;
-    result.limit_id = known.id;
-    return;
-  }
-}
-
 void Run::judge_all() {
   judge(Check::kFinite, static_cast<double>(result_.non_finite_steps), 0);
   if (result_.non_finite_steps > 0) return;
   const double spun = body_.reach * std::sqrt(2 * peak_rotation_) / body_.size;
   double bound = kSizes + kLinear * (result_.linear_displacement + spun) + start_displacement_ / body_.size;
   if (small(kSmall)) bound = kSmallMargin * result_.linear_displacement;
-  if (!scene_.examples.empty())
+  if (!scene_.examples.empty() && body_.reduced.examples)
     for (const ExampleData& example : body_.reduced.examples->examples)
       bound = std::max(bound, kSizes + 2 * largest(example.pose) / body_.size);
   judge(Check::kBounded, result_.largest_displacement, bound);
@@ -409,6 +411,19 @@ Verdict StabilityResult::verdict() const {
     if (check.verdict == Verdict::kKnownLimit) worst = Verdict::kKnownLimit;
   }
   return worst;
+}
+
+void judge(const StabilityCase& test, const StudyBody& body, Check check, double value, double limit,
+           StabilityResult& result) {
+  CheckResult& judged = result[check];
+  judged = {value <= limit ? Verdict::kPass : Verdict::kFail, value, limit, {}};
+  if (judged.verdict == Verdict::kPass) return;
+  for (const KnownLimit& known : known_limits()) {
+    if (known.check != check || !(value <= known.most) || !known.covers(test, body)) continue;
+    judged.verdict = Verdict::kKnownLimit;
+    judged.limit_id = known.id;
+    return;
+  }
 }
 
 StabilityResult run_case(const StabilityCase& test, const StudyBody& body, int most_steps,

@@ -35,6 +35,10 @@ struct StabilityResult {
   Verdict verdict() const;
 };
 
+/// A check of a run as a verdict: passed, failed, or failed as a known limit says.
+void judge(const StabilityCase& test, const StudyBody& body, Check check, double value, double limit,
+           StabilityResult& result);
+
 /// Steps a case until it is to be at rest, at most `most_steps` steps; what is not at rest then is not judged. Bounds
 /// and their reasons: docs/stability.md. Thread-safe.
 /// `policy` plants a fault, which the suite has to notice.

@@ -277,10 +277,10 @@ double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContac
   return change.relative();
 }
 
-NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
-                          std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
-  IslandProblem problem(bodies, pairs, incidences, threads, workspace);
-  for (const WorldBody* const own : bodies) workspace.x.segment(own->offset, own->unknowns()) = own->near().x;
+/// Minimises with friction as it follows, from workspace.x; that of the first round begins where the elastic potential
+/// was started.
+NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                      int threads, IslandWorkspace& workspace) noexcept {
   NewtonReport total;
   for (int round = 0; round < kFrictionRounds; ++round) {
     if (round > 0)
@@ -288,6 +288,51 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
     add(newton_minimise(problem, bodies.front()->scene.newton, workspace.x, workspace.newton), total);
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (refresh_friction(bodies, pairs) <= kSameFriction) break;
+  }
+  return total;
+}
+
+/// The unknowns of a body that stays where it is.
+void stay(WorldBody& body, Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  x.setZero();
+  if (body.rigid() == 0) return;
+  Eigen::VectorXd& own = body.near().x;
+  own = x;
+  x.head<3>() = body.model.frame->placement(body.state.frame).position - body.problem->place(own).position;
+}
+
+void stay(std::span<WorldBody* const> bodies, Eigen::VectorXd& x) noexcept {
+  for (WorldBody* const own : bodies) stay(*own, x.segment(own->offset, own->unknowns()));
+}
+
+/// Whether bodies go so far in a step that they would be deep in each other.
+bool are_fast(std::span<WorldBody* const> bodies) noexcept {
+  return std::ranges::any_of(bodies, [](const WorldBody* own) {
+    const double speed = own->model.frame->velocity(own->state.frame).linear.norm();
+    return own->scene.time_step * speed > kFast * own->surface.bound(own->state.q).radius;
+  });
+}
+
+/// From where the bodies would go without each other. Where that leads nowhere, or to a minimum that is none of theirs,
+/// as between bodies that would be deep in each other, from where they are: there the potential is the energy that they
+/// have, and no minimum below has more.
+NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                          std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
+  IslandProblem problem(bodies, pairs, incidences, threads, workspace);
+  for (const WorldBody* const own : bodies) workspace.x.segment(own->offset, own->unknowns()) = own->near().x;
+  NewtonReport total = minimise(problem, bodies, pairs, threads, workspace);
+  bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated;
+  if (total.status == NewtonStatus::kConverged && are_fast(bodies)) {
+    const double end = problem.value(workspace.x).value;
+    workspace.trial = workspace.x;
+    stay(bodies, workspace.trial);
+    again = problem.value(workspace.trial).value < end;
+    problem.value(workspace.x);  // the bodies are there
+  }
+  if (again) {
+    stay(bodies, workspace.x);
+    for (WorldBody* const own : bodies) own->step->potential().start(own->state.q);
+    add(minimise(problem, bodies, pairs, threads, workspace), total);
   }
   for (WorldBody* const own : bodies) own->near().x = workspace.x.segment(own->offset, own->unknowns());
   return total;

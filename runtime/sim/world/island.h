@@ -13,6 +13,7 @@ namespace exmat::runtime {
 struct IslandWorkspace {
   NewtonWorkspace newton;
   Eigen::VectorXd x;
+  Eigen::VectorXd trial;                         ///< another start
   std::vector<PotentialEvaluation> evaluations;  ///< of each body
   std::vector<PotentialValue> values;            ///< of each body, then of each pair
   std::vector<Eigen::VectorXd> unknowns;         ///< of each body
