@@ -7,6 +7,7 @@
 
 #include "tests/support/allocation_counter.h"
 #include "tests/support/random.h"
+#include "tests/support/surfaces.h"
 
 namespace exmat::runtime {
 namespace {
@@ -116,11 +117,11 @@ Eigen::VectorXd force_after(const Scenario& scenario, const Eigen::VectorXd& z) 
 
 Eigen::VectorXd unit_step(Eigen::Index i, double size) { return size * Eigen::VectorXd::Unit(6 + kModes, i); }
 
-TEST(Contact, ForceIsTheDescentOfThePotential) {
+void expect_descent(const std::vector<Obstacle>& obstacles, int least_touching) {
   constexpr double kStep = 1e-7;
-  Scenario scenario(many_obstacles());
+  Scenario scenario(obstacles);
   scenario.begin();
-  ASSERT_GT(scenario.workspace.touching, 20);
+  ASSERT_GT(scenario.workspace.touching, least_touching);
   displace(scenario, 1e-3 * random_vector(6 + kModes, 77));
   scenario.evaluate();
   const Eigen::VectorXd force = total_force(scenario);
@@ -132,6 +133,18 @@ TEST(Contact, ForceIsTheDescentOfThePotential) {
         (2 * kStep);
     EXPECT_NEAR(-slope, force[i], 1e-6 * force.norm()) << i;
   }
+}
+
+TEST(Contact, ForceIsTheDescentOfThePotential) { expect_descent(many_obstacles(), 20); }
+
+TEST(Contact, ForceOfMeshesAndHeightFieldsIsTheDescentOfThePotential) {
+  const SurfaceMesh ball = test::ball_surface(6, 0.4);
+  const MeshShape solid{std::make_shared<RigidMesh>(ball.vertices, ball.triangles, 0), {0.8, 0.1, 0}};
+  const MeshShape shell{std::make_shared<RigidMesh>(ball.vertices, ball.triangles, 0.1), {-0.35, 0, 0.1}};
+  RowMatrix heights(20, 20);
+  for (Eigen::Index i = 0; i < heights.size(); ++i) heights(i) = -0.4 + 0.05 * std::sin(static_cast<double>(i));
+  const HeightFieldShape hills{std::make_shared<HeightField>(heights, Eigen::Vector2d(0.1, 0.1)), {-1, -1, 0}};
+  expect_descent({obstacle(solid, 300, 0.3), obstacle(shell, 300, 0.5), obstacle(hills, 300, 0.8)}, 20);
 }
 
 TEST(Contact, StiffnessIsTheDerivativeOfTheForceOnPlanes) {

@@ -40,9 +40,11 @@ TEST(FastBodies, DoNotPassThroughEachOther) {
                                           << " rad, " << stiffness << " N/m^3");
           EXPECT_GT(touching, 0);
           EXPECT_LT(blocks.centre(world.state(0))[2] + 0.25 * thickness, blocks.centre(world.state(1))[2]);
-          // Soft thin slabs lose most of it, and tremble at each other.
+          // They part, where the contact stops them within their thickness. Where that takes six times as far, rims go
+          // past each other, and the slabs stay crumpled in each other, at rest but for a hundredth.
+          const double stopped_within = speed * std::sqrt(0.5 * 1000 * thickness / stiffness);
           EXPECT_LT(free_state(world.state(0)).linear_momentum[2] - free_state(world.state(1)).linear_momentum[2],
-                    0.02 * blocks.mass() * speed);
+                    stopped_within < thickness ? 0 : 0.01 * blocks.mass() * speed);
           EXPECT_LE(highest, energy * (1 + 1e-9));
           EXPECT_LE((test::momenta(blocks, world).linear - before.linear).norm(), 1e-12 * blocks.mass() * speed);
         }
