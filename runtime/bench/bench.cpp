@@ -10,15 +10,14 @@
 #include "common/core/error.h"
 #include "common/core/progress.h"
 #include "common/core/timer.h"
+#include "runtime/bench/bench_plan.h"
 #include "runtime/bench/dgemm_rate.h"
 #include "runtime/scene/bodies.h"
 
 namespace exmat::runtime {
 namespace {
 
-constexpr double kWarmUpShare = 0.1;   // of the time to measure
 constexpr double kTurnSeconds = 5e-3;  // of steps between two measurements of the DGEMM rate
-constexpr std::int64_t kMostRounds = 1000;
 
 /// Means per step, added up before they are divided.
 struct Sums {
@@ -36,11 +35,11 @@ class Bench {
 
   void measure(const BenchOptions& options, BenchResult& result) {
     const double step_seconds = warm_up(kWarmUpShare * options.seconds);
-    const auto affordable = std::max(std::llround(options.seconds / step_seconds), 1LL);
-    result.steps = options.steps.value_or(std::min<std::int64_t>(config_.steps, affordable));
-    result.rounds = std::clamp<std::int64_t>(affordable / result.steps, 1, kMostRounds);
+    const BenchPlan plan(options, config_.steps, step_seconds);
+    result.steps = plan.steps;
+    result.rounds = plan.rounds;
     turn_ = std::clamp<std::int64_t>(std::llround(kTurnSeconds / step_seconds), 1, result.steps);
-    const std::int64_t samples = result.steps * result.rounds;
+    const std::int64_t samples = plan.samples();
     result.step_seconds = Samples(samples);
     for (BenchStage& stage : result.stages) stage.seconds = Samples(samples);
     Progress progress("bench", samples);
@@ -149,14 +148,6 @@ std::string target_name(const LoadedScene& loaded) {
     if (acts(loaded.scene.examples[i])) names.insert(loaded.model->examples[i].table ? "table" : "solve");
   if (names.empty()) return "none";
   return names.size() == 1 ? *names.begin() : "table and solve";
-}
-
-double microseconds(double seconds) { return 1e6 * seconds; }
-
-nlohmann::ordered_json times_to_json(const Samples& seconds) {
-  return {{"median_us", microseconds(seconds.quantile(0.5))},
-          {"p95_us", microseconds(seconds.quantile(0.95))},
-          {"mean_us", microseconds(seconds.mean())}};
 }
 
 }  // namespace

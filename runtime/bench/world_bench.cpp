@@ -1,20 +1,17 @@
 #include "runtime/bench/world_bench.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "common/core/progress.h"
 #include "common/core/timer.h"
+#include "runtime/bench/bench_plan.h"
 #include "runtime/scene/world_bodies.h"
 
 namespace exmat::runtime {
 namespace {
-
-constexpr double kWarmUpShare = 0.1;  // of the time to measure
-constexpr std::int64_t kMostRounds = 1000;
 
 /// Sums over all steps.
 struct Sums {
@@ -54,14 +51,6 @@ void measure_step(WorldBodies& bodies, Sums& sums, WorldBenchResult& result) {
   result.unconverged_islands += report.unconverged_islands;
 }
 
-double microseconds(double seconds) { return 1e6 * seconds; }
-
-nlohmann::ordered_json times_to_json(const Samples& seconds) {
-  return {{"median_us", microseconds(seconds.quantile(0.5))},
-          {"p95_us", microseconds(seconds.quantile(0.95))},
-          {"mean_us", microseconds(seconds.mean())}};
-}
-
 }  // namespace
 
 double WorldBenchResult::steps_per_second() const { return 1 / step_seconds.mean(); }
@@ -83,10 +72,10 @@ WorldBenchResult bench(const LoadedWorld& loaded, const WorldConfig& config, con
                             loaded.kinds[i].surface->surface.triangles()});
   }
   const double step_seconds = warm_up(kWarmUpShare * options.seconds, config.steps, bodies);
-  const auto affordable = std::max(std::llround(options.seconds / step_seconds), 1LL);
-  result.steps = options.steps.value_or(std::min<std::int64_t>(config.steps, affordable));
-  result.rounds = std::clamp<std::int64_t>(affordable / result.steps, 1, kMostRounds);
-  const std::int64_t samples = result.steps * result.rounds;
+  const BenchPlan plan(options, config.steps, step_seconds);
+  result.steps = plan.steps;
+  result.rounds = plan.rounds;
+  const std::int64_t samples = plan.samples();
   result.step_seconds = Samples(samples);
   result.stages.fill(Samples(samples));
   Sums sums;
