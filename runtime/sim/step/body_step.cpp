@@ -11,6 +11,8 @@ namespace exmat::runtime {
 namespace {
 
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
+constexpr double kUnclear = 1e-3;      // of the elastic energy: two potentials that differ by less may change places
+
 FrameStep frame_step(const StepScene& scene, const State& state) {
   const double end = static_cast<double>(state.step + 1) * scene.time_step;
   return {scene, scene.time_step, state.time, end, state.q, state.v, state.applied_force};
@@ -78,11 +80,23 @@ void prepare_integrator(const Model& model, const StepScene& scene, const FrameS
 }
 
 /// The predictor q_n + dt v_n or q_n itself, whichever has the lower potential, into workspace.q, and its elasticity.
+/// That comes with a stiffness, which costs as much as the rest of a step: so the one that was lower in the last step
+/// has it first. No result depends on this: where the two are not clearly apart, the energy alone decides.
 void choose_first_iterate(const StepScene& scene, const State& state, IncrementalPotential& potential,
                           Workspace& workspace, StepReport& report) {
   workspace.q = state.q + scene.time_step * state.v;
-  const double predicted = potential.start(workspace.q);
-  if (predicted <= potential.potential_at_start() || workspace.q == state.q) return;
+  const bool begins_with_predictor = workspace.predictor_was_lower || workspace.q == state.q;
+  const double at_start = potential.potential_at_start();
+  const double first = begins_with_predictor ? potential.start(workspace.q) : potential.potential_of_start(workspace.q);
+  if (workspace.q == state.q) return;
+  const bool is_clear = std::abs(first - at_start) > kUnclear * std::abs(potential.elastic_energy());
+  const bool is_decided = !begins_with_predictor || is_clear;
+  const double predicted = is_decided ? first : potential.potential_of_start(workspace.q);
+  workspace.predictor_was_lower = predicted <= at_start;
+  if (workspace.predictor_was_lower) {
+    if (!begins_with_predictor) potential.start(workspace.q);
+    return;
+  }
   ++report.line_search_evaluations;
   workspace.q = state.q;
   potential.start(workspace.q);

@@ -55,6 +55,11 @@ double IncrementalPotential::start(const Eigen::VectorXd& first_iterate) noexcep
   return elastic_energy_ + inertia_and_load(first_iterate);
 }
 
+double IncrementalPotential::potential_of_start(const Eigen::VectorXd& first_iterate) noexcept {
+  const StageTimer timer(workspace_.profile, Stage::kInternalForce);
+  return model_.internal_force.energy(first_iterate, workspace_.elasticity) + inertia_and_load(first_iterate);
+}
+
 double IncrementalPotential::potential_at_start() const noexcept {
   return state_.elastic_energy + inertia_and_load(state_.q);
 }

@@ -26,6 +26,8 @@ class IncrementalPotential {
   /// force alone; comparable with potential_at_start().
   double start(const Eigen::VectorXd& first_iterate) noexcept;
   double potential_at_start() const noexcept;
+  /// What start() returns, but for rounding, and nothing else of it.
+  double potential_of_start(const Eigen::VectorXd& first_iterate) noexcept;
 
   /// The quadratic form. After start(); with example forces, after prepare_example_forces().
   void prepare() noexcept;
@@ -40,7 +42,7 @@ class IncrementalPotential {
   int gyroscopic_terms() const noexcept;
   const Eigen::VectorXd& gyroscopic_product(const Eigen::VectorXd& x) const noexcept;
 
-  /// E at the last evaluate().
+  /// E at the last evaluate() or start().
   double elastic_energy() const noexcept { return elastic_energy_; }
   /// Of a solution that was found elsewhere.
   void set_elastic_energy(double energy) noexcept { elastic_energy_ = energy; }

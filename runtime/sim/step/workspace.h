@@ -41,7 +41,8 @@ struct ExampleWorkspace {
   ExampleForce force;
 };
 
-/// Scratch of one step, sized once for a model and a scene; holds nothing from step to step. One per thread.
+/// Scratch of one step, sized once for a model and a scene; holds nothing from step to step that a result depends on.
+/// One per thread.
 struct Workspace {
   Workspace(const Model& model, const StepScene& scene);
 
@@ -60,6 +61,8 @@ struct Workspace {
   Eigen::VectorXd product;         ///< padded(r)
 
   Eigen::VectorXd frozen_force, next_frozen_force;  ///< r, see IncrementalPotential
+
+  bool predictor_was_lower = true;  ///< in the last step than where it began: which of the two is looked at first
 
   std::optional<ContactProblemWorkspace> near;  ///< where it may touch anything
   FrameWorkspace frame;                         ///< of the model's frame
