@@ -28,6 +28,8 @@ struct NewtonPolicy {
   bool projection = true;   ///< false: stagnates where the exact Hessian is not positive definite
 };
 
+enum class NewtonBegin { kHessian, kFactor };
+
 enum class NewtonStatus {
   kConverged,
   kIterationLimit,
@@ -200,14 +202,19 @@ inline bool factor_serves(const NewtonSettings& settings, double before, double 
 ///   bool kSeeksLowest                                    optional constant: lengths are halved for as long as the
 ///                                                        potential falls, beyond the first that is low enough
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.
-/// On return the last evaluate() was at x.
+/// On return the last evaluate() was at x. `begin`: with the Hessian of the first iterate, or with the factor that
+/// stands in the workspace, of a problem much like this one.
 template <class Problem>
 NewtonReport newton_minimise(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
-                             NewtonWorkspace& workspace) noexcept {
+                             NewtonWorkspace& workspace, NewtonBegin begin = NewtonBegin::kHessian) noexcept {
   NewtonReport report;
   auto& [gradient, trial, trial_gradient, hessian, factor, direction, profile, policy, lu] = workspace;
-  PotentialEvaluation here = problem.evaluate(x, gradient, hessian);
-  enum class Hessian { kEvaluated, kFactorised, kStale } state = Hessian::kEvaluated;
+  const bool begins_with_factor = begin == NewtonBegin::kFactor;
+  PotentialEvaluation here =
+      begins_with_factor ? problem.evaluate(x, gradient) : problem.evaluate(x, gradient, hessian);
+  if (begins_with_factor) problem.accept(here);
+  enum class Hessian { kEvaluated, kFactorised, kStale };
+  Hessian state = begins_with_factor ? Hessian::kFactorised : Hessian::kEvaluated;
   const auto finish = [&](NewtonStatus status) {
     report.status = status;
     return report;

@@ -63,11 +63,14 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
   ContactProblem problem(model, state, potential, workspace);
   NewtonReport total;
   for (int round = 0; round < kFrictionRounds; ++round) {
-    if (round > 0) {
+    // Friction of other size changes the stiffness little: the factor goes on serving.
+    const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
+    if (round > 0 && !has_factor) {
       workspace.q = state.q + near.x.tail(state.q.size());
       potential.start(workspace.q);
     }
-    add(newton_minimise(problem, scene.newton, near.x, near.newton), total);
+    const NewtonBegin begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
+    add(newton_minimise(problem, scene.newton, near.x, near.newton, begin), total);
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
   }

@@ -283,9 +283,11 @@ NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies
                       int threads, IslandWorkspace& workspace) noexcept {
   NewtonReport total;
   for (int round = 0; round < kFrictionRounds; ++round) {
-    if (round > 0)
+    const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
+    if (round > 0 && !has_factor)
       for_all(bodies.size(), threads, [&](std::size_t i) { bodies[i]->step->potential().start(bodies[i]->near().q); });
-    add(newton_minimise(problem, bodies.front()->scene.newton, workspace.x, workspace.newton), total);
+    const NewtonBegin begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
+    add(newton_minimise(problem, bodies.front()->scene.newton, workspace.x, workspace.newton, begin), total);
     if (total.status == NewtonStatus::kNonFinite) return total;
     if (refresh_friction(bodies, pairs) <= kSameFriction) break;
   }

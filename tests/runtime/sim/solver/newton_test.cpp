@@ -94,6 +94,31 @@ TEST(Newton, ProjectionLeavesAConcavePlace) {
   EXPECT_EQ(x, 0.1);
 }
 
+/// x^2 / 2 - b x
+Function parabola() {
+  return {[](double x) { return 0.5 * x * x - 3 * x; }, [](double x) { return x - 3; }, [](double) { return 1.0; }};
+}
+
+TEST(Newton, GoesOnWithTheFactorOfAnEarlierMinimisation) {
+  Function first = parabola(), second = rounded_cone();
+  Eigen::VectorXd x = Eigen::VectorXd::Constant(1, 1);
+  NewtonWorkspace workspace(1);
+  EXPECT_EQ(newton_minimise(first, {}, x, workspace).factorisations, 1);
+  // The same function from elsewhere: the factor is exact.
+  x[0] = -8;
+  const NewtonReport again = newton_minimise(first, {}, x, workspace, NewtonBegin::kFactor);
+  EXPECT_EQ(again.status, NewtonStatus::kConverged);
+  EXPECT_EQ(again.factorisations, 0);
+  EXPECT_EQ(again.iterations, 1);
+  EXPECT_NEAR(x[0], 3, 1e-6);
+  // Another one, whose curvature there is 5 times as low: it does not serve for long.
+  x[0] = 1.4;
+  const NewtonReport other = newton_minimise(second, {}, x, workspace, NewtonBegin::kFactor);
+  EXPECT_EQ(other.status, NewtonStatus::kConverged);
+  EXPECT_GE(other.factorisations, 1);
+  EXPECT_NEAR(x[0], 0, 1e-6);
+}
+
 TEST(Newton, GoesDownWhereASeriesPointsUp) {
   double x = 1;
   EXPECT_EQ(minimise(Uphill(), x).status, NewtonStatus::kConverged);
