@@ -116,6 +116,21 @@ struct Kernels {
   void (*positions)(const float* rest, const float* basis, std::ptrdiff_t blocks, std::ptrdiff_t modes, const float* q,
                     float* positions);
 
+  // Of vertices, whose three rows have `stride` numbers each, a multiple of kLanes; row 3 v is the first of vertex v.
+
+  /// products [3 count]: the rows of each of `vertices` times x [stride].
+  void (*vertex_products)(const double* rows, std::ptrdiff_t stride, const int* vertices, std::ptrdiff_t count,
+                          const double* x, double* products);
+  /// sums [stride] += those of the rows of each of `vertices` times the three numbers of its vector [3 count].
+  void (*add_vertex_loads)(const double* rows, std::ptrdiff_t stride, const int* vertices, std::ptrdiff_t count,
+                           const double* vectors, double* sums);
+  /// The same sums [stride] one by one, each `outer` after the last.
+  void (*vertex_loads)(const double* rows, std::ptrdiff_t stride, const int* vertices, std::ptrdiff_t count,
+                       const double* vectors, double* loads, std::ptrdiff_t outer);
+  /// Upper triangle, by rows, of squares [stride x stride] += F^T F, F [count x stride] by rows; blocks on the diagonal
+  /// are whole.
+  void (*add_squares)(const double* factors, std::ptrdiff_t count, std::ptrdiff_t stride, double* squares);
+
   // Of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies [kLanes].
   void (*lanes_energy)(const ElementArrays&, const ElementLaw&, const double* q, double* energy);
   void (*lanes_force)(const ElementArrays&, const ElementLaw&, const double* q, double* energy, double* force);

@@ -159,6 +159,10 @@ inline void copy_triangle(const double* from, Index stride, Index modes, double*
     for (Index j = i; j < modes; ++j) to[i * outer + j] = from[i * stride + j];
 }
 
+// --- vertices -------------------------------------------------------------------------------------------------------
+
+#include "runtime/kernels/vertices_isa.inl"
+
 // --- the table -------------------------------------------------------------------------------------------------------
 
 template <class Law>
@@ -429,6 +433,10 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  cholesky_solve,
                                  gemm,
                                  positions,
+                                 vertex_products,
+                                 add_vertex_loads,
+                                 vertex_loads,
+                                 add_squares,
                                  lanes_energy,
                                  lanes_force,
                                  lanes_force_and_stiffness,

@@ -94,7 +94,8 @@ TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool mee
     rest.row(i) = set.rest(i);
     basis.middleRows<3>(3 * i) = set.basis_rows(i);
   }
-  approach_bounds = surface.approach_bounds(rest, basis);
+  vertex_bounds = surface.approach_bounds(rest, basis);
+  approach_bounds = vertex_bounds.colwise().maxCoeff();
 }
 
 bool TouchingSurface::may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
@@ -126,6 +127,7 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
   const double fast = kFast * b.touching.surface.bound(b.pose.q).radius;
   auto last = held.begin();
   const auto test = [&](int vertex) {
+    if (own && a.touching.vertex_bounds.row(vertex).dot(a.pose.q.cwiseAbs()) < 1) return;
     while (last != held.end() && last->vertex < vertex) ++last;
     const bool was_inside = last != held.end() && last->vertex == vertex;
     const Eigen::Vector3d arm = a.set.world_arm(vertex, a.pose);
@@ -139,9 +141,8 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
       return nearest_facing(b.touching.surface, point, looks, margin + depth, shape);
     };
     const auto to_own = [&] {
-      const Eigen::Vector3d looks =
-          b.touching.surface.normal_of(b.touching.places[static_cast<std::size_t>(vertex)], shape);
-      return b.touching.surface.nearest_approached(point, a.set.rest(vertex), looks, margin + depth, shape);
+      return b.touching.surface.nearest_approached(
+          point, a.set.rest(vertex), b.touching.places[static_cast<std::size_t>(vertex)], margin + depth, shape);
     };
     const auto hit = own ? to_own() : to_others();
     if (own && hit && hit->distance < 0 && !was_inside) return;
@@ -193,14 +194,15 @@ void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyP
   for (std::size_t i = 0; i < candidates.all.size(); ++i) {
     BodyCandidate& candidate = candidates.all[i];
     if (candidate.clearance > way) {
-      leave_untouched(way, candidate);
+      leave_untouched(candidate);
       continue;
     }
     candidate.arm = set.world_arm(candidate.vertex, a);
     candidate.surface_arm = surface_arm(candidates, i, b);
     const Eigen::Vector3d place = place_of(a, b, candidate);
     const double gap = candidate.normal.dot(place);
-    evaluate_contact(SurfacePoint{gap, candidate.normal, Eigen::Vector3d::Zero()}, place, candidate);
+    const double potential =
+        evaluate_contact(SurfacePoint{gap, candidate.normal, Eigen::Vector3d::Zero()}, place, candidate);
     if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
     if (candidate.normal_force > 0) {
       ++sums_a.touching;
@@ -212,7 +214,7 @@ void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyP
     sums_a.torque += candidate.arm.cross(candidate.force);
     const Eigen::Vector3d force_a = a.rotation.transpose() * candidate.force;
     sums_a.generalised += set.basis_rows(candidate.vertex).transpose().lazyProduct(force_a);
-    sums_a.potential += contact_potential(candidate, gap, place);
+    sums_a.potential += potential;
     sums_b.force -= candidate.force;
     sums_b.torque -= candidate.surface_arm.cross(candidate.force);
     const Eigen::Vector3d force_b = b.rotation.transpose() * candidate.force;

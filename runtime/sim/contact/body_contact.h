@@ -49,7 +49,8 @@ struct TouchingSurface {
 
   // Empty where it does not meet itself.
   std::vector<SurfaceHit> places;   ///< of the vertices of the set on the surface
-  Eigen::VectorXd approach_bounds;  ///< [r] BodySurface::approach_bounds() of them
+  RowMatrix vertex_bounds;          ///< [vertices x r] BodySurface::approach_bounds() of them
+  Eigen::VectorXd approach_bounds;  ///< [r] the largest of each mode
 };
 
 /// One body of a pair: what it is, where, and how it moves.

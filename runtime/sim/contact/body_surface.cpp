@@ -19,6 +19,25 @@ constexpr double kApproached = 0.5;  // of the distance at rest
 constexpr int kLeafTriangles = 4;
 constexpr int kBlockTriangles = 64;  // whose vertices are moved together
 constexpr double kSameWay = 0.5;     // cosine
+constexpr double kSurely = 1 + 1e-9;
+
+/// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them.
+template <class Accepts, class Excludes, class ExcludesTriangle>
+struct SearchFilter {
+  bool operator()(int triangle, const TrianglePoint& here) const { return accepts(triangle, here); }
+  Accepts accepts;
+  Excludes excludes;
+  ExcludesTriangle excludes_triangle;
+};
+template <class Accepts, class Excludes, class ExcludesTriangle>
+SearchFilter(Accepts, Excludes, ExcludesTriangle) -> SearchFilter<Accepts, Excludes, ExcludesTriangle>;
+
+/// A bound on the squared distance from a triangle, that from the box about it: several times as cheap.
+double squared_box_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                            const Eigen::Vector3d& c) {
+  const Eigen::Array3d low = a.array().min(b.array()).min(c.array()), high = a.array().max(b.array()).max(c.array());
+  return (low - point.array()).max(point.array() - high).max(0).matrix().squaredNorm();
+}
 
 /// Across the edge that begins at each corner; -1 where there is none or more than one.
 TriangleArray neighbours_of(const TriangleArray& triangles) {
@@ -175,6 +194,8 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
   while (count > 0) {
     const auto [node, bound] = waiting[--count];
     if (bound > nearest) continue;
+    if constexpr (requires { accepts.excludes(node, bound); })
+      if (accepts.excludes(node, bound)) continue;
     if (is_block(node) && shape.box_of[static_cast<std::size_t>(node)] != shape.placed) {
       open_block(node, shape);
       if (squared_bound(node, point, shape) > nearest) continue;
@@ -189,9 +210,13 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
     }
     for (int i = branch.first; i < branch.last; ++i) {
       const int triangle = tree_.order()[static_cast<std::size_t>(i)];
-      const TrianglePoint here =
-          nearest_on_triangle(point, position(triangles_(triangle, 0), shape), position(triangles_(triangle, 1), shape),
-                              position(triangles_(triangle, 2), shape));
+      const Eigen::Vector3d a = position(triangles_(triangle, 0), shape), b = position(triangles_(triangle, 1), shape),
+                            c = position(triangles_(triangle, 2), shape);
+      const double away = squared_box_distance(point, a, b, c);
+      if (away > kSurely * nearest) continue;
+      if constexpr (requires { accepts.excludes_triangle(triangle, away); })
+        if (accepts.excludes_triangle(triangle, away)) continue;
+      const TrianglePoint here = nearest_on_triangle(point, a, b, c);
       if (here.squared_distance > nearest) continue;
       if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
       if (!accepts(triangle, here)) continue;
@@ -219,16 +244,38 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
 }
 
 std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
-                                                          const Eigen::Vector3d& facing, double radius,
+                                                          const SurfaceHit& place, double radius,
                                                           SurfaceShape& shape) const noexcept {
-  return search(point, radius, shape, [&](int triangle, const TrianglePoint& here) {
+  std::optional<Eigen::Vector3d> facing;  // few vertices have come near to anything
+  const auto accepts = [&](int triangle, const TrianglePoint& here) {
     const double at_rest = (rest - rest_of({triangle, here.barycentric})).squaredNorm();
-    return here.squared_distance < kApproached * kApproached * at_rest && !looks_along(triangle, facing, shape);
-  });
+    if (!(here.squared_distance < kApproached * kApproached * at_rest)) return false;
+    if (!facing) facing = normal_of(place, shape);
+    return !looks_along(triangle, *facing, shape);
+  };
+  // No point of the branch is farther away at rest than the far side of its ball.
+  const auto excludes = [&](int node, double bound) {
+    const DeformationTree::Node& branch = tree_.node(node);
+    const double farthest = kSurely * kApproached * ((rest - branch.centre).norm() + branch.radius);
+    return bound >= farthest * farthest;
+  };
+  Eigen::Index corner = 0;
+  const bool is_vertex = place.barycentric.maxCoeff(&corner) == 1;
+  const int own = is_vertex ? triangles_(place.triangle, corner) : -1;
+  const auto excludes_triangle = [&](int triangle, double bound) {
+    double farthest = 0;
+    for (int c = 0; c < 3; ++c) {
+      const int vertex = triangles_(triangle, c);
+      if (vertex == own) return true;
+      farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
+    }
+    return bound >= kSurely * kApproached * kApproached * farthest;
+  };
+  return search(point, radius, shape, SearchFilter{accepts, excludes, excludes_triangle});
 }
 
-Eigen::VectorXd BodySurface::approach_bounds(const VertexArray& rest, const RowMatrix& basis) const {
-  Eigen::VectorXd bounds = Eigen::VectorXd::Zero(modes());
+RowMatrix BodySurface::approach_bounds(const VertexArray& rest, const RowMatrix& basis) const {
+  RowMatrix bounds = RowMatrix::Zero(rest.rows(), modes());
   for (Eigen::Index i = 0; i < rest.rows(); ++i)
     for (Eigen::Index t = 0; t < triangles_.rows(); ++t) {
       const auto corner = [&](int c) -> Eigen::Vector3d { return rest_.row(triangles_(t, c)); };
@@ -250,7 +297,7 @@ Eigen::VectorXd BodySurface::approach_bounds(const VertexArray& rest, const RowM
           const Eigen::Vector3d own = basis.block<3, 1>(3 * i, j);
           for (int c = 0; c < 3; ++c) ratio = std::max(ratio, (moved(c) - own).norm() / distance);
         }
-        bounds[j] = std::max(bounds[j], ratio / (1 - kApproached));
+        bounds(i, j) = std::max(bounds(i, j), ratio / (1 - kApproached));
       }
     }
   return bounds;

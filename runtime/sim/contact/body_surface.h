@@ -65,19 +65,19 @@ class BodySurface {
                                     const Eigen::Vector3d* facing = nullptr) const noexcept;
 
   /// The same for a point of the body itself, at rest at `rest`: of the surface that has come nearer to it than half of
-  /// how far away it is at rest, and does not look the same way as `facing`. No neighbour is, as long as nothing is
-  /// compressed to half its length.
+  /// how far away it is at rest, and does not look the same way as the surface at `place`, its own. No neighbour is, as
+  /// long as nothing is compressed to half its length.
   std::optional<SurfaceHit> nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
-                                               const Eigen::Vector3d& facing, double radius,
+                                               const SurfaceHit& place, double radius,
                                                SurfaceShape& shape) const noexcept;
 
   /// The unit normal at a point of the surface as it is deformed, outward.
   Eigen::Vector3d normal_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
 
-  /// [r] c: while sum_j c_j |q_j| < 1 no point of the surface has come nearer to any of these points of it, at rest at
-  /// `rest` [k x 3] and moved by `basis` [3k x r], than half of how far away it is at rest (a certificate after Barbic
-  /// and James 2010). Takes k f r products.
-  Eigen::VectorXd approach_bounds(const VertexArray& rest, const RowMatrix& basis) const;
+  /// [k x r] c: while sum_j c_ij |q_j| < 1 no point of the surface has come nearer to point i of these of it, at rest
+  /// at `rest` [k x 3] and moved by `basis` [3k x r], than half of how far away it is at rest (a certificate after
+  /// Barbic and James 2010). Takes k f r products.
+  RowMatrix approach_bounds(const VertexArray& rest, const RowMatrix& basis) const;
 
   /// Its material point of a hit: at rest [m], and the rows of the basis [3 x r].
   Eigen::Vector3d rest_of(const SurfaceHit& hit) const noexcept;

@@ -2,19 +2,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace exmat::runtime {
 namespace {
 
 constexpr int kLeafVertices = 16;
-constexpr Eigen::Index kFactorColumns = 32;
-
-/// Lower triangle of A += F F^T, F the first `used` columns of `factors`. Eigen keeps its panels on the stack up to r =
-/// 500.
-void add_factors(const Eigen::MatrixXd& factors, Eigen::Index used, Eigen::MatrixXd& A) {
-  if (used > 0) A.selfadjointView<Eigen::Lower>().rankUpdate(factors.topLeftCorner(A.rows(), used));
-}
+constexpr int kBatch = 48;  // vertices, or factors of the stiffness: they stay in the first-level cache
 
 /// Whether the distance that a candidate feels changes by no more than its vertex goes: not by a side plane, nor over
 /// the border of ground.
@@ -23,7 +18,27 @@ bool has_steady_distance(const PlacedObstacle& placed, const ContactCandidate& c
          !std::holds_alternative<HeightFieldShape>(placed.obstacle->shape);
 }
 
+void set_x(const Eigen::VectorXd& of, ContactWorkspace& workspace) {
+  std::copy(of.begin(), of.end(), workspace.x.data());
+}
+
 }  // namespace
+
+/// Some vertices at a time, as the kernels take them.
+struct ContactSet::Batch {
+  void add(int vertex, std::size_t candidate) {
+    candidates[static_cast<std::size_t>(count)] = candidate;
+    vertices[static_cast<std::size_t>(count++)] = vertex;
+  }
+  bool full() const { return count == kBatch; }
+
+  int count = 0;
+  std::array<int, kBatch> vertices;
+  std::array<std::size_t, kBatch> candidates;
+  Eigen::Matrix<double, 3, kBatch> products;  // with the rows of each vertex
+  Eigen::Matrix<double, 3, kBatch> vectors;   // frame of the body, that its rows are summed by
+  Eigen::Matrix<double, 6, kBatch> rigid;     // of the same, force and torque, world
+};
 
 double way_bound(double reach, double basis_norm, const BodyPose& pose, const Placement& from,
                  const Eigen::VectorXd& from_q) noexcept {
@@ -35,8 +50,14 @@ double way_bound(double reach, double basis_norm, const BodyPose& pose, const Pl
 ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_count)
     : obstacles(obstacle_count),
       candidates(obstacle_count * static_cast<std::size_t>(set.vertices())),
+      clearances(candidates.size()),
+      is_left(candidates.size()),
+      loaded(candidates.size()),
       first_q(set.modes()),
-      factors(Eigen::MatrixXd::Zero(6 + set.modes(), kFactorColumns)) {
+      x(set.modes()),
+      loads(set.modes()),
+      factors(kBatch * padded(6 + set.modes())),
+      squares(padded(6 + set.modes()) * padded(6 + set.modes())) {
   set_zero(set.modes());
 }
 
@@ -50,8 +71,13 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
     object_vertices_.push_back(numbered ? static_cast<int>(data.vertices[index]) : index);
   rest_ = rest(data_indices_, Eigen::all);
   areas_ = data.areas(data_indices_);
-  basis_.resize(3 * count, data.basis.cols());
-  for (int i = 0; i < count; ++i) basis_.middleRows<3>(3 * i) = data.basis.middleRows<3>(3 * data_index(i));
+  modes_ = data.basis.cols();
+  rows_ = AlignedArray(3 * count * stride());
+  for (int i = 0; i < count; ++i)
+    for (int row = 0; row < 3; ++row) {
+      const auto from = data.basis.row(3 * data_index(i) + row);
+      std::copy(from.begin(), from.end(), rows_.data() + (3 * i + row) * stride());
+    }
   if (count > 0) reach_ = rest.rowwise().norm().maxCoeff();
 }
 
@@ -93,21 +119,39 @@ bool ContactSet::is_near(int node, const BodyPose& pose, double q_norm, double m
 }
 
 Eigen::Vector3d ContactSet::world_arm(int vertex, const BodyPose& pose) const noexcept {
-  const Eigen::Vector3d moved = rest_.row(vertex).transpose() + basis_.middleRows<3>(3 * vertex).lazyProduct(pose.q);
+  const Eigen::Vector3d moved = rest_.row(vertex).transpose() + basis_rows(vertex).lazyProduct(pose.q);
   return pose.rotation * moved;
 }
 
 Eigen::Vector3d ContactSet::world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
                                            const BodyVelocity& velocity) const noexcept {
-  const Eigen::Vector3d own = basis_.middleRows<3>(3 * vertex).lazyProduct(velocity.v);
+  const Eigen::Vector3d own = basis_rows(vertex).lazyProduct(velocity.v);
   return velocity.at(arm) + pose.rotation * own;
 }
 
+/// The rows of its vertices times x.
+void ContactSet::set_products(const ContactWorkspace& workspace, Batch& batch) const noexcept {
+  kernels().vertex_products(rows_.data(), stride(), batch.vertices.data(), batch.count, workspace.x.data(),
+                            batch.products.data());
+}
+
+/// world_arm() of one of a batch, x = q.
+Eigen::Vector3d ContactSet::arm_in(const Batch& batch, int index, const BodyPose& pose) const noexcept {
+  const int vertex = batch.vertices[static_cast<std::size_t>(index)];
+  return pose.rotation * (rest_.row(vertex).transpose() + batch.products.col(index));
+}
+
+/// With q in workspace.x.
 void ContactSet::test_vertices(const DeformationTree::Node& node, const BodyPose& pose, double margin,
                                ContactWorkspace& workspace) const noexcept {
-  for (int vertex = node.first; vertex < node.last; ++vertex) {
+  static_assert(kLeafVertices <= kBatch);
+  Batch batch;
+  for (int vertex = node.first; vertex < node.last; ++vertex) batch.add(vertex, 0);
+  set_products(workspace, batch);
+  for (int index = 0; index < batch.count; ++index) {
+    const int vertex = node.first + index;
     ++workspace.tested_vertices;
-    const Eigen::Vector3d arm = world_arm(vertex, pose);
+    const Eigen::Vector3d arm = arm_in(batch, index, pose);
     const Eigen::Vector3d point = pose.position + arm;
     for (std::size_t i = 0; i < workspace.obstacles.size(); ++i) {
       if (!workspace.obstacles[i].may_meet(point, 0, margin)) continue;
@@ -129,6 +173,7 @@ void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time,
   const double q_norm = pose.q.norm();
   find_sweeping(pose, q_norm, workspace);
   if (!body_is_near(pose, q_norm, margin, workspace)) return;
+  set_x(pose.q, workspace);
   const auto count = static_cast<int>(tree_.nodes().size());
   for (int node = 0; node < count;) {
     ++workspace.visited_nodes;
@@ -143,17 +188,34 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, cons
                         double time_step, const ContactState& state, ContactWorkspace& workspace) const noexcept {
   std::size_t next = 0;
   workspace.has_first = false;
+  workspace.loaded_count = 0;
+  std::fill_n(workspace.clearances.begin(), workspace.candidate_count, -1.0);
+  set_x(velocity.v, workspace);
+  Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
-    ContactCandidate& candidate = workspace.candidates[i];
+    batch.add(workspace.candidates[i].vertex, i);
+    if (batch.full()) freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
+  }
+  freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
+}
+
+/// With v in workspace.x; empties the batch.
+void ContactSet::freeze_batch(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected,
+                              double time_step, const ContactState& state, std::size_t& next, Batch& batch,
+                              ContactWorkspace& workspace) const noexcept {
+  set_products(workspace, batch);
+  for (int index = 0; index < batch.count; ++index) {
+    ContactCandidate& candidate = workspace.candidates[batch.candidates[static_cast<std::size_t>(index)]];
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
     const Eigen::Vector3d arm = candidate.arm;
     const Eigen::Vector3d point = pose.position + arm;
-    const Eigen::Vector3d at = world_velocity(candidate.vertex, arm, pose, velocity);
+    const Eigen::Vector3d at = velocity.at(arm) + pose.rotation * batch.products.col(index);
     const Eigen::Vector3d predicted = point + time_step * at;
     const Eigen::Vector3d heading = predicted + time_step * (at + expected.at(arm) - velocity.at(arm));
     freeze_contact(placed, find_held(state, next, candidate), {point, predicted, heading}, areas_[candidate.vertex],
                    time_step, candidate);
   }
+  batch.count = 0;
 }
 
 void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) const noexcept {
@@ -165,80 +227,141 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
     workspace.first_q = pose.q;
   }
   const double way = is_first ? 0 : way_bound(reach_, tree_.basis_norm(), pose, workspace.first, workspace.first_q);
+  set_x(pose.q, workspace);
+  std::fill_n(workspace.loads.data(), stride(), 0.0);
+  workspace.loaded_count = 0;
+  Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
-    ContactCandidate& candidate = workspace.candidates[i];
-    if (candidate.clearance > way) {
-      leave_untouched(way, candidate);
+    if (workspace.clearances[i] > way) {
+      if (!workspace.is_left[i]) leave_untouched(workspace.candidates[i]);
+      workspace.is_left[i] = true;
       continue;
     }
-    candidate.arm = world_arm(candidate.vertex, pose);
+    workspace.is_left[i] = false;
+    batch.add(workspace.candidates[i].vertex, i);
+    if (batch.full()) evaluate_batch(pose, is_first, batch, workspace);
+  }
+  evaluate_batch(pose, is_first, batch, workspace);
+  workspace.generalised = Eigen::Map<const Eigen::VectorXd>(workspace.loads.data(), modes());
+}
+
+/// With q in workspace.x; empties the batch.
+void ContactSet::evaluate_batch(const BodyPose& pose, bool is_first, Batch& batch,
+                                ContactWorkspace& workspace) const noexcept {
+  set_products(workspace, batch);
+  int loaded = 0;  // those with a force move to the front
+  for (int index = 0; index < batch.count; ++index) {
+    ContactCandidate& candidate = workspace.candidates[batch.candidates[static_cast<std::size_t>(index)]];
+    candidate.arm = arm_in(batch, index, pose);
     const Eigen::Vector3d point = pose.position + candidate.arm;
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
-    evaluate_contact(placed, point, candidate);
-    if (is_first && has_steady_distance(placed, candidate)) candidate.clearance = clearance_of(candidate, point);
+    const double potential = evaluate_contact(placed, point, candidate);
+    const std::size_t number = batch.candidates[static_cast<std::size_t>(index)];
+    if (is_first && has_steady_distance(placed, candidate))
+      workspace.clearances[number] = clearance_of(candidate, point);
     if (candidate.normal_force > 0) {
       ++workspace.touching;
       workspace.stiffness += candidate.weights[0];
     }
     if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
+    workspace.loaded[workspace.loaded_count++] = number;
     workspace.force += candidate.force;
     workspace.torque += candidate.arm.cross(candidate.force);
-    const Eigen::Vector3d body_force = pose.rotation.transpose() * candidate.force;
-    workspace.generalised += basis_.middleRows<3>(3 * candidate.vertex).transpose().lazyProduct(body_force);
-    workspace.potential += contact_potential(candidate, candidate.gap, point);
+    workspace.potential += potential;
+    batch.vectors.col(loaded) = pose.rotation.transpose() * candidate.force;
+    batch.vertices[static_cast<std::size_t>(loaded++)] = candidate.vertex;
   }
+  kernels().add_vertex_loads(rows_.data(), stride(), batch.vertices.data(), loaded, batch.vectors.data(),
+                             workspace.loads.data());
+  batch.count = 0;
 }
 
-double ContactSet::potential(const BodyPose& pose, const ContactWorkspace& workspace) const noexcept {
+double ContactSet::potential(const BodyPose& pose, ContactWorkspace& workspace) const noexcept {
   double sum = 0;
   const double way =
       workspace.has_first ? way_bound(reach_, tree_.basis_norm(), pose, workspace.first, workspace.first_q) : 0;
+  set_x(pose.q, workspace);
+  Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
-    const ContactCandidate& candidate = workspace.candidates[i];
-    if (candidate.clearance > way) continue;
-    const Eigen::Vector3d point = pose.position + world_arm(candidate.vertex, pose);
+    if (workspace.clearances[i] > way) continue;
+    batch.add(workspace.candidates[i].vertex, i);
+    if (batch.full()) sum += potential_of(pose, batch, workspace);
+  }
+  return sum + potential_of(pose, batch, workspace);
+}
+
+/// With q in workspace.x; empties the batch.
+double ContactSet::potential_of(const BodyPose& pose, Batch& batch, ContactWorkspace& workspace) const noexcept {
+  double sum = 0;
+  set_products(workspace, batch);
+  for (int index = 0; index < batch.count; ++index) {
+    const ContactCandidate& candidate = workspace.candidates[batch.candidates[static_cast<std::size_t>(index)]];
+    const Eigen::Vector3d point = pose.position + arm_in(batch, index, pose);
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
     sum += contact_potential(placed, candidate, point);
   }
+  batch.count = 0;
   return sum;
 }
 
 double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept {
-  return runtime::refresh_friction(workspace.obstacles, workspace.candidates, workspace.candidate_count);
+  FrictionChange change;
+  for (std::size_t i = 0; i < workspace.loaded_count; ++i) {
+    ContactCandidate& candidate = workspace.candidates[workspace.loaded[i]];
+    change.refresh(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
+  }
+  return change.relative();
 }
 
-template <int kRigid>
-void ContactSet::add_stiffness_of(const BodyPose& pose, ContactWorkspace& workspace,
+/// The factors of a batch, r of each by the rows of its vertex and then its rigid ones, and their squares; empties it.
+void ContactSet::add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept {
+  const Eigen::Index width = padded(rigid + modes());
+  kernels().vertex_loads(rows_.data(), stride(), batch.vertices.data(), batch.count, batch.vectors.data(),
+                         workspace.factors.data(), width);
+  for (int index = 0; index < batch.count; ++index) {
+    double* const after = workspace.factors.data() + index * width + modes();
+    std::copy_n(batch.rigid.col(index).data(), rigid, after);
+    std::fill(after + rigid, workspace.factors.data() + (index + 1) * width, 0.0);
+  }
+  kernels().add_squares(workspace.factors.data(), batch.count, width, workspace.squares.data());
+  batch.count = 0;
+}
+
+void ContactSet::add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
                                   Eigen::MatrixXd& stiffness) const noexcept {
-  Eigen::Index used = 0;
-  for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
-    const ContactCandidate& candidate = workspace.candidates[i];
+  const Eigen::Index width = padded(rigid + modes());
+  std::fill_n(workspace.squares.data(), width * width, 0.0);
+  Batch batch;
+  for (std::size_t i = 0; i < workspace.loaded_count; ++i) {
+    const ContactCandidate& candidate = workspace.candidates[workspace.loaded[i]];
     for (int k = 0; k < 3; ++k) {
       if (candidate.weights[k] <= 0) continue;
       const Eigen::Vector3d direction = std::sqrt(candidate.weights[k]) * candidate.directions.col(k);
-      auto factor = workspace.factors.col(used).head(kRigid + modes());
-      if constexpr (kRigid > 0) {
-        factor.template head<3>() = direction;
-        factor.template segment<3>(3) = candidate.arm.cross(direction);
-      }
-      const Eigen::Vector3d body_direction = pose.rotation.transpose() * direction;
-      factor.tail(modes()) = basis_.middleRows<3>(3 * candidate.vertex).transpose().lazyProduct(body_direction);
-      if (++used < kFactorColumns) continue;
-      add_factors(workspace.factors, used, stiffness);
-      used = 0;
+      batch.rigid.col(batch.count) << direction, candidate.arm.cross(direction);
+      batch.vectors.col(batch.count) = pose.rotation.transpose() * direction;
+      batch.add(candidate.vertex, workspace.loaded[i]);
+      if (batch.full()) add_squares(rigid, batch, workspace);
     }
   }
-  add_factors(workspace.factors, used, stiffness);
+  add_squares(rigid, batch, workspace);
+  const Eigen::Map<const RowMatrix> upper(workspace.squares.data(), width, width);
+  for (Eigen::Index j = 0; j < modes(); ++j) {
+    const Eigen::Index below = modes() - j;
+    stiffness.col(rigid + j).tail(below) += upper.row(j).segment(j, below).transpose();
+    stiffness.row(rigid + j).head(rigid) += upper.row(j).segment(modes(), rigid);
+  }
+  for (Eigen::Index c = 0; c < rigid; ++c)
+    stiffness.col(c).segment(c, rigid - c) += upper.row(modes() + c).segment(modes() + c, rigid - c).transpose();
 }
 
 void ContactSet::add_stiffness(const BodyPose& pose, ContactWorkspace& workspace,
                                Eigen::MatrixXd& stiffness) const noexcept {
-  add_stiffness_of<6>(pose, workspace, stiffness);
+  add_stiffness_of(6, pose, workspace, stiffness);
 }
 
 void ContactSet::add_reduced_stiffness(const BodyPose& pose, ContactWorkspace& workspace,
                                        Eigen::MatrixXd& stiffness) const noexcept {
-  add_stiffness_of<0>(pose, workspace, stiffness);
+  add_stiffness_of(0, pose, workspace, stiffness);
 }
 
 void ContactSet::commit(const BodyPose& pose, const ContactWorkspace& workspace, ContactState& state) const noexcept {

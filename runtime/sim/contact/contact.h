@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
+#include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/contact/contact_law.h"
 #include "runtime/sim/contact/deformation_tree.h"
 #include "runtime/sim/frame/placement.h"
@@ -62,6 +63,10 @@ struct ContactWorkspace : ContactSums {
   std::vector<PlacedObstacle> obstacles;     ///< at the end of the step
   std::vector<ContactCandidate> candidates;  ///< the first candidate_count, in order of vertex and obstacle
   std::size_t candidate_count = 0;
+  std::vector<double> clearances;   ///< theirs, which each evaluation looks at
+  std::vector<char> is_left;        ///< of each: the last evaluation did not look at it
+  std::vector<std::size_t> loaded;  ///< the first loaded_count: those with a normal force or friction in the last one
+  std::size_t loaded_count = 0;
 
   // Of the last gather().
   int visited_nodes = 0;
@@ -72,7 +77,10 @@ struct ContactWorkspace : ContactSums {
   Placement first;
   Eigen::VectorXd first_q;
 
-  Eigen::MatrixXd factors;  ///< (6 + r) x some columns
+  AlignedArray x;        ///< padded(r), q or v
+  AlignedArray loads;    ///< padded(r), of the generalised force
+  AlignedArray factors;  ///< some of padded(6 + r) each: r, then 6
+  AlignedArray squares;  ///< padded(6 + r) x padded(6 + r), their sum
 };
 
 /// Contact of a body's surface with obstacles, by the law of contact_law.h. docs/method.md, "Contact".
@@ -86,7 +94,7 @@ class ContactSet {
   explicit ContactSet(const ContactData& data, const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
 
   Eigen::Index vertices() const noexcept { return areas_.size(); }
-  Eigen::Index modes() const noexcept { return basis_.cols(); }
+  Eigen::Index modes() const noexcept { return modes_; }
 
   /// Of a vertex: its number in the object, and its place in ContactData, which is the number, too, where the data has
   /// none; the set has an order of its own.
@@ -113,7 +121,7 @@ class ContactSet {
   void evaluate(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
 
   /// W alone [J]; leaves the last evaluation as it is.
-  double potential(const BodyPose& pose, const ContactWorkspace& workspace) const noexcept;
+  double potential(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
 
   /// Takes lambda from the last evaluation. Returns the largest change of mu lambda over the largest mu lambda.
   double refresh_friction(ContactWorkspace& workspace) const noexcept;
@@ -138,12 +146,27 @@ class ContactSet {
                                  const BodyVelocity& velocity) const noexcept;
   Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }  ///< frame of the body [m]
   double area(int vertex) const noexcept { return areas_[vertex]; }              ///< share of the surface [m^2]
-  auto basis_rows(int vertex) const noexcept { return basis_.middleRows<3>(3 * vertex); }  ///< 3 x r
+  auto basis_rows(int vertex) const noexcept {                                   ///< 3 x r
+    return BasisRows(rows_.data() + 3 * vertex * stride(), 3, modes_, Eigen::OuterStride<>(stride()));
+  }
 
   const DeformationTree& tree() const noexcept { return tree_; }  ///< its items are the vertices, in their order
   double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
 
  private:
+  using BasisRows = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>, Eigen::Unaligned,
+                               Eigen::OuterStride<>>;
+  struct Batch;
+
+  Eigen::Index stride() const noexcept { return padded(modes_); }
+  void set_products(const ContactWorkspace& workspace, Batch& batch) const noexcept;
+  Eigen::Vector3d arm_in(const Batch& batch, int index, const BodyPose& pose) const noexcept;
+  void freeze_batch(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected, double time_step,
+                    const ContactState& state, std::size_t& next, Batch& batch,
+                    ContactWorkspace& workspace) const noexcept;
+  void evaluate_batch(const BodyPose& pose, bool is_first, Batch& batch, ContactWorkspace& workspace) const noexcept;
+  double potential_of(const BodyPose& pose, Batch& batch, ContactWorkspace& workspace) const noexcept;
+  void add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept;
   void find_sweeping(const BodyPose& pose, double q_norm, ContactWorkspace& workspace) const noexcept;
   bool is_near(int node, const BodyPose& pose, double q_norm, double margin,
                const ContactWorkspace& workspace) const noexcept;
@@ -151,11 +174,12 @@ class ContactSet {
                     const ContactWorkspace& workspace) const noexcept;
   void test_vertices(const DeformationTree::Node& node, const BodyPose& pose, double margin,
                      ContactWorkspace& workspace) const noexcept;
-  template <int kRigid>
-  void add_stiffness_of(const BodyPose& pose, ContactWorkspace& workspace, Eigen::MatrixXd& stiffness) const noexcept;
+  void add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
+                        Eigen::MatrixXd& stiffness) const noexcept;
 
-  VertexArray rest_;       // k x 3, X
-  RowMatrix basis_;        // 3k x r
+  VertexArray rest_;  // k x 3, X
+  Eigen::Index modes_ = 0;
+  AlignedArray rows_;      // of the basis, 3k x padded(r)
   Eigen::VectorXd areas_;  // k
   std::vector<int> data_indices_, object_vertices_;
   DeformationTree tree_;

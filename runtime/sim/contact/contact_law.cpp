@@ -38,21 +38,23 @@ double damped_depth(const ContactCandidate& candidate, double gap, const Eigen::
   return -gap - candidate.damping * candidate.normal.dot(point - candidate.carried);
 }
 
-void evaluate_normal(ContactCandidate& candidate, const SurfacePoint& surface, const Eigen::Vector3d& point) {
+/// Returns what it adds to (1 + tau) W, as evaluate_friction().
+double evaluate_normal(ContactCandidate& candidate, const SurfacePoint& surface, const Eigen::Vector3d& point) {
   candidate.gap = surface.distance;
   const double depth = damped_depth(candidate, surface.distance, point);
-  if (depth <= 0) return;
+  if (depth <= 0) return 0;
   const double factor = 1 + candidate.damping;
   const Eigen::Vector3d direction = (surface.normal + candidate.damping * candidate.normal) / factor;
   candidate.force = candidate.stiffness * depth * direction;
   candidate.normal_force = candidate.force.norm();
   candidate.directions.col(0) = direction;
   candidate.weights[0] = candidate.stiffness * factor;
+  return 0.5 * candidate.stiffness * depth * depth;
 }
 
-void evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& point) {
+double evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& point) {
   candidate.slip = slip_of(candidate, point);
-  if (candidate.friction_force <= 0) return;
+  if (candidate.friction_force <= 0) return 0;
   const double length = candidate.slip.norm();
   const SlipLaw law(candidate.friction_force, candidate.stiffness, length);
   const Eigen::Vector3d along =
@@ -62,6 +64,7 @@ void evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& point
   candidate.directions.col(2) = candidate.normal.cross(along);
   candidate.weights[1] = (1 + candidate.damping) * law.tangent;
   candidate.weights[2] = (1 + candidate.damping) * law.secant;
+  return law.energy;
 }
 
 bool precedes(const HeldContact& held, const ContactCandidate& candidate) {
@@ -113,12 +116,13 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
   candidate.friction_force = obstacle.friction * held->normal_force;
 }
 
-void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept {
+double evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
+                        ContactCandidate& candidate) noexcept {
   candidate.force.setZero();
   candidate.weights.setZero();
   candidate.normal_force = 0;
-  evaluate_normal(candidate, surface, point);
-  evaluate_friction(candidate, point);
+  const double normal = evaluate_normal(candidate, surface, point);
+  return (normal + evaluate_friction(candidate, point)) / (1 + candidate.damping);
 }
 
 double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept {
@@ -127,17 +131,17 @@ double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& po
   return std::min(candidate.gap, -damped_depth(candidate, candidate.gap, point) / (1 + candidate.damping));
 }
 
-void leave_untouched(double way, ContactCandidate& candidate) noexcept {
+void leave_untouched(ContactCandidate& candidate) noexcept {
   candidate.force.setZero();
   candidate.weights.setZero();
   candidate.normal_force = 0;
-  candidate.gap = candidate.clearance - way;
+  candidate.gap = 0;
 }
 
-void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
-                      ContactCandidate& candidate) noexcept {
+double evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
+                        ContactCandidate& candidate) noexcept {
   const SurfacePoint surface = felt_surface(placed, candidate.passage, point, candidate.hint, candidate.by_plane);
-  evaluate_contact(surface, point, candidate);
+  return evaluate_contact(surface, point, candidate);
 }
 
 double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
@@ -160,16 +164,6 @@ void FrictionChange::refresh(double friction, ContactCandidate& candidate) noexc
   change = std::max(change, std::abs(force - candidate.friction_force));
   largest = std::max({largest, force, candidate.friction_force});
   candidate.friction_force = force;
-}
-
-double refresh_friction(const std::vector<PlacedObstacle>& obstacles, std::vector<ContactCandidate>& candidates,
-                        std::size_t count) noexcept {
-  FrictionChange total;
-  for (std::size_t i = 0; i < count; ++i) {
-    const PlacedObstacle& placed = obstacles[static_cast<std::size_t>(candidates[i].obstacle)];
-    total.refresh(placed.obstacle->friction, candidates[i]);
-  }
-  return total.relative();
 }
 
 Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point,

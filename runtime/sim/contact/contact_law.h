@@ -69,7 +69,7 @@ struct ContactCandidate {
   // Of the last evaluation.
   NearestHint hint;                                          ///< of nearest_surface_point()
   bool by_plane = false;                                     ///< its surface was the passage's plane
-  double gap = 0;                                            ///< [m]
+  double gap = 0;                                            ///< [m]; 0 where it was not looked at
   double normal_force = 0;                                   ///< [N]
   Eigen::Vector3d arm = Eigen::Vector3d::Zero();             ///< x - position [m]
   Eigen::Vector3d force = Eigen::Vector3d::Zero();           ///< on the vertex [N]
@@ -99,17 +99,19 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
                     const Eigen::Vector3d& predicted, double area, double time_step,
                     ContactCandidate& candidate) noexcept;
 
-/// Force and stiffness of the vertex at `point` at the end of the step.
-void evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
+/// Force and stiffness of the vertex at `point` at the end of the step. Returns W [J].
+double evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
+                        ContactCandidate& candidate) noexcept;
 
 /// The same where `surface` is its nearest point of what it may touch.
-void evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point, ContactCandidate& candidate) noexcept;
+double evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
+                        ContactCandidate& candidate) noexcept;
 
 /// After the first evaluation: how far the vertex may go from there and still feel nothing.
 double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept;
 
-/// The last evaluation of a vertex that has gone no farther than `way` [m] from the first, less than its clearance.
-void leave_untouched(double way, ContactCandidate& candidate) noexcept;
+/// What an evaluation is of a vertex that has gone no farther than its clearance from the first.
+void leave_untouched(ContactCandidate& candidate) noexcept;
 
 /// W [J] of the vertex at `point` whose distance is `gap` [m].
 double contact_potential(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) noexcept;
@@ -126,11 +128,6 @@ struct FrictionChange {
   void refresh(double friction, ContactCandidate& candidate) noexcept;
   double relative() const noexcept { return largest > 0 ? change / largest : 0; }
 };
-
-/// Takes lambda of the first `count` candidates from their last evaluation. Returns the largest change of mu lambda
-/// over the largest mu lambda.
-double refresh_friction(const std::vector<PlacedObstacle>& obstacles, std::vector<ContactCandidate>& candidates,
-                        std::size_t count) noexcept;
 
 /// How far the tangential spring of a touching candidate is stretched at the end of the step, its vertex at `point`
 /// [m].

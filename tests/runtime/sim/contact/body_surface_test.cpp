@@ -9,6 +9,7 @@
 #include "runtime/sim/contact/obstacle.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/mesh_distance.h"
+#include "tests/support/random.h"
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::runtime {
@@ -93,21 +94,43 @@ TEST(BodySurface, QueriesDoNotAllocate) {
   EXPECT_EQ(counter.count(), 0);
 }
 
+// The triangles about a vertex are at no distance from it but for rounding, at rest as deformed.
+TEST(BodySurface, AVertexDoesNotApproachItsOwnTriangles) {
+  Surface body;
+  SurfaceShape shape = body.surface.make_shape();
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(body.bar.modes());
+  for (int trial = 0; trial < 20; ++trial) {
+    const Eigen::VectorXd q = 0.02 * test::random_vector(body.bar.modes(), 11 + static_cast<std::uint32_t>(trial));
+    for (Eigen::Index v = 0; v < body.mesh().vertices.rows(); ++v) {
+      const Eigen::Vector3d at_rest = body.mesh().vertices.row(v);
+      body.surface.place(rest, shape);
+      const auto place = body.surface.nearest(at_rest, 1e-9, shape);
+      if (!place) continue;  // within
+      body.surface.place(q, shape);
+      // As a vertex comes by another way of summing up than the surface's own.
+      const Eigen::Vector3d point = at_rest + body.bar.basis().middleRows<3>(3 * v) * q;
+      EXPECT_FALSE(body.surface.nearest_approached(point, at_rest, *place, 1e-6, shape)) << v;
+    }
+  }
+}
+
 TEST(BodySurface, NothingApproachesItselfWithinTheBounds) {
   const test::Bar bar = test::make_bar({.cells = {6, 2, 3}, .lengths = {0.6, 0.2, 0.3}, .slot_start = 2});
   const TetMesh& mesh = bar.model.object->mesh;
   const BodySurface surface = BodySurface::of_tets(mesh.tets, mesh.vertices, bar.basis(), Eigen::Vector3d::Zero());
   const TriangleArray triangles = surface_triangles(mesh.tets);
-  const Eigen::VectorXd bounds = surface.approach_bounds(mesh.vertices, bar.basis());
+  const RowMatrix bounds_of = surface.approach_bounds(mesh.vertices, bar.basis());
+  const Eigen::VectorXd bounds = bounds_of.colwise().maxCoeff();
   std::mt19937 random(3);
   std::uniform_real_distribution<double> unit(-1, 1);
   SurfaceShape shape = surface.make_shape();
   double nearest_to_bound = 1;
-  const auto smallest_ratio = [&](const Eigen::VectorXd& q) {  // of distances to those at rest, at points of triangles
+  // Of distances to those at rest, of vertices [first, last) to points of triangles.
+  const auto smallest_ratio = [&](const Eigen::VectorXd& q, Eigen::Index first, Eigen::Index last) {
     VertexArray x = mesh.vertices;
     x.reshaped<Eigen::RowMajor>() += bar.basis() * q;
     double smallest = 1;
-    for (Eigen::Index v = 0; v < x.rows(); ++v)
+    for (Eigen::Index v = first; v < last; ++v)
       for (Eigen::Index t = 0; t < triangles.rows(); ++t)
         for (int a = 0; a <= 4; ++a)
           for (int b = 0; a + b <= 4; ++b) {
@@ -129,17 +152,29 @@ TEST(BodySurface, NothingApproachesItselfWithinTheBounds) {
                             : Eigen::VectorXd(Eigen::VectorXd::NullaryExpr(bar.modes(), [&] { return unit(random); }));
     q *= 0.999 / bounds.dot(q.cwiseAbs());
     for (const double sign : {-1.0, 1.0}) {
-      const double ratio = smallest_ratio(sign * q);
+      const double ratio = smallest_ratio(sign * q, 0, mesh.vertices.rows());
       EXPECT_GE(ratio, 0.5);
       nearest_to_bound = std::min(nearest_to_bound, ratio);
       surface.place(sign * q, shape);
       for (Eigen::Index v = 0; v < mesh.vertices.rows(); v += 7) {
         const Eigen::Vector3d point = mesh.vertices.row(v).transpose() + bar.basis().middleRows<3>(3 * v) * sign * q;
-        EXPECT_FALSE(surface.nearest_approached(point, mesh.vertices.row(v), Eigen::Vector3d::Zero(), 1, shape));
+        EXPECT_FALSE(surface.nearest_approached(point, mesh.vertices.row(v), SurfaceHit(), 1, shape));
       }
     }
   }
   EXPECT_LT(nearest_to_bound, 0.75);  // not idle
+  // Each vertex has bounds of its own, beyond those of all.
+  double farthest = 0;
+  for (Eigen::Index v = 0; v < mesh.vertices.rows(); v += 5) {
+    Eigen::VectorXd q = Eigen::VectorXd::NullaryExpr(bar.modes(), [&] { return unit(random); });
+    q *= 0.999 / bounds_of.row(v).dot(q.cwiseAbs());
+    farthest = std::max(farthest, bounds.dot(q.cwiseAbs()));
+    EXPECT_GE(smallest_ratio(q, v, v + 1), 0.5) << v;
+    surface.place(q, shape);
+    const Eigen::Vector3d point = mesh.vertices.row(v).transpose() + bar.basis().middleRows<3>(3 * v) * q;
+    EXPECT_FALSE(surface.nearest_approached(point, mesh.vertices.row(v), SurfaceHit(), 1, shape)) << v;
+  }
+  EXPECT_GT(farthest, 1.2);
 }
 
 }  // namespace
