@@ -76,7 +76,7 @@ std::optional<int> Bodies::first_non_finite() const {
 }
 
 void Bodies::add_contact_load(Eigen::VectorXd& load) const {
-  runtime::add_contact_load(model_, states_.front(), threads_.front().workspace, load);
+  runtime::add_contact_load(model_, states_.front(), threads_.front().workspace.body(0), load);
 }
 
 std::uint64_t Bodies::hash() const {

@@ -36,6 +36,7 @@ class LaneWorkspace {
 
   /// What a body's step left, as Workspace of step().
   Workspace& body(std::size_t lane) { return bodies_[lane]; }
+  const Workspace& body(std::size_t lane) const { return bodies_[lane]; }
 
   /// Stages of all lanes add to it; null: nobody times them.
   void set_profile(Profile* profile);
