@@ -29,8 +29,8 @@ struct Crowd {
 };
 
 struct Kind {
-  BarOptions bar;
-  ModelOptions model;
+  BarOptions bar{};
+  ModelOptions model{};
   Integrator integrator = Integrator::kBdf2;
   double tolerance = 1e-11;
 };
