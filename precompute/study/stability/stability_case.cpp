@@ -402,6 +402,16 @@ const std::vector<KnownLimit>& known_limits() {
        "they turn by several radians in a step, which is not resolved, while they are in each other: what the contacts "
        "hold comes back as more than it was",
        "none; a smaller time_step"},
+      {"bodies-momenta", Check::kMomentum,
+       [](const StabilityCase& test, const StudyBody&) {
+         return test.company == Company::kPair && test.velocity >= 50 && test.time_step >= kSixtieth &&
+                test.contact_stiffness >= 1e8;
+       },
+       0.3, "bodies that meet stiffly and off their centres at 50 m/s, in steps of 1/60 s and more",
+       "a step that did not converge gives each body the momentum of the way that it went",
+       "run: \"N solutions of bodies that touch did not reach the tolerance; a smaller time_step or contact stiffness "
+       "may "
+       "help\""},
       {"corotational-kink", Check::kSolved,
        [](const StabilityCase& test, const StudyBody&) {
          return test.body.material == MaterialModel::kCorotational && test.tip_load.norm() > 0;

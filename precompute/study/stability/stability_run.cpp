@@ -72,8 +72,11 @@ class Run {
   bool tumbles() const {
     return test_.body.free && ((test_.spin > 0 && !test_.principal_axis) || !scene_.forces.empty() || rocks());
   }
-  /// Whether the ground is round: a bar rocks on it for long.
-  bool rocks() const { return test_.ground == Ground::kSphere || test_.ground == Ground::kCapsule; }
+  /// Whether it rocks or rolls for long: on round ground, or as it is bent itself.
+  bool rocks() const {
+    return test_.ground == Ground::kSphere || test_.ground == Ground::kCapsule ||
+           (test_.ground != Ground::kNone && !scene_.examples.empty());
+  }
   /// Whether the run stays in the range where displacements are below so many L in linear elasticity.
   bool small(double sizes) const;
   bool conservative() const;

@@ -155,13 +155,15 @@ void WorldRun::plan_steps() {
   double rate = 0.5 * body_.lowest_frequency;
   if (test_.ground != Ground::kNone) {  // a body rocks on the patch where it crosses the next
     const double width = lengths()[1];
-    rate =
-        std::min(rate, width * width / lengths()[0] * std::sqrt(test_.contact_stiffness / body_.reduced.rigid->mass));
+    const double rocking =
+        width * width / lengths()[0] * std::sqrt(test_.contact_stiffness / body_.reduced.rigid->mass);
+    rate = std::min(rate, 0.7 * rocking);
   }
   const double needed = 2 * kLoadSteps + std::max<double>(kShortest, kRestTime / (rate * test_.time_step));
   if (needed > most_steps_) return;
   steps_ = static_cast<std::int64_t>(std::ceil(needed));
-  expects_rest_ = test_.company == Company::kPile || (test_.company == Company::kItself && !test_.body.free);
+  expects_rest_ = (test_.company == Company::kPile && scene_.examples.empty()) ||
+                  (test_.company == Company::kItself && !test_.body.free);
 }
 
 /// As of one body, which may get the energy of all.

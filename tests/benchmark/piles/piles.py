@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 """Drops piles of teddies, steps them until they rest, and writes what came out into docs/performance.md.
 
-Usage: piles.py PROGRAMS RESULTS [--page PAGE.md] [--counts 1,30,100,1000] [--seconds 8] [--bundle TEDDY.h5]
+Usage: piles.py PROGRAMS RESULTS [--page PAGE.md] [--counts 1,30,100,1000] [--seconds 6] [--bundle TEDDY.h5]
 PROGRAMS has exmat-precompute and exmat-pile-benchmark. The target `piles` of the build calls it.
 """
 import argparse
@@ -87,7 +87,7 @@ def main():
     parser.add_argument("results", type=Path)
     parser.add_argument("--page", type=Path)
     parser.add_argument("--counts", default="1,30,100,1000")
-    parser.add_argument("--seconds", type=float, default=8)
+    parser.add_argument("--seconds", type=float, default=6)
     parser.add_argument("--bundle", type=Path, help="of the teddy, in place of a new one")
     options = parser.parse_args()
     options.results.mkdir(parents=True, exist_ok=True)

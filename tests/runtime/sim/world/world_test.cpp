@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/runtime/sim/world/touching_blocks.h"
+#include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace {
@@ -113,6 +114,42 @@ TEST(World, AStackComesToRestAndEachBodyCarriesWhatIsAboveIt) {
       for (const HeldBodyContact& contact : side) force += contact.normal_force;
     EXPECT_NEAR(force, weight * (kCount - 1 - pair.first), 0.01 * weight);
   }
+}
+
+// Thirty, at random turned, fall between four slopes: they come to rest, hardly in each other, and gain no energy.
+TEST(World, APileComesToRest) {
+  Blocks blocks(4e-3);
+  blocks.set_gravity(kGravity);
+  blocks.scene.mass_damping = 1;
+  blocks.scene.stiffness_damping = 2e-3;
+  constexpr double kStiffness = 1e8, kDamping = 2e5;
+  blocks.add_floor(kStiffness, 0.5, kDamping);
+  for (const auto& [x, y] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}})
+    blocks.scene.obstacles.push_back(
+        {Plane{{-0.9 * x, -0.9 * y, 0}, {0.8 * x, 0.8 * y, 0.6}}, RigidMotion(), kStiffness, kDamping, 0.3});
+  std::vector<WorldBodyStart> bodies;
+  for (int i = 0; i < 30; ++i) {
+    const Eigen::Vector4d turn = exmat::test::random_vector(4, static_cast<std::uint32_t>(i)).normalized();
+    bodies.push_back(blocks.body({0.5 * (i % 3) - 0.7, 0.5 * (i / 3 % 3) - 0.6, 0.2 + 0.5 * (i / 9)}, {0, 0, 0},
+                                 {0, 0, 0}, Eigen::Quaterniond(turn[0], turn[1], turn[2], turn[3])));
+  }
+  World world(std::move(bodies), {kStiffness, kDamping, 0.4});
+  const double start = world.energies().total();
+  WorldReport report;
+  for (int i = 0; i < 1400; ++i) {
+    report = world.step(1);
+    ASSERT_EQ(report.unconverged_islands, 0) << i;
+    ASSERT_LE(world.energies().total(), start + 1e-9 * std::abs(start)) << i;
+  }
+  EXPECT_GT(report.touching_pairs, 20);
+  double deepest = 0, fastest = 0;
+  for (const HeldPair& pair : world.held())
+    for (const auto& side : pair.held)
+      for (const HeldBodyContact& contact : side) deepest = std::max(deepest, -contact.gap);
+  for (int i = 0; i < world.count(); ++i)
+    fastest = std::max(fastest, free_state(world.state(i)).linear_momentum.norm() / blocks.mass());
+  EXPECT_LE(deepest, 0.005 * blocks.bar.length);
+  EXPECT_LE(fastest, 0.01);
 }
 
 TEST(World, ThreadsAndTheWayOfSolvingDoNotChangeTheResult) {
