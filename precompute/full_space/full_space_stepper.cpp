@@ -239,8 +239,7 @@ NewtonReport Stepper::minimise(StepPotential& potential, Eigen::VectorXd& d) {
   NewtonReport newton = minimise_step(potential, scene_.newton, workspace_.direction, d);
   add(newton);
   for (int round = 1; terms_.contacts != nullptr && round < runtime::kFrictionRounds; ++round) {
-    const double change =
-        runtime::refresh_friction(contacts_.obstacles, contacts_.candidates, contacts_.candidates.size());
+    const double change = runtime::refresh_friction(contacts_.obstacles, contacts_.candidates);
     if (newton.status == NewtonStatus::kNonFinite || change <= runtime::kSameFriction) return newton;
     potential.start(d);
     newton = minimise_step(potential, scene_.newton, workspace_.direction, d);

@@ -260,7 +260,11 @@ def main():
     parser.add_argument("--compiler", default="unknown")
     parser.add_argument("--worlds", action="store_true", help="of bodies that touch, instead of all else")
     parser.add_argument("--crowds", action="store_true", help="of many bodies, likewise")
+    parser.add_argument("--bullet", action="store_true", help="what the comparison with Bullet prints, likewise")
     options = parser.parse_args()
+    if options.bullet:
+        put(options.page, "bullet", subprocess.run([options.run], check=True, capture_output=True, text=True).stdout.strip())
+        return
     for name, wanted, repetitions, write in (("world", options.worlds, WORLD_REPETITIONS, report_worlds), ("crowd", options.crowds, CROWD_REPETITIONS, report_crowds)):
         if not wanted:
             continue

@@ -166,6 +166,14 @@ void FrictionChange::refresh(double friction, ContactCandidate& candidate) noexc
   candidate.friction_force = force;
 }
 
+double refresh_friction(const std::vector<PlacedObstacle>& obstacles,
+                        std::vector<ContactCandidate>& candidates) noexcept {
+  FrictionChange total;
+  for (ContactCandidate& candidate : candidates)
+    total.refresh(obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
+  return total.relative();
+}
+
 Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point,
                              const ContactCandidate& candidate) noexcept {
   const double full = 2 * friction * candidate.normal_force / candidate.stiffness;

@@ -129,6 +129,11 @@ struct FrictionChange {
   double relative() const noexcept { return largest > 0 ? change / largest : 0; }
 };
 
+/// Takes lambda of all candidates from their last evaluation. Returns the largest change of mu lambda over the largest
+/// mu lambda.
+double refresh_friction(const std::vector<PlacedObstacle>& obstacles,
+                        std::vector<ContactCandidate>& candidates) noexcept;
+
 /// How far the tangential spring of a touching candidate is stretched at the end of the step, its vertex at `point`
 /// [m].
 Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point, const ContactCandidate& candidate) noexcept;
