@@ -11,21 +11,13 @@
 
 #include "common/elastic/materials.h"
 #include "runtime/sim/elasticity/element_potential.h"
+#include "tests/support/instruction_sets.h"
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace {
 
 using Shape = std::pair<int, int>;  // r, s
-
-constexpr InstructionSet kSets[] = {InstructionSet::kPortable, InstructionSet::kAvx2, InstructionSet::kAvx512};
-
-std::vector<const Kernels*> available() {
-  std::vector<const Kernels*> found;
-  for (const InstructionSet set : kSets)
-    if (const Kernels* kernels = kernels_for(set)) found.push_back(kernels);
-  return found;
-}
 
 constexpr MaterialModel kModels[] = {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
                                      MaterialModel::kCorotational};

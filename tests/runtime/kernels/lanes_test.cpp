@@ -7,6 +7,7 @@
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/kernels/kernels.h"
 #include "runtime/sim/elasticity/element_potential.h"
+#include "tests/support/instruction_sets.h"
 #include "tests/support/random.h"
 
 // The kernels of kLanes bodies side by side, of every instruction set, against Eigen and against one body at a time.
@@ -17,13 +18,6 @@ namespace {
 using Shape = std::pair<int, int>;  // r, s
 
 constexpr double kRounding = 1e-13;  // of sums of a few hundred terms
-
-std::vector<const Kernels*> available() {
-  std::vector<const Kernels*> found;
-  for (const InstructionSet set : {InstructionSet::kPortable, InstructionSet::kAvx2, InstructionSet::kAvx512})
-    if (const Kernels* kernels = kernels_for(set)) found.push_back(kernels);
-  return found;
-}
 
 using Vectors = Eigen::Matrix<double, kLanes, Eigen::Dynamic>;  // a body in each row
 

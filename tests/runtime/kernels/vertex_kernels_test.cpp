@@ -5,12 +5,12 @@
 
 #include "common/core/arrays.h"
 #include "runtime/kernels/aligned_array.h"
+#include "tests/support/instruction_sets.h"
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
 namespace {
 
-constexpr InstructionSet kSets[] = {InstructionSet::kPortable, InstructionSet::kAvx2, InstructionSet::kAvx512};
 constexpr double kRounding = 1e-14;  // of sums of at most 50 terms, over their norms
 
 /// Rows of vertices, numbers beside them, and some of the vertices, not in order and one of them twice.
@@ -19,12 +19,6 @@ class VertexKernels : public testing::TestWithParam<int> {
   VertexKernels() : basis(test::random_matrix(3 * kVertices, modes, 1)), rows(3 * kVertices * stride) {
     for (Eigen::Index i = 0; i < basis.rows(); ++i)
       for (Eigen::Index c = 0; c < modes; ++c) rows[i * stride + c] = basis(i, c);
-  }
-  static std::vector<const Kernels*> available() {
-    std::vector<const Kernels*> found;
-    for (const InstructionSet set : kSets)
-      if (const Kernels* kernels = kernels_for(set)) found.push_back(kernels);
-    return found;
   }
   auto rows_of(Eigen::Index i) const { return basis.middleRows<3>(3 * vertices[static_cast<std::size_t>(i)]); }
   Eigen::Index count() const { return std::ssize(vertices); }
