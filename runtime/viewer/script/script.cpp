@@ -182,7 +182,7 @@ void ScriptPlayer::set(const Json& set) {
   const auto force = std::ranges::find(settings.forces, region, &ForceSettings::region);
   const bool of_force =
       std::ranges::any_of(std::initializer_list<const char*>{"on", "stiffness", "damping", "bias", "target", "weights"},
-                          [&](const char* name) { return set.contains(name); });
+                          [&](const char* member) { return set.contains(member); });
   if (of_force && force == settings.forces.end())
     throw InputError({script_.file.string(), "/actions", "settings of an example force that the scene has",
                       region.empty() ? "those of the whole body" : "those of \"" + region + '"', ""});

@@ -155,10 +155,10 @@ TEST_F(ApiContactTest, MovedObstaclesCarryAndRemovedOnesLetGo) {
   plate.half_extents[2] = 0.1;
   plate.point[2] = -0.1;
   const std::int64_t ball = body.add_obstacle([] {
-    exmat_obstacle ball = default_obstacle();
-    ball.shape = EXMAT_SPHERE;
-    ball.point[0] = 50;
-    return ball;
+    exmat_obstacle shape = default_obstacle();
+    shape.shape = EXMAT_SPHERE;
+    shape.point[0] = 50;
+    return shape;
   }());
   const std::int64_t id = body.add_obstacle(plate);
   body.step(1500);

@@ -402,7 +402,8 @@ TEST_F(SceneRunTest, TheTrajectoryOfManyBodiesIsThatOfTheFirst) {
   const RunSummary& one = summaries[1];
   const RunSummary& many = summaries[7];
   ASSERT_EQ(reduced[7].size(), reduced[1].size());
-  const double rounding = one.steps * 1e-13;  // seven step side by side, where sums have another order
+  const double rounding =
+      1e-13 * static_cast<double>(one.steps);  // seven step side by side, where sums have another order
   for (std::size_t i = 0; i < reduced[1].size(); ++i) EXPECT_NEAR(reduced[7][i], reduced[1][i], rounding) << i;
   EXPECT_EQ(many.bodies, 7);
   EXPECT_EQ(many.steps, one.steps) << "of each body";
