@@ -154,7 +154,9 @@ TEST_P(LanesTest, ALaneThatIsNotPositiveDefiniteIsAlone) {
     for (Eigen::Index i = 0; i < modes_; ++i)
       for (Eigen::Index j = 0; j <= i; ++j)
         for (Eigen::Index lane = 0; lane < kLanes; ++lane)
-          if (lane != 3) EXPECT_EQ(all[lane_entry(i, j) + lane], without[lane_entry(i, j) + lane]) << kernels->name;
+          if (lane != 3) {
+            EXPECT_EQ(all[lane_entry(i, j) + lane], without[lane_entry(i, j) + lane]) << kernels->name;
+          }
     EXPECT_TRUE(std::isnan(without[lane_entry(modes_ - 1, modes_ - 1) + 3])) << kernels->name;
   }
 }
