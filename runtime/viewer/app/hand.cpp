@@ -15,9 +15,10 @@ Eigen::Vector2d pixel_of(const ImVec2& mouse) { return {mouse.x - 0.5, mouse.y -
 
 }  // namespace
 
-void Hand::act(Studio& studio, const PictureSize& picture) {
+void Hand::act(Studio& studio, const PictureSize& picture, std::span<const int> keys) {
   use_mouse(studio, picture);
-  if (!ImGui::GetIO().WantTextInput) use_keys(studio);
+  if (ImGui::GetIO().WantTextInput) return;
+  for (const int key : keys) use_key(studio, key);
 }
 
 void Hand::use_mouse(Studio& studio, const PictureSize& picture) {
@@ -41,33 +42,60 @@ void Hand::use_mouse(Studio& studio, const PictureSize& picture) {
   mode_ = Mode::kNone;
 }
 
-void Hand::use_keys(Studio& studio) {
-  const ImGuiIO& io = ImGui::GetIO();
-  const auto pressed = [](int key) { return ImGui::IsKeyPressed(key); };
+void Hand::use_key(Studio& studio, int key) {
   Look& look = studio.look();
   Runner& runner = studio.runner();
-  if (pressed(GLFW_KEY_SPACE)) studio.toggle_pause();
-  if (pressed(GLFW_KEY_RIGHT)) {
-    runner.set_paused(true);
-    runner.step(io.KeyShift ? 10 : 1);
+  switch (key) {
+    case GLFW_KEY_SPACE:
+      return studio.toggle_pause();
+    case GLFW_KEY_RIGHT:
+      runner.set_paused(true);
+      return runner.step(ImGui::GetIO().KeyShift ? 10 : 1);
+    case GLFW_KEY_R:
+      return studio.reset();
+    case GLFW_KEY_MINUS:
+    case GLFW_KEY_KP_SUBTRACT:
+      return runner.set_speed(runner.speed() / kSpeedPerKey);
+    case GLFW_KEY_EQUAL:
+    case GLFW_KEY_KP_ADD:
+      return runner.set_speed(runner.speed() * kSpeedPerKey);
+    case GLFW_KEY_F:
+      studio.frame_next = true;
+      break;
+    case GLFW_KEY_C:
+      look.colouring = static_cast<Colouring>((static_cast<int>(look.colouring) + 1) % 4);
+      break;
+    case GLFW_KEY_W:
+      look.wireframe = !look.wireframe;
+      break;
+    case GLFW_KEY_E:
+      look.elements = !look.elements;
+      break;
+    case GLFW_KEY_X:
+      look.examples = !look.examples;
+      studio.frame_next = true;
+      break;
+    case GLFW_KEY_T:
+      look.targets = !look.targets;
+      break;
+    case GLFW_KEY_G:
+      return toggle_gravity(studio);
+    case GLFW_KEY_H:
+      studio.interface = !studio.interface;
+      break;
+    case GLFW_KEY_SLASH:
+    case GLFW_KEY_F1:
+      studio.help = !studio.help;
+      break;
+    case GLFW_KEY_ESCAPE:
+      studio.help = false;
+      break;
+    case GLFW_KEY_Q:
+      studio.end = true;
+      break;
+    default:
+      break;
   }
-  if (pressed(GLFW_KEY_R)) studio.reset();
-  if (pressed(GLFW_KEY_MINUS) || pressed(GLFW_KEY_KP_SUBTRACT)) runner.set_speed(runner.speed() / kSpeedPerKey);
-  if (pressed(GLFW_KEY_EQUAL) || pressed(GLFW_KEY_KP_ADD)) runner.set_speed(runner.speed() * kSpeedPerKey);
-  if (pressed(GLFW_KEY_F)) studio.frame_next = true;
-  if (pressed(GLFW_KEY_C)) look.colouring = static_cast<Colouring>((static_cast<int>(look.colouring) + 1) % 4);
-  if (pressed(GLFW_KEY_W)) look.wireframe = !look.wireframe;
-  if (pressed(GLFW_KEY_E)) look.elements = !look.elements;
-  if (pressed(GLFW_KEY_X)) {
-    look.examples = !look.examples;
-    studio.frame_next = true;
-  }
-  if (pressed(GLFW_KEY_T)) look.targets = !look.targets;
-  if (pressed(GLFW_KEY_G)) toggle_gravity(studio);
-  if (pressed(GLFW_KEY_H)) studio.interface = !studio.interface;
-  if (pressed(GLFW_KEY_SLASH) || pressed(GLFW_KEY_F1)) studio.help = !studio.help;
-  if (pressed(GLFW_KEY_ESCAPE)) studio.help = false;
-  if (pressed(GLFW_KEY_Q)) studio.end = true;
 }
 
 void Hand::toggle_gravity(Studio& studio) {

@@ -1,19 +1,22 @@
 #pragma once
 
+#include <span>
+
 #include "runtime/viewer/studio/studio.h"
 
 namespace exmat::viewer {
 
-/// Mouse and keys of the current ImGui frame become what they ask for.
+/// The mouse of the current ImGui frame and keys become what they ask for.
 class Hand {
  public:
-  void act(Studio& studio, const PictureSize& picture);
+  /// `keys` that went down since the last frame, by GLFW's numbers.
+  void act(Studio& studio, const PictureSize& picture, std::span<const int> keys);
 
  private:
   enum class Mode { kNone, kDrag, kOrbit, kPan };
 
   void use_mouse(Studio& studio, const PictureSize& picture);
-  void use_keys(Studio& studio);
+  void use_key(Studio& studio, int key);
   void toggle_gravity(Studio& studio);
 
   Mode mode_ = Mode::kNone;

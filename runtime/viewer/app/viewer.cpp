@@ -115,7 +115,7 @@ void run_window(Show& show, Studio& studio) {
     frame_seconds += 0.1 * (seconds - frame_seconds);
     show.fit_window();
     show.begin(seconds);
-    hand.act(studio, show.canvas().size());
+    hand.act(studio, show.canvas().size(), show.window().take_keys());
     if (studio.runner().paused()) studio.runner().refresh();
     show.draw(*show.note(), seconds, frame_seconds);
     studio.pass(seconds);

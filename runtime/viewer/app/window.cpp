@@ -55,6 +55,11 @@ Window::Window(const PictureSize& size, bool visible) {
   }
   glfwMakeContextCurrent(window_);
   glfwSwapInterval(visible ? 1 : 0);
+  // ImGui, which comes later, hands keys on to it. It would lose one that comes up before the next picture.
+  glfwSetWindowUserPointer(window_, this);
+  glfwSetKeyCallback(window_, [](GLFWwindow* window, int key, int, int action, int) {
+    if (action != GLFW_RELEASE) static_cast<Window*>(glfwGetWindowUserPointer(window))->keys_.push_back(key);
+  });
 }
 
 Window::~Window() {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "runtime/viewer/view/camera.h"
 
@@ -24,6 +26,8 @@ class Window {
   float scale() const;
   bool closed() const;
   void show_next();
+  /// GLFW's numbers of the keys that went down since the last call, however soon they came up again.
+  std::vector<int> take_keys() { return std::exchange(keys_, {}); }
 
   /// What draws, in words; whether that is the processor.
   std::string renderer() const;
@@ -31,6 +35,7 @@ class Window {
 
  private:
   GLFWwindow* window_ = nullptr;
+  std::vector<int> keys_;
 };
 
 }  // namespace exmat::viewer
