@@ -9,6 +9,14 @@
 #include "runtime/scene/contact_load.h"
 
 namespace exmat::runtime {
+namespace {
+
+/// Scratch that one thread needs at once.
+std::size_t workspaces(int count) {
+  return count < kFewestLanes ? 1 : static_cast<std::size_t>(std::min<std::ptrdiff_t>(count, kLanes));
+}
+
+}  // namespace
 
 Bodies::Bodies(const Model& model, StepScene scene, State start, int count, SceneKeys keys)
     : model_(model),
@@ -16,7 +24,8 @@ Bodies::Bodies(const Model& model, StepScene scene, State start, int count, Scen
       keys_(std::move(keys)),
       start_(std::move(start)),
       reports_(static_cast<std::size_t>(count)),
-      threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())), Thread{{model, scene_}, {}}) {
+      threads_(static_cast<std::size_t>(std::min(count, omp_get_max_threads())),
+               Thread{{model, scene_, workspaces(count)}, {}}) {
   keys_.apply_start(model, scene_);
   refresh_weights(model, scene_, start_, threads_.front().workspace.body(0));
   states_.assign(reports_.size(), start_);

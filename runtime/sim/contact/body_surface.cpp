@@ -192,7 +192,8 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
   double nearest = radius * radius;
   if (!tree_.empty()) waiting[count++] = bound_of(0);
   while (count > 0) {
-    const auto [node, bound] = waiting[--count];
+    const int node = waiting[--count].node;
+    const double bound = waiting[count].bound;
     if (bound > nearest) continue;
     if constexpr (requires { accepts.excludes(node, bound); })
       if (accepts.excludes(node, bound)) continue;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/example_forces.h"
@@ -43,8 +44,10 @@ bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept 
   return true;
 }
 
-LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene)
-    : bodies_(kLanes, Workspace(model, scene)), scratch_(lane_scratch(model.modes())) {
+LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies)
+    : bodies_(bodies, Workspace(model, scene)) {
+  if (std::cmp_less(bodies, kFewestLanes)) return;
+  scratch_ = AlignedArray(lane_scratch(model.modes()));
   const Eigen::Index modes = model.modes();
   for (AlignedArray* vectors :
        {&start_, &q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_, &linear_, &frozen_,

@@ -29,10 +29,11 @@ struct LaneBody {
   State* state;
 };
 
-/// Scratch of kLanes bodies of one model, sized once. One per thread.
+/// Scratch of bodies of one model, sized once. One per thread.
 class LaneWorkspace {
  public:
-  LaneWorkspace(const Model& model, const StepScene& scene);
+  /// Of groups of up to `bodies` in [1, kLanes].
+  LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies = kLanes);
 
   /// What a body's step left, as Workspace of step().
   Workspace& body(std::size_t lane) { return bodies_[lane]; }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
-#include <ranges>
 #include <string>
 
 namespace exmat::viewer {
@@ -82,8 +81,8 @@ void draw_energies(const Style& style, const History& history) {
 /// Stages beside each other; nothing of bodies that touch each other, whose stages are not told apart.
 void draw_stages(const Style& style, const StageTimes& stages) {
   constexpr float kNone = 0.005F;  // us
-  const std::size_t rest = StageTimes::kStages - 1;
-  if (std::ranges::none_of(stages.microseconds | std::views::take(rest), [](float time) { return time > kNone; }))
+  if (std::none_of(stages.microseconds.begin(), stages.microseconds.end() - 1,
+                   [](float time) { return time > kNone; }))  // all but the rest
     return;
   const ImVec2 at = ImGui::GetCursorScreenPos();
   const ImVec2 size{ImGui::GetContentRegionAvail().x, 12 * style.scale};
