@@ -172,7 +172,7 @@ def sizes(result):
 
 def crowds(result):
     """A row for each number of bodies, a column for each model and number of threads; and the ratios of the largest."""
-    found = [name.split("/")[1:] for name in result.best if name.startswith("crowd/")]
+    found = sorted((name.split("/")[1:] for name in result.best if name.startswith("crowd/")), key=lambda name: (name[0], *(int(size[1:]) for size in name[1:3])))
     rows = []
     for kind in dict.fromkeys(name[0] for name in found):
         for count in sorted({int(name[4]) for name in found}):
