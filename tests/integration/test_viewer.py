@@ -46,7 +46,7 @@ class Viewer(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         read, write = os.pipe()
-        cls.server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "640x480x24"], pass_fds=[write],
+        cls.server = subprocess.Popen(["Xvfb", "-noreset", "-displayfd", str(write), "-screen", "0", "640x480x24"], pass_fds=[write],
                                       stderr=subprocess.DEVNULL)
         os.close(write)
         with os.fdopen(read) as pipe:
@@ -245,11 +245,15 @@ class Viewer(unittest.TestCase):
 
     @unittest.skipUnless(EXAMPLES and EXAMPLES.is_dir(), "no scenes of examples")
     def test_opens_the_scenes_of_the_examples(self):
-        for scene in sorted(EXAMPLES.glob("*/scene*.json")):
+        scenes = sorted(EXAMPLES.glob("*/scene*.json"))
+        if not scenes:
+            self.skipTest("the tests of the examples, which come before this one, make the bundles")
+        for scene in scenes:
             content = json.loads(scene.read_text())
-            if all((scene.parent / kind["bundle"]).is_file() for kind in content.get("bodies", [content])):
-                with self.subTest(scene=scene.parent.name):
-                    self.view(scene, "--frames", 2, "--screenshot", self.folder / "x.png", "--size", "160x90")
+            with self.subTest(scene=scene.parent.name):
+                for kind in content.get("bodies", [content]):
+                    self.assertTrue((scene.parent / kind["bundle"]).is_file(), kind["bundle"])
+                self.view(scene, "--frames", 2, "--screenshot", self.folder / "x.png", "--size", "160x90")
 
     @unittest.skipUnless(shutil.which("ffmpeg"), "there is no ffmpeg")
     def test_records_movies(self):
