@@ -118,6 +118,7 @@ inline void lanes_clear(double* numbers, Index count) {
 }
 
 constexpr Index kElementsAtOnce = 2;  // their B and D B stay in the first-level cache
+static_assert(lane_scratch(kBlock) == kElementsAtOnce * 9 * kBlock * kLanes);
 
 /// `product` [kElementsAtOnce x 9 x rows x kLanes].
 template <Want want, class Law>
@@ -151,21 +152,11 @@ inline void lanes_evaluate(const ElementArrays& elements, const ElementLaw& law,
 template <Want want>
 inline void lanes_evaluate_parts(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
                                  double* energy, double* force, double* stiffness) {
-  for (Index at = 0; at < kLanes; at += kWidth) {
-    const auto work = [&]<class Law>() {
-      lanes_evaluate<want, Law>(elements, law, q + at, product, energy + at, force + at, stiffness + at);
-    };
-    switch (law.kind) {
-      case ElementLaw::Kind::kStableNeoHookean:
-        work.template operator()<StableNeoHookean>();
-        break;
-      case ElementLaw::Kind::kCorotational:
-        work.template operator()<Corotational>();
-        break;
-      default:
-        work.template operator()<StVenantKirchhoff>();
-    }
-  }
+  for (Index at = 0; at < kLanes; at += kWidth)
+    with_law(law, [&]<class Law>() {
+      if constexpr (!std::is_same_v<Law, Quadratic>)
+        lanes_evaluate<want, Law>(elements, law, q + at, product, energy + at, force + at, stiffness + at);
+    });
 }
 
 void lanes_energy(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy) {
