@@ -11,6 +11,9 @@
 namespace exmat::runtime {
 namespace {
 
+constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
+constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
+
 auto rows_of(const BodyCandidates& candidates, std::size_t index) {
   return candidates.basis.middleRows<3>(3 * static_cast<Eigen::Index>(index));
 }
@@ -76,57 +79,31 @@ std::optional<SurfaceHit> nearest_by_side(const BodySurface& surface, const Eige
   return entry->normal.dot(side) > 0 ? entry : hit;
 }
 
-}  // namespace
-
-TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself)
-    : surface(std::move(of)), normals(set.vertices(), 3) {
-  SurfaceShape shape = surface.make_shape();
-  surface.place(Eigen::VectorXd::Zero(surface.modes()), shape);
-  for (int i = 0; i < normals.rows(); ++i) {
-    const auto hit = surface.nearest(set.rest(i), std::numeric_limits<double>::infinity(), shape);
-    normals.row(i) = hit ? hit->normal : Eigen::Vector3d::Zero();
-    if (meets_itself) places.push_back(hit.value_or(SurfaceHit()));
+/// The candidates of one body's vertices and the surface of another, or of its own, vertex by vertex in ascending
+/// order.
+struct Gathering {
+  Gathering(const ContactLaw& its_law, const TouchingBody& its_a, const TouchingBody& its_b, double its_time_step,
+            double its_margin, bool is_anew, bool is_own, const std::vector<HeldBodyContact>& its_held,
+            SurfaceShape& its_shape, BodyCandidates& its_candidates)
+      : law(its_law),
+        a(its_a),
+        b(its_b),
+        time_step(its_time_step),
+        margin(its_margin),
+        anew(is_anew),
+        own(is_own),
+        held(its_held),
+        shape(its_shape),
+        candidates(its_candidates),
+        last(held.begin()) {
+    candidates.all.clear();
+    const double radius = b.touching.surface.bound(b.pose.q).radius;
+    fast = kFast * radius;
+    deepest = anew ? 2 * radius : 0;
+    for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
   }
-  if (!meets_itself) return;
-  VertexArray rest(set.vertices(), 3);
-  RowMatrix basis(3 * set.vertices(), set.modes());
-  for (int i = 0; i < rest.rows(); ++i) {
-    rest.row(i) = set.rest(i);
-    basis.middleRows<3>(3 * i) = set.basis_rows(i);
-  }
-  vertex_bounds = surface.approach_bounds(rest, basis);
-  approach_bounds = vertex_bounds.colwise().maxCoeff();
-}
 
-bool TouchingSurface::may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
-                                      double time_step) const noexcept {
-  if (approach_bounds.size() == 0) return false;
-  return approach_bounds.dot(q.cwiseAbs() + kContactMarginSteps * time_step * v.cwiseAbs()) >= 1;
-}
-
-void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
-                         const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
-                         BodyCandidates& candidates) const {
-  gather_near(a, b, time_step, margin, anew, /*own=*/false, held, shape, candidates);
-}
-
-void BodyContact::gather_own(const TouchingBody& body, double time_step, double margin,
-                             const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
-                             BodyCandidates& candidates) const {
-  gather_near(body, body, time_step, margin, /*anew=*/false, /*own=*/true, held, shape, candidates);
-}
-
-void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
-                              bool own, const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
-                              BodyCandidates& candidates) const {
-  candidates.all.clear();
-  const DeformationTree& tree = a.set.tree();
-  const double q_norm = a.pose.q.norm();
-  double deepest = anew ? 2 * b.touching.surface.bound(b.pose.q).radius : 0;
-  for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
-  const double fast = kFast * b.touching.surface.bound(b.pose.q).radius;
-  auto last = held.begin();
-  const auto test = [&](int vertex) {
+  void test(int vertex) {
     if (own && a.touching.vertex_bounds.row(vertex).dot(a.pose.q.cwiseAbs()) < 1) return;
     while (last != held.end() && last->vertex < vertex) ++last;
     const bool was_inside = last != held.end() && last->vertex == vertex;
@@ -172,21 +149,118 @@ void BodyContact::gather_near(const TouchingBody& a, const TouchingBody& b, doub
       surface.distance = surface.normal.dot(offset - arm_b);
     }
     const Eigen::Vector3d place = offset - arm_b;
-    freeze_contact(law_, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
+    freeze_contact(law, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
     if (!was_inside) return;
-    candidate.friction_force = law_.friction * last->normal_force;
+    candidate.friction_force = law.friction * last->normal_force;
     take_stretch(*last, b.pose.rotation, candidate);
-  };
+  }
+
+  const ContactLaw& law;
+  const TouchingBody &a, &b;
+  double time_step, margin;
+  bool anew, own;
+  const std::vector<HeldBodyContact>& held;
+  SurfaceShape& shape;
+  BodyCandidates& candidates;
+  std::vector<HeldBodyContact>::const_iterator last;
+  double deepest = 0;  ///< that a vertex may be inside [m]
+  double fast = 0;     ///< the way of a step that a vertex may pass the surface in [m]
+};
+
+/// Calls visit(vertex) for every vertex of a that the surface of b may be within `radius` of, in ascending order.
+template <class Visit>
+void for_near(const TouchingBody& a, const TouchingBody& b, double radius, SurfaceShape& shape, const Visit& visit) {
+  const DeformationTree& tree = a.set.tree();
+  const double q_norm = a.pose.q.norm();
   const auto count = static_cast<int>(tree.nodes().size());
   for (int node = 0; node < count;) {
     const DeformationTree::Ball ball = tree.ball(node, a.pose.q, q_norm);
     const Eigen::Vector3d offset = a.pose.position + a.pose.rotation * ball.centre - b.pose.position;
     const bool near =
-        b.touching.surface.may_be_within(b.pose.rotation.transpose() * offset, ball.radius + margin + deepest, shape);
+        b.touching.surface.may_be_within(b.pose.rotation.transpose() * offset, ball.radius + radius, shape);
     if (near && tree.node(node).is_leaf)
-      for (int vertex = tree.node(node).first; vertex < tree.node(node).last; ++vertex) test(vertex);
+      for (int vertex = tree.node(node).first; vertex < tree.node(node).last; ++vertex) visit(vertex);
     node = near ? node + 1 : tree.node(node).next;
   }
+}
+
+Placement a_in_b(const BodyPose& a, const BodyPose& b) {
+  Placement relative;
+  relative.position = b.rotation.transpose() * (a.position - b.position);
+  relative.rotation = b.rotation.transpose() * a.rotation;
+  return relative;
+}
+
+/// Bound on how far vertices of a and the surface of b have moved against each other since the search [m].
+double way_between(const TouchingBody& a, const TouchingBody& b, const NearVertices& near) {
+  if (near.radius < 0) return 0;
+  const Placement relative = a_in_b(a.pose, b.pose);
+  return way_bound(a.set.reach(), a.set.tree().basis_norm(), BodyPose{relative, a.pose.q}, near.a_in_b, near.q_a) +
+         b.touching.surface.basis_norm() * (b.pose.q - near.q_b).norm();
+}
+
+void search_near(const TouchingBody& a, const TouchingBody& b, double radius, SurfaceShape& shape, NearVertices& near) {
+  near.radius = radius;
+  near.a_in_b = a_in_b(a.pose, b.pose);
+  near.q_a = a.pose.q;
+  near.q_b = b.pose.q;
+  near.found.clear();
+  for_near(a, b, radius, shape, [&](int vertex) {
+    const Eigen::Vector3d point = near.a_in_b.position + a.set.world_arm(vertex, {near.a_in_b, a.pose.q});
+    const auto hit = b.touching.surface.nearest(point, radius, shape);
+    if (hit) near.found.push_back({vertex, std::abs(hit->distance)});
+  });
+}
+
+}  // namespace
+
+TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself)
+    : surface(std::move(of)), normals(set.vertices(), 3) {
+  SurfaceShape shape = surface.make_shape();
+  surface.place(Eigen::VectorXd::Zero(surface.modes()), shape);
+  for (int i = 0; i < normals.rows(); ++i) {
+    const auto hit = surface.nearest(set.rest(i), std::numeric_limits<double>::infinity(), shape);
+    normals.row(i) = hit ? hit->normal : Eigen::Vector3d::Zero();
+    if (meets_itself) places.push_back(hit.value_or(SurfaceHit()));
+  }
+  if (!meets_itself) return;
+  VertexArray rest(set.vertices(), 3);
+  RowMatrix basis(3 * set.vertices(), set.modes());
+  for (int i = 0; i < rest.rows(); ++i) {
+    rest.row(i) = set.rest(i);
+    basis.middleRows<3>(3 * i) = set.basis_rows(i);
+  }
+  vertex_bounds = surface.approach_bounds(rest, basis);
+  approach_bounds = vertex_bounds.colwise().maxCoeff();
+}
+
+bool TouchingSurface::may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                                      double time_step) const noexcept {
+  if (approach_bounds.size() == 0) return false;
+  return approach_bounds.dot(q.cwiseAbs() + kContactMarginSteps * time_step * v.cwiseAbs()) >= 1;
+}
+
+void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
+                         const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
+                         BodyCandidates& candidates) const {
+  Gathering gathering{law_, a, b, time_step, margin, anew, /*own=*/false, held, shape, candidates};
+  const double radius = margin + gathering.deepest;
+  const double farther = kSearchedMargins * margin + kSearchedShare * b.touching.surface.bound(b.pose.q).radius;
+  double way = way_between(a, b, near);
+  // A search of whatever depth knows more than it should: on a long way all of that would come near.
+  if (way > farther || radius + way > near.radius) {
+    search_near(a, b, radius + farther, shape, near);
+    way = 0;
+  }
+  for (const auto& [vertex, distance] : near.found)
+    if (distance - way <= radius) gathering.test(vertex);
+}
+
+void BodyContact::gather_own(const TouchingBody& body, double time_step, double margin,
+                             const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
+                             BodyCandidates& candidates) const {
+  Gathering gathering{law_, body, body, time_step, margin, /*anew=*/false, /*own=*/true, held, shape, candidates};
+  for_near(body, body, margin + gathering.deepest, shape, [&](int vertex) { gathering.test(vertex); });
 }
 
 void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way,

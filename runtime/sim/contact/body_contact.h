@@ -36,6 +36,20 @@ struct BodyCandidates {
   std::array<Eigen::VectorXd, 2> first_q{};
 };
 
+/// Vertices of one body, a, near the surface of another, b, by a search that went farther than one step needs: until
+/// the bodies have moved against each other by what it went farther, no step has to search again.
+struct NearVertices {
+  struct Found {
+    int vertex = 0;
+    double distance = 0;  ///< from the surface, inside or outside [m]
+  };
+  double radius = -1;        ///< all that were nearer than this are known [m]; negative: none is
+  std::vector<Found> found;  ///< in ascending order
+  // Where the bodies were.
+  Placement a_in_b;  ///< a in the frame of b
+  Eigen::VectorXd q_a, q_b;
+};
+
 /// The surface of a body that touches others, and how its vertices look.
 struct TouchingSurface {
   TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself = false);
@@ -72,9 +86,11 @@ class BodyContact {
   explicit BodyContact(const ContactLaw& law) : law_(law) {}
 
   /// Finds and freezes the candidates: vertices less than `margin` [m] outside, and those inside: that were so in the
-  /// last step, `held`, or of any depth where `anew`, that is without a last step. `shape` is that of b, placed.
+  /// last step, `held`, or of any depth where `anew`, that is without a last step. `shape` is that of b, placed. `near`
+  /// is what earlier calls found of the same two bodies; the candidates are the same without.
   void gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
-              const std::vector<HeldBodyContact>& held, SurfaceShape& shape, BodyCandidates& candidates) const;
+              const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
+              BodyCandidates& candidates) const;
 
   /// The same of a body with itself: vertices that parts of its surface which are farther away at rest have come near
   /// to from outside. What overlaps at the start never pushes.
@@ -106,9 +122,6 @@ class BodyContact {
               std::vector<HeldBodyContact>& held) const;
 
  private:
-  void gather_near(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew, bool own,
-                   const std::vector<HeldBodyContact>& held, SurfaceShape& shape, BodyCandidates& candidates) const;
-
   ContactLaw law_;
 };
 

@@ -42,7 +42,7 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     contact.gather_own(touching(own), own.scene.time_step, margin, held, other.shape, candidates_[at]);
   else
     contact.gather(touching(own), touching(other), own.scene.time_step, margin, own.anew || other.anew, held,
-                   other.shape, candidates_[at]);
+                   other.shape, near_[at], candidates_[at]);
 }
 
 double PairContact::way_since_first(const WorldBody& first, const WorldBody& second) const noexcept {

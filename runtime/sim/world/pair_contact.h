@@ -29,6 +29,8 @@ struct BodyTouch {
 /// surface, with half of the law.
 class PairContact {
  public:
+  /// Of other bodies than before.
+  void forget() noexcept { near_[0].radius = near_[1].radius = -1; }
   /// Bodies and what they remember; nothing is met yet.
   void reset(int first, int second, const HeldPair* held);
 
@@ -82,6 +84,7 @@ class PairContact {
   bool has_first_ = false;  // evaluation; where the bodies were in it
   std::array<Placement, 2> first_{};
   std::array<Eigen::VectorXd, 2> first_q_;
+  std::array<NearVertices, 2> near_{};
   std::array<BodyCandidates, 2> candidates_;  // vertices of the first, of the second
   std::array<ContactSums, 2> sums_;           // of the first, of the second
   // Columns of the candidates of each, of the side's body and of the other.

@@ -147,6 +147,7 @@ void World::find_pairs(int threads) {
     balls_[i] = {pose.position + pose.rotation * ball.centre,
                  ball.radius + margins_[i] + kContactMarginSteps * straight};
   }
+  last_near_.swap(near_);
   overlapping_pairs(balls_, order_, near_);
   const std::size_t others = near_.size();
   for (int i = 0; i < count(); ++i) {
@@ -154,6 +155,26 @@ void World::find_pairs(int threads) {
     if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(i, i);
   }
   if (near_.size() > others) std::ranges::sort(near_);
+  keep_pairs();
+}
+
+/// Pairs that were near in the last step have their PairContact, which knows what is near; others take what is left.
+void World::keep_pairs() {
+  last_pairs_.swap(pairs_);
+  pairs_.resize(std::max(last_pairs_.size(), near_.size()));
+  std::size_t last = 0;
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    while (last < last_near_.size() && last_near_[last] < near_[p]) ++last;
+    if (last < last_near_.size() && last_near_[last] == near_[p]) pairs_[p] = std::move(last_pairs_[last]);
+  }
+  std::size_t left = 0;
+  for (std::unique_ptr<PairContact>& pair : pairs_) {
+    if (pair) continue;
+    while (left < last_pairs_.size() && !last_pairs_[left]) ++left;
+    pair = left < last_pairs_.size() ? std::move(last_pairs_[left]) : std::make_unique<PairContact>();
+    pair->forget();
+  }
+  last_pairs_.clear();
 }
 
 const HeldPair* World::held_of(int first, int second) const {
@@ -176,7 +197,6 @@ double World::margin_between(int own, int other) const noexcept {
 /// Candidates, the surface of one body at a time: what is computed of its shape serves all that are near.
 void World::gather(int threads) {
   const StageTimer timer(profile_, WorldStage::kCandidates);
-  while (pairs_.size() < near_.size()) pairs_.push_back(std::make_unique<PairContact>());
   for (std::vector<Incidence>& pairs : against_) pairs.clear();
   for (std::size_t p = 0; p < near_.size(); ++p) {
     const auto [first, second] = near_[p];

@@ -81,6 +81,7 @@ class World {
   void resize();
   void find_pairs(int threads);
   double margin_between(int own, int other) const noexcept;
+  void keep_pairs();
   void gather(int threads);
   void step_single_bodies(int threads);
   void step_islands(int threads);
@@ -112,8 +113,8 @@ class World {
   std::vector<DeformationTree::Ball> balls_;
   std::vector<double> margins_;  // how far each may go beyond its centre's straight way [m]
   std::vector<int> order_, parents_, island_of_, place_in_island_;
-  std::vector<std::pair<int, int>> near_;
-  std::vector<std::unique_ptr<PairContact>> pairs_;
+  std::vector<std::pair<int, int>> near_, last_near_;
+  std::vector<std::unique_ptr<PairContact>> pairs_, last_pairs_;  // the first of them, those of near_
   std::vector<std::vector<Incidence>> against_;  // of each body: pairs in which its surface is met, and by which side
   std::vector<std::unique_ptr<Island>> islands_;
   std::size_t island_count_ = 0;

@@ -25,7 +25,8 @@ struct Overlap {
     const TouchingBody a{
         *blocks.model->contact, *blocks.surface, {start_a, qa}, {FrameVelocity{{0, 0, 1}, {0, 1, 0}}, va}};
     const TouchingBody b{*blocks.model->contact, *blocks.surface, {start_b, qb}, {FrameVelocity{{1, 0, 0}, {}}, vb}};
-    contact.gather(a, b, 1e-3, 0.01, true, {}, shape, candidates);
+    NearVertices near;
+    contact.gather(a, b, 1e-3, 0.01, true, {}, shape, near, candidates);
   }
 
   /// W after the rigid unknowns (translation, rotation about the position) and q of either changed.
@@ -132,11 +133,60 @@ TEST(BodyContact, FindsWhatIsNearAndWhatWasInside) {
   overlap.contact.evaluate(a.set, a.pose, b.pose, 0, overlap.candidates, sums, sums);
   std::vector<HeldBodyContact> held;
   overlap.contact.commit(a.pose, b.pose, overlap.candidates, held);
-  BodyCandidates near, again;
-  overlap.contact.gather(a, b, 1e-3, 1e-6, false, {}, shape, near);
-  overlap.contact.gather(a, b, 1e-3, 0.01, false, held, shape, again);
-  EXPECT_LT(near.all.size(), all);
+  BodyCandidates closest, again;
+  NearVertices near;
+  overlap.contact.gather(a, b, 1e-3, 1e-6, false, {}, shape, near, closest);
+  overlap.contact.gather(a, b, 1e-3, 0.01, false, held, shape, near, again);
+  EXPECT_LT(closest.all.size(), all);
   EXPECT_EQ(again.all.size(), all);
+}
+
+TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
+  // One block wanders over and into another while both deform; each gathering is compared with the distances of all
+  // vertices and with a gathering that knows of none before it.
+  const Overlap overlap(0.3);
+  const BodySurface& surface = overlap.blocks.surface->surface;
+  const ContactSet& set = *overlap.blocks.model->contact;
+  constexpr double kMargin = 1e-2;  // [m]
+  constexpr int kSteps = 2000;
+  SurfaceShape shape = surface.make_shape();
+  NearVertices kept;
+  int searches = 0, most = 0;
+  for (int step = 0; step < kSteps; ++step) {
+    const double t = step / static_cast<double>(kSteps);
+    Placement place_a = overlap.start_a;
+    const Placement& place_b = overlap.start_b;
+    place_a.position += Eigen::Vector3d(0.3 * std::sin(7 * t), 0.2 * t, 0.05 * std::cos(9 * t) - 0.06);
+    place_a.rotation = Eigen::AngleAxisd(2 * t, Eigen::Vector3d(1, -1, 2).normalized()).toRotationMatrix();
+    const Eigen::VectorXd qa = (1 + t) * overlap.qa, qb = std::cos(5 * t) * overlap.qb;
+    const TouchingBody a{set, *overlap.blocks.surface, {place_a, qa}, {FrameVelocity{}, overlap.va}};
+    const TouchingBody b{set, *overlap.blocks.surface, {place_b, qb}, {FrameVelocity{}, overlap.vb}};
+    surface.place(qb, shape);
+    BodyCandidates with, without;
+    const double before = kept.radius;
+    const Placement from = kept.a_in_b;
+    NearVertices none;
+    overlap.contact.gather(a, b, 1e-3, kMargin, false, {}, shape, kept, with);
+    overlap.contact.gather(a, b, 1e-3, kMargin, false, {}, shape, none, without);
+    if (before < 0 || from.position != kept.a_in_b.position) ++searches;
+    std::vector<int> brute;
+    for (int vertex = 0; vertex < set.vertices(); ++vertex) {
+      const Eigen::Vector3d point =
+          place_b.rotation.transpose() * (place_a.position + set.world_arm(vertex, a.pose) - place_b.position);
+      const auto hit = surface.nearest(point, 10, shape);
+      if (hit && std::abs(hit->distance) <= kMargin) brute.push_back(vertex);
+    }
+    ASSERT_EQ(with.all.size(), brute.size()) << step;
+    ASSERT_EQ(with.all.size(), without.all.size()) << step;
+    for (std::size_t i = 0; i < brute.size(); ++i) {
+      EXPECT_EQ(with.all[i].vertex, brute[i]) << step;
+      EXPECT_EQ(with.all[i].normal, without.all[i].normal) << step;
+      EXPECT_EQ(with.all[i].rest, without.all[i].rest) << step;
+    }
+    most = std::max(most, static_cast<int>(brute.size()));
+  }
+  EXPECT_GT(most, 3);
+  EXPECT_LT(searches, kSteps / 2);
 }
 
 }  // namespace
