@@ -199,7 +199,11 @@ double way_between(const TouchingBody& a, const TouchingBody& b, const NearVerti
          b.touching.surface.basis_norm() * (b.pose.q - near.q_b).norm();
 }
 
-void search_near(const TouchingBody& a, const TouchingBody& b, double radius, SurfaceShape& shape, NearVertices& near) {
+/// What vertices of a are near the surface of b, by `distance_of`(vertex, point in the frame of b, radius), infinity
+/// where there is nothing.
+template <class Distance>
+void search_near(const TouchingBody& a, const TouchingBody& b, double radius, SurfaceShape& shape, NearVertices& near,
+                 const Distance& distance_of) {
   near.radius = radius;
   near.a_in_b = a_in_b(a.pose, b.pose);
   near.q_a = a.pose.q;
@@ -207,9 +211,28 @@ void search_near(const TouchingBody& a, const TouchingBody& b, double radius, Su
   near.found.clear();
   for_near(a, b, radius, shape, [&](int vertex) {
     const Eigen::Vector3d point = near.a_in_b.position + a.set.world_arm(vertex, {near.a_in_b, a.pose.q});
-    const auto hit = b.touching.surface.nearest(point, radius, shape);
-    if (hit) near.found.push_back({vertex, std::abs(hit->distance)});
+    const double distance = distance_of(vertex, point, radius);
+    if (distance <= radius) near.found.push_back({vertex, distance});
   });
+}
+
+/// Tests the vertices that may be within reach, searching for them where what is known does not tell: `distance_of` as
+/// above with how far everything may move from now on until the next search [m].
+template <class Distance>
+void gather_from(Gathering& gathering, NearVertices& near, const Distance& distance_of) {
+  const TouchingBody &a = gathering.a, &b = gathering.b;
+  const double radius = gathering.margin + gathering.deepest;
+  const double farther =
+      kSearchedMargins * gathering.margin + kSearchedShare * b.touching.surface.bound(b.pose.q).radius;
+  double way = way_between(a, b, near);
+  // A search of whatever depth knows more than it should: on a long way all of that would come near.
+  if (!(way <= near.farther && radius + way <= near.radius)) {
+    near.farther = farther;
+    search_near(a, b, radius + farther, gathering.shape, near, distance_of);
+    way = 0;
+  }
+  for (const auto& [vertex, distance] : near.found)
+    if (distance - way <= radius) gathering.test(vertex);
 }
 
 }  // namespace
@@ -244,23 +267,25 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, double ti
                          const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
                          BodyCandidates& candidates) const {
   Gathering gathering{law_, a, b, time_step, margin, anew, /*own=*/false, held, shape, candidates};
-  const double radius = margin + gathering.deepest;
-  const double farther = kSearchedMargins * margin + kSearchedShare * b.touching.surface.bound(b.pose.q).radius;
-  double way = way_between(a, b, near);
-  // A search of whatever depth knows more than it should: on a long way all of that would come near.
-  if (way > farther || radius + way > near.radius) {
-    search_near(a, b, radius + farther, shape, near);
-    way = 0;
-  }
-  for (const auto& [vertex, distance] : near.found)
-    if (distance - way <= radius) gathering.test(vertex);
+  gather_from(gathering, near, [&](int, const Eigen::Vector3d& point, double radius) {
+    const auto hit = b.touching.surface.nearest(point, radius, shape);
+    return hit ? std::abs(hit->distance) : std::numeric_limits<double>::infinity();
+  });
 }
 
 void BodyContact::gather_own(const TouchingBody& body, double time_step, double margin,
-                             const std::vector<HeldBodyContact>& held, SurfaceShape& shape,
+                             const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
                              BodyCandidates& candidates) const {
+  const TouchingSurface& touching = body.touching;
   Gathering gathering{law_, body, body, time_step, margin, /*anew=*/false, /*own=*/true, held, shape, candidates};
-  for_near(body, body, margin + gathering.deepest, shape, [&](int vertex) { gathering.test(vertex); });
+  gather_from(gathering, near, [&](int vertex, const Eigen::Vector3d& point, double radius) {
+    // Until the next search q changes by so much at most.
+    const double change = near.farther / (body.set.tree().basis_norm() + touching.surface.basis_norm());
+    const auto bounds = touching.vertex_bounds.row(vertex);
+    if (bounds.dot(body.pose.q.cwiseAbs()) + change * bounds.norm() < 1) return std::numeric_limits<double>::infinity();
+    return touching.surface.approach_distance(
+        point, body.set.rest(vertex), touching.places[static_cast<std::size_t>(vertex)], radius, near.farther, shape);
+  });
 }
 
 void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way,

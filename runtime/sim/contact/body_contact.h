@@ -36,14 +36,15 @@ struct BodyCandidates {
   std::array<Eigen::VectorXd, 2> first_q{};
 };
 
-/// Vertices of one body, a, near the surface of another, b, by a search that went farther than one step needs: until
-/// the bodies have moved against each other by what it went farther, no step has to search again.
+/// Vertices of one body, a, near the surface of another, b, or its own, by a search that went farther than one step
+/// needs: until the bodies have moved against each other by what it went farther, no step has to search again.
 struct NearVertices {
   struct Found {
     int vertex = 0;
     double distance = 0;  ///< from the surface, inside or outside [m]
   };
   double radius = -1;        ///< all that were nearer than this are known [m]; negative: none is
+  double farther = -1;       ///< what the bodies may have moved by for that to hold [m]
   std::vector<Found> found;  ///< in ascending order
   // Where the bodies were.
   Placement a_in_b;  ///< a in the frame of b
@@ -95,7 +96,7 @@ class BodyContact {
   /// The same of a body with itself: vertices that parts of its surface which are farther away at rest have come near
   /// to from outside. What overlaps at the start never pushes.
   void gather_own(const TouchingBody& body, double time_step, double margin, const std::vector<HeldBodyContact>& held,
-                  SurfaceShape& shape, BodyCandidates& candidates) const;
+                  SurfaceShape& shape, NearVertices& near, BodyCandidates& candidates) const;
 
   /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone. `way`:
   /// how far vertices and surface have gone, at most, from where they were when set_clearances() was called [m].

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -244,6 +245,34 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
                 [&](int triangle, const TrianglePoint&) { return !looks_along(triangle, *facing, shape); });
 }
 
+/// A search for what is nearer than half of its distance at rest, or may be once it has moved by `way` [m].
+template <class Accepts>
+auto BodySurface::approach_filter(const Eigen::Vector3d& rest, const SurfaceHit& place, double way,
+                                  const Accepts& accepts) const noexcept {
+  const auto is_beyond = [way](double squared_distance, double at_rest) {
+    const double near = kSurely * kApproached * at_rest + way;
+    return squared_distance >= near * near;
+  };
+  // No point of the branch is farther away at rest than the far side of its ball.
+  const auto excludes = [=, this](int node, double bound) {
+    const DeformationTree::Node& branch = tree_.node(node);
+    return is_beyond(bound, (rest - branch.centre).norm() + branch.radius);
+  };
+  Eigen::Index corner = 0;
+  const bool is_vertex = place.barycentric.maxCoeff(&corner) == 1;
+  const int own = is_vertex ? triangles_(place.triangle, corner) : -1;
+  const auto excludes_triangle = [=, this](int triangle, double bound) {
+    double farthest = 0;
+    for (int c = 0; c < 3; ++c) {
+      const int vertex = triangles_(triangle, c);
+      if (vertex == own) return true;
+      farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
+    }
+    return is_beyond(bound, std::sqrt(farthest));
+  };
+  return SearchFilter{accepts, excludes, excludes_triangle};
+}
+
 std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
                                                           const SurfaceHit& place, double radius,
                                                           SurfaceShape& shape) const noexcept {
@@ -254,25 +283,17 @@ std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d&
     if (!facing) facing = normal_of(place, shape);
     return !looks_along(triangle, *facing, shape);
   };
-  // No point of the branch is farther away at rest than the far side of its ball.
-  const auto excludes = [&](int node, double bound) {
-    const DeformationTree::Node& branch = tree_.node(node);
-    const double farthest = kSurely * kApproached * ((rest - branch.centre).norm() + branch.radius);
-    return bound >= farthest * farthest;
-  };
-  Eigen::Index corner = 0;
-  const bool is_vertex = place.barycentric.maxCoeff(&corner) == 1;
-  const int own = is_vertex ? triangles_(place.triangle, corner) : -1;
-  const auto excludes_triangle = [&](int triangle, double bound) {
-    double farthest = 0;
-    for (int c = 0; c < 3; ++c) {
-      const int vertex = triangles_(triangle, c);
-      if (vertex == own) return true;
-      farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
-    }
-    return bound >= kSurely * kApproached * kApproached * farthest;
-  };
-  return search(point, radius, shape, SearchFilter{accepts, excludes, excludes_triangle});
+  return search(point, radius, shape, approach_filter(rest, place, 0, accepts));
+}
+
+double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
+                                      const SurfaceHit& place, double radius, double way,
+                                      SurfaceShape& shape) const noexcept {
+  // Any point of the triangle may become the nearest: none is farther away at rest than the corners, by
+  // excludes_triangle.
+  const auto accepts = [](int, const TrianglePoint&) { return true; };
+  const auto hit = search(point, radius, shape, approach_filter(rest, place, way, accepts));
+  return hit ? std::abs(hit->distance) : std::numeric_limits<double>::infinity();
 }
 
 RowMatrix BodySurface::approach_bounds(const VertexArray& rest, const RowMatrix& basis) const {

@@ -71,6 +71,11 @@ class BodySurface {
                                                const SurfaceHit& place, double radius,
                                                SurfaceShape& shape) const noexcept;
 
+  /// How far away what nearest_approached() finds is at least, within `radius`, as long as the point and the surface
+  /// move by no more than `way` together [m] beyond that; infinity where it finds nothing.
+  double approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place,
+                           double radius, double way, SurfaceShape& shape) const noexcept;
+
   /// The unit normal at a point of the surface as it is deformed, outward.
   Eigen::Vector3d normal_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
 
@@ -87,6 +92,9 @@ class BodySurface {
   bool is_block(int node) const noexcept;
   void open_block(int node, SurfaceShape& shape) const noexcept;
   double squared_bound(int node, const Eigen::Vector3d& point, SurfaceShape& shape) const noexcept;
+  template <class Accepts>
+  auto approach_filter(const Eigen::Vector3d& rest, const SurfaceHit& place, double way,
+                       const Accepts& accepts) const noexcept;
   template <class Accept>
   std::optional<SurfaceHit> search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                    const Accept& accepts) const noexcept;

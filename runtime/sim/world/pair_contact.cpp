@@ -39,7 +39,7 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);
   if (is_own())
-    contact.gather_own(touching(own), own.scene.time_step, margin, held, other.shape, candidates_[at]);
+    contact.gather_own(touching(own), own.scene.time_step, margin, held, other.shape, near_[at], candidates_[at]);
   else
     contact.gather(touching(own), touching(other), own.scene.time_step, margin, own.anew || other.anew, held,
                    other.shape, near_[at], candidates_[at]);

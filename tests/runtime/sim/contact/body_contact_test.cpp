@@ -4,6 +4,7 @@
 #include <cmath>
 #include <gtest/gtest.h>
 
+#include "tests/runtime/sim/world/fork.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 
 namespace exmat::runtime {
@@ -186,6 +187,52 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
     most = std::max(most, static_cast<int>(brute.size()));
   }
   EXPECT_GT(most, 3);
+  EXPECT_LT(searches, kSteps / 2);
+}
+
+// The same of a body with itself: the prongs of a fork close and open, beside a search for every vertex.
+TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
+  const test::Fork fork(1e-3, /*free=*/false, /*meets_itself=*/true);
+  const TouchingSurface& touching = *fork.blocks.surface;
+  const ContactSet& set = *fork.blocks.model->contact;
+  const BodyContact contact({1e6, 1e2, 0.3});
+  constexpr double kMargin = 1e-2;  // [m]
+  constexpr int kSteps = 3000;
+  SurfaceShape shape = touching.surface.make_shape();
+  NearVertices kept;
+  Eigen::VectorXd searched;
+  int searches = 0;
+  std::size_t found = 0;
+  const Eigen::VectorXd sway = Eigen::VectorXd::Random(fork.blocks.model->modes());
+  for (int step = 0; step < kSteps; ++step) {
+    const double t = step / static_cast<double>(kSteps);
+    const State state = fork.closed_to(0.042 + 0.038 * std::cos(9 * t), 0).state;
+    const Eigen::VectorXd q = state.q + 2e-4 * std::sin(20 * t) * sway;
+    const TouchingBody body{set, touching, {Placement(), q}, {FrameVelocity{}, state.v}};
+    touching.surface.place(q, shape);
+    BodyCandidates with, without;
+    NearVertices none;
+    contact.gather_own(body, 1e-3, kMargin, {}, shape, kept, with);
+    contact.gather_own(body, 1e-3, kMargin, {}, shape, none, without);
+    if (searched.size() == 0 || searched != kept.q_a) ++searches;
+    searched = kept.q_a;
+    std::vector<int> all;
+    for (int vertex = 0; vertex < set.vertices(); ++vertex) {
+      if (touching.vertex_bounds.row(vertex).dot(q.cwiseAbs()) < 1) continue;
+      const auto hit =
+          touching.surface.nearest_approached(set.world_arm(vertex, body.pose), set.rest(vertex),
+                                              touching.places[static_cast<std::size_t>(vertex)], kMargin, shape);
+      if (hit && hit->distance >= 0) all.push_back(vertex);
+    }
+    ASSERT_EQ(with.all.size(), all.size()) << step;
+    ASSERT_EQ(with.all.size(), without.all.size()) << step;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      ASSERT_EQ(with.all[i].vertex, all[i]) << step;
+      ASSERT_EQ(with.all[i].rest, without.all[i].rest) << step;
+    }
+    found += all.size();
+  }
+  EXPECT_GT(found, 500U);
   EXPECT_LT(searches, kSteps / 2);
 }
 
