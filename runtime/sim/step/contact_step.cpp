@@ -3,19 +3,6 @@
 #include <algorithm>
 
 namespace exmat::runtime {
-namespace {
-
-void add(const NewtonReport& more, NewtonReport& total) {
-  total.status = more.status;
-  total.residual = more.residual;
-  total.iterations += more.iterations;
-  total.factorisations += more.factorisations;
-  total.line_search_evaluations += more.line_search_evaluations;
-  total.projections += more.projections;
-}
-
-}  // namespace
-
 BodyPose pose_of(const Model& model, const State& state) noexcept {
   return {model.frame->placement(state.frame), state.q};
 }
@@ -55,25 +42,28 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
   return true;
 }
 
+void add(const NewtonReport& more, NewtonReport& total) noexcept {
+  total.status = more.status;
+  total.residual = more.residual;
+  total.iterations += more.iterations;
+  total.factorisations += more.factorisations;
+  total.line_search_evaluations += more.line_search_evaluations;
+  total.projections += more.projections;
+}
+
 NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,
                                  IncrementalPotential& potential, Workspace& workspace) noexcept {
   ContactProblemWorkspace& near = *workspace.near;
   start_contact(model, scene, state, workspace);
   near.newton.profile = workspace.profile;
   ContactProblem problem(model, state, potential, workspace);
-  NewtonReport total;
-  for (int round = 0; round < kFrictionRounds; ++round) {
-    // Friction of other size changes the stiffness little: the factor goes on serving.
-    const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
-    if (round > 0 && !has_factor) {
-      workspace.q = state.q + near.x.tail(state.q.size());
-      potential.start(workspace.q);
-    }
-    const NewtonBegin begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
-    add(newton_minimise(problem, scene.newton, near.x, near.newton, begin), total);
-    if (total.status == NewtonStatus::kNonFinite) return total;
-    if (model.contact->refresh_friction(near.contact) <= kSameFriction) break;
-  }
+  const auto restart = [&] {
+    workspace.q = state.q + near.x.tail(state.q.size());
+    potential.start(workspace.q);
+  };
+  const auto refresh = [&] { return model.contact->refresh_friction(near.contact); };
+  const NewtonReport total = minimise_with_friction(problem, scene.newton, near.x, near.newton, restart, refresh);
+  if (total.status == NewtonStatus::kNonFinite) return total;
   finish_contact(model, state, total.status == NewtonStatus::kConverged, near.contact.torque, workspace);
   return total;
 }

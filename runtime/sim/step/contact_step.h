@@ -20,6 +20,28 @@ void start_contact(const Model& model, const StepScene& scene, const State& stat
 void finish_contact(const Model& model, const State& state, bool converged, const Eigen::Vector3d& torque,
                     Workspace& workspace) noexcept;
 
+/// The counts of a minimisation, after those of others before it.
+void add(const NewtonReport& more, NewtonReport& total) noexcept;
+
+/// Newton's method from x with friction as it follows the normal forces of the solution. A round goes on with the
+/// factor of the one before it, as friction of other size changes the stiffness little. Where there is none,
+/// `restart()` starts the elastic potential where the last round ended. `refresh()` sets friction and returns its
+/// relative change.
+template <class Problem, class Restart, class Refresh>
+NewtonReport minimise_with_friction(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
+                                    NewtonWorkspace& workspace, const Restart& restart,
+                                    const Refresh& refresh) noexcept {
+  NewtonReport total;
+  for (int round = 0; round < kFrictionRounds; ++round) {
+    const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
+    if (round > 0 && !has_factor) restart();
+    const NewtonBegin begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
+    add(newton_minimise(problem, settings, x, workspace, begin), total);
+    if (total.status == NewtonStatus::kNonFinite || refresh() <= kSameFriction) break;
+  }
+  return total;
+}
+
 /// Newton's method of a step near obstacles, from workspace.q; friction follows the normal forces of the solution.
 /// Leaves q, and where a free body will be and its momenta, in the workspace.
 NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,

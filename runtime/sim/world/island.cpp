@@ -26,15 +26,6 @@ void for_all(std::size_t count, int threads, const Work& work) {
   for (std::ptrdiff_t i = 0; i < end; ++i) work(static_cast<std::size_t>(i));
 }
 
-void add(const NewtonReport& more, NewtonReport& total) {
-  total.status = more.status;
-  total.residual = more.residual;
-  total.iterations += more.iterations;
-  total.factorisations += more.factorisations;
-  total.line_search_evaluations += more.line_search_evaluations;
-  total.projections += more.projections;
-}
-
 }  // namespace
 
 IslandProblem::IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
@@ -281,17 +272,11 @@ double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContac
 /// was started.
 NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                       int threads, IslandWorkspace& workspace) noexcept {
-  NewtonReport total;
-  for (int round = 0; round < kFrictionRounds; ++round) {
-    const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
-    if (round > 0 && !has_factor)
-      for_all(bodies.size(), threads, [&](std::size_t i) { bodies[i]->step->potential().start(bodies[i]->near().q); });
-    const NewtonBegin begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
-    add(newton_minimise(problem, bodies.front()->scene.newton, workspace.x, workspace.newton, begin), total);
-    if (total.status == NewtonStatus::kNonFinite) return total;
-    if (refresh_friction(bodies, pairs) <= kSameFriction) break;
-  }
-  return total;
+  const auto restart = [&] {
+    for_all(bodies.size(), threads, [&](std::size_t i) { bodies[i]->step->potential().start(bodies[i]->near().q); });
+  };
+  const auto refresh = [&] { return refresh_friction(bodies, pairs); };
+  return minimise_with_friction(problem, bodies.front()->scene.newton, workspace.x, workspace.newton, restart, refresh);
 }
 
 /// The unknowns of a body that stays where it is.
