@@ -13,6 +13,8 @@ namespace {
 
 constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
 constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
+constexpr int kWorthwhile = 4;           // steps that a search has to serve: it costs about two without
+constexpr int kWithout = 16;             // steps without, after one that did not
 
 auto rows_of(const BodyCandidates& candidates, std::size_t index) {
   return candidates.basis.middleRows<3>(3 * static_cast<Eigen::Index>(index));
@@ -222,17 +224,23 @@ template <class Distance>
 void gather_from(Gathering& gathering, NearVertices& near, const Distance& distance_of) {
   const TouchingBody &a = gathering.a, &b = gathering.b;
   const double radius = gathering.margin + gathering.deepest;
-  const double farther =
-      kSearchedMargins * gathering.margin + kSearchedShare * b.touching.surface.bound(b.pose.q).radius;
-  double way = way_between(a, b, near);
+  const double way = way_between(a, b, near);
   // A search of whatever depth knows more than it should: on a long way all of that would come near.
-  if (!(way <= near.farther && radius + way <= near.radius)) {
-    near.farther = farther;
-    search_near(a, b, radius + farther, gathering.shape, near, distance_of);
-    way = 0;
+  const bool is_known = way <= near.farther && radius + way <= near.radius;
+  if (!is_known && near.radius >= 0 && near.served < kWorthwhile) near.without = kWithout;
+  if (near.without > 0) {
+    --near.without;
+    near.radius = near.farther = -1;
+    return for_near(a, b, radius, gathering.shape, [&](int vertex) { gathering.test(vertex); });
   }
+  if (!is_known) {
+    near.farther = kSearchedMargins * gathering.margin + kSearchedShare * b.touching.surface.bound(b.pose.q).radius;
+    near.served = 0;
+    search_near(a, b, radius + near.farther, gathering.shape, near, distance_of);
+  }
+  ++near.served;
   for (const auto& [vertex, distance] : near.found)
-    if (distance - way <= radius) gathering.test(vertex);
+    if (distance - (is_known ? way : 0) <= radius) gathering.test(vertex);
 }
 
 }  // namespace

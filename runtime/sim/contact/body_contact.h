@@ -45,6 +45,8 @@ struct NearVertices {
   };
   double radius = -1;        ///< all that were nearer than this are known [m]; negative: none is
   double farther = -1;       ///< what the bodies may have moved by for that to hold [m]
+  int served = 0;            ///< steps, by the last search
+  int without = 0;           ///< so many more steps look for themselves: the last search did not serve enough
   std::vector<Found> found;  ///< in ascending order
   // Where the bodies were.
   Placement a_in_b;  ///< a in the frame of b

@@ -30,7 +30,9 @@ struct BodyTouch {
 class PairContact {
  public:
   /// Of other bodies than before.
-  void forget() noexcept { near_[0].radius = near_[1].radius = -1; }
+  void forget() noexcept {
+    for (NearVertices& near : near_) near.radius = -1, near.without = 0;
+  }
   /// Bodies and what they remember; nothing is met yet.
   void reset(int first, int second, const HeldPair* held);
 
