@@ -31,7 +31,10 @@ class PairContact {
  public:
   /// Of other bodies than before.
   void forget() noexcept {
-    for (NearVertices& near : near_) near.radius = -1, near.without = 0;
+    for (NearVertices& near : near_) {
+      near.radius = -1;
+      near.without = 0;
+    }
   }
   /// Bodies and what they remember; nothing is met yet.
   void reset(int first, int second, const HeldPair* held);
