@@ -99,9 +99,8 @@ struct Gathering {
         candidates(its_candidates),
         last(held.begin()) {
     candidates.all.clear();
-    const double radius = b.touching.surface.bound(b.pose.q).radius;
-    fast = kFast * radius;
-    deepest = anew ? 2 * radius : 0;
+    surface_radius = b.touching.surface.bound(b.pose.q).radius;
+    deepest = anew ? 2 * surface_radius : 0;
     for (const HeldBodyContact& contact : held) deepest = std::max(deepest, -contact.gap);
   }
 
@@ -140,7 +139,7 @@ struct Gathering {
     const Eigen::Vector3d apart = a.set.world_velocity(vertex, arm, a.pose, a.velocity) - b.velocity.at(arm_b) - own_b;
     SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
     const double way = time_step * apart.norm();
-    if (!own && !was_inside && hit->distance > 0 && way > std::max(hit->distance, fast)) {
+    if (!own && !was_inside && hit->distance > 0 && way > std::max(hit->distance, kFast * surface_radius)) {
       const Eigen::Vector3d heading = kContactMarginSteps * time_step * (b.pose.rotation.transpose() * apart);
       const auto met = first_meeting(point, point + heading, [&](const Eigen::Vector3d& at, double left) {
         return b.touching.surface.nearest(at, left, shape);
@@ -165,8 +164,8 @@ struct Gathering {
   SurfaceShape& shape;
   BodyCandidates& candidates;
   std::vector<HeldBodyContact>::const_iterator last;
-  double deepest = 0;  ///< that a vertex may be inside [m]
-  double fast = 0;     ///< the way of a step that a vertex may pass the surface in [m]
+  double deepest = 0;         ///< that a vertex may be inside [m]
+  double surface_radius = 0;  ///< of the ball about the surface of b [m]
 };
 
 /// Calls visit(vertex) for every vertex of a that the surface of b may be within `radius` of, in ascending order.
@@ -230,11 +229,11 @@ void gather_from(Gathering& gathering, NearVertices& near, const Distance& dista
   if (!is_known && near.radius >= 0 && near.served < kWorthwhile) near.without = kWithout;
   if (near.without > 0) {
     --near.without;
-    near.radius = near.farther = -1;
+    near.radius = -1;
     return for_near(a, b, radius, gathering.shape, [&](int vertex) { gathering.test(vertex); });
   }
   if (!is_known) {
-    near.farther = kSearchedMargins * gathering.margin + kSearchedShare * b.touching.surface.bound(b.pose.q).radius;
+    near.farther = kSearchedMargins * gathering.margin + kSearchedShare * gathering.surface_radius;
     near.served = 0;
     search_near(a, b, radius + near.farther, gathering.shape, near, distance_of);
   }

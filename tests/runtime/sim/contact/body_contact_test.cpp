@@ -152,7 +152,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
   constexpr int kSteps = 2000;
   SurfaceShape shape = surface.make_shape();
   NearVertices kept;
-  int searches = 0, most = 0;
+  int searches = 0, served = 0, most = 0;
   for (int step = 0; step < kSteps; ++step) {
     const double t = step / static_cast<double>(kSteps);
     Placement place_a = overlap.start_a;
@@ -170,6 +170,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
     overlap.contact.gather(a, b, 1e-3, kMargin, false, {}, shape, kept, with);
     overlap.contact.gather(a, b, 1e-3, kMargin, false, {}, shape, none, without);
     if (before < 0 || from.position != kept.a_in_b.position) ++searches;
+    if (kept.radius >= 0 && kept.served > 1) ++served;
     std::vector<int> brute;
     for (int vertex = 0; vertex < set.vertices(); ++vertex) {
       const Eigen::Vector3d point =
@@ -188,6 +189,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
   }
   EXPECT_GT(most, 3);
   EXPECT_LT(searches, kSteps / 2);
+  EXPECT_GT(served, kSteps / 2);
 }
 
 // The same of a body with itself: the prongs of a fork close and open, beside a search for every vertex.
@@ -201,7 +203,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
   SurfaceShape shape = touching.surface.make_shape();
   NearVertices kept;
   Eigen::VectorXd searched;
-  int searches = 0;
+  int searches = 0, served = 0;
   std::size_t found = 0;
   const Eigen::VectorXd sway = Eigen::VectorXd::Random(fork.blocks.model->modes());
   for (int step = 0; step < kSteps; ++step) {
@@ -216,6 +218,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
     contact.gather_own(body, 1e-3, kMargin, {}, shape, none, without);
     if (searched.size() == 0 || searched != kept.q_a) ++searches;
     searched = kept.q_a;
+    if (kept.radius >= 0 && kept.served > 1) ++served;
     std::vector<int> all;
     for (int vertex = 0; vertex < set.vertices(); ++vertex) {
       if (touching.vertex_bounds.row(vertex).dot(q.cwiseAbs()) < 1) continue;
@@ -234,6 +237,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
   }
   EXPECT_GT(found, 500U);
   EXPECT_LT(searches, kSteps / 2);
+  EXPECT_GT(served, kSteps / 2);
 }
 
 }  // namespace
