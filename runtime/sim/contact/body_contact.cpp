@@ -11,6 +11,10 @@
 namespace exmat::runtime {
 namespace {
 
+// A vertex that comes in is found within some steps of its way, or this share of the surface's radius. What is deeper
+// and was not inside before has not come in: surfaces that fold, or cross themselves, do not tell inside from outside.
+constexpr double kEntrySteps = 2, kEntryShare = 0.01;
+
 constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
 constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
 constexpr int kWorthwhile = 4;           // steps that a search has to serve: it costs about two without
@@ -139,6 +143,8 @@ struct Gathering {
     const Eigen::Vector3d apart = a.set.world_velocity(vertex, arm, a.pose, a.velocity) - b.velocity.at(arm_b) - own_b;
     SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
     const double way = time_step * apart.norm();
+    if (!own && !anew && !was_inside && -hit->distance > std::max(kEntrySteps * way, kEntryShare * surface_radius))
+      return candidates.all.pop_back();
     if (!own && !was_inside && hit->distance > 0 && way > std::max(hit->distance, kFast * surface_radius)) {
       const Eigen::Vector3d heading = kContactMarginSteps * time_step * (b.pose.rotation.transpose() * apart);
       const auto met = first_meeting(point, point + heading, [&](const Eigen::Vector3d& at, double left) {
@@ -353,11 +359,13 @@ void BodyContact::refresh_friction(BodyCandidates& candidates, FrictionChange& c
 Eigen::Index BodyContact::stiffness_columns(const ContactSet& set, int rigid_a, int rigid_b, const BodyPose& a,
                                             const BodyPose& b, const BodyCandidates& candidates,
                                             Eigen::MatrixXd& columns_a, Eigen::MatrixXd& columns_b) {
-  const Eigen::Index most = 3 * std::ssize(candidates.all);
-  if (columns_a.rows() != rigid_a + a.q.size() || columns_a.cols() < most)
-    columns_a.resize(rigid_a + a.q.size(), 2 * most);
-  if (columns_b.rows() != rigid_b + b.q.size() || columns_b.cols() < most)
-    columns_b.resize(rigid_b + b.q.size(), 2 * most);
+  Eigen::Index needed = 0;  // most candidates touch nothing
+  for (const BodyCandidate& candidate : candidates.all) needed += (candidate.weights.array() > 0).count();
+  const auto make_room = [needed](Eigen::Index rows, Eigen::MatrixXd& columns) {
+    if (columns.rows() != rows || columns.cols() < needed) columns.resize(rows, 2 * needed);
+  };
+  make_room(rigid_a + a.q.size(), columns_a);
+  make_room(rigid_b + b.q.size(), columns_b);
   Eigen::Index used = 0;
   for (std::size_t i = 0; i < candidates.all.size(); ++i) {
     const BodyCandidate& candidate = candidates.all[i];

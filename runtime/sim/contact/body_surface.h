@@ -23,6 +23,7 @@ struct SurfaceShape {
   Eigen::VectorXd q;  ///< [r]
   double q_norm = 0;
   int placed = 0;                            ///< times that it was placed
+  int looks = 0;                             ///< searches since then
   VertexArray positions;                     ///< k x 3, where `position_of` is `placed` [m]
   std::vector<DeformationTree::Ball> balls;  ///< of branches, from their bounds
   std::vector<Eigen::AlignedBox3d> boxes;    ///< of branches within a block, from the positions
@@ -90,6 +91,7 @@ class BodySurface {
 
  private:
   bool is_block(int node) const noexcept;
+  void count_look(SurfaceShape& shape) const noexcept;
   void open_block(int node, SurfaceShape& shape) const noexcept;
   double squared_bound(int node, const Eigen::Vector3d& point, SurfaceShape& shape) const noexcept;
   template <class Accepts>

@@ -1,6 +1,7 @@
 #include "runtime/sim/contact/body_contact.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <gtest/gtest.h>
 
@@ -11,6 +12,8 @@ namespace exmat::runtime {
 namespace {
 
 using test::Blocks;
+
+constexpr double kTimeStep = 1e-3;
 
 /// Two overlapping blocks, the vertices of the first against the surface of the second.
 struct Overlap {
@@ -27,7 +30,7 @@ struct Overlap {
         *blocks.model->contact, *blocks.surface, {start_a, qa}, {FrameVelocity{{0, 0, 1}, {0, 1, 0}}, va}};
     const TouchingBody b{*blocks.model->contact, *blocks.surface, {start_b, qb}, {FrameVelocity{{1, 0, 0}, {}}, vb}};
     NearVertices near;
-    contact.gather(a, b, 1e-3, 0.01, true, {}, shape, near, candidates);
+    contact.gather(a, b, kTimeStep, 0.01, true, {}, shape, near, candidates);
   }
 
   /// W after the rigid unknowns (translation, rotation about the position) and q of either changed.
@@ -45,7 +48,7 @@ struct Overlap {
                              candidates);
   }
 
-  Blocks blocks{1e-3};
+  Blocks blocks{kTimeStep};
   BodyContact contact;
   Placement start_a, start_b;
   Eigen::VectorXd qa, qb, va, vb;
@@ -140,6 +143,45 @@ TEST(BodyContact, FindsWhatIsNearAndWhatWasInside) {
   overlap.contact.gather(a, b, 1e-3, 0.01, false, held, shape, near, again);
   EXPECT_LT(closest.all.size(), all);
   EXPECT_EQ(again.all.size(), all);
+}
+
+// Surfaces that fold or cross themselves do not tell inside from outside: what is suddenly deep has not come in.
+TEST(BodyContact, WhatIsDeepWithoutHavingComeInDoesNotPush) {
+  Overlap overlap(0);
+  SurfaceShape shape = overlap.blocks.surface->surface.make_shape();
+  overlap.blocks.surface->surface.place(overlap.qb, shape);
+  const Eigen::VectorXd still = Eigen::VectorXd::Zero(overlap.qa.size());
+  const auto gather = [&](double speed, bool anew) {
+    const TouchingBody a{*overlap.blocks.model->contact,
+                         *overlap.blocks.surface,
+                         {overlap.start_a, overlap.qa},
+                         {FrameVelocity{{0, 0, speed}, {}}, still}};
+    const TouchingBody b{*overlap.blocks.model->contact,
+                         *overlap.blocks.surface,
+                         {overlap.start_b, overlap.qb},
+                         {FrameVelocity{}, still}};
+    BodyCandidates found;
+    NearVertices near;
+    overlap.contact.gather(a, b, kTimeStep, 0.1, anew, {}, shape, near, found);
+    ContactSums sums;
+    sums.set_zero(overlap.qa.size());
+    overlap.contact.evaluate(a.set, a.pose, b.pose, 0, found, sums, sums);
+    return found;
+  };
+  const auto deeper_than = [](const BodyCandidates& found, double depth) {
+    return std::ranges::count_if(found.all, [=](const BodyCandidate& one) { return -one.gap > depth; });
+  };
+  const double radius = overlap.blocks.surface->surface.bound(overlap.qb).radius;
+  const BodyCandidates anew = gather(0, /*anew=*/true);
+  for (const double speed : {0.0, 2.0}) {
+    SCOPED_TRACE(speed);
+    // Two steps of the way, or a hundredth of the radius.
+    const double deepest = std::max(2 * kTimeStep * speed, 0.01 * radius);
+    const BodyCandidates found = gather(speed, /*anew=*/false);
+    EXPECT_EQ(deeper_than(found, 1.001 * deepest), 0);
+    EXPECT_EQ(std::ssize(found.all), std::ssize(anew.all) - deeper_than(anew, deepest));
+    EXPECT_GT(deeper_than(anew, 1.001 * deepest), 0);
+  }
 }
 
 TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
