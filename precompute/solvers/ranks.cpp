@@ -144,11 +144,16 @@ bool started_by_mpirun() {
 }
 
 // A single process needs no daemon, no binding, no network, and nothing that others share: neither a folder in the
-// temporary directory, which Open MPI's processes remove under each other, nor shared memory. mpirun sets its own.
+// temporary directory, which Open MPI's processes remove under each other, nor shared memory. mpirun sets its own. Nor
+// does it wait for anybody: each look for messages would give the processor away, and on a busy machine not be given it
+// back for some milliseconds.
 void set_environment() {
-  setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // ranks may be more than cores
-  setenv("HWLOC_HIDE_ERRORS", "2", 0);             // stderr is for the log, also in containers without /sys
-  if (started_by_mpirun()) return;
+  setenv("HWLOC_HIDE_ERRORS", "2", 0);  // stderr is for the log, also in containers without /sys
+  if (started_by_mpirun()) {
+    setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // ranks may be more than cores
+    return;
+  }
+  setenv("OMPI_MCA_mpi_yield_when_idle", "0", 0);
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
   setenv("OMPI_MCA_btl", "self", 0);
