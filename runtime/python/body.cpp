@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <array>
 #include <pybind11/stl.h>
 
@@ -7,107 +6,7 @@
 namespace exmat::python {
 namespace {
 
-using Vector3 = std::array<double, 3>;
 using Shared = std::shared_ptr<BodyObject>;
-
-py::array_t<double> array_of(const double* numbers, std::size_t count) {
-  return py::array_t<double>(static_cast<py::ssize_t>(count), numbers);
-}
-
-// ---- what is read
-
-void bind_report(py::module_& module) {
-  py::class_<exmat_report>(module, "Report", "What the steps of one call did: sums, unless said otherwise.")
-      .def_readonly("steps", &exmat_report::steps, "Steps taken.")
-      .def_readonly("status", &exmat_report::status,
-                    "Bits of all steps: 1 non-finite, 2 iteration limit, 4 stagnated, 8 target not converged, 16 "
-                    "subnormal numbers set to zero, which is no fault.")
-      .def_readonly("newton_iterations", &exmat_report::newton_iterations, "Newton iterations.")
-      .def_readonly("factorisations", &exmat_report::factorisations, "Factorisations of the Hessian.")
-      .def_readonly("line_search_evaluations", &exmat_report::line_search_evaluations, "Of line searches.")
-      .def_readonly("projections", &exmat_report::projections, "Hessians that were made positive definite.")
-      .def_readonly("target_iterations", &exmat_report::target_iterations, "Newton iterations towards targets.")
-      .def_readonly("residual", &exmat_report::residual,
-                    "Of the equation of motion at the end of the last step [kg^(1/2) m/s^2].")
-      .def_readonly("seconds", &exmat_report::seconds, "Wall clock [s].")
-      .def("__repr__", [](const exmat_report& report) {
-        return py::str("Report(steps={}, status={}, newton_iterations={}, residual={:.3g}, seconds={:.3g})")
-            .format(report.steps, report.status, report.newton_iterations, report.residual, report.seconds);
-      });
-}
-
-void bind_energies(py::module_& module) {
-  py::class_<exmat_energies>(module, "Energies", "Of the last step [J].")
-      .def_readonly("kinetic", &exmat_energies::kinetic, "Of the body in the world [J].")
-      .def_readonly("elastic", &exmat_energies::elastic, "[J].")
-      .def_readonly("potential", &exmat_energies::potential, "Of gravity, 0 at rest [J].")
-      .def_property_readonly(
-          "total", [](const exmat_energies& now) { return now.kinetic + now.elastic + now.potential; },
-          "Their sum [J].")
-      .def("__repr__", [](const exmat_energies& now) {
-        return py::str("Energies(kinetic={:.6g}, elastic={:.6g}, potential={:.6g})")
-            .format(now.kinetic, now.elastic, now.potential);
-      });
-}
-
-exmat_motion make_motion(const Vector3& position, const std::array<double, 4>& orientation, const Vector3& linear,
-                         const Vector3& angular) {
-  exmat_motion motion{};
-  std::ranges::copy(position, motion.position);
-  std::ranges::copy(orientation, motion.orientation);
-  std::ranges::copy(linear, motion.linear_velocity);
-  std::ranges::copy(angular, motion.angular_velocity);
-  return motion;
-}
-
-void bind_motion(py::module_& module) {
-  py::class_<exmat_motion>(module, "Motion", "How a body moves as a whole, world frame. Its arrays are copies.")
-      .def(py::init(&make_motion), py::kw_only(), py::arg("position") = Vector3{},
-           py::arg("orientation") = std::array<double, 4>{1, 0, 0, 0}, py::arg("linear_velocity") = Vector3{},
-           py::arg("angular_velocity") = Vector3{}, "Shapes (3,), (4,), (3,), (3,), as the properties.")
-      .def_property_readonly(
-          "position", [](const exmat_motion& motion) { return array_of(motion.position, 3); },
-          "Displacement of the centre of mass from rest, shape (3,) [m].")
-      .def_property_readonly(
-          "orientation", [](const exmat_motion& motion) { return array_of(motion.orientation, 4); },
-          "Unit quaternion, w first, shape (4,).")
-      .def_property_readonly(
-          "linear_velocity", [](const exmat_motion& motion) { return array_of(motion.linear_velocity, 3); },
-          "Of the centre of mass, shape (3,) [m/s].")
-      .def_property_readonly(
-          "angular_velocity", [](const exmat_motion& motion) { return array_of(motion.angular_velocity, 3); },
-          "Shape (3,) [rad/s].");
-}
-
-void bind_state(py::module_& module) {
-  py::class_<StateObject, std::shared_ptr<StateObject>>(
-      module, "State",
-      "All that a body carries from step to step, copied. Bodies of the same bundle and settings take it and go on to "
-      "the last bit. It can be pickled and compared.")
-      .def_property_readonly(
-          "numbers",
-          [](const py::object& self) {
-            const auto& state = self.cast<const StateObject&>();
-            return view(state.numbers.data(), state.numbers.size(), self);
-          },
-          "The state as numbers, shape (size,): read-only, without a copy.")
-      .def_readonly("input_sha256", &StateObject::sha, "Of the bundle that it belongs to.")
-      .def(
-          "__eq__", [](const StateObject& state, const StateObject& other) { return state == other; },
-          py::is_operator())
-      .def("__copy__", [](const StateObject& state) { return state; })
-      .def(
-          "__deepcopy__", [](const StateObject& state, const py::dict&) { return state; }, py::arg("memo"))
-      .def(py::pickle(
-          [](const StateObject& state) {
-            return py::make_tuple(array_of(state.numbers.data(), state.numbers.size()), state.sha);
-          },
-          [](const py::tuple& kept) {
-            const auto numbers = kept[0].cast<Numbers>();
-            return StateObject{{numbers.data(), numbers.data() + numbers.size()}, kept[1].cast<std::string>()};
-          }))
-      .attr("__hash__") = py::none();
-}
 
 // ---- what bodies do
 
@@ -171,35 +70,37 @@ void take_weights(BodyObject& body, const py::object& weights, const py::object&
 
 // ---- copies
 
-using KeptFactors = std::map<std::pair<int, std::int64_t>, double>;
-
 py::tuple kept(BodyObject& body) {
-  KeptFactors factors;
-  for (const auto& [key, number] : body.factors) factors[{static_cast<int>(key.first), key.second}] = number;
-  return py::make_tuple(body.model, state_of(body), factors, body.weights, body.gravity);
+  return py::make_tuple(body.model.object(), state_of(body), kept_settings(body), kept_obstacles(body));
 }
 
 Shared restored(const py::tuple& from) {
-  auto body = std::make_shared<BodyObject>(from[0].cast<std::shared_ptr<ModelObject>>());
-  for (const auto& [key, number] : from[2].cast<KeptFactors>())
-    set_factor(*body, static_cast<ExampleFactor>(key.first), number, key.second);
-  for (const auto& [region, weights] : from[3].cast<std::map<std::int64_t, std::vector<double>>>())
-    set_weights(*body, weights, region);
-  if (const auto gravity = from[4].cast<std::optional<std::array<double, 3>>>()) set_gravity(*body, *gravity);
+  auto body = std::make_shared<BodyObject>(ModelHold(from[0].cast<std::shared_ptr<ModelObject>>()));
+  const auto obstacles = from[3].cast<py::dict>();
+  set_settings(*body, from[2].cast<py::tuple>());
+  set_obstacles(*body, obstacles);
   set_state(*body, from[1].cast<StateObject>());
+  set_obstacle_motions(*body, obstacles);
   return body;
 }
 
 Shared copy(BodyObject& body) { return restored(kept(body)); }
 
-void bind_body_class(py::module_& module) {
-  py::class_<BodyObject, Shared>(
+}  // namespace
+
+BodyClass bind_body(py::module_& module) {
+  BodyClass type(
       module, "Body",
       "One body of a model: its state and the forces on it. Steps release the interpreter's lock; until they are done, "
-      "other threads are refused. copy.copy() and pickle keep the state and what was set for this body alone.")
-      .def(py::init([](std::shared_ptr<ModelObject> model) { return std::make_shared<BodyObject>(std::move(model)); }),
+      "other threads are refused. copy.copy() and pickle keep the state and what was set for this body alone; the copy "
+      "is in "
+      "no world.");
+  type.def(py::init([](std::shared_ptr<ModelObject> model) {
+             return std::make_shared<BodyObject>(ModelHold(std::move(model)));
+           }),
            py::arg("model"), "At rest at time 0, or as the model's scene starts it.")
-      .def_readonly("model", &BodyObject::model, "The model that it is of.")
+      .def_property_readonly(
+          "model", [](const BodyObject& body) { return body.model.object(); }, "The model that it is of.")
       .def("step", &step, py::arg("n") = 1,
            "Takes `n` >= 0 steps. Returns their Report. Raises NonFinite where a step meets NaN or infinity: the body "
            "is "
@@ -261,6 +162,19 @@ void bind_body_class(py::module_& module) {
            "Gravity of this body alone, three numbers [m/s^2]; after an abrupt change restart_integrator() keeps the "
            "impulse exact. reset() keeps it.")
       .def(
+          "set_damping",
+          [](BodyObject& body, double alpha, double beta) {
+            set_damping(body, {alpha, beta});
+          },
+          py::arg("alpha"), py::arg("beta"),
+          "Rayleigh damping of this body alone: alpha >= 0 [1/s] of the mass, beta >= 0 [s] of the stiffness.")
+      .def(
+          "set_integrator",
+          [](BodyObject& body, const std::string& integrator) {
+            set_integrator(body, number_of(py::str(integrator), "integrator", kIntegrators));
+          },
+          py::arg("integrator"), "\"bdf2\", \"backward_euler\" or \"newmark\", of this body alone.")
+      .def(
           "set_example_damping",
           [](BodyObject& body, double c_kappa, const py::object& region) {
             set_factor(body, ExampleFactor::kDamping, c_kappa, region_of(body, region));
@@ -289,16 +203,7 @@ void bind_body_class(py::module_& module) {
       .def(
           "__deepcopy__", [](BodyObject& body, const py::dict&) { return copy(body); }, py::arg("memo"))
       .def(py::pickle(&kept, &restored));
-}
-
-}  // namespace
-
-void bind_body(py::module_& module) {
-  bind_report(module);
-  bind_energies(module);
-  bind_motion(module);
-  bind_state(module);
-  bind_body_class(module);
+  return type;
 }
 
 }  // namespace exmat::python

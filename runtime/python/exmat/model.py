@@ -1,14 +1,12 @@
 """Models: bundles prepared for stepping."""
-import json
 import os
 import pathlib
-import tempfile
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from . import _exmat
+from .arrays import StrPath
 from .errors import BadInput
-
-StrPath = Union[str, "os.PathLike[str]"]
+from .inputs import json_text, plain_members
 
 
 class Model(_exmat.Model):
@@ -31,6 +29,7 @@ class Model(_exmat.Model):
     example_target       "auto", "table" or "solve"
     target_iterations    most in one step, 1 to 1000; 4
     energy_reference     "example" or "rest"
+    use_contact          whether bodies can touch obstacles of add_obstacle() and each other in a TouchingWorld; False
 
     Raises BadInput (the bundle) and InvalidArgument (a setting).
     """
@@ -54,6 +53,7 @@ class Model(_exmat.Model):
         example_target: Optional[str] = None,
         target_iterations: Optional[int] = None,
         energy_reference: Optional[str] = None,
+        use_contact: bool = False,
     ) -> None:
         examples = dict(example_stiffness=example_stiffness, example_damping=example_damping, example_bias=example_bias,
                         example_target=example_target, target_iterations=target_iterations, energy_reference=energy_reference)
@@ -61,29 +61,45 @@ class Model(_exmat.Model):
             use_examples = any(value is not None for value in examples.values())
         others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
                       mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
-                      newton_tolerance=newton_tolerance, use_examples=int(use_examples))
+                      newton_tolerance=newton_tolerance, use_examples=int(use_examples), use_contact=int(use_contact))
         self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
 
     @classmethod
-    def from_scene(cls, scene: Union[StrPath, Mapping[str, Any]]) -> "Model":
+    def from_scene(cls, scene: Union[StrPath, Mapping[str, Any]], *, use_contact: bool = False) -> "Model":
         """Of a scene, with its scripted forces, obstacles, motions and start; a path, or the members of such a file.
 
         Paths in members are relative to the current folder. Steps, instances and output are not the model's business.
+        With `use_contact` bodies can touch also where the scene has no obstacles. A scene of several bodies is for
+        TouchingWorld.from_scene().
         """
         model = cls.__new__(cls)
-        if not isinstance(scene, Mapping):
+        if isinstance(scene, Mapping):
+            model._load_members(plain_members(scene), use_contact)
+        elif use_contact and os.path.exists(scene):
+            model._load_text(pathlib.Path(scene).read_bytes(), os.fspath(scene))
+        else:
             model._load(scene, None)
-            return model
-        with tempfile.TemporaryDirectory() as folder:
-            path = pathlib.Path(folder) / "scene.json"
-            path.write_text(json.dumps(_with_absolute_paths(scene)))
-            model._load(path, None)
-        model._recipe = ("members", dict(_with_absolute_paths(scene)), None)
         return model
 
     def _load(self, path: StrPath, settings: Optional[Dict[str, Any]]) -> None:
         _exmat.Model.__init__(self, os.fspath(path), settings)
         self._recipe: Tuple[str, Any, Optional[Dict[str, Any]]] = ("file", os.path.abspath(path), settings)
+
+    def _load_text(self, scene: bytes, path: str) -> None:
+        _exmat.Model.__init__(self, scene, path, True)
+        self._recipe = ("text", (scene, os.path.abspath(path)), None)
+
+    def _load_members(self, scene: Dict[str, Any], use_contact: bool) -> None:
+        _exmat.Model.__init__(self, json_text(scene), os.path.abspath("scene.json"), use_contact)
+        self._recipe = ("members", scene, {"use_contact": use_contact})
+
+    @classmethod
+    def _of_kind(cls, world: _exmat.TouchingWorld, kind: int, recipe: Any) -> "Model":
+        """That of the bodies of a kind in a new world, which `recipe` makes."""
+        model = cls.__new__(cls)
+        _exmat.Model.__init__(model, world, kind)
+        model._recipe = ("world", (recipe, kind), None)
+        return model
 
     def __copy__(self) -> "Model":
         return self
@@ -96,36 +112,36 @@ class Model(_exmat.Model):
         return _reload, (self._recipe, self.input_sha256)
 
     def __repr__(self) -> str:
-        kind, what, _ = self._recipe
-        name = pathlib.Path(what if kind == "file" else what["bundle"]).name
-        return f"<exmat.Model {name}: {self.modes} modes, {self.vertices} vertices, {self.examples} examples>"
+        return f"<exmat.Model {_name(self._recipe)}: {self.modes} modes, {self.vertices} vertices, {self.examples} examples>"
+
+
+def _name(recipe: Tuple[str, Any, Optional[Dict[str, Any]]]) -> str:
+    """Of the file that a model is of."""
+    kind, what, _ = recipe
+    if kind == "world":
+        return f"{world_name(what[0])}[{what[1]}]"
+    return pathlib.Path(what["bundle"] if kind == "members" else what[1] if kind == "text" else what).name
+
+
+def world_name(recipe: Tuple[str, Any]) -> str:
+    return pathlib.Path(recipe[1]).name if recipe[0] == "file" else "scene"
 
 
 def _reload(recipe: Tuple[str, Any, Optional[Dict[str, Any]]], sha: str) -> Model:
     kind, what, settings = recipe
+    model = Model.__new__(Model)
     if kind == "members":
-        model = Model.from_scene(what)
+        model._load_members(what, bool(settings and settings["use_contact"]))
+    elif kind == "text":
+        model._load_text(*what)
+    elif kind == "world":
+        from .touching_world import world_of
+
+        made, place = what
+        model = Model._of_kind(world_of(made), place, made)
     else:
-        model = Model.__new__(Model)
         model._load(what, settings)
     if model.input_sha256 != sha:
-        raise BadInput(f"{what if kind == 'file' else what['bundle']}: expected the bundle {sha} that was pickled, found "
-                       f"{model.input_sha256}; unpickle it beside the same bundle")
+        raise BadInput(f"{_name(recipe)}: expected the bundle {sha} that was pickled, found {model.input_sha256}; unpickle it beside the same "
+                       "bundle")
     return model
-
-
-def _with_absolute_paths(scene: Mapping[str, Any]) -> Dict[str, Any]:
-    members = dict(scene)
-    if "bundle" in members:
-        members["bundle"] = os.path.abspath(members["bundle"])
-    members["forces"] = [_absolute_file(force) for force in scene.get("forces", [])]
-    if not members["forces"]:
-        del members["forces"]
-    return members
-
-
-def _absolute_file(force: Mapping[str, Any]) -> Dict[str, Any]:
-    vertices = dict(force.get("vertices", {}))
-    if "file" in vertices:
-        vertices["file"] = os.path.abspath(vertices["file"])
-    return {**force, "vertices": vertices}
