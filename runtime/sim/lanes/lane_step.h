@@ -4,17 +4,15 @@
 #include <span>
 #include <vector>
 
-#include "runtime/kernels/aligned_array.h"
+#include "runtime/sim/lanes/lane_examples.h"
+#include "runtime/sim/lanes/lane_frames.h"
+#include "runtime/sim/lanes/lane_numbers.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
 #include "runtime/sim/step/step_report.h"
 #include "runtime/sim/step/workspace.h"
 
 namespace exmat::runtime {
-
-/// A number of each of kLanes bodies, a vector [r] of each, and a symmetric matrix of each (kernels.h).
-using LaneNumbers = Eigen::Array<double, kLanes, 1>;
-using LaneVectors = Eigen::Map<Eigen::Array<double, kLanes, Eigen::Dynamic>>;
 
 /// Fewer bodies than these are faster one after the other.
 inline constexpr std::ptrdiff_t kFewestLanes = 4;
@@ -46,10 +44,11 @@ class LaneWorkspace {
   friend class LaneStep;
   std::vector<Workspace> bodies_;
   AlignedArray start_, q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_,
-      next_frozen_, offset_, product_, external_, acceleration_centre_;  // r x kLanes
-  AlignedArray quadratic_, stiffness_, hessian_, factor_, new_factor_;   // lane_triangle(r)
+      next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;  // r x kLanes
+  AlignedArray quadratic_, stiffness_, factor_, new_factor_;                     // lane_triangle(r)
+  std::vector<LaneExamples> examples_;                                           // one for each of the model's
+  LaneFrames frames_;
   AlignedArray scratch_;
-  Eigen::MatrixXd of_frame_;  // r x r
 };
 
 /// One step of each of at most kLanes bodies of one model, as step() takes it, but side by side: each in its lane of
