@@ -31,6 +31,8 @@ class Model(_exmat.Model):
     example_target       "auto", "table" or "solve"
     target_iterations    most in one step, 1 to 1000; 4
     energy_reference     "example" or "rest"
+    sleep_energy         a body is left alone once its kinetic energy has been below this [J]; 0: never
+    sleep_time           for so long, > 0 [s]; 0.5
 
     Raises BadInput (the bundle) and InvalidArgument (a setting).
     """
@@ -54,6 +56,8 @@ class Model(_exmat.Model):
         example_target: Optional[str] = None,
         target_iterations: Optional[int] = None,
         energy_reference: Optional[str] = None,
+        sleep_energy: Optional[float] = None,
+        sleep_time: Optional[float] = None,
     ) -> None:
         examples = dict(example_stiffness=example_stiffness, example_damping=example_damping, example_bias=example_bias,
                         example_target=example_target, target_iterations=target_iterations, energy_reference=energy_reference)
@@ -61,7 +65,8 @@ class Model(_exmat.Model):
             use_examples = any(value is not None for value in examples.values())
         others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
                       mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
-                      newton_tolerance=newton_tolerance, use_examples=int(use_examples))
+                      newton_tolerance=newton_tolerance, use_examples=int(use_examples), sleep_energy=sleep_energy,
+                      sleep_time=sleep_time)
         self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
 
     @classmethod

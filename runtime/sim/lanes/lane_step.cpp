@@ -9,6 +9,7 @@
 
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/example_forces.h"
+#include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -33,9 +34,9 @@ LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::si
   if (std::cmp_less(bodies, kFewestLanes)) return;
   scratch_ = AlignedArray(lane_scratch(model.modes()));
   const Eigen::Index modes = model.modes();
-  for (AlignedArray* vectors :
-       {&start_, &q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_, &linear_, &frozen_,
-        &next_frozen_, &offset_, &external_, &velocity_centre_, &acceleration_centre_})
+  forms_ = LaneForms(modes);
+  for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
+                                &linear_, &frozen_, &next_frozen_, &offset_})
     *vectors = AlignedArray(modes * kLanes);
   for (AlignedArray* matrices : {&quadratic_, &stiffness_, &factor_, &new_factor_})
     *matrices = AlignedArray(lane_triangle(modes));
@@ -55,7 +56,8 @@ class LaneStep {
         bodies_(bodies),
         workspace_(workspace),
         elements_(model.internal_force.cubature()),
-        start_(vectors(workspace.start_)),
+        forms_(workspace.forms_),
+        start_(vectors(forms_.start)),
         q_(vectors(workspace.q_)),
         previous_(vectors(workspace.previous_)),
         trial_(vectors(workspace.trial_)),
@@ -67,26 +69,19 @@ class LaneStep {
         frozen_(vectors(workspace.frozen_)),
         next_frozen_(vectors(workspace.next_frozen_)),
         offset_(vectors(workspace.offset_)),
-        external_(vectors(workspace.external_)),
-        velocity_centre_(vectors(workspace.velocity_centre_)),
-        acceleration_centre_(vectors(workspace.acceleration_centre_)) {
-    form_ = {model.modes(),
-             start_.data(),
-             external_.data(),
-             velocity_centre_.data(),
-             acceleration_centre_.data(),
-             velocity_factor_.data(),
-             acceleration_factor_.data(),
-             mass_damping_.data(),
-             stiffness_damping_.data()};
-  }
+        external_(vectors(forms_.external)),
+        velocity_centre_(vectors(forms_.velocity_centre)),
+        acceleration_centre_(vectors(forms_.acceleration_centre)) {}
 
   void take(std::span<StepReport> reports) noexcept {
     begin();
-    choose_first_iterate();
-    find_targets();
-    prepare();
-    minimise();
+    if (any([](std::size_t) { return true; })) {
+      gather();
+      choose_first_iterate();
+      find_targets();
+      prepare();
+      minimise();
+    }
     for (std::size_t l = 0; l < bodies_.size(); ++l) {
       const LaneBody& body = bodies_[l];
       Workspace& own = workspace_.bodies_[l];
@@ -131,35 +126,34 @@ class LaneStep {
       if (runs(l)) work(l, static_cast<Eigen::Index>(l));
   }
 
-  /// External forces, obstacles near, forms of the integrators. Lanes without a body repeat the first one's.
+  /// External forces, obstacles near, forms of the integrators.
   void begin() noexcept {
-    const Eigen::Index modes = model_.modes();
+    for (std::size_t l = 0; l < bodies_.size(); ++l) {
+      const LaneBody& body = bodies_[l];
+      alone_[l] = sleeps(model_, *body.scene, *body.state);
+      if (alone_[l]) continue;
+      first_awake_ = std::min(l, first_awake_);
+      steps_[l].emplace(model_, *body.scene, *body.state, workspace_.bodies_[l]);
+      steps_[l]->begin(/*touches_others=*/false);
+      alone_[l] = steps_[l]->is_near();
+    }
+  }
+
+  /// Lanes without a body, or with one that sleeps, repeat the first that is awake.
+  void gather() noexcept {
     for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l) {
-      const std::size_t from = l < bodies_.size() ? l : 0;
+      const std::size_t from = steps_[l] ? l : first_awake_;
       const auto lane = static_cast<Eigen::Index>(l);
       const StepScene& scene = *bodies_[from].scene;
       const State& state = *bodies_[from].state;
-      Workspace& own = workspace_.bodies_[from];
-      if (l < bodies_.size()) {
-        steps_[l].emplace(model_, scene, *bodies_[l].state, own);
-        steps_[l]->begin(/*touches_others=*/false);
-        alone_[l] = steps_[l]->is_near();
-      }
-      frames().set_problem(lane, own);
-      start_.row(lane) = state.q;
-      external_.row(lane) = own.external_force;
-      velocity_centre_.row(lane) = own.form.velocity_centre;
-      acceleration_centre_.row(lane) = own.form.acceleration_centre;
-      for (Eigen::Index c = 0; c < modes; ++c) trial_(lane, c) = state.q[c] + scene.time_step * state.v[c];
-      acceleration_factor_[lane] = own.form.acceleration_factor;
-      velocity_factor_[lane] = own.form.velocity_factor;
-      stiffness_damping_[lane] = scene.stiffness_damping;
-      mass_damping_[lane] = scene.mass_damping;
+      forms_.set(lane, scene, state, workspace_.bodies_[from]);
+      frames().set_problem(lane, workspace_.bodies_[from]);
+      for (Eigen::Index c = 0; c < model_.modes(); ++c) trial_(lane, c) = state.q[c] + scene.time_step * state.v[c];
       tolerance_[lane] = scene.newton.tolerance;
       energy_at_start_[lane] = state.elastic_energy;
     }
     external_norm_ = norm(external_);
-    frames().begin(velocity_factor_, velocity_centre_);
+    frames().begin(forms_.velocity_factor, velocity_centre_);
   }
 
   /// See choose_first_iterate() of BodyStep: energies alone tell which, so that stiffness is evaluated once.
@@ -168,7 +162,7 @@ class LaneStep {
     elements_.lanes_energy(trial_.data(), energy_.data());
     const auto inertia_and_load = [&](const LaneVectors& q) {
       offset_ = q - acceleration_centre_;
-      return LaneNumbers(0.5 * acceleration_factor_ * dot(offset_, offset_) - dot(external_, q));
+      return LaneNumbers(0.5 * forms_.acceleration_factor * dot(offset_, offset_) - dot(external_, q));
     };
     const LaneNumbers predicted = energy_ + inertia_and_load(trial_),
                       at_start = energy_at_start_ + inertia_and_load(start_);
@@ -224,7 +218,7 @@ class LaneStep {
 
   /// The quadratic form A and its gradient at q_n, as IncrementalPotential::prepare().
   void prepare() noexcept {
-    kernels().lanes_prepare(form_, workspace_.stiffness_.data(), offset_.data(), workspace_.quadratic_.data(),
+    kernels().lanes_prepare(forms_.arrays(), workspace_.stiffness_.data(), offset_.data(), workspace_.quadratic_.data(),
                             linear_.data(), rounding_.data());
     rounding_ *= IncrementalPotential::kForceRounding;
     for (std::size_t i = 0; i < bodies_.front().scene->examples.size(); ++i) add_example_force(i);
@@ -240,7 +234,7 @@ class LaneStep {
       const ExampleSettings& settings = bodies_[l].scene->examples[i];
       if (!is_filtered(settings)) return;
       factor[lane] = linear_stiffness(settings);
-      damping[lane] = settings.damping * velocity_factor_[lane];
+      damping[lane] = settings.damping * forms_.velocity_factor[lane];
     });
     const LaneNumbers stiffness = factor + damping;
     if ((stiffness == 0).all()) return;
@@ -257,12 +251,12 @@ class LaneStep {
   /// those at x in the gradient, those frozen in the value.
   void assemble(const LaneVectors& x, LaneVectors& gradient) noexcept {
     Eigen::Array<double, kLanes, kLaneSums> sums;
-    kernels().lanes_assemble(form_, x.data(), workspace_.quadratic_.data(), linear_.data(), internal_.data(),
+    kernels().lanes_assemble(forms_.arrays(), x.data(), workspace_.quadratic_.data(), linear_.data(), internal_.data(),
                              offset_.data(), gradient.data(), sums.data());
     const LaneNumbers square = 0.5 * sums.col(0), slope = sums.col(1);
     there_.value = there_.energy + square + slope;
     there_.magnitude = there_.energy.abs() + square.abs() + slope.abs();
-    there_.scale = external_norm_ + sums.col(2).sqrt() + acceleration_factor_ * sums.col(3).sqrt() +
+    there_.scale = external_norm_ + sums.col(2).sqrt() + forms_.acceleration_factor * sums.col(3).sqrt() +
                    rounding_ * sums.col(4).sqrt() / tolerance_;
     there_.residual = sums.col(5).sqrt();
     if (!frames().exert_forces()) return;
@@ -473,24 +467,30 @@ class LaneStep {
   std::span<const LaneBody> bodies_;
   LaneWorkspace& workspace_;
   const ReducedElasticity& elements_;
+  LaneForms& forms_;
   LaneVectors start_, q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_,
       next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;
-  LaneForm form_;
   std::array<std::optional<BodyStep>, kLanes> steps_;
   std::array<bool, kLanes> alone_{}, done_{}, below_rounding_{};
+  std::size_t first_awake_ = kLanes;
   std::array<int, kLanes> start_searches_{};
   std::array<double, kLanes> unchecked_from_{};
   std::array<Hessian, kLanes> state_{};
   std::array<NewtonReport, kLanes> reports_;
-  LaneNumbers acceleration_factor_, velocity_factor_, stiffness_damping_, mass_damping_, tolerance_, energy_at_start_;
+  LaneNumbers tolerance_, energy_at_start_;
   LaneNumbers rounding_, energy_, previous_energy_, slope_, slope_there_, external_norm_;
   Evaluation here_, there_;
 };
 
+void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
+                   std::span<StepReport> reports) noexcept {
+  LaneStep(model, bodies, workspace).take(reports);
+}
+
 void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
                        std::span<StepReport> reports) noexcept {
   if (std::ssize(bodies) >= kFewestLanes) {
-    LaneStep(model, bodies, workspace).take(reports);
+    step_in_lanes(model, bodies, workspace, reports);
     return;
   }
   for (std::size_t l = 0; l < bodies.size(); ++l)

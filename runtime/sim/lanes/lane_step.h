@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/sim/lanes/lane_examples.h"
+#include "runtime/sim/lanes/lane_forms.h"
 #include "runtime/sim/lanes/lane_frames.h"
 #include "runtime/sim/lanes/lane_numbers.h"
 #include "runtime/sim/step/scene.h"
@@ -43,19 +44,24 @@ class LaneWorkspace {
  private:
   friend class LaneStep;
   std::vector<Workspace> bodies_;
-  AlignedArray start_, q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_,
-      next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;  // r x kLanes
-  AlignedArray quadratic_, stiffness_, factor_, new_factor_;                     // lane_triangle(r)
-  std::vector<LaneExamples> examples_;                                           // one for each of the model's
+  LaneForms forms_;
+  AlignedArray q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_, next_frozen_,
+      offset_;                                                // r x kLanes
+  AlignedArray quadratic_, stiffness_, factor_, new_factor_;  // lane_triangle(r)
+  std::vector<LaneExamples> examples_;                        // one for each of the model's
   LaneFrames frames_;
   AlignedArray scratch_;
 };
 
-/// One step of each of at most kLanes bodies of one model, as step() takes it, but side by side: each in its lane of
-/// the registers, so that the model's constants are read once for all. docs/step_in_detail.md, "Bodies in lanes". A
-/// body near an obstacle, one that Newton's method needs more for than whole steps with exact Hessians, and all of them
-/// where they are fewer than kFewestLanes, step by themselves. No body's numbers depend on the others'; they are those
-/// of step() to rounding. No call allocates or throws.
+/// One step of each of 1 to kLanes bodies of one model, as step() takes it, but side by side: each in its lane of the
+/// registers, so that the model's constants are read once for all. docs/step_in_detail.md, "Bodies in lanes". A body
+/// that sleeps, one near an obstacle, and one that Newton's method needs more for than whole steps with exact Hessians,
+/// step by themselves. No body's numbers depend on the others'; they are those of step() to rounding. No call allocates
+/// or throws.
+void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
+                   std::span<StepReport> reports) noexcept;
+
+/// The same, but that those of a group of fewer than kFewestLanes step by themselves.
 void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
                        std::span<StepReport> reports) noexcept;
 
