@@ -9,6 +9,7 @@
 #include "precompute/study/stability/stability_report.h"
 #include "precompute/study/sweep/report.h"
 #include "precompute/study/sweep/study.h"
+#include "precompute/study/worlds/world_study.h"
 
 namespace exmat {
 namespace {
@@ -35,13 +36,40 @@ void print_sources(const precompute::ErrorSplit& split, const std::string& headl
              split.advice);
 }
 
+void print_front(const precompute::WorldStudyResult& result) {
+  fmt::print("\n{:>5}{:>14}{:>16}{:>12}  {}\n", "point", "position [%]", "body step [us]", "p95 [us]", "front");
+  for (const std::size_t i : result.front) {
+    const precompute::WorldPointResult& point = result.points[i];
+    std::string settings;
+    for (std::size_t k = 0; k < result.kinds.size(); ++k)
+      settings += fmt::format("{}{}: {}", k > 0 ? "; " : "", result.kinds[k], precompute::describe(point.settings[k]));
+    fmt::print("{:>5}{:>14.3f}{:>16.2f}{:>12.2f}  {}\n", i + 1, 100 * point.errors.front().position.mean,
+               1e6 * point.times->median, 1e6 * point.times->p95, settings);
+  }
+}
+
+void world_study_command(const StudyCommandOptions& options, const precompute::StudyConfig& config,
+                         const precompute::StudyOptions& how) {
+  const precompute::WorldStudyResult result = precompute::run_world_study(config, how);
+  fmt::print("{}: {} points; {}\n", result.name, result.points.size(),
+             (std::filesystem::path(options.folder) / "results.json").string());
+  print_front(result);
+  if (result.recommended) fmt::print("\nrecommended: point {}\n", *result.recommended + 1);
+  if (const std::size_t failed = result.failures(); failed > 0)
+    throw WorkError(
+        fmt::format("{}: {} of {} points failed; see results.json", options.study, failed, result.points.size()));
+  if ((how.budget.seconds || how.budget.error) && !result.recommended) throw WorkError("no point meets the budget");
+}
+
 }  // namespace
 
 void study_command(const StudyCommandOptions& options) {
   precompute::StudyOptions how{.folder = options.folder, .jobs = options.jobs, .budget = {}};
   if (options.budget_us) how.budget.seconds = 1e-6 * *options.budget_us;
   if (options.max_error) how.budget.error = 1e-2 * *options.max_error;
-  const precompute::StudyResult result = precompute::run_study(precompute::load_study(options.study), how);
+  const precompute::StudyConfig config = precompute::load_study(options.study);
+  if (precompute::is_of_bodies(config)) return world_study_command(options, config, how);
+  const precompute::StudyResult result = precompute::run_study(config, how);
   fmt::print("{}: {} points; {}\n", result.config.name, result.points.size(),
              (std::filesystem::path(options.folder) / "report.html").string());
   print_front(result);

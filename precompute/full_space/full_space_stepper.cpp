@@ -1,290 +1,30 @@
 #include "precompute/full_space/full_space_stepper.h"
 
-#include <algorithm>
-#include <utility>
-
 #include "common/core/timer.h"
+#include "precompute/full_space/full_space_step.h"
 #include "precompute/full_space/sparse_newton.h"
 
 namespace exmat::precompute {
 namespace {
 
-using runtime::ExampleState;
 using runtime::NewtonReport;
 using runtime::NewtonStatus;
 
-bool pushes(const VertexForceConfig& force, double time) { return force.start <= time && time < force.end; }
-
-// One step from its beginning to its end.
-class Stepper {
- public:
-  Stepper(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
-          FullSpaceWorkspace& workspace)
-      : model_(model), scene_(scene), state_(state), workspace_(workspace) {}
-
-  FullSpaceReport run();
-
- private:
-  void gather_external_force();
-  bool begins_anew() const;
-  runtime::StepHistory history() const { return {state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous}; }
-  bool find_contacts();
-  void set_form(Integrator integrator);
-  void set_rate_centre(Integrator integrator);
-  Eigen::VectorXd start_acceleration();
-  bool acts(std::size_t group) const;
-  void update_targets(const Eigen::VectorXd& q);
-  ExampleState next_target(std::size_t group, const Eigen::VectorXd& u);
-  Eigen::VectorXd start_target(std::size_t group, const Eigen::VectorXd& weights) const;
-  void solve_target(std::size_t group, ExampleState& examples);
-  void solve_by_method(const TargetMethod& method, ExampleState& examples);
-  const MeshElasticity* undeformed(std::size_t group, const Eigen::VectorXd& target);
-  Eigen::VectorXd choose_first_iterate(StepPotential& potential);
-  NewtonReport minimise(StepPotential& potential, Eigen::VectorXd& d);
-  void add(const NewtonReport& newton);
-  void commit(const StepPotential& potential, const Eigen::VectorXd& d);
-
-  const FullSpaceModel& model_;
-  const FullSpaceScene& scene_;
-  FullSpaceState& state_;
-  FullSpaceWorkspace& workspace_;
-  FullSpaceReport report_;
-  StepTerms terms_;
-  VertexContacts::Step contacts_;
-  std::vector<ExampleState> examples_;  // at the end of the step, of those that act
-};
-
-void Stepper::gather_external_force() {
-  const double midpoint = state_.time + 0.5 * scene_.time_step;
-  Eigen::VectorXd forces = Eigen::VectorXd::Zero(3 * model_.rest.rows());
-  for (const VertexForceConfig& force : scene_.forces)
-    if (pushes(force, midpoint))
-      for (const std::int64_t vertex : force.vertices) forces.segment<3>(3 * vertex) += force.force;
-  terms_.external_force = model_.system.restrict(forces) + model_.gravity_load * scene_.gravity + state_.applied_force;
-}
-
-// The first step, one after contact, and one that a force begins or ends with have no smooth past.
-bool Stepper::begins_anew() const {
-  const double midpoint = state_.time + 0.5 * scene_.time_step;
-  return state_.begins_anew || std::ranges::any_of(scene_.forces, [&](const VertexForceConfig& force) {
-           return pushes(force, midpoint) != pushes(force, midpoint - scene_.time_step);
-         });
-}
-
-bool Stepper::find_contacts() {
-  if (!model_.contacts || scene_.obstacles.empty()) return false;
-  const double dt = scene_.time_step;
-  const auto capacity = scene_.obstacles.size() * static_cast<std::size_t>(model_.contacts->vertices());
-  if (state_.contacts.held.size() < capacity) state_.contacts.held.resize(capacity);
-  contacts_ = model_.contacts->begin(scene_.obstacles, static_cast<double>(state_.step + 1) * dt, dt, state_.q,
-                                     state_.v, dt * dt * scene_.gravity.norm(), state_.contacts);
-  if (contacts_.candidates.empty()) return false;
-  terms_.contacts = &contacts_;
-  return true;
-}
-
-void Stepper::set_form(Integrator integrator) {
-  if (integrator == Integrator::kNewmark)
-    runtime::newmark_form(history(), begins_anew() ? start_acceleration() : state_.a, scene_.time_step, terms_.form);
-  else if (integrator == Integrator::kBdf2 && !begins_anew())
-    runtime::bdf2_form(history(), scene_.time_step, terms_.form);
-  else
-    runtime::backward_euler_form(history(), scene_.time_step, terms_.form);
-}
-
-// u_v by the formulas of the velocity's centre, of the deformations at the beginning and one step before.
-void Stepper::set_rate_centre(Integrator integrator) {
-  if (!model_.frame) {
-    terms_.rate_centre = terms_.form.velocity_centre;
-    return;
+NewtonStatus minimise(const FullSpaceScene& scene, FullSpaceWorkspace& workspace, FullSpaceStep& step) {
+  const auto solve = [&] {
+    const NewtonReport newton = minimise_step(step.potential(), scene.newton, workspace.direction, step.d());
+    step.add(newton);
+    return newton.status;
+  };
+  NewtonStatus status = solve();
+  for (int round = 1; step.near_obstacles() && round < runtime::kFrictionRounds; ++round) {
+    runtime::FrictionChange change;
+    step.refresh_friction(change);
+    if (status == NewtonStatus::kNonFinite || change.relative() <= runtime::kSameFriction) return status;
+    step.potential().start(step.d());
+    status = solve();
   }
-  const Deformation start(model_, state_.q);
-  terms_.rate_centre = start.u();
-  if (integrator == Integrator::kNewmark)
-    terms_.rate_centre += 0.5 * scene_.time_step * start.rate(state_.v);
-  else if (integrator == Integrator::kBdf2 && !begins_anew())
-    terms_.rate_centre = (4 * start.u() - Deformation(model_, state_.q_previous).u()) / 3;
-}
-
-// Of the equation of motion at the beginning of the step.
-Eigen::VectorXd Stepper::start_acceleration() {
-  Eigen::VectorXd internal;
-  LowerTriangle stiffness;
-  model_.elasticity.force_and_stiffness(state_.q, runtime::Tangent::kExact, internal, stiffness);
-  const Deformation start(model_, state_.q);
-  const Eigen::VectorXd rate = start.rate(state_.v);
-  const Eigen::VectorXd bending = start.to_frame(stiffness.selfadjointView<Eigen::Lower>() * start.to_world(rate));
-  Eigen::VectorXd deforming = scene_.stiffness_damping * bending;
-  deforming += scene_.mass_damping * (model_.system.mass * rate);
-  update_targets(state_.q);
-  for (const ExampleTerm& term : terms_.examples) {
-    if (term.elasticity != nullptr) {
-      Eigen::VectorXd pull;
-      term.elasticity->force(state_.q - term.target, pull);
-      internal += term.settings->stiffness * pull;
-    }
-    if (runtime::is_filtered(*term.settings))
-      deforming += term.examples->filter(runtime::linear_stiffness(*term.settings) * (start.u() - term.target) +
-                                         term.settings->damping * rate);
-  }
-  if (!workspace_.mass) {
-    LowerTriangle mass = model_.elasticity.pattern();
-    mass.coeffs() = model_.mass_values;
-    workspace_.mass = std::make_unique<Eigen::SimplicialLLT<LowerTriangle, Eigen::Lower>>(mass);
-  }
-  return workspace_.mass->solve(terms_.external_force - internal - start.force(deforming));
-}
-
-bool Stepper::acts(std::size_t group) const {
-  return group < scene_.examples.size() && runtime::acts(scene_.examples[group]);
-}
-
-void Stepper::update_targets(const Eigen::VectorXd& q) {
-  const Timer timer;
-  terms_.examples.clear();
-  report_.inverted_tets = 0;
-  examples_ = state_.examples;
-  std::optional<Deformation> deformation;
-  for (std::size_t group = 0; group < model_.examples.size(); ++group) {
-    if (!acts(group)) continue;
-    if (!deformation) deformation.emplace(model_, q);
-    const FullSpaceExamples& examples = model_.examples[group];
-    examples_[group] = next_target(group, deformation->u());
-    ExampleTerm& term = terms_.examples.emplace_back();
-    term.examples = &examples;
-    term.settings = &scene_.examples[group];
-    const bool of_method = !model_.target_methods.empty();
-    term.target = (of_method ? examples.pose_basis() : examples.target_fields()) * examples_[group].target;
-    if (runtime::elastic_factor(scene_.examples[group]) > 0) term.elasticity = undeformed(group, term.target);
-  }
-  report_.target_seconds += timer.seconds();
-}
-
-ExampleState Stepper::next_target(std::size_t group, const Eigen::VectorXd& u) {
-  const ExampleState& former = state_.examples[group];
-  ExampleState next = former;
-  next.weights = model_.examples[group].weights(u);
-  runtime::apply_example_bias(scene_.examples[group].bias, next.weights);
-  if (!former.has_target) next.target = start_target(group, next.weights);
-  next.has_target = true;
-  next.target_converged = former.has_target && former.target_converged && next.weights == former.weights;
-  if (!next.target_converged)
-    model_.target_methods.empty() ? solve_target(group, next) : solve_by_method(*model_.target_methods[group], next);
-  if (!next.target_converged) report_.status |= runtime::kTargetNotConverged;
-  return next;
-}
-
-// The blend of the examples.
-Eigen::VectorXd Stepper::start_target(std::size_t group, const Eigen::VectorXd& weights) const {
-  const FullSpaceExamples& examples = model_.examples[group];
-  Eigen::VectorXd target = Eigen::VectorXd::Zero(examples.pose_basis().cols());
-  if (model_.target_methods.empty()) {
-    examples.target().start(weights, target);
-    return target;
-  }
-  for (Eigen::Index k = 0; k < examples.count(); ++k) target += weights[k] * examples.pose(k);
-  return target;
-}
-
-void Stepper::solve_target(std::size_t group, ExampleState& examples) {
-  const runtime::TargetSolver& solver = model_.examples[group].target();
-  auto& scratch = workspace_.examples[group].target;
-  if (!scratch) scratch.emplace(solver.make_workspace());
-  const NewtonReport solved = solver.solve(examples.weights, *scratch, examples.target);
-  report_.target_iterations += solved.iterations;
-  examples.target_converged = solved.status != NewtonStatus::kIterationLimit;
-  if (solved.status == NewtonStatus::kNonFinite) report_.status |= runtime::kStepNonFinite;
-}
-
-void Stepper::solve_by_method(const TargetMethod& method, ExampleState& examples) {
-  const MinimiserReport solved = method.solve(examples.weights, examples.target);
-  report_.target_iterations += solved.iterations;
-  report_.target_evaluations += solved.evaluations;
-  examples.target_converged = solved.converged;
-  if (!examples.target.allFinite()) report_.status |= runtime::kStepNonFinite;
-}
-
-// The elasticity of which the target [f] is the undeformed shape.
-const MeshElasticity* Stepper::undeformed(std::size_t group, const Eigen::VectorXd& target) {
-  auto& elasticity = workspace_.examples[group].elasticity;
-  if (!elasticity) {
-    elasticity = model_.elasticity;
-    if (const auto shares = model_.examples[group].tet_shares()) elasticity->set_shares(*shares);
-  }
-  const Eigen::VectorXd displacement = model_.system.extend(target);
-  const VertexArray shape = model_.rest + displacement.reshaped<Eigen::RowMajor>(model_.rest.rows(), 3);
-  report_.inverted_tets += elasticity->set_undeformed(shape);
-  return &*elasticity;
-}
-
-// The step to the predictor q_n + dt v_n or none, whichever has the lower potential.
-Eigen::VectorXd Stepper::choose_first_iterate(StepPotential& potential) {
-  Eigen::VectorXd d = scene_.time_step * state_.v;
-  if (potential.start(d) <= potential.potential_at_start() || d.isZero(0)) return d;
-  ++report_.line_search_evaluations;
-  d.setZero();
-  potential.start(d);
-  return d;
-}
-
-void Stepper::add(const NewtonReport& newton) {
-  report_.newton_iterations += newton.iterations;
-  report_.line_search_evaluations += newton.line_search_evaluations;
-  report_.factorisations += newton.factorisations;
-  report_.projections += newton.projections;
-  report_.residual = newton.residual;
-}
-
-NewtonReport Stepper::minimise(StepPotential& potential, Eigen::VectorXd& d) {
-  NewtonReport newton = minimise_step(potential, scene_.newton, workspace_.direction, d);
-  add(newton);
-  for (int round = 1; terms_.contacts != nullptr && round < runtime::kFrictionRounds; ++round) {
-    const double change = runtime::refresh_friction(contacts_.obstacles, contacts_.candidates);
-    if (newton.status == NewtonStatus::kNonFinite || change <= runtime::kSameFriction) return newton;
-    potential.start(d);
-    newton = minimise_step(potential, scene_.newton, workspace_.direction, d);
-    add(newton);
-  }
-  return newton;
-}
-
-void Stepper::commit(const StepPotential& potential, const Eigen::VectorXd& d) {
-  const runtime::StepForm& form = terms_.form;
-  state_.q_previous = state_.q;
-  state_.v_previous = state_.v;
-  state_.v = form.velocity_factor * (d + (state_.q - form.velocity_centre));
-  state_.a = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
-  state_.q += d;
-  state_.elastic_energy = potential.elastic_energy();
-  ++state_.step;
-  state_.time = static_cast<double>(state_.step) * scene_.time_step;
-  state_.begins_anew = terms_.contacts != nullptr;
-  state_.contacts.count = 0;
-  if (terms_.contacts != nullptr) {
-    model_.contacts->commit(state_.q, contacts_, state_.contacts);
-    report_.contacts = contacts_.touching;
-    report_.contact_force = contacts_.total_force;
-  }
-  state_.examples = std::move(examples_);
-}
-
-FullSpaceReport Stepper::run() {
-  gather_external_force();
-  const Integrator integrator = find_contacts() ? Integrator::kBackwardEuler : scene_.integrator;
-  set_form(integrator);
-  set_rate_centre(integrator);
-  StepPotential potential(model_, scene_, state_, terms_);
-  Eigen::VectorXd d = choose_first_iterate(potential);
-  if (!d.allFinite()) report_.status |= runtime::kStepNonFinite;
-  if (!(report_.status & runtime::kStepNonFinite)) update_targets(state_.q + d);
-  if (report_.status & runtime::kStepNonFinite) return report_;
-  potential.prepare();
-  const NewtonStatus status = minimise(potential, d).status;
-  if (status == NewtonStatus::kNonFinite || !d.allFinite()) report_.status |= runtime::kStepNonFinite;
-  if (status == NewtonStatus::kIterationLimit) report_.status |= runtime::kStepIterationLimit;
-  if (status == NewtonStatus::kStagnated) report_.status |= runtime::kStepStagnated;
-  if (!(report_.status & runtime::kStepNonFinite)) commit(potential, d);
-  return report_;
+  return status;
 }
 
 }  // namespace
@@ -295,7 +35,10 @@ FullSpaceWorkspace::FullSpaceWorkspace(const FullSpaceModel& model)
 FullSpaceReport step(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
                      FullSpaceWorkspace& workspace) {
   const Timer timer;
-  FullSpaceReport report = Stepper(model, scene, state, workspace).run();
+  FullSpaceStep one(model, scene, state, workspace);
+  const NewtonStatus status =
+      one.begin(/*touches_others=*/false) ? minimise(scene, workspace, one) : NewtonStatus::kNonFinite;
+  FullSpaceReport report = one.finish(status);
   report.seconds = timer.seconds();
   return report;
 }

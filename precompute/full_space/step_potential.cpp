@@ -213,11 +213,16 @@ void StepPotential::assemble(const Eigen::VectorXd& d, runtime::Tangent tangent)
 
 Eigen::VectorXd StepPotential::product(const Eigen::VectorXd& x) const {
   Eigen::VectorXd result = hessian_.selfadjointView<Eigen::Lower>() * x;
-  if (!filters()) return result;
+  if (filters()) result += filter_product(x);
+  return result;
+}
+
+Eigen::VectorXd StepPotential::filter_product(const Eigen::VectorXd& x) const {
+  if (!filters()) return {};
   const Eigen::VectorXd change = here_->rate(x);
   Eigen::VectorXd force = filtered(change);
   if (skew()) force -= skew_filtered(change);
-  return result + here_->force(force);
+  return here_->force(force);
 }
 
 }  // namespace exmat::precompute

@@ -6,18 +6,6 @@
 namespace exmat::python {
 namespace {
 
-template <std::size_t kCount>
-std::int32_t number_of(const py::handle& value, const char* setting, const std::array<const char*, kCount>& names) {
-  const auto name = value.cast<std::string>();
-  std::string expected;
-  for (std::size_t i = 0; i < kCount; ++i) {
-    if (name == names[i]) return static_cast<std::int32_t>(i);
-    expected += (i > 0 ? ", " : "") + std::string(names[i]);
-  }
-  throw Error(EXMAT_INVALID_ARGUMENT,
-              (std::string(setting) + " = '" + name + "': expected one of " + expected).c_str());
-}
-
 exmat_settings settings_of(const py::dict& given) {
   exmat_settings settings = default_settings();
   const std::map<std::string, double exmat_settings::*> numbers{
@@ -27,11 +15,14 @@ exmat_settings settings_of(const py::dict& given) {
       {"newton_tolerance", &exmat_settings::newton_tolerance},
       {"example_stiffness", &exmat_settings::example_stiffness},
       {"example_damping", &exmat_settings::example_damping},
-      {"example_bias", &exmat_settings::example_bias}};
+      {"example_bias", &exmat_settings::example_bias},
+      {"sleep_energy", &exmat_settings::sleep_energy},
+      {"sleep_time", &exmat_settings::sleep_time}};
   const std::map<std::string, std::int32_t exmat_settings::*> counts{
       {"newton_iterations", &exmat_settings::newton_iterations},
       {"target_iterations", &exmat_settings::target_iterations},
-      {"use_examples", &exmat_settings::use_examples}};
+      {"use_examples", &exmat_settings::use_examples},
+      {"use_contact", &exmat_settings::use_contact}};
   for (const auto& [key, value] : given) {
     const auto name = key.cast<std::string>();
     if (const auto number = numbers.find(name); number != numbers.end())
@@ -41,13 +32,13 @@ exmat_settings settings_of(const py::dict& given) {
     else if (name == "gravity")
       std::ranges::copy(value.cast<std::array<double, 3>>(), settings.gravity);
     else if (name == "integrator")
-      settings.integrator = number_of<3>(value, "integrator", {"bdf2", "backward_euler", "newmark"});
+      settings.integrator = number_of(value, "integrator", kIntegrators);
     else if (name == "internal_force")
-      settings.internal_force = number_of<3>(value, "internal_force", {"auto", "cubature", "polynomial"});
+      settings.internal_force = number_of(value, "internal_force", {"auto", "cubature", "polynomial"});
     else if (name == "example_target")
-      settings.example_target = number_of<3>(value, "example_target", {"auto", "table", "solve"});
+      settings.example_target = number_of(value, "example_target", {"auto", "table", "solve"});
     else if (name == "energy_reference")
-      settings.energy_reference = number_of<2>(value, "energy_reference", {"example", "rest"});
+      settings.energy_reference = number_of(value, "energy_reference", {"example", "rest"});
     else
       throw Error(EXMAT_INVALID_ARGUMENT, ("there is no setting " + name).c_str());
   }
@@ -65,24 +56,36 @@ std::shared_ptr<ModelObject> load(const std::string& path, const py::object& set
   return std::make_shared<ModelObject>(Model(path, members));
 }
 
-std::shared_ptr<PointsObject> vertices(std::shared_ptr<ModelObject> model, const Ids& ids) {
+std::shared_ptr<ModelObject> of_text(const std::string& scene, const std::string& path, bool use_contact) {
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<ModelObject>(Model::from_text(scene, path, use_contact));
+}
+
+template <typename Make>
+Points without_lock(const Make& make) {
+  const py::gil_scoped_release unlocked;
+  return make();
+}
+
+std::shared_ptr<PointsObject> made(Points points, const std::shared_ptr<ModelObject>& model) {
+  return std::make_shared<PointsObject>(std::move(points), model);
+}
+
+std::shared_ptr<PointsObject> vertices(const std::shared_ptr<ModelObject>& model, const Ids& ids) {
   if (ids.ndim() != 1) throw Error(EXMAT_INVALID_ARGUMENT, "ids: expected an array of one dimension");
   const std::span<const std::int64_t> span(ids.data(), static_cast<std::size_t>(ids.size()));
-  const py::gil_scoped_release unlocked;
-  return std::make_shared<PointsObject>(PointsObject{Points::vertices(model->model, span), std::move(model)});
+  return made(without_lock([&] { return Points::vertices(model->model, span); }), model);
 }
 
-std::shared_ptr<PointsObject> all_vertices(std::shared_ptr<ModelObject> model) {
-  const py::gil_scoped_release unlocked;
-  return std::make_shared<PointsObject>(PointsObject{Points::all_vertices(model->model), std::move(model)});
+std::shared_ptr<PointsObject> all_vertices(const std::shared_ptr<ModelObject>& model) {
+  return made(without_lock([&] { return Points::all_vertices(model->model); }), model);
 }
 
-std::shared_ptr<PointsObject> points_at(std::shared_ptr<ModelObject> model, const Numbers& xyz) {
+std::shared_ptr<PointsObject> points_at(const std::shared_ptr<ModelObject>& model, const Numbers& xyz) {
   if (xyz.ndim() != 2) throw Error(EXMAT_INVALID_ARGUMENT, "xyz: expected an array of shape (k, 3)");
   require_shape(xyz, "xyz", {xyz.shape(0), 3});
   const std::span<const double> span = read_span(xyz);
-  const py::gil_scoped_release unlocked;
-  return std::make_shared<PointsObject>(PointsObject{Points::at(model->model, span), std::move(model)});
+  return made(without_lock([&] { return Points::at(model->model, span); }), model);
 }
 
 void bind_points(py::module_& module) {
@@ -96,7 +99,9 @@ void bind_points(py::module_& module) {
                   "Points of the rest shape, `xyz` of shape (k, 3) [m]. Each moves with the tet that holds it, or with "
                   "the nearest one where none does.")
       .def("__len__", [](const PointsObject& points) { return points.count; })
-      .def_readonly("model", &PointsObject::model, "The model that the points are of.")
+      .def_property_readonly(
+          "model", [](const PointsObject& points) { return points.model.object(); },
+          "The model that the points are of.")
       .def_property_readonly(
           "distances",
           [](const PointsObject& points) {
@@ -112,6 +117,7 @@ void bind_points(py::module_& module) {
 void bind_model(py::module_& module) {
   py::class_<ModelObject, std::shared_ptr<ModelObject>>(module, "Model", "What exmat.Model stands on.")
       .def(py::init(&load), py::arg("path"), py::arg("settings"))
+      .def(py::init(&of_text), py::arg("scene"), py::arg("path"), py::arg("use_contact"))
       .def_readonly("modes", &ModelObject::modes, "r, the number of modes.")
       .def_property_readonly(
           "vertices", [](const ModelObject& model) { return model.model.vertices(); }, "n, the object's vertices.")

@@ -8,6 +8,10 @@ PYBIND11_MODULE(_exmat, module) {
   module.attr("version") = exmat_version();
   bind_errors();
   bind_model(module);
-  bind_body(module);
+  bind_reports(module);
+  bind_states(module);
+  BodyClass body = bind_body(module);
+  bind_obstacles(module, body);
   bind_world(module);
+  bind_touching_world(module);
 }

@@ -11,25 +11,17 @@ std::string shape_text(const py::ssize_t* shape, std::size_t dimensions) {
   return text + (dimensions == 1 ? ",)" : ")");
 }
 
-/// Marks bodies as being stepped while it lives.
-class Stepping {
- public:
-  explicit Stepping(const BodyList& bodies) : bodies_(bodies) {
-    for (const auto& body : bodies) body->get();
-    mark(true);
-  }
-  ~Stepping() { mark(false); }
-  Stepping(const Stepping&) = delete;
-  Stepping& operator=(const Stepping&) = delete;
-
- private:
-  void mark(bool stepping) {
-    for (const auto& body : bodies_) body->stepping = stepping;
-  }
-  const BodyList& bodies_;
-};
-
 }  // namespace
+
+BodyObject::BodyObject(Body made, ModelHold its_model)
+    : own(made.release()), body(own.get()), model(std::move(its_model)) {
+  next_obstacle = exmat_body_obstacles(body.get());
+}
+
+BodyObject::BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<World> its_world)
+    : world(std::move(its_world)), body(its_body), model(std::move(its_model)) {
+  next_obstacle = exmat_body_obstacles(body.get());
+}
 
 WorldObject::WorldObject(std::shared_ptr<ModelObject> its_model, BodyList its_bodies)
     : model(std::move(its_model)), bodies(std::move(its_bodies)) {
@@ -47,7 +39,7 @@ void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles
 }
 
 void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int64_t region) {
-  Body& target = body.get();
+  BodyRef& target = body.get();
   switch (factor) {
     case ExampleFactor::kStiffness:
       target.set_example_stiffness(number, region);
@@ -67,6 +59,16 @@ void set_gravity(BodyObject& body, const std::array<double, 3>& gravity) {
   body.gravity = gravity;
 }
 
+void set_damping(BodyObject& body, const std::array<double, 2>& alpha_and_beta) {
+  body.get().set_damping(alpha_and_beta[0], alpha_and_beta[1]);
+  body.damping = alpha_and_beta;
+}
+
+void set_integrator(BodyObject& body, std::int32_t integrator) {
+  body.get().set_integrator(integrator);
+  body.integrator = integrator;
+}
+
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region) {
   body.get().set_example_weights(weights, region);
   if (weights.empty())
@@ -82,6 +84,17 @@ void set_state(BodyObject& body, const StateObject& state) {
     throw Error(EXMAT_INVALID_ARGUMENT,
                 "state: it is of another bundle; take a body of the bundle that it was read with");
   body.get().set_state(state.numbers);
+}
+
+std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names) {
+  const auto name = value.cast<std::string>();
+  std::string expected;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (name == names[i]) return static_cast<std::int32_t>(i);
+    expected += (i > 0 ? ", " : "") + std::string(names[i]);
+  }
+  throw Error(EXMAT_INVALID_ARGUMENT,
+              (std::string(setting) + " = '" + name + "': expected one of " + expected).c_str());
 }
 
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape) {

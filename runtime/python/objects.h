@@ -31,10 +31,27 @@ struct ModelObject {
   std::size_t modes = model.modes(), examples = model.examples();
 };
 
+/// A model and its Python object, which knows how it is made again.
+class ModelHold {
+ public:
+  explicit ModelHold(std::shared_ptr<ModelObject> model) : model_(std::move(model)), object_(py::cast(model_)) {}
+
+  const ModelObject* operator->() const noexcept { return model_.get(); }
+  const std::shared_ptr<ModelObject>& shared() const noexcept { return model_; }
+  const py::object& object() const noexcept { return object_; }
+
+ private:
+  std::shared_ptr<ModelObject> model_;
+  py::object object_;
+};
+
 /// k points.
 struct PointsObject {
+  PointsObject(Points its_points, std::shared_ptr<ModelObject> its_model)
+      : points(std::move(its_points)), model(std::move(its_model)) {}
+
   Points points;
-  std::shared_ptr<ModelObject> model;
+  ModelHold model;
   std::size_t count = points.size();
 };
 
@@ -45,24 +62,46 @@ struct StateObject {
   bool operator==(const StateObject&) const = default;
 };
 
+/// What an obstacle is made of, in its own frame.
+struct ShapeObject {
+  exmat_obstacle description;   ///< its law is not looked at
+  std::optional<Shape> arrays;  ///< of a mesh or a height field
+  py::tuple arguments;          ///< that it was made of
+};
+
+/// One of a body's obstacles that its host added, moved or gave a law.
+struct HostedObstacle {
+  std::shared_ptr<ShapeObject> shape;  ///< null: the scene's
+  std::optional<exmat_motion> moved;   ///< by the last call that moved it
+};
+
 /// A factor of an example force that a body may have of its own.
 enum class ExampleFactor { kStiffness, kDamping, kBias };
 
 struct BodyObject {
-  explicit BodyObject(std::shared_ptr<ModelObject> its_model) : body(its_model->model), model(std::move(its_model)) {}
+  explicit BodyObject(const ModelHold& its_model) : BodyObject(Body(its_model->model), its_model) {}
+  BodyObject(Body made, ModelHold its_model);
+  /// Of a world, which owns it.
+  BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<World> its_world);
 
   /// Throws where another thread steps it.
-  Body& get() {
+  BodyRef& get() {
     if (stepping) throw Error(EXMAT_INVALID_ARGUMENT, "another thread steps this body");
     return body;
   }
 
-  Body body;
-  std::shared_ptr<ModelObject> model;
+  std::shared_ptr<World> world;  ///< that it is in; null: none
+  detail::Owner<exmat_body, exmat_body_destroy> own;
+  BodyRef body;
+  ModelHold model;
   bool stepping = false;
   std::map<std::pair<ExampleFactor, std::int64_t>, double> factors;  ///< that were set, by region
   std::map<std::int64_t, std::vector<double>> weights;               ///< likewise
   std::optional<std::array<double, 3>> gravity;                      ///< likewise
+  std::optional<std::array<double, 2>> damping;                      ///< likewise
+  std::optional<std::int32_t> integrator;                            ///< likewise
+  std::map<std::int64_t, HostedObstacle> obstacles;                  ///< by id
+  std::int64_t next_obstacle = 0;                                    ///< no id that was given is this or above
 };
 
 using BodyList = std::vector<std::shared_ptr<BodyObject>>;
@@ -70,9 +109,27 @@ using BodyList = std::vector<std::shared_ptr<BodyObject>>;
 struct WorldObject {
   WorldObject(std::shared_ptr<ModelObject> its_model, BodyList its_bodies);
 
-  std::shared_ptr<ModelObject> model;
+  ModelHold model;
   BodyList bodies;
   std::vector<exmat_body*> handles;
+};
+
+/// Marks bodies as being stepped while it lives.
+class Stepping {
+ public:
+  explicit Stepping(const BodyList& bodies) : bodies_(bodies) {
+    for (const auto& body : bodies) body->get();
+    mark(true);
+  }
+  ~Stepping() { mark(false); }
+  Stepping(const Stepping&) = delete;
+  Stepping& operator=(const Stepping&) = delete;
+
+ private:
+  void mark(bool stepping) {
+    for (const auto& body : bodies_) body->stepping = stepping;
+  }
+  const BodyList& bodies_;
 };
 
 /// Steps them without the interpreter's lock.
@@ -81,10 +138,27 @@ void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles
 /// Sets what a body has instead of its model, and remembers it.
 void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int64_t region);
 void set_gravity(BodyObject& body, const std::array<double, 3>& gravity);
+void set_damping(BodyObject& body, const std::array<double, 2>& alpha_and_beta);
+void set_integrator(BodyObject& body, std::int32_t integrator);
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region);
 
 StateObject state_of(BodyObject& body);
 void set_state(BodyObject& body, const StateObject& state);
+
+/// What a body has of its own but for its state, for pickle, and a body that takes it.
+py::tuple kept_settings(BodyObject& body);
+void set_settings(BodyObject& body, const py::tuple& kept);
+py::dict kept_obstacles(BodyObject& body);
+void set_obstacles(BodyObject& body, const py::dict& kept);
+/// To be called after the state is set, with which obstacles stay where they are.
+void set_obstacle_motions(BodyObject& body, const py::dict& kept);
+
+/// A number that is one of `names`.
+std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names);
+inline const std::vector<const char*> kIntegrators{"bdf2", "backward_euler", "newmark"};
+
+exmat_motion read_motion_tuple(const py::tuple& kept);
+py::tuple motion_tuple(const exmat_motion& motion);
 
 /// Throws InvalidArgument of Python unless `array` has this shape.
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
@@ -105,6 +179,10 @@ py::array_t<Number> target_array(const py::object& out, const std::vector<py::ss
 /// An array at `data` that nobody may write; it keeps `owner` alive.
 py::array view(const double* data, std::size_t count, const py::object& owner);
 
+inline py::array_t<double> array_of(const double* numbers, std::size_t count) {
+  return py::array_t<double>(static_cast<py::ssize_t>(count), numbers);
+}
+
 template <typename Array>
 auto span_of(Array& array) {
   using Number = typename Array::value_type;
@@ -114,9 +192,15 @@ inline std::span<const double> read_span(const Numbers& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};
 }
 
+using BodyClass = py::class_<BodyObject, std::shared_ptr<BodyObject>>;
+
 void bind_errors();
 void bind_model(py::module_& module);
-void bind_body(py::module_& module);
+void bind_reports(py::module_& module);
+void bind_states(py::module_& module);
+BodyClass bind_body(py::module_& module);
+void bind_obstacles(py::module_& module, BodyClass& body);
 void bind_world(py::module_& module);
+void bind_touching_world(py::module_& module);
 
 }  // namespace exmat::python

@@ -12,11 +12,14 @@ py::ssize_t modes(const WorldObject& world) { return static_cast<py::ssize_t>(wo
 
 Shared make_world(std::shared_ptr<ModelObject> model, std::int64_t count) {
   if (count < 1) throw Error(EXMAT_INVALID_ARGUMENT, "count: expected at least 1");
-  BodyList bodies;
+  std::vector<Body> made;
   {
     const py::gil_scoped_release unlocked;
-    for (std::int64_t i = 0; i < count; ++i) bodies.push_back(std::make_shared<BodyObject>(model));
+    for (std::int64_t i = 0; i < count; ++i) made.emplace_back(model->model);
   }
+  const ModelHold hold(model);
+  BodyList bodies;
+  for (Body& body : made) bodies.push_back(std::make_shared<BodyObject>(std::move(body), hold));
   return std::make_shared<WorldObject>(std::move(model), std::move(bodies));
 }
 
@@ -68,20 +71,21 @@ py::array_t<Number> gather(WorldObject& world, const py::object& out, std::vecto
 
 py::array_t<double> displacements(WorldObject& world, const py::object& out) {
   return gather<double>(world, out, {modes(world)},
-                        [](Body& body, std::span<double> row) { body.read_displacement(row); });
+                        [](BodyRef& body, std::span<double> row) { body.read_displacement(row); });
 }
 
 py::array_t<double> velocities(WorldObject& world, const py::object& out) {
-  return gather<double>(world, out, {modes(world)}, [](Body& body, std::span<double> row) { body.read_velocity(row); });
+  return gather<double>(world, out, {modes(world)},
+                        [](BodyRef& body, std::span<double> row) { body.read_velocity(row); });
 }
 
 py::array_t<double> weights(WorldObject& world) {
   return gather<double>(world, py::none(), {static_cast<py::ssize_t>(world.model->examples)},
-                        [](Body& body, std::span<double> row) { body.read_weights(row); });
+                        [](BodyRef& body, std::span<double> row) { body.read_weights(row); });
 }
 
 py::array_t<double> energies(WorldObject& world) {
-  return gather<double>(world, py::none(), {3}, [](Body& body, std::span<double> row) {
+  return gather<double>(world, py::none(), {3}, [](BodyRef& body, std::span<double> row) {
     const exmat_energies now = body.energies();
     row[0] = now.kinetic;
     row[1] = now.elastic;
@@ -90,17 +94,17 @@ py::array_t<double> energies(WorldObject& world) {
 }
 
 py::array_t<double> times(WorldObject& world) {
-  return gather<double>(world, py::none(), {}, [](Body& body, std::span<double> row) { row[0] = body.time(); });
+  return gather<double>(world, py::none(), {}, [](BodyRef& body, std::span<double> row) { row[0] = body.time(); });
 }
 
 py::array_t<std::uint32_t> status(WorldObject& world) {
   return gather<std::uint32_t>(world, py::none(), {},
-                               [](Body& body, std::span<std::uint32_t> row) { row[0] = body.report().status; });
+                               [](BodyRef& body, std::span<std::uint32_t> row) { row[0] = body.report().status; });
 }
 
 py::array_t<float> positions(WorldObject& world, const PointsObject& points, const py::object& out) {
   return gather<float>(world, out, {static_cast<py::ssize_t>(points.count), 3},
-                       [&](Body& body, std::span<float> row) { body.read_positions(points.points, row); });
+                       [&](BodyRef& body, std::span<float> row) { body.read_positions(points.points, row); });
 }
 
 void set_reduced(WorldObject& world, const Numbers& q, const Numbers& v) {
@@ -176,7 +180,8 @@ void bind_world(py::module_& module) {
       "N bodies of one model, stepped together: arrays have N as their first dimension. No body touches another. "
       "Results do not depend on the number of threads.")
       .def(py::init(&make_world), py::arg("model"), py::arg("count"), "`count` = N >= 1 bodies, each at its start.")
-      .def_readonly("model", &WorldObject::model, "The model that they are of.")
+      .def_property_readonly(
+          "model", [](const WorldObject& world) { return world.model.object(); }, "The model that they are of.")
       .def("__len__", &count)
       .def("__getitem__", &body_at, py::arg("index"), "The Body of this index itself.")
       .def(
@@ -218,7 +223,8 @@ void bind_world(py::module_& module) {
       .def("set_example_weights", &take_weights, py::arg("weights"),
            "Weights as Body.set_example_weights(), shape (N, K), or (K,) for all; None: those of the poses again.")
       .def_property("states", &states, &set_states, "The State of each body, a list of N copies; likewise to be set.")
-      .def(py::pickle([](const WorldObject& world) { return py::make_tuple(world.model, world.bodies); }, &restored));
+      .def(py::pickle([](const WorldObject& world) { return py::make_tuple(world.model.object(), world.bodies); },
+                      &restored));
   module.def(
       "step", &step_list, py::arg("bodies"), py::arg("n") = 1, py::arg("threads") = 0,
       "Takes `n` steps of each of some different bodies, of any models, by up to `threads` threads, 0: one for each "

@@ -104,19 +104,26 @@ PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
   return normalised(own, own, asset, has_examples(scene));
 }
 
-std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& asset, const SceneConfig& scene) {
+std::vector<PointSettings> expand_all(const StudyConfig& study, const AssetConfig& asset, const SceneConfig& scene) {
   PointSettings own = own_settings(asset, scene);
   const PointSettings normal = own;
   own.cubature_elements = asset.cubature_elements;  // 2 r follows the point's r
   std::vector<PointSettings> points;
   for (std::size_t i = 0; i < study.sweeps.size(); ++i)
     for (const PointSettings& raw : product(study.sweeps[i], own)) {
-      const PointSettings point = normalised(raw, normal, asset, has_examples(scene));
-      require_possible(point, asset, study, i);
-      if (std::ranges::find(points, point) == points.end()) points.push_back(point);
-      if (points.size() > kMostPoints)
-        throw InputError({study.file.string(), "/sweeps", fmt::format("at most {} points", kMostPoints), "more", ""});
+      points.push_back(normalised(raw, normal, asset, has_examples(scene)));
+      require_possible(points.back(), asset, study, i);
     }
+  return points;
+}
+
+std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& asset, const SceneConfig& scene) {
+  std::vector<PointSettings> points;
+  for (const PointSettings& point : expand_all(study, asset, scene)) {
+    if (std::ranges::find(points, point) == points.end()) points.push_back(point);
+    if (points.size() > kMostPoints)
+      throw InputError({study.file.string(), "/sweeps", fmt::format("at most {} points", kMostPoints), "more", ""});
+  }
   return points;
 }
 

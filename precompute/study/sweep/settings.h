@@ -39,6 +39,9 @@ PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene);
 /// InputError: a polynomial of a material that has none, more elements than there are, too many points.
 std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& asset, const SceneConfig& scene);
 
+/// The same with repeated ones: as many, and in the same order, for every asset and scene.
+std::vector<PointSettings> expand_all(const StudyConfig& study, const AssetConfig& asset, const SceneConfig& scene);
+
 /// The files' own with the settings of a point; the scene writes positions and nothing else.
 AssetConfig with_settings(AssetConfig asset, const PointSettings& settings);
 SceneConfig with_settings(SceneConfig scene, const PointSettings& settings);

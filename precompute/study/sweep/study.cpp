@@ -15,7 +15,6 @@
 #include "common/config/json_file.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
-#include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/study/sweep/results_files.h"
 #include "precompute/study/sweep/study_plan.h"
 #include "precompute/study/sweep/study_sources.h"
@@ -27,12 +26,6 @@ namespace {
 
 using Ordered = nlohmann::ordered_json;
 
-void make_folder(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw WorkError(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
-}
-
 std::string processor_name() {
   std::ifstream stream("/proc/cpuinfo");
   for (std::string line; std::getline(stream, line);)
@@ -40,10 +33,16 @@ std::string processor_name() {
   return "unknown processor";
 }
 
+const std::filesystem::path& asset_of(const StudyConfig& config) {
+  if (config.asset.empty())
+    throw InputError({config.file.string(), "/assets", "\"asset\", since the scene is of one body", "assets", ""});
+  return config.asset;
+}
+
 class Study {
  public:
   Study(const StudyConfig& config, const StudyOptions& options)
-      : config_(config), options_(options), asset_(load_asset(config.asset)), scene_(load_scene(config.scene)) {
+      : config_(config), options_(options), asset_(load_asset(asset_of(config))), scene_(load_scene(config.scene)) {
     if (config.steps) scene_.steps = *config.steps;
   }
 
@@ -109,19 +108,7 @@ bool Study::is_finished(const PointPlan& point) const {
 }
 
 void Study::build_bundle(const BundlePlan& plan) const {
-  BuildReport report;
-  const ReducedModel model = build_reduced_model(plan.asset, plan.needs, report, {.scene = &plan.scene});
-  Ordered stages = Ordered::object();
-  double total = 0;
-  for (const StageTime& stage : report.stages) {
-    stages[stage.stage] = stage.seconds;
-    total += stage.seconds;
-  }
-  write_bundle(model, bundle_file(plan.key));
-  write_sealed(stages_file(plan.key), {{"stage_seconds", stages},
-                                       {"seconds", total},
-                                       {"heldout_error", model.cubature->heldout_error},
-                                       {"warnings", report.warnings}});
+  precompute::build_bundle(plan, bundle_file(plan.key), stages_file(plan.key));
 }
 
 void Study::run_reference(const ReferencePlan& plan) const {

@@ -2,6 +2,7 @@
 
 #include "common/config/json_file.h"
 #include "common/config/json_values.h"
+#include "common/core/error.h"
 
 namespace exmat::precompute {
 namespace {
@@ -33,7 +34,12 @@ StudyConfig load_study(const std::filesystem::path& file) {
   StudyConfig study;
   study.file = file;
   study.name = json["name"];
-  study.asset = resolve_path(file, json["asset"]);
+  if (json.contains("asset") == json.contains("assets"))
+    throw InputError({file.string(), "/", "asset or assets", json.contains("asset") ? "both" : "neither",
+                      "a scene of several bodies takes \"assets\", one for each"});
+  if (json.contains("asset")) study.asset = resolve_path(file, json["asset"]);
+  for (const Json& entry : member_or(json, "assets", Json::array()))
+    study.assets.push_back({entry["body"], resolve_path(file, entry["asset"])});
   study.scene = resolve_path(file, json["scene"]);
   study.steps = optional_member<std::int64_t>(json, "steps");
   study.frames = json.value("frames", study.frames);

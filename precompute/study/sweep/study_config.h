@@ -43,9 +43,18 @@ struct PaperTimes {
   double interp = 0, total = 0, zhu_interp = 0, zhu_total = 0;
 };
 
+/// The asset of one of several bodies.
+struct BodyAsset {
+  std::string body;  ///< its name in the scene
+  std::filesystem::path asset;
+};
+
 /// STUDY.json after validation, paths resolved against its folder.
 struct StudyConfig {
-  std::filesystem::path file, asset, scene;
+  std::filesystem::path file;
+  std::filesystem::path asset;    ///< empty: there are `assets`
+  std::vector<BodyAsset> assets;  ///< of a scene of several bodies
+  std::filesystem::path scene;
   std::string name;
   std::optional<std::int64_t> steps;
   int frames = 200;

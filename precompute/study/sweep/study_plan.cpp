@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "common/core/version.h"
@@ -162,6 +163,28 @@ std::string key_of(const StudyPlan& plan, const nlohmann::ordered_json& settings
 StudyPlan plan_study(const StudyConfig& config, const AssetConfig& asset, const SceneConfig& scene,
                      StudyResult& result) {
   return Planner(config, asset, scene, result).plan();
+}
+
+void build_bundle(const BundlePlan& plan, const std::filesystem::path& bundle, const std::filesystem::path& stages) {
+  BuildReport report;
+  const ReducedModel model = build_reduced_model(plan.asset, plan.needs, report, {.scene = &plan.scene});
+  Ordered seconds = Ordered::object();
+  double total = 0;
+  for (const StageTime& stage : report.stages) {
+    seconds[stage.stage] = stage.seconds;
+    total += stage.seconds;
+  }
+  write_bundle(model, bundle);
+  write_sealed(stages, {{"stage_seconds", seconds},
+                        {"seconds", total},
+                        {"heldout_error", model.cubature->heldout_error},
+                        {"warnings", report.warnings}});
+}
+
+void make_folder(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw WorkError(fmt::format("{}: cannot make the folder: {}", folder.string(), error.message()));
 }
 
 }  // namespace exmat::precompute

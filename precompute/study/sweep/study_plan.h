@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <filesystem>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
@@ -55,5 +56,11 @@ std::string key_of(const StudyPlan& plan, const nlohmann::ordered_json& settings
 /// frames. Throws InputError for what is wrong with them.
 StudyPlan plan_study(const StudyConfig& config, const AssetConfig& asset, const SceneConfig& scene,
                      StudyResult& result);
+
+/// Computes a planned bundle, and writes how long each stage took, what its cubature is worth and what it warns of.
+void build_bundle(const BundlePlan& plan, const std::filesystem::path& bundle, const std::filesystem::path& stages);
+
+/// Throws WorkError.
+void make_folder(const std::filesystem::path& folder);
 
 }  // namespace exmat::precompute

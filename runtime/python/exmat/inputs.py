@@ -10,7 +10,7 @@ from .arrays import StrPath, array, surface_arrays
 from .errors import InvalidArgument
 from .surfaces import write_glb
 
-PATHS = ("mesh", "surface", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples")
+PATHS = ("mesh", "surface", "render_mesh", "file", "landmarks", "asset", "scene", "bundle", "exact_examples", "poses")
 
 
 def write_mesh(path: StrPath, vertices: Any, tets: Any) -> None:
@@ -39,7 +39,7 @@ def write_asset(asset: Union[StrPath, Mapping[str, Any]], folder: pathlib.Path) 
     """The asset file: `asset` where it is one, else one in `folder`, with the meshes that are given as arrays beside it."""
     if not isinstance(asset, Mapping):
         return pathlib.Path(asset)
-    members: Dict[str, Any] = _plain(asset)
+    members: Dict[str, Any] = plain_members(asset)
     given = asset.get("object", {})
     if isinstance(given, Mapping):
         _take_object(given, members["object"], folder)
@@ -55,7 +55,7 @@ def write_asset(asset: Union[StrPath, Mapping[str, Any]], folder: pathlib.Path) 
 
 def write_members(given: Union[StrPath, Mapping[str, Any]], path: pathlib.Path) -> pathlib.Path:
     """The file `given`, or `path` with these members; paths in members become absolute."""
-    return _write_json(path, _plain(given)) if isinstance(given, Mapping) else pathlib.Path(given)
+    return _write_json(path, plain_members(given)) if isinstance(given, Mapping) else pathlib.Path(given)
 
 
 def _take_object(given: Mapping[str, Any], members: Dict[str, Any], folder: pathlib.Path) -> None:
@@ -125,10 +125,10 @@ def _tets_of_poses(examples: Any, given: Any) -> Optional[Any]:
     return None
 
 
-def _plain(value: Any, key: str = "") -> Any:
+def plain_members(value: Any, key: str = "") -> Any:
     """As JSON has it: arrays as lists, paths absolute. Meshes in arrays are left out."""
     if isinstance(value, Mapping):
-        return {str(name): _plain(member, str(name)) for name, member in value.items()}
+        return {str(name): plain_members(member, str(name)) for name, member in value.items()}
     if isinstance(value, os.PathLike) or (isinstance(value, str) and key in PATHS):
         return os.path.abspath(value)
     if key in ("mesh", "surface", "render_mesh"):
@@ -137,12 +137,16 @@ def _plain(value: Any, key: str = "") -> Any:
         return value.tolist()
     if isinstance(value, np.generic):
         return value.item()
-    return [_plain(member) for member in value] if isinstance(value, (list, tuple)) else value
+    return [plain_members(member) for member in value] if isinstance(value, (list, tuple)) else value
 
 
 def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:
-    path.write_text(json.dumps(members, indent=1))
+    path.write_text(json_text(members))
     return path
 
 
-__all__: List[str] = ["write_asset", "write_members", "write_mesh", "write_surface"]
+def json_text(members: Mapping[str, Any]) -> str:
+    return json.dumps(members, indent=1)
+
+
+__all__: List[str] = ["json_text", "plain_members", "write_asset", "write_members", "write_mesh", "write_surface"]

@@ -38,7 +38,7 @@ def bundle(folder):
 
 @pytest.fixture(scope="session")
 def free_bundle(folder, bundle):
-    asset = {**ASSET, "object": {name: member for name, member in ASSET["object"].items() if name != "fixed"}, "needs": ["rigid", "contact"]}
+    asset = {**ASSET, "object": {name: member for name, member in ASSET["object"].items() if name != "fixed"}, "needs": ["rigid", "contact", "examples"]}
     exmat.precompute.bundle(asset, folder / "free.h5")
     return folder / "free.h5"
 

@@ -27,6 +27,21 @@ TEST(StudyFile, FillsInDefaultsAndResolvesPaths) {
   EXPECT_EQ(study.timing.rounds, 5);
 }
 
+TEST(StudyFile, ReadsTheAssetsOfSeveralBodies) {
+  const test::TemporaryFolder folder;
+  const StudyConfig study = load_study(folder.write(
+      "study.json",
+      R"({"name": "s", "scene": "b.json", "assets": [{"body": "x", "asset": "a.json"}, {"body": "y", "asset": "c.json"}]})"));
+  EXPECT_TRUE(study.asset.empty());
+  ASSERT_EQ(study.assets.size(), 2U);
+  EXPECT_EQ(study.assets[1].body, "y");
+  EXPECT_EQ(study.assets[1].asset, folder.path("c.json"));
+  for (const char* text :
+       {R"({"name": "s", "scene": "b.json"})",
+        R"({"name": "s", "scene": "b.json", "asset": "a", "assets": [{"body": "x", "asset": "a"}]})"})
+    EXPECT_THROW(load_study(folder.write("study.json", text)), InputError) << text;
+}
+
 TEST(StudyFile, ReadsEveryMember) {
   const test::TemporaryFolder folder;
   const StudyConfig study = load_study(folder.write("study.json", R"({

@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "precompute/full_space/full_space_stepper.h"
+#include "precompute/full_space/step_potential.h"
+
+namespace exmat::precompute {
+
+/// One step of a body from its beginning to its end, for the body alone or with others that it touches: begin(), then
+/// whoever minimises the potential in d(), then finish().
+class FullSpaceStep {
+ public:
+  FullSpaceStep(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
+                FullSpaceWorkspace& workspace)
+      : model_(model), scene_(scene), state_(state), workspace_(workspace) {}
+  FullSpaceStep(const FullSpaceStep&) = delete;
+  FullSpaceStep& operator=(const FullSpaceStep&) = delete;
+
+  /// Whether the potential can be minimised: all numbers are finite. Near obstacles and others it is that of backward
+  /// Euler.
+  bool begin(bool touches_others);
+
+  StepPotential& potential() { return *potential_; }
+  Eigen::VectorXd& d() { return d_; }  ///< [f] change of the displacement; the first iterate, then the solution
+
+  bool near_obstacles() const { return terms_.contacts != nullptr; }
+  /// Friction with obstacles follows the normal forces of the last evaluation.
+  void refresh_friction(runtime::FrictionChange& change);
+
+  void add(const runtime::NewtonReport& newton);
+  /// The state of the end, unless a number is not finite.
+  const FullSpaceReport& finish(runtime::NewtonStatus status);
+
+ private:
+  void gather_external_force();
+  bool begins_anew() const;
+  runtime::StepHistory history() const { return {state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous}; }
+  bool find_contacts();
+  void set_form(Integrator integrator);
+  void set_rate_centre(Integrator integrator);
+  Eigen::VectorXd start_acceleration();
+  bool acts(std::size_t group) const;
+  void update_targets(const Eigen::VectorXd& q);
+  runtime::ExampleState next_target(std::size_t group, const Eigen::VectorXd& u);
+  Eigen::VectorXd start_target(std::size_t group, const Eigen::VectorXd& weights) const;
+  void solve_target(std::size_t group, runtime::ExampleState& examples);
+  void solve_by_method(const TargetMethod& method, runtime::ExampleState& examples);
+  const MeshElasticity* undeformed(std::size_t group, const Eigen::VectorXd& target);
+  void choose_first_iterate();
+  void commit();
+
+  const FullSpaceModel& model_;
+  const FullSpaceScene& scene_;
+  FullSpaceState& state_;
+  FullSpaceWorkspace& workspace_;
+  FullSpaceReport report_;
+  StepTerms terms_;
+  VertexContacts::Step contacts_;
+  std::vector<runtime::ExampleState> examples_;  // at the end of the step, of those that act
+  std::optional<StepPotential> potential_;
+  Eigen::VectorXd d_;
+  bool touches_others_ = false;
+};
+
+}  // namespace exmat::precompute

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+#include "precompute/full_space/full_space_model.h"
+#include "runtime/sim/contact/body_contact.h"
+
+namespace exmat::precompute {
+
+/// The surface of a body where a step begins, in the frame that fits the body best, and how it moves: a surface of one
+/// mode, the way that the body's velocity leads, of which the search of the run time finds what is near.
+class MovingSurface {
+ public:
+  /// `data` with /object and /contact.
+  MovingSurface(const ReducedModel& data, const FullSpaceModel& model, const FullSpaceState& state);
+
+  runtime::TouchingBody touching() const { return {set_, touching_, {placement_, q_}, {{}, v_}}; }
+  runtime::SurfaceShape& shape() { return shape_; }
+
+  const runtime::Placement& placement() const { return placement_; }
+  const Eigen::AlignedBox3d& box() const { return box_; }  ///< about it, world [m]
+  double speed() const { return speed_; }                  ///< of its fastest vertex [m/s]
+
+  const runtime::ContactSet& set() const { return set_; }
+  std::int32_t object_vertex(int vertex) const { return set_.object_vertex(vertex); }
+  /// The corners that a material point of the surface, in its frame, lies between, and their shares.
+  std::array<std::int32_t, 3> corners(const Eigen::Vector3d& point, Eigen::Vector3d& shares);
+
+ private:
+  runtime::Placement placement_;
+  Eigen::VectorXd q_, v_;  // 1
+  runtime::ContactSet set_;
+  runtime::TouchingSurface touching_;
+  runtime::SurfaceShape shape_;
+  const TriangleArray* triangles_;
+  Eigen::AlignedBox3d box_;
+  double speed_ = 0;
+};
+
+/// What vertices that are inside another body remember; `vertex` is the place in ContactData.
+using HeldVertices = std::vector<runtime::HeldBodyContact>;
+
+/// Contact of the vertices of one body, a, with the surface of another, b, in one step: candidates, normals and nearest
+/// material points as the run time finds them where the step begins, the law of contact_law.h. Positions are those of
+/// all vertices [n x 3], world.
+class SurfaceContacts {
+ public:
+  /// `law` of one direction, as runtime::BodyContact has it. `margin`: how far away a vertex may be and yet touch [m].
+  SurfaceContacts(const runtime::ContactLaw& law, MovingSurface& a, MovingSurface& b, double time_step, double margin,
+                  bool anew, const HeldVertices& held);
+
+  bool empty() const { return candidates_.all.empty(); }
+
+  /// Adds forces [n x 3] to those of either body. Returns W [J].
+  double evaluate(const VertexArray& a, const VertexArray& b, VertexArray& force_a, VertexArray& force_b);
+  /// W alone; leaves the last evaluation as it is.
+  double potential(const VertexArray& a, const VertexArray& b) const;
+
+  void refresh_friction(runtime::FrictionChange& change);
+
+  /// A part of -df/dx of the last evaluation: the positive semi-definite `matrix` acts on how `vertex` moves against
+  /// the sum of the shares of how the corners move.
+  struct Stiffness {
+    std::int32_t vertex = 0;                ///< of a
+    std::array<std::int32_t, 3> corners{};  ///< of b
+    Eigen::Vector3d shares = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();  ///< [N/m]
+  };
+  std::vector<Stiffness> stiffness() const;
+
+  /// What the next step has to know of the last evaluation; `rotation_b` of the frame of b at the end.
+  HeldVertices held(const Eigen::Matrix3d& rotation_b) const;
+  int touching() const;
+
+ private:
+  struct Place {
+    std::int32_t vertex = 0;
+    std::array<std::int32_t, 3> corners{};
+    Eigen::Vector3d shares = Eigen::Vector3d::Zero();
+  };
+  Eigen::Vector3d between(std::size_t index, const VertexArray& a, const VertexArray& b) const;
+
+  runtime::BodyContact contact_;
+  const MovingSurface& a_;
+  const MovingSurface& b_;
+  runtime::BodyCandidates candidates_;
+  std::vector<Place> places_;  // of the candidates
+};
+
+}  // namespace exmat::precompute

@@ -1,0 +1,34 @@
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "common/config/scene_config.h"
+#include "precompute/study/measure/frames.h"
+#include "precompute/study/measure/timing.h"
+
+namespace exmat::precompute {
+
+/// What came of a run of a scene of several bodies.
+struct WorldRun {
+  std::vector<std::string> names;            ///< of the bodies
+  std::vector<std::size_t> kinds;            ///< of each, its place among the scene's "bodies"
+  std::vector<BodyFrames> bodies;            ///< what is counted is the same in all: of steps of all bodies
+  std::vector<std::size_t> modes, elements;  ///< r and s of each kind; none in full space
+};
+
+/// Steps the reduced bodies up to the last of `times`, each a multiple of the time step. Throws WorkError at a number
+/// that is not finite.
+WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>& times);
+
+/// The same with all degrees of freedom of all bodies, of whole bundles.
+WorldRun run_full_space_world(const WorldConfig& config, const std::vector<double>& times);
+
+/// Times of steps of all bodies over their number [s], by one thread, of each scene in turns.
+std::vector<StepTimes> time_worlds(const std::vector<WorldConfig>& scenes, const TimingConfig& config);
+
+/// All bodies of a run as one: positions and velocities below each other, energies added up.
+BodyFrames all_of(const WorldRun& run);
+
+}  // namespace exmat::precompute

@@ -1,0 +1,342 @@
+#include <algorithm>
+#include <pybind11/stl.h>
+
+#include "runtime/python/objects.h"
+
+// Bodies that touch each other: world.hpp for Python.
+
+namespace exmat::python {
+namespace {
+
+using SharedBody = std::shared_ptr<BodyObject>;
+
+struct TouchingWorldObject {
+  explicit TouchingWorldObject(World its_world) : world(std::make_shared<World>(std::move(its_world))) {}
+
+  /// Throws where another thread steps it.
+  World& get() {
+    if (stepping) throw Error(EXMAT_INVALID_ARGUMENT, "another thread steps this world");
+    return *world;
+  }
+
+  std::shared_ptr<World> world;  ///< its bodies keep it
+  std::map<std::int64_t, SharedBody> bodies;
+  std::int64_t next_id = 0;  ///< no id that was given is this or above
+  exmat_world_report report{};
+  bool stepping = false;
+};
+
+using Shared = std::shared_ptr<TouchingWorldObject>;
+
+struct WorldStateObject {
+  std::vector<double> numbers;
+  std::vector<std::string> shas;  ///< of the bodies' bundles
+
+  bool operator==(const WorldStateObject&) const = default;
+};
+
+template <typename Make>
+Shared made(const Make& make) {
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<TouchingWorldObject>(make());
+}
+
+Shared empty_world(double stiffness, double damping, double friction, bool self_contact) {
+  exmat_contact_law law = default_contact_law();
+  law.stiffness = stiffness;
+  law.damping = damping;
+  law.friction = friction;
+  law.self = self_contact ? 1 : 0;
+  return made([&] { return World(law); });
+}
+
+Shared of_scene(const std::string& path) {
+  return made([&] { return World::from_scene(path); });
+}
+
+Shared of_text(const std::string& scene, const std::string& path) {
+  return made([&] { return World::from_text(scene, path); });
+}
+
+// ---- bodies
+
+std::shared_ptr<ModelObject> model_of_kind(TouchingWorldObject& world, std::int64_t kind) {
+  for (const std::int64_t id : world.get().ids())
+    if (world.world->kind(id) == kind) return std::make_shared<ModelObject>(world.world->body(id).model());
+  throw Error(EXMAT_INVALID_ARGUMENT, "kind: the world has no such body");
+}
+
+std::int64_t kinds(TouchingWorldObject& world) {
+  std::int64_t last = -1;
+  for (const std::int64_t id : world.get().ids()) last = std::max(last, world.world->kind(id));
+  return last + 1;
+}
+
+/// Of a world of a scene, which has the bodies but not yet their models' Python objects, by kind.
+void take_models(TouchingWorldObject& world, const std::vector<std::shared_ptr<ModelObject>>& models) {
+  for (const std::int64_t id : world.get().ids()) {
+    const auto kind = static_cast<std::size_t>(world.world->kind(id));
+    world.bodies[id] = std::make_shared<BodyObject>(world.world->body(id), ModelHold(models.at(kind)), world.world);
+    world.next_id = id + 1;
+  }
+}
+
+SharedBody body_at(TouchingWorldObject& world, std::int64_t id) {
+  const auto found = world.bodies.find(id);
+  if (found == world.bodies.end()) throw py::key_error("the world has no body " + std::to_string(id));
+  return found->second;
+}
+
+std::int64_t add(TouchingWorldObject& world, const SharedBody& body) {
+  World& to = world.get();
+  exmat_body* const handle = body->get().get();
+  std::int64_t id = -1;
+  const exmat_status status = [&] {
+    const py::gil_scoped_release unlocked;
+    return exmat_world_add_body(to.get(), handle, &id);
+  }();
+  detail::check(status);
+  static_cast<void>(body->own.release());
+  body->world = world.world;
+  world.bodies[id] = body;
+  world.next_id = id + 1;
+  return id;
+}
+
+SharedBody remove(TouchingWorldObject& world, std::int64_t id) {
+  World& from = world.get();
+  SharedBody body = body_at(world, id);
+  body->get();
+  body->own.reset(from.remove(id).release());
+  body->world = nullptr;
+  world.bodies.erase(id);
+  return body;
+}
+
+BodyList list_of(const TouchingWorldObject& world) {
+  BodyList list;
+  for (const auto& [id, body] : world.bodies) list.push_back(body);
+  return list;
+}
+
+py::array_t<std::int64_t> ids(const TouchingWorldObject& world) {
+  py::array_t<std::int64_t> ids(static_cast<py::ssize_t>(world.bodies.size()));
+  std::ranges::transform(world.bodies, ids.mutable_data(), [](const auto& member) { return member.first; });
+  return ids;
+}
+
+// ---- steps, and what is read
+
+exmat_world_report step(TouchingWorldObject& world, std::int64_t steps, int threads) {
+  World& stepped = world.get();
+  const BodyList bodies = list_of(world);
+  const Stepping stepping(bodies);
+  exmat_world_report report{};
+  report.size = sizeof report;
+  world.stepping = true;
+  const exmat_status status = [&] {
+    const py::gil_scoped_release unlocked;
+    return exmat_world_step(stepped.get(), steps, threads, &report);
+  }();
+  world.stepping = false;
+  if (status == EXMAT_OK || status == EXMAT_NON_FINITE) world.report = report;
+  detail::check(status);
+  return report;
+}
+
+py::array_t<exmat_body_contact> contacts(TouchingWorldObject& world) {
+  const std::vector<exmat_body_contact> contacts = world.get().contacts();
+  return py::array_t<exmat_body_contact>(static_cast<py::ssize_t>(contacts.size()), contacts.data());
+}
+
+void set_law(TouchingWorldObject& world, std::optional<double> stiffness, std::optional<double> damping,
+             std::optional<double> friction) {
+  exmat_contact_law law = world.get().contact_law();
+  law.stiffness = stiffness.value_or(law.stiffness);
+  law.damping = damping.value_or(law.damping);
+  law.friction = friction.value_or(law.friction);
+  world.world->set_contact_law(law);
+}
+
+// ---- states
+
+std::vector<std::string> shas_of(const TouchingWorldObject& world) {
+  std::vector<std::string> shas;
+  for (const auto& [id, body] : world.bodies) shas.push_back(body->model->sha);
+  return shas;
+}
+
+WorldStateObject world_state(TouchingWorldObject& world) { return {world.get().state(), shas_of(world)}; }
+
+void set_world_state(TouchingWorldObject& world, const WorldStateObject& state) {
+  for (const auto& [id, body] : world.bodies) body->get();
+  if (state.shas != shas_of(world))
+    throw Error(EXMAT_INVALID_ARGUMENT,
+                "state: it is of bodies of other bundles; take a world of the bodies that it was read with");
+  world.get().set_state(state.numbers);
+}
+
+void bind_world_state(py::module_& module) {
+  py::class_<WorldStateObject>(
+      module, "WorldState",
+      "All that the bodies of a world carry from step to step and what their contacts remember, copied. A world of as "
+      "many such bodies takes it and goes on to the last bit. It can be pickled and compared.")
+      .def_property_readonly(
+          "numbers",
+          [](const py::object& self) {
+            const auto& state = self.cast<const WorldStateObject&>();
+            return view(state.numbers.data(), state.numbers.size(), self);
+          },
+          "The state as numbers, shape (size,): read-only, without a copy.")
+      .def_readonly("input_sha256", &WorldStateObject::shas, "Of the bundle of each body, in the order of their ids.")
+      .def(
+          "__eq__", [](const WorldStateObject& state, const WorldStateObject& other) { return state == other; },
+          py::is_operator())
+      .def("__copy__", [](const WorldStateObject& state) { return state; })
+      .def(
+          "__deepcopy__", [](const WorldStateObject& state, const py::dict&) { return state; }, py::arg("memo"))
+      .def(py::pickle(
+          [](const WorldStateObject& state) {
+            return py::make_tuple(array_of(state.numbers.data(), state.numbers.size()), state.shas);
+          },
+          [](const py::tuple& kept) {
+            const auto numbers = kept[0].cast<Numbers>();
+            return WorldStateObject{{numbers.data(), numbers.data() + numbers.size()},
+                                    kept[1].cast<std::vector<std::string>>()};
+          }))
+      .attr("__hash__") = py::none();
+}
+
+// ---- copies
+
+py::dict kept(TouchingWorldObject& world) {
+  const exmat_contact_law law = world.get().contact_law();
+  py::list bodies;
+  for (const auto& [id, body] : world.bodies) {
+    const bool of_scene = world.world->kind(id) >= 0;
+    bodies.append(
+        py::make_tuple(id, of_scene ? py::none() : body->model.object(), kept_settings(*body), kept_obstacles(*body)));
+  }
+  py::dict result;
+  result["law"] = py::make_tuple(law.stiffness, law.damping, law.friction);
+  result["next"] = world.next_id;
+  result["bodies"] = bodies;
+  result["state"] = world_state(world);
+  return result;
+}
+
+/// Ids up to `id` are given to nobody else: a body of this model comes and goes.
+void skip_ids(TouchingWorldObject& world, std::int64_t id, const ModelHold& model) {
+  while (world.next_id < id) {
+    const std::int64_t skipped = world.get().add(Body(model->model));
+    static_cast<void>(world.get().remove(skipped));
+    world.next_id = skipped + 1;
+  }
+}
+
+void restore_bodies(TouchingWorldObject& world, const py::list& kept) {
+  std::vector<std::int64_t> gone;
+  for (const auto& member : world.bodies) gone.push_back(member.first);
+  for (const py::handle entry : kept) {
+    const auto body = entry.cast<py::tuple>();
+    const auto id = body[0].cast<std::int64_t>();
+    if (std::erase(gone, id) == 0) {
+      const ModelHold model(body[1].cast<std::shared_ptr<ModelObject>>());
+      skip_ids(world, id, model);
+      add(world, std::make_shared<BodyObject>(model));
+    }
+    set_settings(*body_at(world, id), body[2].cast<py::tuple>());
+    set_obstacles(*body_at(world, id), body[3].cast<py::dict>());
+  }
+  for (const std::int64_t id : gone) remove(world, id);
+}
+
+/// What kept() gave of a world that was made in the same way as this new one.
+void restore(TouchingWorldObject& world, const py::dict& kept) {
+  const auto law = kept["law"].cast<py::tuple>();
+  const auto bodies = kept["bodies"].cast<py::list>();
+  set_law(world, law[0].cast<double>(), law[1].cast<double>(), law[2].cast<double>());
+  restore_bodies(world, bodies);
+  if (!world.bodies.empty()) skip_ids(world, kept["next"].cast<std::int64_t>(), world.bodies.begin()->second->model);
+  set_world_state(world, kept["state"].cast<const WorldStateObject&>());
+  for (const py::handle entry : bodies) {
+    const auto body = entry.cast<py::tuple>();
+    set_obstacle_motions(*body_at(world, body[0].cast<std::int64_t>()), body[3].cast<py::dict>());
+  }
+}
+
+void bind_copies(py::module_& module, py::class_<TouchingWorldObject, Shared>& type) {
+  using ModelClass = py::class_<ModelObject, std::shared_ptr<ModelObject>>;
+  py::reinterpret_borrow<ModelClass>(module.attr("Model"))
+      .def(py::init(&model_of_kind), py::arg("world"), py::arg("kind"));
+  type.def_property_readonly("_kinds", &kinds)
+      .def("_take_models", &take_models, py::arg("models"))
+      .def("_kept", &kept)
+      .def("_restore", &restore, py::arg("kept"));
+}
+
+}  // namespace
+
+void bind_touching_world(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(exmat_body_contact, body, other, vertex, position, normal, force, depth);
+  bind_world_state(module);
+  py::class_<TouchingWorldObject, Shared> type(module, "TouchingWorld", "What exmat.TouchingWorld stands on.");
+  type.def(py::init(&empty_world), py::arg("stiffness"), py::arg("damping"), py::arg("friction"),
+           py::arg("self_contact"))
+      .def(py::init(&of_scene), py::arg("path"))
+      .def(py::init(&of_text), py::arg("scene"), py::arg("path"))
+      .def("__len__", [](const TouchingWorldObject& world) { return world.bodies.size(); })
+      .def(
+          "__contains__", [](const TouchingWorldObject& world, std::int64_t id) { return world.bodies.contains(id); },
+          py::arg("id"))
+      .def("__getitem__", &body_at, py::arg("id"), "The Body of this id itself.")
+      .def(
+          "__iter__", [](const TouchingWorldObject& world) { return py::iter(ids(world).attr("tolist")()); },
+          "Over the ids, ascending.")
+      .def_property_readonly("ids", &ids, "Of all bodies, shape (N,), ascending. A copy.")
+      .def_property_readonly("bodies", &list_of, "All bodies, in the order of their ids: a list of the Body of each.")
+      .def("add", &add, py::arg("body"),
+           "The body is the world's from now on, as it is and where it is: its id, which no later one gets. What it "
+           "overlaps pushes it out. Its functions serve as before, but for those that step it.")
+      .def("remove", &remove, py::arg("id"), "Takes a body out and returns it.")
+      .def(
+          "name",
+          [](TouchingWorldObject& world, std::int64_t id) {
+            body_at(world, id);
+            return world.get().name(id);
+          },
+          py::arg("id"), "Of a body of a scene, with its number where there are several: \"teddy_12\"; else \"\".")
+      .def(
+          "kind",
+          [](TouchingWorldObject& world, std::int64_t id) {
+            body_at(world, id);
+            return world.get().kind(id);
+          },
+          py::arg("id"), "Of a body of a scene its place among the scene's \"bodies\"; -1 of one that was added.")
+      .def_property_readonly(
+          "contact_law", [](TouchingWorldObject& world) { return world.get().contact_law(); },
+          "How bodies touch: a ContactLaw.")
+      .def("set_contact_law", &set_law, py::kw_only(), py::arg("stiffness") = py::none(),
+           py::arg("damping") = py::none(), py::arg("friction") = py::none(), "What is None stays.")
+      .def("step", &step, py::arg("n") = 1, py::arg("threads") = 0,
+           "Takes `n` steps of all bodies by up to `threads` threads, 0: one for each processor; the results do not "
+           "depend on their number. Returns a WorldReport. Raises NonFinite, which names the first such body: it and "
+           "what touches it are as they were before that step.")
+      .def_property_readonly(
+          "report", [](TouchingWorldObject& world) { return world.get(), world.report; },
+          "WorldReport of the last call that stepped, also where it raised.")
+      .def_property_readonly(
+          "contacts", &contacts,
+          "Vertices that touched another body, or their own, at the end of the last step, a structured array of shape "
+          "(count,): body, other (ids), vertex, position [m], normal (away from the other), force on the body [N] and "
+          "depth [m]. A copy.")
+      .def_property_readonly(
+          "energies", [](TouchingWorldObject& world) { return world.get().energies(); }, "Of all bodies together.")
+      .def_property_readonly(
+          "state_hash", [](TouchingWorldObject& world) { return world.get().hash(); },
+          "As exmat.state_hash(world.bodies).")
+      .def_property("state", &world_state, &set_world_state, "The whole WorldState, a copy; likewise to be set.");
+  bind_copies(module, type);
+}
+
+}  // namespace exmat::python
