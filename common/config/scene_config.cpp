@@ -102,6 +102,9 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   const Json newton = member_or(shared, "newton", Json::object());
   scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
   scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
+  const Json sleep = member_or(shared, "sleep", Json::object());
+  scene.sleep.energy = sleep.value("energy", scene.sleep.energy);
+  scene.sleep.time = sleep.value("time", scene.sleep.time);
   if (own.contains("examples")) scene.examples = read_example_force(own["examples"], file, place + "/examples");
   scene.regions = read_region_forces(member_or(own, "regions", Json::array()), file, place);
   const Json forces = member_or(own, "forces", Json::array());
@@ -134,6 +137,9 @@ void refuse_members_of_one_body(const Json& json, const std::filesystem::path& f
   if (json.contains("instances"))
     throw InputError(
         {file.string(), "/instances", "no such member beside bodies", "one", "give a body a \"grid\" or \"poses\""});
+  if (json.contains("sleep"))
+    throw InputError({file.string(), "/sleep", "no such member beside bodies", "one",
+                      "bodies that touch each other do not sleep: drop it"});
   if (json.contains("output") && json["output"].value("render", false))
     throw InputError({file.string(), "/output/render", "false beside bodies", "true",
                       "render meshes are written for scenes of one body"});

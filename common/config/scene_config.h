@@ -64,6 +64,11 @@ struct NewtonConfig {
   double tolerance = 1e-6;  ///< relative to |f_ext| + |f_int| + |inertia|
 };
 
+struct SleepConfig {
+  double energy = 0;  ///< a body below this kinetic energy [J]; 0: none
+  double time = 0.5;  ///< for so long is left alone [s]
+};
+
 /// A pose of a rigid motion at a time.
 struct KeyframeConfig {
   double time = 0;                                                  ///< [s]
@@ -140,6 +145,7 @@ struct SceneConfig {
   double mass_damping = 0;                          ///< alpha [1/s]
   double stiffness_damping = 0;                     ///< beta [s]
   NewtonConfig newton;
+  SleepConfig sleep;
   std::optional<ExampleForceConfig> examples;  ///< of the whole body
   std::vector<RegionForceConfig> regions;
   std::vector<VertexForceConfig> forces;

@@ -18,39 +18,51 @@ namespace {
 constexpr double kEnergyWeight = 3;
 constexpr Eigen::Index kHeldoutPoses = 50;
 constexpr Eigen::Index kStiffnessPoses = 10;
-constexpr int kPasses = 4;  // over meshes that offer a part of their tets in each
-// Partial sums over the tets have this fixed size, so that they do not depend on the number of threads.
-constexpr Eigen::Index kSumBlock = 256;
+constexpr int kPasses = 4;                          // over meshes that offer a part of their tets in each
+constexpr Eigen::Index kCandidatesPerElement = 16;  // in each of these passes: more lower no held-out error
+
+// The body in coordinates y = L^T q in which its stiffness at rest is the identity, L L^T = U^T K U: the norm of forces
+// there is that of the inverse rest stiffness.
+class UnitBody {
+ public:
+  UnitBody(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source)
+      : factor_(source.rest_stiffness), basis_(source.basis), samples_(mesh, materials, basis_) {
+    factor_.matrixU().solveInPlace<Eigen::OnTheRight>(basis_);
+  }
+
+  const ElementSamples& samples() const { return samples_; }
+  PoseLanes lanes(const RowMatrix& poses) const { return PoseLanes(poses * factor_.matrixL()); }
+
+ private:
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  RowMatrix basis_;
+  ElementSamples samples_;
+};
 
 // Sum of all tets' responses at the poses, and each tet's mean share of the energy.
 struct Totals {
-  ElementSamples::Response response;
+  Responses responses;
   Eigen::VectorXd element_energies;
 };
 
-Totals sum_responses(const ElementSamples& samples, const RowMatrix& poses) {
-  const Eigen::Index blocks = (samples.count() + kSumBlock - 1) / kSumBlock;
-  std::vector<ElementSamples::Response> partial(static_cast<std::size_t>(blocks));
-  Totals totals{{Eigen::MatrixXd::Zero(samples.modes(), poses.rows()), Eigen::VectorXd::Zero(poses.rows())},
-                Eigen::VectorXd(samples.count())};
-  Progress progress("element responses", blocks);
+Totals sum_responses(const ElementSamples& samples, const PoseLanes& poses) {
+  const std::vector<Part> parts = parts_of(samples.count());
+  const Responses zeros(samples.modes(), poses);
+  std::vector<Responses> partial(parts.size(), zeros);
+  Totals totals{zeros, Eigen::VectorXd(samples.count())};
+  Progress progress("element responses", std::ssize(parts));
 #pragma omp parallel for schedule(dynamic)
-  for (Eigen::Index block = 0; block < blocks; ++block) {
-    auto& sum = partial[static_cast<std::size_t>(block)];
-    sum = {Eigen::MatrixXd::Zero(samples.modes(), poses.rows()), Eigen::VectorXd::Zero(poses.rows())};
-    for (Eigen::Index t = block * kSumBlock; t < std::min(samples.count(), (block + 1) * kSumBlock); ++t) {
-      const auto own = samples.response(t, poses);
-      sum.forces += own.forces;
-      sum.energies += own.energies;
-      totals.element_energies[t] = own.energies.mean();
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    Responses own = zeros;
+    for (Eigen::Index t = parts[i].begin; t < parts[i].end; ++t) {
+      samples.respond(t, poses, own);
+      partial[i].numbers() += own.numbers();
+      totals.element_energies[t] = own.mean_energy();
     }
 #pragma omp critical(element_responses_progress)
     progress.advance();
   }
-  for (const auto& sum : partial) {
-    totals.response.forces += sum.forces;
-    totals.response.energies += sum.energies;
-  }
+  for (const Responses& sum : partial) totals.responses.numbers() += sum.numbers();
   return totals;
 }
 
@@ -58,22 +70,25 @@ Totals sum_responses(const ElementSamples& samples, const RowMatrix& poses) {
 // the energy.
 class TrainingRows {
  public:
-  TrainingRows(const PoseSource& source, const ElementSamples::Response& totals) : factor_(source.rest_stiffness) {
-    const Eigen::MatrixXd whitened = factor_.matrixL().solve(totals.forces);
-    force_scale_ = whitened.colwise().norm().cwiseInverse().transpose();
-    energy_scale_ = kEnergyWeight * totals.energies.cwiseInverse();
+  explicit TrainingRows(const Responses& totals)
+      : force_scale_(Eigen::ArrayXd::Zero(totals.groups() * runtime::kLanes)), energy_scale_(force_scale_) {
+    const Eigen::Index count = totals.energies().size();
+    force_scale_.head(count) = totals.force_norms().array().inverse();
+    energy_scale_.head(count) = kEnergyWeight * totals.energies().array().inverse();
   }
 
-  Eigen::VectorXd operator()(const ElementSamples::Response& response) const {
-    Eigen::MatrixXd rows(response.forces.rows() + 1, response.forces.cols());
-    rows.topRows(response.forces.rows()) = factor_.matrixL().solve(response.forces) * force_scale_.asDiagonal();
-    rows.bottomRows<1>() = response.energies.cwiseProduct(energy_scale_).transpose();
-    return rows.reshaped();
+  Eigen::VectorXd operator()(Responses responses) const {
+    for (Eigen::Index g = 0; g < responses.groups(); ++g) {
+      auto group = responses.group(g);
+      const Eigen::Index r = group.cols() - 1;
+      group.leftCols(r).colwise() *= force_scale_.segment<runtime::kLanes>(g * runtime::kLanes);
+      group.col(r) *= energy_scale_.segment<runtime::kLanes>(g * runtime::kLanes);
+    }
+    return responses.numbers();
   }
 
  private:
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-  Eigen::VectorXd force_scale_, energy_scale_;
+  Eigen::ArrayXd force_scale_, energy_scale_;
 };
 
 // A systematic sample of tets over the order of their energies, `kept` always in it. Ascending.
@@ -97,14 +112,20 @@ std::vector<Eigen::Index> choose_candidates(const Eigen::VectorXd& energies, con
   return chosen;
 }
 
-SelectionProblem build_problem(const ElementSamples& samples, const RowMatrix& poses, const TrainingRows& rows,
-                               const ElementSamples::Response& totals, const std::vector<Eigen::Index>& candidates) {
+SelectionProblem build_problem(const ElementSamples& samples, const PoseLanes& poses, const TrainingRows& rows,
+                               const Responses& totals, const std::vector<Eigen::Index>& candidates) {
   SelectionProblem problem;
   problem.target = rows(totals);
   problem.columns.resize(problem.target.size(), static_cast<Eigen::Index>(candidates.size()));
-#pragma omp parallel for schedule(dynamic, 16)
-  for (std::size_t k = 0; k < candidates.size(); ++k)
-    problem.columns.col(static_cast<Eigen::Index>(k)) = rows(samples.response(candidates[k], poses));
+#pragma omp parallel
+  {
+    Responses own(samples.modes(), poses);
+#pragma omp for schedule(dynamic, 16)
+    for (std::size_t k = 0; k < candidates.size(); ++k) {
+      samples.respond(candidates[k], poses, own);
+      problem.columns.col(static_cast<Eigen::Index>(k)) = rows(own);
+    }
+  }
   return problem;
 }
 
@@ -123,79 +144,6 @@ std::vector<Eigen::Index> to_members(const std::vector<Eigen::Index>& candidates
   return members;
 }
 
-double root_mean_square(const Eigen::VectorXd& values) {
-  return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
-}
-
-// What the subset gives in place of all elements.
-ElementSamples::Response weighted_response(const ElementSamples& samples, const std::vector<Eigen::Index>& elements,
-                                           const Eigen::VectorXd& weights, const RowMatrix& poses) {
-  ElementSamples::Response sum{Eigen::MatrixXd::Zero(samples.modes(), poses.rows()),
-                               Eigen::VectorXd::Zero(poses.rows())};
-  for (std::size_t k = 0; k < elements.size(); ++k) {
-    const auto own = samples.response(elements[k], poses);
-    sum.forces += weights[static_cast<Eigen::Index>(k)] * own.forces;
-    sum.energies += weights[static_cast<Eigen::Index>(k)] * own.energies;
-  }
-  return sum;
-}
-
-// Measures subsets against all elements at fixed poses; the totals are summed once.
-class ErrorMeter {
- public:
-  ErrorMeter(const ElementSamples& samples, const PoseSource& source, const RowMatrix& poses)
-      : samples_(samples), poses_(poses), factor_(source.rest_stiffness), totals_(sum_responses(samples, poses)) {}
-
-  const RowMatrix& poses() const { return poses_; }
-  const Totals& totals() const { return totals_; }
-
-  double force_error(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
-    return force_error(weighted_response(samples_, elements, weights, poses_));
-  }
-
-  CubatureErrors all_errors(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
-    const auto reduced = weighted_response(samples_, elements, weights, poses_);
-    const Eigen::VectorXd energy =
-        (reduced.energies - totals_.response.energies).cwiseQuotient(totals_.response.energies);
-    return {force_error(reduced), root_mean_square(energy), stiffness_error(elements, weights)};
-  }
-
- private:
-  double force_error(const ElementSamples::Response& reduced) const {
-    const Eigen::MatrixXd difference = factor_.matrixL().solve(reduced.forces - totals_.response.forces);
-    const Eigen::MatrixXd reference = factor_.matrixL().solve(totals_.response.forces);
-    return root_mean_square(
-        (difference.colwise().norm().array() / reference.colwise().norm().array()).matrix().transpose());
-  }
-
-  double stiffness_error(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
-    const Eigen::Index count = std::min(kStiffnessPoses, poses_.rows());
-    Eigen::VectorXd errors(count);
-#pragma omp parallel for schedule(dynamic)
-    for (Eigen::Index p = 0; p < count; ++p) {
-      const Eigen::VectorXd pose = poses_.row(p);
-      Eigen::MatrixXd all = Eigen::MatrixXd::Zero(samples_.modes(), samples_.modes()), reduced = all;
-      for (Eigen::Index t = 0; t < samples_.count(); ++t) all += samples_.stiffness(t, pose);
-      for (std::size_t k = 0; k < elements.size(); ++k)
-        reduced += weights[static_cast<Eigen::Index>(k)] * samples_.stiffness(elements[k], pose);
-      errors[p] = (reduced - all).norm() / all.norm();
-    }
-    return root_mean_square(errors);
-  }
-
-  const ElementSamples& samples_;
-  const RowMatrix& poses_;
-  Eigen::LLT<Eigen::MatrixXd> factor_;
-  Totals totals_;
-};
-
-Selection select(const SelectionProblem& problem, const CubatureOptions& options, std::size_t count,
-                 const std::vector<Eigen::Index>& start, const StopRule* stop) {
-  if (options.method == CubatureMethod::kGreedy) return select_greedy_random(problem, count, start, stop, options.seed);
-  if (options.method == CubatureMethod::kNnHtp) return select_hard_thresholding(problem, count);
-  return select_greedy_swap(problem, count, start, stop);
-}
-
 struct Choice {
   std::vector<Eigen::Index> elements;
   Eigen::VectorXd weights;
@@ -207,25 +155,106 @@ Choice every_element(Eigen::Index tets) {
   return choice;
 }
 
-Choice choose(const ElementSamples& samples, const PoseSource& source, const CubatureOptions& options,
-              const ErrorMeter& training, const ErrorMeter* heldout) {
+double root_mean_square(const Eigen::VectorXd& values) {
+  return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+}
+
+// What the subset gives in place of all elements.
+Responses weighted_response(const ElementSamples& samples, const std::vector<Eigen::Index>& elements,
+                            const Eigen::VectorXd& weights, const PoseLanes& poses) {
+  const std::vector<Part> parts = parts_of(std::ssize(elements));
+  Responses sum(samples.modes(), poses);
+  std::vector<Responses> partial(parts.size(), sum);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    Responses own(samples.modes(), poses);
+    for (Eigen::Index k = parts[i].begin; k < parts[i].end; ++k) {
+      samples.respond(elements[static_cast<std::size_t>(k)], poses, own);
+      partial[i].numbers() += weights[k] * own.numbers();
+    }
+  }
+  for (const Responses& own : partial) sum.numbers() += own.numbers();
+  return sum;
+}
+
+// Measures subsets against all elements at fixed poses; the totals are summed once.
+class ErrorMeter {
+ public:
+  ErrorMeter(const UnitBody& body, const RowMatrix& poses)
+      : body_(body), poses_(poses), lanes_(body.lanes(poses)), totals_(sum_responses(body.samples(), lanes_)) {}
+
+  const PoseLanes& lanes() const { return lanes_; }
+  const Totals& totals() const { return totals_; }
+
+  double force_error(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
+    return force_error(weighted_response(body_.samples(), elements, weights, lanes_));
+  }
+
+  // `samples` has the basis that stiffness is measured in.
+  CubatureErrors all_errors(const ElementSamples& samples, const std::vector<Eigen::Index>& elements,
+                            const Eigen::VectorXd& weights) const {
+    const Responses reduced = weighted_response(body_.samples(), elements, weights, lanes_);
+    const Eigen::VectorXd all = totals_.responses.energies();
+    return {force_error(reduced), root_mean_square((reduced.energies() - all).cwiseQuotient(all)),
+            stiffness_error(samples, elements, weights)};
+  }
+
+ private:
+  double force_error(Responses difference) const {
+    difference.numbers() -= totals_.responses.numbers();
+    return root_mean_square(difference.force_norms().cwiseQuotient(totals_.responses.force_norms()));
+  }
+
+  double stiffness_error(const ElementSamples& samples, const std::vector<Eigen::Index>& elements,
+                         const Eigen::VectorXd& weights) const {
+    const Eigen::Index count = std::min(kStiffnessPoses, poses_.rows());
+    const PoseLanes lanes(poses_.topRows(count));
+    const Choice every = every_element(samples.count());
+    const auto all = samples.stiffness(every.elements, every.weights, lanes);
+    const auto reduced = samples.stiffness(elements, weights, lanes);
+    Eigen::VectorXd errors(count);
+    for (Eigen::Index p = 0; p < count; ++p) {
+      const auto at = static_cast<std::size_t>(p);
+      errors[p] = (reduced[at] - all[at]).norm() / all[at].norm();
+    }
+    return root_mean_square(errors);
+  }
+
+  const UnitBody& body_;
+  const RowMatrix& poses_;
+  PoseLanes lanes_;
+  Totals totals_;
+};
+
+Selection select(const SelectionProblem& problem, const CubatureOptions& options, std::size_t count,
+                 const std::vector<Eigen::Index>& start, const StopRule* stop) {
+  if (options.method == CubatureMethod::kGreedy) return select_greedy_random(problem, count, start, stop, options.seed);
+  if (options.method == CubatureMethod::kNnHtp) return select_hard_thresholding(problem, count);
+  return select_greedy_swap(problem, count, start, stop);
+}
+
+Choice choose(const ElementSamples& samples, const CubatureOptions& options, const ErrorMeter& training,
+              const ErrorMeter* heldout) {
   if (options.method == CubatureMethod::kAllElements) return every_element(samples.count());
-  const RowMatrix& poses = training.poses();
+  const PoseLanes& poses = training.lanes();
   const Totals& totals = training.totals();
-  const TrainingRows rows(source, totals.response);
-  const Eigen::Index limit =
-      std::max<Eigen::Index>(1, options.training_entries / ((samples.modes() + 1) * poses.rows()));
-  const int passes = samples.count() > limit ? kPasses : 1;
+  const TrainingRows rows(totals.responses);
   const auto r = static_cast<std::size_t>(samples.modes());
   const bool open_ended = options.tolerance.has_value();
   const auto target = open_ended ? std::min<std::size_t>(10 * r, static_cast<std::size_t>(samples.count()))
                                  : static_cast<std::size_t>(options.elements.value_or(static_cast<int>(2 * r)));
+  const Eigen::Index most =
+      std::max<Eigen::Index>(1, options.training_entries / ((samples.modes() + 1) * poses.count()));
+  const bool all_fit = samples.count() <= most;
+  const int passes = all_fit ? 1 : kPasses;
+  const Eigen::Index limit =
+      all_fit ? most : std::min<Eigen::Index>(most, kCandidatesPerElement * static_cast<Eigen::Index>(target));
   Choice choice;
   Progress progress("cubature passes", passes);
   for (int pass = 0; pass < passes; ++pass) {
     const auto candidates = choose_candidates(totals.element_energies, choice.elements, limit,
                                               options.seed + 1000 + static_cast<unsigned>(pass));
-    const auto problem = build_problem(samples, poses, rows, totals.response, candidates);
+    const auto problem = build_problem(samples, poses, rows, totals.responses, candidates);
     const StopRule tolerance_met{std::max<std::size_t>(1, r / 4), [&](const Selection& selection) {
                                    return heldout->force_error(to_tets(candidates, selection.members),
                                                                selection.weights) <= *options.tolerance;
@@ -259,6 +288,24 @@ void set_elements(const ElementSamples& samples, const TetMaterials& materials, 
   }
 }
 
+Choice choice_of(const CubatureData& data) { return {{data.elements.begin(), data.elements.end()}, data.weights}; }
+
+struct HeldoutMeter {
+  RowMatrix poses;
+  ErrorMeter meter;
+
+  HeldoutMeter(const UnitBody& body, const PoseSource& source, const CubatureOptions& options)
+      : poses(draw_heldout_poses(source, kHeldoutPoses, options.seed + 1'000'003)), meter(body, poses) {}
+
+  void measure(const ElementSamples& samples, const Choice& choice, CubatureData& data) const {
+    const CubatureErrors errors = meter.all_errors(samples, choice.elements, choice.weights);
+    data.heldout_poses = poses;
+    data.heldout_error = errors.force;
+    data.heldout_energy_error = errors.energy;
+    data.heldout_stiffness_error = errors.stiffness;
+  }
+};
+
 void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
   if (options.elements && *options.elements > tets)
     throw InputError({"", "/cubature/elements", "at most the number of tets, " + std::to_string(tets),
@@ -283,50 +330,48 @@ CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, co
 
 CubatureData with_basis(const CubatureData& other, const TetMesh& mesh, const TetMaterials& materials,
                         const RowMatrix& basis) {
-  Choice choice;
-  choice.elements.assign(other.elements.begin(), other.elements.end());
-  choice.weights = other.weights;
   CubatureData data;
   data.method = other.method;
-  set_elements(ElementSamples(mesh, materials, basis), materials, choice, data);
+  set_elements(ElementSamples(mesh, materials, basis), materials, choice_of(other), data);
   return data;
 }
 
 CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                                const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
                                const RowMatrix& poses) {
-  const ElementSamples samples(mesh, materials, source.basis);
-  return ErrorMeter(samples, source, poses).all_errors(elements, weights);
+  const UnitBody body(mesh, materials, source);
+  return ErrorMeter(body, poses).all_errors(ElementSamples(mesh, materials, source.basis), elements, weights);
 }
 
 CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                             const CubatureOptions& options) {
   require_sound_options(options, mesh.tet_count());
+  const UnitBody body(mesh, materials, source);
   const ElementSamples samples(mesh, materials, source.basis);
   const RowMatrix training_poses = draw_poses(source, options.training_poses, options.seed);
-  const ErrorMeter training(samples, source, training_poses);
+  const ErrorMeter training(body, training_poses);
+  std::optional<HeldoutMeter> heldout;
+  if (options.measured || options.tolerance) heldout.emplace(body, source, options);
+  const Choice choice = choose(body.samples(), options, training, heldout ? &heldout->meter : nullptr);
   CubatureData data;
   data.method = options.method;
-  if (!options.measured && !options.tolerance) {
-    set_elements(samples, materials, choose(samples, source, options, training, nullptr), data);
-    return data;
-  }
-  data.heldout_poses = draw_heldout_poses(source, kHeldoutPoses, options.seed + 1'000'003);
-  const ErrorMeter heldout(samples, source, data.heldout_poses);
-  const auto choice = choose(samples, source, options, training, &heldout);
-
   set_elements(samples, materials, choice, data);
   data.training_error = training.force_error(choice.elements, choice.weights);
-  const auto errors = heldout.all_errors(choice.elements, choice.weights);
-  data.heldout_error = errors.force;
-  data.heldout_energy_error = errors.energy;
-  data.heldout_stiffness_error = errors.stiffness;
+  if (heldout) heldout->measure(samples, choice, data);
   if (options.tolerance && data.heldout_error > *options.tolerance)
     throw WorkError(
         fmt::format("cubature.tolerance: expected a held-out error of at most {:.3g}, found {:.3g} with {} elements; "
                     "raise it, or lower basis.size",
                     *options.tolerance, data.heldout_error, data.elements.size()));
   return data;
+}
+
+CubatureData measured_cubature(const CubatureData& data, const TetMesh& mesh, const TetMaterials& materials,
+                               const PoseSource& source, const CubatureOptions& options) {
+  const UnitBody body(mesh, materials, source);
+  CubatureData measured = data;
+  HeldoutMeter(body, source, options).measure(ElementSamples(mesh, materials, source.basis), choice_of(data), measured);
+  return measured;
 }
 
 }  // namespace exmat::precompute

@@ -49,4 +49,8 @@ CubatureData with_basis(const CubatureData& other, const TetMesh& mesh, const Te
 CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                             const CubatureOptions& options);
 
+/// What was built of the same, though not measured, with its errors on held-out poses.
+CubatureData measured_cubature(const CubatureData& data, const TetMesh& mesh, const TetMaterials& materials,
+                               const PoseSource& source, const CubatureOptions& options);
+
 }  // namespace exmat::precompute

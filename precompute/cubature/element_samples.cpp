@@ -1,16 +1,49 @@
 #include "precompute/cubature/element_samples.h"
 
-#include "common/elastic/materials.h"
+#include <algorithm>
+
 #include "common/mesh/geometry.h"
+#include "runtime/sim/elasticity/element_potential.h"
 
 namespace exmat::precompute {
 namespace {
 
-using RowMatrix3Map = Eigen::Map<const RowMatrix3>;
+using runtime::AlignedArray;
+using runtime::ElementArrays;
+using runtime::ElementLaw;
+using runtime::kLanes;
 
-Eigen::Matrix<double, 9, 1> flatten(const Eigen::Matrix3d& matrix) { return matrix.reshaped<Eigen::RowMajor>(); }
+constexpr Eigen::Index kAtOnce = 64;       // tets whose B the second-level cache holds
+constexpr Eigen::Index kPartialSums = 64;  // whatever the number of threads: sums do not depend on it
+
+ElementLaw law_of(MaterialModel model, const double* mu, const double* lambda) {
+  ElementLaw law;
+  law.kind = runtime::law_kind(model);
+  law.mu = mu;
+  law.lambda = lambda;
+  return law;
+}
 
 }  // namespace
+
+PoseLanes::PoseLanes(const RowMatrix& poses)
+    : count_(poses.rows()), modes_(poses.cols()), numbers_(groups() * modes_ * kLanes) {
+  for (Eigen::Index p = 0; p < count_; ++p)
+    for (Eigen::Index c = 0; c < modes_; ++c) numbers_[(p / kLanes * modes_ + c) * kLanes + p % kLanes] = poses(p, c);
+}
+
+Eigen::VectorXd Responses::force_norms() const {
+  Eigen::ArrayXd norms(groups() * kLanes);
+  for (Eigen::Index g = 0; g < groups(); ++g)
+    norms.segment<kLanes>(g * kLanes) = group(g).leftCols(rows_ - 1).square().rowwise().sum().sqrt();
+  return norms.head(poses_);
+}
+
+Eigen::VectorXd Responses::energies() const {
+  Eigen::ArrayXd energies(groups() * kLanes);
+  for (Eigen::Index g = 0; g < groups(); ++g) energies.segment<kLanes>(g * kLanes) = group(g).col(rows_ - 1);
+  return energies.head(poses_);
+}
 
 ElementSamples::ElementSamples(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis)
     : mesh_(mesh), materials_(materials), basis_(basis), volumes_(tet_volumes(mesh)) {}
@@ -20,38 +53,88 @@ LameParameters ElementSamples::lame(Eigen::Index tet) const {
 }
 
 RowMatrix ElementSamples::gradient(Eigen::Index tet) const {
-  const auto shape = shape_gradients(tet_positions(mesh_, tet));
-  RowMatrix B = RowMatrix::Zero(9, modes());
-  for (int corner = 0; corner < 4; ++corner)
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) B.row(3 * a + b) += shape(corner, b) * basis_.row(3 * mesh_.tets(tet, corner) + a);
+  RowMatrix B(9, modes());
+  write_gradient(tet, modes(), B.data());
   return B;
 }
 
-ElementSamples::Response ElementSamples::response(Eigen::Index tet, const RowMatrix& poses) const {
-  const RowMatrix B = gradient(tet);
-  const Eigen::MatrixXd gradients = B * poses.transpose();
-  const auto parameters = lame(tet);
-  Response result{{}, Eigen::VectorXd(poses.rows())};
-  Eigen::MatrixXd stresses(9, poses.rows());
-  with_material(materials_.model, [&](auto material) {
-    for (Eigen::Index p = 0; p < poses.rows(); ++p) {
-      const Eigen::Matrix3d H = RowMatrix3Map(gradients.col(p).data());
-      stresses.col(p) = volumes_[tet] * flatten(material.first_piola_kirchhoff(H, parameters));
-      result.energies[p] = volumes_[tet] * material.energy(H, parameters);
-    }
-  });
-  result.forces = B.transpose() * stresses;
-  return result;
+// Rows `stride` apart.
+void ElementSamples::write_gradient(Eigen::Index tet, Eigen::Index stride, double* numbers) const {
+  const auto shape = shape_gradients(tet_positions(mesh_, tet));
+  Eigen::Map<RowMatrix, 0, Eigen::OuterStride<>> B(numbers, 9, modes(), Eigen::OuterStride<>(stride));
+  B.setZero();
+  for (int corner = 0; corner < 4; ++corner)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b) B.row(3 * a + b) += shape(corner, b) * basis_.row(3 * mesh_.tets(tet, corner) + a);
 }
 
-Eigen::MatrixXd ElementSamples::stiffness(Eigen::Index tet, const Eigen::VectorXd& pose) const {
-  const RowMatrix B = gradient(tet);
-  const Eigen::Matrix<double, 9, 1> flat = B * pose;
-  const Eigen::Matrix3d H = RowMatrix3Map(flat.data());
-  const Matrix9 tangent =
-      with_material(materials_.model, [&](auto material) { return material.tangent(H, lame(tet)); });
-  return volumes_[tet] * (B.transpose() * (tangent * B));
+void ElementSamples::respond(Eigen::Index tet, const PoseLanes& poses, Responses& responses) const {
+  const Eigen::Index r = modes(), stride = runtime::padded(r);
+  thread_local AlignedArray B;
+  if (B.size() != 9 * stride) B = AlignedArray(9 * stride);
+  write_gradient(tet, stride, B.data());
+  const auto parameters = lame(tet);
+  const double mu = volumes_[tet] * parameters.mu, lambda = volumes_[tet] * parameters.lambda;
+  const ElementArrays arrays{1, r, stride, nullptr, B.data(), 1};
+  const ElementLaw law = law_of(materials_.model, &mu, &lambda);
+  for (Eigen::Index g = 0; g < poses.groups(); ++g) {
+    auto group = responses.group(g);
+    runtime::kernels().lanes_force(arrays, law, poses.group(g), &group(0, r), &group(0, 0));
+  }
+}
+
+// Of kLanes poses, in the layout of the kernels.
+void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights, Part part,
+                                   const PoseLanes& poses, std::vector<AlignedArray>& sums) const {
+  const Eigen::Index r = modes(), stride = runtime::padded(r);
+  AlignedArray B(kAtOnce * 9 * stride), mu(kAtOnce), lambda(kAtOnce), scratch(runtime::lane_scratch(r)),
+      force(r * kLanes), stiffness(runtime::lane_triangle(r));
+  double energy[kLanes];
+  for (Eigen::Index first = part.begin; first < part.end; first += kAtOnce) {
+    const Eigen::Index count = std::min(kAtOnce, part.end - first);
+    for (Eigen::Index e = 0; e < count; ++e) {
+      const Eigen::Index tet = tets[static_cast<std::size_t>(first + e)];
+      const auto parameters = lame(tet);
+      write_gradient(tet, stride, B.data() + e * 9 * stride);
+      mu[e] = weights[first + e] * volumes_[tet] * parameters.mu;
+      lambda[e] = weights[first + e] * volumes_[tet] * parameters.lambda;
+    }
+    const ElementArrays arrays{runtime::padded(count) / kLanes, r, stride, nullptr, B.data(), count};
+    const ElementLaw law = law_of(materials_.model, mu.data(), lambda.data());
+    for (Eigen::Index g = 0; g < poses.groups(); ++g) {
+      runtime::kernels().lanes_force_and_stiffness(arrays, law, poses.group(g), scratch.data(), energy, force.data(),
+                                                   stiffness.data());
+      AlignedArray& sum = sums[static_cast<std::size_t>(g)];
+      for (Eigen::Index i = 0; i < stiffness.size(); ++i) sum[i] += stiffness[i];
+    }
+  }
+}
+
+std::vector<Eigen::MatrixXd> ElementSamples::stiffness(const std::vector<Eigen::Index>& tets,
+                                                       const Eigen::VectorXd& weights, const PoseLanes& poses) const {
+  const Eigen::Index r = modes();
+  using Sums = std::vector<AlignedArray>;
+  const Sums zeros(static_cast<std::size_t>(poses.groups()), AlignedArray(runtime::lane_triangle(r)));
+  const std::vector<Part> parts = parts_of(std::ssize(tets));
+  std::vector<Sums> partial(parts.size(), zeros);
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t i = 0; i < parts.size(); ++i) add_stiffness(tets, weights, parts[i], poses, partial[i]);
+  std::vector<Eigen::MatrixXd> stiffness(static_cast<std::size_t>(poses.count()), Eigen::MatrixXd::Zero(r, r));
+  for (const Sums& sums : partial)
+    for (Eigen::Index p = 0; p < poses.count(); ++p)
+      for (Eigen::Index i = 0; i < r; ++i)
+        for (Eigen::Index j = 0; j <= i; ++j)
+          stiffness[static_cast<std::size_t>(p)](i, j) +=
+              sums[static_cast<std::size_t>(p / kLanes)][runtime::lane_entry(i, j) + p % kLanes];
+  for (Eigen::MatrixXd& K : stiffness) K = Eigen::MatrixXd(K.selfadjointView<Eigen::Lower>());
+  return stiffness;
+}
+
+std::vector<Part> parts_of(Eigen::Index count) {
+  std::vector<Part> parts;
+  const Eigen::Index number = std::min(count, kPartialSums);
+  for (Eigen::Index i = 0; i < number; ++i) parts.push_back({count * i / number, count * (i + 1) / number});
+  return parts;
 }
 
 }  // namespace exmat::precompute

@@ -1,10 +1,61 @@
 #pragma once
 
+#include <vector>
+
 #include "common/core/arrays.h"
 #include "common/elastic/material.h"
 #include "common/mesh/tet_mesh.h"
+#include "runtime/kernels/aligned_array.h"
 
 namespace exmat::precompute {
+
+/// What is summed by itself where tets are many: the same parts, and so the same sum, for every number of threads.
+struct Part {
+  Eigen::Index begin = 0, end = 0;
+};
+std::vector<Part> parts_of(Eigen::Index count);
+
+/// Poses as the kernels take them (kernels.h), kLanes of them side by side; zeros after the last.
+class PoseLanes {
+ public:
+  /// [N x r].
+  explicit PoseLanes(const RowMatrix& poses);
+
+  Eigen::Index count() const { return count_; }
+  Eigen::Index groups() const { return (count_ + runtime::kLanes - 1) / runtime::kLanes; }
+  const double* group(Eigen::Index index) const { return numbers_.data() + index * modes_ * runtime::kLanes; }
+
+ private:
+  Eigen::Index count_, modes_;
+  runtime::AlignedArray numbers_;
+};
+
+/// Reduced forces [r] and energies of one tet or a sum of tets at N poses, as the kernels leave them: for each group of
+/// kLanes poses r rows of forces and one of energies, a pose in each column. Columns after the last pose are zeros.
+class Responses {
+ public:
+  Responses(Eigen::Index modes, const PoseLanes& poses)
+      : rows_(modes + 1), poses_(poses.count()), numbers_(poses.groups() * rows_ * runtime::kLanes) {}
+
+  using Group = Eigen::Map<Eigen::Array<double, runtime::kLanes, Eigen::Dynamic>>;
+  using ConstGroup = Eigen::Map<const Eigen::Array<double, runtime::kLanes, Eigen::Dynamic>>;
+  /// [kLanes x (r + 1)], a pose in each row; energies are the last column.
+  Group group(Eigen::Index index) { return {numbers_.data() + begin(index), runtime::kLanes, rows_}; }
+  ConstGroup group(Eigen::Index index) const { return {numbers_.data() + begin(index), runtime::kLanes, rows_}; }
+  Eigen::Index groups() const { return numbers_.size() / begin(1); }
+  Eigen::Map<Eigen::VectorXd> numbers() { return {numbers_.data(), numbers_.size()}; }
+  Eigen::Map<const Eigen::VectorXd> numbers() const { return {numbers_.data(), numbers_.size()}; }
+
+  Eigen::VectorXd force_norms() const;  ///< [N]
+  Eigen::VectorXd energies() const;     ///< [N]
+  double mean_energy() const { return energies().mean(); }
+
+ private:
+  Eigen::Index begin(Eigen::Index group) const { return group * rows_ * runtime::kLanes; }
+
+  Eigen::Index rows_, poses_;
+  runtime::AlignedArray numbers_;
+};
 
 /// Reduced elasticity of single tets: what cubature chooses from, and the sum over all of them.
 class ElementSamples {
@@ -19,18 +70,19 @@ class ElementSamples {
   /// [9 x r] B_j = dF/dq, row 3a + b.
   RowMatrix gradient(Eigen::Index tet) const;
 
-  /// Reduced internal forces [r x N] and energies [N] of one tet at [N x r] poses, times its volume.
-  struct Response {
-    Eigen::MatrixXd forces;
-    Eigen::VectorXd energies;
-  };
-  Response response(Eigen::Index tet, const RowMatrix& poses) const;
+  /// Of one tet, times its volume; `responses` has the size that the poses ask for.
+  void respond(Eigen::Index tet, const PoseLanes& poses, Responses& responses) const;
 
-  /// [r x r] reduced stiffness of one tet at one pose, times its volume.
-  Eigen::MatrixXd stiffness(Eigen::Index tet, const Eigen::VectorXd& pose) const;
+  /// [r x r] at each of the poses: the sum of the reduced stiffnesses of tets, times weights [s] and volumes. The same
+  /// for every number of threads.
+  std::vector<Eigen::MatrixXd> stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights,
+                                         const PoseLanes& poses) const;
 
  private:
   LameParameters lame(Eigen::Index tet) const;
+  void write_gradient(Eigen::Index tet, Eigen::Index stride, double* numbers) const;
+  void add_stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights, Part part,
+                     const PoseLanes& poses, std::vector<runtime::AlignedArray>& sums) const;
 
   const TetMesh& mesh_;
   const TetMaterials& materials_;

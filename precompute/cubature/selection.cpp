@@ -20,6 +20,7 @@ constexpr std::size_t kSwapCandidates = 64;  // columns whose exact gain is comp
 constexpr double kSwapGain = 1e-6;           // of the squared residual, below which a swap is noise
 constexpr std::size_t kRandomCandidates = 100;
 constexpr int kThresholdingRounds = 50;
+constexpr Eigen::Index kBlock = 64;          // columns of A that meet the new ones at once
 constexpr double kCorrelationFloor = 1e-12;  // of |b|: no column helps any more
 
 using Members = std::vector<Eigen::Index>;
@@ -45,19 +46,25 @@ class NormalEquations {
   bool usable(Eigen::Index e) const { return norms_[e] > 0; }
 
   const Eigen::VectorXd& column(Eigen::Index e) {
-    Eigen::VectorXd& values = columns_[e];
-    if (values.size() > 0) return values;
-    values.resize(linear_.size());
-#pragma omp parallel for schedule(static)
-    for (Eigen::Index i = 0; i < linear_.size(); ++i) values[i] = problem_.columns.col(i).dot(problem_.columns.col(e));
-    return values;
+    if (!columns_.contains(e)) compute({e});
+    return columns_.at(e);
   }
 
-  Eigen::MatrixXd gram(const Members& members) {
-    const auto size = static_cast<Eigen::Index>(members.size());
-    Eigen::MatrixXd block(size, size);
-    for (Eigen::Index j = 0; j < size; ++j) block.col(j) = column(members[static_cast<std::size_t>(j)])(members);
-    return block;
+  // Those that are not there yet, all in one pass over A.
+  void compute(const Members& wanted) {
+    Members missing;
+    for (const Eigen::Index e : wanted)
+      if (!columns_.contains(e)) missing.push_back(e);
+    if (missing.empty()) return;
+    const Eigen::Index n = linear_.size(), count = std::ssize(missing), blocks = (n + kBlock - 1) / kBlock;
+    const Eigen::MatrixXd own = problem_.columns(Eigen::all, missing);
+    Eigen::MatrixXd products(n, count);
+#pragma omp parallel for schedule(static)
+    for (Eigen::Index block = 0; block < blocks; ++block) {
+      const Eigen::Index begin = block * kBlock, size = std::min(kBlock, n - begin);
+      products.middleRows(begin, size).noalias() = problem_.columns.middleCols(begin, size).transpose() * own;
+    }
+    for (Eigen::Index k = 0; k < count; ++k) columns_[missing[static_cast<std::size_t>(k)]] = products.col(k);
   }
 
   // h - G w, the negative gradient.
@@ -66,11 +73,6 @@ class NormalEquations {
     for (std::size_t k = 0; k < members.size(); ++k)
       result -= weights[static_cast<Eigen::Index>(k)] * column(members[k]);
     return result;
-  }
-
-  double squared_residual(const Members& members, const Eigen::VectorXd& weights) {
-    const double linear_part = weights.dot(linear_(members));
-    return std::max(0.0, target_squared_ - 2 * linear_part + weights.dot(gram(members) * weights));
   }
 
  private:
@@ -84,28 +86,39 @@ class NormalEquations {
 struct Support {
   Members members;
   Eigen::VectorXd weights;
+  Eigen::MatrixXd gram;  // of the members
 
   bool contains(Eigen::Index e) const { return std::find(members.begin(), members.end(), e) != members.end(); }
-  void add(Eigen::Index e) {
+  void add(NormalEquations& equations, Eigen::Index e) {
     members.push_back(e);
-    weights.conservativeResize(weights.size() + 1);
-    weights[weights.size() - 1] = 0;
+    const auto size = std::ssize(members);
+    weights.conservativeResize(size);
+    weights[size - 1] = 0;
+    gram.conservativeResize(size, size);
+    gram.col(size - 1) = equations.column(e)(members);
+    gram.row(size - 1) = gram.col(size - 1).transpose();
   }
   void remove(std::size_t position) {
-    const auto p = static_cast<Eigen::Index>(position);
+    const auto p = static_cast<Eigen::Index>(position), size = std::ssize(members);
     members.erase(members.begin() + p);
-    const Eigen::VectorXd tail = weights.tail(weights.size() - p - 1);
-    weights.conservativeResize(weights.size() - 1);
-    weights.tail(tail.size()) = tail;
+    Members kept(static_cast<std::size_t>(size));
+    std::iota(kept.begin(), kept.end(), 0);
+    kept.erase(kept.begin() + p);
+    weights = Eigen::VectorXd(weights(kept));
+    gram = Eigen::MatrixXd(gram(kept, kept));
+  }
+  double squared_residual(const NormalEquations& equations) const {
+    const double linear = weights.dot(equations.linear()(members));
+    return std::max(0.0, equations.target_squared() - 2 * linear + weights.dot(gram * weights));
   }
 };
 
 // Non-negative least squares on the support, from its feasible weights: Lawson and Hanson's inner loop. Zeros leave the
 // support.
-void fit_weights(NormalEquations& equations, Support& support) {
+void fit_weights(const NormalEquations& equations, Support& support) {
   while (!support.members.empty()) {
     const Eigen::VectorXd rhs = equations.linear()(support.members);
-    const Eigen::VectorXd free = equations.gram(support.members).ldlt().solve(rhs);
+    const Eigen::VectorXd free = support.gram.ldlt().solve(rhs);
     double step = 1;
     Eigen::Index blocking = -1;
     for (Eigen::Index k = 0; k < free.size(); ++k) {
@@ -125,7 +138,7 @@ void fit_weights(NormalEquations& equations, Support& support) {
   }
 }
 
-Selection finish(NormalEquations& equations, const Support& support) {
+Selection finish(const NormalEquations& equations, const Support& support) {
   std::vector<std::size_t> order(support.members.size());
   std::iota(order.begin(), order.end(), 0);
   std::sort(order.begin(), order.end(),
@@ -136,8 +149,7 @@ Selection finish(NormalEquations& equations, const Support& support) {
     selection.members.push_back(support.members[order[k]]);
     selection.weights[static_cast<Eigen::Index>(k)] = support.weights[static_cast<Eigen::Index>(order[k])];
   }
-  selection.relative_residual =
-      std::sqrt(equations.squared_residual(support.members, support.weights) / equations.target_squared());
+  selection.relative_residual = std::sqrt(support.squared_residual(equations) / equations.target_squared());
   return selection;
 }
 
@@ -167,70 +179,115 @@ void grow(NormalEquations& equations, Support& support, std::size_t count, const
     const auto correlation = equations.correlation(support.members, support.weights);
     const Eigen::Index next = best_candidate(equations, correlation, support, offer());
     if (next < 0) break;
-    support.add(next);
+    support.add(equations, next);
     fit_weights(equations, support);
     if (stop != nullptr && support.members.size() % stop->interval == 0 && stop->satisfied(finish(equations, support)))
       break;
   }
 }
 
-// Positions of the members whose removal raises the squared residual least: w_i^2 / (G^-1)_ii.
-std::vector<std::size_t> cheapest_members(NormalEquations& equations, const Support& support) {
-  const auto size = static_cast<Eigen::Index>(support.members.size());
-  const Eigen::MatrixXd inverse = equations.gram(support.members).ldlt().solve(Eigen::MatrixXd::Identity(size, size));
-  const Eigen::VectorXd cost = support.weights.cwiseAbs2().cwiseQuotient(inverse.diagonal().cwiseMax(1e-300));
-  std::vector<std::size_t> order(support.members.size());
+// G^-1 of the members.
+Eigen::MatrixXd inverse_of(const Support& support) {
+  const auto size = std::ssize(support.members);
+  return support.gram.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
+}
+
+// What the squared residual rises by where a member is removed: w_i^2 / (G^-1)_ii.
+Eigen::VectorXd costs_of_removal(const Support& support, const Eigen::MatrixXd& inverse) {
+  return support.weights.cwiseAbs2().cwiseQuotient(inverse.diagonal().cwiseMax(1e-300));
+}
+
+// Positions of the members of least cost.
+std::vector<std::size_t> cheapest_members(const Eigen::VectorXd& costs) {
+  std::vector<std::size_t> order(static_cast<std::size_t>(costs.size()));
   std::iota(order.begin(), order.end(), 0);
   std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-    return cost[static_cast<Eigen::Index>(a)] < cost[static_cast<Eigen::Index>(b)];
+    return costs[static_cast<Eigen::Index>(a)] < costs[static_cast<Eigen::Index>(b)];
   });
   order.resize(std::min(order.size(), kSwapTries));
   return order;
 }
 
-// The column outside the support whose addition lowers the squared residual most, g^2 / Schur complement, among those
-// of largest g^2 / G_ee.
-Eigen::Index best_gain(NormalEquations& equations, const Support& support, const Eigen::VectorXd& correlation) {
+// The support without a member, and G^-1 of what is left, from that of all: no factorisation where all weights stay
+// positive.
+struct Removal {
+  Support support;
+  Eigen::MatrixXd inverse;
+  bool all_stay = true;
+
+  Removal(const NormalEquations& equations, const Support& from, const Eigen::MatrixXd& inverse_of_all,
+          std::size_t position)
+      : support(from) {
+    const auto p = static_cast<Eigen::Index>(position);
+    const Eigen::VectorXd along = inverse_of_all.col(p) / inverse_of_all(p, p);
+    support.weights -= from.weights[p] * along;
+    const Eigen::MatrixXd whole = inverse_of_all - along * inverse_of_all.row(p);
+    support.remove(position);
+    all_stay = support.weights.size() == 0 || support.weights.minCoeff() > 0;
+    if (all_stay) {
+      Members kept(from.members.size());
+      std::iota(kept.begin(), kept.end(), 0);
+      kept.erase(kept.begin() + p);
+      inverse = whole(kept, kept);
+      return;
+    }
+    support = from;
+    support.remove(position);
+    fit_weights(equations, support);
+    inverse = inverse_of(support);
+  }
+};
+
+// A column outside the support and what its addition lowers the squared residual by, as far as weights stay positive:
+// g^2 / Schur complement, the largest among those of largest g^2 / G_ee.
+struct Gain {
+  Eigen::Index column = -1;
+  double squared = 0;
+};
+
+Gain best_gain(NormalEquations& equations, const Removal& removal, const Eigen::VectorXd& correlation) {
+  const Members& members = removal.support.members;
   Members candidates;
   for (Eigen::Index e = 0; e < correlation.size(); ++e)
-    if (equations.usable(e) && correlation[e] > 0 && !support.contains(e)) candidates.push_back(e);
+    if (equations.usable(e) && correlation[e] > 0 && !removal.support.contains(e)) candidates.push_back(e);
   const auto score = [&](Eigen::Index e) { return correlation[e] / equations.norms()[e]; };
   const std::size_t kept = std::min(candidates.size(), kSwapCandidates);
   std::partial_sort(
       candidates.begin(), candidates.begin() + static_cast<std::ptrdiff_t>(kept), candidates.end(),
       [&](Eigen::Index a, Eigen::Index b) { return score(a) > score(b) || (score(a) == score(b) && a < b); });
   candidates.resize(kept);
-  const auto factor = equations.gram(support.members).ldlt();
-  Eigen::Index best = -1;
-  double best_gain = 0;
-  Eigen::VectorXd coupling(static_cast<Eigen::Index>(support.members.size()));
-  for (const Eigen::Index e : candidates) {
-    for (std::size_t k = 0; k < support.members.size(); ++k)
-      coupling[static_cast<Eigen::Index>(k)] = equations.column(support.members[k])[e];
+  Eigen::MatrixXd couplings(std::ssize(members), std::ssize(candidates));
+  for (std::size_t k = 0; k < members.size(); ++k)
+    couplings.row(static_cast<Eigen::Index>(k)) = equations.column(members[k])(candidates).transpose();
+  const Eigen::RowVectorXd shared = couplings.cwiseProduct(removal.inverse * couplings).colwise().sum();
+  Gain best;
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    const Eigen::Index e = candidates[i];
     const double own = equations.norms()[e] * equations.norms()[e];
-    const double schur = std::max(own - coupling.dot(factor.solve(coupling)), 1e-12 * own);
+    const double schur = std::max(own - shared[static_cast<Eigen::Index>(i)], 1e-12 * own);
     const double gain = correlation[e] * correlation[e] / schur;
-    if (gain > best_gain) {
-      best_gain = gain;
-      best = e;
-    }
+    if (gain > best.squared) best = {e, gain};
   }
   return best;
 }
 
 // One accepted swap, or false.
 bool swap_once(NormalEquations& equations, Support& support, double& squared) {
-  for (const std::size_t position : cheapest_members(equations, support)) {
-    Support trial = support;
-    trial.remove(position);
+  const Eigen::MatrixXd inverse = inverse_of(support);
+  const Eigen::VectorXd costs = costs_of_removal(support, inverse);
+  const double wanted = (1 - kSwapGain) * squared;
+  for (const std::size_t position : cheapest_members(costs)) {
+    Removal removal(equations, support, inverse, position);
+    Support& trial = removal.support;
+    const Gain gain = best_gain(equations, removal, equations.correlation(trial.members, trial.weights));
+    if (gain.column < 0) continue;
+    // Weights that would be negative leave more than this, never less.
+    if (removal.all_stay && squared + costs[static_cast<Eigen::Index>(position)] - gain.squared >= wanted) continue;
+    trial.add(equations, gain.column);
     fit_weights(equations, trial);
-    const Eigen::Index added = best_gain(equations, trial, equations.correlation(trial.members, trial.weights));
-    if (added < 0) continue;
-    trial.add(added);
-    fit_weights(equations, trial);
-    const double trial_squared = equations.squared_residual(trial.members, trial.weights);
-    if (trial_squared >= (1 - kSwapGain) * squared) continue;
-    support = trial;
+    const double trial_squared = trial.squared_residual(equations);
+    if (trial_squared >= wanted) continue;
+    support = std::move(trial);
     squared = trial_squared;
     return true;
   }
@@ -239,8 +296,9 @@ bool swap_once(NormalEquations& equations, Support& support, double& squared) {
 
 Support initial_support(NormalEquations& equations, const Members& start) {
   Support support;
+  equations.compute(start);
   for (const Eigen::Index e : start) {
-    support.add(e);
+    support.add(equations, e);
     fit_weights(equations, support);
   }
   return support;
@@ -257,11 +315,11 @@ Selection select_greedy_swap(const SelectionProblem& problem, std::size_t count,
   const auto offer_all = [&all]() -> const Members& { return all; };
   const auto improve = [&] {
     const std::size_t reached = support.members.size();
-    double squared = equations.squared_residual(support.members, support.weights);
+    double squared = support.squared_residual(equations);
     for (int round = 0; round < kSwapRounds && swap_once(equations, support, squared); ++round) {
       // A swap may drop members whose weights became zero: their places are filled again.
       grow(equations, support, reached, nullptr, offer_all);
-      squared = equations.squared_residual(support.members, support.weights);
+      squared = support.squared_residual(equations);
     }
   };
   // Swaps fit the training poses better, and may break the stop rule's measure: then the support grows on.
@@ -315,14 +373,16 @@ Selection select_hard_thresholding(const SelectionProblem& problem, std::size_t 
     const double curvature = image.squaredNorm();
     if (curvature > 0) point += along.squaredNorm() / curvature * gradient;
     Support next;
-    for (const Eigen::Index e : largest_first(point))
+    const Members largest = largest_first(point);
+    equations.compute(largest);
+    for (const Eigen::Index e : largest)
       if (point[e] > 0) {
-        next.add(e);
+        next.add(equations, e);
         next.weights[next.weights.size() - 1] = point[e] * scale[e];
       }
     fit_weights(equations, next);
     support = next;
-    const double squared = equations.squared_residual(support.members, support.weights);
+    const double squared = support.squared_residual(equations);
     if (squared < best_squared) {
       best_squared = squared;
       best = support;

@@ -3,7 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
+#include <utility>
+#include <vector>
 
 namespace exmat::precompute {
 namespace {
@@ -20,41 +23,50 @@ class PoseGenerator {
   PoseGenerator(const PoseSource& source, std::uint64_t seed)
       : source_(source), generator_(seed), stiffness_factor_(source.rest_stiffness) {}
 
-  Eigen::VectorXd on_manifold() {
+  // What is left to do of a pose once its random numbers are drawn.
+  using Rest = std::function<Eigen::VectorXd()>;
+
+  Rest on_manifold() {
     const Eigen::Index k = source_.eigenvalues.size();
     Eigen::VectorXd z(k);
     for (Eigen::Index i = 0; i < k; ++i) z[i] = normal_(generator_) * source_.eigenvalues[0] / source_.eigenvalues[i];
-    const Eigen::VectorXd linear = source_.reduced_modes * z;
-    Eigen::VectorXd quadratic = Eigen::VectorXd::Zero(linear.size());
-    for (Eigen::Index j = 0; j < k; ++j)
-      for (Eigen::Index i = 0; i <= j; ++i)
-        quadratic += (i == j ? 0.5 : 1.0) * z[i] * z[j] * source_.reduced_derivatives.col(pair_index(i, j));
     const double share = kSmallestShare + (1 - kSmallestShare) * uniform_(generator_);
-    const double scale = scale_to(linear, quadratic, share * kLargestDisplacement * source_.body_size);
-    return with_noise(scale * linear + scale * scale * quadratic);
+    return [this, z, share, noise = noise()] { return with_noise(manifold_point(z, share), noise); };
   }
 
   // Not one at rest, whose forces say nothing.
-  Eigen::VectorXd of_motion(const Eigen::MatrixXd& motions, Eigen::Index own) {
+  Rest of_motion(const Eigen::MatrixXd& motions, Eigen::Index own) {
     const Eigen::Index count = own > 0 && uniform_(generator_) < 0.5 ? own : motions.cols();
     std::uniform_int_distribution<Eigen::Index> any(0, count - 1);
     const double least = kLeastMotion * motions.leftCols(count).colwise().norm().maxCoeff();
     Eigen::Index column = any(generator_);
     while (motions.col(column).norm() < least) column = any(generator_);
-    return with_noise(motions.col(column));
+    return [this, pose = Eigen::VectorXd(motions.col(column)), noise = noise()] { return with_noise(pose, noise); };
   }
 
-  Eigen::VectorXd on_segment() {
+  Rest on_segment() {
     const Eigen::Index count = source_.examples.cols();
     std::uniform_int_distribution<Eigen::Index> any(0, count);  // `count` stands for the rest pose
     const Eigen::Index from = any(generator_);
     const Eigen::Index to =
         (from + 1 + std::uniform_int_distribution<Eigen::Index>(0, count - 1)(generator_)) % (count + 1);
     const double t = uniform_(generator_);
-    return with_noise((1 - t) * example(from) + t * example(to));
+    const Eigen::VectorXd pose = (1 - t) * example(from) + t * example(to);
+    return [this, pose, noise = noise()] { return with_noise(pose, noise); };
   }
 
  private:
+  Eigen::VectorXd manifold_point(const Eigen::VectorXd& z, double share) const {
+    const Eigen::Index k = z.size();
+    const Eigen::VectorXd linear = source_.reduced_modes * z;
+    Eigen::VectorXd quadratic = Eigen::VectorXd::Zero(linear.size());
+    for (Eigen::Index j = 0; j < k; ++j)
+      for (Eigen::Index i = 0; i <= j; ++i)
+        quadratic += (i == j ? 0.5 : 1.0) * z[i] * z[j] * source_.reduced_derivatives.col(pair_index(i, j));
+    const double scale = scale_to(linear, quadratic, share * kLargestDisplacement * source_.body_size);
+    return scale * linear + scale * scale * quadratic;
+  }
+
   Eigen::VectorXd example(Eigen::Index index) const {
     if (index == source_.examples.cols()) return Eigen::VectorXd::Zero(source_.examples.rows());
     return source_.examples.col(index);
@@ -66,8 +78,10 @@ class PoseGenerator {
       return (source_.basis * q).reshaped<Eigen::RowMajor>(source_.basis.rows() / 3, 3);
     };
     const VertexArray a = field(linear), b = field(quadratic);
-    const auto largest = [&](double s) { return (s * a + s * s * b).rowwise().norm().maxCoeff(); };
-    double low = 0, high = target / a.rowwise().norm().maxCoeff();
+    const Eigen::ArrayXd aa = a.rowwise().squaredNorm(), ab = 2 * a.cwiseProduct(b).rowwise().sum(),
+                         bb = b.rowwise().squaredNorm();
+    const auto largest = [&](double s) { return s * std::sqrt((aa + s * (ab + s * bb)).maxCoeff()); };
+    double low = 0, high = target / std::sqrt(aa.maxCoeff());
     while (largest(high) < target) high *= 2;
     for (int round = 0; round < 40; ++round) {
       const double middle = 0.5 * (low + high);
@@ -76,9 +90,13 @@ class PoseGenerator {
     return high;
   }
 
-  Eigen::VectorXd with_noise(const Eigen::VectorXd& pose) {
-    Eigen::VectorXd noise(pose.size());
+  Eigen::VectorXd noise() {
+    Eigen::VectorXd noise(source_.rest_stiffness.rows());
     for (double& entry : noise) entry = normal_(generator_);
+    return noise;
+  }
+
+  Eigen::VectorXd with_noise(const Eigen::VectorXd& pose, Eigen::VectorXd noise) const {
     stiffness_factor_.matrixU().solveInPlace(noise);  // now noise^T K noise = |raw noise|^2
     const double energy = pose.dot(source_.rest_stiffness * pose), raw = noise.dot(source_.rest_stiffness * noise);
     return pose + std::sqrt(kNoiseEnergy * energy / raw) * noise;
@@ -122,15 +140,18 @@ namespace {
 RowMatrix draw(const PoseSource& source, const Eigen::MatrixXd& motions, Eigen::Index own, Eigen::Index count,
                std::uint64_t seed) {
   PoseGenerator generator(source, seed);
-  RowMatrix poses(count, source.rest_stiffness.rows());
+  std::vector<PoseGenerator::Rest> drawn;
   const bool has_examples = source.examples.cols() > 0;
   for (Eigen::Index i = 0; i < count; ++i) {
     if (motions.cols() > 0 && i % kMotionCycle < kMotionsOfCycle)
-      poses.row(i) = generator.of_motion(motions, own);
+      drawn.push_back(generator.of_motion(motions, own));
     else
-      poses.row(i) =
-          has_examples && i % kExampleStride == kExampleStride - 1 ? generator.on_segment() : generator.on_manifold();
+      drawn.push_back(has_examples && i % kExampleStride == kExampleStride - 1 ? generator.on_segment()
+                                                                               : generator.on_manifold());
   }
+  RowMatrix poses(count, source.rest_stiffness.rows());
+#pragma omp parallel for schedule(dynamic)
+  for (Eigen::Index i = 0; i < count; ++i) poses.row(i) = drawn[static_cast<std::size_t>(i)]().transpose();
   return poses;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <memory>
 #include <optional>
 #include <utility>
 
@@ -97,18 +96,20 @@ RegionData region_of(const ExampleGroup& group, std::int64_t index) {
 }  // namespace
 
 PoseFitter::PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
-                       const SemidefiniteSolver* solver, double highest, ShapeStage& stage)
-    : asset_(asset), object_(object), system_(system), stage_(stage), clamp_(system, highest, asset.name) {
-  for (ExampleGroup& group : stage.groups) {
-    fill_gram(stage.data.rest_descriptor, group.examples);
-    if (group.region.empty()) {
-      poses_.push_back(whole_body_poses(stage.object, stage.weights, object.fixed, clamp_));
-    } else {
-      const auto poses = std::make_shared<RegionPoses>(stage.object, stage.weights, *group.view, system, *solver,
-                                                       kRegionStiffness * highest);
-      poses_.emplace_back([poses](const Eigen::MatrixXd& changes) { return poses->displacements(changes); });
-    }
-    fields_.push_back(poses_.back()(changes_from_rest(group.examples)));
+                       std::unique_ptr<SemidefiniteSolver> solver, double highest, const ShapeStage& stage)
+    : asset_(asset), object_(object), system_(system), stage_(stage), poses_(stage.groups.size()) {
+  const Eigen::Index changes = 3 * stage.weights.size();
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    if (stage.groups[i].region.empty()) continue;
+    const RegionPoses poses(stage.object, stage.weights, *stage.groups[i].view, system, *solver,
+                            kRegionStiffness * highest);
+    poses_[i] = poses.displacements(Eigen::MatrixXd::Identity(changes, changes));
+  }
+  solver.reset();  // factors are the most of the memory: the clamp has its own
+  for (std::size_t i = 0; i < poses_.size(); ++i) {
+    if (stage.groups[i].region.empty())
+      poses_[i] = whole_body_poses(stage.object, stage.weights, object.fixed, FieldClamp(system, highest, asset.name));
+    fields_.emplace_back(poses_[i] * changes_from_rest(stage.groups[i].examples));
   }
 }
 
@@ -123,8 +124,7 @@ Eigen::MatrixXd PoseFitter::fields() const {
 
 PoseCoordinates PoseFitter::range(Eigen::Index index) const {
   const auto group = static_cast<std::size_t>(index);
-  const Eigen::Index m = asset_.eigenfunctions;
-  Eigen::MatrixXd fields = poses_[group](Eigen::MatrixXd::Identity(3 * m, 3 * m));
+  Eigen::MatrixXd fields = poses_[group];
   fields -= system_.null_space * (system_.null_space.transpose() * (system_.mass * fields)).eval();
   return pose_range(system_.mass, fields,
                     descriptor_changes(stage_.data.rest_descriptor, stage_.groups[group].examples));
@@ -151,9 +151,8 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   const bool whole = group.region.empty();
   Finished finished{group.examples, direct_projection(stage_.object, stage_.weights, system_.full_mass,
                                                       whole ? basis : RowMatrix(group.view->see(basis)))};
-  const RowMatrix map = whole && !system_.constrained()
-                            ? finished.projection.reduced_from_shape
-                            : pose_map(poses_[index], asset_.eigenfunctions, system_, basis);
+  const RowMatrix map = whole && !system_.constrained() ? finished.projection.reduced_from_shape
+                                                        : pose_map(poses_[index], system_, basis);
   finished.projection.target_basis = range_basis(map);
   fill_weights_problem(stage_.data.rest_descriptor, finished.projection, map, finished.examples);
   const Eigen::MatrixXd fields =
@@ -168,9 +167,9 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
   return finished;
 }
 
-void PoseFitter::preview(ReducedModel& model) const {
-  model.shape_space = stage_.data;
-  for (const ExampleGroup& group : stage_.groups)
+void preview_examples(const ShapeStage& stage, ReducedModel& model) {
+  model.shape_space = stage.data;
+  for (const ExampleGroup& group : stage.groups)
     if (group.region.empty())
       model.examples = group.examples;
     else

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -11,13 +12,17 @@
 
 namespace exmat::precompute {
 
+/// Puts copies of the shape space and of the example sets, as far as they do without a basis, into a model.
+void preview_examples(const ShapeStage& stage, ReducedModel& model);
+
 /// Makes the poses of a shape stage fit for the body, and brings them into its modal basis.
 class PoseFitter {
  public:
-  /// `solver` is that of the system's stiffness, asked only for regions and here alone; `highest` [1/s^2] the squared
-  /// frequency of the highest linear mode: the basis resolves nothing finer. The others are kept by reference.
+  /// `solver` is that of the system's stiffness, asked only for regions and gone before another matrix is factorised;
+  /// `highest` [1/s^2] the squared frequency of the highest linear mode: the basis resolves nothing finer. The others
+  /// are kept by reference.
   PoseFitter(const AssetConfig& asset, const ObjectInput& object, const ElasticSystem& system,
-             const SemidefiniteSolver* solver, double highest, ShapeStage& stage);
+             std::unique_ptr<SemidefiniteSolver> solver, double highest, const ShapeStage& stage);
 
   /// [f x k] displacements of all poses, groups in order: what the basis is to hold.
   Eigen::MatrixXd fields() const;
@@ -31,9 +36,6 @@ class PoseFitter {
 
   /// [n_t] shares of the tets in an elastic force of a group: 1 of the whole body.
   Eigen::VectorXd tet_shares(Eigen::Index group) const;
-
-  /// Puts copies of the shape space and of the example sets, as far as they do without a basis, into a model.
-  void preview(ReducedModel& model) const;
 
   /// Puts shape space, projections, examples and their targets, one for each group, into a model that has its modal
   /// basis.
@@ -54,8 +56,7 @@ class PoseFitter {
   const ObjectInput& object_;
   const ElasticSystem& system_;
   const ShapeStage& stage_;
-  FieldClamp clamp_;
-  std::vector<PoseFields> poses_;        // of the groups
+  std::vector<Eigen::MatrixXd> poses_;   // f x 3m of unit changes of descriptor, of the groups
   std::vector<Eigen::MatrixXd> fields_;  // f x (K-1), of the groups
 };
 

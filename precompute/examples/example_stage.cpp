@@ -242,6 +242,7 @@ VertexArray ShapeStageBuilder::carried_displacement(const TransferredPose& pose)
 ShapeStage ShapeStageBuilder::build() {
   set_shape_data(object_basis());
   add_examples();
+  for (ExampleGroup& group : stage_.groups) fill_gram(stage_.data.rest_descriptor, group.examples);
   return std::move(stage_);
 }
 

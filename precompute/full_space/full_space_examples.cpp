@@ -53,8 +53,7 @@ ExamplePoses whole_body_example_poses(const ReducedModel& model, const ElasticSy
   const LaplaceBasis object = laplace_basis_of(model);
   const FieldClamp clamp(system, clamp_decay(model), model.asset_name);
   const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting);
-  const PoseFields poses = whole_body_poses(object, weights, model.object->fixed, clamp);
-  ExamplePoses result{&*model.examples, {}, poses(Eigen::MatrixXd::Identity(3 * weights.size(), 3 * weights.size()))};
+  ExamplePoses result{&*model.examples, {}, whole_body_poses(object, weights, model.object->fixed, clamp)};
   drop_rigid_motions(system, result.fields);
   return result;
 }

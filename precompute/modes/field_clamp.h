@@ -17,6 +17,8 @@ class FieldClamp {
   /// `decay` >= 0 [1/s^2]; `name` is for messages. `system` must outlive this. Nothing is factorised for a free body.
   FieldClamp(const ElasticSystem& system, double decay, const std::string& name);
 
+  Eigen::Index free_rows() const { return system_.mass.rows(); }  ///< f
+
   /// [f x k] free rows of [3n x k] fields, clamped; of a free body as they are.
   Eigen::MatrixXd apply(const Eigen::MatrixXd& fields) const;
 

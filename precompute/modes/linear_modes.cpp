@@ -1,5 +1,7 @@
 #include "precompute/modes/linear_modes.h"
 
+#include <algorithm>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -10,34 +12,36 @@
 namespace exmat::precompute {
 namespace {
 
-using ElementGradients = std::vector<Eigen::Matrix<double, 4, 3>>;
+constexpr std::size_t kPairsTogether = 16;  // of modes, whose loads are summed in one pass over the tets
 
-// Displacement gradient of one tet: sum of u_a (x) grad N_a.
-Eigen::Matrix3d displacement_gradient(const TetMesh& mesh, Eigen::Index tet,
-                                      const Eigen::Matrix<double, 4, 3>& gradients,
-                                      const Eigen::Ref<const Eigen::VectorXd>& field) {
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (int corner = 0; corner < 4; ++corner) H += field.segment<3>(3 * mesh.tets(tet, corner)) * gradients.row(corner);
-  return H;
-}
+using Pair = std::pair<Eigen::Index, Eigen::Index>;
 
-// [3n] nodal forces of the second derivative of the internal force in directions a and b, at rest.
+// [3n x k] nodal forces of the second derivatives of the internal force in pairs of directions at rest, of the fields
+// [3n x modes].
 template <typename Material>
-Eigen::VectorXd second_derivative(Material material, const TetMesh& mesh, const TetMaterials& materials,
-                                  const ElementGradients& gradients, const Eigen::VectorXd& volumes,
-                                  const Eigen::Ref<const Eigen::VectorXd>& a,
-                                  const Eigen::Ref<const Eigen::VectorXd>& b) {
-  Eigen::VectorXd force = Eigen::VectorXd::Zero(a.size());
+RowMatrix second_derivatives(Material material, const TetMesh& mesh, const TetMaterials& materials,
+                             const Eigen::VectorXd& volumes, const RowMatrix& fields, std::span<const Pair> pairs) {
+  RowMatrix forces = RowMatrix::Zero(fields.rows(), std::ssize(pairs));
+  std::vector<Eigen::Matrix3d> H(static_cast<std::size_t>(fields.cols()));
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    const auto& shape = gradients[static_cast<std::size_t>(t)];
+    const Eigen::Matrix<double, 4, 3> shape = shape_gradients(tet_positions(mesh, t));
     const auto lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
-    const Eigen::Matrix3d stress =
-        volumes[t] * material.rest_second_derivative(displacement_gradient(mesh, t, shape, a),
-                                                     displacement_gradient(mesh, t, shape, b), lame);
-    for (int corner = 0; corner < 4; ++corner)
-      force.segment<3>(3 * mesh.tets(t, corner)) += stress * shape.row(corner).transpose();
+    for (Eigen::Index mode = 0; mode < fields.cols(); ++mode) {
+      Eigen::Matrix3d& gradient = H[static_cast<std::size_t>(mode)];
+      gradient.setZero();
+      for (int corner = 0; corner < 4; ++corner)
+        gradient += fields.col(mode).segment<3>(3 * mesh.tets(t, corner)) * shape.row(corner);
+    }
+    for (std::size_t p = 0; p < pairs.size(); ++p) {
+      const Eigen::Matrix3d stress =
+          volumes[t] * material.rest_second_derivative(H[static_cast<std::size_t>(pairs[p].first)],
+                                                       H[static_cast<std::size_t>(pairs[p].second)], lame);
+      const Eigen::Matrix<double, 3, 4> corners = stress * shape.transpose();
+      for (int corner = 0; corner < 4; ++corner)
+        forces.col(static_cast<Eigen::Index>(p)).segment<3>(3 * mesh.tets(t, corner)) += corners.col(corner);
+    }
   }
-  return force;
+  return forces;
 }
 
 }  // namespace
@@ -50,24 +54,21 @@ LinearModes linear_modes(const ElasticSystem& system, const SemidefiniteSolver& 
 Eigen::MatrixXd modal_derivatives(const TetMesh& mesh, const TetMaterials& materials, const ElasticSystem& system,
                                   const SemidefiniteSolver& solver, const Eigen::MatrixXd& modes) {
   const Eigen::VectorXd volumes = tet_volumes(mesh);
-  ElementGradients gradients(static_cast<std::size_t>(mesh.tet_count()));
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
-    gradients[static_cast<std::size_t>(t)] = shape_gradients(tet_positions(mesh, t));
-  const Eigen::MatrixXd fields = system.extend(modes);
-
-  std::vector<std::pair<Eigen::Index, Eigen::Index>> pairs;
+  const RowMatrix fields = system.extend(modes);
+  std::vector<Pair> pairs;
   for (Eigen::Index j = 0; j < modes.cols(); ++j)
     for (Eigen::Index i = 0; i <= j; ++i) pairs.emplace_back(i, j);
-  Eigen::MatrixXd loads(modes.rows(), static_cast<Eigen::Index>(pairs.size()));
-  Progress progress("modal derivatives", static_cast<std::int64_t>(pairs.size()));
+  Eigen::MatrixXd loads(modes.rows(), std::ssize(pairs));
+  Progress progress("modal derivatives", std::ssize(pairs));
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t p = 0; p < pairs.size(); ++p) {
-    loads.col(static_cast<Eigen::Index>(p)) = -system.restrict(with_material(materials.model, [&](auto material) {
-      return second_derivative(material, mesh, materials, gradients, volumes, fields.col(pairs[p].first),
-                               fields.col(pairs[p].second));
-    }));
+  for (std::size_t begin = 0; begin < pairs.size(); begin += kPairsTogether) {
+    const std::span<const Pair> some = std::span(pairs).subspan(begin, std::min(kPairsTogether, pairs.size() - begin));
+    const RowMatrix forces = with_material(materials.model, [&](auto material) {
+      return second_derivatives(material, mesh, materials, volumes, fields, some);
+    });
+    loads.middleCols(static_cast<Eigen::Index>(begin), std::ssize(some)) = -forces(system.free_dofs, Eigen::all);
 #pragma omp critical(modal_derivatives_progress)
-    progress.advance();
+    progress.advance(std::ssize(some));
   }
   return solver.solve(loads);
 }

@@ -73,6 +73,15 @@ Eigen::MatrixXd example_poses(const ReducedModel& model, Eigen::Index modes) {
   return poses;
 }
 
+// The runs to learn from, before they are run.
+struct PlannedTraining {
+  TrainingPlan plan;
+  std::uint64_t seed = 0;
+  TrainingChains chains{};
+  bool in_modes = false;
+  Eigen::MatrixXd responses{};  // static ones, for runs in modes
+};
+
 class Pipeline {
  public:
   Pipeline(const AssetConfig& asset, const Needs& needs, BuildReport& report, const BuildOptions& options)
@@ -95,7 +104,8 @@ class Pipeline {
   void leave_out(const std::string& group, const std::string& reason);
   TargetSpace target_space(const ElasticSystem& system, const PoseFitter& fitter, Eigen::Index group);
   std::vector<TargetSpace> target_spaces(const ElasticSystem& system, const PoseFitter& fitter);
-  std::optional<Motions> train(const BodyStages& stages, const SemidefiniteSolver* solver, ReducedModel& body);
+  std::optional<PlannedTraining> plan(const TrainingInput& input, const SemidefiniteSolver& solver, ReducedModel& body);
+  std::optional<Motions> train(const BodyStages& stages, const PlannedTraining& planned, const ReducedModel& body);
   std::string training_text() const;
   void require_vertices(const TrainingLoads& loads) const;
   void add_internal_force(ReducedModel& model);
@@ -224,22 +234,37 @@ void Pipeline::require_vertices(const TrainingLoads& loads) const {
                           std::to_string(vertex), ""});
 }
 
-std::optional<Motions> Pipeline::train(const BodyStages& stages, const SemidefiniteSolver* solver, ReducedModel& body) {
-  const ElasticSystem& system = stages.system;
-  if (stages.fitter != nullptr) stages.fitter->preview(body);
-  const TrainingInput input{body, system, stages.modes, stages.targets};
-  const TrainingPlan plan = plan_training(asset_.training, options_.scene, object_.pushed, training_body(input));
-  log::info(fmt::format("training: {}", plan.reason));
-  if (!plan.loads.deforms(!system.constrained())) return std::nullopt;
-  require_vertices(plan.loads);
-  if (plan.loads.obstacle)
+// While there is a solver, since what comes next takes the memory of its factors.
+std::optional<PlannedTraining> Pipeline::plan(const TrainingInput& input, const SemidefiniteSolver& solver,
+                                              ReducedModel& body) {
+  std::optional<PlannedTraining> planned(
+      {plan_training(asset_.training, options_.scene, object_.pushed, training_body(input)),
+       asset_.training.seed.value_or(asset_.seed)});
+  const TrainingLoads& loads = planned->plan.loads;
+  log::info(fmt::format("training: {}", planned->plan.reason));
+  if (!loads.deforms(!input.system.constrained())) return std::nullopt;
+  require_vertices(loads);
+  if (loads.obstacle)
     body.contact = contact_data(*body.object, RowMatrix::Zero(3 * object_.mesh.vertex_count(), 1), object_.contact,
                                 asset_.contact_count);
+  planned->chains = draw_training(input, loads, asset_.training, planned->seed);
+  planned->in_modes = trains_in_modes(asset_.training.space, input.system);
+  if (planned->in_modes)
+    planned->responses = timed("static responses", [&] {
+      return static_responses(input.system, solver, bounding_box_diagonal(object_.mesh.vertices), planned->chains.runs);
+    });
+  return planned;
+}
+
+std::optional<Motions> Pipeline::train(const BodyStages& stages, const PlannedTraining& planned,
+                                       const ReducedModel& body) {
+  const ElasticSystem& system = stages.system;
+  const TrainingPlan& plan = planned.plan;
   return timed("training", [&] {
-    const std::uint64_t seed = asset_.training.seed.value_or(asset_.seed);
+    const std::uint64_t seed = planned.seed;
     std::optional<Motions> result(std::in_place);
     Motions& motions = *result;
-    motions.chains = draw_training(input, plan.loads, asset_.training, seed);
+    motions.chains = planned.chains;
     motions.loads = plan.loads;
     motions.general = plan.general;
     motions.reason = plan.reason;
@@ -250,16 +275,17 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const Semidefin
       return cache_.get(stage, work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
                         copies_of(example_sets(body)), object_.contact, asset_.contact_count, text_of(plan.loads),
                         asset_.training.segments, asset_.training.seconds, seed,
-                        solver != nullptr ? asset_.linear_modes : 0);
+                        planned.in_modes ? asset_.linear_modes : 0);
     };
-    if (solver != nullptr)
+    if (planned.in_modes)
       std::tie(motions.set, motions.elements) = cached("training in modes", [&] {
-        const ManyModes modes =
-            many_modes(stages, body, *solver, motions.chains, plan.loads.obstacle.has_value(), seed);
+        const ManyModes modes = many_modes(stages, body, planned.responses, plan.loads.obstacle.has_value(), seed);
         return std::pair(run_training(modes, system, motions.chains), *modes.model.cubature);
       });
     else
-      motions.set = cached("training", [&] { return run_training(input, motions.chains); });
+      motions.set = cached("training", [&] {
+        return run_training({body, system, stages.modes}, stages.targets, motions.chains);
+      });
     const TrainingRuns& runs = motions.set.runs;
     log::info(fmt::format(
         "training: {} runs of {} steps in {}, {} snapshots", runs.segments, runs.steps,
@@ -366,27 +392,27 @@ ReducedModel Pipeline::run() {
   });
 
   const double size = bounding_box_diagonal(object_.mesh.vertices);
+  ReducedModel body;
+  body.asset_name = model.asset_name;
+  body.object = model.object;
+  if (shape) preview_examples(*shape, body);
+  const std::optional<PlannedTraining> planned = plan({body, system, modes}, *solver, body);
   // Factors are the most of the memory: none longer than needed.
-  const bool in_modes = trains_in_modes(asset_.training.space, system);
-  if (!in_modes && (!shape || !shape->has_regions())) solver.reset();
+  if (!shape || !shape->has_regions()) solver.reset();
   std::optional<PoseFitter> fitter;
   if (shape)
     timed("poses of the examples", [&] {
       // As fine as the linear modes resolve.
-      fitter.emplace(asset_, object_, system, solver.get(), modes.eigenvalues.tail(1)[0], *shape);
+      fitter.emplace(asset_, object_, system, std::move(solver), modes.eigenvalues.tail(1)[0], *shape);
     });
-  if (!in_modes) solver.reset();
   std::vector<TargetSpace> targets;
   if (fitter) targets = target_spaces(system, *fitter);
   const BodyStages stages{asset_,      object_,
                           system,      modes,
                           derivatives, fitter ? &*fitter : nullptr,
                           targets,     fitter ? elastic_groups(*fitter) : std::vector<bool>()};
-  ReducedModel body;
-  body.asset_name = model.asset_name;
-  body.object = model.object;
-  const std::optional<Motions> motions = train(stages, in_modes ? solver.get() : nullptr, body);
-  solver.reset();
+  std::optional<Motions> motions;
+  if (planned) motions = train(stages, *planned, body);
   const BasisChoice choice = timed("basis", [&] { return choose_basis(stages, body, motions ? &*motions : nullptr); });
   const Eigen::MatrixXd& basis = choice.basis;
   put_basis(stages, basis, model);

@@ -37,21 +37,13 @@ Eigen::MatrixXd loads_of(const std::vector<Chain>& chains, const ElasticSystem& 
   return columns;
 }
 
-// Poses of the examples, and what the body looks like at rest under the loads, as far as that is linear.
-Eigen::MatrixXd fields_of(const BodyStages& stages, const SemidefiniteSolver& solver, const TrainingChains& chains) {
-  const Eigen::MatrixXd loads = loads_of(chains.runs, stages.system);
+// Poses of the examples, and the responses.
+Eigen::MatrixXd fields_of(const BodyStages& stages, const Eigen::MatrixXd& responses) {
   Eigen::MatrixXd fields(stages.system.mass.rows(), 0);
   if (stages.fitter != nullptr) fields = stages.fitter->fields();
-  if (loads.cols() == 0) return fields;
   const Eigen::Index poses = fields.cols();
-  fields.conservativeResize(Eigen::NoChange, poses + loads.cols());
-  fields.rightCols(loads.cols()) = solver.solve(loads);
-  const double most = kMostDisplacement * bounding_box_diagonal(stages.object.mesh.vertices);
-  for (auto field : fields.rightCols(loads.cols()).colwise()) {
-    const Eigen::VectorXd whole = stages.system.extend(field);
-    const double largest = whole.reshaped<Eigen::RowMajor>(whole.size() / 3, 3).rowwise().norm().maxCoeff();
-    field *= std::min(1.0, most / largest);
-  }
+  fields.conservativeResize(Eigen::NoChange, poses + responses.cols());
+  fields.rightCols(responses.cols()) = responses;
   return fields;
 }
 
@@ -61,8 +53,22 @@ bool trains_in_modes(TrainingSpace space, const ElasticSystem& system) {
   return space == TrainingSpace::kModes || (space == TrainingSpace::kAuto && system.mass.rows() > kMostDisplacements);
 }
 
-ManyModes many_modes(const BodyStages& stages, const ReducedModel& body, const SemidefiniteSolver& solver,
-                     const TrainingChains& chains, bool thrown, std::uint64_t seed) {
+Eigen::MatrixXd static_responses(const ElasticSystem& system, const SemidefiniteSolver& solver, double size,
+                                 const std::vector<Chain>& chains) {
+  const Eigen::MatrixXd loads = loads_of(chains, system);
+  if (loads.cols() == 0) return loads;
+  Eigen::MatrixXd responses = solver.solve(loads);
+  const double most = kMostDisplacement * size;
+  for (auto field : responses.colwise()) {
+    const Eigen::VectorXd whole = system.extend(field);
+    const double largest = whole.reshaped<Eigen::RowMajor>(whole.size() / 3, 3).rowwise().norm().maxCoeff();
+    field *= std::min(1.0, most / largest);
+  }
+  return responses;
+}
+
+ManyModes many_modes(const BodyStages& stages, const ReducedModel& body, const Eigen::MatrixXd& responses, bool thrown,
+                     std::uint64_t seed) {
   const ElasticSystem& system = stages.system;
   ManyModes result;
   ReducedModel& model = result.model;
@@ -70,7 +76,7 @@ ManyModes many_modes(const BodyStages& stages, const ReducedModel& body, const S
   model.object = body.object;
   const ObjectData& object = *model.object;
   const double size = bounding_box_diagonal(object.mesh.vertices);
-  const BasisInput input{system, stages.modes, stages.derivatives, size, fields_of(stages, solver, chains)};
+  const BasisInput input{system, stages.modes, stages.derivatives, size, fields_of(stages, responses)};
   const Eigen::Index most = std::min(stages.modes.modes.cols() + stages.derivatives.cols(),
                                      (system.mass.rows() - system.null_space.cols()) / 2);
   const Eigen::MatrixXd basis = modal_basis(input, static_cast<int>(std::min(kModes, most)));

@@ -15,10 +15,15 @@ struct ManyModes {
   EnergyReference reference = EnergyReference::kExample;  ///< of its targets
 };
 
-/// Up to 100 modes: those of modal_basis() of the examples' poses and the static displacements under the loads of the
-/// chains, and up to 300 elements. `body` has /object; `solver` is that of the system's stiffness.
-ManyModes many_modes(const BodyStages& stages, const ReducedModel& body, const SemidefiniteSolver& solver,
-                     const TrainingChains& chains, bool thrown, std::uint64_t seed);
+/// [f x k] what a body of `size` [m] looks like at rest under the loads of the chains, as far as that is linear;
+/// `solver` is that of the system's stiffness.
+Eigen::MatrixXd static_responses(const ElasticSystem& system, const SemidefiniteSolver& solver, double size,
+                                 const std::vector<Chain>& chains);
+
+/// Up to 100 modes: those of modal_basis() of the examples' poses and the static responses [f x k], and up to 300
+/// elements. `body` has /object.
+ManyModes many_modes(const BodyStages& stages, const ReducedModel& body, const Eigen::MatrixXd& responses, bool thrown,
+                     std::uint64_t seed);
 
 /// Runs the chains with it.
 TrainingSet run_training(const ManyModes& body, const ElasticSystem& system, const TrainingChains& chains);

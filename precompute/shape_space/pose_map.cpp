@@ -1,8 +1,15 @@
 #include "precompute/shape_space/pose_map.h"
 
+#include <algorithm>
+
 #include "precompute/shape_space/projection.h"
 
 namespace exmat::precompute {
+namespace {
+
+constexpr Eigen::Index kClampedTogether = 16;  // what is in the making of a field is some times as large as the field
+
+}  // namespace
 
 void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displacements) {
   const double count = fixed.cast<double>().sum();
@@ -25,15 +32,23 @@ Eigen::MatrixXd carried_fields(const LaplaceBasis& object, const Eigen::VectorXd
   return fields;
 }
 
-PoseFields whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
-                            const FieldClamp& clamp) {
-  return [&](const Eigen::MatrixXd& changes) { return clamp.apply(carried_fields(object, weights, fixed, changes)); };
+Eigen::MatrixXd whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                                 const FieldClamp& clamp) {
+  const Eigen::Index changes = 3 * weights.size();
+  const auto unit = [changes](Eigen::Index begin, Eigen::Index count) -> Eigen::MatrixXd {
+    return Eigen::MatrixXd::Identity(changes, changes).middleCols(begin, count);
+  };
+  Eigen::MatrixXd poses(clamp.free_rows(), changes);
+  for (Eigen::Index begin = 0; begin < changes; begin += kClampedTogether) {
+    const Eigen::Index count = std::min(kClampedTogether, changes - begin);
+    poses.middleCols(begin, count) = clamp.apply(carried_fields(object, weights, fixed, unit(begin, count)));
+  }
+  return poses;
 }
 
-RowMatrix pose_map(const PoseFields& poses, Eigen::Index functions, const ElasticSystem& system,
-                   const RowMatrix& basis) {
+RowMatrix pose_map(const Eigen::MatrixXd& poses, const ElasticSystem& system, const RowMatrix& basis) {
   const Eigen::MatrixXd projector = system.mass * system.restrict(basis);
-  return projector.transpose() * poses(Eigen::MatrixXd::Identity(3 * functions, 3 * functions));
+  return projector.transpose() * poses;
 }
 
 }  // namespace exmat::precompute

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <functional>
-
 #include "precompute/fem/elastic_system.h"
 #include "precompute/modes/field_clamp.h"
 #include "precompute/shape_space/laplace_basis.h"
@@ -17,17 +15,14 @@ void hold_fixed_mean(const FlagVector& fixed, Eigen::Ref<Eigen::MatrixXd> displa
 Eigen::MatrixXd carried_fields(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
                                const Eigen::MatrixXd& changes);
 
-/// [f x k] free rows of the displacements that changes of descriptor [3m x k], entry 3i + axis, stand for.
-using PoseFields = std::function<Eigen::MatrixXd(const Eigen::MatrixXd& changes)>;
+/// [f x 3m] free rows of the displacements that unit changes of descriptor stand for, column 3i + axis, of the whole
+/// body: carried_fields() with the fixed vertices of a clamped body put back, by a FieldClamp. docs/method.md, "Direct
+/// projection".
+Eigen::MatrixXd whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
+                                 const FieldClamp& clamp);
 
-/// Those of the whole body: carried_fields() with the fixed vertices of a clamped body put back, by a FieldClamp.
-/// docs/method.md, "Direct projection". All are kept by reference.
-PoseFields whole_body_poses(const LaplaceBasis& object, const Eigen::VectorXd& weights, const FlagVector& fixed,
-                            const FieldClamp& clamp);
-
-/// [r x 3m] reduced coordinates U^T M w of the pose w that each unit change of descriptor stands for. `basis` is U,
-/// 3n x r. T^+ where w is that of a free body as a whole.
-RowMatrix pose_map(const PoseFields& poses, Eigen::Index functions, const ElasticSystem& system,
-                   const RowMatrix& basis);
+/// [r x 3m] reduced coordinates U^T M w of the poses w [f x 3m] of unit changes. `basis` is U, 3n x r. T^+ where w is
+/// that of a free body as a whole.
+RowMatrix pose_map(const Eigen::MatrixXd& poses, const ElasticSystem& system, const RowMatrix& basis);
 
 }  // namespace exmat::precompute

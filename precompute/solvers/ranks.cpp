@@ -8,6 +8,8 @@
 #include <map>
 #include <memory>
 #include <new>
+#include <string>
+#include <string_view>
 #include <sys/resource.h>
 #include <thread>
 
@@ -144,11 +146,16 @@ bool started_by_mpirun() {
 }
 
 // A single process needs no daemon, no binding, no network, and nothing that others share: neither a folder in the
-// temporary directory, which Open MPI's processes remove under each other, nor shared memory. mpirun sets its own.
+// temporary directory, which Open MPI's processes remove under each other, nor shared memory. mpirun sets its own. Nor
+// does it wait for anybody: each look for messages would give the processor away, and on a busy machine not be given it
+// back for some milliseconds.
 void set_environment() {
-  setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // ranks may be more than cores
-  setenv("HWLOC_HIDE_ERRORS", "2", 0);             // stderr is for the log, also in containers without /sys
-  if (started_by_mpirun()) return;
+  setenv("HWLOC_HIDE_ERRORS", "2", 0);  // stderr is for the log, also in containers without /sys
+  if (started_by_mpirun()) {
+    setenv("OMPI_MCA_mpi_yield_when_idle", "1", 0);  // ranks may be more than cores
+    return;
+  }
+  setenv("OMPI_MCA_mpi_yield_when_idle", "0", 0);
   setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
   setenv("OMPI_MCA_hwloc_base_binding_policy", "none", 0);
   setenv("OMPI_MCA_btl", "self", 0);
@@ -163,13 +170,45 @@ PetscErrorCode remember_error(MPI_Comm, int, const char*, const char*, PetscErro
   return code;
 }
 
+template <typename Function>
+Function function_of_blas(const char* name) {
+  return reinterpret_cast<Function>(dlsym(RTLD_DEFAULT, name));
+}
+
+// OpenBLAS's kernels for the instructions of this processor, or null.
+const char* kernels_of_processor() {
+#if defined(__x86_64__)
+  const bool avx512 = __builtin_cpu_supports("avx512f") != 0 && __builtin_cpu_supports("avx512cd") != 0 &&
+                      __builtin_cpu_supports("avx512bw") != 0 && __builtin_cpu_supports("avx512dq") != 0 &&
+                      __builtin_cpu_supports("avx512vl") != 0;
+  if (avx512) return "SkylakeX";
+  if (__builtin_cpu_supports("avx2") != 0 && __builtin_cpu_supports("fma") != 0) return "Haswell";
+#endif
+  return nullptr;
+}
+
+// OpenBLAS knows processors by their model numbers, and takes kernels of twenty years ago, a quarter as fast, for those
+// that are newer than itself. Nothing is computed yet: it may choose once more.
+void choose_blas_kernels() {
+  constexpr const char* kUnknown = "Prescott";
+  constexpr const char* kChoice = "OPENBLAS_CORETYPE";
+  const auto name = function_of_blas<char* (*)()>("openblas_get_corename");
+  const auto leave = function_of_blas<void (*)()>("gotoblas_dynamic_quit");
+  const auto choose = function_of_blas<void (*)()>("gotoblas_dynamic_init");
+  if (name == nullptr || leave == nullptr || choose == nullptr || std::getenv(kChoice) != nullptr) return;
+  const char* kernels = kernels_of_processor();
+  if (kernels == nullptr || std::string_view(name()) != kUnknown) return;
+  setenv(kChoice, kernels, 0);
+  leave();
+  choose();
+}
+
 // OpenBLAS, where it is the BLAS in use: it keeps to one thread, as the many small products of a factorisation leave
 // threads waiting for each other and results would depend on their number; and it gets its work space while there is
 // memory, as it would wait for it for ever.
 void prepare_blas() {
-  using SetThreads = void (*)(int);
-  if (const auto set_threads = reinterpret_cast<SetThreads>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads")))
-    set_threads(1);
+  choose_blas_kernels();
+  if (const auto set_threads = function_of_blas<void (*)(int)>("openblas_set_num_threads")) set_threads(1);
   constexpr std::size_t kWorkSpace = 160'000'000;
   if (std::unique_ptr<char[]>(new (std::nothrow) char[kWorkSpace]) == nullptr) throw WorkError("not enough memory");
   const PetscBLASInt one = 1;

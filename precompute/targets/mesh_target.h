@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "common/model/reduced_model.h"
@@ -28,16 +29,24 @@ PoseCoordinates pose_range(const SparseMatrix& mass, const Eigen::MatrixXd& fiel
 /// [3m x K] changes of descriptor from the object's own to the examples, entry 3i + axis.
 Eigen::MatrixXd descriptor_changes(const RowMatrix& rest_descriptor, const ExampleSet& set);
 
+class TetForces;
+
 /// The energies of targets over the tets of a mesh.
 struct MeshTarget {
   runtime::TargetSolver solver;    ///< in coordinates of unit stiffness at rest, `solver.basis()` [d x d] away from y
   std::vector<Eigen::Index> tets;  ///< that take part, ascending
   Eigen::Index left_out = 0;       ///< tets that an example turns inside out, where the energies start from examples
+  std::shared_ptr<const TetForces> all;  ///< where the solver has a sample of the tets alone: the forces of all
 };
 
 /// Throws InputError where no tet is left.
 MeshTarget mesh_target(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
                        EnergyReference reference);
+
+/// A solver of a systematic sample of at most `most` tets, each for as many as it stands for, and the forces of all.
+/// `object` must outlive it.
+MeshTarget sampled_target(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
+                          EnergyReference reference, Eigen::Index most);
 
 /// The examples of a target solver, with the poses [d x K] as theirs.
 std::vector<ExampleData> examples_at(const Eigen::MatrixXd& poses);

@@ -12,23 +12,33 @@ constexpr double kResidual = 0.1;  // of the distance of answers that are one mi
 
 }  // namespace
 
+// Whether `y` became a minimum.
+bool MinimumFinder::descend(const Eigen::VectorXd& weights, runtime::TargetSolver::Workspace& workspace,
+                            Eigen::VectorXd& y) const {
+  const double enough = kResidual * same_distance_;
+  if (all_ == nullptr || !near_) {
+    const auto report = target_.solve(weights, workspace, y);
+    if (report.status != runtime::NewtonStatus::kConverged && !(report.residual <= enough)) return false;
+  }
+  if (all_ == nullptr) return true;
+  const auto answer = all_->polish(target_, weights, workspace, y);
+  return answer.converged || answer.residual <= enough;
+}
+
 MinimumFinder::Minimum MinimumFinder::lowest(const Eigen::VectorXd& weights, const std::vector<Eigen::VectorXd>& starts,
                                              runtime::TargetSolver::Workspace& workspace) const {
   Minimum lowest{Eigen::VectorXd::Constant(target_.dimension(), std::numeric_limits<double>::quiet_NaN())};
   bool found = false;
-  const auto descend = [&](Eigen::VectorXd y) {
-    const auto report = target_.solve(weights, workspace, y);
-    const bool solved =
-        report.status == runtime::NewtonStatus::kConverged || report.residual <= kResidual * same_distance_;
-    if (!solved) return;
+  const auto try_from = [&](Eigen::VectorXd y) {
+    if (!descend(weights, workspace, y)) return;
     const bool same = found && (y - lowest.y).norm() <= same_distance_;
     lowest.only = lowest.only && (same || !found);
     if (!found || (!same && target_.energy(weights, y, workspace) < target_.energy(weights, lowest.y, workspace)))
       lowest.y = y;
     found = true;
   };
-  std::ranges::for_each(starts, descend);
-  if (!found) descend(blend(target_, weights));
+  std::ranges::for_each(starts, try_from);
+  if (!found) try_from(blend(target_, weights));
   return lowest;
 }
 
@@ -45,6 +55,7 @@ RowMatrix MinimumFinder::find(const RowMatrix& weights, const Starts& starts, co
       const auto from = starts(w, i);
       const Minimum minimum = lowest(w, from, workspace);
       found.row(i) = minimum.y.transpose();
+      if (correction_) found.row(i) += correction_(w).transpose();
       solves += static_cast<int>(from.size());
       ambiguous += minimum.only ? 0 : 1;
 #pragma omp critical(target_minima_progress)

@@ -3,9 +3,11 @@
 #include <Eigen/Core>
 #include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "precompute/targets/tet_forces.h"
 #include "runtime/sim/examples/target.h"
 
 namespace exmat::precompute {
@@ -16,9 +18,17 @@ class MinimumFinder {
  public:
   using Starts = std::function<std::vector<Eigen::VectorXd>(const Eigen::VectorXd& weights, Eigen::Index row)>;
 
-  /// Answers nearer to each other than `same_distance` in y are one minimum.
-  MinimumFinder(const runtime::TargetSolver& target, double same_distance)
-      : target_(target), same_distance_(same_distance) {}
+  /// Answers nearer to each other than `same_distance` in y are one minimum. Where the target is that of some tets,
+  /// `all` makes them the minima of all.
+  MinimumFinder(const runtime::TargetSolver& target, double same_distance, const TetForces* all = nullptr)
+      : target_(target), same_distance_(same_distance), all_(all) {}
+
+  /// Starts are near minima of all tets: the target of some would lead away from them.
+  void starts_are_near() { near_ = true; }
+
+  /// What is added to each answer.
+  using Correction = std::function<Eigen::VectorXd(const Eigen::VectorXd& weights)>;
+  void correct_by(Correction correction) { correction_ = std::move(correction); }
 
   /// [n x d] for weights [n x K], each found by itself; NaN where no start led to a minimum. `stage` names the work.
   RowMatrix find(const RowMatrix& weights, const Starts& starts, const std::string& stage);
@@ -34,8 +44,13 @@ class MinimumFinder {
   Minimum lowest(const Eigen::VectorXd& weights, const std::vector<Eigen::VectorXd>& starts,
                  runtime::TargetSolver::Workspace& workspace) const;
 
+  bool descend(const Eigen::VectorXd& weights, runtime::TargetSolver::Workspace& workspace, Eigen::VectorXd& y) const;
+
   const runtime::TargetSolver& target_;
   double same_distance_;
+  const TetForces* all_;
+  bool near_ = false;
+  Correction correction_;
   int solves_ = 0;
   int ambiguous_ = 0;
 };

@@ -11,6 +11,7 @@
 #include "common/model/needs.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/cubature/selection.h"
+#include "precompute/targets/example_stress.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
 
@@ -28,17 +29,6 @@ struct Sample {
   Eigen::VectorXd y;  ///< d, where
   Eigen::Index example = 0;
 };
-
-// dE/dF of an example's energy density at displacement gradient H.
-template <typename Material>
-Eigen::Matrix3d stress(const Material& material, EnergyReference reference, const Eigen::Matrix3d& H,
-                       const Eigen::Matrix3d& H_example, const LameParameters& lame) {
-  if (reference == EnergyReference::kRest) return material.first_piola_kirchhoff(H - H_example, lame);
-  const Eigen::Matrix3d example = Eigen::Matrix3d::Identity() + H_example;
-  const Eigen::Matrix3d inverse = example.inverse();
-  const Eigen::Matrix3d relative = (H - H_example) * inverse;
-  return example.determinant() * material.first_piola_kirchhoff(relative, lame) * inverse.transpose();
-}
 
 class ElementChooser {
  public:
@@ -84,7 +74,7 @@ RowMatrix ElementChooser::weights(int per_dimension) const {
 // At targets and beside them.
 std::vector<Sample> ElementChooser::force_samples() const {
   const RowMatrix at = weights(3);
-  MinimumFinder finder(target_.solver, std::numeric_limits<double>::max());
+  MinimumFinder finder(target_.solver, std::numeric_limits<double>::max(), target_.all.get());
   const RowMatrix minima = finder.find(at, from_blend(target_.solver), "targets that elements are chosen by");
   double scale = 0;
   for (Eigen::Index k = 0; k < coordinates_.poses.cols(); ++k)
@@ -128,8 +118,9 @@ Eigen::MatrixXd ElementChooser::forces(Eigen::Index tet, const std::vector<Sampl
     for (Eigen::Index i = 0; i < stresses.cols(); ++i) {
       const Sample& sample = samples[static_cast<std::size_t>(i)];
       const Eigen::Matrix<double, 9, 1> H = B * sample.y, H_example = poses.col(sample.example);
-      const Eigen::Matrix3d P = stress(material, options_.energy_reference, Eigen::Map<const RowMatrix3>(H.data()),
-                                       Eigen::Map<const RowMatrix3>(H_example.data()), lame);
+      const Eigen::Matrix3d P =
+          example_stress(material, options_.energy_reference, Eigen::Map<const RowMatrix3>(H.data()),
+                         Eigen::Map<const RowMatrix3>(H_example.data()), lame);
       stresses.col(i) = samples_.volume(tet) * P.reshaped<Eigen::RowMajor>();
     }
   });
@@ -211,7 +202,7 @@ double ElementChooser::error(const CubatureData& cubature) const {
 
 CubatureData ElementChooser::choose() {
   held_out_ = weights(5);
-  MinimumFinder finder(target_.solver, std::numeric_limits<double>::max());
+  MinimumFinder finder(target_.solver, std::numeric_limits<double>::max(), target_.all.get());
   exact_ = finder.find(held_out_, from_blend(target_.solver), "targets that elements are checked by");
   const std::vector<Sample> samples = force_samples();
   const std::vector<Eigen::Index> tets = candidates();

@@ -1,6 +1,7 @@
 #include "precompute/targets/target_space.h"
 
 #include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <fmt/format.h>
 #include <utility>
@@ -9,6 +10,7 @@
 #include "common/model/needs.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
+#include "precompute/targets/table_error.h"
 #include "precompute/targets/target_elements.h"
 #include "precompute/targets/target_table.h"
 #include "runtime/sim/examples/bernstein_basis.h"
@@ -18,10 +20,12 @@ namespace {
 
 using runtime::TargetSolver;
 
-constexpr double kShare = 0.1;     // of the tolerance that the space may take
-constexpr int kRounds = 4;         // in which weights whose targets the space misses are added
-constexpr double kNothing = 1e-9;  // of the largest example: a direction of poses that is rounding
-constexpr double kSame = 0.1;      // of the tolerance: answers nearer to each other are one minimum
+constexpr double kShare = 0.1;        // of the tolerance that the space may take
+constexpr int kRounds = 4;            // in which weights whose targets the space misses are added
+constexpr double kNothing = 1e-9;     // of the largest example: a direction of poses that is rounding
+constexpr double kSame = 0.1;         // of the tolerance: answers nearer to each other are one minimum
+constexpr int kCorrectionDegree = 5;  // of what elements are off by
+constexpr int kTableChecks = 8;       // targets of all tets on every edge of the simplex, that a table is checked by
 
 // One, two or three examples at equal shares, then all of them.
 RowMatrix equal_shares(Eigen::Index examples) {
@@ -97,7 +101,7 @@ class SpaceBuilder {
         system_(system),
         range_(range),
         options_(options),
-        whole_(mesh_target(object, system, range, options.energy_reference)),
+        whole_(target_in(range)),
         count_(range.poses.cols()),
         examples_(whole_.solver.dimension(), count_) {
     for (Eigen::Index k = 0; k < count_; ++k) examples_.col(k) = whole_.solver.example(k);
@@ -110,6 +114,15 @@ class SpaceBuilder {
   Eigen::MatrixXd solve(const RowMatrix& weights, const MinimumFinder::Starts& starts);
   PoseCoordinates coordinates() const;
   double check(int round);
+  MeshTarget target_in(const PoseCoordinates& coordinates) const;
+  TargetTableOptions table_options() const {
+    return {.tolerance = options_.tolerance, .energy_reference = options_.energy_reference};
+  }
+  void add_table(TargetSpace& space) const;
+  void add_table_of_many(TargetSpace& space, TargetTableReport& report) const;
+  std::optional<TargetTableData> corrected_table(const TargetSolver& elements, const Eigen::MatrixXd& poses,
+                                                 TargetTableOptions options, TargetTableReport& report) const;
+  MinimumFinder::Correction correction_of(const TargetSolver& elements) const;
 
   const ObjectData& object_;
   const ElasticSystem& system_;
@@ -124,9 +137,15 @@ class SpaceBuilder {
   MeshTarget small_;         // in these
 };
 
+MeshTarget SpaceBuilder::target_in(const PoseCoordinates& coordinates) const {
+  if (object_.mesh.tet_count() <= options_.most_tets)
+    return mesh_target(object_, system_, coordinates, options_.energy_reference);
+  return sampled_target(object_, system_, coordinates, options_.energy_reference, options_.sample);
+}
+
 // [d' x N], those that were found.
 Eigen::MatrixXd SpaceBuilder::solve(const RowMatrix& weights, const MinimumFinder::Starts& starts) {
-  MinimumFinder finder(whole_.solver, kSame * options_.tolerance * scale_);
+  MinimumFinder finder(whole_.solver, kSame * options_.tolerance * scale_, whole_.all.get());
   const RowMatrix minima = finder.find(weights, starts, "targets on the whole mesh");
   std::vector<Eigen::Index> found;
   for (Eigen::Index i = 0; i < minima.rows(); ++i)
@@ -142,13 +161,14 @@ PoseCoordinates SpaceBuilder::coordinates() const {
 // the largest example.
 double SpaceBuilder::check(int round) {
   const RowMatrix weights = check_weights(count_, round);
-  MinimumFinder finder(small_.solver, kSame * options_.tolerance * scale_);
+  MinimumFinder finder(small_.solver, kSame * options_.tolerance * scale_, small_.all.get());
   const RowMatrix inside = finder.find(weights, from_blend(small_.solver), "targets in their space");
   const Eigen::MatrixXd guesses = columns_ * (small_.solver.basis() * inside.transpose());
   const auto from_space = [&](const Eigen::VectorXd&, Eigen::Index row) {
     return std::vector<Eigen::VectorXd>{guesses.col(row)};
   };
-  MinimumFinder polish(whole_.solver, kSame * options_.tolerance * scale_);
+  MinimumFinder polish(whole_.solver, kSame * options_.tolerance * scale_, whole_.all.get());
+  polish.starts_are_near();
   const RowMatrix minima = polish.find(weights, from_space, "targets on the whole mesh");
   double error = 0;
   std::vector<Eigen::Index> found;
@@ -173,24 +193,76 @@ TargetSpace SpaceBuilder::build() {
   for (int round = 0; round < kRounds; ++round) {
     columns_ = principal_space(examples_, samples_, 0.5 * distance, kNothing * scale_);
     space.coordinates = coordinates();
-    small_ = mesh_target(object_, system_, space.coordinates, options_.energy_reference);
+    small_ = target_in(space.coordinates);
     if (scale_ == 0 || count_ < 2) break;
     space.error = check(round);
     if (space.error <= kShare * options_.tolerance) break;
   }
   space.left_out = whole_.left_out;
   log::info(fmt::format("targets: {} displacements hold them, error {:.1e}", columns_.cols(), space.error));
-  if (options_.table) {
-    TargetTableReport report;
-    space.table =
-        build_target_table(small_.solver, space.coordinates.poses,
-                           {.tolerance = options_.tolerance, .energy_reference = options_.energy_reference}, report);
-    if (space.table) space.table->error += space.error;
-    space.table_message = report.message;
-  }
   space.elements = target_elements(object_, system_, space.coordinates, small_,
                                    {options_.energy_reference, options_.element_tolerance, options_.seed});
+  if (options_.table) add_table(space);
   return space;
+}
+
+// By all tets, or where they are many by way of the elements that stand for them.
+void SpaceBuilder::add_table(TargetSpace& space) const {
+  TargetTableReport report;
+  if (small_.all)
+    add_table_of_many(space, report);
+  else
+    space.table = build_target_table(small_.solver, space.coordinates.poses, table_options(), report);
+  if (space.table) space.table->error += space.error;
+  space.table_message = report.message;
+}
+
+void SpaceBuilder::add_table_of_many(TargetSpace& space, TargetTableReport& report) const {
+  TargetSolver elements;
+  const Eigen::MatrixXd& poses = space.coordinates.poses;
+  const auto complaint = elements.build(object_.materials.model, space.elements, examples_at(poses),
+                                        RowMatrix::Identity(poses.rows(), poses.rows()), options_.energy_reference);
+  const bool accurate = !complaint && space.elements.heldout_error <= options_.element_tolerance;
+  TargetTableOptions options = table_options();
+  // The elements say whether any table is accurate enough, and of which degree.
+  if (accurate && !build_target_table(elements, poses, options, report)) return;
+  options.all = small_.all.get();
+  options.first_degree = accurate && report.pieces == 1 ? report.degree : options.first_degree;
+  if (accurate && report.pieces == 1) space.table = corrected_table(elements, poses, options, report);
+  if (!space.table) space.table = build_target_table(accurate ? elements : small_.solver, poses, options, report);
+}
+
+// What the elements are off by changes slowly with the weights: few targets of all tets correct theirs, and others say
+// how far the table is from all tets. None where that is too far.
+std::optional<TargetTableData> SpaceBuilder::corrected_table(const TargetSolver& elements, const Eigen::MatrixXd& poses,
+                                                             TargetTableOptions options,
+                                                             TargetTableReport& report) const {
+  options.all = nullptr;
+  options.correction = correction_of(elements);
+  auto table = build_target_table(elements, poses, options, report);
+  if (!table) return std::nullopt;
+  const TableError meter(elements, count_);
+  MinimumFinder finder(elements, kSame * options.tolerance * meter.scale(), small_.all.get());
+  const RowMatrix weights = spread_points(count_, kTableChecks);
+  const RowMatrix exact = finder.find(weights, from_blend(elements), "targets to check the table by");
+  const double error = meter.errors(runtime::TargetTable(*table), {weights, exact}).maxCoeff();
+  if (!(error <= options.tolerance)) return std::nullopt;
+  table->error = std::max(table->error, error);
+  return table;
+}
+
+// From the elements' targets to those of all tets, as a polynomial of the weights.
+MinimumFinder::Correction SpaceBuilder::correction_of(const TargetSolver& elements) const {
+  const runtime::BernsteinBasis basis(kCorrectionDegree, static_cast<int>(count_));
+  const RowMatrix weights = interpolation_nodes(basis.exponents());
+  const double same = kSame * options_.tolerance * scale_;
+  MinimumFinder of_elements(elements, same), of_all(elements, same, small_.all.get());
+  const RowMatrix rough = of_elements.find(weights, from_blend(elements), "targets of the elements"),
+                  exact = of_all.find(weights, from_blend(elements), "targets of all tets");
+  const Eigen::MatrixXd coefficients = collocation(basis, weights).partialPivLu().solve(Eigen::MatrixXd(exact - rough));
+  return [basis, coefficients](const Eigen::VectorXd& w) -> Eigen::VectorXd {
+    return (collocation(basis, w.transpose()) * coefficients).transpose();
+  };
 }
 
 }  // namespace

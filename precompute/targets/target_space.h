@@ -16,12 +16,17 @@ struct TargetSpaceOptions {
   double element_tolerance = 1e-3;  ///< of what the elements lose of them, beside that
   bool table = true;                ///< make one, where 2 <= K <= kMostTableExamples
   std::uint64_t seed = 1;           ///< of the poses that the elements are chosen by
+  /// That energies are summed over at every step. Targets of more begin with a sample of their tets, and a table of
+  /// them with the elements.
+  Eigen::Index most_tets = 50'000;
+  Eigen::Index sample = 8192;
 };
 
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpaceOptions& value) {
-  pass_all(archive, value.energy_reference, value.tolerance, value.element_tolerance, value.table, value.seed);
+  pass_all(archive, value.energy_reference, value.tolerance, value.element_tolerance, value.table, value.seed,
+           value.most_tets, value.sample);
 }
 
 /// The targets of a set of examples, minimised over all tets of the mesh in all poses that descriptors stand for:

@@ -22,7 +22,7 @@ using runtime::BernsteinBasis;
 using runtime::TargetSolver;
 using runtime::TargetTable;
 
-constexpr int kFirstDegree = 4, kDegreeStep = 2;
+constexpr int kDegreeStep = 2;
 constexpr int kDegreesPerGrid = 2;       // degrees that are fitted to the same nodes
 constexpr double kOversampling = 1.25;   // degree of the nodes over that of the polynomial
 constexpr int kChecksPerDimension = 64;  // weights on every edge; twice as many on every face
@@ -73,7 +73,9 @@ TableBuilder::TableBuilder(const TargetSolver& target, const Eigen::MatrixXd& po
       report_(report),
       examples_(poses.cols()),
       error_(target, examples_),
-      finder_(target, kSame * options.tolerance * error_.scale()) {}
+      finder_(target, kSame * options.tolerance * error_.scale(), options.all) {
+  if (options.correction) finder_.correct_by(options.correction);
+}
 
 // Not from the table, which must not confirm itself.
 TargetSamples TableBuilder::solve_checks() {
@@ -159,7 +161,7 @@ std::optional<TargetTableData> TableBuilder::one_polynomial(const TargetSamples&
   const int most = most_degree(options_, examples_);
   TargetSamples nodes;
   int served = 0;  // largest degree that the nodes are for
-  for (int degree = std::min(kFirstDegree, most); degree <= most; degree += kDegreeStep) {
+  for (int degree = std::min(options_.first_degree, most); degree <= most; degree += kDegreeStep) {
     if (degree > served) {
       served = std::min(most, degree + kDegreeStep * (kDegreesPerGrid - 1));
       nodes = solve_nodes(static_cast<int>(std::ceil(kOversampling * served)));
@@ -190,7 +192,7 @@ std::optional<TargetTableData> TableBuilder::run() {
   lost_ = !checks.minima.allFinite();
   std::optional<TargetTableData> data;
   if (!lost_) data = one_polynomial(checks);
-  if (!lost_ && !data && examples_ == 2) data = pieces(checks);
+  if (!lost_ && !data && examples_ == 2 && !options_.correction) data = pieces(checks);
   report_.solves = finder_.solves();
   report_.message = data ? success_message(*data) : lost_ ? lost_message() : refusal_message();
   return data;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
+#include "precompute/targets/minimum_finder.h"
 #include "runtime/sim/examples/target.h"
 
 namespace exmat::precompute {
@@ -13,8 +14,11 @@ namespace exmat::precompute {
 struct TargetTableOptions {
   double tolerance = 1e-4;  ///< of the error as TargetTableData has it [Limit: > 0]
   EnergyReference energy_reference = EnergyReference::kExample;
-  int most_degree = 0;             ///< of one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
-  std::int64_t most_pieces = 256;  ///< for K = 2
+  int first_degree = 4;                    ///< to be tried
+  int most_degree = 0;                     ///< of one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
+  std::int64_t most_pieces = 256;          ///< for K = 2
+  const TetForces* all = nullptr;          ///< where the solver's tets stand for all: targets are those of all
+  MinimumFinder::Correction correction{};  ///< of the solver's targets; for one polynomial alone
 };
 
 /// One table that was tried, and its largest error at the weights of the check.

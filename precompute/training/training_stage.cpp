@@ -16,14 +16,13 @@ constexpr double kMostSag = 0.2;            // of L, that gravity of unknown dir
 constexpr int kHeldoutSegments = 2;
 constexpr std::uint64_t kHeldoutSeed = 7'000'003;
 
-FullSpaceModel full_space_of(const TrainingInput& input) {
+FullSpaceModel full_space_of(const TrainingInput& input, const std::vector<TargetSpace>& spaces) {
   FullSpaceOptions options;
   options.whole_body = input.model.examples.has_value();
-  for (const TargetSpace& targets : input.targets) options.coordinates.push_back(targets.coordinates);
-  if (options.whole_body) options.energy_reference = input.targets.front().energy_reference;
+  for (const TargetSpace& targets : spaces) options.coordinates.push_back(targets.coordinates);
+  if (options.whole_body) options.energy_reference = spaces.front().energy_reference;
   for (std::size_t i = 0; i < input.model.regions.size(); ++i)
-    options.regions.push_back(
-        {input.model.regions[i].name, input.targets[i + (options.whole_body ? 1 : 0)].energy_reference});
+    options.regions.push_back({input.model.regions[i].name, spaces[i + (options.whole_body ? 1 : 0)].energy_reference});
   return build_full_space_model(input.model, options);
 }
 
@@ -73,8 +72,9 @@ TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, co
            .stiffness_damping = loads.stiffness_damping}};
 }
 
-TrainingSet run_training(const TrainingInput& input, const TrainingChains& chains) {
-  const FullSpaceModel model = full_space_of(input);
+TrainingSet run_training(const TrainingInput& input, const std::vector<TargetSpace>& targets,
+                         const TrainingChains& chains) {
+  const FullSpaceModel model = full_space_of(input, targets);
   TrainingRunOptions whole = chains.options;
   whole.positions = true;
   return {run_segments(model, chains.runs, chains.options), run_segments(model, chains.heldout, whole)};

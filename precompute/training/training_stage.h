@@ -31,10 +31,9 @@ void pass_members(Archive& archive, TrainingSet& value) {
 
 /// A body that runs are made of, before it has a basis.
 struct TrainingInput {
-  const ReducedModel& model;  ///< /object, the shape space and example sets of `targets`, /contact where it is thrown
+  const ReducedModel& model;  ///< /object, the shape space and example sets, /contact where it is thrown
   const ElasticSystem& system;
   const LinearModes& modes;
-  const std::vector<TargetSpace>& targets;  ///< of the model's whole body, if it has examples, then of its regions
 };
 
 TrainingBody training_body(const TrainingInput& input);
@@ -43,7 +42,8 @@ TrainingBody training_body(const TrainingInput& input);
 TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, const TrainingConfig& config,
                              std::uint64_t seed);
 
-/// Runs them in full space.
-TrainingSet run_training(const TrainingInput& input, const TrainingChains& chains);
+/// Runs them in full space, with the targets of the model's whole body, if it has examples, then of its regions.
+TrainingSet run_training(const TrainingInput& input, const std::vector<TargetSpace>& targets,
+                         const TrainingChains& chains);
 
 }  // namespace exmat::precompute

@@ -9,6 +9,7 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
+#include "runtime/sim/step/sleep.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -29,6 +30,7 @@ void size_for_contact(exmat_body& body) {
   body.workspace.near.reset();
   if (may_touch(body.model(), body.scene)) body.workspace.near.emplace(body.model(), body.scene);
   body.contacts.prepare(body.model(), count);
+  wake(body.state);
 }
 
 }  // namespace exmat::runtime
@@ -287,6 +289,7 @@ exmat_status exmat_body_move_obstacle(exmat_body* body, std::int64_t id, const e
     const std::size_t place = place_of(*body, id);
     body->scene.obstacles[place].motion = RigidMotion::going_on(body->state.time, sample_of(*motion));
     body->obstacles[place].hosted = true;
+    wake(body->state);
   });
 }
 
@@ -314,6 +317,7 @@ exmat_status exmat_body_set_obstacle_law(exmat_body* body, std::int64_t id, doub
     obstacle.stiffness = stiffness;
     obstacle.damping = damping;
     obstacle.friction = friction;
+    wake(body->state);
   });
 }
 

@@ -15,7 +15,7 @@ namespace exmat::runtime {
 namespace {
 
 constexpr double kLayout = 2;
-constexpr std::size_t kHeadNumbers = 5, kContactNumbers = 9;
+constexpr std::size_t kHeadNumbers = 5, kSleepNumbers = 3, kContactNumbers = 9;
 constexpr double kMostSteps = 9007199254740992;  // 2^53: whole numbers up to here have all their digits
 
 constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q,          &State::v, &State::q_previous,
@@ -31,11 +31,14 @@ class Writer {
   std::vector<double> numbers_;
 };
 
+bool may_sleep(const exmat_body& body) { return body.scene.sleep.energy > 0; }
+
 std::size_t contact_count(const exmat_body& body) { return body.state.contacts.count; }
 
 std::size_t size_without_contacts(const exmat_body& body) {
   std::size_t size = kHeadNumbers + 1 + std::size(kModeArrays) * static_cast<std::size_t>(body.modes());
   size += body.frame_numbers;
+  if (may_sleep(body)) size += kSleepNumbers;
   for (const ExampleState& examples : body.state.examples)
     size += static_cast<std::size_t>(examples.weights.size() + examples.target.size()) + 2;
   return size;
@@ -74,6 +77,11 @@ std::vector<double> write_state(const exmat_body& body) {
     writer.add_all(examples.target);
     writer.add(examples.has_target ? 1 : 0);
     writer.add(examples.target_converged ? 1 : 0);
+  }
+  if (may_sleep(body)) {
+    writer.add(state.sleep.asleep ? 1 : 0);
+    writer.add(static_cast<double>(state.sleep.still_steps));
+    writer.add(static_cast<double>(state.sleep.loads));
   }
   for (const HeldContact& held : std::span(state.contacts.held).first(contact_count(body))) {
     for (const double number :
@@ -114,6 +122,11 @@ void set_state(std::span<const double> numbers, exmat_body& body) {
     reader.read(examples.target);
     examples.has_target = reader.flag("has_target");
     examples.target_converged = reader.flag("target_converged");
+  }
+  if (may_sleep(body)) {
+    state.sleep.asleep = reader.flag("asleep");
+    state.sleep.still_steps = static_cast<std::int64_t>(reader.count("still steps", kMostSteps));
+    state.sleep.loads = static_cast<std::uint64_t>(reader.count("loads", kMostSteps));
   }
   read_contacts(reader, contacts, body, state.contacts);
   const double time = body.state.time;

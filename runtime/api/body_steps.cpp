@@ -21,7 +21,7 @@ void add_step(const StepReport& step, const Workspace& workspace, exmat_body& bo
   sum.target_iterations += step.target_iterations;
   sum.residual = step.residual;
   if ((step.status & kStepNonFinite) != 0) return;
-  body.contacts.add(step, body.model(), body.state, workspace);
+  if ((step.status & kStepAsleep) == 0) body.contacts.add(step, body.model(), body.state, workspace);
   ++sum.steps;
 }
 

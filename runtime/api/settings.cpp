@@ -46,7 +46,7 @@ exmat_settings completed(const exmat_settings* given) {
 }
 
 void check_finite(const exmat_settings& settings) {
-  const std::array<std::pair<const char*, double>, 10> members{{{"time_step", settings.time_step},
+  const std::array<std::pair<const char*, double>, 12> members{{{"time_step", settings.time_step},
                                                                 {"gravity[0]", settings.gravity[0]},
                                                                 {"gravity[1]", settings.gravity[1]},
                                                                 {"gravity[2]", settings.gravity[2]},
@@ -55,7 +55,9 @@ void check_finite(const exmat_settings& settings) {
                                                                 {"newton_tolerance", settings.newton_tolerance},
                                                                 {"example_stiffness", settings.example_stiffness},
                                                                 {"example_damping", settings.example_damping},
-                                                                {"example_bias", settings.example_bias}}};
+                                                                {"example_bias", settings.example_bias},
+                                                                {"sleep_energy", settings.sleep_energy},
+                                                                {"sleep_time", settings.sleep_time}}};
   for (const auto& [name, value] : members)
     if (!std::isfinite(value))
       throw InvalidArgument(fmt::format("settings.{} = {}: expected a finite number", name, value));
@@ -63,16 +65,17 @@ void check_finite(const exmat_settings& settings) {
 
 /// The ranges are those of scene files.
 void check_ranges(const exmat_settings& settings) {
-  const Json scene{
-      {"bundle", "a bundle"},
-      {"time_step", settings.time_step},
-      {"damping", {{"mass", settings.mass_damping}, {"stiffness", settings.stiffness_damping}}},
-      {"newton", {{"max_iterations", settings.newton_iterations}, {"tolerance", settings.newton_tolerance}}},
-      {"examples",
-       {{"stiffness", settings.example_stiffness},
-        {"damping", settings.example_damping},
-        {"bias", settings.example_bias},
-        {"target_iterations", settings.target_iterations}}}};
+  Json scene{{"bundle", "a bundle"},
+             {"time_step", settings.time_step},
+             {"damping", {{"mass", settings.mass_damping}, {"stiffness", settings.stiffness_damping}}},
+             {"newton", {{"max_iterations", settings.newton_iterations}, {"tolerance", settings.newton_tolerance}}},
+             {"examples",
+              {{"stiffness", settings.example_stiffness},
+               {"damping", settings.example_damping},
+               {"bias", settings.example_bias},
+               {"target_iterations", settings.target_iterations}}}};
+  // 0 is what a scene file says by having none.
+  scene["sleep"] = {{"energy", settings.sleep_energy == 0 ? 1 : settings.sleep_energy}, {"time", settings.sleep_time}};
   try {
     check_against_schema(scene, "scene", "settings");
   } catch (const InputError& error) {
@@ -100,6 +103,8 @@ exmat_settings default_settings() {
   settings.example_damping = examples.damping;
   settings.example_bias = examples.bias;
   settings.target_iterations = examples.target_iterations;
+  settings.sleep_energy = scene.sleep.energy;
+  settings.sleep_time = scene.sleep.time;
   return settings;
 }
 
@@ -117,6 +122,7 @@ SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* 
   scene.mass_damping = settings.mass_damping;
   scene.stiffness_damping = settings.stiffness_damping;
   scene.newton = {settings.newton_iterations, settings.newton_tolerance};
+  scene.sleep = {settings.sleep_energy, settings.sleep_time};
   ExampleForceConfig examples;
   examples.stiffness = settings.example_stiffness;
   examples.damping = settings.example_damping;

@@ -107,6 +107,10 @@ void check_joins(const exmat_world& world, const exmat_body& body) {
   if (body.world != nullptr) throw InvalidArgument("the body is in a world already");
   if (!body.model().contact)
     throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");
+  if (body.scene.sleep.energy > 0)
+    throw InvalidArgument(
+        fmt::format("the body's model has sleep_energy = {:g}: expected 0, bodies of a world do not sleep",
+                    body.scene.sleep.energy));
   if (world.members.empty()) return;
   const double step = world.members.front().body->scene.time_step;
   if (body.scene.time_step != step)

@@ -34,6 +34,8 @@ void print_summary(const RunSummary& summary, const LoadedScene& loaded, const S
     print("target iterations", fmt::format("{:.2f} a step", summary.target_iterations.mean()));
   print("projections", std::to_string(summary.projections));
   print("unconverged steps", std::to_string(summary.unconverged_steps));
+  if (loaded.scene.sleep.energy > 0)
+    print("steps asleep", fmt::format("{} of {}", summary.slept_steps, summary.steps * summary.bodies));
   print("kinetic energy", fmt::format("{:.6g} J", summary.energies.kinetic));
   print("elastic energy", fmt::format("{:.6g} J", summary.energies.elastic));
   print("potential energy", fmt::format("{:.6g} J", summary.energies.potential));

@@ -75,6 +75,56 @@ constexpr std::ptrdiff_t lane_entry(std::ptrdiff_t i, std::ptrdiff_t j) {
   return ((row * (row + 1) / 2 + column) * kLaneBlock * kLaneBlock + i % kLaneBlock * kLaneBlock + j % kLaneBlock) *
          kLanes;
 }
+/// What a step of kLanes bodies keeps: vectors [r] and numbers of each, see StepForm and IncrementalPotential.
+struct LaneForm {
+  std::ptrdiff_t modes = 0;
+  const double *start = nullptr, *external = nullptr, *velocity_centre = nullptr, *acceleration_centre = nullptr;
+  const double *velocity_factor = nullptr, *acceleration_factor = nullptr, *mass_damping = nullptr,
+               *stiffness_damping = nullptr;
+};
+/// Of lanes_assemble(): offset . (A offset), linear . offset, and the squares of the internal force, of x less the
+/// centre of the acceleration, of x and of the gradient.
+inline constexpr std::ptrdiff_t kLaneSums = 6;
+
+/// The rotation of kLanes free bodies, see DeformingInertia and FreeMotionWorkspace. r modes, padded to `stride`.
+struct LaneRotationArrays {
+  // Of the model.
+  std::ptrdiff_t modes = 0, stride = 0;
+  const double* stacked = nullptr;         ///< 9 stride x r by columns: S_ab of six pairs, A_c
+  const double* linear = nullptr;          ///< r x 6 by columns
+  const double* second_moments = nullptr;  ///< 6
+  // Of a step of each body: c_v, q_v [r], and the problem of its spin.
+  const double *velocity_factor = nullptr, *velocity_centre = nullptr;
+  const double *momentum = nullptr, *offset = nullptr, *factor = nullptr;
+  // What the calls below leave for each other.
+  double *spin = nullptr, *rotation = nullptr;  ///< 3 each, the spin as its first guess at first
+  double* inverse_inertia = nullptr;            ///< 9
+  double* products = nullptr;                   ///< 9 x r, stacked q
+  double* centre_products = nullptr;            ///< 3 x r, A_c q_v
+  double* factors = nullptr;                    ///< r x 12: rows of (D + V)^T, of H^T, and those times J^-1
+};
+
+/// The points of a convex hull that may be the nearest one, each an affine function of the load: see ExampleWeights.
+struct WeightCandidates {
+  static constexpr std::ptrdiff_t kMostExamples = 4;
+
+  std::ptrdiff_t examples = 0;  ///< K <= kMostExamples
+  std::ptrdiff_t count = 0;     ///< N
+  const double* numbers =
+      nullptr;  ///< K x K x padded(N): value k of n is numbers[k, 0, n] + sum_j>0 numbers[k, j, n] load_j
+  const double* members = nullptr;  ///< K x padded(N): 1 where that is a weight, 0 where it is a slope
+};
+
+/// See BernsteinBasis.
+struct BernsteinArrays {
+  std::ptrdiff_t degree = 0, weights = 0;  ///< D, K >= 2
+  const double* binomials = nullptr;       ///< D + 1 columns, n over a at a + n (D + 1)
+  double smallest_power = 0;               ///< powers below it are taken as zero
+};
+/// Doubles of scratch of lanes_bernstein().
+constexpr std::ptrdiff_t lane_bernstein_scratch(std::ptrdiff_t degree, std::ptrdiff_t weights) {
+  return (weights * (degree + 1) + (degree + 1) * (degree + 2) / 2) * kLanes;
+}
 /// Doubles of scratch of lanes_force_and_stiffness().
 constexpr std::ptrdiff_t lane_scratch(std::ptrdiff_t modes) { return 2 * 9 * lane_rows(modes) * kLanes; }
 
@@ -137,14 +187,46 @@ struct Kernels {
   /// scratch: lane_scratch(r).
   void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
                                     double* energy, double* force, double* stiffness);
-  /// L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
-  void (*lanes_cholesky)(const double* A, std::ptrdiff_t n, double* L);
+  /// A <- L, L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
+  void (*lanes_cholesky)(double* A, std::ptrdiff_t n);
   void (*lanes_cholesky_solve)(const double* L, std::ptrdiff_t n, double* x);
   /// y = A x, A of each body.
   void (*lanes_symmetric_product)(const double* A, std::ptrdiff_t n, const double* x, double* y);
-  /// y = A x, the same A [rows x columns] for all, rows `outer` apart.
+  /// y = A x, the same A [rows x columns] for all, columns `outer` apart.
   void (*lanes_matrix_product)(const double* A, std::ptrdiff_t rows, std::ptrdiff_t columns, std::ptrdiff_t outer,
                                const double* x, double* y);
+  /// sum = a . b of vectors [n].
+  void (*lanes_dot)(std::ptrdiff_t n, const double* a, const double* b, double* sum);
+  /// sum = a + b, n numbers of each body.
+  void (*lanes_sum)(std::ptrdiff_t n, const double* a, const double* b, double* sum);
+  /// numbers += factor constants; n numbers of each body, the constants the same for all.
+  void (*lanes_add_constants)(std::ptrdiff_t n, const double* constants, const double* factor, double* numbers);
+  /// to = from, n numbers of each body for which `chosen` is not zero.
+  void (*lanes_take)(std::ptrdiff_t n, const double* chosen, const double* from, double* to);
+  /// A = (c_a + alpha c_v) I + beta c_v K and its gradient at the start, without example forces; offset = c_v (start -
+  /// q_v); trace: the sum of the sizes of K's diagonal.
+  void (*lanes_prepare)(const LaneForm&, const double* stiffness, double* offset, double* quadratic, double* linear,
+                        double* trace);
+  /// offset = x - start, gradient = internal + linear + A offset; sums [kLaneSums].
+  void (*lanes_assemble)(const LaneForm&, const double* x, const double* quadratic, const double* linear,
+                         const double* internal, double* offset, double* gradient, double* sums);
+  /// Of a step, before the calls below.
+  void (*lanes_begin_rotation)(const LaneRotationArrays&);
+  /// Moments at x [r], and the spins of those that are active (not zero) with the velocity c_v (x - q_v), by Newton's
+  /// method from the last ones: `found` is 1 where there is one and the turn is below a radian, else 0. force [r] as
+  /// rotation_force().
+  void (*lanes_rotate)(const LaneRotationArrays&, const double* active, const double* x, double* force, double* found);
+  /// As add_rotation_stiffness() of the chosen (not zero), of the others anything; of the centrifugal softening
+  /// `softening` times.
+  void (*lanes_rotation_stiffness)(const LaneRotationArrays&, const double* chosen, const double* softening,
+                                   double* hessian);
+  /// As gyroscopic_product(), after lanes_rotation_stiffness(); scratch 3 x r.
+  void (*lanes_gyroscopic_product)(const LaneRotationArrays&, const double* x, double* scratch, double* product);
+  /// weights [K]: of the candidate whose least value is the largest, the first of equals, its weights where they are
+  /// positive. load [K], whose first number is zero.
+  void (*lanes_weights)(const WeightCandidates&, const double* load, double* weights);
+  /// values: all polynomials at weights [K], in order; scratch: lane_bernstein_scratch(D, K).
+  void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
 };
 
 enum class InstructionSet { kPortable, kAvx2, kAvx512 };

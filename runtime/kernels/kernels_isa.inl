@@ -416,7 +416,10 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
   }
 }
 
+#include "runtime/kernels/lanes_examples_isa.inl"
 #include "runtime/kernels/lanes_isa.inl"
+#include "runtime/kernels/lanes_rotation_isa.inl"
+#include "runtime/kernels/lanes_vectors_isa.inl"
 
 }  // namespace
 
@@ -443,6 +446,18 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_cholesky,
                                  lanes_cholesky_solve,
                                  lanes_symmetric_product,
-                                 lanes_matrix_product};
+                                 lanes_matrix_product,
+                                 lanes_dot,
+                                 lanes_sum,
+                                 lanes_add_constants,
+                                 lanes_take,
+                                 lanes_prepare,
+                                 lanes_assemble,
+                                 lanes_begin_rotation,
+                                 lanes_rotate,
+                                 lanes_rotation_stiffness,
+                                 lanes_gyroscopic_product,
+                                 lanes_weights,
+                                 lanes_bernstein};
 
 }  // namespace exmat::runtime

@@ -243,9 +243,8 @@ inline void lanes_solve_block(const double* L, double* block) {
     for (Index n = 0; n < kBlock; ++n) store(block + in_block(m, n), b[m][n]);
 }
 
-void lanes_cholesky(const double* A, Index n, double* L) {
+void lanes_cholesky(double* L, Index n) {
   const Index blocks = lane_rows(n) / kBlock;
-  for (Index i = 0; i < lane_triangle(n); i += kWidth) store(L + i, load(A + i));
   for (Index at = 0; at < kLanes; at += kWidth)
     for (Index column = 0; column < blocks; ++column)
       for (Index row = column; row < blocks; ++row) {
@@ -303,47 +302,77 @@ void lanes_cholesky_solve(const double* L, Index n, double* x) {
   }
 }
 
-void lanes_symmetric_product(const double* A, Index n, const double* x, double* y) {
-  const Index blocks = lane_rows(n) / kBlock;
-  lanes_clear(y, n);
-  for (Index at = 0; at < kLanes; at += kWidth)
-    for (Index row = 0; row < blocks; ++row) {
-      const Index count = n - kBlock * row < kBlock ? n - kBlock * row : kBlock;
-      for (Index m = 0; m < count; ++m) {
-        const Index i = kBlock * row + m;
-        const Vec here = load(x + i * kLanes + at);
-        Vec sum = load(y + i * kLanes + at);
-        for (Index column = 0; column < row; ++column) {
-          const double* const block = A + block_start(row, column) + at;
-          for (Index k = 0; k < kBlock; ++k) {
-            const Index j = kBlock * column + k;
-            const Vec a = load(block + in_block(m, k));
-            sum += a * load(x + j * kLanes + at);
-            store(y + j * kLanes + at, load(y + j * kLanes + at) + a * here);
-          }
-        }
-        const double* const block = A + block_start(row, row) + at;
-        for (Index k = 0; k < m; ++k) {
-          const Index j = kBlock * row + k;
-          const Vec a = load(block + in_block(m, k));
-          sum += a * load(x + j * kLanes + at);
-          store(y + j * kLanes + at, load(y + j * kLanes + at) + a * here);
-        }
-        store(y + i * kLanes + at, sum + load(block + in_block(m, m)) * here);
-      }
+/// The first `count` rows of a block, `diagonal`: its lower triangle alone. here += B x, there += B^T y.
+template <bool diagonal, Index count>
+inline void lanes_add_products(const double* block, const Vec* x, const Vec* y, Vec* here, Vec* there) {
+#pragma GCC unroll 4
+  for (Index m = 0; m < count; ++m)
+#pragma GCC unroll 4
+    for (Index k = 0; k < (diagonal ? m : kBlock); ++k) {
+      const Vec a = load(block + in_block(m, k));
+      here[m] += a * x[k];
+      there[k] += a * y[m];
     }
 }
 
-void lanes_matrix_product(const double* A, Index rows, Index columns, Index outer, const double* x, double* y) {
-  for (Index at = 0; at < kLanes; at += kWidth)
-    for (Index i = 0; i < rows; ++i) {
-      Vec even = zero(), odd = zero();
-      Index c = 0;
-      for (; c + 1 < columns; c += 2) {
-        even += load(x + c * kLanes + at) * A[i * outer + c];
-        odd += load(x + (c + 1) * kLanes + at) * A[i * outer + c + 1];
-      }
-      if (c < columns) even += load(x + c * kLanes + at) * A[i * outer + c];
-      store(y + i * kLanes + at, even + odd);
+/// One row of blocks, `count` rows of it.
+template <Index count>
+inline void lanes_symmetric_rows(const double* A, Index row, const double* x, double* y) {
+  Vec own[count], here[count];
+#pragma GCC unroll 4
+  for (Index m = 0; m < count; ++m) {
+    own[m] = load(x + (kBlock * row + m) * kLanes);
+    here[m] = zero();
+  }
+  for (Index column = 0; column < row; ++column) {
+    double* const above = y + kBlock * column * kLanes;
+    Vec others[kBlock], there[kBlock];
+#pragma GCC unroll 4
+    for (Index k = 0; k < kBlock; ++k) {
+      others[k] = load(x + (kBlock * column + k) * kLanes);
+      there[k] = load(above + k * kLanes);
     }
+    lanes_add_products<false, count>(A + block_start(row, column), others, own, here, there);
+#pragma GCC unroll 4
+    for (Index k = 0; k < kBlock; ++k) store(above + k * kLanes, there[k]);
+  }
+  const double* const block = A + block_start(row, row);
+  lanes_add_products<true, count>(block, own, own, here, here);
+#pragma GCC unroll 4
+  for (Index m = 0; m < count; ++m)
+    store(y + (kBlock * row + m) * kLanes, here[m] + load(block + in_block(m, m)) * own[m]);
+}
+
+void lanes_symmetric_product(const double* A, Index n, const double* x, double* y) {
+  const Index whole = n / kBlock;
+  for (Index at = 0; at < kLanes; at += kWidth) {
+    for (Index row = 0; row < whole; ++row) lanes_symmetric_rows<kBlock>(A + at, row, x + at, y + at);
+    if (n % kBlock == 1) lanes_symmetric_rows<1>(A + at, whole, x + at, y + at);
+    if (n % kBlock == 2) lanes_symmetric_rows<2>(A + at, whole, x + at, y + at);
+    if (n % kBlock == 3) lanes_symmetric_rows<3>(A + at, whole, x + at, y + at);
+  }
+}
+
+/// y [rows] = A x, one register's bodies.
+template <Index rows>
+inline void lanes_product_rows(const double* A, Index columns, Index outer, const double* x, double* y) {
+  Vec sums[rows];
+#pragma GCC unroll 8
+  for (Index i = 0; i < rows; ++i) sums[i] = zero();
+  for (Index c = 0; c < columns; ++c) {
+    const Vec here = load(x + c * kLanes);
+#pragma GCC unroll 8
+    for (Index i = 0; i < rows; ++i) sums[i] += here * A[c * outer + i];
+  }
+#pragma GCC unroll 8
+  for (Index i = 0; i < rows; ++i) store(y + i * kLanes, sums[i]);
+}
+
+void lanes_matrix_product(const double* A, Index rows, Index columns, Index outer, const double* x, double* y) {
+  for (Index at = 0; at < kLanes; at += kWidth) {
+    Index i = 0;
+    for (; i + 8 <= rows; i += 8) lanes_product_rows<8>(A + i, columns, outer, x + at, y + i * kLanes + at);
+    for (; i + 4 <= rows; i += 4) lanes_product_rows<4>(A + i, columns, outer, x + at, y + i * kLanes + at);
+    for (; i < rows; ++i) lanes_product_rows<1>(A + i, columns, outer, x + at, y + i * kLanes + at);
+  }
 }

@@ -15,7 +15,9 @@ exmat_settings settings_of(const py::dict& given) {
       {"newton_tolerance", &exmat_settings::newton_tolerance},
       {"example_stiffness", &exmat_settings::example_stiffness},
       {"example_damping", &exmat_settings::example_damping},
-      {"example_bias", &exmat_settings::example_bias}};
+      {"example_bias", &exmat_settings::example_bias},
+      {"sleep_energy", &exmat_settings::sleep_energy},
+      {"sleep_time", &exmat_settings::sleep_time}};
   const std::map<std::string, std::int32_t exmat_settings::*> counts{
       {"newton_iterations", &exmat_settings::newton_iterations},
       {"target_iterations", &exmat_settings::target_iterations},

@@ -16,7 +16,7 @@ void bind_report(py::module_& module) {
       .def_readonly("steps", &exmat_report::steps, "Steps taken.")
       .def_readonly("status", &exmat_report::status,
                     "Bits of all steps: 1 non-finite, 2 iteration limit, 4 stagnated, 8 target not converged, 16 "
-                    "subnormal numbers set to zero, which is no fault.")
+                    "subnormal numbers set to zero and 32 asleep, which are no faults.")
       .def_readonly("newton_iterations", &exmat_report::newton_iterations, "Newton iterations.")
       .def_readonly("factorisations", &exmat_report::factorisations, "Factorisations of the Hessian.")
       .def_readonly("line_search_evaluations", &exmat_report::line_search_evaluations, "Of line searches.")

@@ -7,6 +7,7 @@
 
 #include "common/core/timer.h"
 #include "runtime/scene/contact_load.h"
+#include "runtime/sim/step/sleep.h"
 
 namespace exmat::runtime {
 namespace {
@@ -50,6 +51,40 @@ void Bodies::step_share(int thread) noexcept {
     step_group(group * size, std::min((group + 1) * size, states_.size()), threads_[static_cast<std::size_t>(thread)]);
 }
 
+/// The same where bodies may sleep: groups are made of those that are awake. Those of a last group that is too small
+/// for lanes step by themselves whoever is awake, so that nobody's results depend on that.
+void Bodies::step_share_awake(int thread) noexcept {
+  Thread& own = threads_[static_cast<std::size_t>(thread)];
+  const std::size_t rest = states_.size() % kLanes, in_lanes = states_.size() - (rest < kFewestLanes ? rest : 0);
+  const std::size_t first = in_lanes * static_cast<std::size_t>(thread) / threads_.size();
+  const std::size_t last = in_lanes * static_cast<std::size_t>(thread + 1) / threads_.size();
+  std::array<std::size_t, kLanes> awake{};
+  std::size_t count = 0;
+  for (std::size_t body = first; body < last; ++body) {
+    if (sleeps(model_, scene_, states_[body]))
+      reports_[body] = sleep_through(scene_, states_[body]);
+    else
+      awake[count++] = body;
+    if (count == kLanes || (count > 0 && body + 1 == last)) {
+      step_awake(std::span(awake).first(count), own);
+      count = 0;
+    }
+  }
+  if (thread + 1 == threads() && in_lanes < states_.size()) step_group(in_lanes, states_.size(), own);
+}
+
+void Bodies::step_awake(std::span<const std::size_t> awake, Thread& thread) noexcept {
+  const Timer timer;
+  std::array<LaneBody, kLanes> bodies;
+  std::array<StepReport, kLanes> reports;
+  for (std::size_t lane = 0; lane < awake.size(); ++lane) bodies[lane] = {&scene_, &states_[awake[lane]]};
+  step_in_lanes(model_, {bodies.data(), awake.size()}, thread.workspace, {reports.data(), awake.size()});
+  for (std::size_t lane = 0; lane < awake.size(); ++lane) reports_[awake[lane]] = reports[lane];
+  if (thread.workspace.body(0).profile == nullptr) return;
+  thread.measured.seconds += timer.seconds();
+  for (const std::size_t body : awake) thread.measured.work += step_work(model_, scene_, reports_[body]);
+}
+
 void Bodies::step_group(std::size_t first, std::size_t last, Thread& thread) noexcept {
   const Timer timer;
   if (side_by_side_) {
@@ -69,12 +104,18 @@ std::span<const StepReport> Bodies::step() noexcept {
   const int threads = this->threads();
   keys_.apply(model_, states_.front().step, scene_);
   side_by_side_ = count() >= kFewestLanes && can_step_side_by_side(model_, scene_);
+  const auto step_share_of = [&](int thread) {
+    if (side_by_side_ && scene_.sleep.energy > 0)
+      step_share_awake(thread);
+    else
+      step_share(thread);
+  };
   if (threads == 1) {
-    step_share(0);
+    step_share_of(0);
     return reports_;
   }
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
-  for (int thread = 0; thread < threads; ++thread) step_share(thread);
+  for (int thread = 0; thread < threads; ++thread) step_share_of(thread);
   return reports_;
 }
 

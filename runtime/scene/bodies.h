@@ -64,6 +64,8 @@ class Bodies {
     Measured measured;
   };
   void step_share(int thread) noexcept;
+  void step_share_awake(int thread) noexcept;
+  void step_awake(std::span<const std::size_t> awake, Thread& thread) noexcept;
   void step_group(std::size_t first, std::size_t last, Thread& thread) noexcept;
 
   const Model& model_;

@@ -129,6 +129,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.mass_damping = config.mass_damping;
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
+  scene.sleep = {config.sleep.energy, config.sleep.time};
   scene.obstacles = make_obstacles(config);
   scene.meets_bodies = config.meets_bodies;
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
@@ -278,6 +279,9 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   } else {
     left_out("damping", "both factors are 0");
   }
+  if (scene.sleep.energy > 0)
+    plan.push_back(
+        fmt::format("sleep: after {:g} s with a kinetic energy below {:g} J", scene.sleep.time, scene.sleep.energy));
   if (scene.forces.empty()) {
     left_out("scripted forces", "the scene names none");
   } else {

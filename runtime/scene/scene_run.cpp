@@ -18,6 +18,7 @@ void add_reports(std::span<const StepReport> reports, double seconds, RunSummary
     target += report.target_iterations;
     summary.projections += report.projections;
     if ((report.status & kStepUnconverged) != 0) ++summary.unconverged_steps;
+    if ((report.status & kStepAsleep) != 0) ++summary.slept_steps;
   }
   ++summary.steps;
   summary.step_seconds.add(seconds / bodies);

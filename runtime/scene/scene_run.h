@@ -30,6 +30,7 @@ struct RunSummary {
   Samples target_iterations;                   ///< likewise
   std::int64_t projections = 0;                ///< of all bodies
   std::int64_t unconverged_steps = 0;          ///< residual above the tolerance; of all bodies
+  std::int64_t slept_steps = 0;                ///< that bodies slept through; of all bodies
   Energies energies;                           ///< of the first body, at the end
   std::uint64_t state_hash = 0;                ///< of all bodies, at the end; see Bodies::hash
   std::optional<double> largest_displacement;  ///< over the written frames [m]; only with a trajectory

@@ -38,6 +38,8 @@ class BodyReader {
     state.time = static_cast<double>(state.step) * loaded_.scene.time_step;
     state.elastic_energy = body_["elastic_energy"];
     state.begins_anew = body_["begins_anew"];
+    if (body_.contains("sleep"))
+      state.sleep = {body_["sleep"]["asleep"], body_["sleep"]["still_steps"], body_["sleep"]["loads"]};
     const BodyFrame& frame = *loaded_.model->frame;
     const std::vector<double> numbers = body_["frame"];
     require_count("/frame", numbers.size(), frame.numbers(state.frame).size());
@@ -103,6 +105,9 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
                    {"examples", OrderedJson::array()},
                    {"contacts", OrderedJson::array()}};
   for (const auto& [name, member] : kModeArrays) body[name] = array_of(state.*member);
+  if (state.sleep.loads != 0)
+    body["sleep"] = {
+        {"asleep", state.sleep.asleep}, {"still_steps", state.sleep.still_steps}, {"loads", state.sleep.loads}};
   for (const ExampleState& examples : state.examples)
     body["examples"].push_back({{"weights", array_of(examples.weights)},
                                 {"target", array_of(examples.target)},

@@ -81,6 +81,9 @@ typedef struct exmat_settings {
   int32_t target_iterations; /* most in one step, 1 to 1000; 4 */
   int32_t energy_reference;  /* EXMAT_ENERGY_REFERENCE_EXAMPLE */
   int32_t use_contact;       /* 1: bodies can touch obstacles of exmat_body_add_obstacle(); 0 */
+  double sleep_energy;       /* > 0: a body is left alone once its kinetic energy has been below this [J]; 0: never. Not
+                                for bodies of a world */
+  double sleep_time;         /* for so long, > 0 [s]; 0.5 */
 } exmat_settings;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
@@ -165,7 +168,8 @@ enum {
   EXMAT_STEP_ITERATION_LIMIT = 2,      /* the residual is above the tolerance */
   EXMAT_STEP_STAGNATED = 4,            /* likewise, and no descent is left: rounding */
   EXMAT_STEP_TARGET_NOT_CONVERGED = 8, /* the next step carries on */
-  EXMAT_STEP_SUBNORMAL = 16            /* no fault: numbers below 2.2e-308 were set to zero */
+  EXMAT_STEP_SUBNORMAL = 16,           /* no fault: numbers below 2.2e-308 were set to zero */
+  EXMAT_STEP_ASLEEP = 32               /* no fault: the body rests, see sleep_energy; its contacts are not told */
 };
 
 /* What the steps of one call did: sums, unless said otherwise. */

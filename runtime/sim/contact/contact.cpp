@@ -91,6 +91,11 @@ double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& veloci
          (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.basis_norm() * velocity.v.norm());
 }
 
+bool ContactSet::may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept {
+  const DeformationTree::Ball all = tree_.ball(0, pose.q, pose.q.norm());
+  return obstacle.may_meet(pose.position + pose.rotation * all.centre, all.radius, 0);
+}
+
 bool ContactSet::body_is_near(const BodyPose& pose, double q_norm, double margin,
                               const ContactWorkspace& workspace) const noexcept {
   const DeformationTree::Node& all = tree_.nodes().front();

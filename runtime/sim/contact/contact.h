@@ -107,6 +107,9 @@ class ContactSet {
   /// Bound on how far a vertex goes in `time_step` at this velocity [m].
   double travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept;
 
+  /// False only where nothing of a body that stays at this pose touches the obstacle in the step.
+  bool may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept;
+
   /// Finds the candidates: vertices of this pose, that of the beginning, at most `margin` [m] away from the
   /// obstacles as they are at `end_time` [s]. Costs O(obstacles + r) where the whole body is farther away.
   void gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,

@@ -51,6 +51,10 @@ Eigen::Index BernsteinBasis::number(const Eigen::VectorXi& exponents) const {
   return before;
 }
 
+BernsteinArrays BernsteinBasis::arrays() const noexcept {
+  return {degree_, weights_, binomials_.data(), kSmallestPower};
+}
+
 void BernsteinBasis::fill_powers(const Eigen::VectorXd& w, Workspace& workspace) const noexcept {
   for (int k = 0; k < weights_; ++k) {
     double power = 1;

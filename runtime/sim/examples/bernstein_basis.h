@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "common/core/arrays.h"
+#include "runtime/kernels/kernels.h"
 
 namespace exmat::runtime {
 
@@ -35,6 +36,9 @@ class BernsteinBasis {
 
   /// `values` [N] at w [K], w >= 0. Values far below rounding, near corners and edges, become exactly zero.
   void values(const Eigen::VectorXd& w, Workspace& workspace, Eigen::Ref<Eigen::VectorXd> values) const noexcept;
+
+  /// The same of kLanes bodies side by side: see Kernels::lanes_bernstein.
+  BernsteinArrays arrays() const noexcept;
 
  private:
   void fill_powers(const Eigen::VectorXd& w, Workspace& workspace) const noexcept;

@@ -1,5 +1,9 @@
 #include "runtime/sim/examples/example_weights.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -10,6 +14,9 @@ enum ExampleState : int { kOut, kIn, kRefused };
 
 constexpr double kWeightRounding = 64 * std::numeric_limits<double>::epsilon();
 constexpr double kDependent = 1e-14;  // squared distance from the corral's affine hull, relative
+constexpr double kWellApart = 1e-6;   // least over largest squared extent of the examples' simplex, for candidates
+
+bool is_member(unsigned members, Eigen::Index k) { return (members >> k & 1U) != 0; }
 
 }  // namespace
 
@@ -20,6 +27,62 @@ ExampleWeights::ExampleWeights(const RowMatrix& gram, const Eigen::VectorXd& h0,
           Eigen::MatrixXd::Constant(count, count, gram(0, 0));
   h0_ = (h0.array() - h0[0]).matrix() - (first.array() - gram(0, 0)).matrix();
   hq_ = hq.rowwise() - hq.row(0);
+  slope_ = hq_;
+  build_candidates();
+}
+
+void ExampleWeights::build_candidates() {
+  if (examples() > WeightCandidates::kMostExamples) return;
+  if (examples() > 1) {
+    const Eigen::MatrixXd differences = gram_.bottomRightCorner(examples() - 1, examples() - 1);
+    const Eigen::VectorXd extents = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(differences).eigenvalues();
+    if (!(extents[0] > kWellApart * extents[examples() - 2])) return;
+  }
+  std::vector<unsigned> sets;
+  for (unsigned members = 1; members < 1U << examples(); ++members) sets.push_back(members);
+  std::ranges::stable_sort(sets, {}, [](unsigned members) { return std::popcount(members); });
+  candidate_count_ = static_cast<Eigen::Index>(sets.size());
+  candidate_numbers_ = AlignedArray(examples() * examples() * padded(candidate_count_));
+  candidate_members_ = AlignedArray(examples() * padded(candidate_count_));
+  for (Eigen::Index n = 0; n < candidate_count_; ++n) set_candidate(n, sets[static_cast<std::size_t>(n)]);
+}
+
+/// Affine functions of the load as rows of K + 1 numbers, the last one constant.
+void ExampleWeights::set_candidate(Eigen::Index n, unsigned members) {
+  const Eigen::Index count = examples(), stride = padded(candidate_count_), size = std::popcount(members) - 1;
+  const auto origin = static_cast<Eigen::Index>(std::countr_zero(members));
+  const auto load_difference = [&](Eigen::Index k) {
+    return Eigen::RowVectorXd(Eigen::RowVectorXd::Unit(count + 1, k) - Eigen::RowVectorXd::Unit(count + 1, origin));
+  };
+  std::vector<Eigen::Index> others;
+  for (Eigen::Index k = origin + 1; k < count; ++k)
+    if (is_member(members, k)) others.push_back(k);
+  Eigen::MatrixXd values = Eigen::MatrixXd::Zero(count, count + 1);
+  values(origin, count) = 1;
+  if (size > 0) {
+    Eigen::MatrixXd system(size, size), right(size, count + 1);
+    for (Eigen::Index i = 0; i < size; ++i) {
+      const Eigen::Index row = others[static_cast<std::size_t>(i)];
+      right.row(i) = load_difference(row);
+      right(i, count) -= gram_(row, origin) - gram_(origin, origin);
+      for (Eigen::Index j = 0; j < size; ++j) {
+        const Eigen::Index column = others[static_cast<std::size_t>(j)];
+        system(i, j) = gram_(row, column) - gram_(row, origin) - gram_(origin, column) + gram_(origin, origin);
+      }
+    }
+    const Eigen::MatrixXd solved = system.llt().solve(right);
+    for (Eigen::Index i = 0; i < size; ++i) values.row(others[static_cast<std::size_t>(i)]) = solved.row(i);
+    values.row(origin) -= solved.colwise().sum();
+  }
+  const Eigen::MatrixXd weights = values;
+  const double scale = std::max(gram_.diagonal().maxCoeff(), std::numeric_limits<double>::min());
+  for (Eigen::Index k = 0; k < count; ++k) {
+    candidate_members_[k * stride + n] = is_member(members, k) ? 1 : 0;
+    if (!is_member(members, k))
+      values.row(k) = ((gram_.row(k) - gram_.row(origin)) * weights - load_difference(k)) / scale;
+    candidate_numbers_[k * count * stride + n] = values(k, count);
+    for (Eigen::Index j = 1; j < count; ++j) candidate_numbers_[(k * count + j) * stride + n] = values(k, j);
+  }
 }
 
 ExampleWeights::Workspace ExampleWeights::make_workspace() const {

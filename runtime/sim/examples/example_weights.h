@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 
 #include "common/core/arrays.h"
+#include "runtime/kernels/aligned_array.h"
 
 namespace exmat::runtime {
 
@@ -28,18 +29,36 @@ class ExampleWeights {
 
   Eigen::Index examples() const { return gram_.rows(); }
 
+  /// The load of a pose relative to example 0, h(q) = h0 + hq q: h0 [K] and hq [K x r], whose first numbers are zero.
+  const Eigen::VectorXd& load_at_rest() const { return h0_; }
+  const Eigen::MatrixXd& load_slope() const { return slope_; }
+
+  /// The minima over the affine hulls of all 2^K - 1 sets of examples, as functions of the load: weights of those in a
+  /// set, and how much steeper than in it the descent towards the others is. The solution is the one where none of
+  /// these is negative. There are none for many examples, and for such that are affinely dependent or nearly so.
+  bool has_candidates() const { return candidate_count_ > 0; }
+  WeightCandidates candidates() const {
+    return {examples(), candidate_count_, candidate_numbers_.data(), candidate_members_.data()};
+  }
+
   /// `weights` [K] at the pose q [r].
   void solve(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& weights) const noexcept;
 
  private:
   bool solve_affine(Workspace& workspace, int count) const noexcept;
   int shrink_to_simplex(Workspace& workspace, int count, Eigen::VectorXd& weights) const noexcept;
+  void build_candidates();
+  void set_candidate(Eigen::Index n, unsigned members);
 
   // Relative to example 0, which changes the objective by a constant on the simplex and keeps the digits of the
   // differences.
-  Eigen::MatrixXd gram_;  ///< (e_i - e_0)^T (e_j - e_0)
-  Eigen::VectorXd h0_;    ///< (e_k - e_0)^T (c_rest - e_0)
-  RowMatrix hq_;          ///< (e_k - e_0)^T T
+  Eigen::MatrixXd gram_;   ///< (e_i - e_0)^T (e_j - e_0)
+  Eigen::VectorXd h0_;     ///< (e_k - e_0)^T (c_rest - e_0)
+  RowMatrix hq_;           ///< (e_k - e_0)^T T
+  Eigen::MatrixXd slope_;  ///< the same, by columns
+
+  Eigen::Index candidate_count_ = 0;
+  AlignedArray candidate_numbers_, candidate_members_;  ///< see WeightCandidates
 };
 
 /// w_0 <- bias w_0, the rest of it shared equally among the others; nothing for K = 1. `bias` in [0, 1].

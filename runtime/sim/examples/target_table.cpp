@@ -59,6 +59,16 @@ void TargetTable::evaluate(const Eigen::VectorXd& weights, Workspace& workspace,
   target = Eigen::Map<const Eigen::VectorXd>(workspace.sum.data(), modes_);
 }
 
+Eigen::Index TargetTable::lanes_scratch() const noexcept {
+  return basis_.size() * kLanes + lane_bernstein_scratch(degree(), examples());
+}
+
+void TargetTable::evaluate_lanes(const double* weights, double* scratch, double* target) const noexcept {
+  double* const values = scratch + lane_bernstein_scratch(degree(), examples());
+  kernels().lanes_bernstein(basis_.arrays(), weights, scratch, values);
+  kernels().lanes_matrix_product(control_points_.data(), modes_, basis_.size(), padded(modes_), values, target);
+}
+
 // dp/dw_k = D sum_b B_b(w) P_(b + 1_k) for independent weights, which along w itself gives D p. In a piece those are
 // its own weights; the difference of the two columns is dp/ds = (t_i+1 - t_i) dp/dt.
 void TargetTable::derivative(const Eigen::VectorXd& weights, Workspace& workspace,

@@ -39,6 +39,11 @@ class TargetTable {
   /// `target` [r] = p*(w) in reduced coordinates; weights [K] >= 0 add up to 1.
   void evaluate(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::VectorXd& target) const noexcept;
 
+  /// Of kLanes bodies side by side (kernels.h): weights [K] and target [r] of each, for tables of one piece; scratch
+  /// lanes_scratch().
+  void evaluate_lanes(const double* weights, double* scratch, double* target) const noexcept;
+  Eigen::Index lanes_scratch() const noexcept;
+
   /// `jacobian` [r x K] = d/dw p*(w / sum w) where the weights add up to 1. Along tangents of the simplex (dw adds up
   /// to zero) it is dp*; across, jacobian w = 0, which settles the vector that may be added to all columns.
   void derivative(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::MatrixXd& jacobian) const noexcept;

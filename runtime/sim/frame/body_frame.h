@@ -53,6 +53,8 @@ class BodyFrame {
   virtual Eigen::Vector3d origin() const noexcept { return Eigen::Vector3d::Zero(); }
   /// Of the body at rest, world [m]; 0 of a frame that does not move.
   virtual Eigen::Vector3d centre_of_mass() const noexcept { return Eigen::Vector3d::Zero(); }
+  /// Of a body that is moved by its momenta, else null: such bodies rotate side by side (sim/lanes).
+  virtual const DeformingInertia* inertia_of_momenta() const noexcept { return nullptr; }
   /// Whether it exerts forces on q that depend on q and its velocity and have no potential.
   virtual bool exerts_forces() const noexcept { return false; }
 

@@ -30,6 +30,7 @@ DeformingInertia::DeformingInertia(const RigidData& data)
   Eigen::Map<Eigen::MatrixXd> stacked(stacked_.data(), kProducts * stride, r);
   for (int pair = 0; pair < kSymmetric; ++pair) {
     const int a = kFirst[pair], b = kSecond[pair];
+    pairs_[pair] = data.second_moments(a, b);
     linear_.col(pair) = data.linear_moments.row(3 * a + b);
     stacked.middleRows(pair * stride, r) = 0.5 * (S(a, b) + S(b, a));
   }
@@ -95,10 +96,24 @@ void DeformingInertia::add_centrifugal(const Eigen::Vector3d& spin, double facto
   }
 }
 
+bool DeformingInertia::softens(const Eigen::Vector3d& spin, double velocity_factor) noexcept {
+  const double share = spin.squaredNorm() / (velocity_factor * velocity_factor);
+  return share >= kLeastSoftening && share <= kMostSoftening;
+}
+
 void DeformingInertia::add_softening(const Eigen::Vector3d& spin, double velocity_factor,
                                      Eigen::MatrixXd& hessian) const noexcept {
-  const double share = spin.squaredNorm() / (velocity_factor * velocity_factor);
-  if (share >= kLeastSoftening && share <= kMostSoftening) add_centrifugal(spin, -1, hessian);
+  if (softens(spin, velocity_factor)) add_centrifugal(spin, -1, hessian);
+}
+
+LaneRotationArrays DeformingInertia::lane_arrays() const noexcept {
+  LaneRotationArrays arrays;
+  arrays.modes = modes();
+  arrays.stride = padded(modes());
+  arrays.stacked = stacked_.data();
+  arrays.linear = linear_.data();
+  arrays.second_moments = pairs_.data();
+  return arrays;
 }
 
 void DeformingInertia::inertia_slope(const Moments& moments, const Eigen::Vector3d& spin,

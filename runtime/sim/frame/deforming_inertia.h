@@ -48,9 +48,14 @@ class DeformingInertia {
   /// (d(J w)/dq)^T [r x 3] at fixed w.
   void inertia_slope(const Moments& moments, const Eigen::Vector3d& spin, Eigen::MatrixX3d& slope) const noexcept;
 
-  /// What the centrifugal force takes from the Hessian c_v^2 I + ..., where that is neither so much that it could leave
-  /// it indefinite nor too little to change an iteration.
+  /// Whether the Hessian c_v^2 I + ... is to have what the centrifugal force takes from it: where that is neither so
+  /// much that it could leave it indefinite nor too little to change an iteration.
+  static bool softens(const Eigen::Vector3d& spin, double velocity_factor) noexcept;
+  /// What it takes, where it does.
   void add_softening(const Eigen::Vector3d& spin, double velocity_factor, Eigen::MatrixXd& hessian) const noexcept;
+
+  /// The constants of LaneRotationArrays.
+  LaneRotationArrays lane_arrays() const noexcept;
 
  private:
   static constexpr int kSymmetric = 6;
@@ -59,8 +64,9 @@ class DeformingInertia {
   double mass_ = 0;
   Eigen::Vector3d centre_of_mass_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second_moments_ = Eigen::Matrix3d::Zero();
-  Eigen::MatrixXd linear_;  ///< r x 6, p1_ab
-  AlignedArray stacked_;    ///< kProducts padded(r) x r by columns: S_ab and A_c
+  Eigen::Matrix<double, 6, 1> pairs_ = Eigen::Matrix<double, 6, 1>::Zero();  ///< of the second moments
+  Eigen::MatrixXd linear_;                                                   ///< r x 6, p1_ab
+  AlignedArray stacked_;  ///< kProducts padded(r) x r by columns: S_ab and A_c
 };
 
 }  // namespace exmat::runtime

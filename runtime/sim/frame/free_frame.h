@@ -17,6 +17,7 @@ class FreeFrame final : public BodyFrame {
   Eigen::Vector3d centre_of_mass() const noexcept override { return inertia_.centre_of_mass(); }
   bool exerts_forces() const noexcept override { return true; }
   const DeformingInertia& inertia() const noexcept { return inertia_; }
+  const DeformingInertia* inertia_of_momenta() const noexcept override { return &inertia_; }
 
   FrameState make_state() const override;
   FrameWorkspace make_workspace() const override { return FreeMotionWorkspace(inertia_); }

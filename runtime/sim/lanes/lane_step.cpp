@@ -9,28 +9,13 @@
 
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/example_forces.h"
+#include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-LaneNumbers dot(const LaneVectors& a, const LaneVectors& b) {
-  LaneNumbers sum = LaneNumbers::Zero();
-  for (Eigen::Index c = 0; c < a.cols(); ++c) sum += a.col(c) * b.col(c);
-  return sum;
-}
-
-LaneNumbers norm(const LaneVectors& a) { return dot(a, a).sqrt(); }
-
-LaneNumbers distance(const LaneVectors& a, const LaneVectors& b) {
-  LaneNumbers sum = LaneNumbers::Zero();
-  for (Eigen::Index c = 0; c < a.cols(); ++c) sum += (a.col(c) - b.col(c)).square();
-  return sum.sqrt();
-}
-
-void set_lane(LaneVectors& vectors, Eigen::Index lane, const Eigen::VectorXd& own) { vectors.row(lane) = own; }
 
 }  // namespace
 
@@ -45,17 +30,17 @@ bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept 
 }
 
 LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies)
-    : bodies_(bodies, Workspace(model, scene)) {
+    : bodies_(bodies, Workspace(model, scene)), frames_(model) {
   if (std::cmp_less(bodies, kFewestLanes)) return;
   scratch_ = AlignedArray(lane_scratch(model.modes()));
   const Eigen::Index modes = model.modes();
-  for (AlignedArray* vectors :
-       {&start_, &q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_, &linear_, &frozen_,
-        &next_frozen_, &offset_, &product_, &external_, &acceleration_centre_})
+  forms_ = LaneForms(modes);
+  for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
+                                &linear_, &frozen_, &next_frozen_, &offset_})
     *vectors = AlignedArray(modes * kLanes);
-  for (AlignedArray* matrices : {&quadratic_, &stiffness_, &hessian_, &factor_, &new_factor_})
+  for (AlignedArray* matrices : {&quadratic_, &stiffness_, &factor_, &new_factor_})
     *matrices = AlignedArray(lane_triangle(modes));
-  of_frame_.setZero(modes, modes);
+  for (const ExampleModel& examples : model.examples) examples_.emplace_back(examples);
 }
 
 void LaneWorkspace::set_profile(Profile* profile) {
@@ -71,7 +56,8 @@ class LaneStep {
         bodies_(bodies),
         workspace_(workspace),
         elements_(model.internal_force.cubature()),
-        start_(vectors(workspace.start_)),
+        forms_(workspace.forms_),
+        start_(vectors(forms_.start)),
         q_(vectors(workspace.q_)),
         previous_(vectors(workspace.previous_)),
         trial_(vectors(workspace.trial_)),
@@ -83,16 +69,19 @@ class LaneStep {
         frozen_(vectors(workspace.frozen_)),
         next_frozen_(vectors(workspace.next_frozen_)),
         offset_(vectors(workspace.offset_)),
-        product_(vectors(workspace.product_)),
-        external_(vectors(workspace.external_)),
-        acceleration_centre_(vectors(workspace.acceleration_centre_)) {}
+        external_(vectors(forms_.external)),
+        velocity_centre_(vectors(forms_.velocity_centre)),
+        acceleration_centre_(vectors(forms_.acceleration_centre)) {}
 
   void take(std::span<StepReport> reports) noexcept {
     begin();
-    choose_first_iterate();
-    find_targets();
-    prepare();
-    minimise();
+    if (any([](std::size_t) { return true; })) {
+      gather();
+      choose_first_iterate();
+      find_targets();
+      prepare();
+      minimise();
+    }
     for (std::size_t l = 0; l < bodies_.size(); ++l) {
       const LaneBody& body = bodies_[l];
       Workspace& own = workspace_.bodies_[l];
@@ -101,6 +90,7 @@ class LaneStep {
         continue;
       }
       own.q = q_.row(static_cast<Eigen::Index>(l)).matrix();
+      frames().take(static_cast<Eigen::Index>(l), own);
       steps_[l]->potential().set_elastic_energy(energy_[static_cast<Eigen::Index>(l)]);
       reports[l] = steps_[l]->finish(reports_[l]);
     }
@@ -108,6 +98,11 @@ class LaneStep {
 
  private:
   enum class Hessian { kEvaluated, kFactorised, kStale };
+
+  LaneNumbers dot(const LaneVectors& a, const LaneVectors& b) const noexcept {
+    return runtime::dot(model_.modes(), a.data(), b.data());
+  }
+  LaneNumbers norm(const LaneVectors& a) const noexcept { return dot(a, a).sqrt(); }
 
   LaneVectors vectors(AlignedArray& array) const { return {array.data(), kLanes, model_.modes()}; }
 
@@ -118,7 +113,9 @@ class LaneStep {
     return running * of_one;
   }
   double force_flops() const noexcept { return model_.internal_force.force_flops(); }
-  double stiffness_flops() const noexcept { return model_.internal_force.stiffness_flops(); }
+  double all_flops() const noexcept { return force_flops() + model_.internal_force.stiffness_flops(); }
+  LaneFrames& frames() const noexcept { return workspace_.frames_; }
+  std::span<Workspace> own() const noexcept { return std::span(workspace_.bodies_).first(bodies_.size()); }
   Profile* profile() const noexcept { return workspace_.bodies_.front().profile; }
 
   bool runs(std::size_t l) const noexcept { return l < bodies_.size() && !alone_[l] && !done_[l]; }
@@ -129,39 +126,43 @@ class LaneStep {
       if (runs(l)) work(l, static_cast<Eigen::Index>(l));
   }
 
-  /// External forces, obstacles near, forms of the integrators. Lanes without a body repeat the first one's.
+  /// External forces, obstacles near, forms of the integrators.
   void begin() noexcept {
-    const Eigen::Index modes = model_.modes();
+    for (std::size_t l = 0; l < bodies_.size(); ++l) {
+      const LaneBody& body = bodies_[l];
+      alone_[l] = sleeps(model_, *body.scene, *body.state);
+      if (alone_[l]) continue;
+      first_awake_ = std::min(l, first_awake_);
+      steps_[l].emplace(model_, *body.scene, *body.state, workspace_.bodies_[l]);
+      steps_[l]->begin(/*touches_others=*/false);
+      alone_[l] = steps_[l]->is_near();
+    }
+  }
+
+  /// Lanes without a body, or with one that sleeps, repeat the first that is awake.
+  void gather() noexcept {
     for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l) {
-      const std::size_t from = l < bodies_.size() ? l : 0;
+      const std::size_t from = steps_[l] ? l : first_awake_;
       const auto lane = static_cast<Eigen::Index>(l);
       const StepScene& scene = *bodies_[from].scene;
       const State& state = *bodies_[from].state;
-      Workspace& own = workspace_.bodies_[from];
-      if (l < bodies_.size()) {
-        steps_[l].emplace(model_, scene, *bodies_[l].state, own);
-        steps_[l]->begin(/*touches_others=*/false);
-        alone_[l] = steps_[l]->is_near();
-      }
-      set_lane(start_, lane, state.q);
-      set_lane(external_, lane, own.external_force);
-      set_lane(acceleration_centre_, lane, own.form.acceleration_centre);
-      for (Eigen::Index c = 0; c < modes; ++c) trial_(lane, c) = state.q[c] + scene.time_step * state.v[c];
-      acceleration_factor_[lane] = own.form.acceleration_factor;
-      velocity_factor_[lane] = own.form.velocity_factor;
-      stiffness_damping_[lane] = scene.stiffness_damping;
-      mass_damping_[lane] = scene.mass_damping;
+      forms_.set(lane, scene, state, workspace_.bodies_[from]);
+      frames().set_problem(lane, workspace_.bodies_[from]);
+      for (Eigen::Index c = 0; c < model_.modes(); ++c) trial_(lane, c) = state.q[c] + scene.time_step * state.v[c];
       tolerance_[lane] = scene.newton.tolerance;
       energy_at_start_[lane] = state.elastic_energy;
     }
+    external_norm_ = norm(external_);
+    frames().begin(forms_.velocity_factor, velocity_centre_);
   }
 
   /// See choose_first_iterate() of BodyStep: energies alone tell which, so that stiffness is evaluated once.
   void choose_first_iterate() noexcept {
-    const StageTimer timer(profile(), Stage::kInternalForce, flops(force_flops() + stiffness_flops()));
+    const StageTimer timer(profile(), Stage::kInternalForce, flops(all_flops()));
     elements_.lanes_energy(trial_.data(), energy_.data());
     const auto inertia_and_load = [&](const LaneVectors& q) {
-      return LaneNumbers(0.5 * acceleration_factor_ * distance(q, acceleration_centre_).square() - dot(external_, q));
+      offset_ = q - acceleration_centre_;
+      return LaneNumbers(0.5 * forms_.acceleration_factor * dot(offset_, offset_) - dot(external_, q));
     };
     const LaneNumbers predicted = energy_ + inertia_and_load(trial_),
                       at_start = energy_at_start_ + inertia_and_load(start_);
@@ -174,60 +175,72 @@ class LaneStep {
                                         workspace_.stiffness_.data());
   }
 
+  bool finds_targets_side_by_side() const noexcept {
+    return std::ranges::all_of(workspace_.examples_, &LaneExamples::finds_targets);
+  }
+
+  /// Of lanes whose numbers are finite; the others are left to step().
   void find_targets() noexcept {
+    each([&](std::size_t l, Eigen::Index lane) { alone_[l] = !std::isfinite(energy_[lane]); });
+    if (finds_targets_side_by_side()) {
+      for (std::size_t i = 0; i < bodies_.front().scene->examples.size(); ++i) find_targets_side_by_side(i);
+      return;
+    }
     each([&](std::size_t l, Eigen::Index lane) {
       Workspace& own = workspace_.bodies_[l];
       own.q = q_.row(lane).matrix();
-      alone_[l] = !own.q.allFinite() || !steps_[l]->find_targets();
+      if (!steps_[l]->find_targets()) alone_[l] = true;
+      for (std::size_t i = 0; i < own.examples.size(); ++i)
+        workspace_.examples_[i].pull().row(lane) = own.examples[i].target;
     });
+  }
+
+  /// Of the i-th example force.
+  void find_targets_side_by_side(std::size_t i) noexcept {
+    if (!any([&](std::size_t l) { return acts(bodies_[l].scene->examples[i]); })) return;
+    LaneExamples& examples = workspace_.examples_[i];
+    {
+      const StageTimer timer(profile(), Stage::kWeights);
+      examples.find_weights(model_.examples[i], q_.data());
+      each([&](std::size_t l, Eigen::Index lane) {
+        const ExampleSettings& settings = bodies_[l].scene->examples[i];
+        if (!acts(settings)) return;
+        if (settings.given_weights.size() > 0)
+          examples.give_weights(lane, settings.given_weights);
+        else
+          examples.apply_bias(lane, settings.bias);
+        workspace_.bodies_[l].examples[i].weights = examples.weights().row(lane);
+      });
+    }
+    const StageTimer timer(profile(), Stage::kTarget);
+    examples.find_targets(model_.examples[i]);
   }
 
   /// The quadratic form A and its gradient at q_n, as IncrementalPotential::prepare().
   void prepare() noexcept {
-    const Eigen::Index modes = model_.modes();
-    const double* stiffness = workspace_.stiffness_.data();
-    linear_ = -external_;
-    for (Eigen::Index c = 0; c < modes; ++c)
-      linear_.col(c) += acceleration_factor_ * (start_.col(c) - acceleration_centre_.col(c));
-    for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l) {
-      const StepForm& form = workspace_.bodies_[l < bodies_.size() ? l : 0].form;
-      const auto lane = static_cast<Eigen::Index>(l);
-      offset_.row(lane) = form.velocity_factor * (start_.row(lane) - form.velocity_centre.transpose().array());
-    }
-    kernels().lanes_symmetric_product(stiffness, modes, offset_.data(), product_.data());
-    const LaneNumbers damping = stiffness_damping_ * velocity_factor_;
-    for (Eigen::Index c = 0; c < modes; ++c)
-      linear_.col(c) += mass_damping_ * offset_.col(c) + stiffness_damping_ * product_.col(c);
-    rounding_.setZero();
-    for (Eigen::Index i = 0; i < modes; ++i) {
-      rounding_ += entry(workspace_.stiffness_, i, i).abs();
-      for (Eigen::Index j = 0; j <= i; ++j)
-        entry(workspace_.quadratic_, i, j) = damping * entry(workspace_.stiffness_, i, j);
-    }
+    kernels().lanes_prepare(forms_.arrays(), workspace_.stiffness_.data(), offset_.data(), workspace_.quadratic_.data(),
+                            linear_.data(), rounding_.data());
     rounding_ *= IncrementalPotential::kForceRounding;
     for (std::size_t i = 0; i < bodies_.front().scene->examples.size(); ++i) add_example_force(i);
-    for (Eigen::Index i = 0; i < modes; ++i)
-      entry(workspace_.quadratic_, i, i) += acceleration_factor_ + velocity_factor_ * mass_damping_;
+    if (!frames().exert_forces()) return;
     frozen_.setZero();
     next_frozen_.setZero();
   }
 
+  /// See prepare_example_forces(): k (q_n - q_c) = k q_n - c_kappa c_v q_v.
   void add_example_force(std::size_t i) noexcept {
-    LaneNumbers factor = LaneNumbers::Zero();
-    offset_.setZero();
+    LaneNumbers factor = LaneNumbers::Zero(), damping = LaneNumbers::Zero();
     each([&](std::size_t l, Eigen::Index lane) {
-      if (!is_filtered(bodies_[l].scene->examples[i])) return;
-      const ExampleForce& example = workspace_.bodies_[l].examples[i].force;
-      factor[lane] = example.stiffness;
-      offset_.row(lane) = example.stiffness * (start_.row(lane) - example.centre.transpose().array());
-      linear_.row(lane) -= example.pull.transpose().array();
+      const ExampleSettings& settings = bodies_[l].scene->examples[i];
+      if (!is_filtered(settings)) return;
+      factor[lane] = linear_stiffness(settings);
+      damping[lane] = settings.damping * forms_.velocity_factor[lane];
     });
-    const Eigen::MatrixXd& filter = model_.examples[i].filter.matrix();  // symmetric
-    const Eigen::Index modes = model_.modes();
-    kernels().lanes_matrix_product(filter.data(), modes, modes, filter.outerStride(), offset_.data(), product_.data());
-    linear_ += product_;
-    for (Eigen::Index r = 0; r < modes; ++r)
-      for (Eigen::Index c = 0; c <= r; ++c) entry(workspace_.quadratic_, r, c) += factor * filter(c, r);
+    const LaneNumbers stiffness = factor + damping;
+    if ((stiffness == 0).all()) return;
+    offset_ = start_.colwise() * stiffness - velocity_centre_.colwise() * damping;
+    workspace_.examples_[i].add_force(model_.examples[i], factor, stiffness, workspace_.offset_, workspace_.linear_,
+                                      workspace_.quadratic_);
   }
 
   Eigen::Map<LaneNumbers> entry(AlignedArray& matrices, Eigen::Index i, Eigen::Index j) const noexcept {
@@ -237,74 +250,63 @@ class LaneStep {
   /// Value, its magnitude, force scale and gradient at x of the energies and forces there. The forces of frames are
   /// those at x in the gradient, those frozen in the value.
   void assemble(const LaneVectors& x, LaneVectors& gradient) noexcept {
-    const Eigen::Index modes = model_.modes();
-    offset_ = x - start_;
-    kernels().lanes_symmetric_product(workspace_.quadratic_.data(), modes, offset_.data(), product_.data());
-    gradient = internal_ + linear_ + product_;
-    const LaneNumbers square = 0.5 * dot(offset_, product_), slope = dot(linear_, offset_);
+    Eigen::Array<double, kLanes, kLaneSums> sums;
+    kernels().lanes_assemble(forms_.arrays(), x.data(), workspace_.quadratic_.data(), linear_.data(), internal_.data(),
+                             offset_.data(), gradient.data(), sums.data());
+    const LaneNumbers square = 0.5 * sums.col(0), slope = sums.col(1);
     there_.value = there_.energy + square + slope;
     there_.magnitude = there_.energy.abs() + square.abs() + slope.abs();
-    there_.scale = norm(external_) + norm(internal_) + acceleration_factor_ * distance(x, acceleration_centre_) +
-                   rounding_ * norm(x) / tolerance_;
-    if (!model_.frame->exerts_forces()) return;
+    there_.scale = external_norm_ + sums.col(2).sqrt() + forms_.acceleration_factor * sums.col(3).sqrt() +
+                   rounding_ * sums.col(4).sqrt() / tolerance_;
+    there_.residual = sums.col(5).sqrt();
+    if (!frames().exert_forces()) return;
     there_.value += dot(frozen_, offset_);
-    each([&](std::size_t l, Eigen::Index lane) {
-      if (!update_frame_force(l, x)) there_.value[lane] = kInfinity;
-      gradient.row(lane) += next_frozen_.row(lane);
+    const LaneNumbers found = frames().update(own(), running(), x, next_frozen_);
+    each([&](std::size_t, Eigen::Index lane) {
+      if (found[lane] == 0) there_.value[lane] = kInfinity;
     });
+    gradient += next_frozen_;
+    there_.residual = norm(gradient);
   }
 
-  bool update_frame_force(std::size_t l, const LaneVectors& x) noexcept {
-    Workspace& own = workspace_.bodies_[l];
-    const auto lane = static_cast<Eigen::Index>(l);
-    own.q = x.row(lane).matrix();
-    const bool found = model_.frame->update_force(own.q, own.form.velocity_factor, own.form.velocity_centre, own.frame);
-    next_frozen_.row(lane) = -model_.frame->force(own.frame)->transpose().array();
-    return found;
+  /// 1 for those that still run.
+  LaneNumbers running() const noexcept {
+    LaneNumbers numbers;
+    for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l)
+      numbers[static_cast<Eigen::Index>(l)] = runs(l) ? 1 : 0;
+    return numbers;
   }
 
-  /// Takes the frozen forces of what was last assembled.
-  void accept(Eigen::Index lane) noexcept {
-    if (!model_.frame->exerts_forces()) return;
-    const double change = ((next_frozen_.row(lane) - frozen_.row(lane)) * offset_.row(lane)).sum();
-    frozen_.row(lane) = next_frozen_.row(lane);
-    there_.value[lane] += change;
+  /// Takes the frozen forces of what was last assembled, of the chosen.
+  void accept(const LaneNumbers& chosen) noexcept {
+    if (!frames().exert_forces()) return;
+    const LaneNumbers change = dot(next_frozen_, offset_) - dot(frozen_, offset_);
+    there_.value = (chosen != 0).select(there_.value + change, there_.value);
+    kernels().lanes_take(model_.modes(), chosen.data(), next_frozen_.data(), frozen_.data());
   }
 
   /// Factors of the Hessians of those that have none, from `stiffness_`.
   void factorise() noexcept {
     const Eigen::Index modes = model_.modes();
     const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(modes * modes * modes) / 3));
-    double* hessian = workspace_.hessian_.data();
-    for (std::ptrdiff_t i = 0; i < lane_triangle(modes); ++i)
-      hessian[i] = workspace_.stiffness_[i] + workspace_.quadratic_[i];
-    if (model_.frame->exerts_forces())
-      each([&](std::size_t l, Eigen::Index) {
-        if (state_[l] != Hessian::kFactorised) add_frame_stiffness(l);
-      });
     // Where all need one, none is to be kept.
-    AlignedArray& factor = any(Hessian::kFactorised) ? workspace_.new_factor_ : workspace_.factor_;
-    kernels().lanes_cholesky(hessian, modes, factor.data());
+    const bool keeps = any(Hessian::kFactorised);
+    AlignedArray& factor = keeps ? workspace_.new_factor_ : workspace_.factor_;
+    kernels().lanes_sum(lane_triangle(modes) / kLanes, workspace_.stiffness_.data(), workspace_.quadratic_.data(),
+                        factor.data());
+    LaneNumbers fresh = running();
     each([&](std::size_t l, Eigen::Index lane) {
-      if (state_[l] == Hessian::kFactorised) return;
-      ++reports_[l].factorisations;
-      const double last = entry(factor, modes - 1, modes - 1)[lane];
-      if (!std::isfinite(last)) {
-        alone_[l] = true;
-        return;
-      }
-      if (&factor == &workspace_.factor_) return;
-      for (std::ptrdiff_t i = lane; i < lane_triangle(modes); i += kLanes) workspace_.factor_[i] = factor[i];
+      if (state_[l] == Hessian::kFactorised) fresh[lane] = 0;
     });
-  }
-
-  void add_frame_stiffness(std::size_t l) noexcept {
-    Eigen::MatrixXd& part = workspace_.of_frame_;
-    const auto lane = static_cast<Eigen::Index>(l);
-    part.setZero();
-    model_.frame->add_stiffness(workspace_.bodies_[l].form.velocity_factor, workspace_.bodies_[l].frame, part);
-    for (Eigen::Index j = 0; j < part.cols(); ++j)
-      for (Eigen::Index i = j; i < part.rows(); ++i) entry(workspace_.hessian_, i, j)[lane] += part(i, j);
+    if (frames().exert_forces()) frames().add_stiffness(own(), fresh, factor);
+    kernels().lanes_cholesky(factor.data(), modes);
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (fresh[lane] == 0) return;
+      ++reports_[l].factorisations;
+      alone_[l] = !std::isfinite(entry(factor, modes - 1, modes - 1)[lane]);
+    });
+    if (keeps)
+      kernels().lanes_take(lane_triangle(modes) / kLanes, fresh.data(), factor.data(), workspace_.factor_.data());
   }
 
   /// Newton's direction, and its slope.
@@ -313,35 +315,28 @@ class LaneStep {
     const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(modes * modes)));
     direction_ = -gradient_;
     kernels().lanes_cholesky_solve(workspace_.factor_.data(), modes, direction_.data());
-    if (model_.frame->exerts_forces()) add_gyroscopic_terms();
+    if (frames().exert_forces()) add_gyroscopic_terms();
     slope_ = dot(gradient_, direction_);
   }
 
   /// As solve_direction() of newton.h; a part that is not weak is left to step().
   void add_gyroscopic_terms() noexcept {
-    std::array<int, kLanes> terms{};
-    int most = 0;
-    each([&](std::size_t l, Eigen::Index) {
-      if (steps_[l]->potential().gyroscopic() != nullptr) {
+    const LaneNumbers ratios = frames().gyroscopic_ratios(own());
+    LaneNumbers terms = LaneNumbers::Zero();
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (IncrementalPotential::is_weak(ratios[lane]))
+        terms[lane] = IncrementalPotential::gyroscopic_terms(ratios[lane]);
+      else
         alone_[l] = true;
-        return;
-      }
-      terms[l] = steps_[l]->potential().gyroscopic_terms();
-      most = std::max(most, terms[l]);
     });
+    const auto most = static_cast<int>(terms.maxCoeff());
     for (int term = 0; term < most; ++term) {
+      const LaneNumbers chosen = (terms > term).cast<double>();
       trial_ = direction_;
-      direction_ = -gradient_;
-      each([&](std::size_t l, Eigen::Index lane) {
-        if (term >= terms[l]) return;
-        Workspace& own = workspace_.bodies_[l];
-        own.q = trial_.row(lane).matrix();
-        direction_.row(lane) -= steps_[l]->potential().gyroscopic_product(own.q).transpose().array();
-      });
-      kernels().lanes_cholesky_solve(workspace_.factor_.data(), model_.modes(), direction_.data());
-      each([&](std::size_t l, Eigen::Index lane) {
-        if (term >= terms[l]) direction_.row(lane) = trial_.row(lane);
-      });
+      frames().gyroscopic_products(own(), chosen, trial_, offset_);
+      trial_gradient_ = -gradient_ - offset_;
+      kernels().lanes_cholesky_solve(workspace_.factor_.data(), model_.modes(), trial_gradient_.data());
+      kernels().lanes_take(model_.modes(), chosen.data(), trial_gradient_.data(), direction_.data());
     }
   }
 
@@ -352,17 +347,18 @@ class LaneStep {
         end{there_.value[lane], there_.magnitude[lane]};
     const SearchLine<Eigen::VectorXd> line{unused, unused, unused, start, slope_[lane]};
     return line.is_low_enough(1, end) || line.is_lower_by_slope(end, slope_there_[lane]) ||
-           residual_there_[lane] <= 0.5 * reports_[l].residual;
+           there_.residual[lane] <= 0.5 * reports_[l].residual;
   }
 
   void end_where_there_is_reason() noexcept {
+    LaneNumbers returned = LaneNumbers::Zero();
     each([&](std::size_t l, Eigen::Index lane) {
       NewtonReport& report = reports_[l];
       if (std::isfinite(unchecked_from_[l]) && !(report.residual <= unchecked_from_[l])) {
         q_.row(lane) = previous_.row(lane);
         energy_[lane] = previous_energy_[lane];
         report.residual = unchecked_from_[l];
-        if (model_.frame->exerts_forces()) update_frame_force(l, q_);
+        returned[lane] = 1;
         report.status = NewtonStatus::kStagnated;
         done_[l] = true;
         return;
@@ -379,20 +375,26 @@ class LaneStep {
         done_[l] = true;
       }
     });
+    if (frames().exert_forces() && (returned != 0).any()) frames().update(own(), returned, q_, next_frozen_);
+  }
+
+  template <class Condition>
+  bool any(Condition holds) const noexcept {
+    for (std::size_t l = 0; l < bodies_.size(); ++l)
+      if (runs(l) && holds(l)) return true;
+    return false;
   }
 
   bool any(Hessian state) const noexcept {
-    for (std::size_t l = 0; l < bodies_.size(); ++l)
-      if (runs(l) && state_[l] == state) return true;
-    return false;
+    return any([&](std::size_t l) { return state_[l] == state; });
   }
 
   void minimise() noexcept {
     there_.energy = energy_;
     assemble(q_, gradient_);
-    const LaneNumbers residual = norm(gradient_);
+    const LaneNumbers residual = there_.residual;
+    accept(running());
     each([&](std::size_t l, Eigen::Index lane) {
-      accept(lane);
       reports_[l].residual = residual[lane];
       reports_[l].line_search_evaluations = start_searches_[l];
       unchecked_from_[l] = kInfinity;
@@ -404,7 +406,7 @@ class LaneStep {
       const bool stale = any(Hessian::kStale);
       if (!stale && !any(Hessian::kEvaluated) && !any(Hessian::kFactorised)) return;
       if (stale) {
-        const StageTimer timer(profile(), Stage::kInternalForce, flops(force_flops() + stiffness_flops()));
+        const StageTimer timer(profile(), Stage::kInternalForce, flops(all_flops()));
         elements_.lanes_force_and_stiffness(q_.data(), workspace_.scratch_.data(), there_.energy.data(),
                                             internal_.data(), workspace_.stiffness_.data());
       }
@@ -420,7 +422,7 @@ class LaneStep {
       below_rounding_[l] = std::abs(slope_[lane]) <= kRounding * here_.magnitude[lane];
       unchecked_from_[l] = below_rounding_[l] ? reports_[l].residual : kInfinity;
     });
-    trial_ = q_ + direction_;
+    kernels().lanes_sum(model_.modes(), q_.data(), direction_.data(), trial_.data());
     for (std::size_t l = 0; l < static_cast<std::size_t>(kLanes); ++l)
       if (!runs(l)) trial_.row(static_cast<Eigen::Index>(l)) = q_.row(static_cast<Eigen::Index>(l));
     {
@@ -428,58 +430,67 @@ class LaneStep {
       elements_.lanes_force(trial_.data(), there_.energy.data(), internal_.data());
       assemble(trial_, trial_gradient_);
     }
-    residual_there_ = norm(trial_gradient_);
     slope_there_ = dot(trial_gradient_, direction_);
+    LaneNumbers taken = LaneNumbers::Zero();
     each([&](std::size_t l, Eigen::Index lane) {
       if (!is_low_enough(l, lane)) {
         alone_[l] = true;
         return;
       }
-      accept(lane);
+      taken[lane] = 1;
+    });
+    accept(taken);
+    each([&](std::size_t l, Eigen::Index lane) {
       NewtonReport& report = reports_[l];
-      previous_.row(lane) = q_.row(lane);
       previous_energy_[lane] = energy_[lane];
-      q_.row(lane) = trial_.row(lane);
-      gradient_.row(lane) = trial_gradient_.row(lane);
       energy_[lane] = there_.energy[lane];
       here_.value[lane] = there_.value[lane];
       here_.magnitude[lane] = there_.magnitude[lane];
       here_.scale[lane] = there_.scale[lane];
       ++report.iterations;
       const double before = report.residual;
-      report.residual = residual_there_[lane];
+      report.residual = there_.residual[lane];
       const NewtonSettings& settings = bodies_[l].scene->newton;
       state_[l] = detail::factor_serves(settings, before, report.residual, settings.tolerance * here_.scale[lane])
                       ? Hessian::kFactorised
                       : Hessian::kStale;
     });
+    for (const auto& [from, to] : {std::pair(&q_, &previous_), {&trial_, &q_}, {&trial_gradient_, &gradient_}})
+      kernels().lanes_take(model_.modes(), taken.data(), from->data(), to->data());
   }
 
   struct Evaluation {
-    LaneNumbers energy, value, magnitude, scale;
+    LaneNumbers energy, value, magnitude, scale, residual;
   };
 
   const Model& model_;
   std::span<const LaneBody> bodies_;
   LaneWorkspace& workspace_;
   const ReducedElasticity& elements_;
+  LaneForms& forms_;
   LaneVectors start_, q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_,
-      next_frozen_, offset_, product_, external_, acceleration_centre_;
+      next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;
   std::array<std::optional<BodyStep>, kLanes> steps_;
   std::array<bool, kLanes> alone_{}, done_{}, below_rounding_{};
+  std::size_t first_awake_ = kLanes;
   std::array<int, kLanes> start_searches_{};
   std::array<double, kLanes> unchecked_from_{};
   std::array<Hessian, kLanes> state_{};
   std::array<NewtonReport, kLanes> reports_;
-  LaneNumbers acceleration_factor_, velocity_factor_, stiffness_damping_, mass_damping_, tolerance_, energy_at_start_;
-  LaneNumbers rounding_, energy_, previous_energy_, slope_, slope_there_, residual_there_;
+  LaneNumbers tolerance_, energy_at_start_;
+  LaneNumbers rounding_, energy_, previous_energy_, slope_, slope_there_, external_norm_;
   Evaluation here_, there_;
 };
+
+void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
+                   std::span<StepReport> reports) noexcept {
+  LaneStep(model, bodies, workspace).take(reports);
+}
 
 void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
                        std::span<StepReport> reports) noexcept {
   if (std::ssize(bodies) >= kFewestLanes) {
-    LaneStep(model, bodies, workspace).take(reports);
+    step_in_lanes(model, bodies, workspace, reports);
     return;
   }
   for (std::size_t l = 0; l < bodies.size(); ++l)

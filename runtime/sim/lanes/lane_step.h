@@ -4,17 +4,16 @@
 #include <span>
 #include <vector>
 
-#include "runtime/kernels/aligned_array.h"
+#include "runtime/sim/lanes/lane_examples.h"
+#include "runtime/sim/lanes/lane_forms.h"
+#include "runtime/sim/lanes/lane_frames.h"
+#include "runtime/sim/lanes/lane_numbers.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
 #include "runtime/sim/step/step_report.h"
 #include "runtime/sim/step/workspace.h"
 
 namespace exmat::runtime {
-
-/// A number of each of kLanes bodies, a vector [r] of each, and a symmetric matrix of each (kernels.h).
-using LaneNumbers = Eigen::Array<double, kLanes, 1>;
-using LaneVectors = Eigen::Map<Eigen::Array<double, kLanes, Eigen::Dynamic>>;
 
 /// Fewer bodies than these are faster one after the other.
 inline constexpr std::ptrdiff_t kFewestLanes = 4;
@@ -45,18 +44,24 @@ class LaneWorkspace {
  private:
   friend class LaneStep;
   std::vector<Workspace> bodies_;
-  AlignedArray start_, q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_,
-      next_frozen_, offset_, product_, external_, acceleration_centre_;  // r x kLanes
-  AlignedArray quadratic_, stiffness_, hessian_, factor_, new_factor_;   // lane_triangle(r)
+  LaneForms forms_;
+  AlignedArray q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_, next_frozen_,
+      offset_;                                                // r x kLanes
+  AlignedArray quadratic_, stiffness_, factor_, new_factor_;  // lane_triangle(r)
+  std::vector<LaneExamples> examples_;                        // one for each of the model's
+  LaneFrames frames_;
   AlignedArray scratch_;
-  Eigen::MatrixXd of_frame_;  // r x r
 };
 
-/// One step of each of at most kLanes bodies of one model, as step() takes it, but side by side: each in its lane of
-/// the registers, so that the model's constants are read once for all. docs/step_in_detail.md, "Bodies in lanes". A
-/// body near an obstacle, one that Newton's method needs more for than whole steps with exact Hessians, and all of them
-/// where they are fewer than kFewestLanes, step by themselves. No body's numbers depend on the others'; they are those
-/// of step() to rounding. No call allocates or throws.
+/// One step of each of 1 to kLanes bodies of one model, as step() takes it, but side by side: each in its lane of the
+/// registers, so that the model's constants are read once for all. docs/step_in_detail.md, "Bodies in lanes". A body
+/// that sleeps, one near an obstacle, and one that Newton's method needs more for than whole steps with exact Hessians,
+/// step by themselves. No body's numbers depend on the others'; they are those of step() to rounding. No call allocates
+/// or throws.
+void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
+                   std::span<StepReport> reports) noexcept;
+
+/// The same, but that those of a group of fewer than kFewestLanes step by themselves.
 void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
                        std::span<StepReport> reports) noexcept;
 

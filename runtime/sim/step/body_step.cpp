@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/example_forces.h"
+#include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -28,15 +30,6 @@ StepHistory history_of(const Model& model, const State& state) {
 Integrator integrator_of_step(const Model& model, const StepScene& scene, const State& state, bool near) {
   const bool resolved = !near && model.frame->turn_rate(state.frame) * scene.time_step <= kResolvedTurn;
   return resolved ? scene.integrator : Integrator::kBackwardEuler;
-}
-
-/// Whether this step has no smooth past: the first one, or one that a scripted force begins or ends with, or in which
-/// a setting of the scene or the accelerations of the frame jump.
-bool begins_anew(const Model& model, const StepScene& scene, const State& state, double midpoint) {
-  if (state.begins_anew || scene.begins_anew) return true;
-  for (const ScriptedForce& force : scene.forces)
-    if (force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step)) return true;
-  return model.frame->jumps(scene, midpoint - scene.time_step, midpoint);
 }
 
 /// a_n of Newmark's method from the equation of motion at the beginning of the step.
@@ -63,7 +56,7 @@ void start_acceleration(const Model& model, const StepScene& scene, const FrameS
 
 void prepare_integrator(const Model& model, const StepScene& scene, const FrameStep& frame_step, Integrator integrator,
                         const State& state, Workspace& workspace, StepReport& report) {
-  const bool anew = begins_anew(model, scene, state, frame_step.midpoint());
+  const bool anew = begins_anew(model, scene, state);
   const StepHistory history = history_of(model, state);
   if (integrator == Integrator::kNewmark) {
     if (anew) {
@@ -104,13 +97,13 @@ void choose_first_iterate(const StepScene& scene, const State& state, Incrementa
 
 /// Arithmetic on subnormal numbers takes a hundred times as long, and a body that comes to rest is full of them.
 bool flush_subnormals(Eigen::VectorXd& numbers) {
-  bool found = false;
-  for (double& number : numbers)
-    if (std::fpclassify(number) == FP_SUBNORMAL) {
-      number = 0;
-      found = true;
-    }
-  return found;
+  int found = 0;
+  for (double& number : numbers) {  // without branches
+    const bool subnormal = (std::abs(number) < std::numeric_limits<double>::min()) & (number != 0);
+    found += subnormal;
+    number = subnormal ? 0 : number;
+  }
+  return found > 0;
 }
 
 void commit(const Model& model, const StepScene& scene, double elastic_energy, Workspace& workspace, State& state) {
@@ -140,6 +133,14 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) {
 }
 
 }  // namespace
+
+bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept {
+  if (state.begins_anew || scene.begins_anew) return true;
+  const double midpoint = state.time + 0.5 * scene.time_step;
+  for (const ScriptedForce& force : scene.forces)
+    if (force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step)) return true;
+  return model.frame->jumps(scene, midpoint - scene.time_step, midpoint);
+}
 
 BodyStep::BodyStep(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept
     : model_(model),
@@ -194,10 +195,12 @@ NewtonReport BodyStep::solve() noexcept {
 StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
   const bool unbalanced = near_ && newton.status != NewtonStatus::kConverged;
   const Energies before = unbalanced ? energies(model_, scene_, state_) : Energies{};
-  const StepReport& report = take(newton);
-  if (!unbalanced || (report.status & kStepNonFinite)) return report;
-  const Energies now = energies(model_, scene_, state_);
-  limit_kinetic_energy(before.total() - now.elastic - now.potential);
+  take(newton);
+  if (unbalanced && (report_.status & kStepNonFinite) == 0) {
+    const Energies now = energies(model_, scene_, state_);
+    limit_kinetic_energy(before.total() - now.elastic - now.potential);
+  }
+  fall_asleep(model_, scene_, state_, workspace_, report_);
   return report_;
 }
 

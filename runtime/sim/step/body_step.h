@@ -9,6 +9,10 @@
 
 namespace exmat::runtime {
 
+/// Whether the next step has no smooth past: the first one, or one that a scripted force begins or ends with, or in
+/// which a setting of the scene or the accelerations of the frame jump.
+bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept;
+
 /// One step of one body in parts: begin(), solve(), finish(). Bodies that touch are solved together instead: begin(),
 /// prepare(), their common solution, finish(). Refers to all that it is made of. No call allocates.
 class BodyStep {

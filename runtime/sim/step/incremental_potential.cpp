@@ -186,20 +186,25 @@ bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcep
   return found;
 }
 
-/// The antisymmetric part of the frame's forces, where it is not small beside c_a.
-const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
-  const double factor = workspace_.form.velocity_factor;
-  if (model_.frame->gyroscopic_ratio(factor, workspace_.frame) <= kSmallRatio) return nullptr;
-  return model_.frame->gyroscopic(factor, workspace_.frame);
-}
+bool IncrementalPotential::is_weak(double ratio) noexcept { return ratio <= kSmallRatio; }
 
-int IncrementalPotential::gyroscopic_terms() const noexcept {
-  const double ratio = model_.frame->gyroscopic_ratio(workspace_.form.velocity_factor, workspace_.frame);
-  if (!(ratio <= kSmallRatio)) return 0;  // since the factorisation it has grown beyond what the series is for
+int IncrementalPotential::gyroscopic_terms(double ratio) noexcept {
+  if (!is_weak(ratio)) return 0;  // since the factorisation it has grown beyond what the series is for
   double error = ratio;
   int terms = 0;
   for (; error > kGyroscopicError; error *= ratio) ++terms;
   return terms;
+}
+
+/// The antisymmetric part of the frame's forces, where it is not small beside c_a.
+const Eigen::MatrixXd* IncrementalPotential::gyroscopic() const noexcept {
+  const double factor = workspace_.form.velocity_factor;
+  if (is_weak(model_.frame->gyroscopic_ratio(factor, workspace_.frame))) return nullptr;
+  return model_.frame->gyroscopic(factor, workspace_.frame);
+}
+
+int IncrementalPotential::gyroscopic_terms() const noexcept {
+  return gyroscopic_terms(model_.frame->gyroscopic_ratio(workspace_.form.velocity_factor, workspace_.frame));
 }
 
 const Eigen::VectorXd& IncrementalPotential::gyroscopic_product(const Eigen::VectorXd& x) const noexcept {

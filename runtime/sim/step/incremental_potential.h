@@ -40,6 +40,9 @@ class IncrementalPotential {
   void accept(PotentialEvaluation& evaluation) noexcept;
   const Eigen::MatrixXd* gyroscopic() const noexcept;
   int gyroscopic_terms() const noexcept;
+  /// Whether an antisymmetric part of that ratio to inertia is weak: then so many terms of a series serve.
+  static bool is_weak(double ratio) noexcept;
+  static int gyroscopic_terms(double ratio) noexcept;
   const Eigen::VectorXd& gyroscopic_product(const Eigen::VectorXd& x) const noexcept;
 
   /// E at the last evaluate() or start().

@@ -25,6 +25,12 @@ struct ExampleSettings {
   Eigen::VectorXd given_weights{};  ///< [K] taken as they are, without the bias; empty: those of the pose
 };
 
+/// When a body is left alone: once its kinetic energy has been below `energy` for `time`.
+struct SleepSettings {
+  double energy = 0;  ///< [J]; 0: never
+  double time = 0.5;  ///< [s]
+};
+
 /// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.
 struct StepScene : WorldLoads {
   double time_step = 0.001;  ///< > 0 [s]
@@ -32,6 +38,7 @@ struct StepScene : WorldLoads {
   double mass_damping = 0;       ///< alpha >= 0 [1/s]
   double stiffness_damping = 0;  ///< beta >= 0 [s]
   NewtonSettings newton;
+  SleepSettings sleep;
   std::vector<Obstacle> obstacles;
   bool meets_bodies = false;              ///< whether the body is one of a World, whose bodies touch each other
   std::vector<ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, example forces

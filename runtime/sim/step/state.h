@@ -17,6 +17,13 @@ struct ExampleState {
   bool target_converged = false;
 };
 
+/// Of a body that may fall asleep.
+struct SleepState {
+  bool asleep = false;           ///< nothing has acted on it since it was put to sleep
+  std::int64_t still_steps = 0;  ///< without a break, before it was
+  std::uint64_t loads = 0;       ///< hash of what acted on it in the last step
+};
+
 /// All that a body carries from step to step. r modes.
 struct State {
   Eigen::VectorXd q, v;                    ///< [r] reduced displacement, velocity
@@ -29,6 +36,7 @@ struct State {
   std::vector<ExampleState> examples;      ///< one for each of the model's example forces
   ContactState contacts;                   ///< what touches; sized for its scene by prepare_contacts()
   bool begins_anew = true;                 ///< the last step was no smooth one: the first, or one near obstacles
+  SleepState sleep;                        ///< where the scene lets bodies sleep
   FrameState frame;                        ///< of the model's frame; nothing of a clamped body
 };
 

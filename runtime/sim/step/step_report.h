@@ -12,6 +12,7 @@ enum StepStatus : std::uint32_t {
   kStepStagnated = 4,       ///< likewise, and no step along the Newton direction lowers the potential
   kTargetNotConverged = 8,  ///< the target is its last iterate
   kStepSubnormal = 16,      ///< no fault: numbers of q or v below 2.2e-308 were set to zero, which keeps steps fast
+  kStepAsleep = 32,         ///< no fault: the body rests, and the step has left it alone
 };
 
 /// The bits that say that a residual is above its tolerance.

@@ -3,10 +3,12 @@
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/example_forces.h"
+#include "runtime/sim/step/sleep.h"
 
 namespace exmat::runtime {
 
 StepReport step(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
+  if (sleeps(model, scene, state)) return sleep_through(scene, state);
   BodyStep step(model, scene, state, workspace);
   step.begin(/*touches_others=*/false);
   return step.finish(step.solve());

@@ -6,9 +6,11 @@
 #include <omp.h>
 #include <random>
 
+#include "precompute/targets/tet_forces.h"
 #include "runtime/sim/examples/target_table.h"
 #include "runtime/sim/step/model.h"
 #include "tests/precompute/full_space/full_space_bar.h"
+#include "tests/support/random.h"
 
 // Against the minimum over all tets in all poses, solved by itself at weights that nothing here has seen.
 
@@ -59,6 +61,13 @@ class Body {
                               {.energy_reference = reference_, .tolerance = tolerance});
   }
 
+  /// As of a mesh of many tets: the steps that a sample of these takes and the forces of all.
+  TargetSpace build_by_sample(double tolerance, Eigen::Index sample) const {
+    return build_target_space(
+        *bar_.model.object, system_, range_,
+        {.energy_reference = reference_, .tolerance = tolerance, .most_tets = 0, .sample = sample});
+  }
+
   /// The displacement [f] of the target, and of the largest example.
   Eigen::VectorXd target(const Eigen::VectorXd& w) const {
     auto workspace = whole_.solver.make_workspace();
@@ -96,7 +105,11 @@ std::vector<Eigen::VectorXd> random_weights(int examples, int count) {
 
 class TargetSpaceOf : public ::testing::TestWithParam<Case> {
  protected:
+  static constexpr double kTolerance = 1e-4;  // the asset's default
+
   TargetSpaceOf() : body_(GetParam()) {}
+  void expect_near(const TargetSpace& space) const;
+
   Body body_;
 };
 
@@ -108,9 +121,34 @@ INSTANTIATE_TEST_SUITE_P(
 
 // The table is as near as it says, for the targets of the whole mesh; the tolerance is the asset's default. The kinds
 // of random weights are many more than the checks', so that a little more may turn up between these: a tenth.
-TEST_P(TargetSpaceOf, TableIsNearTheTargetsOfTheWholeMesh) {
-  const double tolerance = 1e-4;
-  const TargetSpace space = body_.build(tolerance);
+TEST_P(TargetSpaceOf, TableIsNearTheTargetsOfTheWholeMesh) { expect_near(body_.build(kTolerance)); }
+
+// Of half of the tets alone the targets are off by a tenth.
+TEST_P(TargetSpaceOf, TableOfASampleIsNearTheTargetsOfTheWholeMesh) {
+  const Eigen::Index tets = body_.bar_.model.object->mesh.tet_count();
+  const TargetSpace space = body_.build_by_sample(kTolerance, tets / 2);
+  expect_near(space);
+  EXPECT_EQ(space.left_out, body_.build(kTolerance).left_out);
+}
+
+// By the vertices against the kernels' sum over tets. A tet's numbers are summed in another order: rounding.
+TEST_P(TargetSpaceOf, ForcesOfTetsAreTheDerivativeOfTheirEnergies) {
+  const TetForces forces(*body_.bar_.model.object, body_.system_, body_.range_, body_.reference_);
+  const runtime::TargetSolver& solver = body_.whole_.solver;
+  EXPECT_EQ(forces.tets(), body_.whole_.tets);
+  auto workspace = solver.make_workspace();
+  for (const Eigen::VectorXd& w : random_weights(GetParam().examples, 5)) {
+    Eigen::VectorXd y(solver.dimension()), expected(solver.dimension());
+    solver.start(w, y);
+    y += 0.1 * y.norm() * test::random_vector(y.size(), 3).normalized();
+    solver.force(w, y, workspace, expected);
+    const Eigen::VectorXd found = solver.basis().transpose() * forces.force(w, solver.basis() * y);
+    EXPECT_LE((found - expected).norm(), 1e-10 * body_.scale());
+  }
+}
+
+void TargetSpaceOf::expect_near(const TargetSpace& space) const {
+  const double tolerance = kTolerance;
   if (GetParam().examples > 4) {
     EXPECT_FALSE(space.table);
     return;

@@ -1,3 +1,5 @@
+#include "tests/support/lanes.h"
+
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <gtest/gtest.h>
@@ -19,17 +21,9 @@ using Shape = std::pair<int, int>;  // r, s
 
 constexpr double kRounding = 1e-13;  // of sums of a few hundred terms
 
-using Vectors = Eigen::Matrix<double, kLanes, Eigen::Dynamic>;  // a body in each row
-
-AlignedArray in_lanes(const Vectors& vectors) {
-  AlignedArray numbers(vectors.size());
-  Eigen::Map<Vectors>(numbers.data(), kLanes, vectors.cols()) = vectors;
-  return numbers;
-}
-
-Vectors out_of_lanes(const AlignedArray& numbers, Eigen::Index size) {
-  return Eigen::Map<const Vectors>(numbers.data(), kLanes, size);
-}
+using test::in_lanes;
+using test::out_of_lanes;
+using Vectors = test::LaneRows;
 
 /// A symmetric positive definite matrix for each lane.
 std::vector<Eigen::MatrixXd> matrices(Eigen::Index n) {
@@ -39,18 +33,6 @@ std::vector<Eigen::MatrixXd> matrices(Eigen::Index n) {
     found.push_back(half * half.transpose() + 0.1 * Eigen::MatrixXd::Identity(n, n));
   }
   return found;
-}
-
-/// The lower triangles; what is above the diagonal and beyond the last row must not be read.
-AlignedArray in_lanes(const std::vector<Eigen::MatrixXd>& matrices) {
-  const Eigen::Index n = matrices.front().rows();
-  AlignedArray numbers(lane_triangle(n));
-  for (std::ptrdiff_t i = 0; i < numbers.size(); ++i) numbers[i] = 1e300;
-  for (Eigen::Index i = 0; i < n; ++i)
-    for (Eigen::Index j = 0; j <= i; ++j)
-      for (std::size_t lane = 0; lane < matrices.size(); ++lane)
-        numbers[lane_entry(i, j) + static_cast<std::ptrdiff_t>(lane)] = matrices[lane](i, j);
-  return numbers;
 }
 
 class LanesTest : public ::testing::TestWithParam<Shape> {
@@ -126,8 +108,8 @@ TEST_P(LanesTest, CholeskySolvesEachLane) {
   const auto A = matrices(modes_);
   const AlignedArray numbers = in_lanes(A);
   for (const Kernels* kernels : available()) {
-    AlignedArray factor(lane_triangle(modes_)), x = in_lanes(q_), product(modes_ * kLanes);
-    kernels->lanes_cholesky(numbers.data(), modes_, factor.data());
+    AlignedArray factor = numbers, x = in_lanes(q_), product(modes_ * kLanes);
+    kernels->lanes_cholesky(factor.data(), modes_);
     kernels->lanes_cholesky_solve(factor.data(), modes_, x.data());
     kernels->lanes_symmetric_product(numbers.data(), modes_, in_lanes(q_).data(), product.data());
     for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
@@ -148,9 +130,9 @@ TEST_P(LanesTest, ALaneThatIsNotPositiveDefiniteIsAlone) {
   const Eigen::Index bad = modes_ / 2;
   A[3](bad, bad) = -1;
   for (const Kernels* kernels : available()) {
-    AlignedArray all(lane_triangle(modes_)), without(lane_triangle(modes_));
-    kernels->lanes_cholesky(in_lanes(matrices(modes_)).data(), modes_, all.data());
-    kernels->lanes_cholesky(in_lanes(A).data(), modes_, without.data());
+    AlignedArray all = in_lanes(matrices(modes_)), without = in_lanes(A);
+    kernels->lanes_cholesky(all.data(), modes_);
+    kernels->lanes_cholesky(without.data(), modes_);
     for (Eigen::Index i = 0; i < modes_; ++i)
       for (Eigen::Index j = 0; j <= i; ++j)
         for (Eigen::Index lane = 0; lane < kLanes; ++lane)
@@ -162,7 +144,7 @@ TEST_P(LanesTest, ALaneThatIsNotPositiveDefiniteIsAlone) {
 }
 
 TEST_P(LanesTest, OneMatrixServesAllLanes) {
-  const RowMatrix A = test::random_matrix(modes_ + 2, modes_, 5);
+  const Eigen::MatrixXd A = test::random_matrix(modes_ + 2, modes_, 5);
   for (const Kernels* kernels : available()) {
     AlignedArray product((modes_ + 2) * kLanes);
     kernels->lanes_matrix_product(A.data(), A.rows(), A.cols(), A.outerStride(), in_lanes(q_).data(), product.data());

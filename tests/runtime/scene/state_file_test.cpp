@@ -40,6 +40,7 @@ std::vector<Case> cases() {
            R"(, "examples": {"stiffness": 100, "target": "solve", "target_iterations": 1})"},
           {"newmark", {}, false, R"(, "integrator": "newmark", "instances": 3)"},
           {"free", {.free = true}, true, free_members.c_str()},
+          {"asleep", {}, false, R"(, "instances": 2, "damping": {"mass": 20}, "sleep": {"energy": 1, "time": 0.15})"},
           {"carried",
            {.carried = true},
            false,
