@@ -19,6 +19,12 @@ using Cases = std::vector<StabilityCase>;
 
 bool is_newmark(const StabilityCase& test) { return test.integrator == Integrator::kNewmark; }
 
+/// Of the body with its example force [rad/s].
+double highest_frequency(const StabilityCase& test, const StudyBody& body) {
+  if (test.examples.elastic) return body.highest_frequency * std::sqrt(1 + test.examples.stiffness);
+  return std::max(body.highest_frequency, std::sqrt(test.examples.stiffness));
+}
+
 /// Every integrator.
 void add(StabilityCase test, Cases& cases) {
   for (const Integrator integrator : kIntegrators) {
@@ -370,10 +376,11 @@ const std::vector<KnownLimit>& known_limits() {
   static const std::vector<KnownLimit> limits{
       {"newmark-rings", Check::kRest,
        [](const StabilityCase& test, const StudyBody& body) {
-         const double example_frequency = std::sqrt(test.examples.stiffness);
-         return is_newmark(test) && test.time_step * std::max(body.highest_frequency, example_frequency) > 1;
+         return is_newmark(test) && test.time_step * highest_frequency(test, body) > 1;
        },
-       1, "newmark, time step above 1 over the highest frequency of the basis or sqrt(kappa)",
+       1,
+       "newmark, time step above 1 over the highest frequency of the basis, times sqrt(1 + e) with an elastic example "
+       "force, or sqrt(kappa)",
        "the amplification of modes that the time step does not resolve tends to -1: they ring on, whatever the damping",
        "none: the summary's kinetic energy does not fall; take bdf2"},
       {"newmark-grows", Check::kBounded, [](const StabilityCase& test, const StudyBody&) { return is_newmark(test); },
@@ -412,6 +419,16 @@ const std::vector<KnownLimit>& known_limits() {
        "run: \"N solutions of bodies that touch did not reach the tolerance; a smaller time_step or contact stiffness "
        "may "
        "help\""},
+      {"friction-couple", Check::kRest,
+       [](const StabilityCase& test, const StudyBody&) {
+         return test.company == Company::kPile && test.friction > 0 && test.contact_stiffness <= 1e4 &&
+                test.time_step >= kSixtieth;
+       },
+       1e-4, "bodies that lie as deep in each other as they are thick, in steps of 1/60 s and more",
+       "friction acts at the vertex and at the surface, which are apart by the depth, and each body gets half of that "
+       "couple after the solution: the next step takes it back, and bodies that do not move keep an angular velocity "
+       "that grows with friction, depth and time step",
+       "none; a larger contact stiffness or a smaller time_step"},
       {"corotational-kink", Check::kSolved,
        [](const StabilityCase& test, const StudyBody&) {
          return test.body.material == MaterialModel::kCorotational && test.tip_load.norm() > 0;

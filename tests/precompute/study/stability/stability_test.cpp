@@ -55,6 +55,27 @@ TEST_P(StabilityGroups, MeetEveryBoundOrEndAtAKnownLimit) {
   }
 }
 
+/// The limit "friction-couple" and its reason: it goes with friction, and as the square of the time step.
+TEST(Stability, ThePileThatDoesNotComeToRestIsHeldByACoupleOfFriction) {
+  auto cases = cases_of({"bodies"});
+  std::erase_if(cases, [](const StabilityCase& test) {
+    return test.company != Company::kPile || test.contact_stiffness > 1e4 || test.time_step < 1.0 / 40 ||
+           test.examples.stiffness > 0;
+  });
+  ASSERT_EQ(cases.size(), 1U);
+  StabilityCase smooth = cases[0], fine = cases[0];
+  smooth.friction = 0.02;
+  fine.time_step /= 2;
+  cases.push_back(smooth);
+  cases.push_back(fine);
+  const auto runs = run_stability(cases, {.most_steps = 3000});
+  const auto rest = [&](std::size_t i) { return runs[i].result[Check::kRest]; };
+  EXPECT_EQ(rest(0).limit_id, "friction-couple");
+  EXPECT_EQ(rest(1).verdict, Verdict::kPass) << rest(1).value;
+  EXPECT_EQ(rest(2).limit_id, "friction-couple");
+  EXPECT_NEAR(rest(2).value, rest(0).value / 4, 0.2 * rest(0).value / 4);
+}
+
 TEST(Stability, SuiteReachesEveryExtreme) {
   const auto cases = short_stability_suite();
   const auto any = [&](auto matches) { return std::ranges::any_of(cases, matches); };
