@@ -92,7 +92,8 @@ Eigen::VectorXd FullSpaceStep::start_acceleration() {
   if (!workspace_.mass) {
     LowerTriangle mass = model_.elasticity.pattern();
     mass.coeffs() = model_.mass_values;
-    workspace_.mass = std::make_unique<Eigen::SimplicialLLT<LowerTriangle, Eigen::Lower>>(mass);
+    workspace_.mass = std::make_unique<SupernodalCholesky>(mass);
+    workspace_.mass->factorise(mass);
   }
   return workspace_.mass->solve(terms_.external_force - internal - start.force(deforming));
 }

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/SparseCholesky>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -31,8 +30,8 @@ struct FullSpaceScene {
 struct FullSpaceWorkspace {
   explicit FullSpaceWorkspace(const FullSpaceModel& model);
 
-  SparseDirection direction;                                                ///< of Newton's method
-  std::unique_ptr<Eigen::SimplicialLLT<LowerTriangle, Eigen::Lower>> mass;  ///< once it is needed
+  SparseDirection direction;                 ///< of Newton's method
+  std::unique_ptr<SupernodalCholesky> mass;  ///< once it is needed
   struct Examples {
     std::optional<runtime::TargetSolver::Workspace> target;
     std::optional<MeshElasticity> elasticity;  ///< from the target

@@ -9,32 +9,22 @@ namespace {
 constexpr double kTolerance = 1e-5;           // of the residual; Newton's method has the rest
 constexpr int kMostIterations = 500;          // with fresh factors
 constexpr int kLeastWorthwhile = 6;           // iterations with older ones
-constexpr double kIterationsPerFactor = 0.5;  // of those that make as many operations as a factorisation
+constexpr double kIterationsPerFactor = 0.1;  // of those that make as many operations as a factorisation, which has
+                                              // products of matrices alone
 constexpr double kFirstShift = 1e-6;          // times the largest diagonal entry
 constexpr int kShifts = 12;
 
-// Iterations of as many operations as the factorisation, by the columns of L: sum of squares over 4 per entry.
-double iterations_per_factor(const Eigen::SparseMatrix<double>& factor) {
-  double operations = 0;
-  for (Eigen::Index j = 0; j < factor.outerSize(); ++j) {
-    const double entries = factor.outerIndexPtr()[j + 1] - factor.outerIndexPtr()[j];
-    operations += entries * entries;
-  }
-  return operations / (4.0 * static_cast<double>(factor.nonZeros()));
-}
-
 }  // namespace
 
-SparseDirection::SparseDirection(const LowerTriangle& pattern) { factors_.analyzePattern(pattern); }
+SparseDirection::SparseDirection(const LowerTriangle& pattern)
+    : factors_(pattern),
+      // An iteration has four operations per entry of L.
+      worthwhile_(std::max(kLeastWorthwhile, static_cast<int>(kIterationsPerFactor * factors_.operations() /
+                                                              (4.0 * static_cast<double>(factors_.entries()))))) {}
 
 bool SparseDirection::factorise(const LowerTriangle& matrix) {
   ++factorisations_;
-  factors_.factorize(matrix);
-  has_factors_ = factors_.info() == Eigen::Success;
-  if (has_factors_ && worthwhile_ == 0)
-    worthwhile_ =
-        std::max(kLeastWorthwhile,
-                 static_cast<int>(kIterationsPerFactor * iterations_per_factor(factors_.matrixL().nestedExpression())));
+  has_factors_ = factors_.factorise(matrix);
   return has_factors_;
 }
 

@@ -1,9 +1,9 @@
 #pragma once
 
-#include <Eigen/SparseCholesky>
 #include <functional>
 
 #include "precompute/full_space/mesh_elasticity.h"
+#include "precompute/full_space/supernodal_cholesky.h"
 
 namespace exmat::precompute {
 
@@ -35,9 +35,9 @@ class SparseDirection {
   Outcome iterate(const Product& product, const Eigen::VectorXd& b, int most, Eigen::VectorXd& x);
   bool factorise(const LowerTriangle& matrix);
 
-  Eigen::SimplicialLLT<LowerTriangle, Eigen::Lower> factors_;
+  SupernodalCholesky factors_;
   bool has_factors_ = false;
-  int worthwhile_ = 0;  // iterations that cost less than a factorisation
+  int worthwhile_;  // iterations that cost less than a factorisation
   int factorisations_ = 0, iterations_ = 0;
 };
 

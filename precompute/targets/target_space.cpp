@@ -20,12 +20,11 @@ namespace {
 
 using runtime::TargetSolver;
 
-constexpr double kShare = 0.1;        // of the tolerance that the space may take
-constexpr int kRounds = 4;            // in which weights whose targets the space misses are added
-constexpr double kNothing = 1e-9;     // of the largest example: a direction of poses that is rounding
-constexpr double kSame = 0.1;         // of the tolerance: answers nearer to each other are one minimum
-constexpr int kCorrectionDegree = 5;  // of what elements are off by
-constexpr int kTableChecks = 8;       // targets of all tets on every edge of the simplex, that a table is checked by
+constexpr double kShare = 0.1;     // of the tolerance that the space may take
+constexpr int kRounds = 4;         // in which weights whose targets the space misses are added
+constexpr double kNothing = 1e-9;  // of the largest example: a direction of poses that is rounding
+constexpr double kSame = 0.1;      // of the tolerance: answers nearer to each other are one minimum
+constexpr int kTableChecks = 8;    // targets of all tets on every edge of the simplex, that a table is checked by
 
 // One, two or three examples at equal shares, then all of them.
 RowMatrix equal_shares(Eigen::Index examples) {
@@ -248,12 +247,13 @@ std::optional<TargetTableData> SpaceBuilder::corrected_table(const TargetSolver&
   const double error = meter.errors(runtime::TargetTable(*table), {weights, exact}).maxCoeff();
   if (!(error <= options.tolerance)) return std::nullopt;
   table->error = std::max(table->error, error);
+  report.message += fmt::format(", {:.2g} from all tets", error);
   return table;
 }
 
 // From the elements' targets to those of all tets, as a polynomial of the weights.
 MinimumFinder::Correction SpaceBuilder::correction_of(const TargetSolver& elements) const {
-  const runtime::BernsteinBasis basis(kCorrectionDegree, static_cast<int>(count_));
+  const runtime::BernsteinBasis basis(count_ == 2 ? 14 : count_ == 3 ? 8 : 5, static_cast<int>(count_));
   const RowMatrix weights = interpolation_nodes(basis.exponents());
   const double same = kSame * options_.tolerance * scale_;
   MinimumFinder of_elements(elements, same), of_all(elements, same, small_.all.get());

@@ -19,7 +19,7 @@ constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it nor
 constexpr double kApproached = 0.5;  // of the distance at rest
 constexpr int kLeafTriangles = 4;
 constexpr int kBlockTriangles = 64;  // whose vertices are moved together
-constexpr int kManyLooks = 64;  // a search costs about half a microsecond, all boxes twenty
+constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
 constexpr double kSameWay = 0.5;     // cosine
 constexpr double kSurely = 1 + 1e-9;
 
