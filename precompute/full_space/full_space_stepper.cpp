@@ -24,3 +24,28 @@ NewtonStatus minimise(const FullSpaceScene& scene, FullSpaceWorkspace& workspace
     step.potential().start(step.d());
     status = solve();
   }
+  return status;
+}
+
+}  // namespace
+
+FullSpaceWorkspace::FullSpaceWorkspace(const FullSpaceModel& model)
+    : direction(model.elasticity.pattern()), examples(model.examples.size()) {}
+
+FullSpaceReport step(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
+                     FullSpaceWorkspace& workspace) {
+  const Timer timer;
+  FullSpaceStep one(model, scene, state, workspace);
+  const NewtonStatus status =
+      one.begin(/*touches_others=*/false) ? minimise(scene, workspace, one) : NewtonStatus::kNonFinite;
+  FullSpaceReport report = one.finish(status);
+  report.seconds = timer.seconds();
+  return report;
+}
+
+runtime::Energies energies(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state) {
+  return {0.5 * state.v.dot(model.system.mass * state.v), state.elastic_energy,
+          -(model.gravity_load * scene.gravity).dot(state.q)};
+}
+
+}  // namespace exmat::precompute

@@ -29,5 +29,124 @@ class Model(_exmat.Model):
     example_target       "auto", "table" or "solve"
     target_iterations    most in one step, 1 to 1000; 4
     energy_reference     "example" or "rest"
-                      newton_tolerance=newton_tolerance, use_examples=int(use_examples), sleep_energy=sleep_energy,
-                      sleep_time=sleep_time)
+    use_contact          whether bodies can touch obstacles of add_obstacle() and each other in a TouchingWorld; False
+    sleep_energy         a body is left alone once its kinetic energy has been below this [J]; 0: never
+    sleep_time           for so long, > 0 [s]; 0.5
+
+    Raises BadInput (the bundle) and InvalidArgument (a setting).
+    """
+
+    def __init__(
+        self,
+        bundle: StrPath,
+        *,
+        time_step: Optional[float] = None,
+        gravity: Optional[Sequence[float]] = None,
+        integrator: Optional[str] = None,
+        internal_force: Optional[str] = None,
+        mass_damping: Optional[float] = None,
+        stiffness_damping: Optional[float] = None,
+        newton_iterations: Optional[int] = None,
+        newton_tolerance: Optional[float] = None,
+        use_examples: Optional[bool] = None,
+        example_stiffness: Optional[float] = None,
+        example_damping: Optional[float] = None,
+        example_bias: Optional[float] = None,
+        example_target: Optional[str] = None,
+        target_iterations: Optional[int] = None,
+        energy_reference: Optional[str] = None,
+        use_contact: bool = False,
+        sleep_energy: Optional[float] = None,
+        sleep_time: Optional[float] = None,
+    ) -> None:
+        examples = dict(example_stiffness=example_stiffness, example_damping=example_damping, example_bias=example_bias,
+                        example_target=example_target, target_iterations=target_iterations, energy_reference=energy_reference)
+        if use_examples is None:
+            use_examples = any(value is not None for value in examples.values())
+        others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
+                      mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
+                      newton_tolerance=newton_tolerance, use_examples=int(use_examples), use_contact=int(use_contact),
+                      sleep_energy=sleep_energy, sleep_time=sleep_time)
+        self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
+
+    @classmethod
+    def from_scene(cls, scene: Union[StrPath, Mapping[str, Any]], *, use_contact: bool = False) -> "Model":
+        """Of a scene, with its scripted forces, obstacles, motions and start; a path, or the members of such a file.
+
+        Paths in members are relative to the current folder. Steps, instances and output are not the model's business.
+        With `use_contact` bodies can touch also where the scene has no obstacles. A scene of several bodies is for
+        TouchingWorld.from_scene().
+        """
+        model = cls.__new__(cls)
+        if isinstance(scene, Mapping):
+            model._load_members(plain_members(scene), use_contact)
+        elif use_contact and os.path.exists(scene):
+            model._load_text(pathlib.Path(scene).read_bytes(), os.fspath(scene))
+        else:
+            model._load(scene, None)
+        return model
+
+    def _load(self, path: StrPath, settings: Optional[Dict[str, Any]]) -> None:
+        _exmat.Model.__init__(self, os.fspath(path), settings)
+        self._recipe: Tuple[str, Any, Optional[Dict[str, Any]]] = ("file", os.path.abspath(path), settings)
+
+    def _load_text(self, scene: bytes, path: str) -> None:
+        _exmat.Model.__init__(self, scene, path, True)
+        self._recipe = ("text", (scene, os.path.abspath(path)), None)
+
+    def _load_members(self, scene: Dict[str, Any], use_contact: bool) -> None:
+        _exmat.Model.__init__(self, json_text(scene), os.path.abspath("scene.json"), use_contact)
+        self._recipe = ("members", scene, {"use_contact": use_contact})
+
+    @classmethod
+    def _of_kind(cls, world: _exmat.TouchingWorld, kind: int, recipe: Any) -> "Model":
+        """That of the bodies of a kind in a new world, which `recipe` makes."""
+        model = cls.__new__(cls)
+        _exmat.Model.__init__(model, world, kind)
+        model._recipe = ("world", (recipe, kind), None)
+        return model
+
+    def __copy__(self) -> "Model":
+        return self
+
+    def __deepcopy__(self, memo: Dict[int, Any]) -> "Model":
+        return self
+
+    def __reduce__(self) -> Any:
+        """It is loaded again where it is unpickled: from the same file, which has to hold the same bundle."""
+        return _reload, (self._recipe, self.input_sha256)
+
+    def __repr__(self) -> str:
+        return f"<exmat.Model {_name(self._recipe)}: {self.modes} modes, {self.vertices} vertices, {self.examples} examples>"
+
+
+def _name(recipe: Tuple[str, Any, Optional[Dict[str, Any]]]) -> str:
+    """Of the file that a model is of."""
+    kind, what, _ = recipe
+    if kind == "world":
+        return f"{world_name(what[0])}[{what[1]}]"
+    return pathlib.Path(what["bundle"] if kind == "members" else what[1] if kind == "text" else what).name
+
+
+def world_name(recipe: Tuple[str, Any]) -> str:
+    return pathlib.Path(recipe[1]).name if recipe[0] == "file" else "scene"
+
+
+def _reload(recipe: Tuple[str, Any, Optional[Dict[str, Any]]], sha: str) -> Model:
+    kind, what, settings = recipe
+    model = Model.__new__(Model)
+    if kind == "members":
+        model._load_members(what, bool(settings and settings["use_contact"]))
+    elif kind == "text":
+        model._load_text(*what)
+    elif kind == "world":
+        from .touching_world import world_of
+
+        made, place = what
+        model = Model._of_kind(world_of(made), place, made)
+    else:
+        model._load(what, settings)
+    if model.input_sha256 != sha:
+        raise BadInput(f"{_name(recipe)}: expected the bundle {sha} that was pickled, found {model.input_sha256}; unpickle it beside the same "
+                       "bundle")
+    return model
