@@ -229,6 +229,8 @@ struct Kernels {
   void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
 };
 
+  /// The same of one body.
+  void (*choose_weights)(const WeightCandidates&, const double* load, double* weights);
 enum class InstructionSet { kPortable, kAvx2, kAvx512 };
 
 /// The fastest that this machine has, or what the environment variable EXMAT_SIMD ("portable", "avx2", "avx512") asks

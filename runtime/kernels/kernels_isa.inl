@@ -459,5 +459,6 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_gyroscopic_product,
                                  lanes_weights,
                                  lanes_bernstein};
+                                 choose_weights,
 
 }  // namespace exmat::runtime

@@ -43,6 +43,35 @@ void lanes_weights(const WeightCandidates& candidates, const double* load, doubl
   }
 }
 
+/// A candidate in each lane.
+void choose_weights(const WeightCandidates& candidates, const double* load_, double* weights) {
+  constexpr Index kMost = WeightCandidates::kMostExamples, kMostSets = padded((1 << kMost) - 1);
+  const Index examples = candidates.examples, stride = padded(candidates.count);
+  alignas(kAlignment) double values[kMost * kMostSets], least[kMostSets];
+  for (Index n = 0; n < stride; n += kWidth) {
+    const double* numbers = candidates.numbers + n;
+    Vec lowest = zero();
+    for (Index k = 0; k < examples; ++k) {
+      Vec value = load(numbers);
+      numbers += stride;
+      for (Index j = 1; j < examples; ++j, numbers += stride) value += load(numbers) * load_[j];
+      store(values + k * kMostSets + n, value);
+      lowest = select(value < lowest, value, lowest);
+    }
+    store(least + n, lowest);
+  }
+  Index best = 0;
+  for (Index n = 1; n < candidates.count; ++n) best = least[n] > least[best] ? n : best;
+  double sum = 0;
+  for (Index k = 0; k < examples; ++k) {
+    const double value = values[k * kMostSets + best];
+    weights[k] = (value > 0 ? value : 0) * candidates.members[k * stride + best];
+    sum += weights[k];
+  }
+  const double share = 1 / sum;  // one but for rounding
+  for (Index k = 0; k < examples; ++k) weights[k] *= share;
+}
+
 /// The polynomials whose first `k` exponents are given, `product` of their factors, the others adding up to `left`.
 inline void lanes_expand(const BernsteinArrays& basis, Index k, Index left, Vec product, const double* powers,
                          const double* pairs, double*& next) {

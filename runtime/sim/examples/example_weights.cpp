@@ -26,8 +26,8 @@ ExampleWeights::ExampleWeights(const RowMatrix& gram, const Eigen::VectorXd& h0,
   gram_ = gram - first * Eigen::RowVectorXd::Ones(count) - Eigen::VectorXd::Ones(count) * gram.row(0) +
           Eigen::MatrixXd::Constant(count, count, gram(0, 0));
   h0_ = (h0.array() - h0[0]).matrix() - (first.array() - gram(0, 0)).matrix();
-  hq_ = hq.rowwise() - hq.row(0);
-  slope_ = hq_;
+  slope_.setZero(padded(count), hq.cols());
+  slope_.topRows(count) = hq.rowwise() - hq.row(0);
   build_candidates();
 }
 
@@ -87,14 +87,23 @@ void ExampleWeights::set_candidate(Eigen::Index n, unsigned members) {
 
 ExampleWeights::Workspace ExampleWeights::make_workspace() const {
   const Eigen::Index count = examples();
-  return {Eigen::VectorXd::Zero(count),        Eigen::VectorXd::Zero(count), Eigen::VectorXd::Zero(count),
-          Eigen::MatrixXd::Zero(count, count), Eigen::VectorXi::Zero(count), Eigen::VectorXi::Zero(count)};
+  return {Eigen::VectorXd::Zero(padded(count)), Eigen::VectorXd::Zero(count), Eigen::VectorXd::Zero(count),
+          Eigen::MatrixXd::Zero(count, count),  Eigen::VectorXi::Zero(count), Eigen::VectorXi::Zero(count)};
 }
 
 void ExampleWeights::solve(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& weights) const noexcept {
-  auto& [load, affine, slopes, system, corral, state] = workspace;
-  load = h0_;
-  load.noalias() += hq_ * q;
+  kernels().matrix_vector(slope_.data(), slope_.rows(), slope_.cols(), slope_.outerStride(), q.data(),
+                          workspace.load.data());
+  workspace.load.head(examples()) += h0_;
+  if (has_candidates())
+    kernels().choose_weights(candidates(), workspace.load.data(), weights.data());
+  else
+    solve_by_sets(workspace, weights);
+}
+
+void ExampleWeights::solve_by_sets(Workspace& workspace, Eigen::VectorXd& weights) const noexcept {
+  auto& [padded_load, affine, slopes, system, corral, state] = workspace;
+  const auto load = padded_load.head(examples());
   Eigen::Index start = 0;
   (0.5 * gram_.diagonal() - load).minCoeff(&start);
   weights.setZero();

@@ -9,15 +9,17 @@ namespace exmat::runtime {
 
 /// Example weights w(q): min 1/2 w^T G w - h(q)^T w subject to sum w = 1, w >= 0, h(q) = h0 + hq q.
 /// docs/step_in_detail.md, "Weights". That is the point of the convex hull of the K examples nearest to the current
-/// descriptor, found exactly by the algorithm of Wolfe 1976 in Gram form, for any K and for repeated or affinely
-/// dependent examples. Deterministic; no call allocates or throws.
+/// descriptor, the best of few candidates where examples are few and well apart, else found by the algorithm of Wolfe
+/// 1976 in Gram form, for any K and for repeated or affinely dependent examples. Exact and deterministic; no call
+/// allocates or throws.
 class ExampleWeights {
  public:
   struct Workspace {
-    Eigen::VectorXd load, affine, slopes;  ///< K each
-    Eigen::MatrixXd system;                ///< K x K
-    Eigen::VectorXi corral;                ///< affinely independent examples of positive weight, the first ones used
-    Eigen::VectorXi state;                 ///< K: whether each example is out, in the corral or refused
+    Eigen::VectorXd load;            ///< padded(K)
+    Eigen::VectorXd affine, slopes;  ///< K each
+    Eigen::MatrixXd system;          ///< K x K
+    Eigen::VectorXi corral;          ///< affinely independent examples of positive weight, the first ones used
+    Eigen::VectorXi state;           ///< K: whether each example is out, in the corral or refused
   };
 
   ExampleWeights() = default;
@@ -29,7 +31,8 @@ class ExampleWeights {
 
   Eigen::Index examples() const { return gram_.rows(); }
 
-  /// The load of a pose relative to example 0, h(q) = h0 + hq q: h0 [K] and hq [K x r], whose first numbers are zero.
+  /// The load of a pose relative to example 0, h(q) = h0 + hq q: h0 [K] and hq [padded(K) x r] by columns, whose first
+  /// numbers are zero.
   const Eigen::VectorXd& load_at_rest() const { return h0_; }
   const Eigen::MatrixXd& load_slope() const { return slope_; }
 
@@ -45,6 +48,7 @@ class ExampleWeights {
   void solve(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& weights) const noexcept;
 
  private:
+  void solve_by_sets(Workspace& workspace, Eigen::VectorXd& weights) const noexcept;
   bool solve_affine(Workspace& workspace, int count) const noexcept;
   int shrink_to_simplex(Workspace& workspace, int count, Eigen::VectorXd& weights) const noexcept;
   void build_candidates();
@@ -54,8 +58,7 @@ class ExampleWeights {
   // differences.
   Eigen::MatrixXd gram_;   ///< (e_i - e_0)^T (e_j - e_0)
   Eigen::VectorXd h0_;     ///< (e_k - e_0)^T (c_rest - e_0)
-  RowMatrix hq_;           ///< (e_k - e_0)^T T
-  Eigen::MatrixXd slope_;  ///< the same, by columns
+  Eigen::MatrixXd slope_;  ///< (e_k - e_0)^T T, padded
 
   Eigen::Index candidate_count_ = 0;
   AlignedArray candidate_numbers_, candidate_members_;  ///< see WeightCandidates

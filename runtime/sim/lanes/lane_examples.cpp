@@ -16,8 +16,9 @@ LaneExamples::LaneExamples(const ExampleModel& model)
 
 void LaneExamples::find_weights(const ExampleModel& model, const double* q) noexcept {
   const Eigen::MatrixXd& slope = model.weights.load_slope();
-  kernels().lanes_matrix_product(slope.data(), slope.rows(), slope.cols(), slope.outerStride(), q, load_.data());
-  LaneVectors(load_.data(), kLanes, slope.rows()).rowwise() += model.weights.load_at_rest().transpose().array();
+  const Eigen::Index count = model.weights.examples();
+  kernels().lanes_matrix_product(slope.data(), count, slope.cols(), slope.outerStride(), q, load_.data());
+  LaneVectors(load_.data(), kLanes, count).rowwise() += model.weights.load_at_rest().transpose().array();
   kernels().lanes_weights(model.weights.candidates(), load_.data(), weights_.data());
 }
 

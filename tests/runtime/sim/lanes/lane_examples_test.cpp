@@ -30,7 +30,8 @@ Problem random_problem(Eigen::Index count, std::uint32_t seed) {
 
 /// Of the candidates of every instruction set at the poses in the rows of q: [kLanes x K] each.
 std::vector<test::LaneRows> weights_in_lanes(const ExampleWeights& solver, const test::LaneRows& q) {
-  const test::LaneRows load = (q * solver.load_slope().transpose()).rowwise() + solver.load_at_rest().transpose();
+  const test::LaneRows load =
+      (q * solver.load_slope().topRows(solver.examples()).transpose()).rowwise() + solver.load_at_rest().transpose();
   std::vector<test::LaneRows> found;
   for (const Kernels* kernels : available()) {
     AlignedArray weights(solver.examples() * kLanes);
@@ -40,8 +41,8 @@ std::vector<test::LaneRows> weights_in_lanes(const ExampleWeights& solver, const
   return found;
 }
 
-// Wolfe's algorithm beside them, and the optimality conditions by themselves: poses far from the hull, near it, on its
-// faces and corners.
+// Those of one body beside them, and the optimality conditions: poses far from the hull, near it, on its faces and
+// corners.
 TEST(LaneExamples, WeightsAreTheNearestPointOfTheHull) {
   int inside = 0, corners = 0;
   for (Eigen::Index count = 1; count <= WeightCandidates::kMostExamples; ++count)
