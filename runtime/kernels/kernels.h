@@ -225,12 +225,12 @@ struct Kernels {
   /// weights [K]: of the candidate whose least value is the largest, the first of equals, its weights where they are
   /// positive. load [K], whose first number is zero.
   void (*lanes_weights)(const WeightCandidates&, const double* load, double* weights);
+  /// The same of one body.
+  void (*choose_weights)(const WeightCandidates&, const double* load, double* weights);
   /// values: all polynomials at weights [K], in order; scratch: lane_bernstein_scratch(D, K).
   void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
 };
 
-  /// The same of one body.
-  void (*choose_weights)(const WeightCandidates&, const double* load, double* weights);
 enum class InstructionSet { kPortable, kAvx2, kAvx512 };
 
 /// The fastest that this machine has, or what the environment variable EXMAT_SIMD ("portable", "avx2", "avx512") asks

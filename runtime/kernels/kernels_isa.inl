@@ -458,7 +458,7 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_rotation_stiffness,
                                  lanes_gyroscopic_product,
                                  lanes_weights,
-                                 lanes_bernstein};
                                  choose_weights,
+                                 lanes_bernstein};
 
 }  // namespace exmat::runtime
