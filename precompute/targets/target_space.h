@@ -18,7 +18,7 @@ struct TargetSpaceOptions {
   std::uint64_t seed = 1;           ///< of the poses that the elements are chosen by
   /// That energies are summed over at every step. Targets of more begin with a sample of their tets, and a table of
   /// them with the elements.
-  Eigen::Index most_tets = 50'000;
+  Eigen::Index most_tets = 20'000;
   Eigen::Index sample = 8192;
 };
 
