@@ -22,6 +22,7 @@ struct ElementArrays {
   std::ptrdiff_t stride = 0;           ///< padded(r)
   const double* by_mode = nullptr;     ///< panels x r x 9 x kLanes: gradients and forces of a panel at once
   const double* by_element = nullptr;  ///< padded(s) x 9 x stride: stiffness
+  const float* by_pair = nullptr;      ///< padded(s) / 2 x 9 x stride x 2: of two elements side by side, rounded
   std::ptrdiff_t count = 0;            ///< s
 };
 
@@ -187,6 +188,9 @@ struct Kernels {
   /// scratch: lane_scratch(r).
   void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
                                     double* energy, double* force, double* stiffness);
+  /// The same but for the rounding of the stiffness to single precision.
+  void (*lanes_force_and_mixed_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
+                                          double* energy, double* force, double* stiffness);
   /// A <- L, L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
   void (*lanes_cholesky)(double* A, std::ptrdiff_t n);
   void (*lanes_cholesky_solve)(const double* L, std::ptrdiff_t n, double* x);
@@ -225,12 +229,12 @@ struct Kernels {
   /// weights [K]: of the candidate whose least value is the largest, the first of equals, its weights where they are
   /// positive. load [K], whose first number is zero.
   void (*lanes_weights)(const WeightCandidates&, const double* load, double* weights);
+  /// The same of one body.
+  void (*choose_weights)(const WeightCandidates&, const double* load, double* weights);
   /// values: all polynomials at weights [K], in order; scratch: lane_bernstein_scratch(D, K).
   void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
 };
 
-  /// The same of one body.
-  void (*choose_weights)(const WeightCandidates&, const double* load, double* weights);
 enum class InstructionSet { kPortable, kAvx2, kAvx512 };
 
 /// The fastest that this machine has, or what the environment variable EXMAT_SIMD ("portable", "avx2", "avx512") asks

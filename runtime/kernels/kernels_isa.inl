@@ -443,6 +443,7 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_energy,
                                  lanes_force,
                                  lanes_force_and_stiffness,
+                                 lanes_force_and_mixed_stiffness,
                                  lanes_cholesky,
                                  lanes_cholesky_solve,
                                  lanes_symmetric_product,
@@ -458,7 +459,7 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_rotation_stiffness,
                                  lanes_gyroscopic_product,
                                  lanes_weights,
-                                 lanes_bernstein};
                                  choose_weights,
+                                 lanes_bernstein};
 
 }  // namespace exmat::runtime
