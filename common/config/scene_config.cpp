@@ -96,6 +96,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   read_gravity(own.contains("gravity") ? own : shared, file, own.contains("gravity") ? place : "", scene);
   scene.integrator = choice_or(shared, "integrator", scene.integrator);
   scene.internal_force = choice_or(own, "internal_force", scene.internal_force);
+  scene.precision = choice_or(shared, "precision", scene.precision);
   const Json damping = member_or(shared, "damping", Json::object());
   scene.mass_damping = damping.value("mass", scene.mass_damping);
   scene.stiffness_damping = damping.value("stiffness", scene.stiffness_damping);
@@ -137,6 +138,9 @@ void refuse_members_of_one_body(const Json& json, const std::filesystem::path& f
   if (json.contains("instances"))
     throw InputError(
         {file.string(), "/instances", "no such member beside bodies", "one", "give a body a \"grid\" or \"poses\""});
+  if (json.value("precision", "double") != "double")
+    throw InputError({file.string(), "/precision", "\"double\" beside bodies", "\"mixed\"",
+                      "it is for bodies of a kind that touch nothing, \"instances\""});
   if (json.contains("sleep"))
     throw InputError({file.string(), "/sleep", "no such member beside bodies", "one",
                       "bodies that touch each other do not sleep: drop it"});

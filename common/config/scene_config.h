@@ -144,6 +144,7 @@ struct SceneConfig {
   ForceMethod internal_force = ForceMethod::kAuto;  ///< auto: the bundle's choice
   double mass_damping = 0;                          ///< alpha [1/s]
   double stiffness_damping = 0;                     ///< beta [s]
+  Precision precision = Precision::kDouble;
   NewtonConfig newton;
   SleepConfig sleep;
   std::optional<ExampleForceConfig> examples;  ///< of the whole body

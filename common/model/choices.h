@@ -10,6 +10,11 @@ enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<Integrator>{"bdf2", "backward_euler", "newmark"};
 
+/// Of bodies side by side: mixed has stiffness in single precision.
+enum class Precision { kDouble, kMixed };
+template <>
+inline constexpr std::array<std::string_view, 2> kNames<Precision>{"double", "mixed"};
+
 /// How the internal force is computed; `auto` as the bundle says, or by measurement where the bundle is made.
 enum class ForceMethod { kAuto, kCubature, kPolynomial };
 template <>

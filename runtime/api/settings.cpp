@@ -123,6 +123,7 @@ SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* 
   scene.stiffness_damping = settings.stiffness_damping;
   scene.newton = {settings.newton_iterations, settings.newton_tolerance};
   scene.sleep = {settings.sleep_energy, settings.sleep_time};
+  scene.precision = choice_of<Precision>(settings.precision, "precision");
   ExampleForceConfig examples;
   examples.stiffness = settings.example_stiffness;
   examples.damping = settings.example_damping;

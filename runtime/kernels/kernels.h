@@ -22,6 +22,7 @@ struct ElementArrays {
   std::ptrdiff_t stride = 0;           ///< padded(r)
   const double* by_mode = nullptr;     ///< panels x r x 9 x kLanes: gradients and forces of a panel at once
   const double* by_element = nullptr;  ///< padded(s) x 9 x stride: stiffness
+  const float* by_pair = nullptr;      ///< padded(s) / 2 x 9 x stride x 2: of two elements side by side, rounded
   std::ptrdiff_t count = 0;            ///< s
 };
 
@@ -187,6 +188,9 @@ struct Kernels {
   /// scratch: lane_scratch(r).
   void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
                                     double* energy, double* force, double* stiffness);
+  /// The same but for the rounding of the stiffness to single precision.
+  void (*lanes_force_and_mixed_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
+                                          double* energy, double* force, double* stiffness);
   /// A <- L, L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
   void (*lanes_cholesky)(double* A, std::ptrdiff_t n);
   void (*lanes_cholesky_solve)(const double* L, std::ptrdiff_t n, double* x);

@@ -32,19 +32,44 @@ inline void lanes_add_force(const double* B, Index stride, Index modes, const Ve
   }
 }
 
-/// product [9 x rows x kLanes] = D B of one element, the first `modes` columns.
-inline void lanes_tangent_product(const double* tangent, const double* B, Index stride, Index modes, Index rows,
-                                  double* product) {
+/// How the stiffness is summed up. In doubles: an element at a time, B's numbers as they are.
+struct InDoubles {
+  using Number = double;
+  using Lanes = Vec;
+  static constexpr Index kSpread = kLanes;  ///< from number to number of one body
+  static constexpr Index kEach = 1;         ///< numbers of B in one place
+  static double factor(const double* B, Index i) { return B[i]; }
+};
+
+/// In floats: two elements at a time, the even and the odd lanes of a register, which holds as many bodies as one of
+/// doubles; B's numbers in pairs of these elements.
+struct InPairsOfFloats {
+  using Number = float;
+  using Lanes = FloatVec;
+  static constexpr Index kSpread = 2 * kLanes, kEach = 2;
+  static FloatVec factor(const float* B, Index i) {
+    using Bits = long long __attribute__((vector_size(sizeof(Vec))));
+    long long pair;
+    __builtin_memcpy(&pair, B + 2 * i, sizeof pair);
+    return reinterpret_cast<FloatVec>(Bits{} + pair);
+  }
+};
+
+/// product [9 x rows x kSpread] = D B of one element, or of a pair, the first `modes` columns.
+template <class In>
+inline void lanes_tangent_product(const typename In::Number* tangent, const typename In::Number* B, Index stride,
+                                  Index modes, Index rows, typename In::Number* product) {
+  using Lanes = typename In::Lanes;
 #pragma GCC unroll 9
   for (Index i = 0; i < 9; ++i) {
-    Vec D[9];
+    Lanes D[9];
 #pragma GCC unroll 9
-    for (Index k = 0; k < 9; ++k) D[k] = load(tangent + triangle_entry<9>(i, k) * kLanes);
+    for (Index k = 0; k < 9; ++k) D[k] = load(tangent + triangle_entry<9>(i, k) * In::kSpread);
     for (Index c = 0; c < modes; ++c) {
-      Vec even = D[0] * B[c], odd = D[1] * B[stride + c];
+      Lanes even = D[0] * In::factor(B, c), odd = D[1] * In::factor(B, stride + c);
 #pragma GCC unroll 7
-      for (Index k = 2; k < 9; ++k) (k % 2 == 0 ? even : odd) += D[k] * B[k * stride + c];
-      store(product + (i * rows + c) * kLanes, even + odd);
+      for (Index k = 2; k < 9; ++k) (k % 2 == 0 ? even : odd) += D[k] * In::factor(B, k * stride + c);
+      store(product + (i * rows + c) * In::kSpread, even + odd);
     }
   }
 }
@@ -52,24 +77,26 @@ inline void lanes_tangent_product(const double* tangent, const double* B, Index 
 /// kBlockColumns columns, from `first` on, of a block of the stiffness += B^T (D B) over `depth` rows, those of B
 /// `stride` and those of D B `rows` numbers apart; only the first `count` rows of the block, of a diagonal one the
 /// lower triangle.
-template <bool diagonal, Index count, Index first>
-inline void lanes_add_columns(const double* B, Index stride, const double* product, Index rows, Index depth,
-                              double* block) {
+template <class In, bool diagonal, Index count, Index first>
+inline void lanes_add_columns(const typename In::Number* B, Index stride, const typename In::Number* product,
+                              Index rows, Index depth, typename In::Number* block) {
+  using Lanes = typename In::Lanes;
   constexpr auto wanted = [](Index m, Index n) { return !diagonal || first + n <= m; };
-  Vec sums[count][kBlockColumns];
+  constexpr auto place = [](Index m, Index n) { return (m * kBlock + first + n) * In::kSpread; };
+  Lanes sums[count][kBlockColumns];
 #pragma GCC unroll 4
   for (Index m = 0; m < count; ++m)
 #pragma GCC unroll 4
     for (Index n = 0; n < kBlockColumns; ++n)
-      if (wanted(m, n)) sums[m][n] = load(block + in_block(m, first + n));
+      if (wanted(m, n)) sums[m][n] = load(block + place(m, n));
   for (Index k = 0; k < depth; ++k) {
-    Vec right[kBlockColumns];
+    Lanes right[kBlockColumns];
 #pragma GCC unroll 4
     for (Index n = 0; n < kBlockColumns; ++n)
-      if (wanted(count - 1, n)) right[n] = load(product + (k * rows + first + n) * kLanes);
+      if (wanted(count - 1, n)) right[n] = load(product + (k * rows + first + n) * In::kSpread);
 #pragma GCC unroll 4
     for (Index m = 0; m < count; ++m) {
-      const double left = B[k * stride + m];
+      const auto left = In::factor(B, k * stride + m);
 #pragma GCC unroll 4
       for (Index n = 0; n < kBlockColumns; ++n)
         if (wanted(m, n)) sums[m][n] += right[n] * left;
@@ -79,38 +106,37 @@ inline void lanes_add_columns(const double* B, Index stride, const double* produ
   for (Index m = 0; m < count; ++m)
 #pragma GCC unroll 4
     for (Index n = 0; n < kBlockColumns; ++n)
-      if (wanted(m, n)) store(block + in_block(m, first + n), sums[m][n]);
+      if (wanted(m, n)) store(block + place(m, n), sums[m][n]);
 }
 
-template <bool diagonal, Index count>
-inline void lanes_add_block(const double* B, Index stride, const double* product, Index rows, Index depth,
-                            double* block) {
-  lanes_add_columns<diagonal, count, 0>(B, stride, product, rows, depth, block);
+template <class In, bool diagonal, Index count>
+inline void lanes_add_block(const typename In::Number* B, Index stride, const typename In::Number* product, Index rows,
+                            Index depth, typename In::Number* block) {
+  lanes_add_columns<In, diagonal, count, 0>(B, stride, product, rows, depth, block);
   if constexpr (kBlockColumns < kBlock && (!diagonal || count > kBlockColumns))
-    lanes_add_columns<diagonal, count, kBlock - kBlockColumns>(B, stride, product, rows, depth, block);
+    lanes_add_columns<In, diagonal, count, kBlock - kBlockColumns>(B, stride, product, rows, depth, block);
 }
 
 /// One row of blocks of the stiffness, `count` rows of it.
-template <Index count>
-inline void lanes_add_row(const double* B, Index stride, const double* product, Index rows, Index depth, Index row,
-                          double* stiffness) {
+template <class In, Index count>
+inline void lanes_add_row(const typename In::Number* B, Index stride, const typename In::Number* product, Index rows,
+                          Index depth, Index row, typename In::Number* stiffness) {
+  const auto block = [&](Index column) { return stiffness + block_start(row, column) / kLanes * In::kSpread; };
+  B += In::kEach * kBlock * row;
   for (Index column = 0; column < row; ++column)
-    lanes_add_block<false, count>(B, stride, product + kBlock * column * kLanes, rows, depth,
-                                  stiffness + block_start(row, column));
-  lanes_add_block<true, count>(B, stride, product + kBlock * row * kLanes, rows, depth,
-                               stiffness + block_start(row, row));
+    lanes_add_block<In, false, count>(B, stride, product + kBlock * column * In::kSpread, rows, depth, block(column));
+  lanes_add_block<In, true, count>(B, stride, product + kBlock * row * In::kSpread, rows, depth, block(row));
 }
 
 /// Stiffness += B^T (D B) over `depth` rows.
-inline void lanes_add_stiffness(const double* B, Index stride, const double* product, Index modes, Index depth,
-                                double* stiffness) {
+template <class In>
+inline void lanes_add_stiffness(const typename In::Number* B, Index stride, const typename In::Number* product,
+                                Index modes, Index depth, typename In::Number* stiffness) {
   const Index rows = lane_rows(modes), whole = modes / kBlock;
-  for (Index row = 0; row < whole; ++row)
-    lanes_add_row<kBlock>(B + kBlock * row, stride, product, rows, depth, row, stiffness);
-  const double* const last = B + kBlock * whole;
-  if (modes % kBlock == 1) lanes_add_row<1>(last, stride, product, rows, depth, whole, stiffness);
-  if (modes % kBlock == 2) lanes_add_row<2>(last, stride, product, rows, depth, whole, stiffness);
-  if (modes % kBlock == 3) lanes_add_row<3>(last, stride, product, rows, depth, whole, stiffness);
+  for (Index row = 0; row < whole; ++row) lanes_add_row<In, kBlock>(B, stride, product, rows, depth, row, stiffness);
+  if (modes % kBlock == 1) lanes_add_row<In, 1>(B, stride, product, rows, depth, whole, stiffness);
+  if (modes % kBlock == 2) lanes_add_row<In, 2>(B, stride, product, rows, depth, whole, stiffness);
+  if (modes % kBlock == 3) lanes_add_row<In, 3>(B, stride, product, rows, depth, whole, stiffness);
 }
 
 inline void lanes_clear(double* numbers, Index count) {
@@ -141,11 +167,70 @@ inline void lanes_evaluate(const ElementArrays& elements, const ElementLaw& law,
       total += material.template evaluate<want>(H, P, tangent);
       if constexpr (want != Want::kEnergy) lanes_add_force(B, stride, elements.modes, P, force);
       if constexpr (want == Want::kStiffness)
-        lanes_tangent_product(tangent, B, stride, elements.modes, rows, product + e * 9 * rows * kLanes);
+        lanes_tangent_product<InDoubles>(tangent, B, stride, elements.modes, rows, product + e * 9 * rows * kLanes);
     }
     if constexpr (want == Want::kStiffness)
-      lanes_add_stiffness(block, stride, product, elements.modes, 9 * count, stiffness);
+      lanes_add_stiffness<InDoubles>(block, stride, product, elements.modes, 9 * count, stiffness);
   }
+  store(energy, total);
+}
+
+/// The numbers of two elements, as floats beside each other.
+inline FloatVec in_pairs(Vec even, Vec odd) {
+  using Half = float __attribute__((vector_size(kWidth * sizeof(float))));
+  using HalfBits = unsigned __attribute__((vector_size(kWidth * sizeof(unsigned))));
+  using Bits = unsigned long long __attribute__((vector_size(sizeof(Vec))));
+  const auto bits = [](Vec numbers) {
+    return __builtin_convertvector(reinterpret_cast<HalfBits>(__builtin_convertvector(numbers, Half)), Bits);
+  };
+  return reinterpret_cast<FloatVec>(bits(even) | (bits(odd) << 32));
+}
+
+/// The sums of what stands beside each other.
+inline Vec sum_of_pairs(FloatVec pairs) {
+  using Half = float __attribute__((vector_size(kWidth * sizeof(float))));
+  using HalfBits = unsigned __attribute__((vector_size(kWidth * sizeof(unsigned))));
+  using Bits = unsigned long long __attribute__((vector_size(sizeof(Vec))));
+  const auto numbers = [](Bits bits) {
+    return __builtin_convertvector(reinterpret_cast<Half>(__builtin_convertvector(bits, HalfBits)), Vec);
+  };
+  const Bits bits = reinterpret_cast<Bits>(pairs);
+  return numbers(bits & 0xffffffffU) + numbers(bits >> 32);
+}
+
+/// As lanes_evaluate() with the stiffness, which is summed up in floats: `product` holds two pairs of elements in place
+/// of two elements, and `stiffness` floats until the end. Elements beyond the last are zeros.
+template <class Law>
+inline void lanes_evaluate_mixed(const ElementArrays& elements, const ElementLaw& law, const double* q, float* product,
+                                 double* energy, double* force, double* stiffness) {
+  alignas(kAlignment) double tangents[2][kTangentNumbers * kLanes];
+  alignas(kAlignment) float pair[2 * kTangentNumbers * kLanes];
+  const Index stride = elements.stride, rows = lane_rows(elements.modes), depth = 9 * kElementsAtOnce;
+  float* const sums = reinterpret_cast<float*>(stiffness);
+  Vec total = zero();
+  lanes_clear(force, elements.modes);
+  lanes_clear(stiffness, lane_triangle(elements.modes) / kLanes);
+  for (Index first = 0; first < elements.count; first += 2 * kElementsAtOnce) {
+    const float* const block = elements.by_pair + first * 9 * stride;
+    for (Index e = 0; e < 2 * kElementsAtOnce; ++e) {
+      const double* const B = elements.by_element + (first + e) * 9 * stride;
+      double* const tangent = tangents[e % 2];
+      Vec H[9], P[9];
+      lanes_gradient(B, stride, elements.modes, q, H);
+      clear_result<Want::kStiffness>(P, tangent);
+      const Law material{zero() + law.mu[first + e], zero() + law.lambda[first + e]};
+      total += material.template evaluate<Want::kStiffness>(H, P, tangent);
+      lanes_add_force(B, stride, elements.modes, P, force);
+      if (e % 2 == 0) continue;
+      for (Index i = 0; i < kTangentNumbers; ++i)
+        store(pair + i * 2 * kLanes, in_pairs(load(tangents[0] + i * kLanes), load(tangents[1] + i * kLanes)));
+      lanes_tangent_product<InPairsOfFloats>(pair, block + e / 2 * 18 * stride, stride, elements.modes, rows,
+                                             product + e / 2 * 18 * rows * kLanes);
+    }
+    lanes_add_stiffness<InPairsOfFloats>(block, stride, product, elements.modes, depth, sums);
+  }
+  for (Index i = 0; i < lane_triangle(elements.modes); i += kLanes)
+    store(stiffness + i, sum_of_pairs(load(sums + 2 * i)));
   store(energy, total);
 }
 
@@ -172,6 +257,16 @@ void lanes_force(const ElementArrays& elements, const ElementLaw& law, const dou
 void lanes_force_and_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
                                double* energy, double* force, double* stiffness) {
   lanes_evaluate_parts<Want::kStiffness>(elements, law, q, product, energy, force, stiffness);
+}
+
+void lanes_force_and_mixed_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q,
+                                     double* product, double* energy, double* force, double* stiffness) {
+  for (Index at = 0; at < kLanes; at += kWidth)
+    with_law(law, [&]<class Law>() {
+      if constexpr (!std::is_same_v<Law, Quadratic>)
+        lanes_evaluate_mixed<Law>(elements, law, q + at, reinterpret_cast<float*>(product), energy + at, force + at,
+                                  stiffness + at);
+    });
 }
 
 /// block -= left right^T of two blocks of a factor.

@@ -9,6 +9,7 @@
 #include "common/core/error.h"
 #include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
+#include "runtime/sim/lanes/lane_step.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -129,6 +130,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.mass_damping = config.mass_damping;
   scene.stiffness_damping = config.stiffness_damping;
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
+  scene.precision = config.precision;
   scene.sleep = {config.sleep.energy, config.sleep.time};
   scene.obstacles = make_obstacles(config);
   scene.meets_bodies = config.meets_bodies;
@@ -271,6 +273,10 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
                                                    : fmt::format("internal_force: cubature, s = {} elements",
                                                                  model.internal_force.cubature().elements()));
   plan.push_back(fmt::format("instruction set: {}", kernels().name));
+  if (scene.precision == Precision::kMixed)
+    plan.push_back(can_step_side_by_side(model, scene) && config.instances >= kFewestLanes
+                       ? "precision: mixed, stiffness in single precision"
+                       : "precision: double, mixed is for four and more bodies side by side");
   plan.push_back(fmt::format("solve: Newton, Cholesky of {} x {}, at most {} iterations", model.modes(), model.modes(),
                              scene.newton.max_iterations));
   if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {

@@ -37,10 +37,12 @@ double flops_of_a_step(const runtime::Model& model, const runtime::StepScene& sc
   return (counted + work.weights_flops + work.target_flops + work.other_flops) / kCycle / count;
 }
 
-void time_crowd(::benchmark::State& state, int modes, int elements, bool free, int threads, int count) {
+void time_crowd(::benchmark::State& state, int modes, int elements, bool free, int threads, int count,
+                Precision precision = Precision::kDouble) {
   omp_set_num_threads(threads);
   const auto model = prepare(bar_model(modes, elements, free), Target::kTable, false);
-  const runtime::StepScene scene = swing(*model, Target::kTable);
+  runtime::StepScene scene = swing(*model, Target::kTable);
+  scene.precision = precision;
   const double flops = flops_of_a_step(*model, scene, std::min(count, 96));
   runtime::Bodies bodies(*model, scene, make_state(*model), count);
   std::int64_t steps = 0;
@@ -59,6 +61,13 @@ void time_crowd(::benchmark::State& state, int modes, int elements, bool free, i
 }  // namespace
 
 void register_crowds() {
+  for (const bool free : {false, true})
+    for (const auto& [modes, elements] : {std::pair{20, 23}, {20, 60}, {30, 60}})
+      add(fmt::format("mixed/{}/r{}/s{}/threads1/1000", free ? "free" : "clamped", modes, elements),
+          [modes = modes, elements = elements, free](::benchmark::State& state) {
+            time_crowd(state, modes, elements, free, 1, 1000, Precision::kMixed);
+          })
+          ->UseRealTime();
   for (const bool free : {false, true})
     for (const auto& [modes, elements] : {std::pair{20, 23}, {20, 60}, {30, 60}})
       for (const int threads : {1, 2})

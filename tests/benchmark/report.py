@@ -31,7 +31,7 @@ def run(program, results):
         output.unlink(missing_ok=True)
         command = [str(program), f"--benchmark_out={output}", "--benchmark_out_format=json", "--benchmark_min_time=0.1",
                    f"--benchmark_repetitions={REPETITIONS}", "--benchmark_enable_random_interleaving=true",
-                   "--benchmark_filter=" + ("-^(world|crowd)/" if first else "^kernel/")]
+                   "--benchmark_filter=" + ("-^(world|crowd|mixed)/" if first else "^kernel/")]
         subprocess.run(command, check=True, env=os.environ | {"EXMAT_SIMD": name})
         if json.loads(output.read_text())["context"]["instruction_set"] == name:
             first = False

@@ -62,6 +62,8 @@ enum { EXMAT_INTERNAL_FORCE_AUTO = 0, EXMAT_CUBATURE = 1, EXMAT_POLYNOMIAL = 2 }
 enum { EXMAT_TARGET_AUTO = 0, EXMAT_TARGET_TABLE = 1, EXMAT_TARGET_SOLVE = 2 };   /* example_target */
 enum { EXMAT_ENERGY_REFERENCE_EXAMPLE = 0, EXMAT_ENERGY_REFERENCE_REST = 1 };     /* energy_reference */
 
+enum { EXMAT_PRECISION_DOUBLE = 0, EXMAT_PRECISION_MIXED = 1 }; /* precision */
+
 /* The members of a scene file that belong to a model; schemas/scene.json says what each is. */
 typedef struct exmat_settings {
   size_t size;               /* sizeof(exmat_settings) where the caller was compiled */
@@ -84,6 +86,7 @@ typedef struct exmat_settings {
   double sleep_energy;       /* > 0: a body is left alone once its kinetic energy has been below this [J]; 0: never. Not
                                 for bodies of a world */
   double sleep_time;         /* for so long, > 0 [s]; 0.5 */
+  int32_t precision;         /* EXMAT_PRECISION_DOUBLE; of exmat_bodies_step() */
 } exmat_settings;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */

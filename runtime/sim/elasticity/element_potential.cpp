@@ -67,13 +67,16 @@ ElementPotential::ElementPotential(const RowMatrix& gradient)
     : elements_(gradient.rows() / 9),
       modes_(gradient.cols()),
       by_mode_(panels() * modes_ * 9 * kLanes),
-      by_element_(padded(elements_) * 9 * padded(modes_)) {
+      by_element_(padded(elements_) * 9 * padded(modes_)),
+      by_pair_(by_element_.size() / 2) {
+  auto* const pairs = reinterpret_cast<float*>(by_pair_.data());
   for (Eigen::Index j = 0; j < elements_; ++j)
     for (Eigen::Index i = 0; i < 9; ++i)
       for (Eigen::Index c = 0; c < modes_; ++c) {
         const double value = gradient(9 * j + i, c);
         by_mode_[((j / kLanes * modes_ + c) * 9 + i) * kLanes + j % kLanes] = value;
         by_element_[(9 * j + i) * padded(modes_) + c] = value;
+        pairs[2 * ((9 * (j / 2) + i) * padded(modes_) + c) + j % 2] = static_cast<float>(value);
       }
 }
 
@@ -84,7 +87,10 @@ ElementPotential::Workspace ElementPotential::make_workspace() const {
 }
 
 ElementArrays ElementPotential::arrays() const noexcept {
-  return {panels(), modes_, padded(modes_), by_mode_.data(), by_element_.data(), elements_};
+  return {panels(),           modes_,
+          padded(modes_),     by_mode_.data(),
+          by_element_.data(), reinterpret_cast<const float*>(by_pair_.data()),
+          elements_};
 }
 
 double ElementPotential::energy(const ElementLaw& law, const Eigen::VectorXd& x) const noexcept {

@@ -4,6 +4,7 @@
 
 #include "common/core/arrays.h"
 #include "common/elastic/material_model.h"
+#include "common/model/choices.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/kernels/kernels.h"
 
@@ -61,9 +62,11 @@ class ElementPotential {
   void lanes_force(const ElementLaw& law, const double* x, double* energy, double* force) const noexcept {
     kernels().lanes_force(arrays(), law, x, energy, force);
   }
-  void lanes_force_and_stiffness(const ElementLaw& law, const double* x, double* scratch, double* energy, double* force,
-                                 double* stiffness) const noexcept {
-    kernels().lanes_force_and_stiffness(arrays(), law, x, scratch, energy, force, stiffness);
+  void lanes_force_and_stiffness(const ElementLaw& law, const double* x, Precision precision, double* scratch,
+                                 double* energy, double* force, double* stiffness) const noexcept {
+    const auto evaluate = precision == Precision::kMixed ? kernels().lanes_force_and_mixed_stiffness
+                                                         : kernels().lanes_force_and_stiffness;
+    evaluate(arrays(), law, x, scratch, energy, force, stiffness);
   }
 
   /// Floating-point operations: products with B, and half of the symmetric product B^T (D B). docs/step_in_detail.md,
@@ -83,6 +86,7 @@ class ElementPotential {
 
   Eigen::Index elements_ = 0, modes_ = 0;
   AlignedArray by_mode_, by_element_;
+  AlignedArray by_pair_;  ///< of floats
 };
 
 }  // namespace exmat::runtime

@@ -68,9 +68,9 @@ class ReducedElasticity {
   void lanes_force(const double* q, double* energy, double* force) const noexcept {
     potential_.lanes_force(law(), q, energy, force);
   }
-  void lanes_force_and_stiffness(const double* q, double* scratch, double* energy, double* force,
+  void lanes_force_and_stiffness(const double* q, Precision precision, double* scratch, double* energy, double* force,
                                  double* stiffness) const noexcept {
-    potential_.lanes_force_and_stiffness(law(), q, scratch, energy, force, stiffness);
+    potential_.lanes_force_and_stiffness(law(), q, precision, scratch, energy, force, stiffness);
   }
 
  private:

@@ -14,9 +14,7 @@
 
 namespace exmat::runtime {
 namespace {
-
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
 }  // namespace
 
 bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept {
@@ -171,12 +169,16 @@ class LaneStep {
       q_.row(lane) = as_predicted ? trial_.row(lane) : start_.row(lane);
       start_searches_[static_cast<std::size_t>(lane)] = as_predicted ? 0 : 1;
     }
-    elements_.lanes_force_and_stiffness(q_.data(), workspace_.scratch_.data(), energy_.data(), internal_.data(),
-                                        workspace_.stiffness_.data());
+    evaluate_stiffness(energy_);
   }
 
   bool finds_targets_side_by_side() const noexcept {
     return std::ranges::all_of(workspace_.examples_, &LaneExamples::finds_targets);
+  }
+
+  void evaluate_stiffness(LaneNumbers& energy) noexcept {
+    elements_.lanes_force_and_stiffness(q_.data(), bodies_.front().scene->precision, workspace_.scratch_.data(),
+                                        energy.data(), internal_.data(), workspace_.stiffness_.data());
   }
 
   /// Of lanes whose numbers are finite; the others are left to step().
@@ -309,7 +311,6 @@ class LaneStep {
       kernels().lanes_take(lane_triangle(modes) / kLanes, fresh.data(), factor.data(), workspace_.factor_.data());
   }
 
-  /// Newton's direction, and its slope.
   void find_direction() noexcept {
     const Eigen::Index modes = model_.modes();
     const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(modes * modes)));
@@ -407,8 +408,7 @@ class LaneStep {
       if (!stale && !any(Hessian::kEvaluated) && !any(Hessian::kFactorised)) return;
       if (stale) {
         const StageTimer timer(profile(), Stage::kInternalForce, flops(all_flops()));
-        elements_.lanes_force_and_stiffness(q_.data(), workspace_.scratch_.data(), there_.energy.data(),
-                                            internal_.data(), workspace_.stiffness_.data());
+        evaluate_stiffness(there_.energy);
       }
       if (stale || any(Hessian::kEvaluated)) factorise();
       iterate();

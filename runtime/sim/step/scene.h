@@ -38,6 +38,7 @@ struct StepScene : WorldLoads {
   double mass_damping = 0;       ///< alpha >= 0 [1/s]
   double stiffness_damping = 0;  ///< beta >= 0 [s]
   NewtonSettings newton;
+  Precision precision = Precision::kDouble;  ///< of bodies side by side, the same for all of them
   SleepSettings sleep;
   std::vector<Obstacle> obstacles;
   bool meets_bodies = false;              ///< whether the body is one of a World, whose bodies touch each other

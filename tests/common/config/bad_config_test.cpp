@@ -221,6 +221,8 @@ const BadConfig kBadScenes[] = {
      "a.json: /newton/max_iterations: expected an integer >= 1"},
     {"NewtonTolerance", scene(R"("newton": {"tolerance": 1})"),
      "a.json: /newton/tolerance: expected a number > 0 and < 1"},
+    {"UnknownPrecision", scene(R"("precision": "half")"),
+     "a.json: /precision: expected \"double\" or \"mixed\", found \"half\""},
     {"SleepWithoutEnergy", scene(R"("sleep": {"time": 1})"), "a.json: /sleep/energy: expected a number > 0"},
     {"SleepAtOnce", scene(R"("sleep": {"energy": 1, "time": 0})"),
      "a.json: /sleep/time: expected a number > 0, found 0"},

@@ -124,6 +124,7 @@ TEST(LoadScene, FillsInDefaults) {
   EXPECT_EQ(scene.gravity, Eigen::Vector3d::Zero());
   EXPECT_FALSE(scene.examples || scene.trajectory || scene.render || needs_of(scene).render);
   EXPECT_EQ(scene.newton.max_iterations, 200);
+  EXPECT_EQ(scene.precision, Precision::kDouble);
   EXPECT_EQ(scene.sleep.energy, 0);
   EXPECT_EQ(scene.sleep.time, 0.5);
   EXPECT_EQ(scene.internal_force, ForceMethod::kAuto);
@@ -168,7 +169,7 @@ TEST(LoadScene, ReadsEveryMember) {
     "bundle": "car.h5", "time_step": 0.01, "steps": 20, "gravity": [0, -0.98, 0], "integrator": "newmark",
     "internal_force": "polynomial", "instances": 1000,
     "damping": {"mass": 0.02, "stiffness": 0.003}, "newton": {"max_iterations": 5, "tolerance": 1e-8},
-    "sleep": {"energy": 1e-5, "time": 0.25},
+    "sleep": {"energy": 1e-5, "time": 0.25}, "precision": "mixed",
     "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "target": "table", "target_iterations": 7,
                  "force": "linear", "energy_reference": "rest"},
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
@@ -182,6 +183,7 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.stiffness_damping, 0.003);
   EXPECT_EQ(scene.newton.max_iterations, 5);
   EXPECT_EQ(scene.newton.tolerance, 1e-8);
+  EXPECT_EQ(scene.precision, Precision::kMixed);
   EXPECT_EQ(scene.sleep.energy, 1e-5);
   EXPECT_EQ(scene.sleep.time, 0.25);
   EXPECT_EQ(scene.examples->stiffness, 400);

@@ -86,6 +86,7 @@ TEST_F(WorldConfigTest, MistakesAreNamed) {
   EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "instances": 3})"), HasSubstr("grid"));
   EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "sleep": {"energy": 1}})"),
               HasSubstr("/sleep: expected no such"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "precision": "mixed"})"), HasSubstr("/precision: expected"));
   EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "output": {"render": true}})"), HasSubstr("/output/render"));
   EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a/b", "bundle": "a.h5"}]})"), HasSubstr("/bodies/0/name"));
   EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "colour": 1}]})"),

@@ -73,6 +73,7 @@ TEST_F(ApiTest, SettingsOutOfRangeAreInvalid) {
       {[](auto& s) { s.mass_damping = -1; }, "/damping/mass: expected"},
       {[](auto& s) { s.newton_tolerance = 1; }, "/newton/tolerance: expected"},
       {[](auto& s) { s.newton_iterations = 0; }, "/newton/max_iterations: expected"},
+      {[](auto& s) { s.precision = 2; }, "settings.precision = 2: expected 0 to 1"},
       {[](auto& s) { s.sleep_energy = -1; }, "/sleep/energy: expected"},
       {[](auto& s) { s.sleep_time = 0; }, "/sleep/time: expected"},
       {[](auto& s) { s.sleep_energy = kNaN; }, "settings.sleep_energy = nan"},

@@ -27,6 +27,7 @@ TEST(Settings, DefaultsAreThoseOfASceneFile) {
   EXPECT_EQ(found.stiffness_damping, file.stiffness_damping);
   EXPECT_EQ(found.newton.max_iterations, file.newton.max_iterations);
   EXPECT_EQ(found.newton.tolerance, file.newton.tolerance);
+  EXPECT_EQ(found.precision, file.precision);
   EXPECT_EQ(found.sleep.energy, file.sleep.energy);
   EXPECT_EQ(found.sleep.time, file.sleep.time);
   EXPECT_EQ(found.gravity, file.gravity);

@@ -42,7 +42,18 @@ class LanesTest : public ::testing::TestWithParam<Shape> {
     by_element_ = AlignedArray(padded(elements_) * 9 * padded(modes_));
     for (Eigen::Index row = 0; row < gradient_.rows(); ++row)
       for (Eigen::Index c = 0; c < modes_; ++c) by_element_[row * padded(modes_) + c] = gradient_(row, c);
-    arrays_ = {padded(elements_) / kLanes, modes_, padded(modes_), nullptr, by_element_.data(), elements_};
+    by_pair_ = AlignedArray(by_element_.size() / 2);
+    const Eigen::Index block = 9 * padded(modes_);
+    for (Eigen::Index i = 0; i < by_element_.size(); ++i)
+      reinterpret_cast<float*>(by_pair_.data())[2 * (i / block / 2 * block + i % block) + i / block % 2] =
+          static_cast<float>(by_element_[i]);
+    arrays_ = {padded(elements_) / kLanes,
+               modes_,
+               padded(modes_),
+               nullptr,
+               by_element_.data(),
+               reinterpret_cast<const float*>(by_pair_.data()),
+               elements_};
     mu_ = in_lanes(test::random_matrix(kLanes, padded(elements_) / kLanes, 2).cwiseAbs());
     lambda_ = in_lanes(test::random_matrix(kLanes, padded(elements_) / kLanes, 3).cwiseAbs());
     q_ = test::random_matrix(kLanes, modes_, 4);
@@ -50,7 +61,7 @@ class LanesTest : public ::testing::TestWithParam<Shape> {
 
   Eigen::Index modes_, elements_;
   RowMatrix gradient_;
-  AlignedArray by_element_, mu_, lambda_;
+  AlignedArray by_element_, by_pair_, mu_, lambda_;
   ElementArrays arrays_;
   Vectors q_;
 };
@@ -100,6 +111,43 @@ TEST_P(LanesTest, ElementsAreThoseOfOneBodyAtATime) {
       kernels->lanes_energy(arrays_, law, q.data(), energy_alone.data());
       for (Eigen::Index lane = 0; lane < kLanes; ++lane)
         EXPECT_NEAR(energy_alone[lane], energy[lane], kRounding * energy[lane]) << kernels->name;
+    }
+  }
+}
+
+// Energy and force to the bit; the stiffness to single precision, of sums of 9 s products.
+TEST_P(LanesTest, MixedStiffnessIsTheSameToSinglePrecision) {
+  ElementLaw law;
+  AlignedArray mu(padded(elements_)), lambda(padded(elements_));
+  for (Eigen::Index j = 0; j < elements_; ++j) mu[j] = mu_[j], lambda[j] = lambda_[j];
+  law.mu = mu.data();
+  law.lambda = lambda.data();
+  const AlignedArray q = in_lanes(q_);
+  for (const MaterialModel model :
+       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational}) {
+    law.kind = law_kind(model);
+    for (const Kernels* kernels : available()) {
+      AlignedArray energy(kLanes), force(modes_ * kLanes), stiffness(lane_triangle(modes_)),
+          scratch(lane_scratch(modes_));
+      AlignedArray mixed_energy = energy, mixed_force = force, mixed = stiffness;
+      kernels->lanes_force_and_stiffness(arrays_, law, q.data(), scratch.data(), energy.data(), force.data(),
+                                         stiffness.data());
+      kernels->lanes_force_and_mixed_stiffness(arrays_, law, q.data(), scratch.data(), mixed_energy.data(),
+                                               mixed_force.data(), mixed.data());
+      for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+        EXPECT_EQ(mixed_energy[lane], energy[lane]) << kernels->name;
+        double difference = 0, size = 0;
+        for (Eigen::Index i = 0; i < modes_; ++i) {
+          EXPECT_EQ(mixed_force[i * kLanes + lane], force[i * kLanes + lane]) << kernels->name;
+          for (Eigen::Index j = 0; j <= i; ++j) {
+            const double expected = stiffness[lane_entry(i, j) + lane];
+            difference = std::max(difference, std::abs(mixed[lane_entry(i, j) + lane] - expected));
+            size = std::max(size, std::abs(expected));
+          }
+        }
+        EXPECT_LE(difference, 2e-6 * size) << kernels->name;
+        EXPECT_GT(difference, 0) << kernels->name << ": it is the same";
+      }
     }
   }
 }

@@ -132,6 +132,35 @@ TEST(LaneStep, MovesBodiesAsOneByOne) {
   }
 }
 
+// 1,000 steps with stiffness in single precision, which the residual is not: the same motion where no damping is made
+// of that stiffness, and as many iterations.
+TEST(LaneStep, MixedPrecisionMovesBodiesAsDouble) {
+  for (const auto& [name, kind] : kinds()) {
+    const Bar bar = full_bar(kind.bar);
+    const auto model = prepared(bar, kind.model);
+    Crowd mixed = make_crowd(bar, *model, kind, 8), exact = mixed;
+    for (StepScene& scene : mixed.scenes) scene.precision = Precision::kMixed;
+    LaneWorkspace workspace(*model, mixed.scenes.front());
+    std::vector<StepReport> reports(8), expected(8);
+    int more = 0, all = 0;
+    for (int n = 0; n < 1000; ++n) {
+      step_side_by_side(*model, mixed.bodies(), workspace, reports);
+      step_side_by_side(*model, exact.bodies(), workspace, expected);
+      for (std::size_t i = 0; i < 8; ++i) {
+        ASSERT_EQ(reports[i].status & ~kStepStagnated, 0U) << name << ", body " << i << ", step " << n;
+        more += reports[i].newton_iterations - expected[i].newton_iterations;
+        all += expected[i].newton_iterations;
+      }
+    }
+    for (std::size_t i = 0; i < 8; ++i) {
+      const bool damped = mixed.scenes[i].stiffness_damping > 0;
+      EXPECT_LE(difference(*model, exact.states[i], mixed.states[i]), damped ? 1e-6 : 1e-9) << name << ", body " << i;
+    }
+    EXPECT_GT(difference(*model, exact.states[1], mixed.states[1]), 0) << name << ": it is the same";
+    EXPECT_LE(std::abs(more), all / 20) << name;
+  }
+}
+
 TEST(LaneStep, NoBodyDependsOnTheOthers) {
   const Kind kind{.bar = {.free = true, .examples = 3}};
   const Bar bar = test::make_bar(kind.bar);
