@@ -32,13 +32,9 @@ exmat_settings settings_of(const py::dict& given) {
     else if (name == "gravity")
       std::ranges::copy(value.cast<std::array<double, 3>>(), settings.gravity);
     else if (name == "integrator")
-<<<<<<< HEAD
       settings.integrator = number_of(value, "integrator", kIntegrators);
-=======
-      settings.integrator = number_of<3>(value, "integrator", {"bdf2", "backward_euler", "newmark"});
     else if (name == "precision")
-      settings.precision = number_of<2>(value, "precision", {"double", "mixed"});
->>>>>>> lanes
+      settings.precision = number_of(value, "precision", {"double", "mixed"});
     else if (name == "internal_force")
       settings.internal_force = number_of(value, "internal_force", {"auto", "cubature", "polynomial"});
     else if (name == "example_target")

@@ -67,13 +67,8 @@ class Model(_exmat.Model):
             use_examples = any(value is not None for value in examples.values())
         others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
                       mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
-<<<<<<< HEAD
                       newton_tolerance=newton_tolerance, use_examples=int(use_examples), use_contact=int(use_contact),
-                      sleep_energy=sleep_energy, sleep_time=sleep_time)
-=======
-                      newton_tolerance=newton_tolerance, use_examples=int(use_examples), sleep_energy=sleep_energy,
-                      sleep_time=sleep_time, precision=precision)
->>>>>>> lanes
+                      sleep_energy=sleep_energy, sleep_time=sleep_time, precision=precision)
         self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
 
     @classmethod
