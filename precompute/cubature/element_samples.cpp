@@ -75,7 +75,7 @@ void ElementSamples::respond(Eigen::Index tet, const PoseLanes& poses, Responses
   write_gradient(tet, stride, B.data());
   const auto parameters = lame(tet);
   const double mu = volumes_[tet] * parameters.mu, lambda = volumes_[tet] * parameters.lambda;
-  const ElementArrays arrays{1, r, stride, nullptr, B.data(), 1};
+  const ElementArrays arrays{1, r, stride, nullptr, B.data(), nullptr, 1};
   const ElementLaw law = law_of(materials_.model, &mu, &lambda);
   for (Eigen::Index g = 0; g < poses.groups(); ++g) {
     auto group = responses.group(g);
@@ -99,7 +99,7 @@ void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const 
       mu[e] = weights[first + e] * volumes_[tet] * parameters.mu;
       lambda[e] = weights[first + e] * volumes_[tet] * parameters.lambda;
     }
-    const ElementArrays arrays{runtime::padded(count) / kLanes, r, stride, nullptr, B.data(), count};
+    const ElementArrays arrays{runtime::padded(count) / kLanes, r, stride, nullptr, B.data(), nullptr, count};
     const ElementLaw law = law_of(materials_.model, mu.data(), lambda.data());
     for (Eigen::Index g = 0; g < poses.groups(); ++g) {
       runtime::kernels().lanes_force_and_stiffness(arrays, law, poses.group(g), scratch.data(), energy, force.data(),
