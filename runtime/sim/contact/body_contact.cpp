@@ -53,14 +53,15 @@ void take_stretch(const HeldBodyContact& held, const Eigen::Matrix3d& rotation, 
   if (length > 0) candidate.anchor -= held.stretch.norm() / length * along;
 }
 
-/// The nearest point; of a vertex inside that looks the way `looks`, preferably of what does not look the same way:
-/// where edges lie on each other, the nearest may be that of a side.
+/// The nearest point; of a vertex inside that looks the way `looks`, preferably of what does not look the same way and
+/// is no deeper than `deepest` [m]: where edges lie on each other, the nearest may be that of a side.
 std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen::Vector3d& point,
-                                         const Eigen::Vector3d& looks, double radius, SurfaceShape& shape) {
+                                         const Eigen::Vector3d& looks, double radius, double deepest,
+                                         SurfaceShape& shape) {
   auto hit = surface.nearest(point, radius, shape);
   if (!hit || hit->distance >= 0 || hit->normal.dot(looks) <= 0) return hit;
   auto facing = surface.nearest(point, radius, shape, &looks);
-  if (!facing) return hit;
+  if (!facing || std::abs(facing->distance) > deepest) return hit;
   if (facing->distance > 0) {  // told by a part of the surface alone; it is inside
     facing->distance = -facing->distance;
     facing->normal = -facing->normal;
@@ -73,7 +74,7 @@ std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen
 std::optional<SurfaceHit> nearest_by_side(const BodySurface& surface, const Eigen::Vector3d& point,
                                           const Eigen::Vector3d& looks, const Eigen::Vector3d& side, double radius,
                                           SurfaceShape& shape) {
-  auto hit = nearest_facing(surface, point, looks, radius, shape);
+  auto hit = nearest_facing(surface, point, looks, radius, radius, shape);
   if (!hit || hit->normal.dot(side) >= kOtherSide) return hit;
   const Eigen::Vector3d far_side = -side;
   auto entry = surface.nearest(point, radius, shape, &far_side);
@@ -120,7 +121,9 @@ struct Gathering {
       const Eigen::Vector3d looks =
           b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
       if (was_inside) return nearest_by_side(b.touching.surface, point, looks, last->normal, margin + depth, shape);
-      return nearest_facing(b.touching.surface, point, looks, margin + depth, shape);
+      const Eigen::Vector3d apart = a.set.world_velocity(vertex, arm, a.pose, a.velocity) - b.velocity.at(offset);
+      const double deepest_entry = anew ? margin + depth : deepest_that_comes_in(time_step * apart.norm());
+      return nearest_facing(b.touching.surface, point, looks, margin + depth, deepest_entry, shape);
     };
     const auto to_own = [&] {
       return b.touching.surface.nearest_approached(
@@ -143,8 +146,7 @@ struct Gathering {
     const Eigen::Vector3d apart = a.set.world_velocity(vertex, arm, a.pose, a.velocity) - b.velocity.at(arm_b) - own_b;
     SurfacePoint surface{hit->distance, b.pose.rotation * hit->normal, Eigen::Vector3d::Zero()};
     const double way = time_step * apart.norm();
-    if (!own && !anew && !was_inside && -hit->distance > std::max(kEntrySteps * way, kEntryShare * surface_radius))
-      return candidates.all.pop_back();
+    if (!own && !anew && !was_inside && -hit->distance > deepest_that_comes_in(way)) return candidates.all.pop_back();
     if (!own && !was_inside && hit->distance > 0 && way > std::max(hit->distance, kFast * surface_radius)) {
       const Eigen::Vector3d heading = kContactMarginSteps * time_step * (b.pose.rotation.transpose() * apart);
       const auto met = first_meeting(point, point + heading, [&](const Eigen::Vector3d& at, double left) {
@@ -161,6 +163,9 @@ struct Gathering {
     candidate.friction_force = law.friction * last->normal_force;
     take_stretch(*last, b.pose.rotation, candidate);
   }
+
+  /// By a way of so much in a step [m].
+  double deepest_that_comes_in(double way) const { return std::max(kEntrySteps * way, kEntryShare * surface_radius); }
 
   const ContactLaw& law;
   const TouchingBody &a, &b;
