@@ -190,7 +190,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
   const Overlap overlap(0.3);
   const BodySurface& surface = overlap.blocks.surface->surface;
   const ContactSet& set = *overlap.blocks.model->contact;
-  constexpr double kMargin = 1e-2;  // [m]
+  constexpr double kMargin = 2e-2;  // [m]
   constexpr int kSteps = 2000;
   const Eigen::VectorXd still = Eigen::VectorXd::Zero(overlap.qa.size());
   SurfaceShape shape = surface.make_shape();
@@ -231,7 +231,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
     }
     most = std::max(most, static_cast<int>(brute.size()));
   }
-  EXPECT_GE(most, 3);  // what is deep has not come in
+  EXPECT_GT(most, 3);
   EXPECT_LT(searches, kSteps / 2);
   EXPECT_GT(served, kSteps / 2);
 }
