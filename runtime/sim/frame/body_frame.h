@@ -116,6 +116,13 @@ class BodyFrame {
   virtual Eigen::Vector3d limit_kinetic_energy(double allowed, const Eigen::Vector3d& impulse,
                                                FrameWorkspace& workspace, Eigen::VectorXd& v,
                                                FrameState& state) const noexcept;
+  /// After a step: every velocity, q's v included, becomes `share` of what it is and that of a rigid motion beside it.
+  virtual void add_motion(double /*share*/, const FrameVelocity& /*added*/, FrameWorkspace& /*workspace*/,
+                          Eigen::VectorXd& /*v*/, FrameState& /*state*/) const noexcept {}
+  /// After a step, about the centre of mass, world [kg m^2]; 0 where the body is not moved by its momenta.
+  virtual Eigen::Matrix3d inertia(const FrameWorkspace& /*workspace*/, const FrameState& /*state*/) const noexcept {
+    return Eigen::Matrix3d::Zero();
+  }
   /// Whether something outside moves it whatever energy that takes.
   virtual bool is_driven() const noexcept { return false; }
 
@@ -131,6 +138,10 @@ class BodyFrame {
   /// Moves what external forces move. `near`: obstacles may touch in this step; `dissipative`: by backward Euler.
   virtual void move(const FrameStep& /*step*/, bool /*near*/, bool /*dissipative*/, const FrameState& /*state*/,
                     FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*external_force*/) const noexcept {}
+  /// After move(), until end_contact(): the momenta that external forces alone have made; where it is moved by them.
+  virtual std::optional<FrameMomenta> expected_momenta(const FrameWorkspace& /*workspace*/) const noexcept {
+    return std::nullopt;
+  }
   /// Whether its accelerations may jump in [from, to).
   virtual bool jumps(const WorldLoads& /*loads*/, double /*from*/, double /*to*/) const noexcept { return false; }
 

@@ -160,6 +160,27 @@ Eigen::Vector3d FreeFrame::limit_kinetic_energy(double allowed, const Eigen::Vec
   return before - body.linear_momentum;
 }
 
+void FreeFrame::add_motion(double share, const FrameVelocity& added, FrameWorkspace& workspace, Eigen::VectorXd& v,
+                           FrameState& state) const noexcept {
+  const DeformingInertia::Moments& moments = own(workspace).moments;
+  FreeState& body = own(state);
+  v *= share;
+  body.linear_momentum = share * body.linear_momentum + body.mass * added.linear;
+  body.angular_momentum = share * body.angular_momentum + inertia(workspace, state) * added.angular;
+  body.spin = share * body.spin + body.orientation.conjugate() * added.angular;
+  body.momentum = v + moments.deformation.lazyProduct(body.spin);
+}
+
+Eigen::Matrix3d FreeFrame::inertia(const FrameWorkspace& workspace, const FrameState& state) const noexcept {
+  const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix();
+  return rotation * own(workspace).moments.inertia * rotation.transpose();
+}
+
+std::optional<FrameMomenta> FreeFrame::expected_momenta(const FrameWorkspace& workspace) const noexcept {
+  const FreeState& body = own(workspace).moved;
+  return FrameMomenta{body.linear_momentum, body.angular_momentum};
+}
+
 // ---- A step ---------------------------------------------------------------------------------------------------------
 
 /// Scripted forces act on its momenta first, in move().

@@ -16,7 +16,6 @@ class FreeFrame final : public BodyFrame {
   Eigen::Vector3d origin() const noexcept override { return inertia_.centre_of_mass(); }
   Eigen::Vector3d centre_of_mass() const noexcept override { return inertia_.centre_of_mass(); }
   bool exerts_forces() const noexcept override { return true; }
-  const DeformingInertia& inertia() const noexcept { return inertia_; }
   const DeformingInertia* inertia_of_momenta() const noexcept override { return &inertia_; }
 
   FrameState make_state() const override;
@@ -42,10 +41,14 @@ class FreeFrame final : public BodyFrame {
   void clear_forces(FrameState& state) const noexcept override;
   Eigen::Vector3d limit_kinetic_energy(double allowed, const Eigen::Vector3d& impulse, FrameWorkspace& workspace,
                                        Eigen::VectorXd& v, FrameState& state) const noexcept override;
+  void add_motion(double share, const FrameVelocity& added, FrameWorkspace& workspace, Eigen::VectorXd& v,
+                  FrameState& state) const noexcept override;
+  Eigen::Matrix3d inertia(const FrameWorkspace& workspace, const FrameState& state) const noexcept override;
 
   void begin(const FrameStep& step, FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept override;
   void move(const FrameStep& step, bool near, bool dissipative, const FrameState& state, FrameWorkspace& workspace,
             Eigen::VectorXd& external_force) const noexcept override;
+  std::optional<FrameMomenta> expected_momenta(const FrameWorkspace& workspace) const noexcept override;
   void add_start_force(const FrameStep& step, const FrameState& state, FrameWorkspace& workspace,
                        Eigen::VectorXd& force) const noexcept override;
   bool update_force(const Eigen::VectorXd& q, double velocity_factor, const Eigen::VectorXd& velocity_centre,

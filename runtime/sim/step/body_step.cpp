@@ -231,4 +231,12 @@ void BodyStep::limit_kinetic_energy(double allowed) noexcept {
   report_.contact_force -= lost / scene_.time_step;
 }
 
+void BodyStep::add_motion(double share, const FrameVelocity& added) noexcept {
+  const std::optional<FrameMomenta> before = model_.frame->momenta(state_.frame);
+  model_.frame->add_motion(share, added, workspace_.frame, state_.v, state_.frame);
+  if (!before) return;
+  const Eigen::Vector3d gained = model_.frame->momenta(state_.frame)->linear - before->linear;
+  report_.contact_force += gained / scene_.time_step;
+}
+
 }  // namespace exmat::runtime

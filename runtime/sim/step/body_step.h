@@ -45,6 +45,9 @@ class BodyStep {
   /// the difference.
   void limit_kinetic_energy(double allowed) noexcept;
 
+  /// After take(): every velocity becomes `share` of what it is and that of a rigid motion beside it, likewise.
+  void add_motion(double share, const FrameVelocity& added) noexcept;
+
   const StepReport& report() const noexcept { return report_; }
 
   IncrementalPotential& potential() noexcept { return potential_; }

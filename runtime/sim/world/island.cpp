@@ -6,6 +6,7 @@
 
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/stepper.h"
+#include "runtime/sim/world/island_momenta.h"
 
 namespace exmat::runtime {
 namespace {
@@ -336,14 +337,13 @@ double kinetic_and_total(std::span<WorldBody* const> bodies, double& total) noex
   return kinetic;
 }
 
-/// The step of an island that did not converge: its bodies together have no more energy than before.
-void take_solution(std::span<WorldBody* const> bodies, const NewtonReport& newton) noexcept {
-  double before = 0, now = 0;
-  const bool converged = newton.status == NewtonStatus::kConverged;
-  if (!converged) kinetic_and_total(bodies, before);
-  for (WorldBody* const own : bodies) own->step->take(newton);
-  if (converged) return;
+/// After the step of an island that did not converge: its bodies have the `momenta` that they have to have, if any, and
+/// together no more energy than `before` [J].
+void limit_energy(std::span<WorldBody* const> bodies, const std::optional<IslandMomenta>& momenta,
+                  double before) noexcept {
+  double now = 0;
   const double kinetic = kinetic_and_total(bodies, now);
+  if (momenta) return take_momenta(bodies, *momenta, before - (now - kinetic));
   if (!(now > before) || !(kinetic > 0)) return;
   const double share = std::max(0.0, 1 - (now - before) / kinetic);
   for (WorldBody* const own : bodies)
@@ -367,6 +367,12 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   });
   const NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
   const bool converged = newton.status == NewtonStatus::kConverged;
+  std::optional<IslandMomenta> momenta;
+  double energy = 0;
+  if (!converged) {
+    momenta = expected_momenta(bodies);
+    kinetic_and_total(bodies, energy);
+  }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
     Eigen::Vector3d torque = own.near().contact.torque;
@@ -381,7 +387,9 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
     }
     finish_contact(own.model, own.state, converged, torque, own.workspace);
   }
-  take_solution(bodies, newton);
+  for (WorldBody* const own : bodies) own->step->take(newton);
+  const auto is_finite = [](const WorldBody* own) { return (own->step->report().status & kStepNonFinite) == 0; };
+  if (!converged && std::ranges::all_of(bodies, is_finite)) limit_energy(bodies, momenta, energy);
   for (WorldBody* const own : bodies) own->report = own->step->report();
   return newton;
 }
