@@ -182,6 +182,15 @@ struct Kernels {
   /// are whole.
   void (*add_squares)(const double* factors, std::ptrdiff_t count, std::ptrdiff_t stride, double* squares);
 
+  // Of kLanes triangles: corners [3 x 3 x kLanes], of each corner its x, y and z.
+
+  /// squared [kLanes]: of the distance of a point [3] from each, or less by the rounding of its terms.
+  void (*triangle_distances)(const double* corners, const double* point, double* squared);
+  /// The same where it is at most `share` of the square of how far away the nearest point is at rest, with the
+  /// triangles at `rest_corners` and the point at `rest_point` [3]; infinity elsewhere.
+  void (*approached_triangles)(const double* corners, const double* point, const double* rest_corners,
+                               const double* rest_point, double share, double* squared);
+
   // Of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies [kLanes].
   void (*lanes_energy)(const ElementArrays&, const ElementLaw&, const double* q, double* energy);
   void (*lanes_force)(const ElementArrays&, const ElementLaw&, const double* q, double* energy, double* force);

@@ -420,6 +420,7 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
 #include "runtime/kernels/lanes_isa.inl"
 #include "runtime/kernels/lanes_rotation_isa.inl"
 #include "runtime/kernels/lanes_vectors_isa.inl"
+#include "runtime/kernels/triangles_isa.inl"
 
 }  // namespace
 
@@ -440,6 +441,8 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  add_vertex_loads,
                                  vertex_loads,
                                  add_squares,
+                                 triangle_distances,
+                                 approached_triangles,
                                  lanes_energy,
                                  lanes_force,
                                  lanes_force_and_stiffness,

@@ -3,12 +3,14 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <map>
 #include <utility>
 
 #include "common/mesh/geometry.h"
+#include "runtime/kernels/kernels.h"
 #include "runtime/sim/contact/nearest_on_triangle.h"
 
 namespace exmat::runtime {
@@ -16,29 +18,38 @@ namespace {
 
 constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it normals of the surface say which way is out
 
-constexpr double kApproached = 0.5;  // of the distance at rest
-constexpr int kLeafTriangles = 4;
-constexpr int kBlockTriangles = 64;  // whose vertices are moved together
-constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
-constexpr double kSameWay = 0.5;     // cosine
+constexpr double kApproached = 0.5;                             // of the distance at rest
+constexpr double kNearlyApproached = (1 + 1e-5) * kApproached;  // but for the rounding of where the nearest point is
+constexpr int kLeafTriangles = kLanes;
+constexpr Eigen::Index kCornerNumbers = 9 * kLanes;  // of the triangles of a leaf
+constexpr int kBlockTriangles = 64;                  // whose vertices are moved together
+constexpr int kManyLooks = 64;                       // a search costs about half a microsecond, all boxes twenty
+constexpr double kSameWay = 0.5;                     // cosine
 constexpr double kSurely = 1 + 1e-9;
 
-/// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them.
-template <class Accepts, class Excludes, class ExcludesTriangle>
+/// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them,
+/// and how it bounds the triangles of a leaf.
+template <class Accepts, class Excludes, class ExcludesTriangle, class BoundTriangles>
 struct SearchFilter {
   bool operator()(int triangle, const TrianglePoint& here) const { return accepts(triangle, here); }
   Accepts accepts;
   Excludes excludes;
   ExcludesTriangle excludes_triangle;
+  BoundTriangles bound_triangles;
 };
-template <class Accepts, class Excludes, class ExcludesTriangle>
-SearchFilter(Accepts, Excludes, ExcludesTriangle) -> SearchFilter<Accepts, Excludes, ExcludesTriangle>;
+template <class Accepts, class Excludes, class ExcludesTriangle, class BoundTriangles>
+SearchFilter(Accepts, Excludes, ExcludesTriangle, BoundTriangles)
+    -> SearchFilter<Accepts, Excludes, ExcludesTriangle, BoundTriangles>;
 
-/// A bound on the squared distance from a triangle, that from the box about it: several times as cheap.
-double squared_box_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
-                            const Eigen::Vector3d& c) {
-  const Eigen::Array3d low = a.array().min(b.array()).min(c.array()), high = a.array().max(b.array()).max(c.array());
-  return (low - point.array()).max(point.array() - high).max(0).matrix().squaredNorm();
+/// Where those of a leaf begin: all leaves but the last are full.
+Eigen::Index corners_begin(const DeformationTree::Node& leaf) { return leaf.first / kLeafTriangles * kCornerNumbers; }
+/// Of one of the triangles of a leaf.
+Eigen::Vector3d corner_of(const double* corners, int triangle, int corner) {
+  const double* x = corners + 3 * corner * kLanes + triangle;
+  return {x[0], x[kLanes], x[2 * kLanes]};
+}
+void set_corner(const Eigen::Vector3d& place, int triangle, int corner, double* corners) {
+  for (int axis = 0; axis < 3; ++axis) corners[(3 * corner + axis) * kLanes + triangle] = place[axis];
 }
 
 /// Across the edge that begins at each corner; -1 where there is none or more than one.
@@ -64,7 +75,7 @@ BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray
       triangles_(std::move(triangles)),
       neighbours_(neighbours_of(triangles_)),
       fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
-      tree_(triangles_, rest_, basis_, kLeafTriangles),
+      tree_(triangles_, rest_, basis_, kLeafTriangles, /*full_leaves=*/true),
       reach_(rest.rows() > 0 ? rest_.rowwise().norm().maxCoeff() : 0) {
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
@@ -73,6 +84,15 @@ BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray
   std::vector<int> next = fan_starts_;
   for (int t = 0; t < triangles_.rows(); ++t)
     for (int c = 0; c < 3; ++c) fans_[static_cast<std::size_t>(next[static_cast<std::size_t>(triangles_(t, c))]++)] = t;
+  rest_corners_ = make_corners();
+  for (int i = 0; i < triangles_.rows(); ++i)
+    for (int c = 0; c < 3; ++c)
+      set_corner(rest_.row(triangles_(tree_.order()[static_cast<std::size_t>(i)], c)), i % kLeafTriangles, c,
+                 rest_corners_.data() + i / kLeafTriangles * kCornerNumbers);
+}
+
+AlignedArray BodySurface::make_corners() const {
+  return AlignedArray((triangles_.rows() + kLeafTriangles - 1) / kLeafTriangles * kCornerNumbers);
 }
 
 BodySurface BodySurface::of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
@@ -102,6 +122,7 @@ SurfaceShape BodySurface::make_shape() const {
   shape.boxes.resize(tree_.nodes().size());
   shape.ball_of.assign(tree_.nodes().size(), 0);
   shape.box_of.assign(tree_.nodes().size(), 0);
+  shape.corners = make_corners();
   return shape;
 }
 
@@ -149,9 +170,13 @@ void BodySurface::open_block(int node, SurfaceShape& shape) const noexcept {
       continue;
     }
     box.setEmpty();
+    double* const corners = shape.corners.data() + corners_begin(branch);
     for (int i = branch.first; i < branch.last; ++i)
-      for (int c = 0; c < 3; ++c)
-        box.extend(position(triangles_(tree_.order()[static_cast<std::size_t>(i)], c), shape));
+      for (int c = 0; c < 3; ++c) {
+        const Eigen::Vector3d place = position(triangles_(tree_.order()[static_cast<std::size_t>(i)], c), shape);
+        box.extend(place);
+        set_corner(place, i - branch.first, c, corners);
+      }
   }
 }
 
@@ -220,15 +245,21 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
       waiting[count++] = near;
       continue;
     }
+    const double* const corners = shape.corners.data() + corners_begin(branch);
+    std::array<double, kLeafTriangles> bounds;
+    if constexpr (requires { accepts.bound_triangles(branch, bounds.data()); })
+      accepts.bound_triangles(branch, bounds.data());
+    else
+      kernels().triangle_distances(corners, point.data(), bounds.data());
     for (int i = branch.first; i < branch.last; ++i) {
-      const int triangle = tree_.order()[static_cast<std::size_t>(i)];
-      const Eigen::Vector3d a = position(triangles_(triangle, 0), shape), b = position(triangles_(triangle, 1), shape),
-                            c = position(triangles_(triangle, 2), shape);
-      const double away = squared_box_distance(point, a, b, c);
+      const int own = i - branch.first;
+      const double away = bounds[static_cast<std::size_t>(own)];
       if (away > kSurely * nearest) continue;
+      const int triangle = tree_.order()[static_cast<std::size_t>(i)];
       if constexpr (requires { accepts.excludes_triangle(triangle, away); })
         if (accepts.excludes_triangle(triangle, away)) continue;
-      const TrianglePoint here = nearest_on_triangle(point, a, b, c);
+      const TrianglePoint here = nearest_on_triangle(point, corner_of(corners, own, 0), corner_of(corners, own, 1),
+                                                     corner_of(corners, own, 2));
       if (here.squared_distance > nearest) continue;
       if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
       if (!accepts(triangle, here)) continue;
@@ -257,8 +288,8 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
 
 /// A search for what is nearer than half of its distance at rest, or may be once it has moved by `way` [m].
 template <class Accepts>
-auto BodySurface::approach_filter(const Eigen::Vector3d& rest, const SurfaceHit& place, double way,
-                                  const Accepts& accepts) const noexcept {
+auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place,
+                                  double way, const SurfaceShape& shape, const Accepts& accepts) const noexcept {
   const auto is_beyond = [way](double squared_distance, double at_rest) {
     const double near = kSurely * kApproached * at_rest + way;
     return squared_distance >= near * near;
@@ -276,11 +307,18 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& rest, const SurfaceHit&
     for (int c = 0; c < 3; ++c) {
       const int vertex = triangles_(triangle, c);
       if (vertex == own) return true;
+      if (way == 0) continue;
       farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
     }
-    return is_beyond(bound, std::sqrt(farthest));
+    return way > 0 && is_beyond(bound, std::sqrt(farthest));
   };
-  return SearchFilter{accepts, excludes, excludes_triangle};
+  const auto bound_triangles = [&, way, this](const DeformationTree::Node& leaf, double* bounds) {
+    const double* const corners = shape.corners.data() + corners_begin(leaf);
+    if (way > 0) return kernels().triangle_distances(corners, point.data(), bounds);
+    kernels().approached_triangles(corners, point.data(), rest_corners_.data() + corners_begin(leaf), rest.data(),
+                                   kNearlyApproached * kNearlyApproached, bounds);
+  };
+  return SearchFilter{accepts, excludes, excludes_triangle, bound_triangles};
 }
 
 std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
@@ -293,7 +331,7 @@ std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d&
     if (!facing) facing = normal_of(place, shape);
     return !looks_along(triangle, *facing, shape);
   };
-  return search(point, radius, shape, approach_filter(rest, place, 0, accepts));
+  return search(point, radius, shape, approach_filter(point, rest, place, 0, shape, accepts));
 }
 
 double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
@@ -302,7 +340,7 @@ double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen:
   // Any point of the triangle may become the nearest: none is farther away at rest than the corners, by
   // excludes_triangle.
   const auto accepts = [](int, const TrianglePoint&) { return true; };
-  const auto hit = search(point, radius, shape, approach_filter(rest, place, way, accepts));
+  const auto hit = search(point, radius, shape, approach_filter(point, rest, place, way, shape, accepts));
   return hit ? std::abs(hit->distance) : std::numeric_limits<double>::infinity();
 }
 

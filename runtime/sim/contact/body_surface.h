@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/contact/deformation_tree.h"
 
 namespace exmat::runtime {
@@ -28,6 +29,7 @@ struct SurfaceShape {
   std::vector<DeformationTree::Ball> balls;  ///< of branches, from their bounds
   std::vector<Eigen::AlignedBox3d> boxes;    ///< of branches within a block, from the positions
   std::vector<int> position_of, ball_of, box_of;
+  AlignedArray corners;  ///< of the triangles of leaves within a block, as Kernels::triangle_distances() has them
 };
 
 /// The closed surface of a reduced body: signed distances to it as it deforms, in the frame of the body. Only what is
@@ -90,13 +92,14 @@ class BodySurface {
   void basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept;
 
  private:
+  AlignedArray make_corners() const;
   bool is_block(int node) const noexcept;
   void count_look(SurfaceShape& shape) const noexcept;
   void open_block(int node, SurfaceShape& shape) const noexcept;
   double squared_bound(int node, const Eigen::Vector3d& point, SurfaceShape& shape) const noexcept;
   template <class Accepts>
-  auto approach_filter(const Eigen::Vector3d& rest, const SurfaceHit& place, double way,
-                       const Accepts& accepts) const noexcept;
+  auto approach_filter(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place, double way,
+                       const SurfaceShape& shape, const Accepts& accepts) const noexcept;
   template <class Accept>
   std::optional<SurfaceHit> search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                    const Accept& accepts) const noexcept;
@@ -113,6 +116,7 @@ class BodySurface {
   TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
   std::vector<int> fan_starts_, fans_;  // triangles of each vertex
   DeformationTree tree_;                // of the triangles
+  AlignedArray rest_corners_;           // as those of a shape
   double reach_ = 0;
 };
 

@@ -27,6 +27,7 @@ struct DeformationTree::Points {
   const VertexArray& rest;
   const RowMatrix& basis;
   int leaf_items;
+  bool full_leaves;
 
   /// The points of some items; each once where items are points.
   std::vector<int> of(const std::vector<int>& order, int first, int last) const {
@@ -47,11 +48,11 @@ struct DeformationTree::Points {
 };
 
 DeformationTree::DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis,
-                                 int leaf_items)
+                                 int leaf_items, bool full_leaves)
     : order_(static_cast<std::size_t>(items.rows())) {
   if (order_.empty()) return;
   std::iota(order_.begin(), order_.end(), 0);
-  const Points points{items, rest, basis, leaf_items};
+  const Points points{items, rest, basis, leaf_items, full_leaves};
   build(points, 0, static_cast<int>(order_.size()));
   basis_norm_ = largest_norm(basis, points.of(order_, 0, static_cast<int>(order_.size())), Rows::Zero(3, basis.cols()));
 }
@@ -68,7 +69,8 @@ void DeformationTree::build(const Points& points, int first, int last) {
     for (int i = first; i < last; ++i) middles.row(i - first) = points.middle(order_[static_cast<std::size_t>(i)]);
     Eigen::Index axis = 0;
     (middles.colwise().maxCoeff() - middles.colwise().minCoeff()).maxCoeff(&axis);
-    const int half = first + (last - first) / 2;
+    int half = first + (last - first) / 2;
+    if (points.full_leaves) half += (points.leaf_items - (half - first) % points.leaf_items) % points.leaf_items;
     std::nth_element(order_.begin() + first, order_.begin() + half, order_.begin() + last, [&](int a, int b) {
       const double at_a = points.middle(a)[axis], at_b = points.middle(b)[axis];
       return at_a != at_b ? at_a < at_b : a < b;

@@ -27,8 +27,9 @@ class DeformationTree {
 
   DeformationTree() = default;
   /// `items` [m x c] are rows of c ids of points at `rest` [n x 3] about the frame's origin, moved by `basis` [3n x r];
-  /// leaves hold at most so many.
-  DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis, int leaf_items);
+  /// leaves hold at most so many, or, with `full_leaves`, all but one as many.
+  DeformationTree(const IndexMatrix& items, const VertexArray& rest, const RowMatrix& basis, int leaf_items,
+                  bool full_leaves = false);
 
   /// Items in the order of the leaves: rows of the matrix that the tree was made of.
   const std::vector<int>& order() const noexcept { return order_; }
