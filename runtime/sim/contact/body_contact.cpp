@@ -17,6 +17,7 @@ constexpr double kEntrySteps = 2, kEntryShare = 0.01;
 
 constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
 constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
+constexpr double kFastMargins = 10;      // of a way: below it what velocities exclude costs more than it saves
 constexpr int kWorthwhile = 4;           // steps that a search has to serve: it costs about two without
 constexpr int kWithout = 16;             // steps without, after one that did not
 
@@ -126,8 +127,11 @@ struct Gathering {
       return nearest_facing(b.touching.surface, point, looks, margin + depth, deepest_entry, shape);
     };
     const auto to_own = [&] {
-      return b.touching.surface.nearest_approached(
-          point, a.set.rest(vertex), b.touching.places[static_cast<std::size_t>(vertex)], margin + depth, shape);
+      const SurfaceHit& place = b.touching.places[static_cast<std::size_t>(vertex)];
+      ClosingPoint closing{Eigen::Vector3d::Zero(), near + depth, kContactMarginSteps * time_step};
+      if (is_fast) closing.velocity = b.touching.surface.velocity_of(place, shape);
+      return b.touching.surface.nearest_approached(point, a.set.rest(vertex), place, margin + depth, shape,
+                                                   is_fast ? &closing : nullptr);
     };
     const auto hit = own ? to_own() : to_others();
     if (own && hit && hit->distance < 0 && !was_inside) return;
@@ -175,6 +179,8 @@ struct Gathering {
   SurfaceShape& shape;
   BodyCandidates& candidates;
   std::vector<HeldBodyContact>::const_iterator last;
+  bool is_fast = false;       ///< of a body with itself: what is nearer than `near` and by ClosingPoint is looked at
+  double near = 0;            ///< [m]
   double deepest = 0;         ///< that a vertex may be inside [m]
   double surface_radius = 0;  ///< of the ball about the surface of b [m]
 };
@@ -295,7 +301,17 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
                              const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
                              BodyCandidates& candidates) const {
   const TouchingSurface& touching = body.touching;
-  Gathering gathering{law_, body, body, time_step, margin, /*anew=*/false, /*own=*/true, held, shape, candidates};
+  double way = time_step * body.set.tree().basis_norm() * body.velocity.v.norm();
+  const bool is_fast = 2 * kContactMarginSteps * way > kFastMargins * margin;
+  if (is_fast) {
+    if (near.scratch.size() == 0) near.scratch = AlignedArray(body.set.modes());
+    way = time_step * body.set.fastest(body.velocity.v, near.scratch);
+    touching.surface.place(body.pose.q, body.velocity.v, shape);
+  }
+  const double farthest = margin + 2 * kContactMarginSteps * way;
+  Gathering gathering{law_, body, body, time_step, farthest, /*anew=*/false, /*own=*/true, held, shape, candidates};
+  gathering.is_fast = is_fast;
+  gathering.near = margin + way;
   gather_from(gathering, near, [&](int vertex, const Eigen::Vector3d& point, double radius) {
     // Until the next search q changes by so much at most.
     const double change = near.farther / (body.set.tree().basis_norm() + touching.surface.basis_norm());

@@ -51,6 +51,8 @@ struct NearVertices {
   // Where the bodies were.
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
+
+  AlignedArray scratch;  ///< [r] of a body with itself
 };
 
 /// The surface of a body that touches others, and how its vertices look.
@@ -96,7 +98,9 @@ class BodyContact {
               BodyCandidates& candidates) const;
 
   /// The same of a body with itself: vertices that parts of its surface which are farther away at rest have come near
-  /// to from outside. What overlaps at the start never pushes.
+  /// to from outside: nearer than `margin` [m] and two steps of the way that they go against each other; where these
+  /// are fast, also one step of the fastest vertex, since what is hit may take its speed. What overlaps at the start
+  /// never pushes.
   void gather_own(const TouchingBody& body, double time_step, double margin, const std::vector<HeldBodyContact>& held,
                   SurfaceShape& shape, NearVertices& near, BodyCandidates& candidates) const;
 

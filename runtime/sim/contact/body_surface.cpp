@@ -52,6 +52,18 @@ void set_corner(const Eigen::Vector3d& place, int triangle, int corner, double* 
   for (int axis = 0; axis < 3; ++axis) corners[(3 * corner + axis) * kLanes + triangle] = place[axis];
 }
 
+/// Of the point against what moves as a box of velocities holds [m/s].
+double fastest_against(const ClosingPoint& closing, const Eigen::AlignedBox3d& velocities) {
+  return (velocities.max() - closing.velocity)
+      .cwiseAbs()
+      .cwiseMax((velocities.min() - closing.velocity).cwiseAbs())
+      .norm();
+}
+bool is_far(const ClosingPoint& closing, double squared_distance, double speed) {
+  const double reach = closing.near + closing.time * speed;
+  return squared_distance > reach * reach;
+}
+
 /// Across the edge that begins at each corner; -1 where there is none or more than one.
 TriangleArray neighbours_of(const TriangleArray& triangles) {
   std::map<std::pair<int, int>, int> edges;  // first triangle of each directed edge
@@ -123,14 +135,22 @@ SurfaceShape BodySurface::make_shape() const {
   shape.ball_of.assign(tree_.nodes().size(), 0);
   shape.box_of.assign(tree_.nodes().size(), 0);
   shape.corners = make_corners();
+  shape.velocities = VertexArray::Zero(rest_.rows(), 3);
+  shape.velocity_boxes.resize(tree_.nodes().size());
   return shape;
 }
 
 void BodySurface::place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept {
   shape.q = q;
+  shape.v.resize(0);
   shape.q_norm = q.norm();
   ++shape.placed;
   shape.looks = 0;
+}
+
+void BodySurface::place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept {
+  place(q, shape);
+  shape.v = v;
 }
 
 const DeformationTree::Ball& BodySurface::ball(int node, SurfaceShape& shape) const noexcept {
@@ -147,6 +167,10 @@ Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noe
   if (placed != shape.placed) {
     const Eigen::Vector3d moved = basis_.middleRows<3>(3 * vertex).lazyProduct(shape.q);
     shape.positions.row(vertex) = rest_.row(vertex) + moved.transpose();
+    if (shape.v.size() > 0) {
+      const Eigen::Vector3d velocity = basis_.middleRows<3>(3 * vertex).lazyProduct(shape.v);
+      shape.velocities.row(vertex) = velocity;
+    }
     placed = shape.placed;
   }
   return shape.positions.row(vertex);
@@ -160,21 +184,28 @@ bool BodySurface::is_block(int node) const noexcept {
 
 /// The boxes of a branch and of those below it; after it come all of them.
 void BodySurface::open_block(int node, SurfaceShape& shape) const noexcept {
+  const bool moves = shape.v.size() > 0;
   for (int below = tree_.node(node).next - 1; below >= node; --below) {
     const DeformationTree::Node& branch = tree_.node(below);
-    Eigen::AlignedBox3d& box = shape.boxes[static_cast<std::size_t>(below)];
+    Eigen::AlignedBox3d &box = shape.boxes[static_cast<std::size_t>(below)],
+                        &velocities = shape.velocity_boxes[static_cast<std::size_t>(below)];
     shape.box_of[static_cast<std::size_t>(below)] = shape.placed;
     if (!branch.is_leaf) {
-      const int second = tree_.node(below + 1).next;
-      box = shape.boxes[static_cast<std::size_t>(below) + 1].merged(shape.boxes[static_cast<std::size_t>(second)]);
+      const auto one = static_cast<std::size_t>(below) + 1;
+      const auto other = static_cast<std::size_t>(tree_.node(below + 1).next);
+      box = shape.boxes[one].merged(shape.boxes[other]);
+      if (moves) velocities = shape.velocity_boxes[one].merged(shape.velocity_boxes[other]);
       continue;
     }
     box.setEmpty();
+    velocities.setEmpty();
     double* const corners = shape.corners.data() + corners_begin(branch);
     for (int i = branch.first; i < branch.last; ++i)
       for (int c = 0; c < 3; ++c) {
-        const Eigen::Vector3d place = position(triangles_(tree_.order()[static_cast<std::size_t>(i)], c), shape);
+        const int vertex = triangles_(tree_.order()[static_cast<std::size_t>(i)], c);
+        const Eigen::Vector3d place = position(vertex, shape);
         box.extend(place);
+        if (moves) velocities.extend(shape.velocities.row(vertex).transpose());
         set_corner(place, i - branch.first, c, corners);
       }
   }
@@ -289,27 +320,34 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
 /// A search for what is nearer than half of its distance at rest, or may be once it has moved by `way` [m].
 template <class Accepts>
 auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place,
-                                  double way, const SurfaceShape& shape, const Accepts& accepts) const noexcept {
+                                  double way, const SurfaceShape& shape, const ClosingPoint* closing,
+                                  const Accepts& accepts) const noexcept {
   const auto is_beyond = [way](double squared_distance, double at_rest) {
     const double near = kSurely * kApproached * at_rest + way;
     return squared_distance >= near * near;
   };
   // No point of the branch is farther away at rest than the far side of its ball.
-  const auto excludes = [=, this](int node, double bound) {
+  const auto excludes = [=, &shape, this](int node, double bound) {
+    const auto index = static_cast<std::size_t>(node);
+    if (closing != nullptr && shape.box_of[index] == shape.placed &&
+        is_far(*closing, bound, fastest_against(*closing, shape.velocity_boxes[index])))
+      return true;
     const DeformationTree::Node& branch = tree_.node(node);
     return is_beyond(bound, (rest - branch.centre).norm() + branch.radius);
   };
   Eigen::Index corner = 0;
   const bool is_vertex = place.barycentric.maxCoeff(&corner) == 1;
   const int own = is_vertex ? triangles_(place.triangle, corner) : -1;
-  const auto excludes_triangle = [=, this](int triangle, double bound) {
-    double farthest = 0;
+  const auto excludes_triangle = [=, &shape, this](int triangle, double bound) {
+    double farthest = 0, fastest = 0;
     for (int c = 0; c < 3; ++c) {
       const int vertex = triangles_(triangle, c);
       if (vertex == own) return true;
-      if (way == 0) continue;
-      farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
+      if (way > 0) farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
+      if (closing != nullptr)
+        fastest = std::max(fastest, (closing->velocity - shape.velocities.row(vertex).transpose()).squaredNorm());
     }
+    if (closing != nullptr && is_far(*closing, bound, std::sqrt(fastest))) return true;
     return way > 0 && is_beyond(bound, std::sqrt(farthest));
   };
   const auto bound_triangles = [&, way, this](const DeformationTree::Node& leaf, double* bounds) {
@@ -322,8 +360,8 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
 }
 
 std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
-                                                          const SurfaceHit& place, double radius,
-                                                          SurfaceShape& shape) const noexcept {
+                                                          const SurfaceHit& place, double radius, SurfaceShape& shape,
+                                                          const ClosingPoint* closing) const noexcept {
   std::optional<Eigen::Vector3d> facing;  // few vertices have come near to anything
   const auto accepts = [&](int triangle, const TrianglePoint& here) {
     const double at_rest = (rest - rest_of({triangle, here.barycentric})).squaredNorm();
@@ -331,7 +369,7 @@ std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d&
     if (!facing) facing = normal_of(place, shape);
     return !looks_along(triangle, *facing, shape);
   };
-  return search(point, radius, shape, approach_filter(point, rest, place, 0, shape, accepts));
+  return search(point, radius, shape, approach_filter(point, rest, place, 0, shape, closing, accepts));
 }
 
 double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
@@ -340,7 +378,7 @@ double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen:
   // Any point of the triangle may become the nearest: none is farther away at rest than the corners, by
   // excludes_triangle.
   const auto accepts = [](int, const TrianglePoint&) { return true; };
-  const auto hit = search(point, radius, shape, approach_filter(point, rest, place, way, shape, accepts));
+  const auto hit = search(point, radius, shape, approach_filter(point, rest, place, way, shape, nullptr, accepts));
   return hit ? std::abs(hit->distance) : std::numeric_limits<double>::infinity();
 }
 
@@ -371,6 +409,16 @@ RowMatrix BodySurface::approach_bounds(const VertexArray& rest, const RowMatrix&
       }
     }
   return bounds;
+}
+
+Eigen::Vector3d BodySurface::velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 3; ++c) {
+    const int vertex = triangles_(hit.triangle, c);
+    position(vertex, shape);
+    velocity += hit.barycentric[c] * shape.velocities.row(vertex).transpose();
+  }
+  return velocity;
 }
 
 Eigen::Vector3d BodySurface::normal_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept {

@@ -19,6 +19,14 @@ struct SurfaceHit {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();      ///< unit, outward: the gradient of the distance
 };
 
+/// How a point of a body moves that parts of the body's own surface may come near to, and what is far: what is farther
+/// away than `near` and the way of the two against each other in `time`.
+struct ClosingPoint {
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the point in the frame of the body [m/s]
+  double near = 0;                                     ///< [m]
+  double time = 0;                                     ///< [s]
+};
+
 /// A surface at some q: what was computed of it so far. Sized once by BodySurface::make_shape(); one thread at a time.
 struct SurfaceShape {
   Eigen::VectorXd q;  ///< [r]
@@ -29,6 +37,12 @@ struct SurfaceShape {
   std::vector<DeformationTree::Ball> balls;  ///< of branches, from their bounds
   std::vector<Eigen::AlignedBox3d> boxes;    ///< of branches within a block, from the positions
   std::vector<int> position_of, ball_of, box_of;
+
+  // Where it was placed with a velocity, beside positions and boxes.
+  Eigen::VectorXd v;       ///< [r], or empty
+  VertexArray velocities;  ///< [m/s]
+  std::vector<Eigen::AlignedBox3d> velocity_boxes;
+
   AlignedArray corners;  ///< of the triangles of leaves within a block, as Kernels::triangle_distances() has them
 };
 
@@ -55,6 +69,10 @@ class BodySurface {
 
   SurfaceShape make_shape() const;
   void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;
+  /// Moving with v [r], for ClosingPoint.
+  void place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept;
+  /// At v in the frame of the body [m/s]; near a search that found something there.
+  Eigen::Vector3d velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
 
   /// A ball about all of it.
   DeformationTree::Ball bound(const Eigen::VectorXd& q) const noexcept { return tree_.ball(0, q, q.norm()); }
@@ -69,10 +87,10 @@ class BodySurface {
 
   /// The same for a point of the body itself, at rest at `rest`: of the surface that has come nearer to it than half of
   /// how far away it is at rest, and does not look the same way as the surface at `place`, its own. No neighbour is, as
-  /// long as nothing is compressed to half its length.
+  /// long as nothing is compressed to half its length. With `closing`, of a shape that moves, what is not far by it.
   std::optional<SurfaceHit> nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
-                                               const SurfaceHit& place, double radius,
-                                               SurfaceShape& shape) const noexcept;
+                                               const SurfaceHit& place, double radius, SurfaceShape& shape,
+                                               const ClosingPoint* closing = nullptr) const noexcept;
 
   /// How far away what nearest_approached() finds is at least, within `radius`, as long as the point and the surface
   /// move by no more than `way` together [m] beyond that; infinity where it finds nothing.
@@ -99,7 +117,7 @@ class BodySurface {
   double squared_bound(int node, const Eigen::Vector3d& point, SurfaceShape& shape) const noexcept;
   template <class Accepts>
   auto approach_filter(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place, double way,
-                       const SurfaceShape& shape, const Accepts& accepts) const noexcept;
+                       const SurfaceShape& shape, const ClosingPoint* closing, const Accepts& accepts) const noexcept;
   template <class Accept>
   std::optional<SurfaceHit> search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                    const Accept& accepts) const noexcept;

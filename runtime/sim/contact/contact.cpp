@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 
 namespace exmat::runtime {
 namespace {
@@ -89,6 +90,20 @@ double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& veloci
   const double reach = reach_ + tree_.basis_norm() * pose.q.norm();
   return time_step *
          (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.basis_norm() * velocity.v.norm());
+}
+
+double ContactSet::fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept {
+  std::copy(v.begin(), v.end(), scratch.data());
+  double square = 0;
+  Batch batch;
+  for (int begin = 0; begin < vertices(); begin += kBatch) {
+    batch.count = std::min(kBatch, static_cast<int>(vertices()) - begin);
+    std::iota(batch.vertices.begin(), batch.vertices.begin() + batch.count, begin);
+    kernels().vertex_products(rows_.data(), stride(), batch.vertices.data(), batch.count, scratch.data(),
+                              batch.products.data());
+    square = std::max(square, batch.products.leftCols(batch.count).colwise().squaredNorm().maxCoeff());
+  }
+  return std::sqrt(square);
 }
 
 bool ContactSet::may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept {

@@ -107,6 +107,9 @@ class ContactSet {
   /// Bound on how far a vertex goes in `time_step` at this velocity [m].
   double travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept;
 
+  /// Speed of the fastest vertex in the frame of a body that moves with v [r] [m/s]. `scratch` has at least r numbers.
+  double fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept;
+
   /// False only where nothing of a body that stays at this pose touches the obstacle in the step.
   bool may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept;
 

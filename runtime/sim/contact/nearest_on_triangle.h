@@ -28,9 +28,9 @@ inline TrianglePoint nearest_on_triangle(const Eigen::Vector3d& point, const Eig
   const double d5 = ab.dot(cp), d6 = ac.dot(cp);
   if (d6 >= 0 && d5 <= d6) return at(0, 0, 1);
   const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return at(d3 / (d3 - d1), d1 / (d1 - d3), 0);
+  if (vc <= 0 && d1 >= 0 && d3 <= 0 && d1 > d3) return at(d3 / (d3 - d1), d1 / (d1 - d3), 0);
   const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return at(d6 / (d6 - d2), 0, d2 / (d2 - d6));
+  if (vb <= 0 && d2 >= 0 && d6 <= 0 && d2 > d6) return at(d6 / (d6 - d2), 0, d2 / (d2 - d6));
   const double va = d3 * d6 - d5 * d4;
   if (va <= 0 && d4 >= d3 && d5 >= d6) {
     const double along = (d4 - d3) + (d5 - d6);

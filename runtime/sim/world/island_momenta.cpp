@@ -77,8 +77,8 @@ std::optional<IslandMomenta> expected_momenta(std::span<WorldBody* const> bodies
 void take_momenta(std::span<WorldBody* const> bodies, const IslandMomenta& momenta, double allowed) noexcept {
   const Together together(bodies);
   const IslandMomenta now = momenta_of(bodies, momenta.about);
-  const IslandMomenta missing{
-      momenta.about, {momenta.total.linear - now.total.linear, momenta.total.angular - now.total.angular}};
+  const IslandMomenta missing{momenta.about,
+                              {momenta.total.linear - now.total.linear, momenta.total.angular - now.total.angular}};
   add_motion(bodies, 1, together.motion_of(missing), together.centre);
   double kinetic = 0;
   for (const WorldBody* const own : bodies) kinetic += own->model.frame->kinetic_energy(own->state.v, own->state.frame);

@@ -186,10 +186,7 @@ const HeldPair* World::held_of(int first, int second) const {
 /// How far apart vertices of one body and the surface of another, or of its own, may be and yet touch in the step [m].
 double World::margin_between(int own, int other) const noexcept {
   const WorldBody &a = at(own), &b = at(other);
-  if (own == other) {
-    const double way = 2 * b.scene.time_step * b.contact().tree().basis_norm() * b.state.v.norm();
-    return kContactMarginSteps * way + kOwnMargin * balls_[static_cast<std::size_t>(own)].radius;
-  }
+  if (own == other) return kOwnMargin * balls_[static_cast<std::size_t>(own)].radius;
   const double straight = kContactMarginSteps * b.scene.time_step * (linear_velocity(a) - linear_velocity(b)).norm();
   return margins_[static_cast<std::size_t>(own)] + margins_[static_cast<std::size_t>(other)] + straight;
 }

@@ -236,6 +236,44 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
   EXPECT_GT(served, kSteps / 2);
 }
 
+// Of a body that moves fast against itself only what velocities may bring near is looked at. Prongs that have closed to
+// less than half of their distance at rest: who is near after the step on its way is a candidate.
+TEST(BodyContact, WhatMovesFastAgainstItselfFindsWhatComesNear) {
+  const test::Fork fork(1e-3, /*free=*/false, /*meets_itself=*/true);
+  const TouchingSurface& touching = *fork.blocks.surface;
+  const ContactSet& set = *fork.blocks.model->contact;
+  const BodyContact contact({1e6, 1e2, 0.3});
+  constexpr double kMargin = 1e-4, kTimeStep = 1e-3;  // [m], [s]
+  SurfaceShape shape = touching.surface.make_shape();
+  int near_after = 0, few = 0;
+  for (const double speed : {5.0, 20.0, 60.0})
+    for (double gap = 0.004; gap < 0.036; gap += 0.002) {
+      const State state = fork.closed_to(gap, speed).state;
+      ASSERT_GT(4 * kTimeStep * set.tree().basis_norm() * state.v.norm(), 10 * kMargin);
+      const TouchingBody body{set, touching, {Placement(), state.q}, {FrameVelocity{}, state.v}};
+      touching.surface.place(state.q, shape);
+      BodyCandidates candidates;
+      NearVertices near;
+      contact.gather_own(body, kTimeStep, kMargin, {}, shape, near, candidates);
+      std::vector<bool> found(static_cast<std::size_t>(set.vertices()));
+      for (const BodyCandidate& candidate : candidates.all) found[static_cast<std::size_t>(candidate.vertex)] = true;
+      const double step = std::min(kTimeStep, 0.5 * gap / speed);  // none is inside yet
+      const Eigen::VectorXd after = state.q + step * state.v;
+      touching.surface.place(after, shape);
+      for (int vertex = 0; vertex < set.vertices(); ++vertex) {
+        const auto hit =
+            touching.surface.nearest_approached(set.world_arm(vertex, {Placement(), after}), set.rest(vertex),
+                                                touching.places[static_cast<std::size_t>(vertex)], 0.6 * gap, shape);
+        if (!hit) continue;
+        ++near_after;
+        EXPECT_TRUE(found[static_cast<std::size_t>(vertex)]) << vertex << " at " << speed << " from " << gap;
+      }
+      few += candidates.all.size() < static_cast<std::size_t>(set.vertices()) / 2;
+    }
+  EXPECT_GE(few, 24);
+  EXPECT_GT(near_after, 20);
+}
+
 // The same of a body with itself: the prongs of a fork close and open, beside a search for every vertex.
 TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
   const test::Fork fork(1e-3, /*free=*/false, /*meets_itself=*/true);

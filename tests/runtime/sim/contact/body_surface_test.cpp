@@ -1,6 +1,7 @@
 #include "runtime/sim/contact/body_surface.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cmath>
 #include <gtest/gtest.h>
 #include <random>
@@ -175,6 +176,62 @@ TEST(BodySurface, NothingApproachesItselfWithinTheBounds) {
     EXPECT_FALSE(surface.nearest_approached(point, mesh.vertices.row(v), SurfaceHit(), 1, shape)) << v;
   }
   EXPECT_GT(farthest, 1.2);
+}
+
+// What parts of a body come near to a vertex of it, by the definition: of all triangles.
+TEST(BodySurface, WhatApproachesIsTheNearestOfAllTrianglesThatDo) {
+  const test::Bar bar = test::make_bar({.cells = {6, 2, 3}, .lengths = {0.6, 0.2, 0.3}, .slot_start = 2});
+  const TetMesh& mesh = bar.model.object->mesh;
+  const BodySurface surface = BodySurface::of_tets(mesh.tets, mesh.vertices, bar.basis(), Eigen::Vector3d::Zero());
+  const TriangleArray triangles = surface_triangles(mesh.tets);
+  SurfaceShape shape = surface.make_shape();
+  constexpr double kRadius = 0.15;  // [m]
+  int found = 0, far = 0;
+  for (std::uint32_t trial = 0; trial < 40; ++trial) {
+    const Eigen::VectorXd q = 0.4 * test::random_vector(bar.modes(), 2 * trial),
+                          v = 0.5 * test::random_vector(bar.modes(), 2 * trial + 1);
+    VertexArray x = mesh.vertices, velocities = VertexArray::Zero(x.rows(), 3);
+    x.reshaped<Eigen::RowMajor>() += bar.basis() * q;
+    velocities.reshaped<Eigen::RowMajor>() += bar.basis() * v;
+    for (Eigen::Index own = 0; own < x.rows(); ++own) {
+      const Eigen::Vector3d point = x.row(own), rest = mesh.vertices.row(own);
+      surface.place(Eigen::VectorXd::Zero(bar.modes()), shape);
+      const auto place = surface.nearest(rest, 1e-9, shape);
+      if (!place) continue;  // within
+      surface.place(q, v, shape);
+      const Eigen::Vector3d facing = surface.normal_of(*place, shape);
+      const ClosingPoint closing{velocities.row(own), 0.01, 0.03};
+      EXPECT_LE((surface.velocity_of(*place, shape) - closing.velocity).norm(), 1e-12 * v.norm());
+      // With and without what velocities exclude.
+      std::array<double, 2> nearest{kRadius, kRadius};
+      for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
+        if ((triangles.row(t).array() == static_cast<int>(own)).any()) continue;
+        const auto corner = [&](int c) -> Eigen::Vector3d { return x.row(triangles(t, c)); };
+        const TrianglePoint here = nearest_on_triangle(point, corner(0), corner(1), corner(2));
+        Eigen::Vector3d at_rest = Eigen::Vector3d::Zero();
+        double fastest = 0;
+        for (int c = 0; c < 3; ++c) {
+          at_rest += here.barycentric[c] * mesh.vertices.row(triangles(t, c)).transpose();
+          fastest = std::max(fastest, (velocities.row(own) - velocities.row(triangles(t, c))).norm());
+        }
+        const double distance = std::sqrt(here.squared_distance);
+        const Eigen::Vector3d normal = (corner(1) - corner(0)).cross(corner(2) - corner(0)).normalized();
+        if (distance >= 0.5 * (rest - at_rest).norm() || normal.dot(facing) > 0.5) continue;
+        nearest[0] = std::min(nearest[0], distance);
+        if (distance <= closing.near + closing.time * fastest) nearest[1] = std::min(nearest[1], distance);
+      }
+      for (const bool closes : {false, true}) {
+        const auto hit = surface.nearest_approached(point, rest, *place, kRadius, shape, closes ? &closing : nullptr);
+        const double expected = nearest[closes];
+        ASSERT_EQ(hit.has_value(), expected < kRadius) << own << " of " << trial;
+        if (hit) EXPECT_NEAR(std::abs(hit->distance), expected, 1e-12);
+      }
+      found += nearest[1] < kRadius;
+      far += nearest[0] < nearest[1];
+    }
+  }
+  EXPECT_GT(found, 100);
+  EXPECT_GT(far, 100);
 }
 
 }  // namespace

@@ -48,5 +48,23 @@ TEST(NearestOnTriangle, OfNoAreaIsOnIt) {
   EXPECT_GE(found.squared_distance, 1);
 }
 
+// Two corners in one place, whichever they are, leave an edge; three of them a point.
+TEST(NearestOnTriangle, OfCornersInOnePlaceIsOnTheEdge) {
+  std::mt19937 random(4);
+  std::normal_distribution<double> normal;
+  const auto point = [&] { return Eigen::Vector3d(normal(random), normal(random), normal(random)); };
+  for (int i = 0; i < 1000; ++i) {
+    const Eigen::Vector3d a = point(), b = point(), p = 3 * point();
+    const double along = std::clamp((b - a).dot(p - a) / (b - a).squaredNorm(), 0.0, 1.0);
+    const double expected = (a + along * (b - a) - p).norm();
+    for (const TrianglePoint& found :
+         {nearest_on_triangle(p, a, a, b), nearest_on_triangle(p, a, b, a), nearest_on_triangle(p, a, b, b)}) {
+      EXPECT_NEAR(std::sqrt(found.squared_distance), expected, 1e-12);
+      EXPECT_NEAR((found.point - p).norm(), expected, 1e-12);
+    }
+    EXPECT_EQ(nearest_on_triangle(p, a, a, a).point, a);
+  }
+}
+
 }  // namespace
 }  // namespace exmat::runtime
