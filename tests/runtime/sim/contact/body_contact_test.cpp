@@ -243,21 +243,21 @@ TEST(BodyContact, WhatMovesFastAgainstItselfFindsWhatComesNear) {
   const TouchingSurface& touching = *fork.blocks.surface;
   const ContactSet& set = *fork.blocks.model->contact;
   const BodyContact contact({1e6, 1e2, 0.3});
-  constexpr double kMargin = 1e-4, kTimeStep = 1e-3;  // [m], [s]
+  constexpr double kMargin = 1e-4, kStep = 1e-3;  // [m], [s]
   SurfaceShape shape = touching.surface.make_shape();
   int near_after = 0, few = 0;
   for (const double speed : {5.0, 20.0, 60.0})
     for (double gap = 0.004; gap < 0.036; gap += 0.002) {
       const State state = fork.closed_to(gap, speed).state;
-      ASSERT_GT(4 * kTimeStep * set.tree().basis_norm() * state.v.norm(), 10 * kMargin);
+      ASSERT_GT(4 * kStep * set.tree().basis_norm() * state.v.norm(), 10 * kMargin);
       const TouchingBody body{set, touching, {Placement(), state.q}, {FrameVelocity{}, state.v}};
       touching.surface.place(state.q, shape);
       BodyCandidates candidates;
       NearVertices near;
-      contact.gather_own(body, kTimeStep, kMargin, {}, shape, near, candidates);
+      contact.gather_own(body, kStep, kMargin, {}, shape, near, candidates);
       std::vector<bool> found(static_cast<std::size_t>(set.vertices()));
       for (const BodyCandidate& candidate : candidates.all) found[static_cast<std::size_t>(candidate.vertex)] = true;
-      const double step = std::min(kTimeStep, 0.5 * gap / speed);  // none is inside yet
+      const double step = std::min(kStep, 0.5 * gap / speed);  // none is inside yet
       const Eigen::VectorXd after = state.q + step * state.v;
       touching.surface.place(after, shape);
       for (int vertex = 0; vertex < set.vertices(); ++vertex) {
