@@ -188,7 +188,7 @@ TEST(LaneStep, NoResultDependsOnWhatAWorkspaceHasSeen) {
   const Bar bar = test::make_bar();
   const auto model = prepared(bar);
   Crowd known = make_crowd(bar, *model, Kind{.tolerance = 1e-9}, 8);
-  for (StepScene& scene : known.scenes) scene.time_step = 0.01;
+  for (StepScene& scene : known.scenes) scene.time_step = 0.05;
   Crowd unknown = known;
   LaneWorkspace workspace(*model, known.scenes.front());
   std::vector<StepReport> reports(8), expected(8);
