@@ -21,7 +21,7 @@ struct ElementArrays {
   std::ptrdiff_t modes = 0;            ///< r
   std::ptrdiff_t stride = 0;           ///< padded(r)
   const double* by_mode = nullptr;     ///< panels x r x 9 x kLanes: gradients and forces of a panel at once
-  const double* by_element = nullptr;  ///< padded(s) x 9 x stride: stiffness
+  const double* by_element = nullptr;  ///< padded(s) x 9 x stride: of bodies side by side
   const float* by_pair = nullptr;      ///< padded(s) / 2 x 9 x stride x 2: of two elements side by side, rounded
   std::ptrdiff_t count = 0;            ///< s
 };

@@ -154,8 +154,9 @@ class LaneStep {
     if (any([&](std::size_t l) { return !is_decided(l); })) elements_.lanes_energy(trial_.data(), energy.data());
     workspace_.predictor_was_lower_ = true;
     each([&](std::size_t l, Eigen::Index lane) {
+      if (is_one_iterate(lane)) return;
       const double elastic = is_decided(l) ? energy_[lane] : energy[lane];
-      if (is_one_iterate(lane) || elastic + inertia[lane] <= at_start[lane]) return;
+      if (elastic + inertia[lane] <= at_start[lane]) return;
       start_searches_[l] = 1;
       workspace_.predictor_was_lower_ = false;
       q_.row(lane) = start_.row(lane);
