@@ -87,8 +87,8 @@ void ElementSamples::respond(Eigen::Index tet, const PoseLanes& poses, Responses
 void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights, Part part,
                                    const PoseLanes& poses, std::vector<AlignedArray>& sums) const {
   const Eigen::Index r = modes(), stride = runtime::padded(r);
-  AlignedArray B(kAtOnce * 9 * stride), mu(kAtOnce), lambda(kAtOnce), scratch(runtime::lane_scratch(r)),
-      force(r * kLanes), stiffness(runtime::lane_triangle(r));
+  AlignedArray B(kAtOnce * 9 * stride), mu(kAtOnce), lambda(kAtOnce), force(r * kLanes),
+      stiffness(runtime::lane_triangle(r));
   double energy[kLanes];
   for (Eigen::Index first = part.begin; first < part.end; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, part.end - first);
@@ -102,8 +102,7 @@ void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const 
     const ElementArrays arrays{runtime::padded(count) / kLanes, r, stride, nullptr, B.data(), nullptr, count};
     const ElementLaw law = law_of(materials_.model, mu.data(), lambda.data());
     for (Eigen::Index g = 0; g < poses.groups(); ++g) {
-      runtime::kernels().lanes_force_and_stiffness(arrays, law, poses.group(g), scratch.data(), energy, force.data(),
-                                                   stiffness.data());
+      runtime::kernels().lanes_force_and_stiffness(arrays, law, poses.group(g), energy, force.data(), stiffness.data());
       AlignedArray& sum = sums[static_cast<std::size_t>(g)];
       for (Eigen::Index i = 0; i < stiffness.size(); ++i) sum[i] += stiffness[i];
     }

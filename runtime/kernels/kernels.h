@@ -21,7 +21,7 @@ struct ElementArrays {
   std::ptrdiff_t modes = 0;            ///< r
   std::ptrdiff_t stride = 0;           ///< padded(r)
   const double* by_mode = nullptr;     ///< panels x r x 9 x kLanes: gradients and forces of a panel at once
-  const double* by_element = nullptr;  ///< padded(s) x 9 x stride: stiffness
+  const double* by_element = nullptr;  ///< padded(s) x 9 x stride: of bodies side by side
   const float* by_pair = nullptr;      ///< padded(s) / 2 x 9 x stride x 2: of two elements side by side, rounded
   std::ptrdiff_t count = 0;            ///< s
 };
@@ -55,8 +55,7 @@ inline constexpr std::ptrdiff_t kTangentNumbers = 45;  ///< upper triangle by ro
 /// Scratch of the functions below.
 struct ElementScratch {
   double* force = nullptr;      ///< stride x kLanes
-  double* product = nullptr;    ///< 9 kLanes x stride
-  double* stiffness = nullptr;  ///< stride x stride
+  double* stiffness = nullptr;  ///< lane_triangle(r) / kLanes
 };
 
 inline constexpr std::ptrdiff_t kGemmMultiple = 24;
@@ -126,8 +125,6 @@ struct BernsteinArrays {
 constexpr std::ptrdiff_t lane_bernstein_scratch(std::ptrdiff_t degree, std::ptrdiff_t weights) {
   return (weights * (degree + 1) + (degree + 1) * (degree + 2) / 2) * kLanes;
 }
-/// Doubles of scratch of lanes_force_and_stiffness().
-constexpr std::ptrdiff_t lane_scratch(std::ptrdiff_t modes) { return 2 * 9 * lane_rows(modes) * kLanes; }
 
 struct Kernels {
   const char* name;
@@ -194,12 +191,11 @@ struct Kernels {
   // Of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies [kLanes].
   void (*lanes_energy)(const ElementArrays&, const ElementLaw&, const double* q, double* energy);
   void (*lanes_force)(const ElementArrays&, const ElementLaw&, const double* q, double* energy, double* force);
-  /// scratch: lane_scratch(r).
-  void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
-                                    double* energy, double* force, double* stiffness);
+  void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* energy,
+                                    double* force, double* stiffness);
   /// The same but for the rounding of the stiffness to single precision.
-  void (*lanes_force_and_mixed_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* scratch,
-                                          double* energy, double* force, double* stiffness);
+  void (*lanes_force_and_mixed_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* energy,
+                                          double* force, double* stiffness);
   /// A <- L, L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
   void (*lanes_cholesky)(double* A, std::ptrdiff_t n);
   void (*lanes_cholesky_solve)(const double* L, std::ptrdiff_t n, double* x);

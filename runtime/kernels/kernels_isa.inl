@@ -2,6 +2,7 @@
 // EXMAT_SIMD_NAME and EXMAT_SIMD_KERNELS, the name of the table to define.
 
 #include <type_traits>
+#include <utility>
 
 #include "runtime/kernels/kernels.h"
 
@@ -55,36 +56,9 @@ inline void add_force(const double* by_mode, Index modes, const Vec* P, double* 
 
 // --- stiffness -------------------------------------------------------------------------------------------------------
 
-/// `vectors` registers of the columns of D B of one element.
-template <Index vectors>
-inline void tangent_product_columns(const double* tangent, const double* B, Index stride, double* product) {
-  Vec b[9][vectors];
-  for (Index k = 0; k < 9; ++k)
-    for (Index v = 0; v < vectors; ++v) b[k][v] = load(B + k * stride + v * kWidth);
-#pragma GCC unroll 9
-  for (Index i = 0; i < 9; ++i) {
-    Vec even[vectors], odd[vectors];
-    for (Index v = 0; v < vectors; ++v) {
-      even[v] = b[0][v] * tangent[triangle_entry<9>(i, 0) * kLanes];
-      odd[v] = b[1][v] * tangent[triangle_entry<9>(i, 1) * kLanes];
-    }
-#pragma GCC unroll 7
-    for (Index k = 2; k < 9; ++k) {
-      const double d = tangent[triangle_entry<9>(i, k) * kLanes];
-      for (Index v = 0; v < vectors; ++v) (k % 2 == 0 ? even : odd)[v] += b[k][v] * d;
-    }
-    for (Index v = 0; v < vectors; ++v) store(product + i * stride + v * kWidth, even[v] + odd[v]);
-  }
-}
+#include "runtime/kernels/stiffness_isa.inl"
 
-/// product [9 x stride] = D B of one element; D at `tangent`, kLanes apart.
-inline void tangent_product(const double* tangent, const double* B, Index stride, double* product) {
-  constexpr Index kVectors = kWidth == 8 ? 2 : 1;  // what the registers hold
-  Index column = 0;
-  for (; column + kVectors * kWidth <= stride; column += kVectors * kWidth)
-    tangent_product_columns<kVectors>(tangent, B + column, stride, product + column);
-  for (; column < stride; column += kWidth) tangent_product_columns<1>(tangent, B + column, stride, product + column);
-}
+// --- products --------------------------------------------------------------------------------------------------------
 
 /// C [rows x vectors] += A^T B over `depth` rows of A (a_stride apart) and of B (b_stride apart).
 template <Index rows, Index vectors>
@@ -139,26 +113,6 @@ inline void clear(double* values, Index count) {
   for (Index i = 0; i < count; i += kWidth) store(values + i, zero());
 }
 
-inline void add_panel_stiffness(const ElementArrays& elements, Index panel, const double* tangents,
-                                const ElementScratch& scratch) {
-  const double* B = elements.by_element + panel * kLanes * 9 * elements.stride;
-  // As many elements at a time as keep B, D B and the sums in the first-level cache.
-  const Index count = elements.stride > 24 ? kLanes / 2 : kLanes;
-  for (Index first = 0; first < kLanes; first += count) {
-    const double* block = B + first * 9 * elements.stride;
-    for (Index e = 0; e < count; ++e)
-      tangent_product(tangents + first + e, block + e * 9 * elements.stride, elements.stride,
-                      scratch.product + e * 9 * elements.stride);
-    half_product(block, scratch.product, elements.stride, elements.modes, 9 * count, scratch.stiffness);
-  }
-}
-
-/// Upper triangle by rows into lower triangle by columns.
-inline void copy_triangle(const double* from, Index stride, Index modes, double* to, Index outer) {
-  for (Index i = 0; i < modes; ++i)
-    for (Index j = i; j < modes; ++j) to[i * outer + j] = from[i * stride + j];
-}
-
 // --- vertices -------------------------------------------------------------------------------------------------------
 
 #include "runtime/kernels/vertices_isa.inl"
@@ -181,12 +135,26 @@ double energy(const ElementArrays& elements, const ElementLaw& law, const double
   return with_law(law, [&]<class Law>() { return energy_of_elements<Law>(elements, law, q); });
 }
 
+/// sums [count]: of kWidth numbers each, kLanes apart; there are padded(count) of them.
+inline void sum_lanes(const double* numbers, Index count, double* sums) {
+  for (Index first = 0; first < count; first += kWidth, numbers += kWidth * kLanes) {
+    Vec registers[kWidth];
+#pragma GCC unroll 8
+    for (Index i = 0; i < kWidth; ++i) registers[i] = load(numbers + i * kLanes);
+    const Vec found = sums_of_lanes(registers);
+    if (first + kWidth <= count)
+      store(sums + first, found);
+    else
+      for (Index i = 0; first + i < count; ++i) sums[first + i] = found[i];
+  }
+}
+
 template <Want want, class Law>
 inline double evaluate_elements(const ElementArrays& elements, const ElementLaw& law, const double* q,
                                 const ElementScratch& scratch, double* force) {
   alignas(kAlignment) double tangents[kTangentNumbers * kLanes];
   Vec total = zero();
-  clear(scratch.force, elements.modes * kLanes);
+  clear(scratch.force, elements.stride * kLanes);
   for (Index panel = 0; panel < elements.panels; ++panel) {
     const double* by_mode = elements.by_mode + panel * elements.modes * 9 * kLanes;
     for (Index part = 0; part < kParts; ++part) {
@@ -195,9 +163,9 @@ inline double evaluate_elements(const ElementArrays& elements, const ElementLaw&
       total += evaluate_law<want, Law>(law, panel * kLanes + part * kWidth, H, P, tangents + part * kWidth);
       add_force(by_mode + part * kWidth, elements.modes, P, scratch.force);
     }
-    if constexpr (want == Want::kStiffness) add_panel_stiffness(elements, panel, tangents, scratch);
+    if constexpr (want == Want::kStiffness) add_panel_stiffness(elements, panel, tangents, scratch.stiffness);
   }
-  for (Index c = 0; c < elements.modes; ++c) force[c] = sum(load(scratch.force + c * kLanes));
+  sum_lanes(scratch.force, elements.modes, force);
   return sum(total);
 }
 
@@ -209,19 +177,19 @@ double force(const ElementArrays& elements, const ElementLaw& law, const double*
 
 double force_and_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q,
                            const ElementScratch& scratch, double* force, double* stiffness, Index outer) {
-  clear(scratch.stiffness, elements.stride * elements.stride);
+  clear(scratch.stiffness, lane_triangle(elements.modes) / kLanes);
   const double energy = with_law(
       law, [&]<class Law>() { return evaluate_elements<Want::kStiffness, Law>(elements, law, q, scratch, force); });
-  copy_triangle(scratch.stiffness, elements.stride, elements.modes, stiffness, outer);
+  copy_blocks(scratch.stiffness, elements.modes, stiffness, outer);
   return energy;
 }
 
 void stiffness_of_tangents(const ElementArrays& elements, const double* tangents, const ElementScratch& scratch,
                            double* stiffness, Index outer) {
-  clear(scratch.stiffness, elements.stride * elements.stride);
+  clear(scratch.stiffness, lane_triangle(elements.modes) / kLanes);
   for (Index panel = 0; panel < elements.panels; ++panel)
-    add_panel_stiffness(elements, panel, tangents + panel * kTangentNumbers * kLanes, scratch);
-  copy_triangle(scratch.stiffness, elements.stride, elements.modes, stiffness, outer);
+    add_panel_stiffness(elements, panel, tangents + panel * kTangentNumbers * kLanes, scratch.stiffness);
+  copy_blocks(scratch.stiffness, elements.modes, stiffness, outer);
 }
 
 template <class Law>
@@ -302,12 +270,13 @@ inline bool factor_block(Vec* columns, Index count) {
     if (c >= count) break;
     const double pivot = columns[c][c];
     if (!(pivot > 0) || !(pivot < __builtin_inf())) return false;
-    const double inverse = 1 / __builtin_sqrt(pivot);
-    columns[c] *= inverse;
+    // The next pivot waits for a division alone, not for the root.
+    const double inverse = 1 / pivot, root = 1 / __builtin_sqrt(pivot);
 #pragma GCC unroll 8
-    for (Index d = c + 1; d < kWidth; ++d) columns[d] -= columns[c] * columns[c][d];
+    for (Index d = c + 1; d < kWidth; ++d) columns[d] -= columns[c] * columns[c][d] * inverse;
+    columns[c] *= root;
     for (Index i = 0; i < c; ++i) columns[c][i] = 0;
-    columns[c][c] = inverse;
+    columns[c][c] = root;
   }
   return true;
 }
@@ -355,21 +324,30 @@ bool cholesky(const double* A, Index n, Index outer, double* L) {
   return true;
 }
 
+/// y of L y = x of a factored diagonal block of `count` columns. The unknowns are scaled at the end alone, so that each
+/// waits for one product only.
+inline Vec solve_forward(const double* block, Index stride, Index count, Vec x) {
+  IntVec lanes;
+  Vec inverses = zero();
+#pragma GCC unroll 8
+  for (Index i = 0; i < kWidth; ++i) lanes[i] = i;
+#pragma GCC unroll 8
+  for (Index c = 0; c < kWidth; ++c) {
+    if (c >= count) break;
+    const double inverse = block[c * stride + c];
+    inverses[c] = inverse;
+    x -= select(lanes > c, load(block + c * stride) * inverse, zero()) * x[c];
+  }
+  return x * inverses;
+}
+
 void cholesky_solve(const double* L, Index n, double* x) {
   const Index stride = padded(n);
   for (Index i = n; i < stride; ++i) x[i] = 0;
   for (Index j = 0; j < n; j += kWidth) {
     const Index count = n - j < kWidth ? n - j : kWidth;
     const double* block = L + j * stride;
-    Vec here = load(x + j);
-#pragma GCC unroll 8
-    for (Index c = 0; c < kWidth; ++c) {
-      if (c >= count) break;
-      const double value = here[c] * block[c * stride + j + c];
-      here -= load(block + c * stride + j) * value;
-      here[c] = value;
-    }
-    store(x + j, here);
+    store(x + j, solve_forward(block + j, stride, count, load(x + j)));
     for (Index i = j + kWidth; i < stride; i += kWidth) {
       Vec below = load(x + i);
       for (Index c = 0; c < count; ++c) below -= load(block + c * stride + i) * x[j + c];
@@ -382,11 +360,15 @@ void cholesky_solve(const double* L, Index n, double* x) {
     Vec dots[kWidth] = {};
     for (Index i = j + kWidth; i < stride; i += kWidth) {
       const Vec below = load(x + i);
-      for (Index c = 0; c < count; ++c) dots[c] += load(block + c * stride + i) * below;
+#pragma GCC unroll 8
+      for (Index c = 0; c < kWidth; ++c)
+        if (c < count) dots[c] += load(block + c * stride + i) * below;
     }
     double values[kWidth];
-    for (Index c = 0; c < count; ++c) values[c] = x[j + c] - sum(dots[c]);
-    for (Index c = count - 1; c >= 0; --c) {
+    store(values, load(x + j) - sums_of_lanes(dots));
+#pragma GCC unroll 8
+    for (Index c = kWidth - 1; c >= 0; --c) {
+      if (c >= count) continue;
       values[c] *= block[c * stride + j + c];
       for (Index d = 0; d < c; ++d) values[d] -= values[c] * block[d * stride + j + c];
     }
@@ -406,13 +388,13 @@ void gemm(Index n, const double* A, const double* B, double* C) {
 
 void positions(const float* rest, const float* basis, Index blocks, Index modes, const float* q, float* positions) {
   constexpr Index kFloats = 2 * kWidth;
-  constexpr Index kBlock = 16;
-  for (Index block = 0; block < blocks; ++block, rest += kBlock, positions += kBlock) {
-    FloatVec sums[kBlock / kFloats];
-    for (Index v = 0; v < kBlock / kFloats; ++v) sums[v] = load(rest + v * kFloats);
-    for (Index c = 0; c < modes; ++c, basis += kBlock)
-      for (Index v = 0; v < kBlock / kFloats; ++v) sums[v] += load(basis + v * kFloats) * q[c];
-    for (Index v = 0; v < kBlock / kFloats; ++v) store(positions + v * kFloats, sums[v]);
+  constexpr Index kVertices = 16;
+  for (Index block = 0; block < blocks; ++block, rest += kVertices, positions += kVertices) {
+    FloatVec sums[kVertices / kFloats];
+    for (Index v = 0; v < kVertices / kFloats; ++v) sums[v] = load(rest + v * kFloats);
+    for (Index c = 0; c < modes; ++c, basis += kVertices)
+      for (Index v = 0; v < kVertices / kFloats; ++v) sums[v] += load(basis + v * kFloats) * q[c];
+    for (Index v = 0; v < kVertices / kFloats; ++v) store(positions + v * kFloats, sums[v]);
   }
 }
 

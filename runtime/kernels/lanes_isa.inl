@@ -2,13 +2,6 @@
 // lane. Constants of the model are read once for all of them, and nothing is summed across lanes: a body's numbers do
 // not depend on the others'. One register's bodies at a time, at their first lane.
 
-constexpr Index kBlock = kLaneBlock;
-constexpr Index kBlockNumbers = kBlock * kBlock * kLanes;
-constexpr Index kBlockColumns = kWidth == 8 ? kBlock : 2;  // what the registers hold at once
-
-inline Index block_start(Index row, Index column) { return (row * (row + 1) / 2 + column) * kBlockNumbers; }
-inline Index in_block(Index m, Index n) { return (m * kBlock + n) * kLanes; }
-
 /// H = B q of one element.
 inline void lanes_gradient(const double* B, Index stride, Index modes, const double* q, Vec* H) {
   for (Index i = 0; i < 9; ++i) H[i] = zero();
@@ -32,129 +25,18 @@ inline void lanes_add_force(const double* B, Index stride, Index modes, const Ve
   }
 }
 
-/// How the stiffness is summed up. In doubles: an element at a time, B's numbers as they are.
-struct InDoubles {
-  using Number = double;
-  using Lanes = Vec;
-  static constexpr Index kSpread = kLanes;  ///< from number to number of one body
-  static constexpr Index kEach = 1;         ///< numbers of B in one place
-  static double factor(const double* B, Index i) { return B[i]; }
-};
-
-/// In floats: two elements at a time, the even and the odd lanes of a register, which holds as many bodies as one of
-/// doubles; B's numbers in pairs of these elements.
-struct InPairsOfFloats {
-  using Number = float;
-  using Lanes = FloatVec;
-  static constexpr Index kSpread = 2 * kLanes, kEach = 2;
-  static FloatVec factor(const float* B, Index i) {
-    using Bits = long long __attribute__((vector_size(sizeof(Vec))));
-    long long pair;
-    __builtin_memcpy(&pair, B + 2 * i, sizeof pair);
-    return reinterpret_cast<FloatVec>(Bits{} + pair);
-  }
-};
-
-/// product [9 x rows x kSpread] = D B of one element, or of a pair, the first `modes` columns.
-template <class In>
-inline void lanes_tangent_product(const typename In::Number* tangent, const typename In::Number* B, Index stride,
-                                  Index modes, Index rows, typename In::Number* product) {
-  using Lanes = typename In::Lanes;
-#pragma GCC unroll 9
-  for (Index i = 0; i < 9; ++i) {
-    Lanes D[9];
-#pragma GCC unroll 9
-    for (Index k = 0; k < 9; ++k) D[k] = load(tangent + triangle_entry<9>(i, k) * In::kSpread);
-    for (Index c = 0; c < modes; ++c) {
-      Lanes even = D[0] * In::factor(B, c), odd = D[1] * In::factor(B, stride + c);
-#pragma GCC unroll 7
-      for (Index k = 2; k < 9; ++k) (k % 2 == 0 ? even : odd) += D[k] * In::factor(B, k * stride + c);
-      store(product + (i * rows + c) * In::kSpread, even + odd);
-    }
-  }
-}
-
-/// kBlockColumns columns, from `first` on, of a block of the stiffness += B^T (D B) over `depth` rows, those of B
-/// `stride` and those of D B `rows` numbers apart; only the first `count` rows of the block, of a diagonal one the
-/// lower triangle.
-template <class In, bool diagonal, Index count, Index first>
-inline void lanes_add_columns(const typename In::Number* B, Index stride, const typename In::Number* product,
-                              Index rows, Index depth, typename In::Number* block) {
-  using Lanes = typename In::Lanes;
-  constexpr auto wanted = [](Index m, Index n) { return !diagonal || first + n <= m; };
-  constexpr auto place = [](Index m, Index n) { return (m * kBlock + first + n) * In::kSpread; };
-  Lanes sums[count][kBlockColumns];
-#pragma GCC unroll 4
-  for (Index m = 0; m < count; ++m)
-#pragma GCC unroll 4
-    for (Index n = 0; n < kBlockColumns; ++n)
-      if (wanted(m, n)) sums[m][n] = load(block + place(m, n));
-  for (Index k = 0; k < depth; ++k) {
-    Lanes right[kBlockColumns];
-#pragma GCC unroll 4
-    for (Index n = 0; n < kBlockColumns; ++n)
-      if (wanted(count - 1, n)) right[n] = load(product + (k * rows + first + n) * In::kSpread);
-#pragma GCC unroll 4
-    for (Index m = 0; m < count; ++m) {
-      const auto left = In::factor(B, k * stride + m);
-#pragma GCC unroll 4
-      for (Index n = 0; n < kBlockColumns; ++n)
-        if (wanted(m, n)) sums[m][n] += right[n] * left;
-    }
-  }
-#pragma GCC unroll 4
-  for (Index m = 0; m < count; ++m)
-#pragma GCC unroll 4
-    for (Index n = 0; n < kBlockColumns; ++n)
-      if (wanted(m, n)) store(block + place(m, n), sums[m][n]);
-}
-
-template <class In, bool diagonal, Index count>
-inline void lanes_add_block(const typename In::Number* B, Index stride, const typename In::Number* product, Index rows,
-                            Index depth, typename In::Number* block) {
-  lanes_add_columns<In, diagonal, count, 0>(B, stride, product, rows, depth, block);
-  if constexpr (kBlockColumns < kBlock && (!diagonal || count > kBlockColumns))
-    lanes_add_columns<In, diagonal, count, kBlock - kBlockColumns>(B, stride, product, rows, depth, block);
-}
-
-/// One row of blocks of the stiffness, `count` rows of it.
-template <class In, Index count>
-inline void lanes_add_row(const typename In::Number* B, Index stride, const typename In::Number* product, Index rows,
-                          Index depth, Index row, typename In::Number* stiffness) {
-  const auto block = [&](Index column) { return stiffness + block_start(row, column) / kLanes * In::kSpread; };
-  B += In::kEach * kBlock * row;
-  for (Index column = 0; column < row; ++column)
-    lanes_add_block<In, false, count>(B, stride, product + kBlock * column * In::kSpread, rows, depth, block(column));
-  lanes_add_block<In, true, count>(B, stride, product + kBlock * row * In::kSpread, rows, depth, block(row));
-}
-
-/// Stiffness += B^T (D B) over `depth` rows.
-template <class In>
-inline void lanes_add_stiffness(const typename In::Number* B, Index stride, const typename In::Number* product,
-                                Index modes, Index depth, typename In::Number* stiffness) {
-  const Index rows = lane_rows(modes), whole = modes / kBlock;
-  for (Index row = 0; row < whole; ++row) lanes_add_row<In, kBlock>(B, stride, product, rows, depth, row, stiffness);
-  if (modes % kBlock == 1) lanes_add_row<In, 1>(B, stride, product, rows, depth, whole, stiffness);
-  if (modes % kBlock == 2) lanes_add_row<In, 2>(B, stride, product, rows, depth, whole, stiffness);
-  if (modes % kBlock == 3) lanes_add_row<In, 3>(B, stride, product, rows, depth, whole, stiffness);
-}
-
 inline void lanes_clear(double* numbers, Index count) {
   for (Index i = 0; i < count; ++i) store(numbers + i * kLanes, zero());
 }
 
-constexpr Index kElementsAtOnce = 2;  // their B and D B stay in the first-level cache
-static_assert(lane_scratch(kBlock) == kElementsAtOnce * 9 * kBlock * kLanes);
-
-/// `product` [kElementsAtOnce x 9 x rows x kLanes].
 template <Want want, class Law>
-inline void lanes_evaluate(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
-                           double* energy, double* force, double* stiffness) {
-  alignas(kAlignment) double tangent[kTangentNumbers * kLanes];
-  const Index stride = elements.stride, rows = lane_rows(elements.modes);
+inline void lanes_evaluate(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy,
+                           double* force, double* stiffness) {
+  constexpr Index kTangent = kTangentNumbers * kLanes;
+  alignas(kAlignment) double tangents[want == Want::kStiffness ? kElementsAtOnce * kTangent : kLanes];
+  const Index stride = elements.stride;
   Vec total = zero();
   if constexpr (want != Want::kEnergy) lanes_clear(force, elements.modes);
-  if constexpr (want == Want::kStiffness) lanes_clear(stiffness, lane_triangle(elements.modes) / kLanes);
   for (Index first = 0; first < elements.count; first += kElementsAtOnce) {
     const Index count = elements.count - first < kElementsAtOnce ? elements.count - first : kElementsAtOnce;
     const double* const block = elements.by_element + first * 9 * stride;
@@ -162,15 +44,13 @@ inline void lanes_evaluate(const ElementArrays& elements, const ElementLaw& law,
       const double* const B = block + e * 9 * stride;
       Vec H[9], P[9];
       lanes_gradient(B, stride, elements.modes, q, H);
-      clear_result<want>(P, tangent);
+      clear_result<Want::kForce>(P, nullptr);
       const Law material{zero() + law.mu[first + e], zero() + law.lambda[first + e]};
-      total += material.template evaluate<want>(H, P, tangent);
+      total += evaluate_one<want>(material, H, P, tangents + (want == Want::kStiffness ? e * kTangent : 0));
       if constexpr (want != Want::kEnergy) lanes_add_force(B, stride, elements.modes, P, force);
-      if constexpr (want == Want::kStiffness)
-        lanes_tangent_product<InDoubles>(tangent, B, stride, elements.modes, rows, product + e * 9 * rows * kLanes);
     }
     if constexpr (want == Want::kStiffness)
-      lanes_add_stiffness<InDoubles>(block, stride, product, elements.modes, 9 * count, stiffness);
+      lanes_add_stiffness<InDoubles>(tangents, block, stride, elements.modes, count, first == 0, stiffness);
   }
   store(energy, total);
 }
@@ -198,36 +78,49 @@ inline Vec sum_of_pairs(FloatVec pairs) {
   return numbers(bits & 0xffffffffU) + numbers(bits >> 32);
 }
 
-/// As lanes_evaluate() with the stiffness, which is summed up in floats: `product` holds two pairs of elements in place
-/// of two elements, and `stiffness` floats until the end. Elements beyond the last are zeros.
+/// The tangents of two elements as floats beside each other, from what they are made of; evaluated in floats where
+/// these are good enough.
 template <class Law>
-inline void lanes_evaluate_mixed(const ElementArrays& elements, const ElementLaw& law, const double* q, float* product,
-                                 double* energy, double* force, double* stiffness) {
-  alignas(kAlignment) double tangents[2][kTangentNumbers * kLanes];
-  alignas(kAlignment) float pair[2 * kTangentNumbers * kLanes];
-  const Index stride = elements.stride, rows = lane_rows(elements.modes), depth = 9 * kElementsAtOnce;
+inline void pair_of_tangents(const Law& law, const Vec (&inputs)[2][Law::kTangentInputs], float* tangent) {
+  const auto put = [&](Index entry, FloatVec value) { store(tangent + entry * 2 * kLanes, value); };
+  if constexpr (Law::kTangentInFloats) {
+    FloatVec both[Law::kTangentInputs];
+    for (Index i = 0; i < Law::kTangentInputs; ++i) both[i] = in_pairs(inputs[0][i], inputs[1][i]);
+    law.tangent(both, put);
+  } else {
+    Vec even[kTangentNumbers];
+    law.tangent(inputs[0], [&](Index entry, Vec value) { even[entry] = value; });
+    law.tangent(inputs[1], [&](Index entry, Vec value) { put(entry, in_pairs(even[entry], value)); });
+  }
+}
+
+/// As lanes_evaluate() with the stiffness, which holds floats until the end. An element beyond the last is made of
+/// zeros.
+template <class Law>
+inline void lanes_evaluate_mixed(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy,
+                                 double* force, double* stiffness) {
+  constexpr Index kTangent = 2 * kTangentNumbers * kLanes;
+  alignas(kAlignment) float tangents[kElementsAtOnce * kTangent];
+  Vec inputs[2][Law::kTangentInputs];
+  const Index stride = elements.stride, pairs = (elements.count + 1) / 2;
   float* const sums = reinterpret_cast<float*>(stiffness);
   Vec total = zero();
   lanes_clear(force, elements.modes);
-  lanes_clear(stiffness, lane_triangle(elements.modes) / kLanes);
-  for (Index first = 0; first < elements.count; first += 2 * kElementsAtOnce) {
-    const float* const block = elements.by_pair + first * 9 * stride;
-    for (Index e = 0; e < 2 * kElementsAtOnce; ++e) {
-      const double* const B = elements.by_element + (first + e) * 9 * stride;
-      double* const tangent = tangents[e % 2];
+  for (Index first = 0; first < pairs; first += kElementsAtOnce) {
+    const Index count = pairs - first < kElementsAtOnce ? pairs - first : kElementsAtOnce;
+    for (Index e = 0; e < 2 * count; ++e) {
+      const Index element = 2 * first + e;
+      const double* const B = elements.by_element + element * 9 * stride;
       Vec H[9], P[9];
       lanes_gradient(B, stride, elements.modes, q, H);
-      clear_result<Want::kStiffness>(P, tangent);
-      const Law material{zero() + law.mu[first + e], zero() + law.lambda[first + e]};
-      total += material.template evaluate<Want::kStiffness>(H, P, tangent);
+      clear_result<Want::kForce>(P, nullptr);
+      const Law material{zero() + law.mu[element], zero() + law.lambda[element]};
+      total += material.template evaluate<Want::kStiffness>(H, P, inputs[e % 2]);
       lanes_add_force(B, stride, elements.modes, P, force);
-      if (e % 2 == 0) continue;
-      for (Index i = 0; i < kTangentNumbers; ++i)
-        store(pair + i * 2 * kLanes, in_pairs(load(tangents[0] + i * kLanes), load(tangents[1] + i * kLanes)));
-      lanes_tangent_product<InPairsOfFloats>(pair, block + e / 2 * 18 * stride, stride, elements.modes, rows,
-                                             product + e / 2 * 18 * rows * kLanes);
+      if (e % 2 == 1) pair_of_tangents(material, inputs, tangents + e / 2 * kTangent);
     }
-    lanes_add_stiffness<InPairsOfFloats>(block, stride, product, elements.modes, depth, sums);
+    lanes_add_stiffness<InPairsOfFloats>(tangents, elements.by_pair + first * 18 * stride, stride, elements.modes,
+                                         count, first == 0, sums);
   }
   for (Index i = 0; i < lane_triangle(elements.modes); i += kLanes)
     store(stiffness + i, sum_of_pairs(load(sums + 2 * i)));
@@ -235,37 +128,36 @@ inline void lanes_evaluate_mixed(const ElementArrays& elements, const ElementLaw
 }
 
 template <Want want>
-inline void lanes_evaluate_parts(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
-                                 double* energy, double* force, double* stiffness) {
+inline void lanes_evaluate_parts(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy,
+                                 double* force, double* stiffness) {
   for (Index at = 0; at < kLanes; at += kWidth)
     with_law(law, [&]<class Law>() {
       if constexpr (!std::is_same_v<Law, Quadratic>)
-        lanes_evaluate<want, Law>(elements, law, q + at, product, energy + at, force + at, stiffness + at);
+        lanes_evaluate<want, Law>(elements, law, q + at, energy + at, force + at, stiffness + at);
     });
 }
 
 void lanes_energy(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy) {
   double none[kLanes];
-  lanes_evaluate_parts<Want::kEnergy>(elements, law, q, none, energy, none, none);
+  lanes_evaluate_parts<Want::kEnergy>(elements, law, q, energy, none, none);
 }
 
 void lanes_force(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy, double* force) {
   double none[kLanes];
-  lanes_evaluate_parts<Want::kForce>(elements, law, q, none, energy, force, none);
+  lanes_evaluate_parts<Want::kForce>(elements, law, q, energy, force, none);
 }
 
-void lanes_force_and_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q, double* product,
-                               double* energy, double* force, double* stiffness) {
-  lanes_evaluate_parts<Want::kStiffness>(elements, law, q, product, energy, force, stiffness);
+void lanes_force_and_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q, double* energy,
+                               double* force, double* stiffness) {
+  lanes_evaluate_parts<Want::kStiffness>(elements, law, q, energy, force, stiffness);
 }
 
 void lanes_force_and_mixed_stiffness(const ElementArrays& elements, const ElementLaw& law, const double* q,
-                                     double* product, double* energy, double* force, double* stiffness) {
+                                     double* energy, double* force, double* stiffness) {
   for (Index at = 0; at < kLanes; at += kWidth)
     with_law(law, [&]<class Law>() {
       if constexpr (!std::is_same_v<Law, Quadratic>)
-        lanes_evaluate_mixed<Law>(elements, law, q + at, reinterpret_cast<float*>(product), energy + at, force + at,
-                                  stiffness + at);
+        lanes_evaluate_mixed<Law>(elements, law, q + at, energy + at, force + at, stiffness + at);
     });
 }
 
@@ -297,19 +189,26 @@ inline void lanes_subtract(const double* left, const double* right, double* bloc
   }
 }
 
-/// Factor of a diagonal block, the diagonal its inverse; only `count` rows are there. Lanes that fail become NaN.
-inline void lanes_factor_block(double* block, Index count) {
+/// Factor of the first `count` rows and columns of a diagonal block, the diagonal its inverse. Lanes that fail become
+/// NaN. The next pivot waits for a division alone, not for the root.
+template <Index count>
+inline void lanes_factor_block(double* block) {
+  Vec b[count][count];
+#pragma GCC unroll 4
+  for (Index m = 0; m < count; ++m)
+#pragma GCC unroll 4
+    for (Index n = 0; n <= m; ++n) b[m][n] = load(block + in_block(m, n));
+#pragma GCC unroll 4
   for (Index j = 0; j < count; ++j) {
-    Vec pivot = load(block + in_block(j, j));
-    pivot = select(pivot > 0.0, pivot, zero() + __builtin_nan(""));
-    const Vec inverse = 1.0 / square_root(pivot);
-    store(block + in_block(j, j), inverse);
-    for (Index i = j + 1; i < count; ++i) store(block + in_block(i, j), load(block + in_block(i, j)) * inverse);
-    for (Index k = j + 1; k < count; ++k) {
-      const Vec right = load(block + in_block(k, j));
-      for (Index i = k; i < count; ++i)
-        store(block + in_block(i, k), load(block + in_block(i, k)) - load(block + in_block(i, j)) * right);
-    }
+    const Vec pivot = select(b[j][j] > 0.0, b[j][j], zero() + __builtin_nan(""));
+    const Vec inverse = 1.0 / pivot, root = square_root(inverse);
+#pragma GCC unroll 4
+    for (Index k = j + 1; k < count; ++k)
+#pragma GCC unroll 4
+      for (Index i = k; i < count; ++i) b[i][k] -= b[i][j] * b[k][j] * inverse;
+    store(block + in_block(j, j), root);
+#pragma GCC unroll 4
+    for (Index i = j + 1; i < count; ++i) store(block + in_block(i, j), b[i][j] * root);
   }
 }
 
@@ -346,10 +245,15 @@ void lanes_cholesky(double* L, Index n) {
         double* const block = L + block_start(row, column) + at;
         for (Index k = 0; k < column; ++k)
           lanes_subtract(L + block_start(row, k) + at, L + block_start(column, k) + at, block);
-        if (row > column)
+        if (row > column) {
           lanes_solve_block(L + block_start(column, column) + at, block);
-        else
-          lanes_factor_block(block, n - kBlock * row < kBlock ? n - kBlock * row : kBlock);
+          continue;
+        }
+        const Index count = n - kBlock * row;
+        if (count >= 4) lanes_factor_block<4>(block);
+        if (count == 3) lanes_factor_block<3>(block);
+        if (count == 2) lanes_factor_block<2>(block);
+        if (count == 1) lanes_factor_block<1>(block);
       }
 }
 
@@ -448,26 +352,39 @@ void lanes_symmetric_product(const double* A, Index n, const double* x, double* 
   }
 }
 
+constexpr Index kProductRows = kWidth == 8 ? 12 : 8;  // what the registers hold at once
+
 /// y [rows] = A x, one register's bodies.
 template <Index rows>
 inline void lanes_product_rows(const double* A, Index columns, Index outer, const double* x, double* y) {
   Vec sums[rows];
-#pragma GCC unroll 8
+#pragma GCC unroll 12
   for (Index i = 0; i < rows; ++i) sums[i] = zero();
   for (Index c = 0; c < columns; ++c) {
     const Vec here = load(x + c * kLanes);
-#pragma GCC unroll 8
+#pragma GCC unroll 12
     for (Index i = 0; i < rows; ++i) sums[i] += here * A[c * outer + i];
   }
-#pragma GCC unroll 8
+#pragma GCC unroll 12
   for (Index i = 0; i < rows; ++i) store(y + i * kLanes, sums[i]);
+}
+
+/// The same of fewer rows than kProductRows.
+template <Index most = kProductRows - 1>
+inline void lanes_product_rest(Index rows, const double* A, Index columns, Index outer, const double* x, double* y) {
+  if constexpr (most > 0) {
+    if (rows == most)
+      lanes_product_rows<most>(A, columns, outer, x, y);
+    else
+      lanes_product_rest<most - 1>(rows, A, columns, outer, x, y);
+  }
 }
 
 void lanes_matrix_product(const double* A, Index rows, Index columns, Index outer, const double* x, double* y) {
   for (Index at = 0; at < kLanes; at += kWidth) {
     Index i = 0;
-    for (; i + 8 <= rows; i += 8) lanes_product_rows<8>(A + i, columns, outer, x + at, y + i * kLanes + at);
-    for (; i + 4 <= rows; i += 4) lanes_product_rows<4>(A + i, columns, outer, x + at, y + i * kLanes + at);
-    for (; i < rows; ++i) lanes_product_rows<1>(A + i, columns, outer, x + at, y + i * kLanes + at);
+    for (; i + kProductRows <= rows; i += kProductRows)
+      lanes_product_rows<kProductRows>(A + i, columns, outer, x + at, y + i * kLanes + at);
+    lanes_product_rest(rows - i, A + i, columns, outer, x + at, y + i * kLanes + at);
   }
 }

@@ -65,24 +65,34 @@ inline void clear_result(Vec* P, double* tangent) {
     for (Index i = 0; i < kTangentNumbers; ++i) store(tangent + i * kLanes, zero());
 }
 
+/// Energy by one material; adds the stress to P and sets the tangent, as wanted.
+template <Want want, class Law>
+inline Vec evaluate_one(const Law& law, const Vec* H, Vec* P, double* tangent) {
+  Vec inputs[Law::kTangentInputs];
+  const Vec energy = law.template evaluate<want>(H, P, inputs);
+  if constexpr (want == Want::kStiffness)
+    law.tangent(inputs, [&](Index entry, Vec value) { store(tangent + entry * kLanes, value); });
+  return energy;
+}
+
 /// The sum over the law's examples.
 template <Want want, class Material>
 inline Vec evaluate_examples(const ElementLaw& law, Index at, const Vec* H, Vec* P, double* tangent) {
   alignas(kAlignment) double own_tangent[want == Want::kStiffness ? kTangentNumbers * kLanes : kLanes];
+  clear_result<want>(P, tangent);
   Vec energy = zero();
   for (Index k = 0; k < law.shift_count; ++k) {
     if (law.shift_weights[k] == 0) continue;
     const Reference reference(law, at, k);
     const Material material{reference.weight * load(law.mu + at), reference.weight * load(law.lambda + at)};
-    Vec own[9], own_P[9];
+    Vec own[9], own_P[9] = {};
     reference.displacement_gradient(H, own);
-    if (reference.inverse == nullptr) {
-      energy += material.template evaluate<want>(own, P, tangent);
-      continue;
-    }
-    clear_result<want>(own_P, own_tangent);
-    energy += material.template evaluate<want>(own, own_P, own_tangent);
-    if constexpr (want != Want::kEnergy) reference.add<want>(own_P, own_tangent, P, tangent);
+    energy += evaluate_one<want>(material, own, reference.inverse == nullptr ? P : own_P, own_tangent);
+    if (reference.inverse != nullptr)
+      if constexpr (want != Want::kEnergy) reference.add<want>(own_P, own_tangent, P, tangent);
+    if constexpr (want == Want::kStiffness)
+      for (Index i = 0; reference.inverse == nullptr && i < kTangentNumbers; ++i)
+        add_to(tangent + i * kLanes, load(own_tangent + i * kLanes));
   }
   return energy;
 }
@@ -90,14 +100,13 @@ inline Vec evaluate_examples(const ElementLaw& law, Index at, const Vec* H, Vec*
 /// Energy of one register's elements by the law; sets P and the tangent, as wanted.
 template <Want want, class Law>
 inline Vec evaluate_law(const ElementLaw& law, Index at, const Vec* H, Vec* P, double* tangent) {
-  clear_result<want>(P, tangent);
+  clear_result<Want::kForce>(P, nullptr);
   if constexpr (std::is_same_v<Law, Quadratic>) {
-    const Quadratic quadratic{law.quadratic + (at / kLanes * kQuadraticNumbers) * kLanes + at % kLanes};
-    return quadratic.evaluate<want>(H, P, tangent);
+    return evaluate_one<want>(Quadratic{law.quadratic + (at / kLanes * kQuadraticNumbers) * kLanes + at % kLanes}, H, P,
+                              tangent);
   } else {
     if (law.shift_count > 0) return evaluate_examples<want, Law>(law, at, H, P, tangent);
-    const Law material{load(law.mu + at), load(law.lambda + at)};
-    return material.template evaluate<want>(H, P, tangent);
+    return evaluate_one<want>(Law{load(law.mu + at), load(law.lambda + at)}, H, P, tangent);
   }
 }
 

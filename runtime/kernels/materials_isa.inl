@@ -1,5 +1,7 @@
 // Materials of laws_isa.inl, which includes this file: one register's elements at a time. Each is the lanes of its
-// struct in common/elastic, linear in mu and lambda, which may hold weights.
+// struct in common/elastic, linear in mu and lambda, which may hold weights. A tangent is a function of few numbers,
+// kTangentInputs, which come with the stress: it may be evaluated in another precision than they are, where it is good
+// enough in floats.
 
 // --- small matrices, row-major ---------------------------------------------------------------------------------------
 
@@ -94,17 +96,49 @@ enum class Want { kEnergy, kForce, kStiffness };
 struct StVenantKirchhoff {
   Vec mu, lambda;
 
-  /// Energy; adds the stress to P and the tangent to `tangent`, as wanted.
+  static constexpr Index kTangentInputs = 17;  ///< F, S, mu, lambda
+  static constexpr bool kTangentInFloats = true;
+
+  /// Energy; adds the stress to P and sets what the tangent is made of, as wanted.
   template <Want want>
-  Vec evaluate(const Vec* H, Vec* P, double* tangent) const {
+  Vec evaluate(const Vec* H, Vec* P, Vec* inputs) const {
     Vec E[6], S[6];
     green_strain(H, E);
     if constexpr (want != Want::kEnergy) {
       second_piola_kirchhoff(E, S);
       add_stress(H, S, P);
     }
-    if constexpr (want == Want::kStiffness) add_tangent(H, S, tangent);
+    if constexpr (want == Want::kStiffness) {
+      add_identity(H, inputs);
+      for (Index i = 0; i < 6; ++i) inputs[9 + i] = S[i];
+      inputs[15] = mu;
+      inputs[16] = lambda;
+    }
     return energy(E);
+  }
+
+  /// put(entry, value) of delta_ac S_bd + lambda F_ab F_cd + mu F_ad F_cb + mu delta_bd (F F^T)_ac.
+  template <class Lanes, class Put>
+  static void tangent(const Lanes* inputs, Put put) {
+    const Lanes *F = inputs, *S = inputs + 9, mu = inputs[15], lambda = inputs[16];
+    Lanes left[6];
+    for (Index a = 0; a < 3; ++a)
+      for (Index c = a; c < 3; ++c)
+        left[kVoigt[a][c]] = mu * (F[3 * a] * F[3 * c] + F[3 * a + 1] * F[3 * c + 1] + F[3 * a + 2] * F[3 * c + 2]);
+    Index entry = 0;
+#pragma GCC unroll 9
+    for (Index i = 0; i < 9; ++i) {
+      const Index a = i / 3, b = i % 3;
+      const Lanes lF = lambda * F[i];
+#pragma GCC unroll 9
+      for (Index j = i; j < 9; ++j, ++entry) {
+        const Index c = j / 3, d = j % 3;
+        Lanes value = lF * F[j] + mu * F[3 * a + d] * F[3 * c + b];
+        if (a == c) value += S[kVoigt[b][d]];
+        if (b == d) value += left[kVoigt[a][c]];
+        put(entry, value);
+      }
+    }
   }
 
  private:
@@ -119,43 +153,51 @@ struct StVenantKirchhoff {
     for (Index i = 0; i < 3; ++i) S[i] = pressure + 2.0 * mu * E[i];
     for (Index i = 3; i < 6; ++i) S[i] = 2.0 * mu * E[i];
   }
-
-  /// tangent += delta_ac S_bd + lambda F_ab F_cd + mu F_ad F_cb + mu delta_bd (F F^T)_ac.
-  void add_tangent(const Vec* H, const Vec* S, double* tangent) const {
-    Vec F[9], left[6];
-    add_identity(H, F);
-    for (Index a = 0; a < 3; ++a)
-      for (Index c = a; c < 3; ++c)
-        left[kVoigt[a][c]] = mu * (F[3 * a] * F[3 * c] + F[3 * a + 1] * F[3 * c + 1] + F[3 * a + 2] * F[3 * c + 2]);
-    Index entry = 0;
-    for (Index i = 0; i < 9; ++i) {
-      const Index a = i / 3, b = i % 3;
-      const Vec lF = lambda * F[i];
-      for (Index j = i; j < 9; ++j, ++entry) {
-        const Index c = j / 3, d = j % 3;
-        Vec value = lF * F[j] + mu * F[3 * a + d] * F[3 * c + b];
-        if (a == c) value += S[kVoigt[b][d]];
-        if (b == d) value += left[kVoigt[a][c]];
-        store(tangent + entry * kLanes, load(tangent + entry * kLanes) + value);
-      }
-    }
-  }
 };
 
 /// 1/2 E : C : E - S0 : E + constant, from its 28 numbers.
 struct Quadratic {
   const double* numbers;
 
+  static constexpr Index kTangentInputs = 15;  ///< F, S
+
   template <Want want>
-  Vec evaluate(const Vec* H, Vec* P, double* tangent) const {
+  Vec evaluate(const Vec* H, Vec* P, Vec* inputs) const {
     Vec E[6], S[6];
     green_strain(H, E);
     if constexpr (want != Want::kEnergy) {
       second_piola_kirchhoff(E, S);
       add_stress(H, S, P);
     }
-    if constexpr (want == Want::kStiffness) set_tangent(H, S, tangent);
+    if constexpr (want == Want::kStiffness) {
+      add_identity(H, inputs);
+      for (Index i = 0; i < 6; ++i) inputs[9 + i] = S[i];
+    }
     return energy(E);
+  }
+
+  /// put(entry, value) of delta_ac S_bd + F_ai C_ibjd F_cj.
+  template <class Put>
+  void tangent(const Vec* inputs, Put put) const {
+    const Vec *F = inputs, *S = inputs + 9;
+    for (Index b = 0; b < 3; ++b)
+      for (Index d = b; d < 3; ++d) {
+        Vec FC[9];  // F_ai C_ibjd, at 3a + j
+        for (Index j = 0; j < 3; ++j) {
+          const Vec C0 = number(triangle_entry<6>(kVoigt[0][b], kVoigt[j][d])),
+                    C1 = number(triangle_entry<6>(kVoigt[1][b], kVoigt[j][d])),
+                    C2 = number(triangle_entry<6>(kVoigt[2][b], kVoigt[j][d]));
+          for (Index a = 0; a < 3; ++a) FC[3 * a + j] = F[3 * a] * C0 + F[3 * a + 1] * C1 + F[3 * a + 2] * C2;
+        }
+        for (Index a = 0; a < 3; ++a)
+          for (Index c = 0; c < 3; ++c) {
+            const Index row = 3 * a + b, column = 3 * c + d;
+            if (b == d && row > column) continue;
+            Vec value = FC[3 * a] * F[3 * c] + FC[3 * a + 1] * F[3 * c + 1] + FC[3 * a + 2] * F[3 * c + 2];
+            if (a == c) value += S[kVoigt[b][d]];
+            put(triangle_entry<9>(row, column), value);
+          }
+      }
   }
 
  private:
@@ -183,30 +225,6 @@ struct Quadratic {
     linear_stress(E, S);
     for (Index i = 0; i < 6; ++i) S[i] -= number(21 + i);
   }
-
-  /// tangent = delta_ac S_bd + F_ai C_ibjd F_cj.
-  void set_tangent(const Vec* H, const Vec* S, double* tangent) const {
-    Vec F[9];
-    add_identity(H, F);
-    for (Index b = 0; b < 3; ++b)
-      for (Index d = b; d < 3; ++d) {
-        Vec FC[9];  // F_ai C_ibjd, at 3a + j
-        for (Index j = 0; j < 3; ++j) {
-          const Vec C0 = number(triangle_entry<6>(kVoigt[0][b], kVoigt[j][d])),
-                    C1 = number(triangle_entry<6>(kVoigt[1][b], kVoigt[j][d])),
-                    C2 = number(triangle_entry<6>(kVoigt[2][b], kVoigt[j][d]));
-          for (Index a = 0; a < 3; ++a) FC[3 * a + j] = F[3 * a] * C0 + F[3 * a + 1] * C1 + F[3 * a + 2] * C2;
-        }
-        for (Index a = 0; a < 3; ++a)
-          for (Index c = 0; c < 3; ++c) {
-            const Index row = 3 * a + b, column = 3 * c + d;
-            if (b == d && row > column) continue;
-            Vec value = FC[3 * a] * F[3 * c] + FC[3 * a + 1] * F[3 * c + 1] + FC[3 * a + 2] * F[3 * c + 2];
-            if (a == c) value += S[kVoigt[b][d]];
-            store(tangent + triangle_entry<9>(row, column) * kLanes, value);
-          }
-      }
-  }
 };
 
 // --- stable neo-Hookean ----------------------------------------------------------------------------------------------
@@ -216,8 +234,11 @@ struct StableNeoHookean {
 
   StableNeoHookean(Vec lame_mu, Vec lame_lambda) : mu(4.0 / 3 * lame_mu), lambda(lame_lambda + 5.0 / 6 * lame_mu) {}
 
+  static constexpr Index kTangentInputs = 22;  ///< F, its cofactors, and the four numbers of tangent()
+  static constexpr bool kTangentInFloats = true;
+
   template <Want want>
-  Vec evaluate(const Vec* H, Vec* P, double* tangent) const {
+  Vec evaluate(const Vec* H, Vec* P, Vec* inputs) const {
     Vec E[6], F[9], cofactor_H[9], cofactor[9];
     green_strain(H, E);
     add_identity(H, F);
@@ -238,32 +259,41 @@ struct StableNeoHookean {
         P[i] += shear * symmetric + own * F[i] + volume * cofactor[i];
       }
     }
-    if constexpr (want == Want::kStiffness) add_tangent(F, cofactor, a, j, inverse, tangent);
+    if constexpr (want == Want::kStiffness) {
+      for (Index i = 0; i < 9; ++i) {
+        inputs[i] = F[i];
+        inputs[9 + i] = cofactor[i];
+      }
+      inputs[18] = mu * (3.0 + a) * inverse;
+      inputs[19] = 2.0 * mu * inverse * inverse;
+      inputs[20] = lambda * j - 0.75 * mu;
+      inputs[21] = lambda;
+    }
     return 0.5 * lambda * j * j + 0.5 * mu * (0.75 * j * j - 3.0 * second - 6.0 * third + log_remainder(0.25 * a));
   }
 
- private:
-  void add_tangent(const Vec* F, const Vec* cofactor, Vec a, Vec j, Vec inverse, double* tangent) const {
-    const Vec shear = mu * (3.0 + a) * inverse, growth = 2.0 * mu * inverse * inverse;
-    const Vec pressure = lambda * j - 0.75 * mu;
-    Vec signed_F[9];
+  template <class Lanes, class Put>
+  static void tangent(const Lanes* inputs, Put put) {
+    const Lanes *F = inputs, *cofactor = inputs + 9;
+    const Lanes shear = inputs[18], growth = inputs[19], pressure = inputs[20], lambda = inputs[21];
+    Lanes signed_F[9];
     for (Index i = 0; i < 9; ++i) signed_F[i] = pressure * F[i];
     Index entry = 0;
 #pragma GCC unroll 9
     for (Index i = 0; i < 9; ++i) {
       const Index row = i / 3, column = i % 3;
-      const Vec own = growth * F[i], volume = lambda * cofactor[i];
+      const Lanes own = growth * F[i], volume = lambda * cofactor[i];
 #pragma GCC unroll 9
       for (Index k = i; k < 9; ++k, ++entry) {
         const Index other_row = k / 3, other_column = k % 3;
-        Vec value = own * F[k] + volume * cofactor[k];
+        Lanes value = own * F[k] + volume * cofactor[k];
         if (k == i) value += shear;
         if (row != other_row && column != other_column) {
-          const Vec derivative = signed_F[3 * (3 - row - other_row) + 3 - column - other_column];
+          const Lanes derivative = signed_F[3 * (3 - row - other_row) + 3 - column - other_column];
           const bool positive = (other_row - row + 3) % 3 == (other_column - column + 3) % 3;
           value = positive ? value + derivative : value - derivative;
         }
-        add_to(tangent + entry * kLanes, value);
+        put(entry, value);
       }
     }
   }
@@ -278,8 +308,12 @@ struct Corotational {
 
   Corotational(Vec lame_mu, Vec lame_lambda) : mu(lame_mu), lambda(lame_lambda) {}
 
+  static constexpr Index kTangentInputs = 20;  ///< R, what turns it, 2 mu, lambda
+  /// Turns cost nothing only as far as large terms cancel; bodies bend by turns that are large beside their strains.
+  static constexpr bool kTangentInFloats = false;
+
   template <Want want>
-  Vec evaluate(const Vec* H, Vec* P, double* tangent) const {
+  Vec evaluate(const Vec* H, Vec* P, Vec* inputs) const {
     const NearestRotation at(H);
     if constexpr (want != Want::kEnergy) {
       const Vec pressure = lambda * at.trace;
@@ -288,40 +322,49 @@ struct Corotational {
         P[i] += i % 4 == 0 ? own + pressure : own;
       }
     }
-    if constexpr (want == Want::kStiffness) add_tangent(at, tangent);
+    if constexpr (want == Want::kStiffness) set_inputs(at, inputs);
     return mu * dot(at.stretch, at.stretch, 9) + 0.5 * lambda * at.trace * at.trace;
   }
 
- private:
-  /// 2 mu I + lambda R R + (lambda (tr S - 3) - 2 mu) dR/dF. The turn of R is G^-1 of the skew part of R^T dF, so block
-  /// (a, c) of dR/dF is X_a G^-1 X_c^T with X_a the cross product with row a of R.
-  void add_tangent(const NearestRotation& at, double* tangent) const {
-    Vec R[9], M[9], inverse[9], products[27];
-    add_identity(at.turned, R);
-    at.rotated_stretch(M);
-    at.inverse_sums(M, inverse);
-    const Vec turning = lambda * at.trace - 2.0 * mu;
-    for (Index i = 0; i < 9; ++i) inverse[i] *= turning;
+  /// put(entry, value) of 2 mu I + lambda R R + (lambda (tr S - 3) - 2 mu) dR/dF. The turn of R is G^-1 of the skew
+  /// part of R^T dF, so block (a, c) of dR/dF is X_a G^-1 X_c^T with X_a the cross product with row a of R.
+  template <class Lanes, class Put>
+  static void tangent(const Lanes* inputs, Put put) {
+    const Lanes *R = inputs, *turning = inputs + 9, twice_mu = inputs[18], lambda = inputs[19];
+    Lanes products[27];
     for (Index c = 0; c < 3; ++c)
-      for (Index i = 0; i < 3; ++i) cross(R + 3 * c, inverse + 3 * i, products + 9 * c + 3 * i);
+      for (Index i = 0; i < 3; ++i) cross(R + 3 * c, turning + 3 * i, products + 9 * c + 3 * i);
     Index entry = 0;
 #pragma GCC unroll 9
     for (Index i = 0; i < 9; ++i) {
       const Index a = i / 3, b = i % 3, next = (b + 1) % 3, last = (b + 2) % 3;
-      const Vec scaled = lambda * R[i];
+      const Lanes scaled = lambda * R[i];
 #pragma GCC unroll 9
       for (Index j = i; j < 9; ++j, ++entry) {
         const Index c = j / 3, d = j % 3;
         // Row b of X_a times column d of G^-1 X_c^T.
-        Vec value = scaled * R[j] + R[3 * a + next] * products[9 * c + 3 * last + d] -
-                    R[3 * a + last] * products[9 * c + 3 * next + d];
-        if (i == j) value += 2.0 * mu;
-        add_to(tangent + entry * kLanes, value);
+        Lanes value = scaled * R[j] + R[3 * a + next] * products[9 * c + 3 * last + d] -
+                      R[3 * a + last] * products[9 * c + 3 * next + d];
+        if (i == j) value += twice_mu;
+        put(entry, value);
       }
     }
   }
 
-  static void cross(const Vec* a, const Vec* b, Vec* product) {
+ private:
+  void set_inputs(const NearestRotation& at, Vec* inputs) const {
+    Vec M[9], inverse[9];
+    add_identity(at.turned, inputs);
+    at.rotated_stretch(M);
+    at.inverse_sums(M, inverse);
+    const Vec turning = lambda * at.trace - 2.0 * mu;
+    for (Index i = 0; i < 9; ++i) inputs[9 + i] = inverse[i] * turning;
+    inputs[18] = 2.0 * mu;
+    inputs[19] = lambda;
+  }
+
+  template <class Lanes>
+  static void cross(const Lanes* a, const Lanes* b, Lanes* product) {
     for (Index i = 0; i < 3; ++i) product[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
   }
 };

@@ -47,8 +47,9 @@ void Bodies::step_share(int thread) noexcept {
   const std::size_t size = side_by_side_ ? kLanes : 1, groups = (states_.size() + size - 1) / size;
   const std::size_t first = groups * static_cast<std::size_t>(thread) / threads_.size();
   const std::size_t last = groups * static_cast<std::size_t>(thread + 1) / threads_.size();
+  const auto begin_of = [&](std::size_t group) { return std::min(group * size, states_.size()); };
   for (std::size_t group = first; group < last; ++group)
-    step_group(group * size, std::min((group + 1) * size, states_.size()), threads_[static_cast<std::size_t>(thread)]);
+    step_group(begin_of(group), begin_of(group + 1), begin_of(last), threads_[static_cast<std::size_t>(thread)]);
 }
 
 /// The same where bodies may sleep: groups are made of those that are awake. Those of a last group that is too small
@@ -70,7 +71,7 @@ void Bodies::step_share_awake(int thread) noexcept {
       count = 0;
     }
   }
-  if (thread + 1 == threads() && in_lanes < states_.size()) step_group(in_lanes, states_.size(), own);
+  if (thread + 1 == threads() && in_lanes < states_.size()) step_group(in_lanes, states_.size(), states_.size(), own);
 }
 
 void Bodies::step_awake(std::span<const std::size_t> awake, Thread& thread) noexcept {
@@ -85,13 +86,16 @@ void Bodies::step_awake(std::span<const std::size_t> awake, Thread& thread) noex
   for (const std::size_t body : awake) thread.measured.work += step_work(model_, scene_, reports_[body]);
 }
 
-void Bodies::step_group(std::size_t first, std::size_t last, Thread& thread) noexcept {
+void Bodies::step_group(std::size_t first, std::size_t last, std::size_t end_of_share, Thread& thread) noexcept {
   const Timer timer;
   if (side_by_side_) {
     std::array<LaneBody, kLanes> bodies;
+    std::array<LaneBody, kLanes> next;
     for (std::size_t body = first; body < last; ++body) bodies[body - first] = {&scene_, &states_[body]};
+    const std::size_t others = std::min(end_of_share - last, next.size());
+    for (std::size_t other = 0; other < others; ++other) next[other] = {&scene_, &states_[last + other]};
     step_side_by_side(model_, {bodies.data(), last - first}, thread.workspace,
-                      std::span(reports_).subspan(first, last - first));
+                      std::span(reports_).subspan(first, last - first), {next.data(), others});
   } else {
     reports_[first] = runtime::step(model_, scene_, states_[first], thread.workspace.body(0));
   }

@@ -66,7 +66,7 @@ class Bodies {
   void step_share(int thread) noexcept;
   void step_share_awake(int thread) noexcept;
   void step_awake(std::span<const std::size_t> awake, Thread& thread) noexcept;
-  void step_group(std::size_t first, std::size_t last, Thread& thread) noexcept;
+  void step_group(std::size_t first, std::size_t last, std::size_t end_of_share, Thread& thread) noexcept;
 
   const Model& model_;
   StepScene scene_;

@@ -38,7 +38,7 @@ double flops_of_a_step(const runtime::Model& model, const runtime::StepScene& sc
 }
 
 void time_crowd(::benchmark::State& state, int modes, int elements, bool free, int threads, int count,
-                Precision precision = Precision::kDouble) {
+                Precision precision) {
   omp_set_num_threads(threads);
   const auto model = prepare(bar_model(modes, elements, free), Target::kTable, false);
   runtime::StepScene scene = swing(*model, Target::kTable);
@@ -61,24 +61,20 @@ void time_crowd(::benchmark::State& state, int modes, int elements, bool free, i
 }  // namespace
 
 void register_crowds() {
+  const auto add_crowd = [](const char* kind, int modes, int elements, bool free, int threads, int count,
+                            Precision precision) {
+    add(fmt::format("crowd/{}/r{}/s{}/threads{}/{}", kind, modes, elements, threads, count),
+        [=](::benchmark::State& state) { time_crowd(state, modes, elements, free, threads, count, precision); })
+        ->UseRealTime();
+  };
   for (const bool free : {false, true})
     for (const auto& [modes, elements] : {std::pair{20, 23}, {20, 60}, {30, 60}})
-      add(fmt::format("mixed/{}/r{}/s{}/threads1/1000", free ? "free" : "clamped", modes, elements),
-          [modes = modes, elements = elements, free](::benchmark::State& state) {
-            time_crowd(state, modes, elements, free, 1, 1000, Precision::kMixed);
-          })
-          ->UseRealTime();
-  for (const bool free : {false, true})
-    for (const auto& [modes, elements] : {std::pair{20, 23}, {20, 60}, {30, 60}})
-      for (const int threads : {1, 2})
-        for (const int count : {1, 8, 100, 1000, 10000, 100000}) {
-          if (threads > count) continue;
-          add(fmt::format("crowd/{}/r{}/s{}/threads{}/{}", free ? "free" : "clamped", modes, elements, threads, count),
-              [modes = modes, elements = elements, free, threads, count](::benchmark::State& state) {
-                time_crowd(state, modes, elements, free, threads, count);
-              })
-              ->UseRealTime();
-        }
+      for (const int threads : {1, 2}) {
+        for (const int count : {1, 8, 100, 1000, 10000, 100000})
+          if (threads <= count)
+            add_crowd(free ? "free" : "clamped", modes, elements, free, threads, count, Precision::kDouble);
+        add_crowd(free ? "free_mixed" : "clamped_mixed", modes, elements, free, threads, 1000, Precision::kMixed);
+      }
 }
 
 }  // namespace exmat::benchmarks

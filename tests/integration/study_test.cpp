@@ -54,6 +54,22 @@ class StudyProgram : public testing::Test {
   TemporaryFolder folder_;
 };
 
+// Against the same body in double, which damping by a stiffness in single precision moves a little.
+TEST_F(StudyProgram, MixedPrecisionIsMeasuredAgainstDouble) {
+  write_study(R"({"sweeps": [ { "basis_size": [8], "precision": ["double", "mixed"], "target": ["solve"] } ]})"_json);
+  const Outcome outcome = study("out");
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  const Json json = results("out");
+  ASSERT_EQ(json["points"].size(), 2U);
+  EXPECT_EQ(json["points"][0]["bundle"], json["points"][1]["bundle"]);
+  const Json &exact = json["points"][0]["errors"], &mixed = json["points"][1]["errors"];
+  EXPECT_TRUE(exact["from_double"].is_null());
+  const double difference = mixed["from_double"]["mean"], error = exact["position"]["mean"];
+  EXPECT_GT(difference, 0);
+  EXPECT_LT(difference, 1e-5);
+  EXPECT_NEAR(mixed["position"]["mean"], error, difference + 1e-12) << "the triangle inequality";
+}
+
 TEST_F(StudyProgram, MeasuresAndAnswersABudget) {
   write_study({{"baseline", true}, {"timing", {{"baseline_steps", 1}}}});
   const Outcome outcome = study("out", {"--max-error", "1000"});

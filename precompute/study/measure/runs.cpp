@@ -14,6 +14,7 @@
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/samples.h"
 #include "runtime/sim/frame/world_vertices.h"
+#include "runtime/sim/lanes/lane_step.h"
 
 namespace exmat::precompute {
 namespace {
@@ -120,6 +121,33 @@ WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame
   return found;
 }
 
+namespace {
+
+// Takes steps of one body as a scene's instances take them: with mixed precision in a lane, the others idle.
+class Stepper {
+ public:
+  explicit Stepper(const runtime::LoadedScene& loaded)
+      : loaded_(loaded),
+        in_lanes_(loaded.scene.precision == Precision::kMixed &&
+                  runtime::can_step_side_by_side(*loaded.model, loaded.scene)),
+        workspace_(*loaded.model, loaded.scene, in_lanes_ ? runtime::kLanes : 1) {}
+
+  runtime::StepReport step(runtime::State& state) {
+    if (!in_lanes_) return runtime::step(*loaded_.model, loaded_.scene, state, workspace_.body(0));
+    runtime::StepReport report;
+    const runtime::LaneBody body{&loaded_.scene, &state};
+    runtime::step_in_lanes(*loaded_.model, {&body, 1}, workspace_, {&report, 1});
+    return report;
+  }
+
+ private:
+  const runtime::LoadedScene& loaded_;
+  bool in_lanes_;
+  runtime::LaneWorkspace workspace_;
+};
+
+}  // namespace
+
 std::string target_of(const runtime::LoadedScene& loaded) {
   for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i)
     if (runtime::acts(loaded.scene.examples[i])) return loaded.model->examples[i].table ? "table" : "solve";
@@ -132,7 +160,7 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
                       "measure scenes with the values between the keys, one by one"});
   const runtime::LoadedScene loaded = runtime::load_run(config);
   runtime::State state = loaded.start;
-  runtime::Workspace workspace(*loaded.model, loaded.scene);
+  Stepper stepper(loaded);
   CentreVelocity centre;
   if (!config.obstacles.empty() && loaded.model->frame->momenta(state.frame))
     centre = [&] { return loaded.model->frame->motion(state.frame).linear_velocity; };
@@ -142,7 +170,7 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
   result.internal_force = loaded.model->internal_force.polynomial() ? "polynomial" : "cubature";
   result.target = target_of(loaded);
   result.frames = run(
-      config.time_step, times, [&] { return runtime::step(*loaded.model, loaded.scene, state, workspace); },
+      config.time_step, times, [&] { return stepper.step(state); },
       [&](BodyFrames& frames) {
         WorldFrame now = world_frame(loaded.data, *loaded.model->frame, state);
         frames.positions.push_back(std::move(now.positions));

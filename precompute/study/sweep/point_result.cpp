@@ -36,6 +36,7 @@ PointResult point_from(const Ordered& json) {
   result.errors = errors_from(json.at("errors"));
   json.at("errors").at("worst_time").get_to(result.worst_time);
   result.from_all_elements = relative_error_from(json.at("errors").at("from_all_elements"));
+  result.from_double = relative_error_from(json.at("errors").at("from_double"));
   json.at("modes").get_to(result.modes);
   json.at("elements").get_to(result.elements);
   json.at("internal_force").get_to(result.internal_force);
@@ -95,6 +96,7 @@ Ordered to_json(const PointResult& result) {
                     {"shape", to_json(errors.shape)},
                     {"nearest_phase", to_json(errors.nearest_phase)},
                     {"from_all_elements", to_json(result.from_all_elements)},
+                    {"from_double", to_json(result.from_double)},
                     {"worst_frame", errors.worst_frame},
                     {"worst_time", result.worst_time}};
   if (errors.rebound) json["errors"]["rebound"] = json_number(*errors.rebound);  // else there was none

@@ -21,6 +21,7 @@ struct PointResult {
   TrajectoryErrors errors;
   double worst_time = 0;                             ///< [s]
   std::optional<RelativeError> from_all_elements;    ///< headline against the same point with all elements
+  std::optional<RelativeError> from_double;          ///< of mixed precision, against the same point in double
   std::size_t modes = 0, elements = 0;               ///< r, s
   std::string internal_force, target;                ///< as the run took them
   double heldout_error = 0;                          ///< of cubature, force

@@ -148,6 +148,7 @@ struct Varying {
             s.target,
             fmt::format("{} linear modes", s.linear_modes),
             "training " + s.training,
+            s.precision + " precision",
             force_of(s)};
   }
   std::vector<std::set<std::string>> values_;
@@ -218,6 +219,10 @@ bool rebounds(const StudyResult& result) {
   return std::ranges::any_of(result.points, [](const PointResult& p) { return p.errors.rebound.has_value(); });
 }
 
+bool has_mixed(const StudyResult& result) {
+  return std::ranges::any_of(result.points, [](const PointResult& p) { return p.from_double.has_value(); });
+}
+
 std::vector<std::string> error_names(const StudyResult& result) {
   std::vector<std::string> names;
   for (const char* part : {"mean", "max", "end", "settled", "nearest<br>phase"})
@@ -225,6 +230,7 @@ std::vector<std::string> error_names(const StudyResult& result) {
   if (result.free_body) names.emplace_back("position<br>[%]");
   if (rebounds(result)) names.emplace_back("rebound<br>[%]");
   for (const char* name : {"velocity<br>[%]", "energy<br>[%]", "from all<br>elements [%]"}) names.emplace_back(name);
+  if (has_mixed(result)) names.emplace_back("mixed, from<br>double [%]");
   return names;
 }
 
@@ -237,7 +243,9 @@ std::string error_cells(const StudyResult& result, const PointResult& point) {
   if (result.free_body) html += cell(percent(e.position.mean));
   if (rebounds(result)) html += cell(e.rebound ? percent(*e.rebound) : "-");
   html += cell(percent(e.velocity.mean)) + cell(percent(e.energy));
-  return html + cell(point.from_all_elements ? percent(point.from_all_elements->mean) : "-");
+  html += cell(point.from_all_elements ? percent(point.from_all_elements->mean) : "-");
+  if (has_mixed(result)) html += cell(point.from_double ? percent(point.from_double->mean) : "-");
+  return html;
 }
 
 std::string point_row(const StudyResult& result, std::size_t i) {

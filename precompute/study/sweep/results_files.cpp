@@ -73,6 +73,7 @@ std::vector<Column> settings_columns() {
       {"integrator", [](const PointResult& p) { return p.settings.integrator; }, true},
       {"internal_force", [](const PointResult& p) { return p.settings.internal_force; }, true},
       {"target", [](const PointResult& p) { return p.settings.target; }, true},
+      {"precision", [](const PointResult& p) { return p.settings.precision; }, true},
       {"elastic_stiffness",
        [](const PointResult& p) { return p.settings.elastic_stiffness ? number(*p.settings.elastic_stiffness) : ""; },
        true},
@@ -90,6 +91,8 @@ std::vector<Column> columns(const StudyResult& result) {
       {"rebound_error", [](const PointResult& p) { return p.errors.rebound ? number(*p.errors.rebound) : ""; }});
   add_error(columns, "from_all_elements_error",
             [](const PointResult& p) { return p.from_all_elements ? &*p.from_all_elements : nullptr; });
+  add_error(columns, "from_double_error",
+            [](const PointResult& p) { return p.from_double ? &*p.from_double : nullptr; });
   columns.push_back({"cubature_heldout_error", [](const PointResult& p) { return number(p.heldout_error); }});
   add_time(columns, "step_median_us", &StepTimes::median);
   add_time(columns, "step_p95_us", &StepTimes::p95);
@@ -196,6 +199,8 @@ Ordered asset_fragment(const StudyResult& result, const PointResult& point) {
 
 Ordered scene_fragment(const StudyResult& result, const PointResult& point) {
   Ordered json{{"time_step", point.settings.time_step}, {"integrator", point.settings.integrator}};
+  const auto differs = [&](const PointResult& other) { return other.settings.precision != point.settings.precision; };
+  if (std::ranges::any_of(result.points, differs)) json["precision"] = point.settings.precision;
   if (point.target == kNoTarget) return json;
   Ordered force{{"target", point.target}};
   if (const auto& stiffness = point.settings.elastic_stiffness)

@@ -154,6 +154,13 @@ void Study::run_point(const PointPlan& plan) const {
         trajectory_errors(run.frames, read_or_fail(frames_file(plan_.points[*plan.all_elements].key)), rest, mass,
                           result_.free_body)
             .headline();
+  if (scene.precision == Precision::kMixed) {
+    SceneConfig exact = scene;
+    exact.precision = Precision::kDouble;
+    result.from_double =
+        trajectory_errors(run.frames, run_reduced(exact, result_.times).frames, rest, mass, result_.free_body)
+            .headline();
+  }
   result.modes = run.modes;
   result.elements = run.elements;
   result.internal_force = run.internal_force;

@@ -23,6 +23,7 @@ SweepConfig read_sweep(const Json& json) {
           .integrator = list<std::string>(json, "integrator"),
           .internal_force = list<std::string>(json, "internal_force"),
           .target = list<std::string>(json, "target"),
+          .precision = list<std::string>(json, "precision"),
           .elastic_stiffness = list<double>(json, "elastic_stiffness")};
 }
 

@@ -62,7 +62,7 @@ void Planner::read_inputs() {
 // Settings that make a bundle; the run time chooses between cubature and polynomial.
 Ordered bundle_settings(const PointSettings& settings) {
   Ordered json = to_json(settings);
-  for (const char* name : {"time_step", "integrator", "target"}) json.erase(name);
+  for (const char* name : {"time_step", "integrator", "target", "precision"}) json.erase(name);
   if (settings.internal_force == "polynomial") json["internal_force"] = "cubature";
   return json;
 }

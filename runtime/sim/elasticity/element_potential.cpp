@@ -9,7 +9,7 @@ namespace exmat::runtime {
 namespace {
 
 ElementScratch scratch_of(ElementPotential::Workspace& workspace) {
-  return {workspace.force.data(), workspace.product.data(), workspace.stiffness.data()};
+  return {workspace.force.data(), workspace.stiffness.data()};
 }
 
 /// Numbers of one element among tangents, panels x 45 x kLanes.
@@ -82,7 +82,7 @@ ElementPotential::ElementPotential(const RowMatrix& gradient)
 
 ElementPotential::Workspace ElementPotential::make_workspace() const {
   const Eigen::Index stride = padded(modes_);
-  return {AlignedArray(stride * kLanes), AlignedArray(9 * kLanes * stride), AlignedArray(stride * stride),
+  return {AlignedArray(stride * kLanes), AlignedArray(lane_triangle(modes_) / kLanes),
           AlignedArray(panels() * kTangentNumbers * kLanes), Eigen::VectorXd::Zero(modes_)};
 }
 

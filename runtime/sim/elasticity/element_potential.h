@@ -26,7 +26,7 @@ class ElementPotential {
  public:
   /// Sized once by make_workspace(); any ElementPotential of the same s and r may share it.
   struct Workspace {
-    AlignedArray force, product, stiffness, tangents;
+    AlignedArray force, stiffness, tangents;
     Eigen::VectorXd unused_force;  ///< r
   };
 
@@ -62,11 +62,11 @@ class ElementPotential {
   void lanes_force(const ElementLaw& law, const double* x, double* energy, double* force) const noexcept {
     kernels().lanes_force(arrays(), law, x, energy, force);
   }
-  void lanes_force_and_stiffness(const ElementLaw& law, const double* x, Precision precision, double* scratch,
-                                 double* energy, double* force, double* stiffness) const noexcept {
+  void lanes_force_and_stiffness(const ElementLaw& law, const double* x, Precision precision, double* energy,
+                                 double* force, double* stiffness) const noexcept {
     const auto evaluate = precision == Precision::kMixed ? kernels().lanes_force_and_mixed_stiffness
                                                          : kernels().lanes_force_and_stiffness;
-    evaluate(arrays(), law, x, scratch, energy, force, stiffness);
+    evaluate(arrays(), law, x, energy, force, stiffness);
   }
 
   /// Floating-point operations: products with B, and half of the symmetric product B^T (D B). docs/step_in_detail.md,

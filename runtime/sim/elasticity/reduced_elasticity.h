@@ -63,14 +63,14 @@ class ReducedElasticity {
   }
 
   /// The same of kLanes bodies side by side (kernels.h): energies [kLanes], q and forces [r x kLanes], stiffness of
-  /// lane_triangle(r) doubles; `scratch` lane_scratch(r).
+  /// lane_triangle(r) doubles.
   void lanes_energy(const double* q, double* energy) const noexcept { potential_.lanes_energy(law(), q, energy); }
   void lanes_force(const double* q, double* energy, double* force) const noexcept {
     potential_.lanes_force(law(), q, energy, force);
   }
-  void lanes_force_and_stiffness(const double* q, Precision precision, double* scratch, double* energy, double* force,
+  void lanes_force_and_stiffness(const double* q, Precision precision, double* energy, double* force,
                                  double* stiffness) const noexcept {
-    potential_.lanes_force_and_stiffness(law(), q, precision, scratch, energy, force, stiffness);
+    potential_.lanes_force_and_stiffness(law(), q, precision, energy, force, stiffness);
   }
 
  private:

@@ -7,6 +7,7 @@
 #include <optional>
 #include <utility>
 
+#include "runtime/sim/lanes/fetch_ahead.h"
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/example_forces.h"
 #include "runtime/sim/step/sleep.h"
@@ -17,41 +18,15 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 }  // namespace
 
-bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept {
-  if (model.internal_force.polynomial() || scene.meets_bodies) return false;
-  for (std::size_t i = 0; i < scene.examples.size(); ++i) {
-    const ExampleSettings& examples = scene.examples[i];
-    if (elastic_factor(examples) > 0) return false;
-    if (is_filtered(examples) && !model.examples[i].filter.is_symmetric()) return false;
-  }
-  return true;
-}
-
-LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies)
-    : bodies_(bodies, Workspace(model, scene)), frames_(model) {
-  if (std::cmp_less(bodies, kFewestLanes)) return;
-  scratch_ = AlignedArray(lane_scratch(model.modes()));
-  const Eigen::Index modes = model.modes();
-  forms_ = LaneForms(modes);
-  for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
-                                &linear_, &frozen_, &next_frozen_, &offset_})
-    *vectors = AlignedArray(modes * kLanes);
-  for (AlignedArray* matrices : {&quadratic_, &stiffness_, &factor_, &new_factor_})
-    *matrices = AlignedArray(lane_triangle(modes));
-  for (const ExampleModel& examples : model.examples) examples_.emplace_back(examples);
-}
-
-void LaneWorkspace::set_profile(Profile* profile) {
-  for (Workspace& body : bodies_) body.profile = profile;
-}
-
 /// One step of a few bodies. Newton's method is that of newton_minimise() on the potential of IncrementalPotential,
 /// which it leaves to step() wherever it takes a turn that whole steps with exact Hessians do not.
 class LaneStep {
  public:
-  LaneStep(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace) noexcept
+  LaneStep(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
+           std::span<const LaneBody> next) noexcept
       : model_(model),
         bodies_(bodies),
+        next_(next),
         workspace_(workspace),
         elements_(model.internal_force.cubature()),
         forms_(workspace.forms_),
@@ -124,6 +99,11 @@ class LaneStep {
       if (runs(l)) work(l, static_cast<Eigen::Index>(l));
   }
 
+  /// One of those whose turn comes next, beside arithmetic: all at once would keep what is read now waiting.
+  void fetch_next() noexcept {
+    if (fetched_ < next_.size()) fetch_ahead(*next_[fetched_++].state);
+  }
+
   /// External forces, obstacles near, forms of the integrators.
   void begin() noexcept {
     for (std::size_t l = 0; l < bodies_.size(); ++l) {
@@ -154,36 +134,53 @@ class LaneStep {
     frames().begin(forms_.velocity_factor, velocity_centre_);
   }
 
-  /// See choose_first_iterate() of BodyStep: energies alone tell which, so that stiffness is evaluated once.
+  /// See choose_first_iterate() of BodyStep: no result depends on which of the two is evaluated first.
   void choose_first_iterate() noexcept {
     const StageTimer timer(profile(), Stage::kInternalForce, flops(all_flops()));
-    elements_.lanes_energy(trial_.data(), energy_.data());
     const auto inertia_and_load = [&](const LaneVectors& q) {
       offset_ = q - acceleration_centre_;
       return LaneNumbers(0.5 * forms_.acceleration_factor * dot(offset_, offset_) - dot(external_, q));
     };
-    const LaneNumbers predicted = energy_ + inertia_and_load(trial_),
-                      at_start = energy_at_start_ + inertia_and_load(start_);
-    for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
-      const bool as_predicted = predicted[lane] <= at_start[lane] || (trial_.row(lane) == start_.row(lane)).all();
-      q_.row(lane) = as_predicted ? trial_.row(lane) : start_.row(lane);
-      start_searches_[static_cast<std::size_t>(lane)] = as_predicted ? 0 : 1;
-    }
-    evaluate_stiffness(energy_);
+    const LaneNumbers inertia = inertia_and_load(trial_), at_start = energy_at_start_ + inertia_and_load(start_);
+    const bool begins_with_predictor = workspace_.predictor_was_lower_;
+    q_ = trial_;
+    if (begins_with_predictor) evaluate_stiffness(energy_);
+    const auto is_decided = [&](std::size_t l) {
+      const auto lane = static_cast<Eigen::Index>(l);
+      return is_one_iterate(lane) ||
+             (begins_with_predictor && are_clearly_apart(energy_[lane] + inertia[lane], at_start[lane], energy_[lane]));
+    };
+    LaneNumbers energy = LaneNumbers::Zero();
+    if (any([&](std::size_t l) { return !is_decided(l); })) elements_.lanes_energy(trial_.data(), energy.data());
+    workspace_.predictor_was_lower_ = true;
+    each([&](std::size_t l, Eigen::Index lane) {
+      if (is_one_iterate(lane)) return;
+      const double elastic = is_decided(l) ? energy_[lane] : energy[lane];
+      if (elastic + inertia[lane] <= at_start[lane]) return;
+      start_searches_[l] = 1;
+      workspace_.predictor_was_lower_ = false;
+      q_.row(lane) = start_.row(lane);
+    });
+    if (!begins_with_predictor || !workspace_.predictor_was_lower_) evaluate_stiffness(energy_);
   }
+
+  /// Whether the predictor is where the step begins.
+  bool is_one_iterate(Eigen::Index lane) const noexcept { return (trial_.row(lane) == start_.row(lane)).all(); }
 
   bool finds_targets_side_by_side() const noexcept {
     return std::ranges::all_of(workspace_.examples_, &LaneExamples::finds_targets);
   }
 
   void evaluate_stiffness(LaneNumbers& energy) noexcept {
-    elements_.lanes_force_and_stiffness(q_.data(), bodies_.front().scene->precision, workspace_.scratch_.data(),
-                                        energy.data(), internal_.data(), workspace_.stiffness_.data());
+    fetch_next();
+    elements_.lanes_force_and_stiffness(q_.data(), bodies_.front().scene->precision, energy.data(), internal_.data(),
+                                        workspace_.stiffness_.data());
   }
 
   /// Of lanes whose numbers are finite; the others are left to step().
   void find_targets() noexcept {
     each([&](std::size_t l, Eigen::Index lane) { alone_[l] = !std::isfinite(energy_[lane]); });
+    fetch_next();
     if (finds_targets_side_by_side()) {
       for (std::size_t i = 0; i < bodies_.front().scene->examples.size(); ++i) find_targets_side_by_side(i);
       return;
@@ -215,11 +212,13 @@ class LaneStep {
       });
     }
     const StageTimer timer(profile(), Stage::kTarget);
+    fetch_next();
     examples.find_targets(model_.examples[i]);
   }
 
   /// The quadratic form A and its gradient at q_n, as IncrementalPotential::prepare().
   void prepare() noexcept {
+    fetch_next();
     kernels().lanes_prepare(forms_.arrays(), workspace_.stiffness_.data(), offset_.data(), workspace_.quadratic_.data(),
                             linear_.data(), rounding_.data());
     rounding_ *= IncrementalPotential::kForceRounding;
@@ -252,6 +251,7 @@ class LaneStep {
   /// Value, its magnitude, force scale and gradient at x of the energies and forces there. The forces of frames are
   /// those at x in the gradient, those frozen in the value.
   void assemble(const LaneVectors& x, LaneVectors& gradient) noexcept {
+    fetch_next();
     Eigen::Array<double, kLanes, kLaneSums> sums;
     kernels().lanes_assemble(forms_.arrays(), x.data(), workspace_.quadratic_.data(), linear_.data(), internal_.data(),
                              offset_.data(), gradient.data(), sums.data());
@@ -293,6 +293,7 @@ class LaneStep {
     const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(modes * modes * modes) / 3));
     // Where all need one, none is to be kept.
     const bool keeps = any(Hessian::kFactorised);
+    fetch_next();
     AlignedArray& factor = keeps ? workspace_.new_factor_ : workspace_.factor_;
     kernels().lanes_sum(lane_triangle(modes) / kLanes, workspace_.stiffness_.data(), workspace_.quadratic_.data(),
                         factor.data());
@@ -315,6 +316,7 @@ class LaneStep {
     const Eigen::Index modes = model_.modes();
     const StageTimer timer(profile(), Stage::kSolve, flops(2.0 * static_cast<double>(modes * modes)));
     direction_ = -gradient_;
+    fetch_next();
     kernels().lanes_cholesky_solve(workspace_.factor_.data(), modes, direction_.data());
     if (frames().exert_forces()) add_gyroscopic_terms();
     slope_ = dot(gradient_, direction_);
@@ -427,6 +429,7 @@ class LaneStep {
       if (!runs(l)) trial_.row(static_cast<Eigen::Index>(l)) = q_.row(static_cast<Eigen::Index>(l));
     {
       const StageTimer timer(profile(), Stage::kInternalForce, flops(force_flops()));
+      fetch_next();
       elements_.lanes_force(trial_.data(), there_.energy.data(), internal_.data());
       assemble(trial_, trial_gradient_);
     }
@@ -464,7 +467,7 @@ class LaneStep {
   };
 
   const Model& model_;
-  std::span<const LaneBody> bodies_;
+  std::span<const LaneBody> bodies_, next_;
   LaneWorkspace& workspace_;
   const ReducedElasticity& elements_;
   LaneForms& forms_;
@@ -472,7 +475,7 @@ class LaneStep {
       next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;
   std::array<std::optional<BodyStep>, kLanes> steps_;
   std::array<bool, kLanes> alone_{}, done_{}, below_rounding_{};
-  std::size_t first_awake_ = kLanes;
+  std::size_t first_awake_ = kLanes, fetched_ = 0;
   std::array<int, kLanes> start_searches_{};
   std::array<double, kLanes> unchecked_from_{};
   std::array<Hessian, kLanes> state_{};
@@ -483,18 +486,8 @@ class LaneStep {
 };
 
 void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
-                   std::span<StepReport> reports) noexcept {
-  LaneStep(model, bodies, workspace).take(reports);
-}
-
-void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
-                       std::span<StepReport> reports) noexcept {
-  if (std::ssize(bodies) >= kFewestLanes) {
-    step_in_lanes(model, bodies, workspace, reports);
-    return;
-  }
-  for (std::size_t l = 0; l < bodies.size(); ++l)
-    reports[l] = step(model, *bodies[l].scene, *bodies[l].state, workspace.body(l));
+                   std::span<StepReport> reports, std::span<const LaneBody> next) noexcept {
+  LaneStep(model, bodies, workspace, next).take(reports);
 }
 
 }  // namespace exmat::runtime

@@ -50,19 +50,19 @@ class LaneWorkspace {
   AlignedArray quadratic_, stiffness_, factor_, new_factor_;  // lane_triangle(r)
   std::vector<LaneExamples> examples_;                        // one for each of the model's
   LaneFrames frames_;
-  AlignedArray scratch_;
+  bool predictor_was_lower_ = true;  ///< in the last step, of all; see Workspace
 };
 
 /// One step of each of 1 to kLanes bodies of one model, as step() takes it, but side by side: each in its lane of the
 /// registers, so that the model's constants are read once for all. docs/step_in_detail.md, "Bodies in lanes". A body
 /// that sleeps, one near an obstacle, and one that Newton's method needs more for than whole steps with exact Hessians,
 /// step by themselves. No body's numbers depend on the others'; they are those of step() to rounding. No call allocates
-/// or throws.
+/// or throws. `next`: those whose turn comes after these, if that is known.
 void step_in_lanes(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
-                   std::span<StepReport> reports) noexcept;
+                   std::span<StepReport> reports, std::span<const LaneBody> next = {}) noexcept;
 
 /// The same, but that those of a group of fewer than kFewestLanes step by themselves.
 void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
-                       std::span<StepReport> reports) noexcept;
+                       std::span<StepReport> reports, std::span<const LaneBody> next = {}) noexcept;
 
 }  // namespace exmat::runtime

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "runtime/sim/step/contact_step.h"
@@ -13,7 +14,6 @@ namespace exmat::runtime {
 namespace {
 
 constexpr double kResolvedTurn = 0.3;  // [rad] of a free body in one step
-constexpr double kUnclear = 1e-3;      // of the elastic energy: two potentials that differ by less may change places
 
 FrameStep frame_step(const StepScene& scene, const State& state) {
   const double end = static_cast<double>(state.step + 1) * scene.time_step;
@@ -82,7 +82,7 @@ void choose_first_iterate(const StepScene& scene, const State& state, Incrementa
   const double at_start = potential.potential_at_start();
   const double first = begins_with_predictor ? potential.start(workspace.q) : potential.potential_of_start(workspace.q);
   if (workspace.q == state.q) return;
-  const bool is_clear = std::abs(first - at_start) > kUnclear * std::abs(potential.elastic_energy());
+  const bool is_clear = are_clearly_apart(first, at_start, potential.elastic_energy());
   const bool is_decided = !begins_with_predictor || is_clear;
   const double predicted = is_decided ? first : potential.potential_of_start(workspace.q);
   workspace.predictor_was_lower = predicted <= at_start;
@@ -97,14 +97,19 @@ void choose_first_iterate(const StepScene& scene, const State& state, Incrementa
 
 /// Arithmetic on subnormal numbers takes a hundred times as long, and a body that comes to rest is full of them.
 bool flush_subnormals(Eigen::VectorXd& numbers) {
-  int found = 0;
-  for (double& number : numbers) {  // without branches
-    const bool subnormal = (std::abs(number) < std::numeric_limits<double>::min()) & (number != 0);
-    found += subnormal;
-    number = subnormal ? 0 : number;
-  }
-  return found > 0;
+  const auto is_subnormal = [](double number) {
+    return (std::abs(number) < std::numeric_limits<double>::min()) & (number != 0);
+  };
+  std::int64_t found = 0;  // as wide as the numbers, for whole registers of them
+  for (const double number : numbers) found |= is_subnormal(number) ? 1 : 0;
+  if (found == 0) return false;
+  for (double& number : numbers)
+    if (is_subnormal(number)) number = 0;
+  return true;
 }
+
+/// Without a branch for each number: what is not finite is not zero times zero either.
+bool are_finite(const Eigen::VectorXd& numbers) { return (0 * numbers.array()).sum() == 0; }
 
 void commit(const Model& model, const StepScene& scene, double elastic_energy, Workspace& workspace, State& state) {
   const StepForm& form = workspace.form;
@@ -208,7 +213,7 @@ const StepReport& BodyStep::take(const NewtonReport& newton) noexcept {
   add_newton_report(newton, report_);
   Workspace& workspace = workspace_;
   workspace.v = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
-  if (!workspace.q.allFinite() || !workspace.v.allFinite()) report_.status |= kStepNonFinite;
+  if (!are_finite(workspace.q) || !are_finite(workspace.v)) report_.status |= kStepNonFinite;
   if (report_.status & kStepNonFinite) return report_;
   if (near_) {
     report_.contacts = workspace.near->contact.touching;

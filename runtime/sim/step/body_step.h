@@ -1,5 +1,7 @@
 #pragma once
 
+#include <cmath>
+
 #include "runtime/sim/step/incremental_potential.h"
 #include "runtime/sim/step/model.h"
 #include "runtime/sim/step/scene.h"
@@ -12,6 +14,12 @@ namespace exmat::runtime {
 /// Whether the next step has no smooth past: the first one, or one that a scripted force begins or ends with, or in
 /// which a setting of the scene or the accelerations of the frame jump.
 bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept;
+
+/// Of the two first iterates: whether their potentials differ by more than rounding of the elastic energy may.
+inline bool are_clearly_apart(double a, double b, double elastic_energy) noexcept {
+  constexpr double kUnclear = 1e-3;
+  return std::abs(a - b) > kUnclear * std::abs(elastic_energy);
+}
 
 /// One step of one body in parts: begin(), solve(), finish(). Bodies that touch are solved together instead: begin(),
 /// prepare(), their common solution, finish(). Refers to all that it is made of. No call allocates.

@@ -62,8 +62,8 @@ struct Elements {
     }
     general.kind = ElementLaw::Kind::kQuadraticInGreenStrain;
     general.quadratic = quadratic.data();
-    scratch_arrays = {AlignedArray(stride * kLanes), AlignedArray(9 * kLanes * stride), AlignedArray(stride * stride)};
-    scratch = {scratch_arrays[0].data(), scratch_arrays[1].data(), scratch_arrays[2].data()};
+    scratch_arrays = {AlignedArray(stride * kLanes), AlignedArray(lane_triangle(modes) / kLanes)};
+    scratch = {scratch_arrays[0].data(), scratch_arrays[1].data()};
     q = test::random_vector(modes, 7);
   }
 
@@ -263,7 +263,7 @@ struct Panel {
   std::array<Eigen::Matrix3d, kLanes> rotations(const Kernels& kernels, const Eigen::VectorXd& q) {
     Eigen::VectorXd force(9 * kLanes);
     AlignedArray scratch_force(9 * kLanes * kLanes);
-    kernels.force(arrays, law, q.data(), {scratch_force.data(), nullptr, nullptr}, force.data());
+    kernels.force(arrays, law, q.data(), {scratch_force.data(), nullptr}, force.data());
     std::array<Eigen::Matrix3d, kLanes> found;
     for (int j = 0; j < kLanes; ++j)
       found[j] = Eigen::Matrix3d::Identity() + (q - 0.5 * force).segment<9>(9 * j).reshaped<Eigen::RowMajor>(3, 3);

@@ -88,9 +88,8 @@ TEST_P(LanesTest, ElementsAreThoseOfOneBodyAtATime) {
     const AlignedArray q = in_lanes(q_);
     for (const Kernels* kernels : available()) {
       AlignedArray energy(kLanes), force(modes_ * kLanes), force_alone(modes_ * kLanes), energy_alone(kLanes),
-          stiffness(lane_triangle(modes_)), scratch(lane_scratch(modes_));
-      kernels->lanes_force_and_stiffness(arrays_, law, q.data(), scratch.data(), energy.data(), force.data(),
-                                         stiffness.data());
+          stiffness(lane_triangle(modes_));
+      kernels->lanes_force_and_stiffness(arrays_, law, q.data(), energy.data(), force.data(), stiffness.data());
       kernels->lanes_force(arrays_, law, q.data(), energy_alone.data(), force_alone.data());
       for (Eigen::Index i = 0; i < force.size(); ++i) EXPECT_EQ(force[i], force_alone[i]);
       for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
@@ -127,13 +126,11 @@ TEST_P(LanesTest, MixedStiffnessIsTheSameToSinglePrecision) {
        {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational}) {
     law.kind = law_kind(model);
     for (const Kernels* kernels : available()) {
-      AlignedArray energy(kLanes), force(modes_ * kLanes), stiffness(lane_triangle(modes_)),
-          scratch(lane_scratch(modes_));
+      AlignedArray energy(kLanes), force(modes_ * kLanes), stiffness(lane_triangle(modes_));
       AlignedArray mixed_energy = energy, mixed_force = force, mixed = stiffness;
-      kernels->lanes_force_and_stiffness(arrays_, law, q.data(), scratch.data(), energy.data(), force.data(),
-                                         stiffness.data());
-      kernels->lanes_force_and_mixed_stiffness(arrays_, law, q.data(), scratch.data(), mixed_energy.data(),
-                                               mixed_force.data(), mixed.data());
+      kernels->lanes_force_and_stiffness(arrays_, law, q.data(), energy.data(), force.data(), stiffness.data());
+      kernels->lanes_force_and_mixed_stiffness(arrays_, law, q.data(), mixed_energy.data(), mixed_force.data(),
+                                               mixed.data());
       for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
         EXPECT_EQ(mixed_energy[lane], energy[lane]) << kernels->name;
         double difference = 0, size = 0;

@@ -60,7 +60,7 @@ TEST_F(Settings, AreTheProductOfAllLists) {
           for (const double step : {0.001, 0.002})
             for (const char* integrator : {"bdf2", "newmark"})
               for (const char* target : {"table", "solve"})
-                expected.insert({m, r, l, training, s, material, step, integrator, "cubature", target});
+                expected.insert({m, r, l, training, s, material, step, integrator, "cubature", target, "double"});
   EXPECT_EQ(points.size(), 2U * 3 * 2 * 2 * 2 * 2 * 2 * 2 * 2);
   EXPECT_EQ(std::set<PointSettings>(points.begin(), points.end()), expected);
 }
@@ -110,7 +110,7 @@ TEST_F(Settings, CompareElasticForcesWithThoseOfTheScene) {
 TEST_F(Settings, AreAppliedToAssetAndScene) {
   asset_.cubature_tolerance = 0.01;
   scene_.regions.push_back({"left", {}});
-  const PointSettings point{5, 7, 9, "none", 11, "corotational", 0.002, "newmark", "cubature", "solve"};
+  const PointSettings point{5, 7, 9, "none", 11, "corotational", 0.002, "newmark", "cubature", "solve", "mixed"};
   const AssetConfig asset = with_settings(asset_, point);
   EXPECT_EQ(asset.eigenfunctions, 5);
   EXPECT_EQ(asset.basis_size, 7);
@@ -120,6 +120,7 @@ TEST_F(Settings, AreAppliedToAssetAndScene) {
   EXPECT_FALSE(asset.cubature_tolerance) << "one of them alone";
   EXPECT_EQ(asset.material.model, MaterialModel::kCorotational);
   const SceneConfig scene = with_settings(scene_, point);
+  EXPECT_EQ(scene.precision, Precision::kMixed);
   EXPECT_EQ(scene.time_step, 0.002);
   EXPECT_EQ(scene.integrator, Integrator::kNewmark);
   EXPECT_EQ(scene.examples->target, TargetSource::kSolve);
@@ -144,7 +145,10 @@ TEST_F(Settings, OfAToleranceStayWithoutANumberOfElements) {
 }
 
 TEST_F(Settings, SurviveJson) {
-  study_.sweeps = {{.linear_modes = {7}, .time_step = {1.0 / 3}, .internal_force = {"cubature", "all_elements"}}};
+  study_.sweeps = {{.linear_modes = {7},
+                    .time_step = {1.0 / 3},
+                    .internal_force = {"cubature", "all_elements"},
+                    .precision = {"double", "mixed"}}};
   for (const PointSettings& point : expanded())
     EXPECT_EQ(settings_from_json(nlohmann::ordered_json::parse(to_json(point).dump())), point);
 }

@@ -48,7 +48,7 @@ TEST(StudyFile, ReadsEveryMember) {
     "name": "s", "asset": "a.json", "scene": "b.json", "steps": 7, "frames": 3, "baseline": true,
     "sweeps": [ {"eigenfunctions": [1, 2], "basis_size": [3], "linear_modes": [6, 7], "training": ["none", "scene"],
                  "cubature_elements": [4, 5], "material": ["corotational"],
-                 "time_step": [0.01], "integrator": ["newmark"], "internal_force": ["all_elements"], "target": ["solve"], "elastic_stiffness": [0.5, 2]} ],
+                 "time_step": [0.01], "integrator": ["newmark"], "internal_force": ["all_elements"], "target": ["solve"], "elastic_stiffness": [0.5, 2], "precision": ["mixed"]} ],
     "reference": {"time_step": 0.002, "integrator": "bdf2"},
     "sources": {"eigenfunctions": 40, "time_steps": 4, "exact_examples": "c.json"},
     "timing": {"rounds": 2, "steps": 8, "baseline_steps": 9},
@@ -57,6 +57,7 @@ TEST(StudyFile, ReadsEveryMember) {
   EXPECT_EQ(sweep.eigenfunctions, (std::vector<int>{1, 2}));
   EXPECT_EQ(sweep.linear_modes, (std::vector<int>{6, 7}));
   EXPECT_EQ(sweep.elastic_stiffness, (std::vector<double>{0.5, 2}));
+  EXPECT_EQ(sweep.precision, std::vector<std::string>{"mixed"});
   EXPECT_EQ(sweep.training, (std::vector<std::string>{"none", "scene"}));
   EXPECT_EQ(sweep.cubature_elements, (std::vector<int>{4, 5}));
   EXPECT_EQ(sweep.material, std::vector<std::string>{"corotational"});

@@ -182,6 +182,34 @@ TEST(LaneStep, NoBodyDependsOnTheOthers) {
     EXPECT_EQ(difference(*model, all.states[chosen[k]], few.states[k]), 0) << k;
 }
 
+// The predictor or the pose before it is evaluated first by what the last step took; which bodies come next is known or
+// not. A workspace that knows nothing takes the same steps to the bit.
+TEST(LaneStep, NoResultDependsOnWhatAWorkspaceHasSeen) {
+  const Bar bar = test::make_bar();
+  const auto model = prepared(bar);
+  Crowd known = make_crowd(bar, *model, Kind{.tolerance = 1e-9}, 8);
+  for (StepScene& scene : known.scenes) scene.time_step = 0.05;
+  Crowd unknown = known;
+  LaneWorkspace workspace(*model, known.scenes.front());
+  std::vector<StepReport> reports(8), expected(8);
+  int left = 0, mixed = 0;
+  for (int n = 0; n < 100; ++n) {
+    step_side_by_side(*model, known.bodies(), workspace, reports, known.bodies());
+    LaneWorkspace fresh(*model, known.scenes.front());
+    step_side_by_side(*model, unknown.bodies(), fresh, expected);
+    int now = 0;
+    for (std::size_t i = 0; i < 8; ++i) {
+      EXPECT_EQ(reports[i].line_search_evaluations, expected[i].line_search_evaluations);
+      now += expected[i].line_search_evaluations > 0 ? 1 : 0;
+    }
+    left += now;
+    mixed += now > 0 && now < 8 ? 1 : 0;
+  }
+  EXPECT_GT(left, 0) << "no predictor was left";
+  EXPECT_GT(mixed, 0);
+  for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(difference(*model, unknown.states[i], known.states[i]), 0) << i;
+}
+
 // What Newton's method needs more for: a body pushed flat so that Hessians are indefinite, and one without a number.
 TEST(LaneStep, ABodyThatNeedsMoreStepsByItself) {
   const Kind kind{.tolerance = 1e-9};

@@ -1,0 +1,45 @@
+#include <utility>
+
+#include "runtime/sim/lanes/lane_step.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::runtime {
+
+bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept {
+  if (model.internal_force.polynomial() || scene.meets_bodies) return false;
+  for (std::size_t i = 0; i < scene.examples.size(); ++i) {
+    const ExampleSettings& examples = scene.examples[i];
+    if (elastic_factor(examples) > 0) return false;
+    if (is_filtered(examples) && !model.examples[i].filter.is_symmetric()) return false;
+  }
+  return true;
+}
+
+LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies)
+    : bodies_(bodies, Workspace(model, scene)), frames_(model) {
+  if (std::cmp_less(bodies, kFewestLanes)) return;
+  const Eigen::Index modes = model.modes();
+  forms_ = LaneForms(modes);
+  for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
+                                &linear_, &frozen_, &next_frozen_, &offset_})
+    *vectors = AlignedArray(modes * kLanes);
+  for (AlignedArray* matrices : {&quadratic_, &stiffness_, &factor_, &new_factor_})
+    *matrices = AlignedArray(lane_triangle(modes));
+  for (const ExampleModel& examples : model.examples) examples_.emplace_back(examples);
+}
+
+void LaneWorkspace::set_profile(Profile* profile) {
+  for (Workspace& body : bodies_) body.profile = profile;
+}
+
+void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
+                       std::span<StepReport> reports, std::span<const LaneBody> next) noexcept {
+  if (std::ssize(bodies) >= kFewestLanes) {
+    step_in_lanes(model, bodies, workspace, reports, next);
+    return;
+  }
+  for (std::size_t l = 0; l < bodies.size(); ++l)
+    reports[l] = step(model, *bodies[l].scene, *bodies[l].state, workspace.body(l));
+}
+
+}  // namespace exmat::runtime
