@@ -27,7 +27,7 @@ set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME exmat-runtime)
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Steps example-based elastic bodies in real time: program, library, headers.")
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_NAME exmat-precompute)
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_SUGGESTS exmat-meshing)  # under the GPL, so nobody gets it unasked
-set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS libopenblas0-serial)  # any BLAS does; the reference one is slow
+set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS libopenblas0-pthread)  # any BLAS does; the reference one is slow, the serial OpenBLAS serves one thread
 set(CPACK_COMPONENT_PRECOMPUTE_DESCRIPTION "Turns objects and example poses into bundles for exmat-runtime.")
 set(CPACK_DEBIAN_MESHING_PACKAGE_NAME exmat-meshing)
 set(CPACK_DEBIAN_MESHING_PACKAGE_ENHANCES exmat-precompute)

@@ -40,13 +40,16 @@ std::vector<std::pair<std::string, std::string>> take_solver_options(std::vector
 }
 
 void add_solver_options(CLI::App& app, precompute::SolverSettings& settings) {
-  const std::map<std::string, Eigensolver> names{
-      {"direct", Eigensolver::kDirect}, {"gamg", Eigensolver::kGamg}, {"lobpcg", Eigensolver::kLobpcg}};
+  const std::map<std::string, Eigensolver> names{{"auto", Eigensolver::kAuto},
+                                                 {"direct", Eigensolver::kDirect},
+                                                 {"mixed", Eigensolver::kMixed},
+                                                 {"gamg", Eigensolver::kGamg},
+                                                 {"lobpcg", Eigensolver::kLobpcg}};
   app.add_option("--eigensolver", settings.eigensolver,
-                 "direct (MUMPS), or with less memory gamg (multigrid) or lobpcg; --eps-NAME VALUE and --st-NAME VALUE "
-                 "are passed on to SLEPc and PETSc")
+                 "direct (MUMPS), mixed (factors in single precision), with less memory gamg (multigrid) or lobpcg, or "
+                 "auto, which goes by the mesh; --eps-NAME VALUE and --st-NAME VALUE are passed on to SLEPc and PETSc")
       ->transform(CLI::CheckedTransformer(names, CLI::ignore_case))
-      ->option_text("{direct,gamg,lobpcg} [direct]");
+      ->option_text("{auto,direct,mixed,gamg,lobpcg} [auto]");
 }
 
 }  // namespace exmat

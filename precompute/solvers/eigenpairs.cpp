@@ -6,19 +6,24 @@
 #include <cmath>
 #include <cstdio>
 #include <exception>
+#include <optional>
 #include <random>
 #include <utility>
 #include <vector>
 
 #include "common/core/error.h"
 #include "common/core/progress.h"
+#include "precompute/solvers/davidson.h"
 #include "precompute/solvers/refinement.h"
 #include "precompute/solvers/solver_access.h"
 
 namespace exmat::precompute {
 namespace {
 
-constexpr double kConvergence = 1e-12;       // of Krylov-Schur, relative to the eigenvalue
+constexpr double kConvergence = 1e-12;  // of Krylov-Schur, relative to the eigenvalue
+// Of eigenvectors by Davidson's method, and of those that would show that one was missed: their values are off by the
+// square of it.
+constexpr double kDavidsonAccuracy = 1e-10, kMissedAccuracy = 1e-5;
 constexpr double kLobpcgConvergence = 1e-9;  // |K x - lambda M x| / |lambda M x|, about
 // Of |K x - lambda M x| / |lambda M x|. Rounding alone leaves eps |K| |x| / |lambda M x|, which is more for slender
 // bodies and those with flat tets: their pairs are refined.
@@ -166,7 +171,8 @@ Eigen::MatrixXd solve_eigenproblem(const EigenShare& problem, const Eigen::Matri
   check_petsc(EPSSetOperators(eps.get(), problem.stiffness.get(), problem.mass.get()), "operators");
   check_petsc(EPSSetProblemType(eps.get(), EPS_GHEP), "problem type");
   check_petsc(EPSSetDimensions(eps.get(), static_cast<PetscInt>(count), PETSC_DEFAULT, PETSC_DEFAULT), "dimensions");
-  const bool lobpcg = solver_settings().eigensolver == Eigensolver::kLobpcg;
+  // Of the two with multigrid the one with less work, where it is left to us.
+  const bool lobpcg = problem.solver.means == Means::kMultigrid && solver_settings().eigensolver != Eigensolver::kGamg;
   lobpcg ? set_lobpcg(eps.get(), problem.mass.get(), problem.solver) : set_krylov_schur(eps.get(), problem.solver);
 
   std::vector<VecHandle> deflation = to_vecs(found);
@@ -184,34 +190,36 @@ Eigen::MatrixXd solve_eigenproblem(const EigenShare& problem, const Eigen::Matri
   return eigenvectors(eps.get(), start.size(), count);
 }
 
-// The eigenproblem on all ranks, while it lives.
+// The eigenproblem, on all ranks while it lives unless the leader has the factors.
 class TeamProblem {
  public:
   TeamProblem(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver)
-      : solver_(solver), share_(announced(solver), solver.share()) {
-    share_.pose(stiffness, mass);
+      : stiffness_(stiffness), mass_(mass), solver_(solver) {
+    if (solver.share().mixed) return;
+    const Call call{Task::kPoseEigenproblem, new_share_id(), {solver.share().id}};
+    announce(call);
+    share_.emplace(call, solver.share());
+    share_->pose(stiffness, mass);
   }
 
   // `count` eigenvectors in the M-complement of the columns of `found`.
   Eigen::MatrixXd search(const Eigen::MatrixXd& found, Eigen::Index count) const {
+    if (!share_)
+      return davidson_eigenvectors(stiffness_, mass_, *solver_.share().mixed, found, count,
+                                   found.cols() == 0 ? kDavidsonAccuracy : kMissedAccuracy);
     Eigen::MatrixXd fields(solver_.size(), found.cols() + 1);
     fields.leftCols(found.cols()) = found;
     fields.rightCols(1) = solver_.solve(start_vector(solver_.size(), 1 + static_cast<unsigned>(found.cols())));
-    announce({Task::kSearch, share_.id, {found.cols(), count}});
-    Eigen::MatrixXd vectors = share_.search(fields, found.cols(), count);
+    announce({Task::kSearch, share_->id, {found.cols(), count}});
+    Eigen::MatrixXd vectors = share_->search(fields, found.cols(), count);
     require_options_taken();
     return vectors;
   }
 
  private:
-  static Call announced(const SemidefiniteSolver& solver) {
-    const Call call{Task::kPoseEigenproblem, new_share_id(), {solver.share().id}};
-    announce(call);
-    return call;
-  }
-
+  const SparseMatrix &stiffness_, &mass_;
   const SemidefiniteSolver& solver_;
-  EigenShare share_;
+  std::optional<EigenShare> share_;
 };
 
 struct Polished {

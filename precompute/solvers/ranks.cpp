@@ -276,7 +276,7 @@ std::int64_t peak_memory_of_ranks() {
 }
 
 void configure_solvers(const SolverSettings& wanted) {
-  if (wanted.eigensolver == settings().eigensolver && wanted.options.empty() && settings().options.empty()) return;
+  if (wanted == settings() && wanted.options.empty()) return;
   start_solvers();
   const Call call{Task::kConfigure,
                   0,

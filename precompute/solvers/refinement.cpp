@@ -49,8 +49,9 @@ ExtendedMatrix solve_refined(const SparseMatrix& stiffness, const SparseMatrix& 
 
 ExtendedMatrix extended_product(const SparseMatrix& matrix, const ExtendedMatrix& columns) {
   ExtendedMatrix product = ExtendedMatrix::Zero(matrix.rows(), columns.cols());
-  for (Eigen::Index k = 0; k < columns.cols(); ++k)
-    for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row)
+    for (Eigen::Index k = 0; k < columns.cols(); ++k) {
       long double sum = 0;
       for (SparseMatrix::InnerIterator entry(matrix, row); entry; ++entry)
         sum += static_cast<long double>(entry.value()) * columns(entry.col(), k);

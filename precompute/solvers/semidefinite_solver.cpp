@@ -3,9 +3,15 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <array>
+#include <cstdio>
+#include <omp.h>
 #include <slepcsys.h>
+#include <utility>
 #include <vector>
 
+#include "common/core/log.h"
+#include "precompute/solvers/available_memory.h"
+#include "precompute/solvers/blas.h"
 #include "precompute/solvers/solver_access.h"
 
 namespace exmat::precompute {
@@ -22,8 +28,9 @@ constexpr double kShift = 1e-6;
 constexpr Eigen::Index kRigidMotions = 6;
 // Work space beyond what the pattern of the matrix needs [%], tried one after the other; the first is MUMPS's own.
 constexpr std::array<PetscInt, 7> kWorkSpaces{20, 60, 140, 300, 700, 1500, 3100};
-// Right-hand sides that are copied and solved for together: more are no faster.
-constexpr Eigen::Index kSolvedTogether = 32;
+// Right-hand sides that are copied and solved for together: more are no faster with MUMPS. By factors in single
+// precision, which are copied into the order of BLAS's kernels each time, 64 take a third longer than 32.
+constexpr Eigen::Index kSolvedTogether = 32, kSolvedTogetherMixed = 64;
 
 // Vertices stay whole in multigrid where the matrix is that of displacements.
 Eigen::Index block_of(Eigen::Index soft) { return soft == kRigidMotions ? 3 : 1; }
@@ -75,6 +82,12 @@ NullSpaceHandle null_space_of(const Eigen::MatrixXd& own, Eigen::Index block) {
   return space;
 }
 
+std::string gigabytes(std::int64_t bytes) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.2f GB", 1e-9 * static_cast<double>(bytes));
+  return text.data();
+}
+
 [[noreturn]] void refuse_for_memory(const char* what) {
   throw WorkError(std::string("not enough memory for the ") + what + "; use more ranks, or --eigensolver gamg");
 }
@@ -124,6 +137,41 @@ void require_solved(PetscErrorCode code, Mat factor) {
   check_petsc(code, "solve");
 }
 
+struct Choice {
+  Means means = Means::kMumps;
+  std::unique_ptr<MixedSolver> mixed{};
+};
+
+// Factors in single precision, where they serve. Several ranks have MUMPS, which shares its work among them.
+Choice choose(const SparseMatrix& matrix, const Eigen::MatrixXd& mass_times_null_space,
+              const Eigen::MatrixXd& soft_fields, const std::string& name) {
+  const SolverSettings& settings = solver_settings();
+  const bool by_itself = settings.eigensolver == Eigensolver::kAuto, bordered = mass_times_null_space.cols() > 0;
+  if (settings.eigensolver == Eigensolver::kGamg || settings.eigensolver == Eigensolver::kLobpcg)
+    return {Means::kMultigrid};
+  const bool large = by_itself && settings.options.empty() && matrix.rows() >= settings.large;
+  const bool knows_null_space = !bordered || soft_fields.cols() > 0;
+  if ((settings.eigensolver != Eigensolver::kMixed && !large) || rank_count() > 1 || !knows_null_space) return {};
+  const int block = static_cast<int>(block_of(soft_fields.cols()));
+  const std::shared_ptr<const Elimination> plan = dissected_elimination(graph_of(matrix, block), block);
+  const std::int64_t needed = SingleCholesky::bytes(*plan, block, omp_get_max_threads()),
+                     there = settings.memory > 0 ? settings.memory : available_memory();
+  if (by_itself && needed > there) {
+    log::info(name + ": its factors would take " + gigabytes(needed) + " of memory, and there is " + gigabytes(there) +
+              "; multigrid and LOBPCG in their place");
+    return {Means::kMultigrid};
+  }
+  auto mixed = std::make_unique<MixedSolver>(matrix, bordered ? soft_fields : mass_times_null_space,
+                                             mass_times_null_space, block, plan);
+  if (mixed->objection().empty()) {
+    log::info(name + ": factors in single precision, " + gigabytes(needed) +
+              (blas_callers() < omp_get_max_threads() ? ", by one thread: OpenBLAS was built without" : ""));
+    return {Means::kMixed, std::move(mixed)};
+  }
+  log::info(name + ": " + mixed->objection() + "; factors in double in their place");
+  return {};
+}
+
 }  // namespace
 
 std::string solver_versions() {
@@ -138,9 +186,9 @@ SolverShare::SolverShare(const Call& call)
     : layout{call.numbers[0], 1},
       border(call.numbers[1]),
       soft(call.numbers[2]),
-      direct(solver_settings().eigensolver == Eigensolver::kDirect) {
+      means(static_cast<Means>(call.numbers[3])) {
   id = call.object;
-  if (!direct) layout.block = block_of(soft);
+  if (means == Means::kMultigrid) layout.block = block_of(soft);
 }
 
 SolverShare::~SolverShare() { forget(id); }
@@ -148,7 +196,7 @@ SolverShare::~SolverShare() { forget(id); }
 void SolverShare::factorise(const SparseMatrix& whole, const Eigen::MatrixXd& mass_times_null_space,
                             const Eigen::MatrixXd& soft_fields) {
   agree([&] {
-    if (direct) return factorise_directly(whole, mass_times_null_space);
+    if (means == Means::kMumps) return factorise_directly(whole, mass_times_null_space);
     set_up_multigrid(whole, mass_times_null_space, soft_fields);
   });
 }
@@ -207,7 +255,8 @@ Eigen::MatrixXd SolverShare::solve(const Eigen::MatrixXd& right_hand_sides, Eige
 }
 
 Eigen::MatrixXd SolverShare::solve_rows(const Eigen::MatrixXd& right_hand_sides) const {
-  return direct ? solve_directly(right_hand_sides) : iterate(right_hand_sides);
+  if (means == Means::kMixed) return mixed->solve(right_hand_sides);
+  return means == Means::kMumps ? solve_directly(right_hand_sides) : iterate(right_hand_sides);
 }
 
 Eigen::MatrixXd SolverShare::solve_directly(const Eigen::MatrixXd& right_hand_sides) const {
@@ -251,11 +300,20 @@ Eigen::MatrixXd SolverShare::iterate(Eigen::MatrixXd right_hand_sides) const {
 SemidefiniteSolver::SemidefiniteSolver(const SparseMatrix& matrix, const Eigen::MatrixXd& mass_times_null_space,
                                        const std::string& name, const Eigen::MatrixXd& soft_fields) {
   start_solvers();
-  const Call call{Task::kFactorise, new_share_id(), {matrix.rows(), mass_times_null_space.cols(), soft_fields.cols()}};
+  Choice choice = choose(matrix, mass_times_null_space, soft_fields, name);
+  const Call call{
+      Task::kFactorise,
+      new_share_id(),
+      {matrix.rows(), mass_times_null_space.cols(), soft_fields.cols(), static_cast<std::int64_t>(choice.means)}};
+  if (choice.means == Means::kMixed) {
+    share_ = std::make_unique<SolverShare>(call);
+    share_->mixed = std::move(choice.mixed);
+    return;
+  }
   announce(call);
   share_ = std::make_unique<SolverShare>(call);
   share_->factorise(matrix, mass_times_null_space, soft_fields);
-  if (!share_->direct) return;
+  if (share_->means == Means::kMultigrid) return;
   PetscInt negative = 0, zero = 0, positive = 0;
   check_petsc(MatGetInertia(share_->factor.get(), &negative, &zero, &positive), "inertia");
   if (negative != share_->border || zero != 0)
@@ -272,8 +330,9 @@ Eigen::Index SemidefiniteSolver::size() const { return share_->layout.size; }
 
 Eigen::MatrixXd SemidefiniteSolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
   Eigen::MatrixXd solutions(right_hand_sides.rows(), right_hand_sides.cols());
-  for (Eigen::Index begin = 0; begin < solutions.cols(); begin += kSolvedTogether) {
-    const Eigen::Index count = std::min(kSolvedTogether, solutions.cols() - begin);
+  const Eigen::Index together = share_->means == Means::kMixed ? kSolvedTogetherMixed : kSolvedTogether;
+  for (Eigen::Index begin = 0; begin < solutions.cols(); begin += together) {
+    const Eigen::Index count = std::min(together, solutions.cols() - begin);
     announce({Task::kSolve, share_->id, {count}});
     solutions.middleCols(begin, count) = share_->solve(right_hand_sides.middleCols(begin, count), count);
   }

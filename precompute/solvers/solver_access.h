@@ -3,10 +3,20 @@
 // Private to precompute/solvers: what each rank holds of a solver and of an eigenproblem. Members are collective, and
 // take what is the leader's from the leader alone.
 
+#include <memory>
+
+#include "precompute/solvers/mixed_solver.h"
 #include "precompute/solvers/semidefinite_solver.h"
 #include "precompute/solvers/team.h"
 
 namespace exmat::precompute {
+
+/// What a solver solves by.
+enum class Means : std::int64_t {
+  kMumps,      ///< factors in double
+  kMixed,      ///< factors in single precision, on the leader alone
+  kMultigrid,  ///< conjugate gradients with multigrid
+};
 
 struct SolverShare : Share {
   explicit SolverShare(const Call& call);
@@ -21,9 +31,10 @@ struct SolverShare : Share {
 
   Layout layout;
   Eigen::Index border = 0, soft = 0;  ///< columns of R, of the soft fields
-  bool direct = true;
-  MatHandle matrix;     ///< none where direct
-  MatHandle factor;     ///< of the bordered matrix, where direct
+  Means means = Means::kMumps;
+  std::unique_ptr<MixedSolver> mixed;
+  MatHandle matrix;     ///< of multigrid alone
+  MatHandle factor;     ///< of the bordered matrix, by MUMPS
   KspHandle iteration;  ///< conjugate gradients
   MatHandle shifted;    ///< without null vectors, for multigrid
   NullSpaceHandle soft_space;

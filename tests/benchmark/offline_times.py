@@ -29,6 +29,7 @@ RUNS = [
     ((84, 22, 18), "alone", 0, "none"),
     ((84, 22, 18), "an example", 1, "none"),
     ((84, 22, 18), "an example, training", 1, "auto"),
+    ((147, 36, 32), "alone", 0, "none"),
     ((147, 36, 32), "an example", 1, "none"),
 ]
 STAGES = ["shape space and examples", "factorisation", "linear modes", "modal derivatives", "poses of the examples", "targets", "training", "cubature"]

@@ -78,7 +78,9 @@ TEST_P(Eigensolvers, SolveAsTheDirectOne) {
   EXPECT_LE((solve() - reference).norm() / reference.norm(), kTolerance);
 }
 
-TEST_P(Eigensolvers, RefuseOptionsThatNothingTakes) {
+class MultigridSolvers : public Eigensolvers {};
+
+TEST_P(MultigridSolvers, RefuseOptionsThatNothingTakes) {
   configure_solvers({GetParam(), {{"eps_ncv", "40"}, {"eps_nvc", "40"}}});
   try {
     laplace_basis(box(), kCount, "box");
@@ -88,7 +90,9 @@ TEST_P(Eigensolvers, RefuseOptionsThatNothingTakes) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(, Eigensolvers, testing::Values(Eigensolver::kGamg, Eigensolver::kLobpcg));
+INSTANTIATE_TEST_SUITE_P(, Eigensolvers,
+                         testing::Values(Eigensolver::kMixed, Eigensolver::kGamg, Eigensolver::kLobpcg));
+INSTANTIATE_TEST_SUITE_P(, MultigridSolvers, testing::Values(Eigensolver::kGamg, Eigensolver::kLobpcg));
 
 }  // namespace
 }  // namespace exmat::precompute

@@ -1,0 +1,28 @@
+#pragma once
+
+// Private to precompute/solvers: products of matrices of many rows and few columns, by rows, on all threads. Results
+// are the same for every number of threads.
+
+#include <Eigen/Core>
+
+#include "common/core/arrays.h"
+#include "precompute/fem/assembly.h"
+
+namespace exmat::precompute {
+
+/// Some columns of a matrix by rows.
+using Columns = Eigen::Ref<const RowMatrix, 0, Eigen::OuterStride<>>;
+
+/// A X.
+RowMatrix product(const SparseMatrix& A, const RowMatrix& X);
+
+/// A^T B.
+Eigen::MatrixXd inner(const Columns& A, const Columns& B);
+
+/// X += factor V C.
+void add_product(double factor, const Columns& V, const Eigen::MatrixXd& C, RowMatrix& X);
+
+/// a . b of the columns of both.
+Eigen::RowVectorXd column_dots(const RowMatrix& A, const RowMatrix& B);
+
+}  // namespace exmat::precompute
