@@ -337,13 +337,19 @@ double kinetic_and_total(std::span<WorldBody* const> bodies, double& total) noex
   return kinetic;
 }
 
-/// After the step of an island that did not converge: its bodies have the `momenta` that they have to have, if any, and
-/// together no more energy than `before` [J].
-void limit_energy(std::span<WorldBody* const> bodies, const std::optional<IslandMomenta>& momenta,
-                  double before) noexcept {
+/// After the step of an island that did not converge: its bodies have the momenta that they have to have, if nothing
+/// else touches them, and together no more energy than `before` [J].
+void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
+                  const std::optional<IslandBegin>& begin, double before) {
   double now = 0;
   const double kinetic = kinetic_and_total(bodies, now);
-  if (momenta) return take_momenta(bodies, *momenta, before - (now - kinetic));
+  if (begin) {
+    if (!take_momenta(bodies, *begin, before - (now - kinetic))) return;
+    for (PairContact* const pair : pairs)  // what they remember is of where the bodies are
+      pair->evaluate(*bodies[static_cast<std::size_t>(pair->body(0))],
+                     *bodies[static_cast<std::size_t>(pair->body(1))]);
+    return;
+  }
   if (!(now > before) || !(kinetic > 0)) return;
   const double share = std::max(0.0, 1 - (now - before) / kinetic);
   for (WorldBody* const own : bodies)
@@ -367,10 +373,10 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   });
   const NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
   const bool converged = newton.status == NewtonStatus::kConverged;
-  std::optional<IslandMomenta> momenta;
+  std::optional<IslandBegin> begin;
   double energy = 0;
   if (!converged) {
-    momenta = expected_momenta(bodies);
+    begin = begin_of(bodies);
     kinetic_and_total(bodies, energy);
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -389,7 +395,7 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   }
   for (WorldBody* const own : bodies) own->step->take(newton);
   const auto is_finite = [](const WorldBody* own) { return (own->step->report().status & kStepNonFinite) == 0; };
-  if (!converged && std::ranges::all_of(bodies, is_finite)) limit_energy(bodies, momenta, energy);
+  if (!converged && std::ranges::all_of(bodies, is_finite)) limit_energy(bodies, pairs, begin, energy);
   for (WorldBody* const own : bodies) own->report = own->step->report();
   return newton;
 }

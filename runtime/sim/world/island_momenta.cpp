@@ -60,34 +60,61 @@ void add_motion(std::span<WorldBody* const> bodies, double share, const FrameVel
     own->step->add_motion(share, {added.at(position_of(*own) - centre), added.angular});
 }
 
-}  // namespace
-
-std::optional<IslandMomenta> expected_momenta(std::span<WorldBody* const> bodies) noexcept {
-  IslandMomenta sum{position_of(*bodies.front()), {}};
-  for (const WorldBody* const own : bodies) {
-    const std::optional<FrameMomenta> momenta = own->model.frame->expected_momenta(own->workspace.frame);
-    if (!momenta || own->near().contact.candidate_count > 0) return std::nullopt;
-    // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
-    sum.total.linear += momenta->linear;
-    sum.total.angular += momenta->angular + (position_of(*own) - sum.about).cross(momenta->linear);
+/// Without turning, by which their energy could change.
+void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin, double mass) {
+  add_motion(bodies, 0, {}, Eigen::Vector3d::Zero());
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    WorldBody& own = *bodies[i];
+    const BodyBegin& from = begin.bodies[i];
+    FrameMotion motion = from.motion;
+    motion.position += own.scene.time_step / mass * begin.momenta.total.linear;
+    motion.linear_velocity.setZero();
+    motion.angular_velocity.setZero();
+    own.state.q = own.near().q = from.q;
+    own.state.elastic_energy = from.elastic_energy;
+    own.model.frame->set_motion(motion, own.state.q, own.state.v, own.workspace.frame, own.state.frame);
+    own.placement = own.model.frame->placement(own.state.frame);
   }
-  return sum;
+  const Together together(bodies);
+  add_motion(bodies, 1, together.motion_of(begin.momenta), together.centre);
 }
 
-void take_momenta(std::span<WorldBody* const> bodies, const IslandMomenta& momenta, double allowed) noexcept {
+}  // namespace
+
+std::optional<IslandBegin> begin_of(std::span<WorldBody* const> bodies) {
+  IslandBegin begin{{position_of(*bodies.front()), {}}, {}};
+  FrameMomenta& sum = begin.momenta.total;
+  for (const WorldBody* const own : bodies) {
+    const BodyFrame& frame = *own->model.frame;
+    const std::optional<FrameMomenta> momenta = frame.expected_momenta(own->workspace.frame);
+    if (!momenta || own->near().contact.candidate_count > 0) return std::nullopt;
+    // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
+    sum.linear += momenta->linear;
+    sum.angular += momenta->angular + (position_of(*own) - begin.momenta.about).cross(momenta->linear);
+    begin.bodies.push_back({frame.motion(own->state.frame), own->state.q, own->state.elastic_energy});
+  }
+  return begin;
+}
+
+bool take_momenta(std::span<WorldBody* const> bodies, const IslandBegin& begin, double allowed) {
+  const IslandMomenta& momenta = begin.momenta;
   const Together together(bodies);
+  const double least = together.energy_of(momenta);
+  if (least > allowed) {
+    go_on_together(bodies, begin, together.mass);
+    return true;
+  }
   const IslandMomenta now = momenta_of(bodies, momenta.about);
   const IslandMomenta missing{momenta.about,
                               {momenta.total.linear - now.total.linear, momenta.total.angular - now.total.angular}};
   add_motion(bodies, 1, together.motion_of(missing), together.centre);
   double kinetic = 0;
   for (const WorldBody* const own : bodies) kinetic += own->model.frame->kinetic_energy(own->state.v, own->state.frame);
-  if (kinetic <= allowed) return;
+  if (kinetic <= allowed) return false;
   const FrameVelocity rigid = together.motion_of(momenta);
-  const double least = together.energy_of(momenta);
-  const double share = least < allowed ? std::sqrt((allowed - least) / (kinetic - least)) : 0;
+  const double share = std::sqrt((allowed - least) / (kinetic - least));
   add_motion(bodies, share, {(1 - share) * rigid.linear, (1 - share) * rigid.angular}, together.centre);
-  if (least > allowed) add_motion(bodies, std::sqrt(std::max(0.0, allowed) / least), {}, together.centre);
+  return false;
 }
 
 }  // namespace exmat::runtime

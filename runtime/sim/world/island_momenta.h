@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "runtime/sim/frame/placement.h"
 #include "runtime/sim/world/world_body.h"
@@ -15,13 +16,27 @@ struct IslandMomenta {
   FrameMomenta total;
 };
 
-/// After start_contact() of each, before the end of the step: what external forces alone have made of their momenta.
-/// Nothing where something else takes part: an obstacle that is near, or a body that momenta do not move.
-std::optional<IslandMomenta> expected_momenta(std::span<WorldBody* const> bodies) noexcept;
+/// A body where a step begins.
+struct BodyBegin {
+  FrameMotion motion;
+  Eigen::VectorXd q;
+  double elastic_energy = 0;  ///< [J]
+};
 
-/// After a step of theirs that did not converge, whose motion does not add up to `momenta`: gives it to them by a rigid
-/// motion of all together, then takes out motion against each other until they have no more than `allowed` kinetic
-/// energy [J]. That leaves the momenta, as long as the rigid motion of all has no more energy; else it is slowed, too.
-void take_momenta(std::span<WorldBody* const> bodies, const IslandMomenta& momenta, double allowed) noexcept;
+/// Bodies where a step begins that nothing else touches.
+struct IslandBegin {
+  IslandMomenta momenta;  ///< as external forces alone change them in the step
+  std::vector<BodyBegin> bodies;
+};
+
+/// After start_contact() of each, before the end of the step. Nothing where something else takes part: an obstacle that
+/// is near, or a body that momenta do not move.
+std::optional<IslandBegin> begin_of(std::span<WorldBody* const> bodies);
+
+/// After a step of theirs that did not converge, whose motion does not add up to what they have to have: gives them
+/// their momenta by a rigid motion of all together, then takes out motion against each other until they have no more
+/// than `allowed` kinetic energy [J]. Where the rigid motion alone has more, since they were left deformed or in each
+/// other, they do not do what the step has found, but go on together, as they were, by that motion; then true.
+bool take_momenta(std::span<WorldBody* const> bodies, const IslandBegin& begin, double allowed);
 
 }  // namespace exmat::runtime
