@@ -13,10 +13,11 @@ struct Eigenpairs {
 };
 
 /// The `count` smallest eigenpairs of K x = lambda M x outside the null space of K, by SLEPc's Krylov-Schur on the
-/// inverse that `solver` has factored. No copy of a multiple eigenvalue is missed: the search is repeated in the
-/// complement of what was found until nothing smaller turns up. Residuals |K x - lambda M x| / |lambda M x| are at most
-/// 1e-9, or pairs are refined in long double until |lambda K^-1 M x - x| is, in the norm of M. Throws WorkError when
-/// the search does not converge, IllConditioned when the refinement does not.
+/// inverse that `solver` has factored, or by block Davidson with factors in single precision. No copy of a multiple
+/// eigenvalue is missed: the search is repeated in the complement of what was found until nothing smaller turns up.
+/// Residuals |K x - lambda M x| / |lambda M x| are at most 1e-9, or pairs are refined in long double until |lambda K^-1
+/// M x - x| is, in the norm of M. Throws WorkError when the search does not converge, IllConditioned when the
+/// refinement does not.
 Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass,
                                const SemidefiniteSolver& solver, Eigen::Index count);
 

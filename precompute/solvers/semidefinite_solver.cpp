@@ -28,8 +28,8 @@ constexpr double kShift = 1e-6;
 constexpr Eigen::Index kRigidMotions = 6;
 // Work space beyond what the pattern of the matrix needs [%], tried one after the other; the first is MUMPS's own.
 constexpr std::array<PetscInt, 7> kWorkSpaces{20, 60, 140, 300, 700, 1500, 3100};
-// Right-hand sides that are copied and solved for together: more are no faster with MUMPS. By factors in single
-// precision, which are copied into the order of BLAS's kernels each time, 64 take a third longer than 32.
+// Right-hand sides that are copied and solved for together: more are no faster with MUMPS. Factors in single precision
+// are copied into the order of BLAS's kernels for each pass, so that more columns cost little.
 constexpr Eigen::Index kSolvedTogether = 32, kSolvedTogetherMixed = 64;
 
 // Vertices stay whole in multigrid where the matrix is that of displacements.

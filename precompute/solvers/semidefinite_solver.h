@@ -22,8 +22,10 @@ struct SolverShare;
 
 /// Solves with a symmetric positive semi-definite matrix K whose null space is the span of the M-orthonormal columns of
 /// R, its rows over all ranks: by one direct factorisation (MUMPS through PETSc, L D L^T) of the bordered matrix
-/// [[K, M R], [(M R)^T, 0]], of K itself without a null space; with Eigensolver::kGamg and kLobpcg by conjugate
-/// gradients with algebraic multigrid (PETSc's GAMG).
+/// [[K, M R], [(M R)^T, 0]], of K itself without a null space; of large matrices and with Eigensolver::kMixed by
+/// factors in single precision with conjugate gradients, for which it keeps a copy of K; with kGamg and kLobpcg, and
+/// where factors do not fit into the memory, by conjugate gradients with algebraic multigrid (PETSc's GAMG). The log
+/// says which, but for the first.
 class SemidefiniteSolver {
  public:
   /// `soft_fields` [n x k] deform next to nothing, which multigrid has to know: R where there is a null space, else the
