@@ -224,7 +224,9 @@ TEST(BodySurface, WhatApproachesIsTheNearestOfAllTrianglesThatDo) {
         const auto hit = surface.nearest_approached(point, rest, *place, kRadius, shape, closes ? &closing : nullptr);
         const double expected = nearest[closes];
         ASSERT_EQ(hit.has_value(), expected < kRadius) << own << " of " << trial;
-        if (hit) EXPECT_NEAR(std::abs(hit->distance), expected, 1e-12);
+        if (hit) {
+          EXPECT_NEAR(std::abs(hit->distance), expected, 1e-12);
+        }
       }
       found += nearest[1] < kRadius;
       far += nearest[0] < nearest[1];

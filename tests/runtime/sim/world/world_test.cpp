@@ -63,7 +63,8 @@ TEST(World, ACollisionKeepsMomentaAndTakesNoEnergy) {
       }
 }
 
-// Two iterations are too few for most of these steps: the bodies part in other ways, and yet with what they had together.
+// Two iterations are too few for most of these steps: the bodies part in other ways, and yet with what they had
+// together.
 TEST(World, AnIslandThatDoesNotConvergeKeepsItsMomentaAndGainsNoEnergy) {
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 0.5).normalized()));
   for (const double time_step : {1e-3, 1.0 / 60})
