@@ -155,7 +155,7 @@ TEST(BodyContact, WhatIsDeepWithoutHavingComeInDoesNotPush) {
     const TouchingBody a{*overlap.blocks.model->contact,
                          *overlap.blocks.surface,
                          {overlap.start_a, overlap.qa},
-                         {FrameVelocity{{0, 0, speed}, {}}, still}};
+                         {FrameVelocity{{0, 0, speed}, Eigen::Vector3d::Zero()}, still}};
     const TouchingBody b{*overlap.blocks.model->contact,
                          *overlap.blocks.surface,
                          {overlap.start_b, overlap.qb},
