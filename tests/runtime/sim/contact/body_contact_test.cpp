@@ -28,7 +28,10 @@ struct Overlap {
     blocks.surface->surface.place(qb, shape);
     const TouchingBody a{
         *blocks.model->contact, *blocks.surface, {start_a, qa}, {FrameVelocity{{0, 0, 1}, {0, 1, 0}}, va}};
-    const TouchingBody b{*blocks.model->contact, *blocks.surface, {start_b, qb}, {FrameVelocity{{1, 0, 0}, {}}, vb}};
+    const TouchingBody b{*blocks.model->contact,
+                         *blocks.surface,
+                         {start_b, qb},
+                         {FrameVelocity{{1, 0, 0}, Eigen::Vector3d::Zero()}, vb}};
     NearVertices near;
     contact.gather(a, b, kTimeStep, 0.01, true, {}, shape, near, candidates);
   }
