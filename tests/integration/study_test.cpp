@@ -56,7 +56,8 @@ class StudyProgram : public testing::Test {
 
 // Against the same body in double, which damping by a stiffness in single precision moves a little.
 TEST_F(StudyProgram, MixedPrecisionIsMeasuredAgainstDouble) {
-  write_study(R"({"sweeps": [ { "basis_size": [8], "precision": ["double", "mixed"], "internal_force": ["cubature"] } ]})"_json);
+  write_study(
+      R"({"sweeps": [ { "basis_size": [8], "precision": ["double", "mixed"], "internal_force": ["cubature"] } ]})"_json);
   const Outcome outcome = study("out");
   ASSERT_EQ(outcome.status, 0) << outcome.errors;
   const Json json = results("out");
