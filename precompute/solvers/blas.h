@@ -10,6 +10,7 @@ int blas_callers();
 
 }  // namespace exmat::precompute
 
+// Their names are those of BLAS. NOLINTBEGIN(readability-identifier-naming)
 extern "C" {
 void sgemm_(const char* form_a, const char* form_b, const int* m, const int* n, const int* k, const float* alpha,
             const float* a, const int* lda, const float* b, const int* ldb, const float* beta, float* c,
@@ -22,3 +23,4 @@ void dgemm_(const char* form_a, const char* form_b, const int* m, const int* n, 
             const double* a, const int* lda, const double* b, const int* ldb, const double* beta, double* c,
             const int* ldc);
 }
+// NOLINTEND(readability-identifier-naming)
