@@ -198,7 +198,7 @@ def worlds(result):
     rows = [("a body on the floor, alone", 1, "", number(result.microseconds("world/alone")), ""),
             ("two on each other", 2, "2", number(result.microseconds("world/pair") / 2), "")]
     for kind, words in cells.items():
-        for count in (5, 100, 1000):
+        for count in (5, 100):
             names = [f"world/{kind}/threads{threads}/{count}" for threads in (1, 2)]
             if names[0] not in result.best:
                 continue
