@@ -105,8 +105,7 @@ double SurfaceContacts::evaluate(const VertexArray& a, const VertexArray& b, Ver
     const Eigen::Vector3d way = between(i, a, b);
     candidate.arm = a.row(place.vertex).transpose() - a_.placement().position;
     candidate.surface_arm = candidate.arm + a_.placement().position - b_.placement().position - way;
-    potential += runtime::evaluate_contact({candidate.normal.dot(way), candidate.normal, Eigen::Vector3d::Zero()}, way,
-                                           candidate);
+    potential += runtime::evaluate_contact(candidate.normal.dot(way), candidate.normal, way, candidate);
     force_a.row(place.vertex) += candidate.force.transpose();
     for (std::size_t c = 0; c < 3; ++c)
       force_b.row(place.corners[c]) -= place.shares[static_cast<Eigen::Index>(c)] * candidate.force.transpose();
@@ -131,9 +130,9 @@ std::vector<SurfaceContacts::Stiffness> SurfaceContacts::stiffness() const {
   std::vector<Stiffness> parts;
   for (std::size_t i = 0; i < places_.size(); ++i) {
     const runtime::BodyCandidate& candidate = candidates_.all[i];
-    if (candidate.weights.maxCoeff() <= 0) continue;
-    const Eigen::Matrix3d matrix =
-        candidate.directions * candidate.weights.asDiagonal() * candidate.directions.transpose();
+    if (!candidate.is_loaded()) continue;
+    const runtime::StiffnessFactors factors(candidate);
+    const Eigen::Matrix3d matrix = factors.used() * factors.used().transpose();
     parts.push_back({places_[i].vertex, places_[i].corners, places_[i].shares, matrix});
   }
   return parts;

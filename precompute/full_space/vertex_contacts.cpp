@@ -72,8 +72,8 @@ double VertexContacts::potential(const Eigen::VectorXd& u, const Step& step) con
 
 void VertexContacts::add_stiffness(const Step& step, LowerTriangle& stiffness) const {
   for (const auto& candidate : step.candidates) {
-    const Eigen::Matrix3d block =
-        candidate.directions * candidate.weights.asDiagonal() * candidate.directions.transpose();
+    const runtime::StiffnessFactors factors(candidate);
+    const Eigen::Matrix3d block = factors.used() * factors.used().transpose();
     const Eigen::Index dof = dofs_[static_cast<std::size_t>(candidate.vertex)];
     for (int j = 0; j < 3; ++j)
       for (int i = j; i < 3; ++i) stiffness.coeffRef(dof + i, dof + j) += block(i, j);

@@ -40,7 +40,7 @@ void ContactRecord::add(const StepReport& report, const Model& model, const Stat
                           candidate.obstacle,
                           -candidate.gap,
                           position,
-                          candidate.directions.col(0),
+                          candidate.direction,
                           candidate.force};
   }
 }

@@ -213,8 +213,8 @@ Placement a_in_b(const BodyPose& a, const BodyPose& b) {
 double way_between(const TouchingBody& a, const TouchingBody& b, const NearVertices& near) {
   if (near.radius < 0) return 0;
   const Placement relative = a_in_b(a.pose, b.pose);
-  return way_bound(a.set.reach(), a.set.tree().basis_norm(), BodyPose{relative, a.pose.q}, near.a_in_b, near.q_a) +
-         b.touching.surface.basis_norm() * (b.pose.q - near.q_b).norm();
+  return way_bound(a.set.reach(), a.set.tree().movement(), BodyPose{relative, a.pose.q}, near.a_in_b, near.q_a) +
+         b.touching.surface.movement().of(b.pose.q - near.q_b);
 }
 
 /// What vertices of a are near the surface of b, by `distance_of`(vertex, point in the frame of b, radius), infinity
@@ -301,7 +301,7 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
                              const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
                              BodyCandidates& candidates) const {
   const TouchingSurface& touching = body.touching;
-  double way = time_step * body.set.tree().basis_norm() * body.velocity.v.norm();
+  double way = time_step * body.set.tree().movement().of(body.velocity.v);
   const bool is_fast = 2 * kContactMarginSteps * way > kFastMargins * margin;
   if (is_fast) {
     if (near.scratch.size() == 0) near.scratch = AlignedArray(body.set.modes());
@@ -313,10 +313,12 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   gathering.is_fast = is_fast;
   gathering.near = margin + way;
   gather_from(gathering, near, [&](int vertex, const Eigen::Vector3d& point, double radius) {
-    // Until the next search q changes by so much at most.
-    const double change = near.farther / (body.set.tree().basis_norm() + touching.surface.basis_norm());
+    // Until the next search either moves by half of that at most.
+    const double half = 0.5 * near.farther;
     const auto bounds = touching.vertex_bounds.row(vertex);
-    if (bounds.dot(body.pose.q.cwiseAbs()) + change * bounds.norm() < 1) return std::numeric_limits<double>::infinity();
+    const double more =
+        std::max(body.set.tree().movement().most(bounds, half), touching.surface.movement().most(bounds, half));
+    if (bounds.dot(body.pose.q.cwiseAbs()) + more < 1) return std::numeric_limits<double>::infinity();
     return touching.surface.approach_distance(
         point, body.set.rest(vertex), touching.places[static_cast<std::size_t>(vertex)], radius, near.farther, shape);
   });
@@ -334,14 +336,13 @@ void BodyContact::evaluate(const ContactSet& set, const BodyPose& a, const BodyP
     candidate.surface_arm = surface_arm(candidates, i, b);
     const Eigen::Vector3d place = place_of(a, b, candidate);
     const double gap = candidate.normal.dot(place);
-    const double potential =
-        evaluate_contact(SurfacePoint{gap, candidate.normal, Eigen::Vector3d::Zero()}, place, candidate);
-    if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
+    const double potential = evaluate_contact(gap, candidate.normal, place, candidate);
+    if (!candidate.is_loaded()) continue;
     if (candidate.normal_force > 0) {
       ++sums_a.touching;
       ++sums_b.touching;
-      sums_a.stiffness += candidate.weights[0];
-      sums_b.stiffness += candidate.weights[0];
+      sums_a.stiffness += candidate.normal_stiffness();
+      sums_b.stiffness += candidate.normal_stiffness();
     }
     sums_a.force += candidate.force;
     sums_a.torque += candidate.arm.cross(candidate.force);
@@ -381,7 +382,7 @@ Eigen::Index BodyContact::stiffness_columns(const ContactSet& set, int rigid_a, 
                                             const BodyPose& b, const BodyCandidates& candidates,
                                             Eigen::MatrixXd& columns_a, Eigen::MatrixXd& columns_b) {
   Eigen::Index needed = 0;  // most candidates touch nothing
-  for (const BodyCandidate& candidate : candidates.all) needed += (candidate.weights.array() > 0).count();
+  for (const BodyCandidate& candidate : candidates.all) needed += candidate.is_loaded() ? 3 : 0;
   const auto make_room = [needed](Eigen::Index rows, Eigen::MatrixXd& columns) {
     if (columns.rows() != rows || columns.cols() < needed) columns.resize(rows, 2 * needed);
   };
@@ -390,9 +391,10 @@ Eigen::Index BodyContact::stiffness_columns(const ContactSet& set, int rigid_a, 
   Eigen::Index used = 0;
   for (std::size_t i = 0; i < candidates.all.size(); ++i) {
     const BodyCandidate& candidate = candidates.all[i];
-    for (int k = 0; k < 3; ++k) {
-      if (candidate.weights[k] <= 0) continue;
-      const Eigen::Vector3d direction = std::sqrt(candidate.weights[k]) * candidate.directions.col(k);
+    if (!candidate.is_loaded()) continue;
+    const StiffnessFactors factors(candidate);
+    for (int k = 0; k < factors.count; ++k) {
+      const Eigen::Vector3d direction = factors.columns.col(k);
       auto column_a = columns_a.col(used);
       auto column_b = columns_b.col(used);
       ++used;

@@ -65,7 +65,7 @@ class BodySurface {
   Eigen::Index triangles() const noexcept { return triangles_.rows(); }
 
   double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
-  double basis_norm() const noexcept { return tree_.basis_norm(); }
+  const MovementBound& movement() const noexcept { return tree_.movement(); }  ///< of its vertices
 
   SurfaceShape make_shape() const;
   void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;

@@ -41,11 +41,10 @@ struct ContactSet::Batch {
   Eigen::Matrix<double, 6, kBatch> rigid;     // of the same, force and torque, world
 };
 
-double way_bound(double reach, double basis_norm, const BodyPose& pose, const Placement& from,
+double way_bound(double reach, const MovementBound& movement, const BodyPose& pose, const Placement& from,
                  const Eigen::VectorXd& from_q) noexcept {
   return (pose.position - from.position).norm() +
-         (pose.rotation - from.rotation).norm() * (reach + basis_norm * pose.q.norm()) +
-         basis_norm * (pose.q - from_q).norm();
+         (pose.rotation - from.rotation).norm() * (reach + movement.of(pose.q)) + movement.of(pose.q - from_q);
 }
 
 ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_count)
@@ -83,13 +82,13 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
 }
 
 ContactState ContactSet::make_state(std::size_t obstacle_count) const {
-  return {std::vector<HeldContact>(obstacle_count * static_cast<std::size_t>(vertices())), 0};
+  return {std::vector<HeldContact>(obstacle_count * static_cast<std::size_t>(vertices())), 0,
+          NearPlanes(vertices(), modes(), obstacle_count)};
 }
 
 double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept {
-  const double reach = reach_ + tree_.basis_norm() * pose.q.norm();
-  return time_step *
-         (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.basis_norm() * velocity.v.norm());
+  const double reach = reach_ + tree_.movement().of(pose.q);
+  return time_step * (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.movement().of(velocity.v));
 }
 
 double ContactSet::fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept {
@@ -111,20 +110,19 @@ bool ContactSet::may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) 
   return obstacle.may_meet(pose.position + pose.rotation * all.centre, all.radius, 0);
 }
 
-bool ContactSet::body_is_near(const BodyPose& pose, double q_norm, double margin,
-                              const ContactWorkspace& workspace) const noexcept {
+bool ContactSet::body_is_near(const BodyPose& pose, double margin, const ContactWorkspace& workspace) const noexcept {
   const DeformationTree::Node& all = tree_.nodes().front();
   const Eigen::Vector3d centre = pose.position + pose.rotation * all.centre;
-  const double radius = all.radius + tree_.basis_norm() * q_norm;
+  const double radius = all.radius + tree_.movement().of(pose.q);
   return std::any_of(workspace.obstacles.begin(), workspace.obstacles.end(),
                      [&](const PlacedObstacle& obstacle) { return obstacle.may_meet(centre, radius, margin); });
 }
 
 /// Obstacles that go through the body in the step rather than up to it.
-void ContactSet::find_sweeping(const BodyPose& pose, double q_norm, ContactWorkspace& workspace) const noexcept {
+void ContactSet::find_sweeping(const BodyPose& pose, ContactWorkspace& workspace) const noexcept {
   for (PlacedObstacle& placed : workspace.obstacles) {
     if (!placed.obstacle->motion.moves()) continue;
-    const double reach = reach_ + tree_.basis_norm() * q_norm;
+    const double reach = reach_ + tree_.movement().of(pose.q);
     placed.sweeps = placed.sweep(pose.position, reach) > kSweep * shortest_passage(placed.obstacle->shape);
   }
 }
@@ -161,18 +159,16 @@ Eigen::Vector3d ContactSet::arm_in(const Batch& batch, int index, const BodyPose
   return pose.rotation * (rest_.row(vertex).transpose() + batch.products.col(index));
 }
 
-/// With q in workspace.x.
-void ContactSet::test_vertices(const DeformationTree::Node& node, const BodyPose& pose, double margin,
-                               ContactWorkspace& workspace) const noexcept {
-  static_assert(kLeafVertices <= kBatch);
-  Batch batch;
-  for (int vertex = node.first; vertex < node.last; ++vertex) batch.add(vertex, 0);
+/// The vertices of a batch that may meet obstacles; with q in workspace.x. Empties it.
+void ContactSet::test_batch(const BodyPose& pose, double margin, Batch& batch, ContactWorkspace& workspace,
+                            NearPlanes* found) const noexcept {
   set_products(workspace, batch);
+  workspace.tested_vertices += batch.count;
   for (int index = 0; index < batch.count; ++index) {
-    const int vertex = node.first + index;
-    ++workspace.tested_vertices;
+    const int vertex = batch.vertices[static_cast<std::size_t>(index)];
     const Eigen::Vector3d arm = arm_in(batch, index, pose);
     const Eigen::Vector3d point = pose.position + arm;
+    if (found != nullptr) found->add(vertex, workspace.obstacles, point);
     for (std::size_t i = 0; i < workspace.obstacles.size(); ++i) {
       if (!workspace.obstacles[i].may_meet(point, 0, margin)) continue;
       ContactCandidate& candidate = workspace.candidates[workspace.candidate_count++];
@@ -181,27 +177,52 @@ void ContactSet::test_vertices(const DeformationTree::Node& node, const BodyPose
       candidate.arm = arm;
     }
   }
+  batch.count = 0;
+}
+
+/// Those of all branches within `radius`; all of these into `found`.
+void ContactSet::search(const BodyPose& pose, double q_norm, double margin, double radius, ContactWorkspace& workspace,
+                        NearPlanes* found) const noexcept {
+  static_assert(kLeafVertices <= kBatch);
+  Batch batch;
+  const auto count = static_cast<int>(tree_.nodes().size());
+  for (int node = 0; node < count;) {
+    ++workspace.visited_nodes;
+    const DeformationTree::Node& branch = tree_.node(node);
+    const bool near = is_near(node, pose, q_norm, radius, workspace);
+    if (near && branch.is_leaf) {
+      for (int vertex = branch.first; vertex < branch.last; ++vertex) batch.add(vertex, 0);
+      test_batch(pose, margin, batch, workspace, found);
+    }
+    node = near ? node + 1 : branch.next;
+  }
 }
 
 void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
-                        double margin, ContactWorkspace& workspace) const noexcept {
+                        double margin, NearPlanes& near_planes, ContactWorkspace& workspace) const noexcept {
   workspace.candidate_count = 0;
   workspace.visited_nodes = workspace.tested_vertices = 0;
   if (tree_.empty()) return;
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     workspace.obstacles[i] = PlacedObstacle(obstacles[i], end_time, time_step);
   const double q_norm = pose.q.norm();
-  find_sweeping(pose, q_norm, workspace);
-  if (!body_is_near(pose, q_norm, margin, workspace)) return;
+  find_sweeping(pose, workspace);
+  if (!body_is_near(pose, margin, workspace)) return;
   set_x(pose.q, workspace);
-  const auto count = static_cast<int>(tree_.nodes().size());
-  for (int node = 0; node < count;) {
-    ++workspace.visited_nodes;
-    const DeformationTree::Node& branch = tree_.node(node);
-    const bool near = is_near(node, pose, q_norm, margin, workspace);
-    if (near && branch.is_leaf) test_vertices(branch, pose, margin, workspace);
-    node = near ? node + 1 : branch.next;
+  if (!NearPlanes::serve(workspace.obstacles)) return search(pose, q_norm, margin, margin, workspace, nullptr);
+  const NearPlanes::Pose now{pose, pose.q, reach_, tree_.movement()};
+  if (!near_planes.knows(workspace.obstacles, now, margin)) {
+    if (!near_planes.is_worthwhile()) return search(pose, q_norm, margin, margin, workspace, nullptr);
+    near_planes.begin(workspace.obstacles, now, margin);
+    return search(pose, q_norm, margin, near_planes.radius(), workspace, &near_planes);
   }
+  Batch batch;
+  for (std::size_t i = 0; i < near_planes.count(); ++i) {
+    if (!near_planes.may_be_near(i, margin)) continue;
+    batch.add(near_planes.vertex(i), 0);
+    if (batch.full()) test_batch(pose, margin, batch, workspace, nullptr);
+  }
+  test_batch(pose, margin, batch, workspace, nullptr);
 }
 
 void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected,
@@ -246,7 +267,7 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
     workspace.first = pose;
     workspace.first_q = pose.q;
   }
-  const double way = is_first ? 0 : way_bound(reach_, tree_.basis_norm(), pose, workspace.first, workspace.first_q);
+  const double way = is_first ? 0 : way_bound(reach_, tree_.movement(), pose, workspace.first, workspace.first_q);
   set_x(pose.q, workspace);
   std::fill_n(workspace.loads.data(), stride(), 0.0);
   workspace.loaded_count = 0;
@@ -281,9 +302,9 @@ void ContactSet::evaluate_batch(const BodyPose& pose, bool is_first, Batch& batc
       workspace.clearances[number] = clearance_of(candidate, point);
     if (candidate.normal_force > 0) {
       ++workspace.touching;
-      workspace.stiffness += candidate.weights[0];
+      workspace.stiffness += candidate.normal_stiffness();
     }
-    if (candidate.normal_force == 0 && candidate.friction_force == 0) continue;
+    if (!candidate.is_loaded()) continue;
     workspace.loaded[workspace.loaded_count++] = number;
     workspace.force += candidate.force;
     workspace.torque += candidate.arm.cross(candidate.force);
@@ -299,7 +320,7 @@ void ContactSet::evaluate_batch(const BodyPose& pose, bool is_first, Batch& batc
 double ContactSet::potential(const BodyPose& pose, ContactWorkspace& workspace) const noexcept {
   double sum = 0;
   const double way =
-      workspace.has_first ? way_bound(reach_, tree_.basis_norm(), pose, workspace.first, workspace.first_q) : 0;
+      workspace.has_first ? way_bound(reach_, tree_.movement(), pose, workspace.first, workspace.first_q) : 0;
   set_x(pose.q, workspace);
   Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
@@ -354,9 +375,9 @@ void ContactSet::add_stiffness_of(int rigid, const BodyPose& pose, ContactWorksp
   Batch batch;
   for (std::size_t i = 0; i < workspace.loaded_count; ++i) {
     const ContactCandidate& candidate = workspace.candidates[workspace.loaded[i]];
-    for (int k = 0; k < 3; ++k) {
-      if (candidate.weights[k] <= 0) continue;
-      const Eigen::Vector3d direction = std::sqrt(candidate.weights[k]) * candidate.directions.col(k);
+    const StiffnessFactors factors(candidate);
+    for (int k = 0; k < factors.count; ++k) {
+      const Eigen::Vector3d direction = factors.columns.col(k);
       batch.rigid.col(batch.count) << direction, candidate.arm.cross(direction);
       batch.vectors.col(batch.count) = pose.rotation.transpose() * direction;
       batch.add(candidate.vertex, workspace.loaded[i]);

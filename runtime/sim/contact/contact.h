@@ -23,8 +23,8 @@ struct BodyVelocity : FrameVelocity {
 };
 
 /// Bound on how far a point of a body is at one pose from where it is at another [m]: one that is at most `reach` [m]
-/// from the frame's origin at rest, and moved by q by at most `basis_norm` |q|.
-double way_bound(double reach, double basis_norm, const BodyPose& pose, const Placement& from,
+/// from the frame's origin at rest, and moved by q as far as `movement` allows.
+double way_bound(double reach, const MovementBound& movement, const BodyPose& pose, const Placement& from,
                  const Eigen::VectorXd& from_q) noexcept;
 
 class ContactSet;
@@ -115,8 +115,9 @@ class ContactSet {
 
   /// Finds the candidates: vertices of this pose, that of the beginning, at most `margin` [m] away from the
   /// obstacles as they are at `end_time` [s]. Costs O(obstacles + r) where the whole body is farther away.
+  /// `near_planes` is what earlier calls found of the same body; the candidates are the same without.
   void gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
-              double margin, ContactWorkspace& workspace) const noexcept;
+              double margin, NearPlanes& near_planes, ContactWorkspace& workspace) const noexcept;
 
   /// After gather() at the same pose: sets what the step keeps of each candidate; `expected` is the velocity
   /// that the loads of the step make of it.
@@ -173,13 +174,14 @@ class ContactSet {
   void evaluate_batch(const BodyPose& pose, bool is_first, Batch& batch, ContactWorkspace& workspace) const noexcept;
   double potential_of(const BodyPose& pose, Batch& batch, ContactWorkspace& workspace) const noexcept;
   void add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept;
-  void find_sweeping(const BodyPose& pose, double q_norm, ContactWorkspace& workspace) const noexcept;
+  void find_sweeping(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
   bool is_near(int node, const BodyPose& pose, double q_norm, double margin,
                const ContactWorkspace& workspace) const noexcept;
-  bool body_is_near(const BodyPose& pose, double q_norm, double margin,
-                    const ContactWorkspace& workspace) const noexcept;
-  void test_vertices(const DeformationTree::Node& node, const BodyPose& pose, double margin,
-                     ContactWorkspace& workspace) const noexcept;
+  bool body_is_near(const BodyPose& pose, double margin, const ContactWorkspace& workspace) const noexcept;
+  void test_batch(const BodyPose& pose, double margin, Batch& batch, ContactWorkspace& workspace,
+                  NearPlanes* found) const noexcept;
+  void search(const BodyPose& pose, double q_norm, double margin, double radius, ContactWorkspace& workspace,
+              NearPlanes* found) const noexcept;
   void add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
                         Eigen::MatrixXd& stiffness) const noexcept;
 

@@ -6,20 +6,22 @@
 namespace exmat::runtime {
 namespace {
 
+// Divisions and roots take most of the time of a vertex: each is done once.
+
 /// Friction of size `limit` as a function of the slip l: f1(l) / l, its derivative f1' and its integral f0, all times
 /// the limit.
 struct SlipLaw {
   double secant = 0, tangent = 0, energy = 0;
 
   SlipLaw(double limit, double stiffness, double slip) {
-    const double full = 2 * limit / stiffness;  // where the force reaches its limit
-    if (slip < full) {
-      secant = stiffness * (1 - 0.5 * slip / full);
-      tangent = stiffness * (1 - slip / full);
-      energy = stiffness * slip * slip * (0.5 - slip / full / 6);
+    const double share = slip * (0.5 * stiffness / limit);  // of the slip where the force reaches its limit
+    if (share < 1) {
+      secant = stiffness * (1 - 0.5 * share);
+      tangent = stiffness * (1 - share);
+      energy = stiffness * slip * slip * (0.5 - share * (1.0 / 6));
     } else {
       secant = limit / slip;
-      energy = limit * (slip - full / 3);
+      energy = limit * (slip - limit / stiffness * (2.0 / 3));
     }
   }
 };
@@ -39,31 +41,24 @@ double damped_depth(const ContactCandidate& candidate, double gap, const Eigen::
 }
 
 /// Returns what it adds to (1 + tau) W, as evaluate_friction().
-double evaluate_normal(ContactCandidate& candidate, const SurfacePoint& surface, const Eigen::Vector3d& point) {
-  candidate.gap = surface.distance;
-  const double depth = damped_depth(candidate, surface.distance, point);
+double evaluate_normal(ContactCandidate& candidate, double gap, const Eigen::Vector3d& normal,
+                       const Eigen::Vector3d& point) {
+  candidate.gap = gap;
+  const double depth = damped_depth(candidate, gap, point);
   if (depth <= 0) return 0;
-  const double factor = 1 + candidate.damping;
-  const Eigen::Vector3d direction = (surface.normal + candidate.damping * candidate.normal) / factor;
-  candidate.force = candidate.stiffness * depth * direction;
-  candidate.normal_force = candidate.force.norm();
-  candidate.directions.col(0) = direction;
-  candidate.weights[0] = candidate.stiffness * factor;
+  const bool is_unturned = normal == candidate.normal;
+  candidate.direction = normal;
+  if (!is_unturned) candidate.direction = candidate.spring_share * (normal + candidate.damping * candidate.normal);
+  candidate.force = candidate.stiffness * depth * candidate.direction;
+  candidate.normal_force = is_unturned ? candidate.stiffness * depth : candidate.force.norm();
   return 0.5 * candidate.stiffness * depth * depth;
 }
 
 double evaluate_friction(ContactCandidate& candidate, const Eigen::Vector3d& point) {
   candidate.slip = slip_of(candidate, point);
   if (candidate.friction_force <= 0) return 0;
-  const double length = candidate.slip.norm();
-  const SlipLaw law(candidate.friction_force, candidate.stiffness, length);
-  const Eigen::Vector3d along =
-      length > 0 ? Eigen::Vector3d(candidate.slip / length) : candidate.normal.unitOrthogonal();
+  const SlipLaw law(candidate.friction_force, candidate.stiffness, candidate.slip.norm());
   candidate.force -= law.secant * candidate.slip;
-  candidate.directions.col(1) = along;
-  candidate.directions.col(2) = candidate.normal.cross(along);
-  candidate.weights[1] = (1 + candidate.damping) * law.tangent;
-  candidate.weights[2] = (1 + candidate.damping) * law.secant;
   return law.energy;
 }
 
@@ -83,6 +78,7 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
   candidate.clearance = -1;
   candidate.stiffness = law.stiffness * area;
   candidate.damping = touches ? law.damping / (law.stiffness * time_step) : 0;
+  candidate.spring_share = 1 / (1 + candidate.damping);
   candidate.friction_force = 0;
 }
 
@@ -116,32 +112,48 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
   candidate.friction_force = obstacle.friction * held->normal_force;
 }
 
-double evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
+double evaluate_contact(double gap, const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
                         ContactCandidate& candidate) noexcept {
   candidate.force.setZero();
-  candidate.weights.setZero();
   candidate.normal_force = 0;
-  const double normal = evaluate_normal(candidate, surface, point);
-  return (normal + evaluate_friction(candidate, point)) / (1 + candidate.damping);
+  const double energy = evaluate_normal(candidate, gap, normal, point);
+  return candidate.spring_share * (energy + evaluate_friction(candidate, point));
+}
+
+StiffnessFactors::StiffnessFactors(const ContactCandidate& candidate) noexcept {
+  const auto add = [this](double weight, const Eigen::Vector3d& direction) {
+    if (weight > 0) columns.col(count++) = std::sqrt(weight) * direction;
+  };
+  add(candidate.normal_stiffness(), candidate.direction);
+  if (candidate.friction_force <= 0) return;
+  const double length = candidate.slip.norm();
+  const SlipLaw law(candidate.friction_force, candidate.stiffness, length);
+  const Eigen::Vector3d along =
+      length > 0 ? Eigen::Vector3d(1 / length * candidate.slip) : candidate.normal.unitOrthogonal();
+  add((1 + candidate.damping) * law.tangent, along);
+  add((1 + candidate.damping) * law.secant, candidate.normal.cross(along));
 }
 
 double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept {
   if (candidate.normal_force > 0 || candidate.friction_force > 0) return -1;
   // Distances change by no more than the way, and what damping adds to the depth by no more than its share of it.
-  return std::min(candidate.gap, -damped_depth(candidate, candidate.gap, point) / (1 + candidate.damping));
+  return std::min(candidate.gap, -candidate.spring_share * damped_depth(candidate, candidate.gap, point));
 }
 
 void leave_untouched(ContactCandidate& candidate) noexcept {
   candidate.force.setZero();
-  candidate.weights.setZero();
   candidate.normal_force = 0;
   candidate.gap = 0;
 }
 
 double evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
                         ContactCandidate& candidate) noexcept {
+  if (placed.plane != nullptr) {
+    candidate.by_plane = false;
+    return evaluate_contact(placed.plane->distance(point), placed.plane->normal, point, candidate);
+  }
   const SurfacePoint surface = felt_surface(placed, candidate.passage, point, candidate.hint, candidate.by_plane);
-  return evaluate_contact(surface, point, candidate);
+  return evaluate_contact(surface.distance, surface.normal, point, candidate);
 }
 
 double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
@@ -156,7 +168,7 @@ double contact_potential(const ContactCandidate& candidate, double gap, const Ei
   double energy = 0.5 * candidate.stiffness * depth * depth;
   if (candidate.friction_force > 0)
     energy += SlipLaw(candidate.friction_force, candidate.stiffness, slip_of(candidate, point).norm()).energy;
-  return energy / (1 + candidate.damping);
+  return candidate.spring_share * energy;
 }
 
 void FrictionChange::refresh(double friction, ContactCandidate& candidate) noexcept {

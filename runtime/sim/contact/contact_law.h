@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "runtime/sim/contact/near_planes.h"
 #include "runtime/sim/contact/passage.h"
 
 namespace exmat::runtime {
@@ -44,6 +45,7 @@ struct HeldContact {
 struct ContactState {
   std::vector<HeldContact> held;
   std::size_t count = 0;
+  NearPlanes near_planes;  ///< saves searches; results are the same without
 
   /// How far the farthest of them is from the surface that it came in by, where that is not the nearest [m].
   double longest_way_out() const noexcept;
@@ -59,6 +61,7 @@ struct ContactCandidate {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();   ///< of the tangential spring, world [m]
   double stiffness = 0;                               ///< kappa = area * stiffness [N/m]
   double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
+  double spring_share = 1;                            ///< 1 / (1 + gamma)
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
   Passage passage;                                    ///< of obstacles
 
@@ -67,15 +70,18 @@ struct ContactCandidate {
   double clearance = -1;
 
   // Of the last evaluation.
-  NearestHint hint;                                          ///< of nearest_surface_point()
-  bool by_plane = false;                                     ///< its surface was the passage's plane
-  double gap = 0;                                            ///< [m]; 0 where it was not looked at
-  double normal_force = 0;                                   ///< [N]
-  Eigen::Vector3d arm = Eigen::Vector3d::Zero();             ///< x - position [m]
-  Eigen::Vector3d force = Eigen::Vector3d::Zero();           ///< on the vertex [N]
-  Eigen::Vector3d slip = Eigen::Vector3d::Zero();            ///< y, tangential [m]
-  Eigen::Matrix3d directions = Eigen::Matrix3d::Identity();  ///< columns d_i: -df/dx = sum_i w_i d_i d_i^T
-  Eigen::Vector3d weights = Eigen::Vector3d::Zero();         ///< w_i >= 0 [N/m]
+  NearestHint hint;                                     ///< of nearest_surface_point()
+  bool by_plane = false;                                ///< its surface was the passage's plane
+  double gap = 0;                                       ///< [m]; 0 where it was not looked at
+  double normal_force = 0;                              ///< [N]
+  Eigen::Vector3d arm = Eigen::Vector3d::Zero();        ///< x - position [m]
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();      ///< on the vertex [N]
+  Eigen::Vector3d slip = Eigen::Vector3d::Zero();       ///< y, tangential [m]
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of the normal force, where there is one
+
+  bool is_loaded() const noexcept { return normal_force > 0 || friction_force > 0; }
+  /// How fast the normal force grows [N/m]; 0 where there is none.
+  double normal_stiffness() const noexcept { return normal_force > 0 ? stiffness * (1 + damping) : 0; }
 };
 
 /// What the vertex of a candidate remembers, or null. Candidates come in order; `next`, 0 before the first one, is
@@ -103,9 +109,20 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
 double evaluate_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point,
                         ContactCandidate& candidate) noexcept;
 
-/// The same where `surface` is its nearest point of what it may touch.
-double evaluate_contact(const SurfacePoint& surface, const Eigen::Vector3d& point,
+/// The same `gap` [m] outside of what it may touch, whose outward normal there is `normal`.
+double evaluate_contact(double gap, const Eigen::Vector3d& normal, const Eigen::Vector3d& point,
                         ContactCandidate& candidate) noexcept;
+
+/// The stiffness of a candidate's last evaluation as a sum of squares, -df/dx = sum of f f^T over `count` columns of
+/// `columns` [N^1/2 m^-1/2].
+struct StiffnessFactors {
+  explicit StiffnessFactors(const ContactCandidate& candidate) noexcept;
+
+  auto used() const noexcept { return columns.leftCols(count); }  ///< 3 x count
+
+  Eigen::Matrix3d columns;
+  int count = 0;
+};
 
 /// After the first evaluation: how far the vertex may go from there and still feel nothing.
 double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept;

@@ -54,7 +54,9 @@ DeformationTree::DeformationTree(const IndexMatrix& items, const VertexArray& re
   std::iota(order_.begin(), order_.end(), 0);
   const Points points{items, rest, basis, leaf_items, full_leaves};
   build(points, 0, static_cast<int>(order_.size()));
-  basis_norm_ = largest_norm(basis, points.of(order_, 0, static_cast<int>(order_.size())), Rows::Zero(3, basis.cols()));
+  const std::vector<int> all = points.of(order_, 0, static_cast<int>(order_.size()));
+  movement_ = {largest_norm(basis, all, Rows::Zero(3, basis.cols())), Eigen::RowVectorXd::Zero(basis.cols())};
+  for (const int id : all) movement_.modes = movement_.modes.cwiseMax(basis.middleRows<3>(3 * id).colwise().norm());
 }
 
 void DeformationTree::build(const Points& points, int first, int last) {

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "runtime/sim/contact/movement_bound.h"
 
 namespace exmat::runtime {
 
@@ -44,8 +45,7 @@ class DeformationTree {
     return {branch.centre + means_.middleRows<3>(3 * node).lazyProduct(q), branch.radius + spread};
   }
 
-  /// The largest singular value of the rows of any point [kg^-1/2]: no point moves farther than this times |q|.
-  double basis_norm() const noexcept { return basis_norm_; }
+  const MovementBound& movement() const noexcept { return movement_; }  ///< of its points
 
  private:
   struct Points;
@@ -56,7 +56,7 @@ class DeformationTree {
   std::vector<Node> nodes_;
   RowMatrix means_;       // 3 nodes x r
   RowMatrix deviations_;  // nodes x r
-  double basis_norm_ = 0;
+  MovementBound movement_;
 };
 
 }  // namespace exmat::runtime

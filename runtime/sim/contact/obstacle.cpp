@@ -8,7 +8,7 @@ namespace exmat::runtime {
 namespace {
 
 SurfacePoint nearest(const Plane& plane, const Eigen::Vector3d& point, NearestHint& /*hint*/) {
-  const double distance = plane.normal.dot(point - plane.point);
+  const double distance = plane.distance(point);
   return {distance, plane.normal, point - distance * plane.normal};
 }
 
@@ -121,9 +121,7 @@ double shortest_passage(const Shape& shape) noexcept {
 }
 
 bool PlacedObstacle::may_meet(const Eigen::Vector3d& centre, double radius, double margin) const noexcept {
-  // A plane that stands is the rule: to look at it takes less time than to ask for the kind of a shape.
-  if (const auto* plane = is_fixed ? std::get_if<Plane>(&obstacle->shape) : nullptr)
-    return plane->normal.dot(centre - plane->point) <= radius + margin;
+  if (plane != nullptr) return plane->distance(centre) <= radius + margin;
   if (is_fixed) return may_be_within(obstacle->shape, centre, radius + margin);
   if (!sweeps) return may_be_within(obstacle->shape, pose.to_frame(centre), radius + margin);
   return may_be_within(obstacle->shape, start.to_frame(centre),
@@ -131,8 +129,7 @@ bool PlacedObstacle::may_meet(const Eigen::Vector3d& centre, double radius, doub
 }
 
 SurfacePoint PlacedObstacle::nearest_surface_point(const Eigen::Vector3d& point, NearestHint& hint) const noexcept {
-  if (const auto* plane = is_fixed ? std::get_if<Plane>(&obstacle->shape) : nullptr)
-    return nearest(*plane, point, hint);
+  if (plane != nullptr) return nearest(*plane, point, hint);
   if (is_fixed) return runtime::nearest_surface_point(obstacle->shape, point, hint);
   const SurfacePoint local = runtime::nearest_surface_point(obstacle->shape, pose.to_frame(point), hint);
   return {local.distance, pose.rotation * local.normal, pose.to_world(local.point)};

@@ -54,6 +54,7 @@ std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::
 
 Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const SurfacePoint& nearest,
                      const Eigen::Vector3d& way_out) noexcept {
+  if (std::holds_alternative<Plane>(placed.obstacle->shape)) return {};  // it has one side
   if (!way_out.isZero(0) && !is_back(placed, nearest, way_out)) {
     // The surface may be curved, or end beside the vertex: then nothing is between it and where it came from.
     const auto entry = first_entry(placed, way.carried + (1 + kBeyond) * way_out, way.carried);

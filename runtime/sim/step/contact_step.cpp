@@ -21,7 +21,7 @@ void finish_contact(const Model& model, const State& state, bool converged, cons
   model.frame->end_contact(near.x, converged, torque, state.frame, workspace.frame, near.contact.force);
 }
 
-bool is_near_obstacles(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept {
+bool is_near_obstacles(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   if (workspace.near) workspace.near->contact.candidate_count = 0;
   if (!touches(model, scene)) return false;
   const StageTimer timer(workspace.profile, Stage::kContact);
@@ -34,7 +34,8 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, const State& 
   const double margin =
       kContactMarginSteps * travel + dt * dt * scene.gravity.norm() + state.contacts.longest_way_out();
   ContactWorkspace& contact = workspace.near->contact;
-  set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, contact);
+  set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, state.contacts.near_planes,
+             contact);
   if (contact.candidate_count == 0) return false;
   FrameVelocity loaded = expected;
   loaded.linear += dt * scene.gravity;

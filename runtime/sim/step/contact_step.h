@@ -9,8 +9,9 @@ namespace exmat::runtime {
 /// Where the body is.
 BodyPose pose_of(const Model& model, const State& state) noexcept;
 
-/// Whether any vertex may touch an obstacle in this step; then the candidates are in workspace.near.
-bool is_near_obstacles(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;
+/// Whether any vertex may touch an obstacle in this step; then the candidates are in workspace.near. Of the state what
+/// saves searches changes.
+bool is_near_obstacles(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
 /// The unknowns of a step near something, into workspace.near->x: of free flight, and of workspace.q.
 void start_contact(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;

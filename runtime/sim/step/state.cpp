@@ -26,7 +26,10 @@ State make_state(const Model& model, const Eigen::VectorXd& q, const Eigen::Vect
 }
 
 void prepare_contacts(const Model& model, std::size_t obstacles, State& state) {
-  if (model.contact) state.contacts.held.resize(obstacles * static_cast<std::size_t>(model.contact->vertices()));
+  if (!model.contact) return;
+  const ContactSet& set = *model.contact;
+  state.contacts.held.resize(obstacles * static_cast<std::size_t>(set.vertices()));
+  state.contacts.near_planes = NearPlanes(set.vertices(), set.modes(), obstacles);
 }
 
 bool set_motion(const Model& model, const FrameMotion& motion, State& state) {

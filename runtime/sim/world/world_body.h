@@ -52,8 +52,8 @@ struct WorldBody {
   BodyPose pose() const noexcept { return {placement, near().q}; }  ///< at the iterate
   /// Bound on how far its vertices and its surface are from where they were at another pose [m].
   double way_bound(const Placement& from, const Eigen::VectorXd& from_q) const noexcept {
-    return runtime::way_bound(std::max(contact().reach(), surface.reach()),
-                              std::max(contact().tree().basis_norm(), surface.basis_norm()), pose(), from, from_q);
+    return std::max(runtime::way_bound(contact().reach(), contact().tree().movement(), pose(), from, from_q),
+                    runtime::way_bound(surface.reach(), surface.movement(), pose(), from, from_q));
   }
 };
 

@@ -252,7 +252,7 @@ TEST(BodyContact, WhatMovesFastAgainstItselfFindsWhatComesNear) {
   for (const double speed : {5.0, 20.0, 60.0})
     for (double gap = 0.004; gap < 0.036; gap += 0.002) {
       const State state = fork.closed_to(gap, speed).state;
-      ASSERT_GT(4 * kStep * set.tree().basis_norm() * state.v.norm(), 10 * kMargin);
+      ASSERT_GT(4 * kStep * set.tree().movement().of(state.v), 10 * kMargin);
       const TouchingBody body{set, touching, {Placement(), state.q}, {FrameVelocity{}, state.v}};
       touching.surface.place(state.q, shape);
       BodyCandidates candidates;
