@@ -104,6 +104,18 @@ struct LaneRotationArrays {
   double* factors = nullptr;                    ///< r x 12: rows of (D + V)^T, of H^T, and those times J^-1
 };
 
+/// The rotation of one body, see DeformingInertia. r modes; matrices in panels, see Kernels::panel_product. S_xx q is
+/// q - S_yy q - S_zz q, since the mass of the modes is the identity.
+struct RotationArrays {
+  std::ptrdiff_t modes = 0;
+  const double* panels = nullptr;          ///< 5 r rows padded, S_ab of yy, zz, yz, xz, xy
+  const double* turning_panels = nullptr;  ///< 3 r rows padded, -A_c
+  const double* linear = nullptr;          ///< r x 6 by columns, p1_ab
+};
+/// Of the products of a pose: S_ab q of xx, yy, zz, yz, xz, xy at first; from here on -A_c q.
+constexpr std::ptrdiff_t rotation_turns(std::ptrdiff_t modes) { return padded(modes + padded(5 * modes)); }
+constexpr std::ptrdiff_t rotation_products(std::ptrdiff_t modes) { return rotation_turns(modes) + padded(3 * modes); }
+
 /// The points of a convex hull that may be the nearest one, each an affine function of the load: see ExampleWeights.
 struct WeightCandidates {
   static constexpr std::ptrdiff_t kMostExamples = 4;
@@ -149,6 +161,29 @@ struct Kernels {
   /// y [rows] = A x, columns `outer` apart; rows a multiple of kLanes.
   void (*matrix_vector)(const double* A, std::ptrdiff_t rows, std::ptrdiff_t columns, std::ptrdiff_t outer,
                         const double* x, double* y);
+
+  /// y [panels x kLanes] = A x, A in panels of kLanes rows, each by columns.
+  void (*panel_product)(const double* A, std::ptrdiff_t panels, std::ptrdiff_t columns, const double* x, double* y);
+
+  // Of the rotation of one body. Products of the pose: rotation_products(); products of the velocity [3 r] are -A_c v.
+
+  /// Products of the pose q [r], and sums [6] = q . (p1_ab + S_ab q). Where there is a `centre` [r], not null, its
+  /// -A_c centre too [padded(3 r)].
+  void (*rotation_moments)(const RotationArrays&, const double* q, const double* centre, double* products,
+                           double* centre_products, double* sums);
+  /// sums [3] of the columns [r x 3] times x [r].
+  void (*rotation_dots)(std::ptrdiff_t modes, const double* columns, const double* x, double* sums);
+  /// force [r] = sum_ab slopes_ab (p1_ab + 2 S_ab q) - sum_c by_velocity_c A_c v - sum_c by_pose_c A_c q.
+  void (*rotation_force)(const RotationArrays&, const double* products, const double* velocity_products,
+                         const double* slopes, const double* by_velocity, const double* by_pose, double* force);
+  /// As add_rotation_stiffness(), without softening. factors [r x 12] by columns: (D + V)^T, J^-1 times that and times
+  /// H^T, and the last times c_v^2; inverse_inertia [9], `rate` c_v.
+  void (*rotation_stiffness)(const RotationArrays&, const double* products, const double* velocity_products,
+                             double rate, const double* spin, const double* inverse_inertia, double* factors,
+                             double* hessian, std::ptrdiff_t outer);
+  /// As gyroscopic_product(), of those factors; deformation [r x 3] is H^T; scratch padded(3 r).
+  void (*rotation_product)(const RotationArrays&, const double* deformation, const double* factors, double rate,
+                           const double* spin, const double* x, double* scratch, double* product);
 
   /// L L^T = A of the lower triangle, columns `outer` apart in A and padded(n) in L, whose diagonal holds 1 / L_ii.
   /// False where a pivot is not positive and finite.

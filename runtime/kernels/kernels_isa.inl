@@ -263,7 +263,15 @@ void matrix_vector(const double* A, Index rows, Index columns, Index outer, cons
   if (i < rows) strip_vector<1>(A + i, columns, outer, x, y + i);
 }
 
-/// Factor of the diagonal block in kWidth columns; entries above the diagonal become zero, the diagonal its inverse.
+inline IntVec lane_numbers() {
+  IntVec lanes;
+#pragma GCC unroll 8
+  for (Index i = 0; i < kWidth; ++i) lanes[i] = i;
+  return lanes;
+}
+
+/// Factor of the diagonal block in kWidth columns, the diagonal its inverse. Above it the rows of the block's inverse,
+/// each in the column of its number: a solution then is a product with it, whose terms do not wait for each other.
 inline bool factor_block(Vec* columns, Index count) {
 #pragma GCC unroll 8
   for (Index c = 0; c < kWidth; ++c) {
@@ -275,8 +283,18 @@ inline bool factor_block(Vec* columns, Index count) {
 #pragma GCC unroll 8
     for (Index d = c + 1; d < kWidth; ++d) columns[d] -= columns[c] * columns[c][d] * inverse;
     columns[c] *= root;
-    for (Index i = 0; i < c; ++i) columns[c][i] = 0;
     columns[c][c] = root;
+  }
+  const IntVec lanes = lane_numbers();
+  Vec rows[kWidth];
+#pragma GCC unroll 8
+  for (Index i = 0; i < kWidth; ++i) {
+    if (i >= count) break;
+    Vec row = select(lanes == i, zero() + 1.0, zero());
+#pragma GCC unroll 8
+    for (Index k = 0; k < i; ++k) row -= rows[k] * columns[k][i];
+    rows[i] = row * columns[i][i];
+    columns[i] = select(lanes < i, rows[i], columns[i]);
   }
   return true;
 }
@@ -324,21 +342,9 @@ bool cholesky(const double* A, Index n, Index outer, double* L) {
   return true;
 }
 
-/// y of L y = x of a factored diagonal block of `count` columns. The unknowns are scaled at the end alone, so that each
-/// waits for one product only.
-inline Vec solve_forward(const double* block, Index stride, Index count, Vec x) {
-  IntVec lanes;
-  Vec inverses = zero();
-#pragma GCC unroll 8
-  for (Index i = 0; i < kWidth; ++i) lanes[i] = i;
-#pragma GCC unroll 8
-  for (Index c = 0; c < kWidth; ++c) {
-    if (c >= count) break;
-    const double inverse = block[c * stride + c];
-    inverses[c] = inverse;
-    x -= select(lanes > c, load(block + c * stride) * inverse, zero()) * x[c];
-  }
-  return x * inverses;
+/// Row `i` of the inverse of a factored diagonal block.
+inline Vec inverse_row(const double* block, Index stride, Index i) {
+  return select(lane_numbers() <= i, load(block + i * stride), zero());
 }
 
 void cholesky_solve(const double* L, Index n, double* x) {
@@ -347,11 +353,19 @@ void cholesky_solve(const double* L, Index n, double* x) {
   for (Index j = 0; j < n; j += kWidth) {
     const Index count = n - j < kWidth ? n - j : kWidth;
     const double* block = L + j * stride;
-    store(x + j, solve_forward(block + j, stride, count, load(x + j)));
+    const Vec right = load(x + j);
+    Vec products[kWidth];
+#pragma GCC unroll 8
+    for (Index i = 0; i < kWidth; ++i) products[i] = i < count ? inverse_row(block + j, stride, i) * right : zero();
+    store(x + j, sums_of_lanes(products));
     for (Index i = j + kWidth; i < stride; i += kWidth) {
-      Vec below = load(x + i);
-      for (Index c = 0; c < count; ++c) below -= load(block + c * stride + i) * x[j + c];
-      store(x + i, below);
+      Vec below = load(x + i), other = zero();
+      for (Index c = 0; c + 1 < count; c += 2) {
+        below -= load(block + c * stride + i) * x[j + c];
+        other -= load(block + (c + 1) * stride + i) * x[j + c + 1];
+      }
+      if (count % 2 == 1) below -= load(block + (count - 1) * stride + i) * x[j + count - 1];
+      store(x + i, below + other);
     }
   }
   for (Index j = (n - 1) / kWidth * kWidth; j >= 0; j -= kWidth) {
@@ -364,15 +378,14 @@ void cholesky_solve(const double* L, Index n, double* x) {
       for (Index c = 0; c < kWidth; ++c)
         if (c < count) dots[c] += load(block + c * stride + i) * below;
     }
-    double values[kWidth];
-    store(values, load(x + j) - sums_of_lanes(dots));
+    const Vec right = load(x + j) - sums_of_lanes(dots);
+    Vec even = zero(), odd = zero();
 #pragma GCC unroll 8
-    for (Index c = kWidth - 1; c >= 0; --c) {
-      if (c >= count) continue;
-      values[c] *= block[c * stride + j + c];
-      for (Index d = 0; d < c; ++d) values[d] -= values[c] * block[d * stride + j + c];
+    for (Index i = 0; i < kWidth; i += 2) {
+      if (i < count) even += inverse_row(block + j, stride, i) * right[i];
+      if (i + 1 < count) odd += inverse_row(block + j, stride, i + 1) * right[i + 1];
     }
-    for (Index c = 0; c < count; ++c) x[j + c] = values[c];
+    store(x + j, even + odd);
   }
 }
 
@@ -402,6 +415,7 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
 #include "runtime/kernels/lanes_isa.inl"
 #include "runtime/kernels/lanes_rotation_isa.inl"
 #include "runtime/kernels/lanes_vectors_isa.inl"
+#include "runtime/kernels/rotation_isa.inl"
 #include "runtime/kernels/triangles_isa.inl"
 
 }  // namespace
@@ -415,6 +429,12 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  tangents,
                                  symmetric_product,
                                  matrix_vector,
+                                 panel_product,
+                                 rotation_moments,
+                                 rotation_dots,
+                                 rotation_force,
+                                 rotation_stiffness,
+                                 rotation_product,
                                  cholesky,
                                  cholesky_solve,
                                  gemm,

@@ -145,9 +145,11 @@ inline void moments_of(const LaneRotationArrays& own, Index at, const double* x,
 
 void lanes_rotate(const LaneRotationArrays& own, const double* active, const double* x, double* force, double* found) {
   const Index block = own.modes * kLanes;
-  for (Index k = 0; k < 9; ++k)
+  for (Index k = 1; k < 9; ++k)
     lanes_matrix_product(own.stacked + k * own.stride, own.modes, own.modes, 9 * own.stride, x,
                          own.products + k * block);
+  for (Index i = 0; i < block; i += kWidth)
+    store(own.products + i, load(x + i) - load(own.products + block + i) - load(own.products + 2 * block + i));
   for (Index at = 0; at < kLanes; at += kWidth) {
     Vec J[9], h[3], inverse[9], w[3], slopes[kPairs], turning[3];
     moments_of(own, at, x, J, h);
@@ -215,6 +217,44 @@ inline void set_rotation_factors(const LaneRotationArrays& own, Index at, IntVec
   }
 }
 
+/// What the rotation adds to `rows` rows of the Hessian from row i on, up to the diagonal. `soft`: slopes of the six
+/// pairs, null: none.
+template <Index rows>
+inline void add_rotation_rows(const LaneRotationArrays& own, Index at, Index i, Vec inertia, const Vec* soft,
+                              double* hessian) {
+  Vec slope[rows][3], lost[rows][3];
+#pragma GCC unroll 2
+  for (Index m = 0; m < rows; ++m)
+#pragma GCC unroll 3
+    for (Index c = 0; c < 3; ++c) {
+      const double* const row = own.factors + 12 * (i + m) * kLanes + at;
+      slope[m][c] = load3(row, c);
+      lost[m][c] = inertia * load3(row, 3 + c);
+    }
+  for (Index j = 0; j < i + rows; ++j) {
+    const double* const column = own.factors + (12 * j + 6) * kLanes + at;
+    Vec gains[rows] = {}, losses[rows] = {};
+#pragma GCC unroll 3
+    for (Index c = 0; c < 3; ++c) {
+      const Vec stiffening = load3(column, c), other = load3(column, 3 + c);
+#pragma GCC unroll 2
+      for (Index m = 0; m < rows; ++m) {
+        gains[m] += slope[m][c] * stiffening;
+        losses[m] += lost[m][c] * other;
+      }
+    }
+#pragma GCC unroll 2
+    for (Index m = 0; m < rows; ++m) {
+      if (j > i + m) continue;
+      Vec sum = gains[m] - losses[m];
+      if (soft != nullptr)
+        for (Index pair = 0; pair < kPairs; ++pair)
+          sum += soft[pair] * own.stacked[(j * 9 + pair) * own.stride + i + m];
+      add_to(hessian + lane_entry(i + m, j) + at, sum);
+    }
+  }
+}
+
 void lanes_rotation_stiffness(const LaneRotationArrays& own, const double* chosen, const double* softening,
                               double* hessian) {
   for (Index at = 0; at < kLanes; at += kWidth) {
@@ -224,24 +264,10 @@ void lanes_rotation_stiffness(const LaneRotationArrays& own, const double* chose
     for (Index c = 0; c < 3; ++c) w[c] = load3(own.spin + at, c);
     energy_slopes(w, slopes);
     for (Index pair = 0; pair < kPairs; ++pair) slopes[pair] *= -2.0 * soft;
-    const bool softens = !all(soft == 0.0);
-    for (Index i = 0; i < own.modes; ++i) {
-      const double* const row = own.factors + 12 * i * kLanes + at;
-      Vec slope[3], lost[3];
-      for (Index c = 0; c < 3; ++c) {
-        slope[c] = load3(row, c);
-        lost[c] = inertia * load3(row, 3 + c);
-      }
-      for (Index j = 0; j <= i; ++j) {
-        const double* const column = own.factors + (12 * j + 6) * kLanes + at;
-        Vec sum = load(hessian + lane_entry(i, j) + at);
-        for (Index c = 0; c < 3; ++c) sum += slope[c] * load3(column, c) - lost[c] * load3(column, 3 + c);
-        if (softens)
-          for (Index pair = 0; pair < kPairs; ++pair)
-            sum += slopes[pair] * own.stacked[(j * 9 + pair) * own.stride + i];
-        store(hessian + lane_entry(i, j) + at, sum);
-      }
-    }
+    const Vec* const softens = all(soft == 0.0) ? nullptr : slopes;
+    Index i = 0;
+    for (; i + 2 <= own.modes; i += 2) add_rotation_rows<2>(own, at, i, inertia, softens, hessian);
+    if (i < own.modes) add_rotation_rows<1>(own, at, i, inertia, softens, hessian);
   }
 }
 

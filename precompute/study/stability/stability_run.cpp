@@ -346,7 +346,7 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
 Eigen::Vector3d Run::angular_momentum() const {
   const auto now = moments();
   const runtime::FreeState& body = runtime::free_state(state_);
-  return body.orientation * (now.inertia * body.spin + now.deformation.transpose() * state_.v);
+  return body.orientation * (now.inertia * body.spin + now.deformation().transpose() * state_.v);
 }
 
 // Of a free body as a rigid one.

@@ -37,10 +37,9 @@ void add_carried_load(const CarriedInertia& carried, const RowMatrix& gravity_lo
 void carried_force(const CarriedInertia& carried, const Eigen::VectorXd& q, CarriedWorkspace& workspace) noexcept {
   const DeformingInertia& frame = carried.moments;
   frame.moments(q, workspace.moments);
-  frame.centrifugal_force(workspace.moments, workspace.spin, workspace.force);
-  frame.gyroscopic_product(workspace.spin, workspace.velocity, workspace.scratch, workspace.product);
-  // W' q = -H^T w'.
-  workspace.force += 2 * workspace.product - workspace.moments.deformation.lazyProduct(workspace.spin_rate);
+  frame.turning_products(workspace.velocity, workspace.scratch);
+  frame.force(workspace.moments, workspace.scratch, workspace.spin, 2 * workspace.spin, workspace.spin_rate,
+              workspace.force);
 }
 
 void set_gyroscopic(const CarriedInertia& carried, double velocity_factor, CarriedWorkspace& workspace) noexcept {
@@ -62,7 +61,7 @@ CarriedState carried_state(const CarriedInertia& carried, const RowMatrix& gravi
   const Eigen::Vector3d centre = carried.moments.centre_of_mass(), &spin = workspace.spin;
   const Eigen::Vector3d velocity = frame.rotation.transpose() * frame.velocity_at(frame.to_world(centre));
   const Eigen::Vector3d first = gravity_load.lazyProduct(q), first_rate = gravity_load.lazyProduct(v);
-  const Eigen::Vector3d momentum = carried.spin_load.lazyProduct(v) + workspace.moments.deformation.transpose() * v;
+  const Eigen::Vector3d momentum = carried.spin_load.lazyProduct(v) + workspace.moments.deformation().transpose() * v;
   CarriedState state;
   state.frame = frame;
   state.kinetic_energy =

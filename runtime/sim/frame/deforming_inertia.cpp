@@ -17,6 +17,15 @@ Eigen::Matrix<double, 6, 1> energy_slopes(const Eigen::Vector3d& spin) {
   return slopes;
 }
 
+/// Rows from `first` on of matrices in panels of kLanes rows, each by columns.
+void write_panels(const Eigen::MatrixXd& matrix, Eigen::Index first, AlignedArray& panels) {
+  for (Eigen::Index i = 0; i < matrix.rows(); ++i)
+    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
+      const Eigen::Index row = first + i;
+      panels[(row / kLanes * matrix.cols() + j) * kLanes + row % kLanes] = matrix(i, j);
+    }
+}
+
 }  // namespace
 
 DeformingInertia::DeformingInertia(const RigidData& data)
@@ -24,7 +33,9 @@ DeformingInertia::DeformingInertia(const RigidData& data)
       centre_of_mass_(data.centre_of_mass),
       second_moments_(data.second_moments),
       linear_(data.linear_moments.cols(), kSymmetric),
-      stacked_(kProducts * padded(data.linear_moments.cols()) * data.linear_moments.cols()) {
+      stacked_(kProducts * padded(data.linear_moments.cols()) * data.linear_moments.cols()),
+      panels_(padded(5 * modes()) * modes()),
+      turning_panels_(padded(3 * modes()) * modes()) {
   const Eigen::Index r = modes(), stride = padded(r);
   const auto S = [&](int a, int b) { return data.basis_moments.middleRows((3 * a + b) * r, r); };
   Eigen::Map<Eigen::MatrixXd> stacked(stacked_.data(), kProducts * stride, r);
@@ -33,46 +44,58 @@ DeformingInertia::DeformingInertia(const RigidData& data)
     pairs_[pair] = data.second_moments(a, b);
     linear_.col(pair) = data.linear_moments.row(3 * a + b);
     stacked.middleRows(pair * stride, r) = 0.5 * (S(a, b) + S(b, a));
+    if (pair > 0) write_panels(stacked.middleRows(pair * stride, r), (pair - 1) * r, panels_);
   }
   for (int c = 0; c < 3; ++c) {
     const int a = (c + 1) % 3, b = (c + 2) % 3;
     stacked.middleRows((kSymmetric + c) * stride, r) = S(a, b) - S(b, a);
+    write_panels(S(b, a) - S(a, b), c * r, turning_panels_);
   }
 }
 
 DeformingInertia::Moments DeformingInertia::make_moments() const {
-  return {AlignedArray(kProducts * padded(modes())), Eigen::Matrix3d::Zero(), Eigen::MatrixX3d::Zero(modes(), 3),
-          Eigen::MatrixXd::Zero(modes(), kSymmetric)};
+  return {modes(), AlignedArray(rotation_products(modes())), Eigen::Matrix3d::Zero()};
 }
 
 void DeformingInertia::moments(const Eigen::VectorXd& q, Moments& moments) const noexcept {
-  const Eigen::Index stride = padded(modes()), rows = kProducts * stride;
-  kernels().matrix_vector(stacked_.data(), rows, modes(), rows, q.data(), moments.products.data());
-  const auto product = [&](int i) {
-    return Eigen::Map<const Eigen::VectorXd>(moments.products.data() + i * stride, modes());
-  };
-  Eigen::Matrix3d P = second_moments_;
-  for (int pair = 0; pair < kSymmetric; ++pair) {
-    const double change = q.dot(linear_.col(pair) + product(pair));
-    P(kFirst[pair], kSecond[pair]) += change;
-    if (kFirst[pair] != kSecond[pair]) P(kSecond[pair], kFirst[pair]) += change;
-    moments.gradients.col(pair) = linear_.col(pair) + 2 * product(pair);
-  }
-  moments.inertia = P.trace() * Eigen::Matrix3d::Identity() - P;
-  for (int c = 0; c < 3; ++c) moments.deformation.col(c) = -product(kSymmetric + c);
+  Eigen::Matrix<double, 6, 1> changes;
+  kernels().rotation_moments(arrays(), q.data(), nullptr, moments.products.data(), nullptr, changes.data());
+  set_inertia(changes, moments);
 }
 
-void DeformingInertia::centrifugal_force(const Moments& moments, const Eigen::Vector3d& spin,
-                                         Eigen::VectorXd& force) const noexcept {
-  force.noalias() = moments.gradients.lazyProduct(energy_slopes(spin));
+void DeformingInertia::moments(const Eigen::VectorXd& q, const Eigen::VectorXd& other, Moments& moments,
+                               AlignedArray& other_products) const noexcept {
+  Eigen::Matrix<double, 6, 1> changes;
+  kernels().rotation_moments(arrays(), q.data(), other.data(), moments.products.data(), other_products.data(),
+                             changes.data());
+  set_inertia(changes, moments);
+}
+
+/// Of the changes of P_ab.
+void DeformingInertia::set_inertia(const Eigen::Matrix<double, 6, 1>& changes, Moments& moments) const noexcept {
+  const Eigen::Matrix<double, 6, 1> P = pairs_ + changes;
+  const double trace = P[0] + P[1] + P[2];
+  moments.inertia << trace - P[0], -P[5], -P[4], -P[5], trace - P[1], -P[3], -P[4], -P[3], trace - P[2];
+}
+
+void DeformingInertia::turning_products(const Eigen::VectorXd& v, AlignedArray& products) const noexcept {
+  kernels().panel_product(turning_panels_.data(), padded(3 * modes()) / kLanes, modes(), v.data(), products.data());
+}
+
+void DeformingInertia::force(const Moments& moments, const AlignedArray& velocity_products, const Eigen::Vector3d& spin,
+                             const Eigen::Vector3d& by_velocity, const Eigen::Vector3d& by_pose,
+                             Eigen::VectorXd& force) const noexcept {
+  const Eigen::Matrix<double, 6, 1> slopes = energy_slopes(spin);
+  const Eigen::Vector3d of_velocity = -by_velocity, of_pose = -by_pose;
+  kernels().rotation_force(arrays(), moments.products.data(), velocity_products.data(), slopes.data(),
+                           of_velocity.data(), of_pose.data(), force.data());
 }
 
 void DeformingInertia::gyroscopic_product(const Eigen::Vector3d& spin, const Eigen::VectorXd& v, AlignedArray& scratch,
                                           Eigen::VectorXd& product) const noexcept {
-  const Eigen::Index stride = padded(modes()), all = kProducts * stride;
-  kernels().matrix_vector(stacked_.data() + kSymmetric * stride, 3 * stride, modes(), all, v.data(), scratch.data());
-  const auto part = [&](int c) { return Eigen::Map<const Eigen::VectorXd>(scratch.data() + c * stride, modes()); };
-  product = spin[0] * part(0) + spin[1] * part(1) + spin[2] * part(2);
+  turning_products(v, scratch);
+  const auto part = [&](int c) { return Eigen::Map<const Eigen::VectorXd>(scratch.data() + c * modes(), modes()); };
+  product = -(spin[0] * part(0) + spin[1] * part(1) + spin[2] * part(2));
 }
 
 void DeformingInertia::add_gyroscopic(const Eigen::Vector3d& spin, double factor,
@@ -106,6 +129,10 @@ void DeformingInertia::add_softening(const Eigen::Vector3d& spin, double velocit
   if (softens(spin, velocity_factor)) add_centrifugal(spin, -1, hessian);
 }
 
+RotationArrays DeformingInertia::arrays() const noexcept {
+  return {modes(), panels_.data(), turning_panels_.data(), linear_.data()};
+}
+
 LaneRotationArrays DeformingInertia::lane_arrays() const noexcept {
   LaneRotationArrays arrays;
   arrays.modes = modes();
@@ -114,18 +141,6 @@ LaneRotationArrays DeformingInertia::lane_arrays() const noexcept {
   arrays.linear = linear_.data();
   arrays.second_moments = pairs_.data();
   return arrays;
-}
-
-void DeformingInertia::inertia_slope(const Moments& moments, const Eigen::Vector3d& spin,
-                                     Eigen::MatrixX3d& slope) const noexcept {
-  // J w = tr(P) w - P w.
-  for (int axis = 0; axis < 3; ++axis)
-    slope.col(axis) = spin[axis] * (moments.gradients.col(0) + moments.gradients.col(1) + moments.gradients.col(2));
-  for (int pair = 0; pair < kSymmetric; ++pair) {
-    const int a = kFirst[pair], b = kSecond[pair];
-    slope.col(a) -= spin[b] * moments.gradients.col(pair);
-    if (a != b) slope.col(b) -= spin[a] * moments.gradients.col(pair);
-  }
 }
 
 }  // namespace exmat::runtime

@@ -47,8 +47,8 @@ bool FreeFrame::set_motion(const FrameMotion& motion, const Eigen::VectorXd& q, 
   body.orientation = motion.orientation.normalized();
   body.spin = body.orientation.conjugate() * motion.angular_velocity;
   body.linear_momentum = body.mass * motion.linear_velocity;
-  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation.transpose() * v);
-  body.momentum = v + moments.deformation.lazyProduct(body.spin);
+  body.angular_momentum = body.orientation * (moments.inertia * body.spin + moments.deformation().transpose() * v);
+  body.momentum = v + moments.deformation().lazyProduct(body.spin);
   body.momentum_previous = body.momentum;
   return true;
 }
@@ -155,8 +155,8 @@ Eigen::Vector3d FreeFrame::limit_kinetic_energy(double allowed, const Eigen::Vec
     l *= rest;
     body.angular_momentum = to_body.transpose() * l;
   }
-  body.spin = inverse * (l - free.moments.deformation.transpose() * v);
-  body.momentum = v + free.moments.deformation.lazyProduct(body.spin);
+  body.spin = inverse * (l - free.moments.deformation().transpose() * v);
+  body.momentum = v + free.moments.deformation().lazyProduct(body.spin);
   return before - body.linear_momentum;
 }
 
@@ -168,7 +168,7 @@ void FreeFrame::add_motion(double share, const FrameVelocity& added, FrameWorksp
   body.linear_momentum = share * body.linear_momentum + body.mass * added.linear;
   body.angular_momentum = share * body.angular_momentum + inertia(workspace, state) * added.angular;
   body.spin = share * body.spin + body.orientation.conjugate() * added.angular;
-  body.momentum = v + moments.deformation.lazyProduct(body.spin);
+  body.momentum = v + moments.deformation().lazyProduct(body.spin);
 }
 
 Eigen::Matrix3d FreeFrame::inertia(const FrameWorkspace& workspace, const FrameState& state) const noexcept {
@@ -194,13 +194,19 @@ void FreeFrame::begin(const FrameStep& step, FrameWorkspace& /*workspace*/,
 /// them, away from obstacles.
 void FreeFrame::move(const FrameStep& step, bool near, bool dissipative, const FrameState& state,
                      FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept {
+  const FreeState& start = own(state);
   FreeState& body = own(workspace).moved;
-  body = own(state);
+  body.mass = start.mass;
+  body.position = start.position;
+  body.orientation = start.orientation;
+  body.linear_momentum = start.linear_momentum;
+  body.angular_momentum = start.angular_momentum;
+  body.spin = start.spin;
   const double dt = step.time_step, mass = inertia_.mass();
-  const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
-  Eigen::Vector3d force = mass * step.loads.gravity + body.applied_force, torque = body.applied_torque;
+  Eigen::Vector3d force = mass * step.loads.gravity + start.applied_force, torque = start.applied_torque;
   for (const ScriptedForce& scripted : step.loads.forces) {
     if (!scripted.acts_at(step.midpoint())) continue;
+    const Eigen::Matrix3d rotation = body.orientation.toRotationMatrix() * rotation_of(0.5 * dt * body.spin);
     const Eigen::Vector3d local = rotation.transpose() * scripted.total;
     const Eigen::Vector3d arm = scripted.lever + scripted.mean_basis * step.q;
     force += scripted.total;
@@ -227,11 +233,7 @@ void FreeFrame::add_start_force(const FrameStep& step, const FrameState& state, 
 
 bool FreeFrame::update_force(const Eigen::VectorXd& q, double velocity_factor, const Eigen::VectorXd& velocity_centre,
                              FrameWorkspace& workspace) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
-  free.velocity = velocity_factor * (q - velocity_centre);
-  const bool found = update_spin(inertia_, q, free);
-  rotation_force(inertia_, velocity_factor, free);
-  return found;
+  return update_rotation(inertia_, velocity_factor, q, velocity_centre, own(workspace));
 }
 
 const Eigen::VectorXd* FreeFrame::force(const FrameWorkspace& workspace) const noexcept {
@@ -310,7 +312,7 @@ void FreeFrame::rigid_gradient(const Eigen::VectorXd& x, const FrameMomenta& con
   const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (dt * dt);
   const Eigen::Matrix3d turn = rotation_of(t);
   const Eigen::Vector3d momentum =
-      free.moments.inertia * free.solution.spin + free.moments.deformation.transpose() * free.velocity;
+      free.moments.inertia * free.solution.spin + free.moments.deformation().transpose() * free.velocity;
   const Eigen::Matrix3d to_turn = right_jacobian(t).transpose();
   const Eigen::Vector3d inertia = to_turn * ((momentum - turn.transpose() * free.problem.momentum) / dt);
   unknowns.next_frozen_turn = inertia - quadratic;
@@ -351,7 +353,7 @@ void FreeFrame::add_rigid_hessian(const Eigen::VectorXd& x, const Placement& pla
   hessian.triangularView<Eigen::Lower>() += K;
   hessian.diagonal().head<3>().array() += inertia_.mass() / (dt * dt);
   hessian.block<3, 3>(3, 3).triangularView<Eigen::Lower>() += free.moments.inertia / (dt * dt);
-  hessian.block(6, 3, inertia_.modes(), 3) += free.moments.deformation / (dt * dt);
+  hessian.block(6, 3, inertia_.modes(), 3) += free.moments.deformation() / (dt * dt);
 }
 
 double FreeFrame::residual_of(const Eigen::Vector3d& force) const noexcept {
@@ -364,7 +366,7 @@ void FreeFrame::end_contact(const Eigen::VectorXd& x, bool converged, const Eige
   FreeState& body = free.moved;
   const double dt = free.unknowns.time_step;
   const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
-  const Eigen::Vector3d deformation = free.moments.deformation.transpose() * free.velocity;
+  const Eigen::Vector3d deformation = free.moments.deformation().transpose() * free.velocity;
   if (converged) {
     body.position += dt * dt / body.mass * force;  // d, but for the residual: the centre goes as its momentum says
     body.angular_momentum += dt * torque;

@@ -46,13 +46,15 @@ struct FreeMotionWorkspace {
   Eigen::Vector3d turned_momentum = Eigen::Vector3d::Zero();  ///< L in the body frame at the end of a given turn
   SpinSolution solution;
   DeformingInertia::Moments moments;
-  AlignedArray scratch;
-  Eigen::VectorXd force, product, velocity;             ///< r, product padded(r)
-  Eigen::MatrixX3d slope;                               ///< r x 3, (D + V)^T
-  Eigen::MatrixX3d inverse_slope, inverse_deformation;  ///< r x 3, transposes of J^-1 (D + V) and J^-1 H
-  Eigen::MatrixXd gyroscopic;                           ///< r x r
-  FreeState moved;                                      ///< at the end of the step
-  RigidUnknowns unknowns;                               ///< near obstacles
+  AlignedArray velocity_products;            ///< -A_c v, r each, of the last rotation_force()
+  AlignedArray centre_products;              ///< likewise of velocity_centre
+  AlignedArray scratch;                      ///< 3 r
+  Eigen::VectorXd force, product, velocity;  ///< r
+  Eigen::VectorXd velocity_centre;           ///< r, the last q_v
+  Eigen::MatrixXd factors;                   ///< r x 12: (D + V)^T, J^-1 times that and times H^T, and scratch
+  Eigen::MatrixXd gyroscopic;                ///< r x r
+  FreeState moved;                           ///< at the end of the step
+  RigidUnknowns unknowns;                    ///< near obstacles
 };
 
 /// The problem of the spin in this step, after external forces have changed the momenta of `body`. `dissipative`:
@@ -71,6 +73,11 @@ bool update_spin(const DeformingInertia& frame, const Eigen::VectorXd& q, FreeMo
 
 /// workspace.force = d/dt (W q) + W v + d/dq (1/2 w^T J w), d/dt as the integrator has it: `rate` W q.
 void rotation_force(const DeformingInertia& frame, double rate, FreeMotionWorkspace& workspace) noexcept;
+
+/// update_spin() and rotation_force() for the velocity rate (q - q_v), q_v `velocity_centre` [r]. A_c v is then rate
+/// times the difference of A_c q, which is at hand, and A_c q_v, which is found once for each q_v.
+bool update_rotation(const DeformingInertia& frame, double rate, const Eigen::VectorXd& q,
+                     const Eigen::VectorXd& velocity_centre, FreeMotionWorkspace& workspace) noexcept;
 
 /// The rotation's part of the derivative of the gradient, v = c_v (q - q_v), after rotation_force(): with D = d(J
 /// w)/dq, V = dh/dq and H = dh/dv, w of constant angular momentum gives (D + V - c_v H)^T J^-1 (D + V + c_v H). Adds

@@ -54,7 +54,7 @@ void LaneRotation::take(Eigen::Index lane, FreeMotionWorkspace& body) const noex
   body.solution = {spin_.row(lane).matrix(), rotation_.row(lane).matrix(), true};
   const Eigen::Index modes = inertia_->modes();
   const double* own = products_.data() + 6 * modes * kLanes + lane;
-  for (Eigen::Index i = 0; i < 3 * modes; ++i) body.moments.deformation.data()[i] = -own[i * kLanes];
+  for (Eigen::Index i = 0; i < 3 * modes; ++i) body.moments.deformation().data()[i] = -own[i * kLanes];
 }
 
 LaneRotationArrays LaneRotation::arrays() noexcept {

@@ -29,7 +29,7 @@ struct Bodies {
       own.velocity = kRate * (q.row(lane) - centre.row(lane)).transpose();
       inertia.moments(q.row(lane).transpose(), own.moments);
       state.angular_momentum =
-          state.orientation * (own.moments.inertia * state.spin + own.moments.deformation.transpose() * own.velocity);
+          state.orientation * (own.moments.inertia * state.spin + own.moments.deformation().transpose() * own.velocity);
       state.spin *= 0.99;  // a guess
       begin_rotation(state, kTimeStep, lane % 2 == 0, own);
     }
@@ -97,7 +97,8 @@ TEST(LaneRotation, IsThatOfEachBody) {
       found.rotation.take(lane, taken);
       EXPECT_LE((taken.solution.spin - own.solution.spin).norm(), 1e-11 * (1 + own.solution.spin.norm()));
       EXPECT_LE((taken.solution.rotation - own.solution.rotation).norm(), 1e-13);
-      EXPECT_LE((taken.moments.deformation - own.moments.deformation).norm(), 1e-13 * own.moments.deformation.norm());
+      EXPECT_LE((taken.moments.deformation() - own.moments.deformation()).norm(),
+                1e-13 * own.moments.deformation().norm());
     }
   }
 }
@@ -114,7 +115,7 @@ TEST(LaneRotation, KeepsTheAngularMomentum) {
       found.rotation.take(lane, own);
       bodies.inertia.moments(bodies.q.row(lane).transpose(), own.moments);
       const Eigen::Vector3d now =
-          own.moments.inertia * own.solution.spin + own.moments.deformation.transpose() * own.velocity;
+          own.moments.inertia * own.solution.spin + own.moments.deformation().transpose() * own.velocity;
       EXPECT_LE((rotation_of(own.solution.rotation) * now - momentum).norm(), 1e-13 * (1 + momentum.norm())) << fastest;
     }
   }
