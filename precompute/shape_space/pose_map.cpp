@@ -7,7 +7,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr Eigen::Index kClampedTogether = 16;  // what is in the making of a field is some times as large as the field
+constexpr Eigen::Index kClampedTogether = 32;  // what is in the making of a field is some times as large as the field
 
 }  // namespace
 

@@ -69,7 +69,9 @@ RowMatrix Davidson::start() const {
   std::mt19937_64 generator(1 + static_cast<unsigned>(found_.cols()));
   RowMatrix columns(mass_.rows(), pairs_);
   for (Eigen::Index k = 0; k < columns.size(); ++k) columns.data()[k] = static_cast<double>(generator()) / 0x1p63 - 1.0;
-  return solver_.precondition(product(mass_, columns));
+  RowMatrix loads = product(mass_, columns);
+  solver_.precondition(loads);
+  return loads;
 }
 
 // M-orthonormal among themselves; those that depend on the others go. Stathopoulos and Wu 2002.
@@ -118,10 +120,11 @@ Eigen::MatrixXd Davidson::solve() {
     const Eigen::Index pairs = std::min(pairs_, size_);
     RowMatrix vectors = RowMatrix::Zero(space_.rows(), pairs);
     add_product(1, own(), ritz.eigenvectors().leftCols(pairs), vectors);
-    RowMatrix steps = product(stiffness_, vectors);
-    steps -= product(mass_, vectors) * ritz.eigenvalues().head(pairs).asDiagonal();
-    steps = solver_.precondition(std::move(steps));
-    const Eigen::VectorXd errors = column_dots(steps, product(mass_, steps)).cwiseMax(0).cwiseSqrt().transpose();
+    RowMatrix steps = product(stiffness_, vectors), masses = product(mass_, vectors);
+    combine(Eigen::RowVectorXd::Ones(pairs), -ritz.eigenvalues().head(pairs).transpose(), masses, steps);
+    solver_.precondition(steps);
+    product(mass_, steps, masses);
+    const Eigen::VectorXd errors = column_dots(steps, masses).cwiseMax(0).cwiseSqrt().transpose();
     const double worst = errors.head(std::min(count_, pairs)).maxCoeff();
     progress.reach((errors.head(std::min(count_, pairs)).array() <= accuracy_).count());
     waited = worst < nearest / 2 ? 0 : waited + 1;

@@ -56,45 +56,53 @@ std::string MixedSolver::object() const {
   return "with factors in single precision " + std::to_string(outcome.steps) + " steps do not solve for it";
 }
 
-RowMatrix MixedSolver::precondition(RowMatrix right_hand_sides) const {
+void MixedSolver::precondition(RowMatrix& right_hand_sides) const {
   add_product(-1, mass_null_space_, inner(null_space_, right_hand_sides), right_hand_sides);
-  RowMatrix solutions;
-  factors_.solve(right_hand_sides, solutions);
-  add_product(-1, null_space_, inner(mass_null_space_, solutions), solutions);
-  return solutions;
+  factors_.solve(right_hand_sides, right_hand_sides);
+  add_product(-1, null_space_, inner(mass_null_space_, right_hand_sides), right_hand_sides);
+}
+
+void MixedSolver::precondition(const RowMatrix& residual, RowMatrix& solutions) const {
+  if (nullity() > 0) {
+    solutions = residual;
+    return precondition(solutions);
+  }
+  factors_.solve(residual, solutions);
 }
 
 // Preconditioned conjugate gradients of each column, side by side. Hestenes and Stiefel 1952.
 MixedSolver::Outcome MixedSolver::iterate(RowMatrix residual, int most) const {
   add_product(-1, mass_null_space_, inner(null_space_, residual), residual);
   Outcome outcome{RowMatrix::Zero(residual.rows(), residual.cols())};
-  RowMatrix direction = precondition(residual);
+  RowMatrix direction, image, solved;
+  precondition(residual, direction);
+  const Eigen::RowVectorXd ones = Eigen::RowVectorXd::Ones(residual.cols());
   Eigen::RowVectorXd square = column_dots(residual, direction);
   const Eigen::RowVectorXd limit = kTolerance * kTolerance * square;
   for (;; ++outcome.steps) {
     const auto open = (square.array() > limit.array()).eval();
     outcome.converged = !open.any();
     if (outcome.converged || outcome.steps == most) return outcome;
-    const RowMatrix image = product(matrix_, direction);
+    product(matrix_, direction, image);
     const Eigen::RowVectorXd curvature = column_dots(direction, image);
     if (!curvature.allFinite() || (open && curvature.array() <= 0).any()) return outcome;
     const Eigen::RowVectorXd length = open.select(square.cwiseQuotient(curvature), 0);
-    outcome.solutions += direction * length.asDiagonal();
-    residual -= image * length.asDiagonal();
-    RowMatrix solved = precondition(residual);
+    combine(ones, length, direction, outcome.solutions);
+    combine(ones, -length, image, residual);
+    precondition(residual, solved);
     const Eigen::RowVectorXd next = open.select(column_dots(residual, solved), square);
     const Eigen::RowVectorXd share = open.select(next.cwiseQuotient(square), 0);
-    direction = solved + direction * share.asDiagonal();
+    combine(share, ones, solved, direction);
     square = next;
   }
 }
 
-Eigen::MatrixXd MixedSolver::solve(const Eigen::MatrixXd& right_hand_sides) const {
-  const Outcome outcome = iterate(right_hand_sides, kMostSteps);
+RowMatrix MixedSolver::solve(RowMatrix right_hand_sides) const {
+  Outcome outcome = iterate(std::move(right_hand_sides), kMostSteps);
   if (!outcome.converged)
     throw WorkError("conjugate gradients with factors in single precision do not converge in " +
                     std::to_string(outcome.steps) + " steps; use --eigensolver direct");
-  return outcome.solutions;
+  return std::move(outcome.solutions);
 }
 
 }  // namespace exmat::precompute

@@ -24,10 +24,10 @@ class MixedSolver {
   Eigen::Index nullity() const { return null_space_.cols(); }
 
   /// [n x k] X with K X = (I - M R R^T) B and R^T M X = 0. Throws WorkError where the iteration does not converge.
-  Eigen::MatrixXd solve(const Eigen::MatrixXd& right_hand_sides) const;
+  RowMatrix solve(RowMatrix right_hand_sides) const;
 
-  /// The same, to the precision of the factors.
-  RowMatrix precondition(RowMatrix right_hand_sides) const;
+  /// The same, to the precision of the factors, in place.
+  void precondition(RowMatrix& right_hand_sides) const;
 
  private:
   struct Outcome {
@@ -35,6 +35,8 @@ class MixedSolver {
     bool converged = false;
     int steps = 0;
   };
+  /// Into `solutions`, whose memory is used again where it fits; the null vectors have no share in what is given.
+  void precondition(const RowMatrix& residual, RowMatrix& solutions) const;
   Outcome iterate(RowMatrix right_hand_sides, int most) const;
   std::string object() const;
 

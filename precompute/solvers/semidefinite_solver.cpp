@@ -13,6 +13,7 @@
 #include "precompute/solvers/available_memory.h"
 #include "precompute/solvers/blas.h"
 #include "precompute/solvers/solver_access.h"
+#include "precompute/solvers/tall.h"
 
 namespace exmat::precompute {
 namespace {
@@ -255,7 +256,7 @@ Eigen::MatrixXd SolverShare::solve(const Eigen::MatrixXd& right_hand_sides, Eige
 }
 
 Eigen::MatrixXd SolverShare::solve_rows(const Eigen::MatrixXd& right_hand_sides) const {
-  if (means == Means::kMixed) return mixed->solve(right_hand_sides);
+  if (means == Means::kMixed) return mixed->solve(by_rows(right_hand_sides));
   return means == Means::kMumps ? solve_directly(right_hand_sides) : iterate(right_hand_sides);
 }
 
@@ -333,6 +334,11 @@ Eigen::MatrixXd SemidefiniteSolver::solve(const Eigen::MatrixXd& right_hand_side
   const Eigen::Index together = share_->means == Means::kMixed ? kSolvedTogetherMixed : kSolvedTogether;
   for (Eigen::Index begin = 0; begin < solutions.cols(); begin += together) {
     const Eigen::Index count = std::min(together, solutions.cols() - begin);
+    if (share_->mixed) {
+      put_by_columns(share_->mixed->solve(by_rows(right_hand_sides.middleCols(begin, count))),
+                     solutions.middleCols(begin, count));
+      continue;
+    }
     announce({Task::kSolve, share_->id, {count}});
     solutions.middleCols(begin, count) = share_->solve(right_hand_sides.middleCols(begin, count), count);
   }

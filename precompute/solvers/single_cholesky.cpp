@@ -17,13 +17,12 @@ using Index = std::int32_t;
 using Node = Elimination::Node;
 using Strided = Eigen::Map<Eigen::MatrixXf, 0, Eigen::OuterStride<>>;
 
-constexpr int kSmall = 24;            // columns that are factorised without BLAS
-constexpr int kPanel = 192;           // columns that are factorised at once
-constexpr int kTile = 512;            // rows and columns of a front that a thread updates at once
-constexpr std::size_t kColumns = 64;  // vertices whose columns a thread adds to a front at once
-constexpr int kTogether = 32;         // right-hand sides that go through the factors together
-constexpr Eigen::Index kFew = 8;      // of them that are not worth to be shared by threads, which read all factors each
-constexpr double kSubtree = 1.0 / 32;  // of all operations: larger subtrees are not one thread's alone
+constexpr int kSmall = 24;             // columns that are factorised without BLAS
+constexpr int kPanel = 192;            // columns that are factorised at once
+constexpr int kTile = 512;             // rows and columns of a front that a thread updates at once
+constexpr std::size_t kColumns = 64;   // vertices whose columns a thread adds to a front at once
+constexpr int kTogether = 64;          // right-hand sides that go through the factors together
+constexpr double kSubtree = 1.0 / 32;  // of all work: larger subtrees are not one thread's alone
 constexpr double kLittleWork = 1e7;    // operations: threads that wait for each other cost more
 constexpr float kZero = 0, kOne = 1, kMinusOne = -1;
 
@@ -98,25 +97,6 @@ bool factorise_columns(float* front, int height, int columns, bool shared) {
   return true;
 }
 
-// The nodes below each node and itself, which end with it.
-struct Subtree {
-  std::size_t first = 0;
-  double operations = 0;
-};
-
-std::vector<Subtree> subtrees_of(const std::vector<Node>& nodes) {
-  std::vector<Subtree> subtrees(nodes.size());
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const double height = static_cast<double>(nodes[i].columns) + static_cast<double>(nodes[i].rows.size());
-    subtrees[i] = {i, nodes[i].columns * height * height};
-    for (const Index child : nodes[i].children) {
-      subtrees[i].first = std::min(subtrees[i].first, subtrees[at(child)].first);
-      subtrees[i].operations += subtrees[at(child)].operations;
-    }
-  }
-  return subtrees;
-}
-
 struct Orders {
   Graph graph;
   std::vector<Index> place;
@@ -166,6 +146,49 @@ SingleCholesky::SingleCholesky(std::shared_ptr<const Elimination> plan, int bloc
   }
   factors_.reset(new float[static_cast<std::size_t>(size)]);
   for (std::size_t v = 0; v < original_.size(); ++v) original_[at(plan_->place[v])] = static_cast<Index>(v);
+  for (std::size_t i = 0; i < plan_->nodes.size(); ++i) {
+    const Node& node = plan_->nodes[i];
+    const double columns = node.columns, height = columns + static_cast<double>(node.rows.size());
+    Subtree subtree{i, columns * height * height, columns * height};
+    for (const Index child : node.children) {
+      Subtree& below = subtrees_[at(child)];
+      below.has_parent = true;
+      subtree.first = std::min(subtree.first, below.first);
+      subtree.operations += below.operations;
+      subtree.entries += below.entries;
+    }
+    subtrees_.push_back(subtree);
+  }
+  for (const Subtree& subtree : subtrees_) {
+    operations_ += subtree.has_parent ? 0 : subtree.operations;
+    entries_ += subtree.has_parent ? 0 : subtree.entries;
+  }
+}
+
+template <typename Work>
+void SingleCholesky::visit(Order order, double Subtree::*size, int threads, const Work& work) const {
+  double all = 0;
+  for (const Subtree& subtree : subtrees_) all += subtree.has_parent ? 0 : subtree.*size;
+  // Depth first: few updates wait for their parents at a time.
+  const std::function<void(std::size_t)> visit_tree = [&](std::size_t i) {
+    const Subtree& subtree = subtrees_[i];
+    if (subtree.*size <= kSubtree * all) {
+      const std::size_t count = i - subtree.first + 1;
+      for (std::size_t k = 0; k < count; ++k) work(order == Order::kChildrenFirst ? subtree.first + k : i - k, false);
+      return;
+    }
+    if (order == Order::kParentsFirst) work(i, true);
+    for (const Index child : plan_->nodes[i].children) {
+#pragma omp task firstprivate(child)
+      visit_tree(at(child));
+    }
+#pragma omp taskwait
+    if (order == Order::kChildrenFirst) work(i, true);
+  };
+#pragma omp parallel num_threads(threads)
+#pragma omp single
+  for (std::size_t i = 0; i < subtrees_.size(); ++i)
+    if (!subtrees_[i].has_parent) visit_tree(i);
 }
 
 std::int64_t SingleCholesky::bytes(const Elimination& plan, int block, int threads) {
@@ -239,49 +262,20 @@ bool SingleCholesky::factorise(const SparseMatrix& matrix, const std::vector<Eig
   scale_ = matrix.diagonal().cwiseSqrt().cwiseInverse();
   if (!scale_.allFinite()) return false;
   for (const Eigen::Index row : left_out) scale_[row] = 0;
-  const std::vector<Node>& nodes = plan_->nodes;
-  const std::vector<Subtree> subtrees = subtrees_of(nodes);
-  std::vector<bool> has_parent(nodes.size());
-  double all = 0;
-  for (const Node& node : nodes)
-    for (const Index child : node.children) has_parent[at(child)] = true;
-  for (std::size_t i = 0; i < nodes.size(); ++i) all += has_parent[i] ? 0 : subtrees[i].operations;
-  std::vector<std::vector<float>> updates(nodes.size());
-  const int threads = all * block_ * block_ * block_ < kLittleWork ? 1 : blas_callers();
+  std::vector<std::vector<float>> updates(plan_->nodes.size());
+  const int threads = operations_ * block_ * block_ * block_ < kLittleWork ? 1 : blas_callers();
   std::vector<Scratch> scratch(static_cast<std::size_t>(threads), Scratch{std::vector<Index>(original_.size())});
   std::atomic<bool> definite = true;
-  const auto eliminate_one = [&](std::size_t i, bool shared) {
+  visit(Order::kChildrenFirst, &Subtree::operations, threads, [&](std::size_t i, bool shared) {
     Scratch& own = scratch[static_cast<std::size_t>(omp_get_thread_num())];
     if (definite && !eliminate(i, matrix, shared, own, updates)) definite = false;
-  };
-  // Children before parents, depth first: few updates wait for their parents at a time.
-  const std::function<void(std::size_t)> eliminate_tree = [&](std::size_t i) {
-    if (subtrees[i].operations <= kSubtree * all) {
-      for (std::size_t k = subtrees[i].first; k <= i; ++k) eliminate_one(k, false);
-      return;
-    }
-    for (const Index child : nodes[i].children) {
-#pragma omp task firstprivate(child)
-      eliminate_tree(at(child));
-    }
-#pragma omp taskwait
-    eliminate_one(i, true);
-  };
-#pragma omp parallel num_threads(threads)
-#pragma omp single
-  for (std::size_t i = 0; i < nodes.size(); ++i)
-    if (!has_parent[i]) eliminate_tree(i);
+  });
   return definite;
 }
 
 void SingleCholesky::solve(const RowMatrix& B, RowMatrix& X) const {
   X.resize(B.rows(), B.cols());
-  // Parts do not depend on the number of threads.
-  const Eigen::Index parts = std::max<Eigen::Index>(B.cols() > kFew ? 2 : 1, (B.cols() + kTogether - 1) / kTogether);
-  const bool little =
-      static_cast<double>(plan_->entries()) * static_cast<double>(block_ * block_ * B.cols()) < kLittleWork;
-  const int threads = little ? 1 : std::min(blas_callers(), static_cast<int>(parts));
-#pragma omp parallel for schedule(dynamic) num_threads(threads)
+  const Eigen::Index parts = (B.cols() + kTogether - 1) / kTogether;
   for (Eigen::Index part = 0; part < parts; ++part) {
     const Eigen::Index begin = B.cols() * part / parts, end = B.cols() * (part + 1) / parts;
     solve_some(B, begin, end - begin, X);
@@ -290,49 +284,94 @@ void SingleCholesky::solve(const RowMatrix& B, RowMatrix& X) const {
 
 // Columns of B and X from `begin` on. By columns here are the right-hand sides, `count` numbers in each row of L.
 void SingleCholesky::solve_some(const RowMatrix& B, Eigen::Index begin, Eigen::Index count, RowMatrix& X) const {
-  const std::vector<Node>& nodes = plan_->nodes;
-  const int k = static_cast<int>(count);
+  const int threads = entries_ * block_ * block_ * static_cast<double>(count) < kLittleWork ? 1 : blas_callers();
   // Numbers of any size fit into single precision where the largest of each column is 1.
   Eigen::ArrayXd sizes = Eigen::ArrayXd::Zero(count);
-  for (Eigen::Index row = 0; row < B.rows(); ++row)
-    sizes = sizes.max(scale_[row] * B.row(row).segment(begin, count).array().abs().transpose());
-  sizes = (sizes > 0).select(sizes, 1);
   const auto place_of = [&](Eigen::Index row) {
     return static_cast<Eigen::Index>(block_) * plan_->place[static_cast<std::size_t>(row / block_)] + row % block_;
   };
-  Eigen::MatrixXf x(count, B.rows()), gathered;
-  for (Eigen::Index row = 0; row < B.rows(); ++row)
-    x.col(place_of(row)) = (scale_[row] * B.row(row).segment(begin, count).transpose().array() / sizes).cast<float>();
-  for (std::size_t i = 0; i < nodes.size(); ++i) {
-    const Node& node = nodes[i];
-    const int columns = block_ * node.columns, below = block_ * static_cast<int>(node.rows.size()),
-              height = columns + below;
-    float* own = x.col(static_cast<Eigen::Index>(block_) * node.begin).data();
-    strsm_("R", "L", "T", "N", &k, &columns, &kOne, part(i), &height, own, &k);
-    if (below == 0) continue;
-    gathered.resize(count, below);
-    sgemm_("N", "T", &k, &below, &columns, &kOne, own, &k, part(i) + columns, &height, &kZero, gathered.data(), &k);
-    for (std::size_t j = 0; j < node.rows.size(); ++j)
-      x.middleCols(static_cast<Eigen::Index>(block_) * node.rows[j], block_) -=
-          gathered.middleCols(block_ * static_cast<Eigen::Index>(j), block_);
+  Eigen::MatrixXf x(count, B.rows());
+#pragma omp parallel num_threads(threads)
+  {
+    Eigen::ArrayXd own = Eigen::ArrayXd::Zero(count);
+#pragma omp for schedule(static)
+    for (Eigen::Index row = 0; row < B.rows(); ++row)
+      own = own.max(scale_[row] * B.row(row).segment(begin, count).array().abs().transpose());
+#pragma omp critical(single_cholesky_sizes)
+    sizes = sizes.max(own);
+#pragma omp barrier
+#pragma omp single
+    sizes = (sizes > 0).select(sizes, 1);
+#pragma omp for schedule(static)
+    for (Eigen::Index row = 0; row < B.rows(); ++row)
+      x.col(place_of(row)) = (scale_[row] * B.row(row).segment(begin, count).transpose().array() / sizes).cast<float>();
   }
-  for (std::size_t i = nodes.size(); i-- > 0;) {
-    const Node& node = nodes[i];
-    const int columns = block_ * node.columns, below = block_ * static_cast<int>(node.rows.size()),
-              height = columns + below;
-    float* own = x.col(static_cast<Eigen::Index>(block_) * node.begin).data();
-    if (below > 0) {
-      gathered.resize(count, below);
-      for (std::size_t j = 0; j < node.rows.size(); ++j)
-        gathered.middleCols(block_ * static_cast<Eigen::Index>(j), block_) =
-            x.middleCols(static_cast<Eigen::Index>(block_) * node.rows[j], block_);
-      sgemm_("N", "N", &k, &columns, &below, &kMinusOne, gathered.data(), &k, part(i) + columns, &height, &kOne, own,
-             &k);
-    }
-    strsm_("R", "L", "N", "N", &k, &columns, &kOne, part(i), &height, own, &k);
-  }
+  std::vector<Eigen::MatrixXf> updates(plan_->nodes.size());
+  visit(Order::kChildrenFirst, &Subtree::entries, threads,
+        [&](std::size_t i, bool shared) { solve_down(i, shared, x, updates); });
+  visit(Order::kParentsFirst, &Subtree::entries, threads, [&](std::size_t i, bool shared) { solve_up(i, shared, x); });
+#pragma omp parallel for schedule(static) num_threads(threads)
   for (Eigen::Index row = 0; row < B.rows(); ++row)
     X.row(row).segment(begin, count) = (scale_[row] * sizes * x.col(place_of(row)).cast<double>().array()).transpose();
+}
+
+// L y = b in the columns of a node; what these take from the rows below goes to the parent.
+void SingleCholesky::solve_down(std::size_t index, bool shared, Eigen::MatrixXf& x,
+                                std::vector<Eigen::MatrixXf>& updates) const {
+  const Node& node = plan_->nodes[index];
+  const int k = static_cast<int>(x.rows()), columns = block_ * node.columns,
+            below = block_ * static_cast<int>(node.rows.size()), height = columns + below;
+  Eigen::MatrixXf& rest = updates[index];
+  rest.resize(k, below);
+  const float* beta = &kZero;
+  const auto take_from = [&](Index child) {
+    const std::vector<Index>& rows = plan_->nodes[at(child)].rows;
+    const Eigen::MatrixXf update = std::move(updates[at(child)]);
+    std::size_t j = 0;
+    for (; j < rows.size() && rows[j] < node.begin + node.columns; ++j)
+      x.middleCols(static_cast<Eigen::Index>(block_) * rows[j], block_) -=
+          update.middleCols(block_ * static_cast<Eigen::Index>(j), block_);
+    if (j == rows.size()) return;
+    if (beta == &kZero) rest.setZero();
+    beta = &kOne;
+    for (std::size_t place = 0; j < rows.size(); ++j) {
+      while (node.rows[place] != rows[j]) ++place;
+      rest.middleCols(block_ * static_cast<Eigen::Index>(place), block_) +=
+          update.middleCols(block_ * static_cast<Eigen::Index>(j), block_);
+    }
+  };
+  for (const Index child : node.children) take_from(child);
+  float* own = x.col(static_cast<Eigen::Index>(block_) * node.begin).data();
+  strsm_("R", "L", "T", "N", &k, &columns, &kOne, part(index), &height, own, &k);
+  const std::vector<Span> spans = shared ? tiles(0, below) : std::vector<Span>{{0, below}};
+  for_each(spans.size(), shared, [&](std::size_t i) {
+    const auto& [begin, size] = spans[i];
+    if (size > 0)
+      sgemm_("N", "T", &k, &size, &columns, &kOne, own, &k, part(index) + columns + begin, &height, beta,
+             rest.col(begin).data(), &k);
+  });
+}
+
+// L^T x = y in the columns of a node.
+void SingleCholesky::solve_up(std::size_t index, bool shared, Eigen::MatrixXf& x) const {
+  const Node& node = plan_->nodes[index];
+  const int k = static_cast<int>(x.rows()), columns = block_ * node.columns,
+            below = block_ * static_cast<int>(node.rows.size()), height = columns + below;
+  float* own = x.col(static_cast<Eigen::Index>(block_) * node.begin).data();
+  if (below > 0) {
+    Eigen::MatrixXf gathered(k, below);
+    for (std::size_t j = 0; j < node.rows.size(); ++j)
+      gathered.middleCols(block_ * static_cast<Eigen::Index>(j), block_) =
+          x.middleCols(static_cast<Eigen::Index>(block_) * node.rows[j], block_);
+    const std::vector<Span> spans = shared ? tiles(0, columns) : std::vector<Span>{{0, columns}};
+    for_each(spans.size(), shared, [&](std::size_t i) {
+      const auto& [begin, size] = spans[i];
+      sgemm_("N", "N", &k, &size, &below, &kMinusOne, gathered.data(), &k,
+             part(index) + columns + static_cast<std::ptrdiff_t>(begin) * height, &height, &kOne,
+             own + static_cast<std::ptrdiff_t>(begin) * k, &k);
+    });
+  }
+  strsm_("R", "L", "N", "N", &k, &columns, &kOne, part(index), &height, own, &k);
 }
 
 }  // namespace exmat::precompute

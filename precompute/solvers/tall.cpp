@@ -1,5 +1,6 @@
 #include "precompute/solvers/tall.h"
 
+#include <algorithm>
 #include <omp.h>
 #include <vector>
 
@@ -10,6 +11,8 @@ namespace {
 
 constexpr Eigen::Index kParts = 16;  // of the rows, summed one by one whatever the number of threads
 constexpr Eigen::Index kLittle = 300'000;
+constexpr int kSummed = 8;                // columns of a row of a product that the registers hold
+constexpr Eigen::Index kTransposed = 64;  // rows that are turned around while they are in the caches
 
 struct Part {
   Eigen::Index begin, size;
@@ -38,15 +41,29 @@ int as_int(Eigen::Index i) { return static_cast<int>(i); }
 }  // namespace
 
 RowMatrix product(const SparseMatrix& A, const RowMatrix& X) {
-  RowMatrix Y(A.rows(), X.cols());
+  RowMatrix Y;
+  product(A, X, Y);
+  return Y;
+}
+
+void product(const SparseMatrix& A, const RowMatrix& X, RowMatrix& Y) {
+  Y.resize(A.rows(), X.cols());
+  const Eigen::Index whole = X.cols() / kSummed * kSummed, left = X.cols() - whole;
   const int threads = threads_for(A.nonZeros() + Y.size(), omp_get_max_threads());
 #pragma omp parallel for schedule(static) num_threads(threads)
   for (Eigen::Index row = 0; row < A.rows(); ++row) {
-    auto sum = Y.row(row);
+    for (Eigen::Index begin = 0; begin < whole; begin += kSummed) {
+      Eigen::Matrix<double, 1, kSummed> sum = Eigen::Matrix<double, 1, kSummed>::Zero();
+      for (SparseMatrix::InnerIterator entry(A, row); entry; ++entry)
+        sum += entry.value() * X.row(entry.col()).segment<kSummed>(begin);
+      Y.row(row).segment<kSummed>(begin) = sum;
+    }
+    if (left == 0) continue;
+    auto sum = Y.row(row).tail(left);
     sum.setZero();
-    for (SparseMatrix::InnerIterator entry(A, row); entry; ++entry) sum += entry.value() * X.row(entry.col());
+    for (SparseMatrix::InnerIterator entry(A, row); entry; ++entry)
+      sum += entry.value() * X.row(entry.col()).tail(left);
   }
-  return Y;
 }
 
 Eigen::MatrixXd inner(const Columns& A, const Columns& B) {
@@ -74,6 +91,33 @@ void add_product(double factor, const Columns& V, const Eigen::MatrixXd& C, RowM
     const double one = 1;
     dgemm_("T", "N", &m, &n, &k, &factor, C.data(), &k, V.data() + part.begin * V.outerStride(), &ldv, &one,
            X.data() + part.begin * X.cols(), &m);
+  }
+}
+
+void combine(const Eigen::RowVectorXd& a, const Eigen::RowVectorXd& b, const RowMatrix& V, RowMatrix& X) {
+  const int threads = threads_for(X.size() + V.size(), omp_get_max_threads());
+#pragma omp parallel for schedule(static) num_threads(threads)
+  for (Eigen::Index row = 0; row < X.rows(); ++row)
+    X.row(row) = X.row(row).cwiseProduct(a) + V.row(row).cwiseProduct(b);
+}
+
+RowMatrix by_rows(const Eigen::Ref<const Eigen::MatrixXd>& columns) {
+  RowMatrix rows(columns.rows(), columns.cols());
+  const Eigen::Index blocks = (rows.rows() + kTransposed - 1) / kTransposed;
+#pragma omp parallel for schedule(static) num_threads(threads_for(rows.size(), omp_get_max_threads()))
+  for (Eigen::Index block = 0; block < blocks; ++block) {
+    const Eigen::Index begin = block * kTransposed, count = std::min(kTransposed, rows.rows() - begin);
+    rows.middleRows(begin, count) = columns.middleRows(begin, count);
+  }
+  return rows;
+}
+
+void put_by_columns(const RowMatrix& rows, Eigen::Ref<Eigen::MatrixXd> columns) {
+  const Eigen::Index blocks = (rows.rows() + kTransposed - 1) / kTransposed;
+#pragma omp parallel for schedule(static) num_threads(threads_for(rows.size(), omp_get_max_threads()))
+  for (Eigen::Index block = 0; block < blocks; ++block) {
+    const Eigen::Index begin = block * kTransposed, count = std::min(kTransposed, rows.rows() - begin);
+    columns.middleRows(begin, count) = rows.middleRows(begin, count);
   }
 }
 

@@ -8,62 +8,92 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kResidual = 0.1;  // of the distance of answers that are one minimum
+constexpr double kResidual = 0.1;       // of the distance of answers that are one minimum
+constexpr Eigen::Index kTogether = 64;  // weights whose minima of all tets are found side by side
 
 }  // namespace
 
-// Whether `y` became a minimum.
-bool MinimumFinder::descend(const Eigen::VectorXd& weights, runtime::TargetSolver::Workspace& workspace,
-                            Eigen::VectorXd& y) const {
+// Each of `candidates` to a minimum.
+void MinimumFinder::descend(const RowMatrix& weights, std::vector<Candidate>& candidates) const {
   const double enough = kResidual * same_distance_;
-  if (all_ == nullptr || !near_) {
-    const auto report = target_.solve(weights, workspace, y);
-    if (report.status != runtime::NewtonStatus::kConverged && !(report.residual <= enough)) return false;
+#pragma omp parallel
+  {
+    auto workspace = target_.make_workspace();
+#pragma omp for schedule(dynamic)
+    for (std::size_t i = 0; i < candidates.size(); ++i) {
+      Candidate& candidate = candidates[i];
+      if (all_ != nullptr && near_) continue;
+      const auto report = target_.solve(weights.row(candidate.row).transpose(), workspace, candidate.y);
+      candidate.found = report.status == runtime::NewtonStatus::kConverged || report.residual <= enough;
+    }
   }
-  if (all_ == nullptr) return true;
-  const auto answer = all_->polish(target_, weights, workspace, y);
-  return answer.converged || answer.residual <= enough;
+  if (all_ == nullptr) return;
+  std::erase_if(candidates, [](const Candidate& candidate) { return !candidate.found; });
+  RowMatrix at(std::ssize(candidates), weights.cols());
+  Eigen::MatrixXd y(target_.dimension(), at.rows());
+  for (Eigen::Index i = 0; i < at.rows(); ++i) {
+    at.row(i) = weights.row(candidates[static_cast<std::size_t>(i)].row);
+    y.col(i) = candidates[static_cast<std::size_t>(i)].y;
+  }
+  const std::vector<TetForces::Answer> answers = all_->polish(target_, at, y);
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    candidates[i].y = y.col(static_cast<Eigen::Index>(i));
+    candidates[i].found = answers[i].converged || answers[i].residual <= enough;
+  }
 }
 
-MinimumFinder::Minimum MinimumFinder::lowest(const Eigen::VectorXd& weights, const std::vector<Eigen::VectorXd>& starts,
-                                             runtime::TargetSolver::Workspace& workspace) const {
-  Minimum lowest{Eigen::VectorXd::Constant(target_.dimension(), std::numeric_limits<double>::quiet_NaN())};
-  bool found = false;
-  const auto try_from = [&](Eigen::VectorXd y) {
-    if (!descend(weights, workspace, y)) return;
-    const bool same = found && (y - lowest.y).norm() <= same_distance_;
-    lowest.only = lowest.only && (same || !found);
-    if (!found || (!same && target_.energy(weights, y, workspace) < target_.energy(weights, lowest.y, workspace)))
-      lowest.y = y;
-    found = true;
-  };
-  std::ranges::for_each(starts, try_from);
-  if (!found) try_from(blend(target_, weights));
-  return lowest;
+// Takes minima of the same weights into account.
+void MinimumFinder::add(const RowMatrix& weights, std::vector<Candidate> candidates,
+                        std::vector<Minimum>& minima) const {
+  descend(weights, candidates);
+  auto workspace = target_.make_workspace();
+  for (const Candidate& candidate : candidates) {
+    if (!candidate.found) continue;
+    Minimum& lowest = minima[static_cast<std::size_t>(candidate.row)];
+    const auto energy = [&](const Eigen::VectorXd& y) {
+      return target_.energy(weights.row(candidate.row).transpose(), y, workspace);
+    };
+    const bool same = lowest.found && (candidate.y - lowest.y).norm() <= same_distance_;
+    lowest.only = lowest.only && (same || !lowest.found);
+    if (!lowest.found || (!same && energy(candidate.y) < energy(lowest.y))) lowest.y = candidate.y;
+    lowest.found = true;
+  }
+}
+
+// Of some weights, from their starts; where none leads to a minimum, from the blend.
+std::vector<MinimumFinder::Minimum> MinimumFinder::lowest(
+    const RowMatrix& weights, const std::vector<std::vector<Eigen::VectorXd>>& starts) const {
+  const Eigen::VectorXd none = Eigen::VectorXd::Constant(target_.dimension(), std::numeric_limits<double>::quiet_NaN());
+  std::vector<Minimum> minima(starts.size(), Minimum{none});
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < starts.size(); ++i)
+    for (const Eigen::VectorXd& y : starts[i]) candidates.push_back({static_cast<Eigen::Index>(i), y});
+  add(weights, std::move(candidates), minima);
+  candidates.clear();
+  for (Eigen::Index i = 0; i < weights.rows(); ++i)
+    if (!minima[static_cast<std::size_t>(i)].found)
+      candidates.push_back({i, blend(target_, weights.row(i).transpose())});
+  if (!candidates.empty()) add(weights, std::move(candidates), minima);
+  return minima;
 }
 
 RowMatrix MinimumFinder::find(const RowMatrix& weights, const Starts& starts, const std::string& stage) {
   RowMatrix found(weights.rows(), target_.dimension());
   Progress progress(stage, weights.rows());
-  int solves = 0, ambiguous = 0;
-#pragma omp parallel reduction(+ : solves, ambiguous)
-  {
-    auto workspace = target_.make_workspace();
-#pragma omp for schedule(dynamic)
-    for (Eigen::Index i = 0; i < weights.rows(); ++i) {
-      const Eigen::VectorXd w = weights.row(i).transpose();
-      const auto from = starts(w, i);
-      const Minimum minimum = lowest(w, from, workspace);
-      found.row(i) = minimum.y.transpose();
-      if (correction_) found.row(i) += correction_(w).transpose();
-      solves += static_cast<int>(from.size());
-      ambiguous += minimum.only ? 0 : 1;
-#pragma omp critical(target_minima_progress)
-      progress.advance();
+  for (Eigen::Index begin = 0; begin < weights.rows(); begin += kTogether) {
+    const RowMatrix some = weights.middleRows(begin, std::min(kTogether, weights.rows() - begin));
+    std::vector<std::vector<Eigen::VectorXd>> from;
+    for (Eigen::Index i = 0; i < some.rows(); ++i) from.push_back(starts(some.row(i).transpose(), begin + i));
+    const std::vector<Minimum> minima = lowest(some, from);
+    for (std::size_t i = 0; i < minima.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      found.row(begin + row) = minima[i].y.transpose();
+      if (correction_) found.row(begin + row) += correction_(some.row(row).transpose()).transpose();
+      solves_ += static_cast<int>(from[i].size());
+      ambiguous_ += minima[i].only ? 0 : 1;
     }
+    progress.advance(some.rows());
   }
-  solves_ += solves;
-  ambiguous_ += ambiguous;
   return found;
 }
 

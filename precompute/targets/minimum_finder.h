@@ -37,14 +37,19 @@ class MinimumFinder {
   int ambiguous() const { return ambiguous_; }  ///< weights with more than one minimum
 
  private:
+  struct Candidate {
+    Eigen::Index row = 0;  ///< of its weights
+    Eigen::VectorXd y;
+    bool found = true;
+  };
   struct Minimum {
     Eigen::VectorXd y;
+    bool found = false;
     bool only = true;  ///< all starts led to it
   };
-  Minimum lowest(const Eigen::VectorXd& weights, const std::vector<Eigen::VectorXd>& starts,
-                 runtime::TargetSolver::Workspace& workspace) const;
-
-  bool descend(const Eigen::VectorXd& weights, runtime::TargetSolver::Workspace& workspace, Eigen::VectorXd& y) const;
+  void descend(const RowMatrix& weights, std::vector<Candidate>& candidates) const;
+  void add(const RowMatrix& weights, std::vector<Candidate> candidates, std::vector<Minimum>& minima) const;
+  std::vector<Minimum> lowest(const RowMatrix& weights, const std::vector<std::vector<Eigen::VectorXd>>& starts) const;
 
   const runtime::TargetSolver& target_;
   double same_distance_;

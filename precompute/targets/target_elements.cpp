@@ -14,6 +14,7 @@
 #include "precompute/targets/example_stress.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
+#include "precompute/targets/tet_forces.h"
 
 namespace exmat::precompute {
 namespace {
@@ -47,6 +48,7 @@ class ElementChooser {
   std::vector<Sample> force_samples() const;
   std::vector<Eigen::Index> candidates() const;
   Eigen::MatrixXd forces(Eigen::Index tet, const std::vector<Sample>& samples) const;
+  Eigen::MatrixXd sum_of_forces(const std::vector<Sample>& samples) const;
   SelectionProblem problem(const std::vector<Eigen::Index>& tets, const std::vector<Sample>& samples) const;
   CubatureData cubature(const std::vector<Eigen::Index>& tets, const Selection& selection) const;
   double error(const CubatureData& cubature) const;
@@ -127,9 +129,19 @@ Eigen::MatrixXd ElementChooser::forces(Eigen::Index tet, const std::vector<Sampl
   return target_.solver.basis().transpose() * (B.transpose() * stresses);
 }
 
-SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
-                                         const std::vector<Sample>& samples) const {
+// [d x N] of all tets.
+Eigen::MatrixXd ElementChooser::sum_of_forces(const std::vector<Sample>& samples) const {
   const Eigen::Index d = target_.solver.dimension(), count = std::ssize(samples);
+  if (target_.all) {
+    RowMatrix weights = RowMatrix::Zero(count, coordinates_.poses.cols());
+    Eigen::MatrixXd at(coordinates_.poses.rows(), count);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const Sample& sample = samples[static_cast<std::size_t>(i)];
+      weights(i, sample.example) = 1;
+      at.col(i) = sample.y;
+    }
+    return target_.solver.basis().transpose() * target_.all->forces(weights, at);
+  }
   constexpr Eigen::Index kBlock = 256;  // sums do not depend on the number of threads
   const Eigen::Index blocks = (std::ssize(target_.tets) + kBlock - 1) / kBlock;
   std::vector<Eigen::MatrixXd> partial(static_cast<std::size_t>(blocks));
@@ -143,6 +155,13 @@ SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
   }
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(d, count);
   for (const Eigen::MatrixXd& sum : partial) total += sum;
+  return total;
+}
+
+SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
+                                         const std::vector<Sample>& samples) const {
+  const Eigen::Index count = std::ssize(samples);
+  const Eigen::MatrixXd total = sum_of_forces(samples);
   const Eigen::VectorXd norms = total.colwise().norm();
   const Eigen::VectorXd scales =
       (norms.array() > kNothing * norms.maxCoeff()).select(norms.cwiseInverse(), Eigen::VectorXd::Zero(count));

@@ -3,30 +3,33 @@
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
+#include <utility>
 
-#include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
-#include "precompute/targets/example_stress.h"
+#include "runtime/sim/elasticity/element_potential.h"
 
 namespace exmat::precompute {
 namespace {
 
+using runtime::AlignedArray;
+using runtime::kLanes;
+
 constexpr double kTolerance = 1e-9;  // of the largest example
 constexpr int kMostSteps = 40;
 constexpr int kMostHalvings = 5;
-
-using Edges = Eigen::Matrix3d;
+constexpr Eigen::Index kTogether = 1024;  // tets whose numbers stay in the caches
+constexpr Eigen::Index kEdges = 9;        // numbers of the three edges of a tet from its first corner
 
 // H = sum of (u_c - u_0) (x) grad N_c.
 template <typename Tet>
 Eigen::Matrix3d displacement_gradient(const Eigen::VectorXd& u, const Tet& tet, const Eigen::Matrix3d& shape) {
-  Edges edges;
+  Eigen::Matrix3d edges;
   for (int c = 0; c < 3; ++c) edges.col(c) = u.segment<3>(3 * tet[c + 1]) - u.segment<3>(3 * tet[0]);
   return edges * shape.transpose();
 }
 
 // Its inverse, or of none where it is not positive definite: stiffness at rest is the identity.
-Eigen::MatrixXd inverse_of(Eigen::MatrixXd hessian) {
+Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& hessian) {
   const Eigen::Index d = hessian.rows();
   const Eigen::LLT<Eigen::MatrixXd> factor(hessian);  // of the lower triangle
   if (factor.info() != Eigen::Success) return Eigen::MatrixXd::Identity(d, d);
@@ -42,79 +45,224 @@ void update(const Eigen::VectorXd& step, const Eigen::VectorXd& change, Eigen::M
              (mapped * step.transpose() + step * mapped.transpose()) / curvature;
 }
 
+// One of the sums on its way to its minimum.
+class Descent {
+ public:
+  Descent(Eigen::VectorXd y, Eigen::MatrixXd inverse, double enough)
+      : y_(std::move(y)), inverse_(std::move(inverse)), enough_(enough) {}
+
+  bool open() const { return open_; }
+  Eigen::VectorXd trial() const { return taken_ < 0 ? y_ : y_ + step_; }
+  const Eigen::VectorXd& y() const { return y_; }
+  TetForces::Answer answer() const { return {residual_ <= enough_, residual_}; }
+
+  /// The gradient at the trial.
+  void take(const Eigen::VectorXd& gradient) {
+    const double residual = gradient.norm();
+    if (taken_ < 0 || residual < residual_) {
+      if (taken_ >= 0) {
+        update(step_, gradient - gradient_, inverse_);
+        y_ += step_;
+      }
+      gradient_ = gradient;
+      residual_ = residual;
+      step_ = -(inverse_ * gradient_);
+      halvings_ = 0;
+      open_ = residual_ > enough_ && ++taken_ < kMostSteps;
+    } else {
+      step_ *= 0.5;
+      open_ = ++halvings_ <= kMostHalvings;
+    }
+  }
+
+ private:
+  Eigen::VectorXd y_, gradient_, step_;
+  Eigen::MatrixXd inverse_;
+  double enough_, residual_ = 0;
+  int taken_ = -1, halvings_ = 0;
+  bool open_ = true;
+};
+
 }  // namespace
+
+// Sums at N weights, a number of each in each lane, kLanes of them in a group.
+struct TetForces::Batch {
+  Eigen::Index groups = 0, rows = 0;  ///< rows: of the vertices of a part
+  AlignedArray weights{};             ///< groups x K x kLanes
+  AlignedArray displacements{};       ///< groups x rows x kLanes
+  AlignedArray forces{};              ///< likewise
+
+  const double* weight(Eigen::Index group, std::size_t k, std::size_t examples) const {
+    return weights.data() + (static_cast<std::size_t>(group) * examples + k) * kLanes;
+  }
+};
 
 TetForces::TetForces(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
                      EnergyReference reference)
     : object_(object), reference_(reference), fields_(system.extend(coordinates.basis)) {
   const TetMesh& mesh = object.mesh;
   for (const auto& pose : coordinates.poses.colwise()) examples_.emplace_back(fields_ * pose);
-  const Eigen::VectorXd volumes = tet_volumes(mesh);
+  const auto shape_of = [&](Eigen::Index t) -> Eigen::Matrix3d {
+    return shape_gradients(tet_positions(mesh, t)).bottomRows<3>().transpose();
+  };
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    const Eigen::Matrix3d shape = shape_gradients(tet_positions(mesh, t)).bottomRows<3>().transpose();
+    const Eigen::Matrix3d shape = shape_of(t);
     const auto upright = [&](const Eigen::VectorXd& u) {
       return (Eigen::Matrix3d::Identity() + displacement_gradient(u, mesh.tets.row(t), shape)).determinant() > 0;
     };
-    if (reference == EnergyReference::kExample && !std::ranges::all_of(examples_, upright)) continue;
-    LameParameters lame = lame_parameters(object.materials.youngs_modulus[t], object.materials.poisson_ratio[t]);
-    lame.mu *= volumes[t];
-    lame.lambda *= volumes[t];
-    tets_.push_back(t);
-    shapes_.push_back(shape);
-    lame_.push_back(lame);
+    if (reference != EnergyReference::kExample || std::ranges::all_of(examples_, upright)) tets_.push_back(t);
+  }
+  parts_ = tet_parts(mesh, tets_, kTogether);
+  const Eigen::VectorXd volumes = tet_volumes(mesh);
+  for (const TetPart& part : parts_) {
+    std::vector<Tet>& numbers = numbers_.emplace_back();
+    for (const Eigen::Index t : part.tets) {
+      const LameParameters lame =
+          lame_parameters(object.materials.youngs_modulus[t], object.materials.poisson_ratio[t]);
+      numbers.push_back({shape_of(t), {volumes[t] * lame.mu, volumes[t] * lame.lambda}});
+    }
   }
 }
 
-Eigen::VectorXd TetForces::force(const Eigen::VectorXd& weights, const Eigen::VectorXd& p) const {
-  const Eigen::VectorXd u = fields_ * p;
-  Eigen::VectorXd forces = Eigen::VectorXd::Zero(u.size());
-  with_material(object_.materials.model, [&](auto material) {
-    for (std::size_t i = 0; i < tets_.size(); ++i) {
-      const auto tet = object_.mesh.tets.row(tets_[i]);
-      const Eigen::Matrix3d H = displacement_gradient(u, tet, shapes_[i]);
-      Eigen::Matrix3d P = Eigen::Matrix3d::Zero();
-      for (std::size_t k = 0; k < examples_.size(); ++k)
-        if (const double weight = weights[static_cast<Eigen::Index>(k)]; weight != 0)
-          P += weight *
-               example_stress(material, reference_, H, displacement_gradient(examples_[k], tet, shapes_[i]), lame_[i]);
-      const Eigen::Matrix3d corners = P * shapes_[i];
-      for (int c = 0; c < 3; ++c) {
-        forces.segment<3>(3 * tet[c + 1]) += corners.col(c);
-        forces.segment<3>(3 * tet[0]) -= corners.col(c);
+// Of the tets of a part, by the material's lanes: one tet is all of the body, the three edges are its modes.
+void TetForces::add_forces(std::size_t index, Batch& batch) const {
+  constexpr Eigen::Index kStride = runtime::padded(kEdges);
+  alignas(runtime::kAlignment) double gradient[9 * kStride] = {}, edges[kEdges * kLanes], corners[kEdges * kLanes],
+                                                   energies[kLanes];
+  LameParameters lame;
+  const runtime::ElementArrays arrays{
+      .panels = 1, .modes = kEdges, .stride = kStride, .by_element = gradient, .count = 1};
+  const runtime::ElementLaw law{
+      .kind = runtime::law_kind(object_.materials.model), .mu = &lame.mu, .lambda = &lame.lambda};
+  const TetPart& part = parts_[index];
+  for (std::size_t i = 0; i < part.tets.size(); ++i) {
+    const auto tet = object_.mesh.tets.row(part.tets[i]);
+    const auto places = part.corners.col(static_cast<Eigen::Index>(i));
+    const Tet& own = numbers_[index][i];
+    for (std::size_t k = 0; k < examples_.size(); ++k) {
+      // Gradients from the example's shape on: (u - u_k) by edges, times the inverse of its deformation gradient.
+      Eigen::Matrix3d from_edges = own.shape.transpose();
+      lame = own.lame;
+      if (reference_ == EnergyReference::kExample) {
+        const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + displacement_gradient(examples_[k], tet, own.shape);
+        const double determinant = F.determinant();
+        from_edges *= F.inverse();
+        lame = {determinant * lame.mu, determinant * lame.lambda};
+      }
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < 3; ++b)
+          for (int c = 0; c < 3; ++c) gradient[(3 * a + b) * kStride + 3 * c + a] = from_edges(c, b);
+      const double* example = examples_[k].data();
+      for (Eigen::Index group = 0; group < batch.groups; ++group) {
+        const double* weights = batch.weight(group, k, examples_.size());
+        if (std::all_of(weights, weights + kLanes, [](double weight) { return weight == 0; })) continue;
+        const auto row_of = [&](AlignedArray& numbers, int corner, int axis) {
+          return numbers.data() + (group * batch.rows + 3 * places[corner] + axis) * kLanes;
+        };
+        for (int c = 0; c < 3; ++c)
+          for (int axis = 0; axis < 3; ++axis) {
+            const double *first = row_of(batch.displacements, 0, axis),
+                         *other = row_of(batch.displacements, c + 1, axis);
+            const double rest = example[3 * tet[c + 1] + axis] - example[3 * tet[0] + axis];
+            double* edge = edges + (3 * c + axis) * kLanes;
+            for (Eigen::Index lane = 0; lane < kLanes; ++lane) edge[lane] = other[lane] - first[lane] - rest;
+          }
+        runtime::kernels().lanes_force(arrays, law, edges, energies, corners);
+        for (int c = 0; c < 3; ++c)
+          for (int axis = 0; axis < 3; ++axis) {
+            double *first = row_of(batch.forces, 0, axis), *other = row_of(batch.forces, c + 1, axis);
+            const double* force = corners + (3 * c + axis) * kLanes;
+            for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+              const double weighted = weights[lane] * force[lane];
+              other[lane] += weighted;
+              first[lane] -= weighted;
+            }
+          }
       }
     }
-  });
-  return fields_.transpose() * forces;
+  }
 }
 
-TetForces::Answer TetForces::polish(const runtime::TargetSolver& solver, const Eigen::VectorXd& weights,
-                                    runtime::TargetSolver::Workspace& workspace, Eigen::VectorXd& y) const {
+Eigen::MatrixXd TetForces::forces_of_part(std::size_t index, const RowMatrix& weights, const Eigen::MatrixXd& p) const {
+  const std::vector<std::int32_t>& vertices = parts_[index].vertices;
+  const Eigen::Index d = p.rows(), count = p.cols(), rows = 3 * std::ssize(vertices);
+  RowMatrix by_rows(rows, d);
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    by_rows.middleRows<3>(3 * static_cast<Eigen::Index>(v)) = fields_.middleRows<3>(3 * vertices[v]);
+  const Eigen::MatrixXd by_columns = by_rows;
+  Batch batch{.groups = runtime::padded(count) / kLanes, .rows = rows};
+  batch.weights = AlignedArray(batch.groups * weights.cols() * kLanes);
+  batch.displacements = AlignedArray(batch.groups * rows * kLanes);
+  batch.forces = AlignedArray(batch.groups * rows * kLanes);
+  AlignedArray lanes(d * kLanes);
+  for (Eigen::Index n = 0; n < count; ++n)
+    for (Eigen::Index k = 0; k < weights.cols(); ++k)
+      batch.weights[(n / kLanes * weights.cols() + k) * kLanes + n % kLanes] = weights(n, k);
+  const runtime::Kernels& kernels = runtime::kernels();
+  for (Eigen::Index group = 0; group < batch.groups; ++group) {
+    lanes = AlignedArray(d * kLanes);
+    for (Eigen::Index lane = 0; lane < std::min(kLanes, count - group * kLanes); ++lane)
+      for (Eigen::Index i = 0; i < d; ++i) lanes[i * kLanes + lane] = p(i, group * kLanes + lane);
+    kernels.lanes_matrix_product(by_columns.data(), rows, d, rows, lanes.data(),
+                                 batch.displacements.data() + group * rows * kLanes);
+  }
+  add_forces(index, batch);
+  Eigen::MatrixXd sums(d, count);
+  for (Eigen::Index group = 0; group < batch.groups; ++group) {
+    kernels.lanes_matrix_product(by_rows.data(), d, rows, d, batch.forces.data() + group * rows * kLanes, lanes.data());
+    for (Eigen::Index lane = 0; lane < std::min(kLanes, count - group * kLanes); ++lane)
+      for (Eigen::Index i = 0; i < d; ++i) sums(i, group * kLanes + lane) = lanes[i * kLanes + lane];
+  }
+  return sums;
+}
+
+Eigen::MatrixXd TetForces::forces(const RowMatrix& weights, const Eigen::MatrixXd& p) const {
+  std::vector<Eigen::MatrixXd> of_parts(parts_.size());
+#pragma omp parallel for schedule(dynamic)
+  for (std::size_t index = 0; index < parts_.size(); ++index) of_parts[index] = forces_of_part(index, weights, p);
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(p.rows(), p.cols());
+  for (const Eigen::MatrixXd& of_part : of_parts) sum += of_part;
+  return sum;
+}
+
+std::vector<TetForces::Answer> TetForces::polish(const runtime::TargetSolver& solver, const RowMatrix& weights,
+                                                 Eigen::MatrixXd& y) const {
   const RowMatrix& Z = solver.basis();
   double largest = 0;
-  for (Eigen::Index k = 0; k < weights.size(); ++k) largest = std::max(largest, solver.example(k).norm());
-  const auto force_at = [&](const Eigen::VectorXd& at) -> Eigen::VectorXd {
-    return Z.transpose() * force(weights, Z * at);
-  };
-  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(y.size(), y.size());
-  solver.hessian(weights, y, workspace, hessian);
-  Eigen::MatrixXd inverse = inverse_of(std::move(hessian));
-  Eigen::VectorXd gradient = force_at(y);
-  Answer answer{false, gradient.norm()};
-  for (int taken = 0; taken < kMostSteps; ++taken) {
-    answer.converged = answer.residual <= kTolerance * largest;
-    if (answer.converged) break;
-    Eigen::VectorXd step = -(inverse * gradient), next = force_at(y + step);
-    for (int halving = 0; halving < kMostHalvings && !(next.norm() < answer.residual); ++halving) {
-      step *= 0.5;
-      next = force_at(y + step);
+  for (Eigen::Index k = 0; k < weights.cols(); ++k) largest = std::max(largest, solver.example(k).norm());
+  std::vector<Eigen::MatrixXd> inverses(static_cast<std::size_t>(y.cols()));
+#pragma omp parallel
+  {
+    auto workspace = solver.make_workspace();
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(y.rows(), y.rows());
+#pragma omp for schedule(dynamic)
+    for (Eigen::Index n = 0; n < y.cols(); ++n) {
+      solver.hessian(weights.row(n).transpose(), y.col(n), workspace, hessian);
+      inverses[static_cast<std::size_t>(n)] = inverse_of(hessian);
     }
-    if (!(next.norm() < answer.residual)) break;
-    update(step, next - gradient, inverse);
-    y += step;
-    gradient = next;
-    answer.residual = gradient.norm();
   }
-  return answer;
+  std::vector<Descent> descents;
+  for (Eigen::Index n = 0; n < y.cols(); ++n)
+    descents.emplace_back(y.col(n), std::move(inverses[static_cast<std::size_t>(n)]), kTolerance * largest);
+  for (;;) {
+    std::vector<Eigen::Index> open;
+    for (Eigen::Index n = 0; n < y.cols(); ++n)
+      if (descents[static_cast<std::size_t>(n)].open()) open.push_back(n);
+    if (open.empty()) break;
+    Eigen::MatrixXd trials(y.rows(), std::ssize(open));
+    for (std::size_t i = 0; i < open.size(); ++i)
+      trials.col(static_cast<Eigen::Index>(i)) = descents[static_cast<std::size_t>(open[i])].trial();
+    const Eigen::MatrixXd gradients = Z.transpose() * forces(weights(open, Eigen::all), Z * trials);
+    for (std::size_t i = 0; i < open.size(); ++i)
+      descents[static_cast<std::size_t>(open[i])].take(gradients.col(static_cast<Eigen::Index>(i)));
+  }
+  std::vector<Answer> answers;
+  for (Eigen::Index n = 0; n < y.cols(); ++n) {
+    const Descent& descent = descents[static_cast<std::size_t>(n)];
+    y.col(n) = descent.y();
+    answers.push_back(descent.answer());
+  }
+  return answers;
 }
 
 }  // namespace exmat::precompute

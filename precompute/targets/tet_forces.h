@@ -7,11 +7,14 @@
 #include "common/model/reduced_model.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/targets/mesh_target.h"
+#include "precompute/targets/tet_parts.h"
+#include "runtime/kernels/kernels.h"
 
 namespace exmat::precompute {
 
 /// The force of sum_k w_k E_k over all tets of a mesh, by the displacements of its vertices: what it takes does not
-/// grow with tets times coordinates. With it a target of some of the tets becomes that of all.
+/// grow with tets times coordinates. With it a target of some of the tets becomes that of all. The same for every
+/// number of threads.
 class TetForces {
  public:
   /// All but the coordinates must outlive this. Tets that an example turns inside out are left out where the energies
@@ -26,22 +29,30 @@ class TetForces {
     double residual = 0;  ///< |force| in coordinates of unit stiffness at rest
   };
 
-  /// Takes `y`, in the coordinates of a solver that some of the tets or elements stand for all in, to the minimum of
-  /// all: quasi-Newton steps (BFGS) that begin with the solver's Hessian.
-  Answer polish(const runtime::TargetSolver& solver, const Eigen::VectorXd& weights,
-                runtime::TargetSolver::Workspace& workspace, Eigen::VectorXd& y) const;
+  /// Takes the columns of `y` [d x N], in the coordinates of a solver that some of the tets or elements stand for all
+  /// in, to the minima of all at `weights` [N x K]: quasi-Newton steps (BFGS) that begin with the solver's Hessian,
+  /// side by side.
+  std::vector<Answer> polish(const runtime::TargetSolver& solver, const RowMatrix& weights, Eigen::MatrixXd& y) const;
 
-  /// [d] by the coordinates p.
-  Eigen::VectorXd force(const Eigen::VectorXd& weights, const Eigen::VectorXd& p) const;
+  /// [d x N] by the coordinates `p` [d x N], at weights [N x K].
+  Eigen::MatrixXd forces(const RowMatrix& weights, const Eigen::MatrixXd& p) const;
 
  private:
+  struct Batch;
+  struct Tet {
+    Eigen::Matrix3d shape;  // columns are the gradients of the shape functions of corners 1 to 3
+    LameParameters lame;    // times the volume
+  };
+  void add_forces(std::size_t part, Batch& batch) const;
+  Eigen::MatrixXd forces_of_part(std::size_t part, const RowMatrix& weights, const Eigen::MatrixXd& p) const;
+
   const ObjectData& object_;
   EnergyReference reference_;
   RowMatrix fields_;                       // 3n x d
   std::vector<Eigen::VectorXd> examples_;  // [3n] displacements
   std::vector<Eigen::Index> tets_;
-  std::vector<Eigen::Matrix3d> shapes_;  // of those: columns are the gradients of the shape functions of corners 1 to 3
-  std::vector<LameParameters> lame_;     // times the volume
+  std::vector<TetPart> parts_;
+  std::vector<std::vector<Tet>> numbers_;  // of the tets of each part
 };
 
 }  // namespace exmat::precompute

@@ -49,7 +49,9 @@ TEST_P(Mixed, SolvesAsDenseFactorsDo) {
   const MixedSolver solver = solver_of(system_);
   ASSERT_EQ(solver.objection(), "");
   EXPECT_LE((solver.solve(B) - expected).norm(), 1e-10 * expected.norm());
-  EXPECT_LE((solver.precondition(B) - expected).norm(), 1e-3 * expected.norm());
+  RowMatrix rough = B;
+  solver.precondition(rough);
+  EXPECT_LE((rough - expected).norm(), 1e-3 * expected.norm());
 }
 
 TEST_P(Mixed, FindsTheEigenvectorsOfADenseSolver) {

@@ -1,6 +1,7 @@
 #include "precompute/solvers/single_cholesky.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <gtest/gtest.h>
 #include <numeric>
@@ -69,7 +70,7 @@ TEST(SingleCholesky, SolvesForDisplacementsOfAMesh) {
 TEST(SingleCholesky, GivesTheSameBitsForEveryNumberOfThreads) {
   const SparseMatrix matrix = clamped_stiffness({12, 12, 12});
   const int before = omp_get_max_threads();
-  for (const Eigen::Index columns : {1, 5, 40}) {
+  for (const Eigen::Index columns : {1, 5, 40, 70}) {
     const RowMatrix B = test::random_matrix(matrix.rows(), columns, 4);
     omp_set_num_threads(1);
     const RowMatrix alone = solved(matrix, 3, {}, B);
@@ -85,6 +86,22 @@ TEST(SingleCholesky, SeesMatricesThatAreNotPositiveDefinite) {
   const SparseMatrix matrix = A.sparseView();
   SingleCholesky factors(dissected_elimination(graph_of(matrix, 1), 1), 1);
   EXPECT_FALSE(factors.factorise(matrix, {}));
+}
+
+// As many right-hand sides as go through the factors together, and more; into their own place.
+TEST(SingleCholesky, SolvesForManyRightHandSides) {
+  const SparseMatrix matrix = clamped_stiffness({9, 8, 7});
+  SingleCholesky factors(dissected_elimination(graph_of(matrix, 3), 3), 3);
+  ASSERT_TRUE(factors.factorise(matrix, {}));
+  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> exact(Eigen::SparseMatrix<double>{matrix});
+  for (const Eigen::Index columns : {64, 65, 130}) {
+    const RowMatrix B = test::random_matrix(matrix.rows(), columns, 6);
+    const RowMatrix expected = exact.solve(Eigen::MatrixXd(B));
+    RowMatrix X = B;
+    factors.solve(X, X);
+    for (Eigen::Index k = 0; k < columns; ++k)
+      EXPECT_LE((X.col(k) - expected.col(k)).norm(), kTolerance * expected.col(k).norm()) << k;
+  }
 }
 
 // Every entry that elimination by the book fills is in a node, for any order.

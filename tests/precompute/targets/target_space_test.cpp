@@ -142,7 +142,7 @@ TEST_P(TargetSpaceOf, ForcesOfTetsAreTheDerivativeOfTheirEnergies) {
     solver.start(w, y);
     y += 0.1 * y.norm() * test::random_vector(y.size(), 3).normalized();
     solver.force(w, y, workspace, expected);
-    const Eigen::VectorXd found = solver.basis().transpose() * forces.force(w, solver.basis() * y);
+    const Eigen::VectorXd found = solver.basis().transpose() * forces.forces(w.transpose(), solver.basis() * y);
     EXPECT_LE((found - expected).norm(), 1e-10 * body_.scale());
   }
 }
