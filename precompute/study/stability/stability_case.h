@@ -49,8 +49,9 @@ struct StabilityCase {
   std::string extreme{};  ///< what is extreme in it
   BodySpec body{};
   Integrator integrator = Integrator::kBdf2;
-  double time_step = 1e-3;  ///< [s]
-  double gravity = 0;       ///< along -z [m/s^2]
+  Precision precision = Precision::kDouble;  ///< mixed: it steps as instances do, in lanes
+  double time_step = 1e-3;                   ///< [s]
+  double gravity = 0;                        ///< along -z [m/s^2]
   /// Force on the free end in the first kLoadSteps steps, in units of what would move it by L in linear elasticity.
   Eigen::Vector3d tip_load = Eigen::Vector3d::Zero();
   Start start = Start::kRest;
@@ -95,7 +96,8 @@ struct KnownLimit {
 };
 const std::vector<KnownLimit>& known_limits();
 
-/// The suite of the tests: some hundred runs that reach every extreme.
+/// The suite of the tests: some hundred runs that reach every extreme, and those of them that lanes take in mixed
+/// precision too, each in a group of its own.
 std::vector<StabilityCase> short_stability_suite();
 
 /// That, and the full product of E, nu, density, time step, material, integrator and constraint.

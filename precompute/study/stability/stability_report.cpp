@@ -72,31 +72,34 @@ Table summary(const std::vector<StabilityRun>& runs) {
               {}};
   Row groups;
   std::map<std::string, std::map<std::string, Sum>> sums;
-  std::map<std::string, Sum> totals;
+  std::map<std::string, std::map<std::string, Sum>> totals;
   for (const StabilityRun& run : runs) {
     if (!sums.contains(run.test.group)) groups.push_back(run.test.group);
     const std::string integrator(name_of(run.test.integrator));
     sums[run.test.group][integrator].add(run);
-    totals[integrator].add(run);
+    totals[run.test.precision == Precision::kMixed ? "all, mixed" : "all"][integrator].add(run);
   }
   for (const std::string& group : groups)
     for (const auto& [integrator, sum] : sums[group]) table.rows.push_back(row_of(group, integrator, sum));
-  for (const auto& [integrator, sum] : totals) table.rows.push_back(row_of("all", integrator, sum));
+  for (const auto& [name, total] : totals)
+    for (const auto& [integrator, sum] : total) table.rows.push_back(row_of(name, integrator, sum));
   return table;
 }
 
 Table limits(const std::vector<StabilityRun>& runs) {
-  Table table{{"known limit", "check", "runs", "of these bdf2", "which", "why", "what the user is told"}, {}};
+  Table table{
+      {"known limit", "check", "runs", "of these bdf2", "of these mixed", "which", "why", "what the user is told"}, {}};
   for (const KnownLimit& limit : known_limits()) {
-    int count = 0, default_count = 0;
+    int count = 0, default_count = 0, mixed_count = 0;
     for (const StabilityRun& run : runs) {
       if (run.result[limit.check].limit_id != limit.id) continue;
       ++count;
       default_count += run.test.integrator == Integrator::kBdf2 ? 1 : 0;
+      mixed_count += run.test.precision == Precision::kMixed ? 1 : 0;
     }
     table.rows.push_back({std::string(limit.id), std::string(kCheckNames[static_cast<std::size_t>(limit.check)]),
-                          std::to_string(count), std::to_string(default_count), std::string(limit.what),
-                          std::string(limit.reason), std::string(limit.message)});
+                          std::to_string(count), std::to_string(default_count), std::to_string(mixed_count),
+                          std::string(limit.what), std::string(limit.reason), std::string(limit.message)});
   }
   return table;
 }
@@ -166,6 +169,7 @@ std::vector<std::pair<std::string, Json>> record(const StabilityRun& run) {
       {"material", exmat::name_of(test.body.material)},
       {"body", test.body.free ? "free" : "clamped"},
       {"integrator", name_of(test.integrator)},
+      {"precision", exmat::name_of(test.precision)},
       {"time_step_s", test.time_step},
       {"youngs_modulus_Pa", test.body.youngs_modulus},
       {"poisson_ratio", test.body.poisson_ratio},

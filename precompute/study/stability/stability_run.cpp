@@ -7,9 +7,11 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <random>
 
 #include "common/core/timer.h"
+#include "runtime/sim/lanes/lane_step.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::precompute {
@@ -25,6 +27,36 @@ constexpr int kLeastRestSteps = 60, kUndampedSteps = 300;
 constexpr double kEulerGain = 1e-9, kOtherGain = 1e-6;  // of the energies that a run exchanges
 constexpr double kMomentumDrift = 1e-9;
 constexpr double kClearance = 0.02;  // between body and ground [m]
+
+/// Steps one body: by itself, or in mixed precision as one of instances, in a lane of its own. What is beside it there
+/// changes nothing, so nothing is. Where lanes leave a step to the body alone it is one in double precision.
+class Stepper {
+ public:
+  Stepper(const runtime::Model& model, const runtime::StepScene& scene, const runtime::NewtonPolicy& policy)
+      : model_(model), scene_(scene) {
+    if (scene.precision == Precision::kMixed)
+      lanes_.emplace(model, scene);
+    else
+      alone_.emplace(model, scene);
+    runtime::Workspace& workspace = lanes_ ? lanes_->body(0) : *alone_;
+    workspace.newton.policy = policy;
+    if (workspace.near) workspace.near->newton.policy = policy;
+  }
+
+  runtime::StepReport step(runtime::State& state) {
+    if (alone_) return runtime::step(model_, scene_, state, *alone_);
+    runtime::StepReport report;
+    const runtime::LaneBody body{&scene_, &state};
+    runtime::step_in_lanes(model_, {&body, 1}, *lanes_, {&report, 1});
+    return report;
+  }
+
+ private:
+  const runtime::Model& model_;
+  const runtime::StepScene& scene_;
+  std::optional<runtime::Workspace> alone_;
+  std::optional<runtime::LaneWorkspace> lanes_;
+};
 
 class Run {
  public:
@@ -101,6 +133,7 @@ class Run {
 void Run::make_scene() {
   scene_.time_step = test_.time_step;
   scene_.integrator = test_.integrator;
+  scene_.precision = test_.precision;
   scene_.mass_damping = 2 * test_.damping * body_.lowest_frequency;
   scene_.stiffness_damping = test_.stiffness_damping / body_.lowest_frequency;
   scene_.gravity = Eigen::Vector3d(0, 0, -test_.gravity);
@@ -356,16 +389,14 @@ double Run::rotation_energy() const {
 }
 
 void Run::step_all() {
-  runtime::Workspace workspace(model_, scene_);
-  workspace.newton.policy = policy_;
-  if (workspace.near) workspace.near->newton.policy = policy_;
+  Stepper stepper(model_, scene_, policy_);
   result_.largest_displacement = start_displacement_ / body_.size;
   exchanged_ = runtime::energies(model_, scene_, state_).kinetic + state_.elastic_energy;
   Eigen::VectorXd before;
   const Timer timer;
   for (; result_.steps < steps_; ++result_.steps) {
     before = state_.q;
-    const runtime::StepReport report = runtime::step(model_, scene_, state_, workspace);
+    const runtime::StepReport report = stepper.step(state_);
     if ((report.status & runtime::kStepNonFinite) != 0) {
       ++result_.non_finite_steps;
       break;

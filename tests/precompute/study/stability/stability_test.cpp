@@ -33,10 +33,12 @@ std::string all(const std::vector<const StabilityRun*>& runs) {
 class StabilityGroups : public testing::TestWithParam<const char*> {};
 INSTANTIATE_TEST_SUITE_P(All, StabilityGroups,
                          testing::Values("stiffness", "loads", "starts", "spin", "contact", "bodies", "examples",
-                                         "examples on the ground", "polynomial", "slivers", "no damping"),
+                                         "examples on the ground", "polynomial", "slivers", "no damping",
+                                         "stiffness, mixed", "loads, mixed", "starts, mixed", "spin, mixed",
+                                         "examples, mixed", "slivers, mixed", "no damping, mixed"),
                          [](const auto& group) {
                            std::string name = group.param;
-                           std::erase(name, ' ');
+                           std::erase_if(name, [](char c) { return c == ' ' || c == ','; });
                            return name;
                          });
 
@@ -117,6 +119,38 @@ TEST(Stability, SuiteReachesEveryExtreme) {
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.damping == 0 && test.gravity == 0; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.body.examples == BodyExamples::kNearDuplicates; }));
   EXPECT_TRUE(any([](const StabilityCase& test) { return test.body.examples == BodyExamples::kRestAlone; }));
+}
+
+// Each of them is a case in double precision, steps otherwise, and comes near to where that does.
+TEST(Stability, MixedRunsAreThoseThatLanesTakeInMixedPrecision) {
+  const auto cases = short_stability_suite();
+  std::vector<StabilityCase> both;
+  std::set<std::string> groups;
+  for (const StabilityCase& mixed : cases) {
+    if (mixed.precision != Precision::kMixed) continue;
+    groups.insert(mixed.group);
+    EXPECT_TRUE(mixed.ground == Ground::kNone && mixed.company == Company::kNone) << describe(mixed);
+    const auto is_same = [&](const StabilityCase& test) {
+      return test.precision == Precision::kDouble && test.group + ", mixed" == mixed.group &&
+             test.extreme == mixed.extreme && test.body == mixed.body && test.integrator == mixed.integrator &&
+             test.time_step == mixed.time_step;
+    };
+    const auto same = std::ranges::find_if(cases, is_same);
+    ASSERT_NE(same, cases.end()) << describe(mixed);
+    if (mixed.group != "no damping, mixed" || mixed.integrator != Integrator::kBdf2 || mixed.time_step > 0.01) continue;
+    both.push_back(*same);
+    both.push_back(mixed);
+  }
+  EXPECT_EQ(groups, (std::set<std::string>{"stiffness, mixed", "loads, mixed", "starts, mixed", "spin, mixed",
+                                           "examples, mixed", "slivers, mixed", "no damping, mixed"}));
+  const auto runs = run_stability(both, {.most_steps = 20});
+  int different = 0;
+  for (std::size_t i = 0; i < runs.size(); i += 2) {
+    const double moved = runs[i].result.largest_displacement, mixed = runs[i + 1].result.largest_displacement;
+    EXPECT_NEAR(mixed, moved, 1e-4 * (1e-6 + moved)) << describe(runs[i + 1].test);
+    different += mixed != moved ? 1 : 0;
+  }
+  EXPECT_GT(different, std::ssize(runs) / 4) << "of " << runs.size() / 2;
 }
 
 // A corner of a cube: 90 degrees at its edges, atan(sqrt 2) at the others.
