@@ -14,6 +14,9 @@ namespace {
 using runtime::AlignedArray;
 using runtime::kLanes;
 
+using Lanes = Eigen::Map<Eigen::Array<double, kLanes, 1>, Eigen::AlignedMax>;
+using ConstLanes = Eigen::Map<const Eigen::Array<double, kLanes, 1>, Eigen::AlignedMax>;
+
 constexpr double kTolerance = 1e-9;  // of the largest example
 constexpr int kMostSteps = 40;
 constexpr int kMostHalvings = 5;
@@ -129,6 +132,7 @@ void TetForces::add_forces(std::size_t index, Batch& batch) const {
   constexpr Eigen::Index kStride = runtime::padded(kEdges);
   alignas(runtime::kAlignment) double gradient[9 * kStride] = {}, edges[kEdges * kLanes], corners[kEdges * kLanes],
                                                    energies[kLanes];
+  double rest[kEdges];
   LameParameters lame;
   const runtime::ElementArrays arrays{
       .panels = 1, .modes = kEdges, .stride = kStride, .by_element = gradient, .count = 1};
@@ -153,31 +157,29 @@ void TetForces::add_forces(std::size_t index, Batch& batch) const {
         for (int b = 0; b < 3; ++b)
           for (int c = 0; c < 3; ++c) gradient[(3 * a + b) * kStride + 3 * c + a] = from_edges(c, b);
       const double* example = examples_[k].data();
+      for (int c = 0; c < 3; ++c)
+        for (int axis = 0; axis < 3; ++axis)
+          rest[3 * c + axis] = example[3 * tet[c + 1] + axis] - example[3 * tet[0] + axis];
       for (Eigen::Index group = 0; group < batch.groups; ++group) {
-        const double* weights = batch.weight(group, k, examples_.size());
-        if (std::all_of(weights, weights + kLanes, [](double weight) { return weight == 0; })) continue;
-        const auto row_of = [&](AlignedArray& numbers, int corner, int axis) {
-          return numbers.data() + (group * batch.rows + 3 * places[corner] + axis) * kLanes;
-        };
+        const ConstLanes weights(batch.weight(group, k, examples_.size()));
+        if ((weights == 0).all()) continue;
+        const double* displacements = batch.displacements.data() + group * batch.rows * kLanes;
+        double* forces = batch.forces.data() + group * batch.rows * kLanes;
         for (int c = 0; c < 3; ++c)
-          for (int axis = 0; axis < 3; ++axis) {
-            const double *first = row_of(batch.displacements, 0, axis),
-                         *other = row_of(batch.displacements, c + 1, axis);
-            const double rest = example[3 * tet[c + 1] + axis] - example[3 * tet[0] + axis];
-            double* edge = edges + (3 * c + axis) * kLanes;
-            for (Eigen::Index lane = 0; lane < kLanes; ++lane) edge[lane] = other[lane] - first[lane] - rest;
-          }
+          for (int axis = 0; axis < 3; ++axis)
+            Lanes(edges + (3 * c + axis) * kLanes) = ConstLanes(displacements + (3 * places[c + 1] + axis) * kLanes) -
+                                                     ConstLanes(displacements + (3 * places[0] + axis) * kLanes) -
+                                                     rest[3 * c + axis];
         runtime::kernels().lanes_force(arrays, law, edges, energies, corners);
-        for (int c = 0; c < 3; ++c)
-          for (int axis = 0; axis < 3; ++axis) {
-            double *first = row_of(batch.forces, 0, axis), *other = row_of(batch.forces, c + 1, axis);
-            const double* force = corners + (3 * c + axis) * kLanes;
-            for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
-              const double weighted = weights[lane] * force[lane];
-              other[lane] += weighted;
-              first[lane] -= weighted;
-            }
+        for (int axis = 0; axis < 3; ++axis) {
+          Eigen::Array<double, kLanes, 1> sum = Eigen::Array<double, kLanes, 1>::Zero();
+          for (int c = 0; c < 3; ++c) {
+            const Eigen::Array<double, kLanes, 1> force = weights * ConstLanes(corners + (3 * c + axis) * kLanes);
+            Lanes(forces + (3 * places[c + 1] + axis) * kLanes) += force;
+            sum += force;
           }
+          Lanes(forces + (3 * places[0] + axis) * kLanes) -= sum;
+        }
       }
     }
   }
