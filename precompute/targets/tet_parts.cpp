@@ -41,7 +41,7 @@ class Halving {
     for (const Eigen::Index t : tets)
       for (const std::int32_t vertex : mesh_.tets.row(t)) part.vertices.push_back(vertex);
     std::ranges::sort(part.vertices);
-    part.vertices.erase(std::ranges::unique(part.vertices).begin(), part.vertices.end());
+    part.vertices.erase(std::unique(part.vertices.begin(), part.vertices.end()), part.vertices.end());
     part.corners.resize(4, std::ssize(tets));
     for (std::size_t i = 0; i < tets.size(); ++i)
       for (int c = 0; c < 4; ++c) {
