@@ -1,7 +1,9 @@
 #!/usr/bin/python3
 """What bundles of bars cost, as a table: seconds and memory of the whole command, seconds of the stages that grow with the mesh.
 
-Usage: offline_times.py FOLDER_OF_PROGRAMS [--most TETS] [--page PAGE.md]    renews the page's table
+Usage: offline_times.py FOLDER_OF_PROGRAMS [--most TETS] [--training] [--page PAGE.md]    renews the page's table
+
+With --training there are rows of bars that are trained, which take longer than all others together.
 """
 import itertools
 import json
@@ -17,6 +19,7 @@ import numpy as np
 
 PROGRAM = Path(sys.argv[1]).resolve() / "exmat-precompute"
 MOST = int(sys.argv[sys.argv.index("--most") + 1]) if "--most" in sys.argv else 10**9
+TRAINING = "--training" in sys.argv
 PAGE = Path(sys.argv[sys.argv.index("--page") + 1]) if "--page" in sys.argv else None
 BEGIN, END = "<!-- offline: begin -->\n\n", "\n<!-- offline: end -->"
 LENGTHS = (4, 1, 0.8)
@@ -92,7 +95,7 @@ def measure(folder, cells, examples, training):
 def main():
     lines = ["| tets | bar | seconds | of CPU | GB | " + " | ".join(STAGES) + " |", "| ---: | --- |" + " ---: |" * (3 + len(STAGES))]
     for cells, name, examples, training in RUNS:
-        if 6 * np.prod(cells) > MOST:
+        if 6 * np.prod(cells) > MOST or (training != "none" and not TRAINING):
             continue
         with tempfile.TemporaryDirectory() as folder:
             tets, wall, cpu, memory, stages = measure(Path(folder), cells, examples, training)
@@ -103,7 +106,7 @@ def main():
         text = PAGE.read_text()
         head, rest = text.split(BEGIN)
         load = f"{os.getloadavg()[2]:.1f}"
-        PAGE.write_text(head + BEGIN + "\n".join(lines) + f"\n\nThe machine had {os.cpu_count()} processors and {load} processes that wanted them.\n" + END + rest.split(END)[1])
+        PAGE.write_text(head + BEGIN + "\n".join(lines) + f"\n\nThe machine had {os.cpu_count()} processors and {load} processes that wanted them, with those of the runs.\n" + END + rest.split(END)[1])
 
 
 main()
