@@ -138,6 +138,25 @@ constexpr std::ptrdiff_t lane_bernstein_scratch(std::ptrdiff_t degree, std::ptrd
   return (weights * (degree + 1) + (degree + 1) * (degree + 2) / 2) * kLanes;
 }
 
+/// Boxes about the leaves of a tree, kLanes side by side: panels x 6 x kLanes, lowest x, y, z, highest x, y, z.
+struct LeafBoxes {
+  const double* places = nullptr;
+  const double* velocities = nullptr;  ///< null where nothing moves
+  const double* rest = nullptr;        ///< of the places at rest
+};
+/// What is looked for near some points. Their boxes are six numbers, as above.
+struct LeafQuery {
+  double places[6] = {}, velocities[6] = {}, rest[6] = {};
+  double radius = 0;             ///< what is farther away is far
+  double near = 0, time = 0;     ///< and, of what moves, what is farther away than `near` and the way of both in `time`
+  double share = 0, beyond = 0;  ///< and what is no nearer than `share` of how far it is at most at rest, and `beyond`
+};
+/// Some leaves of kLanes side by side: a bit for each.
+struct LeafPanel {
+  int panel = 0;
+  unsigned lanes = 0;
+};
+
 struct Kernels {
   const char* name;
 
@@ -216,12 +235,20 @@ struct Kernels {
 
   // Of kLanes triangles: corners [3 x 3 x kLanes], of each corner its x, y and z.
 
-  /// squared [kLanes]: of the distance of a point [3] from each, or less by the rounding of its terms.
-  void (*triangle_distances)(const double* corners, const double* point, double* squared);
-  /// The same where it is at most `share` of the square of how far away the nearest point is at rest, with the
-  /// triangles at `rest_corners` and the point at `rest_point` [3]; infinity elsewhere.
-  void (*approached_triangles)(const double* corners, const double* point, const double* rest_corners,
-                               const double* rest_point, double share, double* squared);
+  /// squared [kLanes]: of the distance of a point [3] from each, or less by the rounding of its terms. Returns a bit
+  /// for each that is at most `limit`.
+  unsigned (*triangle_distances)(const double* corners, const double* point, double limit, double* squared);
+  /// The same with a bit for each that is also below `share` of the square of how far away the nearest point is at
+  /// rest, with the triangles at `rest_corners` and the point at `rest_point` [3].
+  unsigned (*approached_triangles)(const double* corners, const double* point, const double* rest_corners,
+                                   const double* rest_point, double share, double limit, double* squared);
+  /// corners as above of the triangles of `vertices` [3 x kLanes] with places `points` [n x 3, by rows], and `box` [6],
+  /// numbers kLanes apart, about all of them.
+  void (*gather_triangles)(const double* points, const int* vertices, double* corners, double* box);
+  /// kept: of some leaves those that are not far, panels without any left out. Returns how many panels; kept has room
+  /// for `count`.
+  std::ptrdiff_t (*near_leaves)(const LeafBoxes&, const LeafQuery&, const LeafPanel* panels, std::ptrdiff_t count,
+                                LeafPanel* kept);
 
   // Of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies [kLanes].
   void (*lanes_energy)(const ElementArrays&, const ElementLaw&, const double* q, double* energy);

@@ -1,4 +1,4 @@
-// Part of kernels_isa.inl, which includes this file: distances from kLanes triangles at once.
+// Part of kernels_isa.inl, which includes this file: kLanes triangles, or leaves of them, at once.
 
 /// What the squared terms of a distance may be wrong by, of the square of the way to the first corner.
 constexpr double kTriangleRounding = 1e-14;
@@ -61,19 +61,112 @@ inline Vec nearest_on_triangles(const TriangleLanes& lanes, Vec& v, Vec& w) {
   return lanes.squared_distance(v, w) - kTriangleRounding * dot3(lanes.away, lanes.away);
 }
 
-void triangle_distances(const double* corners, const double* point, double* squared) {
-  for (Index at = 0; at < kLanes; at += kWidth) {
-    Vec v, w;
-    store(squared + at, larger(nearest_on_triangles(TriangleLanes(corners + at, point), v, w), zero()));
-  }
+inline IntVec lane_bits() {
+  IntVec own;
+#pragma GCC unroll 8
+  for (Index i = 0; i < kWidth; ++i) own[i] = 1LL << i;
+  return own;
+}
+/// A bit for each lane that is true.
+inline unsigned bits(IntVec mask) {
+  IntVec own = mask & lane_bits();
+#if EXMAT_SIMD_WIDTH == 8
+  own |= __builtin_shufflevector(own, own, 4, 5, 6, 7, 0, 1, 2, 3);
+  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1, 6, 7, 4, 5);
+#elif EXMAT_SIMD_WIDTH == 4
+  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1);
+#endif
+  return static_cast<unsigned>(own[0] | own[1]);
 }
 
-void approached_triangles(const double* corners, const double* point, const double* rest_corners,
-                          const double* rest_point, double share, double* squared) {
+unsigned triangle_distances(const double* corners, const double* point, double limit, double* squared) {
+  unsigned near = 0;
+  for (Index at = 0; at < kLanes; at += kWidth) {
+    Vec v, w;
+    const Vec distance = larger(nearest_on_triangles(TriangleLanes(corners + at, point), v, w), zero());
+    store(squared + at, distance);
+    near |= bits(distance <= limit) << at;
+  }
+  return near;
+}
+
+unsigned approached_triangles(const double* corners, const double* point, const double* rest_corners,
+                              const double* rest_point, double share, double limit, double* squared) {
+  unsigned near = 0;
   for (Index at = 0; at < kLanes; at += kWidth) {
     Vec v, w;
     const Vec distance = larger(nearest_on_triangles(TriangleLanes(corners + at, point), v, w), zero());
     const Vec at_rest = TriangleLanes(rest_corners + at, rest_point).squared_distance(v, w);
-    store(squared + at, select(distance <= share * at_rest, distance, zero() + __builtin_inf()));
+    store(squared + at, distance);
+    near |= bits((distance <= limit) & (distance < share * at_rest)) << at;
   }
+  return near;
+}
+
+void gather_triangles(const double* points, const int* vertices, double* corners, double* box) {
+  for (Index corner = 0; corner < 3; ++corner)
+    for (Index lane = 0; lane < kLanes; ++lane) {
+      const double* const point = points + 3 * vertices[corner * kLanes + lane];
+      for (Index axis = 0; axis < 3; ++axis) corners[(3 * corner + axis) * kLanes + lane] = point[axis];
+    }
+  for (Index axis = 0; axis < 3; ++axis) {
+    Vec lowest = load(corners + axis * kLanes), highest = lowest;
+    for (Index at = 0; at < kLanes; at += kWidth)
+      for (Index corner = 0; corner < 3; ++corner) {
+        const Vec place = load(corners + (3 * corner + axis) * kLanes + at);
+        lowest = select(place < lowest, place, lowest);
+        highest = larger(place, highest);
+      }
+    double least = lowest[0], most = highest[0];
+    for (Index i = 1; i < kWidth; ++i) {
+      least = lowest[i] < least ? lowest[i] : least;
+      most = highest[i] > most ? highest[i] : most;
+    }
+    box[axis * kLanes] = least;
+    box[(3 + axis) * kLanes] = most;
+  }
+}
+
+inline Vec square(Vec v) { return v * v; }
+
+/// Squares of the least distances between boxes `own` and those of kWidth leaves.
+inline Vec squared_gaps(const double* boxes, const double* own) {
+  Vec sum = zero();
+  for (Index axis = 0; axis < 3; ++axis) {
+    const Vec above = load(boxes + axis * kLanes) - own[3 + axis], below = own[axis] - load(boxes + (3 + axis) * kLanes);
+    sum += square(larger(larger(above, below), zero()));
+  }
+  return sum;
+}
+/// Squares of the largest distances.
+inline Vec squared_spans(const double* boxes, const double* own) {
+  Vec sum = zero();
+  for (Index axis = 0; axis < 3; ++axis)
+    sum += square(larger(load(boxes + (3 + axis) * kLanes) - own[axis], own[3 + axis] - load(boxes + axis * kLanes)));
+  return sum;
+}
+
+Index near_leaves(const LeafBoxes& leaves, const LeafQuery& query, const LeafPanel* panels, Index count,
+                  LeafPanel* kept) {
+  constexpr Index kNumbers = 6 * kLanes;
+  Index found = 0;
+  for (Index i = 0; i < count; ++i) {
+    const LeafPanel from = panels[i];
+    unsigned lanes = 0;
+    for (Index at = 0; at < kLanes; at += kWidth) {
+      const Index begin = from.panel * kNumbers + at;
+      const Vec gaps = squared_gaps(leaves.places + begin, query.places);
+      IntVec near = gaps <= query.radius * query.radius;
+      const Vec at_rest = squared_spans(leaves.rest + begin, query.rest);
+      near &= query.beyond > 0 ? gaps < square(query.share * square_root(at_rest) + query.beyond)
+                               : gaps < query.share * query.share * at_rest;
+      if (leaves.velocities != nullptr)
+        near &= gaps <= square(query.near + query.time * square_root(squared_spans(leaves.velocities + begin,
+                                                                                    query.velocities)));
+      lanes |= bits(near) << at;
+    }
+    lanes &= from.lanes;
+    if (lanes != 0) kept[found++] = {from.panel, lanes};
+  }
+  return found;
 }

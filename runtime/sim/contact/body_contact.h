@@ -6,6 +6,7 @@
 
 #include "runtime/sim/contact/body_surface.h"
 #include "runtime/sim/contact/contact.h"
+#include "runtime/sim/contact/own_search.h"
 
 namespace exmat::runtime {
 
@@ -34,6 +35,14 @@ struct BodyCandidates {
   bool has_first = false;
   std::array<Placement, 2> first{};
   std::array<Eigen::VectorXd, 2> first_q{};
+
+  auto rows(std::size_t index) const { return basis.middleRows<3>(3 * static_cast<Eigen::Index>(index)); }
+  auto rows(std::size_t index) { return basis.middleRows<3>(3 * static_cast<Eigen::Index>(index)); }
+  /// y - position of the other body, at its pose, world [m].
+  Eigen::Vector3d surface_arm(std::size_t index, const BodyPose& pose) const {
+    const Eigen::Vector3d moved = all[index].rest + rows(index).lazyProduct(pose.q);
+    return pose.rotation * moved;
+  }
 };
 
 /// Vertices of one body, a, near the surface of another, b, or its own, by a search that went farther than one step
@@ -52,7 +61,9 @@ struct NearVertices {
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
 
-  AlignedArray scratch;  ///< [r] of a body with itself
+  // Of a body with itself.
+  AlignedArray scratch;  ///< [r]
+  OwnSearch own;
 };
 
 /// The surface of a body that touches others, and how its vertices look.

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -16,15 +17,12 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kNoDistance = 1e-9;  // of the size of a triangle: below it normals of the surface say which way is out
-
-constexpr double kApproached = 0.5;                             // of the distance at rest
 constexpr double kNearlyApproached = (1 + 1e-5) * kApproached;  // but for the rounding of where the nearest point is
 constexpr int kLeafTriangles = kLanes;
-constexpr Eigen::Index kCornerNumbers = 9 * kLanes;  // of the triangles of a leaf
-constexpr int kBlockTriangles = 64;                  // whose vertices are moved together
-constexpr int kManyLooks = 64;                       // a search costs about half a microsecond, all boxes twenty
-constexpr double kSameWay = 0.5;                     // cosine
+constexpr Eigen::Index kCornerNumbers = SurfaceLeaves::kCornerNumbers;
+constexpr int kBlockTriangles = 64;  // whose vertices are moved together
+constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
+constexpr double kSameWay = 0.5;     // cosine
 constexpr double kSurely = 1 + 1e-9;
 
 /// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them,
@@ -41,8 +39,8 @@ template <class Accepts, class Excludes, class ExcludesTriangle, class BoundTria
 SearchFilter(Accepts, Excludes, ExcludesTriangle, BoundTriangles)
     -> SearchFilter<Accepts, Excludes, ExcludesTriangle, BoundTriangles>;
 
-/// Where those of a leaf begin: all leaves but the last are full.
-Eigen::Index corners_begin(const DeformationTree::Node& leaf) { return leaf.first / kLeafTriangles * kCornerNumbers; }
+/// Where those of the leaf are that begins with a triangle: all leaves but the last are full.
+Eigen::Index corners_begin(int first) { return first / kLeafTriangles * kCornerNumbers; }
 /// Of one of the triangles of a leaf.
 Eigen::Vector3d corner_of(const double* corners, int triangle, int corner) {
   const double* x = corners + 3 * corner * kLanes + triangle;
@@ -80,14 +78,14 @@ TriangleArray neighbours_of(const TriangleArray& triangles) {
 
 }  // namespace
 
-BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray triangles,
+BodySurface::BodySurface(const VertexArray& rest, const RowMatrix& basis, TriangleArray triangles,
                          const Eigen::Vector3d& origin)
     : rest_(rest.rowwise() - origin.transpose()),
-      basis_(std::move(basis)),
+      rows_(basis, Eigen::VectorXi::LinSpaced(rest.rows(), 0, static_cast<int>(rest.rows()) - 1)),
       triangles_(std::move(triangles)),
       neighbours_(neighbours_of(triangles_)),
       fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
-      tree_(triangles_, rest_, basis_, kLeafTriangles, /*full_leaves=*/true),
+      tree_(triangles_, rest_, basis, kLeafTriangles, /*full_leaves=*/true),
       reach_(rest.rows() > 0 ? rest_.rowwise().norm().maxCoeff() : 0) {
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
@@ -102,6 +100,8 @@ BodySurface::BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray
       set_corner(rest_.row(triangles_(tree_.order()[static_cast<std::size_t>(i)], c)), i % kLeafTriangles, c,
                  rest_corners_.data() + i / kLeafTriangles * kCornerNumbers);
 }
+
+void BodySurface::arrange_leaves() { leaves_ = SurfaceLeaves(rest_, triangles_, tree_); }
 
 AlignedArray BodySurface::make_corners() const {
   return AlignedArray((triangles_.rows() + kLeafTriangles - 1) / kLeafTriangles * kCornerNumbers);
@@ -122,12 +122,13 @@ BodySurface BodySurface::of_tets(const TetArray& tets, const VertexArray& rest, 
   RowMatrix rows(3 * kept.size(), basis.cols());
   for (std::size_t i = 0; i < kept.size(); ++i)
     rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * kept[i]);
-  return {rest(kept, Eigen::all), std::move(rows), std::move(triangles), origin};
+  return {rest(kept, Eigen::all), rows, std::move(triangles), origin};
 }
 
 SurfaceShape BodySurface::make_shape() const {
   SurfaceShape shape;
   shape.q.setZero(modes());
+  shape.x = shape.v = AlignedArray(modes());
   shape.positions = rest_;
   shape.position_of.assign(static_cast<std::size_t>(rest_.rows()), 0);
   shape.balls.resize(tree_.nodes().size());
@@ -137,12 +138,14 @@ SurfaceShape BodySurface::make_shape() const {
   shape.corners = make_corners();
   shape.velocities = VertexArray::Zero(rest_.rows(), 3);
   shape.velocity_boxes.resize(tree_.nodes().size());
+  shape.leaves = leaves_.make_placed();
   return shape;
 }
 
 void BodySurface::place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept {
   shape.q = q;
-  shape.v.resize(0);
+  std::copy(q.begin(), q.end(), shape.x.data());
+  shape.moves = false;
   shape.q_norm = q.norm();
   ++shape.placed;
   shape.looks = 0;
@@ -150,7 +153,8 @@ void BodySurface::place(const Eigen::VectorXd& q, SurfaceShape& shape) const noe
 
 void BodySurface::place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept {
   place(q, shape);
-  shape.v = v;
+  std::copy(v.begin(), v.end(), shape.v.data());
+  shape.moves = true;
 }
 
 const DeformationTree::Ball& BodySurface::ball(int node, SurfaceShape& shape) const noexcept {
@@ -165,15 +169,28 @@ const DeformationTree::Ball& BodySurface::ball(int node, SurfaceShape& shape) co
 Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noexcept {
   int& placed = shape.position_of[static_cast<std::size_t>(vertex)];
   if (placed != shape.placed) {
-    const Eigen::Vector3d moved = basis_.middleRows<3>(3 * vertex).lazyProduct(shape.q);
+    Eigen::Vector3d moved;
+    rows_.products(&vertex, 1, shape.x, moved.data());
     shape.positions.row(vertex) = rest_.row(vertex) + moved.transpose();
-    if (shape.v.size() > 0) {
-      const Eigen::Vector3d velocity = basis_.middleRows<3>(3 * vertex).lazyProduct(shape.v);
-      shape.velocities.row(vertex) = velocity;
-    }
+    if (shape.moves) rows_.products(&vertex, 1, shape.v, shape.velocities.row(vertex).data());
     placed = shape.placed;
   }
   return shape.positions.row(vertex);
+}
+
+void BodySurface::place_all(SurfaceShape& shape) const noexcept {
+  rows_.products_from(0, rest_.rows(), shape.x, shape.positions.data());
+  shape.positions += rest_;
+  if (shape.moves) rows_.products_from(0, rest_.rows(), shape.v, shape.velocities.data());
+  std::ranges::fill(shape.position_of, shape.placed);
+  leaves_.place(shape.positions, shape.leaves, shape.corners);
+  if (shape.moves) leaves_.set_velocities(shape.velocities, shape.leaves);
+}
+
+std::ptrdiff_t BodySurface::near_leaves(LeafQuery query, const LeafPanel* panels, std::ptrdiff_t count,
+                                        const SurfaceShape& shape, LeafPanel* kept) const noexcept {
+  query.share = kSurely * kApproached;
+  return leaves_.near(shape.leaves, shape.moves, query, panels, count, kept);
 }
 
 /// Whether a branch is small enough for the boxes of its own triangles.
@@ -184,7 +201,6 @@ bool BodySurface::is_block(int node) const noexcept {
 
 /// The boxes of a branch and of those below it; after it come all of them.
 void BodySurface::open_block(int node, SurfaceShape& shape) const noexcept {
-  const bool moves = shape.v.size() > 0;
   for (int below = tree_.node(node).next - 1; below >= node; --below) {
     const DeformationTree::Node& branch = tree_.node(below);
     Eigen::AlignedBox3d &box = shape.boxes[static_cast<std::size_t>(below)],
@@ -194,18 +210,18 @@ void BodySurface::open_block(int node, SurfaceShape& shape) const noexcept {
       const auto one = static_cast<std::size_t>(below) + 1;
       const auto other = static_cast<std::size_t>(tree_.node(below + 1).next);
       box = shape.boxes[one].merged(shape.boxes[other]);
-      if (moves) velocities = shape.velocity_boxes[one].merged(shape.velocity_boxes[other]);
+      if (shape.moves) velocities = shape.velocity_boxes[one].merged(shape.velocity_boxes[other]);
       continue;
     }
     box.setEmpty();
     velocities.setEmpty();
-    double* const corners = shape.corners.data() + corners_begin(branch);
+    double* const corners = shape.corners.data() + corners_begin(branch.first);
     for (int i = branch.first; i < branch.last; ++i)
       for (int c = 0; c < 3; ++c) {
         const int vertex = triangles_(tree_.order()[static_cast<std::size_t>(i)], c);
         const Eigen::Vector3d place = position(vertex, shape);
         box.extend(place);
-        if (moves) velocities.extend(shape.velocities.row(vertex).transpose());
+        if (shape.moves) velocities.extend(shape.velocities.row(vertex).transpose());
         set_corner(place, i - branch.first, c, corners);
       }
   }
@@ -245,7 +261,58 @@ bool BodySurface::may_be_within(const Eigen::Vector3d& point, double radius, Sur
 
 template <class Accept>
 std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
-                                              const Accept& accepts) const noexcept {
+                                              const Accept& accepts, Leaves leaves) const noexcept {
+  TrianglePoint best;
+  int found = -1;
+  double nearest = radius * radius;
+  const auto look_into = [&](int first, int last) {
+    const double* const corners = shape.corners.data() + corners_begin(first);
+    std::array<double, kLeafTriangles> bounds;
+    const double limit = kSurely * nearest;
+    unsigned near = 0;
+    if constexpr (requires { accepts.bound_triangles(first, limit, bounds.data()); })
+      near = accepts.bound_triangles(first, limit, bounds.data());
+    else
+      near = kernels().triangle_distances(corners, point.data(), limit, bounds.data());
+    for (near &= (1U << (last - first)) - 1U; near != 0; near &= near - 1) {
+      const int own = std::countr_zero(near);
+      const double away = bounds[static_cast<std::size_t>(own)];
+      const int triangle = tree_.order()[static_cast<std::size_t>(first + own)];
+      if constexpr (requires { accepts.excludes_triangle(triangle, away); })
+        if (accepts.excludes_triangle(triangle, away)) continue;
+      const TrianglePoint here = nearest_on_triangle(point, corner_of(corners, own, 0), corner_of(corners, own, 1),
+                                                     corner_of(corners, own, 2));
+      if (here.squared_distance > nearest) continue;
+      if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
+      if (!accepts(triangle, here)) continue;
+      nearest = here.squared_distance;
+      best = here;
+      found = triangle;
+    }
+  };
+  if (leaves) {
+    for (const LeafPanel& panel : *leaves)
+      for (unsigned lanes = panel.lanes; lanes != 0; lanes &= lanes - 1) {
+        const int first = (panel.panel * static_cast<int>(kLanes) + std::countr_zero(lanes)) * kLeafTriangles;
+        look_into(first, std::min(first + kLeafTriangles, static_cast<int>(triangles_.rows())));
+      }
+  } else {
+    search_tree(point, nearest, shape, accepts, look_into);
+  }
+  if (found < 0) return std::nullopt;
+  const Eigen::Vector3d out = outward(found, best.barycentric, shape);
+  const Eigen::Vector3d away = point - best.point;
+  const double distance = std::sqrt(nearest);
+  const double side = away.dot(out) >= 0 ? 1 : -1;
+  SurfaceHit hit{found, best.barycentric, side * distance, out};
+  if (distance * distance > kOnTriangle * kOnTriangle * area_normal(found, shape).norm())
+    hit.normal = side / distance * away;
+  return hit;
+}
+
+template <class Accept, class Look>
+void BodySurface::search_tree(const Eigen::Vector3d& point, const double& nearest, SurfaceShape& shape,
+                              const Accept& accepts, const Look& look_into) const noexcept {
   struct Waiting {
     int node;
     double bound;  // on the squared distance
@@ -254,9 +321,6 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
   const auto bound_of = [&](int node) { return Waiting{node, squared_bound(node, point, shape)}; };
   Waiting waiting[64];  // halves of a tree of at most 2^32 leaves
   int count = 0;
-  TrianglePoint best;
-  int found = -1;
-  double nearest = radius * radius;
   if (!tree_.empty()) waiting[count++] = bound_of(0);
   while (count > 0) {
     const int node = waiting[--count].node;
@@ -276,45 +340,15 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
       waiting[count++] = near;
       continue;
     }
-    const double* const corners = shape.corners.data() + corners_begin(branch);
-    std::array<double, kLeafTriangles> bounds;
-    if constexpr (requires { accepts.bound_triangles(branch, bounds.data()); })
-      accepts.bound_triangles(branch, bounds.data());
-    else
-      kernels().triangle_distances(corners, point.data(), bounds.data());
-    for (int i = branch.first; i < branch.last; ++i) {
-      const int own = i - branch.first;
-      const double away = bounds[static_cast<std::size_t>(own)];
-      if (away > kSurely * nearest) continue;
-      const int triangle = tree_.order()[static_cast<std::size_t>(i)];
-      if constexpr (requires { accepts.excludes_triangle(triangle, away); })
-        if (accepts.excludes_triangle(triangle, away)) continue;
-      const TrianglePoint here = nearest_on_triangle(point, corner_of(corners, own, 0), corner_of(corners, own, 1),
-                                                     corner_of(corners, own, 2));
-      if (here.squared_distance > nearest) continue;
-      if (here.squared_distance == nearest && found >= 0 && triangle > found) continue;
-      if (!accepts(triangle, here)) continue;
-      nearest = here.squared_distance;
-      best = here;
-      found = triangle;
-    }
+    look_into(branch.first, branch.last);
   }
-  if (found < 0) return std::nullopt;
-  const Eigen::Vector3d out = outward(found, best.barycentric, shape);
-  const Eigen::Vector3d away = point - best.point;
-  const double distance = std::sqrt(nearest);
-  const double side = away.dot(out) >= 0 ? 1 : -1;
-  SurfaceHit hit{found, best.barycentric, side * distance, out};
-  if (distance * distance > kNoDistance * kNoDistance * area_normal(found, shape).norm())
-    hit.normal = side / distance * away;
-  return hit;
 }
 
 std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                                const Eigen::Vector3d* facing) const noexcept {
-  if (facing == nullptr) return search(point, radius, shape, [](int, const TrianglePoint&) { return true; });
+  if (facing == nullptr) return search(point, radius, shape, [](int, const TrianglePoint&) { return true; }, {});
   return search(point, radius, shape,
-                [&](int triangle, const TrianglePoint&) { return !looks_along(triangle, *facing, shape); });
+                [&](int triangle, const TrianglePoint&) { return !looks_along(triangle, *facing, shape); }, {});
 }
 
 /// A search for what is nearer than half of its distance at rest, or may be once it has moved by `way` [m].
@@ -350,65 +384,38 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
     if (closing != nullptr && is_far(*closing, bound, std::sqrt(fastest))) return true;
     return way > 0 && is_beyond(bound, std::sqrt(farthest));
   };
-  const auto bound_triangles = [&, way, this](const DeformationTree::Node& leaf, double* bounds) {
-    const double* const corners = shape.corners.data() + corners_begin(leaf);
-    if (way > 0) return kernels().triangle_distances(corners, point.data(), bounds);
-    kernels().approached_triangles(corners, point.data(), rest_corners_.data() + corners_begin(leaf), rest.data(),
-                                   kNearlyApproached * kNearlyApproached, bounds);
+  const auto bound_triangles = [&, way, this](int first, double limit, double* bounds) {
+    const double* const corners = shape.corners.data() + corners_begin(first);
+    if (way > 0) return kernels().triangle_distances(corners, point.data(), limit, bounds);
+    return kernels().approached_triangles(corners, point.data(), rest_corners_.data() + corners_begin(first),
+                                          rest.data(), kNearlyApproached * kNearlyApproached, limit, bounds);
   };
   return SearchFilter{accepts, excludes, excludes_triangle, bound_triangles};
 }
 
 std::optional<SurfaceHit> BodySurface::nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
                                                           const SurfaceHit& place, double radius, SurfaceShape& shape,
-                                                          const ClosingPoint* closing) const noexcept {
+                                                          const ClosingPoint* closing, Leaves leaves) const noexcept {
+  const double itself = kOnTriangle * kOnTriangle * reach_ * reach_;
   std::optional<Eigen::Vector3d> facing;  // few vertices have come near to anything
   const auto accepts = [&](int triangle, const TrianglePoint& here) {
     const double at_rest = (rest - rest_of({triangle, here.barycentric})).squaredNorm();
-    if (!(here.squared_distance < kApproached * kApproached * at_rest)) return false;
+    if (!(here.squared_distance < kApproached * kApproached * at_rest) || at_rest <= itself) return false;
     if (!facing) facing = normal_of(place, shape);
     return !looks_along(triangle, *facing, shape);
   };
-  return search(point, radius, shape, approach_filter(point, rest, place, 0, shape, closing, accepts));
+  return search(point, radius, shape, approach_filter(point, rest, place, 0, shape, closing, accepts), leaves);
 }
 
 double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
-                                      const SurfaceHit& place, double radius, double way,
-                                      SurfaceShape& shape) const noexcept {
+                                      const SurfaceHit& place, double radius, double way, SurfaceShape& shape,
+                                      Leaves leaves) const noexcept {
   // Any point of the triangle may become the nearest: none is farther away at rest than the corners, by
   // excludes_triangle.
   const auto accepts = [](int, const TrianglePoint&) { return true; };
-  const auto hit = search(point, radius, shape, approach_filter(point, rest, place, way, shape, nullptr, accepts));
+  const auto hit =
+      search(point, radius, shape, approach_filter(point, rest, place, way, shape, nullptr, accepts), leaves);
   return hit ? std::abs(hit->distance) : std::numeric_limits<double>::infinity();
-}
-
-RowMatrix BodySurface::approach_bounds(const VertexArray& rest, const RowMatrix& basis) const {
-  RowMatrix bounds = RowMatrix::Zero(rest.rows(), modes());
-  for (Eigen::Index i = 0; i < rest.rows(); ++i)
-    for (Eigen::Index t = 0; t < triangles_.rows(); ++t) {
-      const auto corner = [&](int c) -> Eigen::Vector3d { return rest_.row(triangles_(t, c)); };
-      const double distance =
-          std::sqrt(nearest_on_triangle(rest.row(i), corner(0), corner(1), corner(2)).squared_distance);
-      const Eigen::Vector3d first = corner(1) - corner(0), second = corner(2) - corner(0);
-      const bool beside = distance * distance <= kNoDistance * kNoDistance * first.cross(second).norm();
-      Eigen::Matrix<double, 3, 2> edges;
-      edges << first, second;
-      const Eigen::Matrix2d metric = (edges.transpose() * edges).inverse();
-      for (Eigen::Index j = 0; j < modes(); ++j) {
-        const auto moved = [&](int c) -> Eigen::Vector3d { return basis_.block<3, 1>(3 * triangles_(t, c), j); };
-        double ratio = 0;
-        if (beside) {  // the norm of the gradient in the triangle is above that of its singular values
-          Eigen::Matrix<double, 3, 2> change;
-          change << moved(1) - moved(0), moved(2) - moved(0);
-          ratio = std::sqrt((change * metric * change.transpose()).trace());
-        } else {
-          const Eigen::Vector3d own = basis.block<3, 1>(3 * i, j);
-          for (int c = 0; c < 3; ++c) ratio = std::max(ratio, (moved(c) - own).norm() / distance);
-        }
-        bounds(i, j) = std::max(bounds(i, j), ratio / (1 - kApproached));
-      }
-    }
-  return bounds;
 }
 
 Eigen::Vector3d BodySurface::velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept {
@@ -484,7 +491,7 @@ Eigen::Vector3d BodySurface::rest_of(const SurfaceHit& hit) const noexcept {
 
 void BodySurface::basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept {
   rows.setZero();
-  for (int c = 0; c < 3; ++c) rows += hit.barycentric[c] * basis_.middleRows<3>(3 * triangles_(hit.triangle, c));
+  for (int c = 0; c < 3; ++c) rows += hit.barycentric[c] * rows_[triangles_(hit.triangle, c)];
 }
 
 }  // namespace exmat::runtime

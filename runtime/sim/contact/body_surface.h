@@ -3,11 +3,14 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "common/core/arrays.h"
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/contact/deformation_tree.h"
+#include "runtime/sim/contact/surface_leaves.h"
+#include "runtime/sim/contact/vertex_rows.h"
 
 namespace exmat::runtime {
 
@@ -27,9 +30,14 @@ struct ClosingPoint {
   double time = 0;                                     ///< [s]
 };
 
+/// Below this share of the size of a triangle normals of the surface say which way is out.
+inline constexpr double kOnTriangle = 1e-9;
+inline constexpr double kApproached = 0.5;  ///< of the distance at rest: what is nearer has come near
+
 /// A surface at some q: what was computed of it so far. Sized once by BodySurface::make_shape(); one thread at a time.
 struct SurfaceShape {
   Eigen::VectorXd q;  ///< [r]
+  AlignedArray x;     ///< the same, padded
   double q_norm = 0;
   int placed = 0;                            ///< times that it was placed
   int looks = 0;                             ///< searches since then
@@ -39,11 +47,13 @@ struct SurfaceShape {
   std::vector<int> position_of, ball_of, box_of;
 
   // Where it was placed with a velocity, beside positions and boxes.
-  Eigen::VectorXd v;       ///< [r], or empty
+  bool moves = false;
+  AlignedArray v;          ///< padded(r)
   VertexArray velocities;  ///< [m/s]
   std::vector<Eigen::AlignedBox3d> velocity_boxes;
 
   AlignedArray corners;  ///< of the triangles of leaves within a block, as Kernels::triangle_distances() has them
+  PlacedLeaves leaves;   ///< after place_all()
 };
 
 /// The closed surface of a reduced body: signed distances to it as it deforms, in the frame of the body. Only what is
@@ -52,16 +62,22 @@ struct SurfaceShape {
 /// call but the constructor and make_shape() allocates.
 class BodySurface {
  public:
+  /// Where to look, by near_leaves(); without, the tree tells.
+  using Leaves = std::optional<std::span<const LeafPanel>>;
+
   BodySurface() = default;
   /// Vertices at rest `rest` [k x 3, world, m], moved by `basis` [3k x r]; `triangles` [f x 3] of them look outward.
   /// `origin` [m], world: what rest positions are about, BodyFrame::origin().
-  BodySurface(const VertexArray& rest, RowMatrix basis, TriangleArray triangles, const Eigen::Vector3d& origin);
+  BodySurface(const VertexArray& rest, const RowMatrix& basis, TriangleArray triangles, const Eigen::Vector3d& origin);
 
   /// The boundary of tetrahedra [n_t x 4] of points at rest [n x 3], moved by a basis [3n x r].
   static BodySurface of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
                              const Eigen::Vector3d& origin);
 
-  Eigen::Index modes() const noexcept { return basis_.cols(); }
+  /// For place_all(), once.
+  void arrange_leaves();
+
+  Eigen::Index modes() const noexcept { return rows_.modes(); }
   Eigen::Index triangles() const noexcept { return triangles_.rows(); }
 
   double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
@@ -71,6 +87,14 @@ class BodySurface {
   void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;
   /// Moving with v [r], for ClosingPoint.
   void place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept;
+  /// After place(), of a surface with leaves: the whole of it at once.
+  void place_all(SurfaceShape& shape) const noexcept;
+  /// Those of some leaves, of all_leaves() at first, where parts of the surface may have come near to some points by
+  /// nearest_approached() with a closing point, or approach_distance(): `query` is of the points, but for the share.
+  /// After place_all(). Returns how many panels of them are kept; `kept` has room for `count`.
+  std::ptrdiff_t near_leaves(LeafQuery query, const LeafPanel* panels, std::ptrdiff_t count, const SurfaceShape& shape,
+                             LeafPanel* kept) const noexcept;
+  const std::vector<LeafPanel>& all_leaves() const noexcept { return leaves_.all(); }
   /// At v in the frame of the body [m/s]; near a search that found something there.
   Eigen::Vector3d velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
 
@@ -90,12 +114,13 @@ class BodySurface {
   /// long as nothing is compressed to half its length. With `closing`, of a shape that moves, what is not far by it.
   std::optional<SurfaceHit> nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
                                                const SurfaceHit& place, double radius, SurfaceShape& shape,
-                                               const ClosingPoint* closing = nullptr) const noexcept;
+                                               const ClosingPoint* closing = nullptr,
+                                               Leaves leaves = std::nullopt) const noexcept;
 
   /// How far away what nearest_approached() finds is at least, within `radius`, as long as the point and the surface
   /// move by no more than `way` together [m] beyond that; infinity where it finds nothing.
   double approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place,
-                           double radius, double way, SurfaceShape& shape) const noexcept;
+                           double radius, double way, SurfaceShape& shape, Leaves leaves = std::nullopt) const noexcept;
 
   /// The unit normal at a point of the surface as it is deformed, outward.
   Eigen::Vector3d normal_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
@@ -120,7 +145,10 @@ class BodySurface {
                        const SurfaceShape& shape, const ClosingPoint* closing, const Accepts& accepts) const noexcept;
   template <class Accept>
   std::optional<SurfaceHit> search(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
-                                   const Accept& accepts) const noexcept;
+                                   const Accept& accepts, Leaves leaves) const noexcept;
+  template <class Accept, class Look>
+  void search_tree(const Eigen::Vector3d& point, const double& nearest, SurfaceShape& shape, const Accept& accepts,
+                   const Look& look_into) const noexcept;
   const DeformationTree::Ball& ball(int node, SurfaceShape& shape) const noexcept;
   Eigen::Vector3d position(int vertex, SurfaceShape& shape) const noexcept;
   Eigen::Vector3d area_normal(int triangle, SurfaceShape& shape) const noexcept;
@@ -129,12 +157,13 @@ class BodySurface {
   Eigen::Vector3d vertex_normal(int vertex, SurfaceShape& shape) const noexcept;
 
   VertexArray rest_;  // k x 3, X
-  RowMatrix basis_;   // 3k x r
+  VertexRows rows_;   // of the basis
   TriangleArray triangles_;
   TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
   std::vector<int> fan_starts_, fans_;  // triangles of each vertex
   DeformationTree tree_;                // of the triangles
   AlignedArray rest_corners_;           // as those of a shape
+  SurfaceLeaves leaves_;                // where they are arranged
   double reach_ = 0;
 };
 

@@ -71,13 +71,7 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
     object_vertices_.push_back(numbered ? static_cast<int>(data.vertices[index]) : index);
   rest_ = rest(data_indices_, Eigen::all);
   areas_ = data.areas(data_indices_);
-  modes_ = data.basis.cols();
-  rows_ = AlignedArray(3 * count * stride());
-  for (int i = 0; i < count; ++i)
-    for (int row = 0; row < 3; ++row) {
-      const auto from = data.basis.row(3 * data_index(i) + row);
-      std::copy(from.begin(), from.end(), rows_.data() + (3 * i + row) * stride());
-    }
+  rows_ = VertexRows(data.basis, data_indices_);
   if (count > 0) reach_ = rest.rowwise().norm().maxCoeff();
 }
 
@@ -94,15 +88,25 @@ double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& veloci
 double ContactSet::fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept {
   std::copy(v.begin(), v.end(), scratch.data());
   double square = 0;
-  Batch batch;
+  Eigen::Matrix<double, 3, kBatch> products;
   for (int begin = 0; begin < vertices(); begin += kBatch) {
-    batch.count = std::min(kBatch, static_cast<int>(vertices()) - begin);
-    std::iota(batch.vertices.begin(), batch.vertices.begin() + batch.count, begin);
-    kernels().vertex_products(rows_.data(), stride(), batch.vertices.data(), batch.count, scratch.data(),
-                              batch.products.data());
-    square = std::max(square, batch.products.leftCols(batch.count).colwise().squaredNorm().maxCoeff());
+    const int count = std::min(kBatch, static_cast<int>(vertices()) - begin);
+    rows_.products_from(begin, count, scratch, products.data());
+    square = std::max(square, products.leftCols(count).colwise().squaredNorm().maxCoeff());
   }
   return std::sqrt(square);
+}
+
+Eigen::Vector3d ContactSet::place(int vertex, const AlignedArray& q) const noexcept {
+  Eigen::RowVector3d moved;
+  rows_.products(&vertex, 1, q, moved.data());
+  return (moved + rest_.row(vertex)).transpose();
+}
+
+void ContactSet::place(const AlignedArray& q, VertexArray& points) const noexcept {
+  points.resize(vertices(), 3);
+  rows_.products_from(0, vertices(), q, points.data());
+  points += rest_;
 }
 
 bool ContactSet::may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept {
@@ -149,8 +153,7 @@ Eigen::Vector3d ContactSet::world_velocity(int vertex, const Eigen::Vector3d& ar
 
 /// The rows of its vertices times x.
 void ContactSet::set_products(const ContactWorkspace& workspace, Batch& batch) const noexcept {
-  kernels().vertex_products(rows_.data(), stride(), batch.vertices.data(), batch.count, workspace.x.data(),
-                            batch.products.data());
+  rows_.products(batch.vertices.data(), batch.count, workspace.x, batch.products.data());
 }
 
 /// world_arm() of one of a batch, x = q.
@@ -269,7 +272,7 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
   }
   const double way = is_first ? 0 : way_bound(reach_, tree_.movement(), pose, workspace.first, workspace.first_q);
   set_x(pose.q, workspace);
-  std::fill_n(workspace.loads.data(), stride(), 0.0);
+  std::fill_n(workspace.loads.data(), rows_.stride(), 0.0);
   workspace.loaded_count = 0;
   Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
@@ -312,7 +315,7 @@ void ContactSet::evaluate_batch(const BodyPose& pose, bool is_first, Batch& batc
     batch.vectors.col(loaded) = pose.rotation.transpose() * candidate.force;
     batch.vertices[static_cast<std::size_t>(loaded++)] = candidate.vertex;
   }
-  kernels().add_vertex_loads(rows_.data(), stride(), batch.vertices.data(), loaded, batch.vectors.data(),
+  kernels().add_vertex_loads(rows_.data(), rows_.stride(), batch.vertices.data(), loaded, batch.vectors.data(),
                              workspace.loads.data());
   batch.count = 0;
 }
@@ -357,7 +360,7 @@ double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept 
 /// The factors of a batch, r of each by the rows of its vertex and then its rigid ones, and their squares; empties it.
 void ContactSet::add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept {
   const Eigen::Index width = padded(rigid + modes());
-  kernels().vertex_loads(rows_.data(), stride(), batch.vertices.data(), batch.count, batch.vectors.data(),
+  kernels().vertex_loads(rows_.data(), rows_.stride(), batch.vertices.data(), batch.count, batch.vectors.data(),
                          workspace.factors.data(), width);
   for (int index = 0; index < batch.count; ++index) {
     double* const after = workspace.factors.data() + index * width + modes();

@@ -8,6 +8,7 @@
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/contact/contact_law.h"
 #include "runtime/sim/contact/deformation_tree.h"
+#include "runtime/sim/contact/vertex_rows.h"
 #include "runtime/sim/frame/placement.h"
 
 namespace exmat::runtime {
@@ -94,7 +95,7 @@ class ContactSet {
   explicit ContactSet(const ContactData& data, const Eigen::Vector3d& origin = Eigen::Vector3d::Zero());
 
   Eigen::Index vertices() const noexcept { return areas_.size(); }
-  Eigen::Index modes() const noexcept { return modes_; }
+  Eigen::Index modes() const noexcept { return rows_.modes(); }
 
   /// Of a vertex: its number in the object, and its place in ContactData, which is the number, too, where the data has
   /// none; the set has an order of its own.
@@ -109,6 +110,11 @@ class ContactSet {
 
   /// Speed of the fastest vertex in the frame of a body that moves with v [r] [m/s]. `scratch` has at least r numbers.
   double fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept;
+
+  /// All vertices at q [padded(r)] in the frame of the body [vertices x 3, m]; allocates where `points` is smaller.
+  void place(const AlignedArray& q, VertexArray& points) const noexcept;
+  /// One of them, to the same bits.
+  Eigen::Vector3d place(int vertex, const AlignedArray& q) const noexcept;
 
   /// False only where nothing of a body that stays at this pose touches the obstacle in the step.
   bool may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept;
@@ -151,21 +157,17 @@ class ContactSet {
   /// World [m/s]; `arm` is that of the vertex.
   Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
                                  const BodyVelocity& velocity) const noexcept;
-  Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }  ///< frame of the body [m]
-  double area(int vertex) const noexcept { return areas_[vertex]; }              ///< share of the surface [m^2]
-  auto basis_rows(int vertex) const noexcept {                                   ///< 3 x r
-    return BasisRows(rows_.data() + 3 * vertex * stride(), 3, modes_, Eigen::OuterStride<>(stride()));
-  }
+  Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }     ///< frame of the body [m]
+  const VertexArray& rest() const noexcept { return rest_; }                        ///< of all
+  double area(int vertex) const noexcept { return areas_[vertex]; }                 ///< share of the surface [m^2]
+  VertexRows::Rows basis_rows(int vertex) const noexcept { return rows_[vertex]; }  ///< 3 x r
 
   const DeformationTree& tree() const noexcept { return tree_; }  ///< its items are the vertices, in their order
   double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
 
  private:
-  using BasisRows = Eigen::Map<const Eigen::Matrix<double, 3, Eigen::Dynamic, Eigen::RowMajor>, Eigen::Unaligned,
-                               Eigen::OuterStride<>>;
   struct Batch;
 
-  Eigen::Index stride() const noexcept { return padded(modes_); }
   void set_products(const ContactWorkspace& workspace, Batch& batch) const noexcept;
   Eigen::Vector3d arm_in(const Batch& batch, int index, const BodyPose& pose) const noexcept;
   void freeze_batch(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected, double time_step,
@@ -185,9 +187,8 @@ class ContactSet {
   void add_stiffness_of(int rigid, const BodyPose& pose, ContactWorkspace& workspace,
                         Eigen::MatrixXd& stiffness) const noexcept;
 
-  VertexArray rest_;  // k x 3, X
-  Eigen::Index modes_ = 0;
-  AlignedArray rows_;      // of the basis, 3k x padded(r)
+  VertexArray rest_;       // k x 3, X
+  VertexRows rows_;        // of the basis
   Eigen::VectorXd areas_;  // k
   std::vector<int> data_indices_, object_vertices_;
   DeformationTree tree_;

@@ -1,9 +1,13 @@
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <iterator>
 #include <limits>
+#include <vector>
 
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/contact/nearest_on_triangle.h"
@@ -74,8 +78,10 @@ TEST(TriangleKernels, DistancesAreThoseOfOneTriangleAtATime) {
     const Eigen::Vector3d point = query(triangles, trial);
     for (const Kernels* kernels : available()) {
       std::array<double, kLanes> squared;
-      kernels->triangle_distances(packed.data(), point.data(), squared.data());
+      constexpr double kLimit = 2;
+      const unsigned near = kernels->triangle_distances(packed.data(), point.data(), kLimit, squared.data());
       for (int t = 0; t < kLanes; ++t) {
+        EXPECT_EQ((near >> t & 1U) != 0, squared[static_cast<std::size_t>(t)] <= kLimit) << kernels->name;
         const double expected = triangles.squared_distance(point, t);
         const double away = (point - triangles.corner(0).col(t)).squaredNorm();
         const double found = squared[static_cast<std::size_t>(t)];
@@ -96,22 +102,138 @@ TEST(TriangleKernels, WhatHasNotComeNearIsFar) {
     const Eigen::Vector3d point = query(triangles, trial), rest_point = test::random_vector(3, 5000 + trial);
     for (const Kernels* kernels : available()) {
       std::array<double, kLanes> squared;
-      kernels->approached_triangles(packed.data(), point.data(), rest.data(), rest_point.data(), kShare,
-                                    squared.data());
+      constexpr double kLimit = 3;
+      const unsigned found = kernels->approached_triangles(packed.data(), point.data(), rest.data(), rest_point.data(),
+                                                           kShare, kLimit, squared.data());
       for (int t = 0; t < Triangles::kWithArea; ++t) {  // without an area the nearest point at rest is not the only one
         const TrianglePoint expected = triangles.nearest(point, t);
         Eigen::Vector3d there = Eigen::Vector3d::Zero();
         for (int c = 0; c < 3; ++c) there += expected.barycentric[c] * at_rest.corner(c).col(t);
         const double limit = kShare * (rest_point - there).squaredNorm();
         if (std::abs(expected.squared_distance - limit) < 1e-6 * limit) continue;
-        const double found = squared[static_cast<std::size_t>(t)];
-        EXPECT_EQ(std::isinf(found), expected.squared_distance > limit) << kernels->name << ' ' << trial << ' ' << t;
-        ++(std::isinf(found) ? far : near);
+        const bool is_near = expected.squared_distance <= limit;
+        EXPECT_EQ((found >> t & 1U) != 0, is_near && squared[static_cast<std::size_t>(t)] <= kLimit)
+            << kernels->name << ' ' << trial << ' ' << t;
+        ++(is_near ? near : far);
       }
     }
   }
   EXPECT_GT(near, 500);
   EXPECT_GT(far, 500);
+}
+
+TEST(TriangleKernels, CornersAreGatheredWithABoxAboutThem) {
+  constexpr Eigen::Index kPoints = 30;
+  for (std::uint32_t trial = 0; trial < 20; ++trial) {
+    const Eigen::Matrix3Xd points = test::random_matrix(3, kPoints, trial);
+    std::array<int, 3 * kLanes> vertices;
+    for (std::size_t i = 0; i < vertices.size(); ++i) vertices[i] = static_cast<int>((7 * i + 11 * trial) % kPoints);
+    Eigen::AlignedBox3d expected;
+    for (const int vertex : vertices) expected.extend(points.col(vertex));
+    for (const Kernels* kernels : available()) {
+      AlignedArray corners(9 * kLanes), box(6 * kLanes);
+      kernels->gather_triangles(points.data(), vertices.data(), corners.data(), box.data() + trial % kLanes);
+      for (int c = 0; c < 3; ++c)
+        for (int t = 0; t < kLanes; ++t)
+          for (int axis = 0; axis < 3; ++axis)
+            EXPECT_EQ(corners[(3 * c + axis) * kLanes + t],
+                      points(axis, vertices[static_cast<std::size_t>(c * kLanes + t)]));
+      for (int axis = 0; axis < 3; ++axis) {
+        EXPECT_EQ(box[axis * kLanes + trial % kLanes], expected.min()[axis]) << kernels->name;
+        EXPECT_EQ(box[(3 + axis) * kLanes + trial % kLanes], expected.max()[axis]) << kernels->name;
+      }
+    }
+  }
+}
+
+using Box = Eigen::AlignedBox3d;
+
+Box random_box(double size, std::uint32_t seed) {
+  const Eigen::Vector3d centre = test::random_vector(3, seed),
+                        half = size * test::random_vector(3, seed + 1).cwiseAbs();
+  return {centre - half, centre + half};
+}
+void set_lane(const Box& box, Eigen::Index leaf, AlignedArray& boxes) {
+  for (int axis = 0; axis < 3; ++axis) {
+    boxes[(leaf / kLanes * 6 + axis) * kLanes + leaf % kLanes] = box.min()[axis];
+    boxes[(leaf / kLanes * 6 + 3 + axis) * kLanes + leaf % kLanes] = box.max()[axis];
+  }
+}
+void set_query(const Box& box, double (&numbers)[6]) {
+  for (int axis = 0; axis < 3; ++axis) {
+    numbers[axis] = box.min()[axis];
+    numbers[3 + axis] = box.max()[axis];
+  }
+}
+/// Of any two points of either, by their corners: the distance is convex.
+double farthest(const Box& a, const Box& b) {
+  double most = 0;
+  for (int i = 0; i < 8; ++i)
+    for (int j = 0; j < 8; ++j)
+      most = std::max(most,
+                      (a.corner(static_cast<Box::CornerType>(i)) - b.corner(static_cast<Box::CornerType>(j))).norm());
+  return most;
+}
+
+TEST(TriangleKernels, LeavesThatAreNotFarAreKept) {
+  constexpr Eigen::Index kPanels = 5;
+  int kept_in_all = 0, left_in_all = 0, by_each[3] = {};
+  for (std::uint32_t trial = 0; trial < 200; ++trial) {
+    AlignedArray places(kPanels * 6 * kLanes), velocities(places.size()), rest(places.size());
+    const auto box_of = [&](Eigen::Index leaf, std::uint32_t kind) {
+      return random_box(0.3, 10000 * trial + 10 * static_cast<std::uint32_t>(leaf) + 3 * kind);
+    };
+    const bool moves = trial % 2 == 1;
+    LeafQuery query;
+    const Box own[3] = {box_of(900, 0), box_of(900, 1), box_of(900, 2)};
+    set_query(own[0], query.places);
+    set_query(own[1], query.velocities);
+    set_query(own[2], query.rest);
+    query.radius = 1.1;
+    query.near = 0.3;
+    query.time = 0.4;
+    query.share = 0.5;
+    query.beyond = trial % 3 == 0 ? 0.1 : 0;
+    std::vector<LeafPanel> panels;
+    std::vector<unsigned> expected;
+    for (Eigen::Index panel = 0; panel < kPanels; ++panel) {
+      const unsigned chosen = panel == 2 ? 0xA5 : 0xFF;
+      unsigned kept = 0;
+      for (Eigen::Index lane = 0; lane < kLanes; ++lane) {
+        const Eigen::Index leaf = panel * kLanes + lane;
+        const Box boxes[3] = {box_of(leaf, 0), box_of(leaf, 1), box_of(leaf, 2)};
+        set_lane(boxes[0], leaf, places);
+        set_lane(boxes[1], leaf, velocities);
+        set_lane(boxes[2], leaf, rest);
+        const double gap = boxes[0].exteriorDistance(own[0]);
+        const bool near[3] = {gap <= query.radius, gap < query.share * farthest(boxes[2], own[2]) + query.beyond,
+                              !moves || gap <= query.near + query.time * farthest(boxes[1], own[1])};
+        for (int i = 0; i < 3; ++i) by_each[i] += near[i] ? 0 : 1;
+        if (near[0] && near[1] && near[2] && (chosen >> lane & 1U) != 0) kept |= 1U << lane;
+      }
+      panels.push_back({static_cast<int>(panel), chosen});
+      expected.push_back(kept);
+    }
+    for (const Kernels* kernels : available()) {
+      std::vector<LeafPanel> kept(panels.size());
+      const auto count = kernels->near_leaves({places.data(), moves ? velocities.data() : nullptr, rest.data()}, query,
+                                              panels.data(), std::ssize(panels), kept.data());
+      std::vector<unsigned> found(panels.size(), 0);
+      for (std::ptrdiff_t i = 0; i < count; ++i) {
+        EXPECT_NE(kept[static_cast<std::size_t>(i)].lanes, 0U) << kernels->name;
+        found[static_cast<std::size_t>(kept[static_cast<std::size_t>(i)].panel)] =
+            kept[static_cast<std::size_t>(i)].lanes;
+      }
+      EXPECT_EQ(found, expected) << kernels->name << ' ' << trial;
+      for (const unsigned lanes : found) {
+        kept_in_all += std::popcount(lanes);
+        left_in_all += static_cast<int>(kLanes) - std::popcount(lanes);
+      }
+    }
+  }
+  EXPECT_GT(kept_in_all, 1000);
+  EXPECT_GT(left_in_all, 1000);
+  for (const int count : by_each) EXPECT_GT(count, 500);
 }
 
 }  // namespace
