@@ -25,7 +25,6 @@ class SurfaceLeaves {
   /// Of `tree`, whose items are the `triangles`, in full leaves of kLanes; vertices at `rest` [k x 3, m].
   SurfaceLeaves(const VertexArray& rest, const TriangleArray& triangles, const DeformationTree& tree);
 
-  bool empty() const noexcept { return leaves_ == 0; }
   PlacedLeaves make_placed() const;
   /// With vertices at `positions` [k x 3]: boxes, and the corners of all leaves.
   void place(const VertexArray& positions, PlacedLeaves& placed, AlignedArray& corners) const noexcept;
