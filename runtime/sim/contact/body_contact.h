@@ -61,9 +61,7 @@ struct NearVertices {
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
 
-  // Of a body with itself.
-  AlignedArray scratch;  ///< [r]
-  OwnSearch own;
+  OwnSearch own;  ///< of a body with itself: scratch
 };
 
 /// The surface of a body that touches others, and how its vertices look.

@@ -294,9 +294,8 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   double way = time_step * set.tree().movement().of(body.velocity.v);
   const bool is_fast = 2 * kContactMarginSteps * way > kFastMargins * margin;
   if (is_fast) {
-    if (near.scratch.size() == 0) near.scratch = AlignedArray(set.modes());
-    way = time_step * set.fastest(body.velocity.v, near.scratch);
     surface.place(body.pose.q, body.velocity.v, shape);
+    way = time_step * set.fastest(shape.v);
   }
   const double farthest = margin + 2 * kContactMarginSteps * way;
   Gathering gathering{law_, body, body, time_step, farthest, /*anew=*/false, /*own=*/true, held, shape, candidates};
@@ -304,13 +303,14 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   gathering.near = margin + way;
   const auto approach = [&](int vertex) { return touching.vertex_bounds.row(vertex).dot(body.pose.q.cwiseAbs()); };
   const auto test_all = [&](double radius) {
+    const LeafQuery reach{.radius = radius,
+                          .near = gathering.near + gathering.deepest,
+                          .time = kContactMarginSteps * time_step,
+                          .share = kSurelyApproached};
     near.own.place(set, surface, touching.places, shape);
     near.own.search(
-        set, surface, shape, {radius, 0, gathering.near + gathering.deepest, kContactMarginSteps * time_step},
-        [&](int vertex) { return approach(vertex) >= 1; },
-        [&](const OwnSearch::Found& found) {
-          gathering.test_own(found.vertex, found.point, found.velocity, found.leaves);
-        });
+        set, surface, shape, reach, [&](int vertex) { return approach(vertex) >= 1; },
+        [&](const OwnSearch::Found& found) { gathering.test_own(found); });
   };
   const auto find = [&](double radius, double farther) {
     // Until the next search either moves by half of that at most.
@@ -330,8 +330,11 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
       near.found.push_back({found.vertex, distance});
       if (distance <= radius) gathering.test_own(found);
     };
-    const double infinity = std::numeric_limits<double>::infinity();
-    near.own.search(set, surface, shape, {farther, near.farther, infinity, 0}, wanted, look);
+    const LeafQuery reach{.radius = farther,
+                          .near = std::numeric_limits<double>::infinity(),
+                          .share = kSurelyApproached,
+                          .beyond = near.farther};
+    near.own.search(set, surface, shape, reach, wanted, look);
   };
   gather_from(gathering, near, test_all, find);
 }

@@ -19,11 +19,9 @@ namespace {
 
 constexpr double kNearlyApproached = (1 + 1e-5) * kApproached;  // but for the rounding of where the nearest point is
 constexpr int kLeafTriangles = kLanes;
-constexpr Eigen::Index kCornerNumbers = SurfaceLeaves::kCornerNumbers;
 constexpr int kBlockTriangles = 64;  // whose vertices are moved together
 constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
 constexpr double kSameWay = 0.5;     // cosine
-constexpr double kSurely = 1 + 1e-9;
 
 /// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them,
 /// and how it bounds the triangles of a leaf.
@@ -39,15 +37,10 @@ template <class Accepts, class Excludes, class ExcludesTriangle, class BoundTria
 SearchFilter(Accepts, Excludes, ExcludesTriangle, BoundTriangles)
     -> SearchFilter<Accepts, Excludes, ExcludesTriangle, BoundTriangles>;
 
-/// Where those of the leaf are that begins with a triangle: all leaves but the last are full.
-Eigen::Index corners_begin(int first) { return first / kLeafTriangles * kCornerNumbers; }
 /// Of one of the triangles of a leaf.
 Eigen::Vector3d corner_of(const double* corners, int triangle, int corner) {
   const double* x = corners + 3 * corner * kLanes + triangle;
   return {x[0], x[kLanes], x[2 * kLanes]};
-}
-void set_corner(const Eigen::Vector3d& place, int triangle, int corner, double* corners) {
-  for (int axis = 0; axis < 3; ++axis) corners[(3 * corner + axis) * kLanes + triangle] = place[axis];
 }
 
 /// Of the point against what moves as a box of velocities holds [m/s].
@@ -86,6 +79,7 @@ BodySurface::BodySurface(const VertexArray& rest, const RowMatrix& basis, Triang
       neighbours_(neighbours_of(triangles_)),
       fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
       tree_(triangles_, rest_, basis, kLeafTriangles, /*full_leaves=*/true),
+      leaves_(rest_, triangles_, tree_),
       reach_(rest.rows() > 0 ? rest_.rowwise().norm().maxCoeff() : 0) {
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
@@ -94,17 +88,6 @@ BodySurface::BodySurface(const VertexArray& rest, const RowMatrix& basis, Triang
   std::vector<int> next = fan_starts_;
   for (int t = 0; t < triangles_.rows(); ++t)
     for (int c = 0; c < 3; ++c) fans_[static_cast<std::size_t>(next[static_cast<std::size_t>(triangles_(t, c))]++)] = t;
-  rest_corners_ = make_corners();
-  for (int i = 0; i < triangles_.rows(); ++i)
-    for (int c = 0; c < 3; ++c)
-      set_corner(rest_.row(triangles_(tree_.order()[static_cast<std::size_t>(i)], c)), i % kLeafTriangles, c,
-                 rest_corners_.data() + i / kLeafTriangles * kCornerNumbers);
-}
-
-void BodySurface::arrange_leaves() { leaves_ = SurfaceLeaves(rest_, triangles_, tree_); }
-
-AlignedArray BodySurface::make_corners() const {
-  return AlignedArray((triangles_.rows() + kLeafTriangles - 1) / kLeafTriangles * kCornerNumbers);
 }
 
 BodySurface BodySurface::of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
@@ -135,7 +118,6 @@ SurfaceShape BodySurface::make_shape() const {
   shape.boxes.resize(tree_.nodes().size());
   shape.ball_of.assign(tree_.nodes().size(), 0);
   shape.box_of.assign(tree_.nodes().size(), 0);
-  shape.corners = make_corners();
   shape.velocities = VertexArray::Zero(rest_.rows(), 3);
   shape.velocity_boxes.resize(tree_.nodes().size());
   shape.leaves = leaves_.make_placed();
@@ -183,13 +165,11 @@ void BodySurface::place_all(SurfaceShape& shape) const noexcept {
   shape.positions += rest_;
   if (shape.moves) rows_.products_from(0, rest_.rows(), shape.v, shape.velocities.data());
   std::ranges::fill(shape.position_of, shape.placed);
-  leaves_.place(shape.positions, shape.leaves, shape.corners);
-  if (shape.moves) leaves_.set_velocities(shape.velocities, shape.leaves);
+  leaves_.place_all(shape.positions, shape.moves ? &shape.velocities : nullptr, shape.leaves);
 }
 
-std::ptrdiff_t BodySurface::near_leaves(LeafQuery query, const LeafPanel* panels, std::ptrdiff_t count,
+std::ptrdiff_t BodySurface::near_leaves(const LeafQuery& query, const LeafPanel* panels, std::ptrdiff_t count,
                                         const SurfaceShape& shape, LeafPanel* kept) const noexcept {
-  query.share = kSurely * kApproached;
   return leaves_.near(shape.leaves, shape.moves, query, panels, count, kept);
 }
 
@@ -213,17 +193,10 @@ void BodySurface::open_block(int node, SurfaceShape& shape) const noexcept {
       if (shape.moves) velocities = shape.velocity_boxes[one].merged(shape.velocity_boxes[other]);
       continue;
     }
-    box.setEmpty();
-    velocities.setEmpty();
-    double* const corners = shape.corners.data() + corners_begin(branch.first);
     for (int i = branch.first; i < branch.last; ++i)
-      for (int c = 0; c < 3; ++c) {
-        const int vertex = triangles_(tree_.order()[static_cast<std::size_t>(i)], c);
-        const Eigen::Vector3d place = position(vertex, shape);
-        box.extend(place);
-        if (shape.moves) velocities.extend(shape.velocities.row(vertex).transpose());
-        set_corner(place, i - branch.first, c, corners);
-      }
+      for (int c = 0; c < 3; ++c) position(triangles_(tree_.order()[static_cast<std::size_t>(i)], c), shape);
+    box = leaves_.place(branch.first, shape.positions, shape.leaves);
+    if (shape.moves) velocities = leaves_.velocities(branch.first, shape.velocities, shape.leaves);
   }
 }
 
@@ -266,7 +239,7 @@ std::optional<SurfaceHit> BodySurface::search(const Eigen::Vector3d& point, doub
   int found = -1;
   double nearest = radius * radius;
   const auto look_into = [&](int first, int last) {
-    const double* const corners = shape.corners.data() + corners_begin(first);
+    const double* const corners = SurfaceLeaves::corners(first, shape.leaves);
     std::array<double, kLeafTriangles> bounds;
     const double limit = kSurely * nearest;
     unsigned near = 0;
@@ -357,7 +330,7 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
                                   double way, const SurfaceShape& shape, const ClosingPoint* closing,
                                   const Accepts& accepts) const noexcept {
   const auto is_beyond = [way](double squared_distance, double at_rest) {
-    const double near = kSurely * kApproached * at_rest + way;
+    const double near = kSurelyApproached * at_rest + way;
     return squared_distance >= near * near;
   };
   // No point of the branch is farther away at rest than the far side of its ball.
@@ -385,10 +358,10 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
     return way > 0 && is_beyond(bound, std::sqrt(farthest));
   };
   const auto bound_triangles = [&, way, this](int first, double limit, double* bounds) {
-    const double* const corners = shape.corners.data() + corners_begin(first);
+    const double* const corners = SurfaceLeaves::corners(first, shape.leaves);
     if (way > 0) return kernels().triangle_distances(corners, point.data(), limit, bounds);
-    return kernels().approached_triangles(corners, point.data(), rest_corners_.data() + corners_begin(first),
-                                          rest.data(), kNearlyApproached * kNearlyApproached, limit, bounds);
+    return kernels().approached_triangles(corners, point.data(), leaves_.rest_corners(first), rest.data(),
+                                          kNearlyApproached * kNearlyApproached, limit, bounds);
   };
   return SearchFilter{accepts, excludes, excludes_triangle, bound_triangles};
 }

@@ -32,7 +32,9 @@ struct ClosingPoint {
 
 /// Below this share of the size of a triangle normals of the surface say which way is out.
 inline constexpr double kOnTriangle = 1e-9;
-inline constexpr double kApproached = 0.5;  ///< of the distance at rest: what is nearer has come near
+inline constexpr double kApproached = 0.5;   ///< of the distance at rest: what is nearer has come near
+inline constexpr double kSurely = 1 + 1e-9;  ///< times a bound: whatever rounding does
+inline constexpr double kSurelyApproached = kSurely * kApproached;
 
 /// A surface at some q: what was computed of it so far. Sized once by BodySurface::make_shape(); one thread at a time.
 struct SurfaceShape {
@@ -52,8 +54,7 @@ struct SurfaceShape {
   VertexArray velocities;  ///< [m/s]
   std::vector<Eigen::AlignedBox3d> velocity_boxes;
 
-  AlignedArray corners;  ///< of the triangles of leaves within a block, as Kernels::triangle_distances() has them
-  PlacedLeaves leaves;   ///< after place_all()
+  PlacedLeaves leaves;  ///< those within a block; after place_all() all of them
 };
 
 /// The closed surface of a reduced body: signed distances to it as it deforms, in the frame of the body. Only what is
@@ -74,9 +75,6 @@ class BodySurface {
   static BodySurface of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
                              const Eigen::Vector3d& origin);
 
-  /// For place_all(), once.
-  void arrange_leaves();
-
   Eigen::Index modes() const noexcept { return rows_.modes(); }
   Eigen::Index triangles() const noexcept { return triangles_.rows(); }
 
@@ -87,13 +85,13 @@ class BodySurface {
   void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;
   /// Moving with v [r], for ClosingPoint.
   void place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept;
-  /// After place(), of a surface with leaves: the whole of it at once.
+  /// After place(): the whole of it at once.
   void place_all(SurfaceShape& shape) const noexcept;
   /// Those of some leaves, of all_leaves() at first, where parts of the surface may have come near to some points by
-  /// nearest_approached() with a closing point, or approach_distance(): `query` is of the points, but for the share.
-  /// After place_all(). Returns how many panels of them are kept; `kept` has room for `count`.
-  std::ptrdiff_t near_leaves(LeafQuery query, const LeafPanel* panels, std::ptrdiff_t count, const SurfaceShape& shape,
-                             LeafPanel* kept) const noexcept;
+  /// nearest_approached() with a closing point, or approach_distance(), with kSurelyApproached as the share of the
+  /// query. After place_all(). Returns how many panels of them are kept; `kept` has room for `count`.
+  std::ptrdiff_t near_leaves(const LeafQuery& query, const LeafPanel* panels, std::ptrdiff_t count,
+                             const SurfaceShape& shape, LeafPanel* kept) const noexcept;
   const std::vector<LeafPanel>& all_leaves() const noexcept { return leaves_.all(); }
   /// At v in the frame of the body [m/s]; near a search that found something there.
   Eigen::Vector3d velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
@@ -135,7 +133,6 @@ class BodySurface {
   void basis_of(const SurfaceHit& hit, Eigen::Ref<RowMatrix> rows) const noexcept;
 
  private:
-  AlignedArray make_corners() const;
   bool is_block(int node) const noexcept;
   void count_look(SurfaceShape& shape) const noexcept;
   void open_block(int node, SurfaceShape& shape) const noexcept;
@@ -162,8 +159,7 @@ class BodySurface {
   TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
   std::vector<int> fan_starts_, fans_;  // triangles of each vertex
   DeformationTree tree_;                // of the triangles
-  AlignedArray rest_corners_;           // as those of a shape
-  SurfaceLeaves leaves_;                // where they are arranged
+  SurfaceLeaves leaves_;
   double reach_ = 0;
 };
 

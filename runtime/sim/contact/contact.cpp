@@ -85,13 +85,12 @@ double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& veloci
   return time_step * (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.movement().of(velocity.v));
 }
 
-double ContactSet::fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept {
-  std::copy(v.begin(), v.end(), scratch.data());
+double ContactSet::fastest(const AlignedArray& v) const noexcept {
   double square = 0;
   Eigen::Matrix<double, 3, kBatch> products;
   for (int begin = 0; begin < vertices(); begin += kBatch) {
     const int count = std::min(kBatch, static_cast<int>(vertices()) - begin);
-    rows_.products_from(begin, count, scratch, products.data());
+    rows_.products_from(begin, count, v, products.data());
     square = std::max(square, products.leftCols(count).colwise().squaredNorm().maxCoeff());
   }
   return std::sqrt(square);

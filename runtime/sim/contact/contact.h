@@ -108,8 +108,8 @@ class ContactSet {
   /// Bound on how far a vertex goes in `time_step` at this velocity [m].
   double travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept;
 
-  /// Speed of the fastest vertex in the frame of a body that moves with v [r] [m/s]. `scratch` has at least r numbers.
-  double fastest(const Eigen::VectorXd& v, AlignedArray& scratch) const noexcept;
+  /// Speed of the fastest vertex in the frame of a body that moves with v [padded(r)] [m/s].
+  double fastest(const AlignedArray& v) const noexcept;
 
   /// All vertices at q [padded(r)] in the frame of the body [vertices x 3, m]; allocates where `points` is smaller.
   void place(const AlignedArray& q, VertexArray& points) const noexcept;

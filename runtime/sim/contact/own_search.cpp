@@ -50,14 +50,11 @@ std::ptrdiff_t OwnSearch::keep(const BodySurface& surface, const SurfaceShape& s
   return surface.near_leaves(query, panels_.data() + first, count, shape, panels_.data() + end);
 }
 
-void OwnSearch::begin(const ContactSet& set, const BodySurface& surface, const Reach& reach) {
+/// Boxes of all branches, of the chosen vertices alone.
+void OwnSearch::begin(const ContactSet& set, const BodySurface& surface) {
   const std::vector<LeafPanel>& all = surface.all_leaves();
   if (panels_.size() < all.size()) panels_.resize(all.size());
   std::ranges::copy(all, panels_.begin());
-  reach_.radius = reach.radius;
-  reach_.beyond = reach.beyond;
-  reach_.near = reach.near;
-  reach_.time = reach.time;
   const DeformationTree& tree = set.tree();
   queries_.resize(tree.nodes().size());
   has_chosen_.assign(tree.nodes().size(), 0);

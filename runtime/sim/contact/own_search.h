@@ -13,11 +13,6 @@ namespace exmat::runtime {
 /// vertices is gone down with those leaves of the surface that are left for its branches, kLanes leaves at a time.
 class OwnSearch {
  public:
-  /// What is looked for, see LeafQuery.
-  struct Reach {
-    double radius = 0, beyond = 0;
-    double near = 0, time = 0;  ///< of a shape that moves
-  };
   /// A vertex that parts of the surface may have come near to, in the frame of the body.
   struct Found {
     int vertex = 0;
@@ -31,17 +26,19 @@ class OwnSearch {
   void place(const ContactSet& set, const BodySurface& surface, const std::vector<SurfaceHit>& places,
              SurfaceShape& shape);
 
-  /// Calls visit(found) for those of the vertices that `wanted`(vertex) chooses, in ascending order.
+  /// Calls visit(found) for those of the vertices that `wanted`(vertex) chooses, in ascending order. `reach` is without
+  /// boxes.
   template <class Wanted, class Visit>
-  void search(const ContactSet& set, const BodySurface& surface, const SurfaceShape& shape, const Reach& reach,
+  void search(const ContactSet& set, const BodySurface& surface, const SurfaceShape& shape, const LeafQuery& reach,
               const Wanted& wanted, const Visit& visit) {
     for (std::size_t i = 0; i < chosen_.size(); ++i) chosen_[i] = wanted(static_cast<int>(i)) ? 1 : 0;
-    begin(set, surface, reach);
+    reach_ = reach;
+    begin(set, surface);
     descend(set, surface, shape, 0, 0, std::ssize(surface.all_leaves()), visit);
   }
 
  private:
-  void begin(const ContactSet& set, const BodySurface& surface, const Reach& reach);
+  void begin(const ContactSet& set, const BodySurface& surface);
   LeafQuery query_of(const ContactSet& set, int vertex) const noexcept;
   std::ptrdiff_t keep(const BodySurface& surface, const SurfaceShape& shape, const LeafQuery& query,
                       std::ptrdiff_t first, std::ptrdiff_t count);

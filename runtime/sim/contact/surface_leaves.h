@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "common/core/arrays.h"
@@ -9,40 +10,51 @@
 
 namespace exmat::runtime {
 
-/// The leaves of a surface as they are: boxes as LeafBoxes has them.
+/// The leaves of a surface as they are.
 struct PlacedLeaves {
-  AlignedArray places, velocities;
-  AlignedArray scratch;  ///< corners of a leaf
+  AlignedArray corners;             ///< of the triangles of each leaf, as Kernels::triangle_distances() has them
+  AlignedArray places, velocities;  ///< boxes of all leaves, as LeafBoxes has them
+  AlignedArray scratch;             ///< of one leaf
 };
 
-/// The leaves of a surface's tree, kLanes triangles each, side by side: for many looks at the whole surface, where
-/// boxes about all leaves cost less than branches that are opened one by one.
+/// The leaves of a surface's tree, kLanes triangles each, one by one or all side by side: for many looks at the whole
+/// surface boxes about all leaves cost less than branches that are opened one by one. A leaf is told by its first
+/// triangle in the order of the tree.
 class SurfaceLeaves {
  public:
-  static constexpr Eigen::Index kCornerNumbers = 9 * kLanes;  ///< of a leaf, as Kernels::triangle_distances() has them
-
   SurfaceLeaves() = default;
   /// Of `tree`, whose items are the `triangles`, in full leaves of kLanes; vertices at `rest` [k x 3, m].
   SurfaceLeaves(const VertexArray& rest, const TriangleArray& triangles, const DeformationTree& tree);
 
   PlacedLeaves make_placed() const;
-  /// With vertices at `positions` [k x 3]: boxes, and the corners of all leaves.
-  void place(const VertexArray& positions, PlacedLeaves& placed, AlignedArray& corners) const noexcept;
-  /// Boxes of the velocities of the vertices [k x 3].
-  void set_velocities(const VertexArray& velocities, PlacedLeaves& placed) const noexcept;
 
+  const double* rest_corners(int first) const noexcept { return rest_corners_.data() + corners_begin(first); }
+  static const double* corners(int first, const PlacedLeaves& placed) noexcept {
+    return placed.corners.data() + corners_begin(first);
+  }
+
+  /// One of them with its vertices at `positions` [k x 3]: its corners, and the box about it.
+  Eigen::AlignedBox3d place(int first, const VertexArray& positions, PlacedLeaves& placed) const noexcept;
+  /// The box of the velocities [k x 3] of its vertices.
+  Eigen::AlignedBox3d velocities(int first, const VertexArray& velocities, PlacedLeaves& placed) const noexcept;
+
+  /// All of them: corners and boxes; with velocities, not null, their boxes, too.
+  void place_all(const VertexArray& positions, const VertexArray* velocities, PlacedLeaves& placed) const noexcept;
   /// All of them: panel i holds leaves i kLanes and on.
   const std::vector<LeafPanel>& all() const noexcept { return all_; }
-  /// Kernels::near_leaves().
+  /// Kernels::near_leaves(), after place_all(), with velocities where it `moves`.
   std::ptrdiff_t near(const PlacedLeaves& placed, bool moves, const LeafQuery& query, const LeafPanel* panels,
                       std::ptrdiff_t count, LeafPanel* kept) const noexcept;
 
  private:
+  static constexpr Eigen::Index kCornerNumbers = 9 * kLanes;  // of a leaf
+  static constexpr Eigen::Index corners_begin(int first) { return first / kLanes * kCornerNumbers; }
+  Eigen::AlignedBox3d gather(int first, const VertexArray& points, double* corners) const noexcept;
   void set_boxes(const VertexArray& points, double* corners, Eigen::Index next, AlignedArray& boxes) const noexcept;
 
   Eigen::Index leaves_ = 0;
   std::vector<int> vertices_;  // leaves x 3 x kLanes
-  AlignedArray rest_;
+  AlignedArray rest_corners_, rest_boxes_;
   std::vector<LeafPanel> all_;
 };
 

@@ -16,14 +16,9 @@ TouchingSurface::TouchingSurface(const ContactSet& set, BodySurface of, bool mee
     if (meets_itself) places.push_back(hit.value_or(SurfaceHit()));
   }
   if (!meets_itself) return;
-  surface.arrange_leaves();
-  VertexArray rest(set.vertices(), 3);
   RowMatrix basis(3 * set.vertices(), set.modes());
-  for (int i = 0; i < rest.rows(); ++i) {
-    rest.row(i) = set.rest(i);
-    basis.middleRows<3>(3 * i) = set.basis_rows(i);
-  }
-  vertex_bounds = surface.approach_bounds(rest, basis);
+  for (int i = 0; i < set.vertices(); ++i) basis.middleRows<3>(3 * i) = set.basis_rows(i);
+  vertex_bounds = surface.approach_bounds(set.rest(), basis);
   approach_bounds = vertex_bounds.colwise().maxCoeff();
 }
 
