@@ -75,6 +75,19 @@ constexpr std::ptrdiff_t lane_entry(std::ptrdiff_t i, std::ptrdiff_t j) {
   return ((row * (row + 1) / 2 + column) * kLaneBlock * kLaneBlock + i % kLaneBlock * kLaneBlock + j % kLaneBlock) *
          kLanes;
 }
+/// The stiffness of St.Venant-Kirchhoff, K0_ij + C_ijk q_k + 1/2 D_ijkl q_k q_l, C and D symmetric in all indices; of r
+/// <= kMostPolynomialModes.
+struct StiffnessPolynomialArrays {
+  std::ptrdiff_t modes = 0;          ///< r
+  const double* constant = nullptr;  ///< lane_triangle(r) / kLanes, K0_ij at lane_entry(i, j) / kLanes
+  /// For each i the lower triangle of j, k <= i in blocks of kLaneBlock x kLaneBlock by rows, without padding. Of each
+  /// block r + 1 times its numbers by rows, of those on the diagonal the lower triangle: C_ijk, then 1/2 D_ijkl of each
+  /// l.
+  const double* numbers = nullptr;
+  const float* rounded = nullptr;  ///< the same, 1 and 0, 2 and 1 ... of l beside each other, r / 2 + 1 such pairs
+};
+inline constexpr std::ptrdiff_t kMostPolynomialModes = 32;
+
 /// What a step of kLanes bodies keeps: vectors [r] and numbers of each, see StepForm and IncrementalPotential.
 struct LaneForm {
   std::ptrdiff_t modes = 0;
@@ -258,6 +271,9 @@ struct Kernels {
   /// The same but for the rounding of the stiffness to single precision.
   void (*lanes_force_and_mixed_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* energy,
                                           double* force, double* stiffness);
+  /// Stiffness of that polynomial at q [r]; the same but for the rounding of C and D to single precision.
+  void (*lanes_polynomial_stiffness)(const StiffnessPolynomialArrays&, const double* q, double* stiffness);
+  void (*lanes_mixed_polynomial_stiffness)(const StiffnessPolynomialArrays&, const double* q, double* stiffness);
   /// A <- L, L L^T = A; L's diagonal holds 1 / L_ii. A lane whose pivot is not positive holds NaN from there on.
   void (*lanes_cholesky)(double* A, std::ptrdiff_t n);
   void (*lanes_cholesky_solve)(const double* L, std::ptrdiff_t n, double* x);

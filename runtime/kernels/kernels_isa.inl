@@ -413,6 +413,7 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
 
 #include "runtime/kernels/lanes_examples_isa.inl"
 #include "runtime/kernels/lanes_isa.inl"
+#include "runtime/kernels/lanes_polynomial_isa.inl"
 #include "runtime/kernels/lanes_rotation_isa.inl"
 #include "runtime/kernels/lanes_vectors_isa.inl"
 #include "runtime/kernels/rotation_isa.inl"
@@ -451,6 +452,8 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_force,
                                  lanes_force_and_stiffness,
                                  lanes_force_and_mixed_stiffness,
+                                 lanes_polynomial_stiffness,
+                                 lanes_mixed_polynomial_stiffness,
                                  lanes_cholesky,
                                  lanes_cholesky_solve,
                                  lanes_symmetric_product,

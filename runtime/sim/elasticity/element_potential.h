@@ -40,6 +40,10 @@ class ElementPotential {
   Eigen::Index modes() const { return modes_; }
   Eigen::Index elements() const { return elements_; }
   Eigen::Index panels() const { return padded(elements_) / kLanes; }
+  auto gradient() const {  ///< B [9s x r], a view
+    return Eigen::Map<const RowMatrix, Eigen::Unaligned, Eigen::OuterStride<>>(
+        by_element_.data(), 9 * elements_, modes_, Eigen::OuterStride<>(padded(modes_)));
+  }
 
   double energy(const ElementLaw& law, const Eigen::VectorXd& x) const noexcept;
 

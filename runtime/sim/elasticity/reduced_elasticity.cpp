@@ -1,6 +1,11 @@
 #include "runtime/sim/elasticity/reduced_elasticity.h"
 
 namespace exmat::runtime {
+namespace {
+
+constexpr double kMostFlops = 0.7;  // of the elements': below it the polynomial is faster
+
+}  // namespace
 
 std::vector<LameParameters> cubature_lame(const CubatureData& cubature) {
   std::vector<LameParameters> lame;
@@ -20,11 +25,38 @@ WeightedLame::WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::v
 
 ReducedElasticity::ReducedElasticity(MaterialModel material, const RowMatrix& gradient,
                                      const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame)
-    : kind_(law_kind(material)), potential_(gradient), lame_(weighted_volumes, lame) {}
+    : kind_(law_kind(material)), potential_(gradient), lame_(weighted_volumes, lame) {
+  if (material == MaterialModel::kStVenantKirchhoff && modes() <= kMostPolynomialModes &&
+      StiffnessPolynomial::flops(modes()) < kMostFlops * potential_.stiffness_flops())
+    polynomial_ = std::make_shared<LazyStiffnessPolynomial>();
+}
 
 ReducedElasticity::ReducedElasticity(MaterialModel material, const CubatureData& cubature)
     : ReducedElasticity(material, cubature.gradient, cubature.weights.cwiseProduct(cubature.volumes),
                         cubature_lame(cubature)) {}
+
+void ReducedElasticity::prepare_lanes() const {
+  if (!polynomial_) return;
+  const auto count = elements();
+  std::call_once(polynomial_->once, [&] {
+    polynomial_->made.emplace(potential_.gradient(), Eigen::Map<const Eigen::VectorXd>(lame_.mu.data(), count),
+                              Eigen::Map<const Eigen::VectorXd>(lame_.lambda.data(), count));
+  });
+}
+
+void ReducedElasticity::lanes_force_and_stiffness(const double* q, Precision precision, double* energy, double* force,
+                                                  double* stiffness) const noexcept {
+  if (!polynomial_) {
+    potential_.lanes_force_and_stiffness(law(), q, precision, energy, force, stiffness);
+    return;
+  }
+  potential_.lanes_force(law(), q, energy, force);
+  polynomial_->made->evaluate_lanes(q, precision, stiffness);
+}
+
+double ReducedElasticity::lanes_stiffness_flops() const noexcept {
+  return polynomial_ ? StiffnessPolynomial::flops(modes()) : potential_.stiffness_flops();
+}
 
 ElementLaw ReducedElasticity::law() const noexcept {
   ElementLaw law;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <memory>
 #include <vector>
 
 #include "common/core/arrays.h"
@@ -8,6 +9,7 @@
 #include "common/elastic/material_model.h"
 #include "common/model/reduced_model.h"
 #include "runtime/sim/elasticity/element_potential.h"
+#include "runtime/sim/elasticity/stiffness_polynomial.h"
 
 namespace exmat::runtime {
 
@@ -23,7 +25,8 @@ struct WeightedLame {
 };
 
 /// Elasticity of a reduced body by cubature: E(q) = sum_j c_j Psi(I + B_j q), c_j = w_j V_j. docs/step_in_detail.md,
-/// "Internal force". s elements, r coordinates. Immutable; all scratch is the caller's, no call allocates or throws.
+/// "Internal force". s elements, r coordinates. Immutable; all scratch is the caller's, no call but prepare_lanes()
+/// allocates or throws.
 class ReducedElasticity {
  public:
   using Workspace = ElementPotential::Workspace;
@@ -62,16 +65,19 @@ class ReducedElasticity {
     return potential_.force_and_stiffness(law(), q, workspace, force, stiffness);
   }
 
-  /// The same of kLanes bodies side by side (kernels.h): energies [kLanes], q and forces [r x kLanes], stiffness of
-  /// lane_triangle(r) doubles.
+  /// Makes what only bodies side by side take, unless a call has done so; threads may call it at once.
+  void prepare_lanes() const;
+
+  /// After that the same of kLanes bodies side by side (kernels.h): energies [kLanes], q and forces [r x kLanes],
+  /// stiffness of lane_triangle(r) doubles.
   void lanes_energy(const double* q, double* energy) const noexcept { potential_.lanes_energy(law(), q, energy); }
   void lanes_force(const double* q, double* energy, double* force) const noexcept {
     potential_.lanes_force(law(), q, energy, force);
   }
   void lanes_force_and_stiffness(const double* q, Precision precision, double* energy, double* force,
-                                 double* stiffness) const noexcept {
-    potential_.lanes_force_and_stiffness(law(), q, precision, energy, force, stiffness);
-  }
+                                 double* stiffness) const noexcept;
+  /// Floating-point operations of that stiffness, of one body.
+  double lanes_stiffness_flops() const noexcept;
 
  private:
   ElementLaw law() const noexcept;
@@ -79,6 +85,7 @@ class ReducedElasticity {
   ElementLaw::Kind kind_ = ElementLaw::Kind::kStVenantKirchhoff;
   ElementPotential potential_;
   WeightedLame lame_;
+  std::shared_ptr<LazyStiffnessPolynomial> polynomial_;  ///< where it takes less than the elements do; shared by copies
 };
 
 }  // namespace exmat::runtime

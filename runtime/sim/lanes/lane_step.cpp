@@ -86,7 +86,7 @@ class LaneStep {
     return running * of_one;
   }
   double force_flops() const noexcept { return model_.internal_force.force_flops(); }
-  double all_flops() const noexcept { return force_flops() + model_.internal_force.stiffness_flops(); }
+  double all_flops() const noexcept { return force_flops() + elements_.lanes_stiffness_flops(); }
   LaneFrames& frames() const noexcept { return workspace_.frames_; }
   std::span<Workspace> own() const noexcept { return std::span(workspace_.bodies_).first(bodies_.size()); }
   Profile* profile() const noexcept { return workspace_.bodies_.front().profile; }

@@ -18,6 +18,7 @@ bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept 
 LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies)
     : bodies_(bodies, Workspace(model, scene)), frames_(model) {
   if (std::cmp_less(bodies, kFewestLanes)) return;
+  model.internal_force.cubature().prepare_lanes();
   const Eigen::Index modes = model.modes();
   forms_ = LaneForms(modes);
   for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
