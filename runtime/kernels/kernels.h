@@ -170,6 +170,30 @@ struct LeafPanel {
   unsigned lanes = 0;
 };
 
+/// kLanes vertices beside planes that stand, by the law of contact_law.h, whose names these are. Lanes that are not in
+/// use have no stiffness.
+struct alignas(kAlignment) PlaneContactPanel {
+  // Of a step.
+  double rest[3][kLanes] = {};     ///< X, frame of the body [m]
+  double normal[3][kLanes] = {};   ///< n_0
+  double start[3][kLanes] = {};    ///< x_0 [m]
+  double stretch[3][kLanes] = {};  ///< x_0 - anchor, along the plane [m]
+  double distance[kLanes] = {};    ///< of x_0 [m]
+  double stiffness[kLanes] = {};   ///< kappa [N/m]
+  double damping[kLanes] = {};     ///< gamma
+  double share[kLanes] = {};       ///< 1 / (1 + gamma)
+  double friction[kLanes] = {};    ///< mu lambda [N]
+  // Of the last evaluation.
+  double arm[3][kLanes] = {};        ///< x - position [m]
+  double force[3][kLanes] = {};      ///< on the vertex [N]
+  double slip[3][kLanes] = {};       ///< y [m]
+  double normal_force[kLanes] = {};  ///< [N]
+  double gap[kLanes] = {};           ///< [m]
+};
+/// What evaluations add up: force and torque, W, the stiffness of those that touch, and their number.
+inline constexpr std::ptrdiff_t kPlaneSums = 9;
+inline constexpr std::ptrdiff_t kPlaneFactors = 3 * kLanes;
+
 struct Kernels {
   const char* name;
 
@@ -245,6 +269,20 @@ struct Kernels {
   /// Upper triangle, by rows, of squares [stride x stride] += F^T F, F [count x stride] by rows; blocks on the diagonal
   /// are whole.
   void (*add_squares)(const double* factors, std::ptrdiff_t count, std::ptrdiff_t stride, double* squares);
+
+  // Of kLanes vertices beside planes, at a pose [12]: rotation by rows, position. products [3 x kLanes], by vertices:
+  // how far each is from rest, frame of the body.
+
+  /// What they feel; forces in the body's frame, as the products are, into `turned`. sums [kPlaneSums x kLanes] += what
+  /// each adds. Returns a bit for each that has a normal force or friction.
+  unsigned (*plane_contacts)(PlaneContactPanel&, const double* pose, const double* products, double* turned,
+                             double* sums);
+  /// sums [kLanes] += W.
+  void (*plane_potential)(const PlaneContactPanel&, const double* pose, const double* products, double* sums);
+  /// -df/dx of the last evaluation as a sum of squares, see StiffnessFactors. Of each factor: vectors [3], in the frame
+  /// of the body, rigid [6], force and torque, and the lane of its vertex. Returns how many: at most kPlaneFactors.
+  std::ptrdiff_t (*plane_factors)(const PlaneContactPanel&, const double* pose, double* vectors, double* rigid,
+                                  int* lanes);
 
   // Of kLanes triangles: corners [3 x 3 x kLanes], of each corner its x, y and z.
 

@@ -416,6 +416,7 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
 #include "runtime/kernels/lanes_polynomial_isa.inl"
 #include "runtime/kernels/lanes_rotation_isa.inl"
 #include "runtime/kernels/lanes_vectors_isa.inl"
+#include "runtime/kernels/planes_isa.inl"
 #include "runtime/kernels/rotation_isa.inl"
 #include "runtime/kernels/triangles_isa.inl"
 
@@ -444,6 +445,9 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  add_vertex_loads,
                                  vertex_loads,
                                  add_squares,
+                                 plane_contacts,
+                                 plane_potential,
+                                 plane_factors,
                                  triangle_distances,
                                  approached_triangles,
                                  gather_triangles,

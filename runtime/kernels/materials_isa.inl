@@ -16,6 +16,25 @@ inline bool all(IntVec mask) {
   return every;
 }
 
+inline IntVec lane_bits() {
+  IntVec own;
+#pragma GCC unroll 8
+  for (Index i = 0; i < kWidth; ++i) own[i] = 1LL << i;
+  return own;
+}
+
+/// A bit for each lane that is true.
+inline unsigned bits(IntVec mask) {
+  IntVec own = mask & lane_bits();
+#if EXMAT_SIMD_WIDTH == 8
+  own |= __builtin_shufflevector(own, own, 4, 5, 6, 7, 0, 1, 2, 3);
+  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1, 6, 7, 4, 5);
+#elif EXMAT_SIMD_WIDTH == 4
+  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1);
+#endif
+  return static_cast<unsigned>(own[0] | own[1]);
+}
+
 inline Vec square_root(Vec v) {
   alignas(sizeof(Vec)) double lanes[kWidth];
   store(lanes, v);
@@ -36,6 +55,8 @@ inline Vec dot(const Vec* A, const Vec* B, Index size) {
   for (Index i = 1; i < size; ++i) sum += A[i] * B[i];
   return sum;
 }
+
+inline Vec dot3(const Vec* a, const Vec* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
 inline void add_identity(const Vec* H, Vec* F) {
   for (Index i = 0; i < 9; ++i) F[i] = H[i] + (i % 4 == 0 ? 1.0 : 0.0);

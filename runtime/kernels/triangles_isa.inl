@@ -27,7 +27,6 @@ struct TriangleLanes {
   Vec first[3], second[3], away[3];
 };
 
-inline Vec dot3(const Vec* a, const Vec* b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 inline Vec unit_clamp(Vec x) { return select(x < 0.0, zero(), select(x > 1.0, zero() + 1.0, x)); }
 
 /// The nearest points corner + v first + w second: of the three edges, or inside where the foot of the point is there.
@@ -59,24 +58,6 @@ inline Vec nearest_on_triangles(const TriangleLanes& lanes, Vec& v, Vec& w) {
   const Vec on_face = value(foot_v * scale, foot_w * scale);
   take(inside & (on_face < least), foot_v * scale, foot_w * scale, on_face);
   return lanes.squared_distance(v, w) - kTriangleRounding * dot3(lanes.away, lanes.away);
-}
-
-inline IntVec lane_bits() {
-  IntVec own;
-#pragma GCC unroll 8
-  for (Index i = 0; i < kWidth; ++i) own[i] = 1LL << i;
-  return own;
-}
-/// A bit for each lane that is true.
-inline unsigned bits(IntVec mask) {
-  IntVec own = mask & lane_bits();
-#if EXMAT_SIMD_WIDTH == 8
-  own |= __builtin_shufflevector(own, own, 4, 5, 6, 7, 0, 1, 2, 3);
-  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1, 6, 7, 4, 5);
-#elif EXMAT_SIMD_WIDTH == 4
-  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1);
-#endif
-  return static_cast<unsigned>(own[0] | own[1]);
 }
 
 unsigned triangle_distances(const double* corners, const double* point, double limit, double* squared) {
@@ -133,7 +114,8 @@ inline Vec square(Vec v) { return v * v; }
 inline Vec squared_gaps(const double* boxes, const double* own) {
   Vec sum = zero();
   for (Index axis = 0; axis < 3; ++axis) {
-    const Vec above = load(boxes + axis * kLanes) - own[3 + axis], below = own[axis] - load(boxes + (3 + axis) * kLanes);
+    const Vec above = load(boxes + axis * kLanes) - own[3 + axis],
+              below = own[axis] - load(boxes + (3 + axis) * kLanes);
     sum += square(larger(larger(above, below), zero()));
   }
   return sum;
@@ -161,8 +143,8 @@ Index near_leaves(const LeafBoxes& leaves, const LeafQuery& query, const LeafPan
       near &= query.beyond > 0 ? gaps < square(query.share * square_root(at_rest) + query.beyond)
                                : gaps < query.share * query.share * at_rest;
       if (leaves.velocities != nullptr)
-        near &= gaps <= square(query.near + query.time * square_root(squared_spans(leaves.velocities + begin,
-                                                                                    query.velocities)));
+        near &= gaps <= square(query.near +
+                               query.time * square_root(squared_spans(leaves.velocities + begin, query.velocities)));
       lanes |= bits(near) << at;
     }
     lanes &= from.lanes;

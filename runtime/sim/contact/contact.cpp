@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 namespace exmat::runtime {
 namespace {
@@ -53,6 +54,7 @@ ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_c
       clearances(candidates.size()),
       is_left(candidates.size()),
       loaded(candidates.size()),
+      planes(candidates.size()),
       first_q(set.modes()),
       x(set.modes()),
       loads(set.modes()),
@@ -207,11 +209,12 @@ void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time,
   if (tree_.empty()) return;
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     workspace.obstacles[i] = PlacedObstacle(obstacles[i], end_time, time_step);
+  workspace.are_all_planes = NearPlanes::serve(workspace.obstacles);
   const double q_norm = pose.q.norm();
   find_sweeping(pose, workspace);
   if (!body_is_near(pose, margin, workspace)) return;
   set_x(pose.q, workspace);
-  if (!NearPlanes::serve(workspace.obstacles)) return search(pose, q_norm, margin, margin, workspace, nullptr);
+  if (!workspace.are_all_planes) return search(pose, q_norm, margin, margin, workspace, nullptr);
   const NearPlanes::Pose now{pose, pose.q, reach_, tree_.movement()};
   if (!near_planes.knows(workspace.obstacles, now, margin)) {
     if (!near_planes.is_worthwhile()) return search(pose, q_norm, margin, margin, workspace, nullptr);
@@ -240,6 +243,7 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, cons
     if (batch.full()) freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
   }
   freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
+  if (workspace.are_all_planes) workspace.planes.end(workspace.candidate_count);
 }
 
 /// With v in workspace.x; empties the batch.
@@ -248,7 +252,8 @@ void ContactSet::freeze_batch(const BodyPose& pose, const BodyVelocity& velocity
                               ContactWorkspace& workspace) const noexcept {
   set_products(workspace, batch);
   for (int index = 0; index < batch.count; ++index) {
-    ContactCandidate& candidate = workspace.candidates[batch.candidates[static_cast<std::size_t>(index)]];
+    const std::size_t number = batch.candidates[static_cast<std::size_t>(index)];
+    ContactCandidate& candidate = workspace.candidates[number];
     const PlacedObstacle& placed = workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)];
     const Eigen::Vector3d arm = candidate.arm;
     const Eigen::Vector3d point = pose.position + arm;
@@ -257,6 +262,9 @@ void ContactSet::freeze_batch(const BodyPose& pose, const BodyVelocity& velocity
     const Eigen::Vector3d heading = predicted + time_step * (at + expected.at(arm) - velocity.at(arm));
     freeze_contact(placed, find_held(state, next, candidate), {point, predicted, heading}, areas_[candidate.vertex],
                    time_step, candidate);
+    if (workspace.are_all_planes)
+      workspace.planes.set(number, rest(candidate.vertex), placed.plane->distance(candidate.carried),
+                           placed.obstacle->friction, candidate);
   }
   batch.count = 0;
 }
@@ -273,6 +281,23 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
   set_x(pose.q, workspace);
   std::fill_n(workspace.loads.data(), rows_.stride(), 0.0);
   workspace.loaded_count = 0;
+  if (workspace.are_all_planes) {
+    const PlaneContacts::Sums sums =
+        workspace.planes.evaluate({rows_, pose, workspace.x}, way, is_first, workspace.loads);
+    workspace.force = sums.force;
+    workspace.torque = sums.torque;
+    workspace.potential = sums.potential;
+    workspace.stiffness = sums.stiffness;
+    workspace.touching = sums.touching;
+  } else {
+    evaluate_each(pose, way, is_first, workspace);
+  }
+  workspace.generalised = Eigen::Map<const Eigen::VectorXd>(workspace.loads.data(), modes());
+}
+
+/// Candidates one by one; with q in workspace.x.
+void ContactSet::evaluate_each(const BodyPose& pose, double way, bool is_first,
+                               ContactWorkspace& workspace) const noexcept {
   Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     if (workspace.clearances[i] > way) {
@@ -285,7 +310,6 @@ void ContactSet::evaluate(const BodyPose& pose, ContactWorkspace& workspace) con
     if (batch.full()) evaluate_batch(pose, is_first, batch, workspace);
   }
   evaluate_batch(pose, is_first, batch, workspace);
-  workspace.generalised = Eigen::Map<const Eigen::VectorXd>(workspace.loads.data(), modes());
 }
 
 /// With q in workspace.x; empties the batch.
@@ -324,6 +348,7 @@ double ContactSet::potential(const BodyPose& pose, ContactWorkspace& workspace) 
   const double way =
       workspace.has_first ? way_bound(reach_, tree_.movement(), pose, workspace.first, workspace.first_q) : 0;
   set_x(pose.q, workspace);
+  if (workspace.are_all_planes) return workspace.planes.potential({rows_, pose, workspace.x}, way);
   Batch batch;
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     if (workspace.clearances[i] > way) continue;
@@ -347,12 +372,17 @@ double ContactSet::potential_of(const BodyPose& pose, Batch& batch, ContactWorks
   return sum;
 }
 
-double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept {
-  FrictionChange change;
-  for (std::size_t i = 0; i < workspace.loaded_count; ++i) {
-    ContactCandidate& candidate = workspace.candidates[workspace.loaded[i]];
+void ContactSet::refresh_friction(ContactWorkspace& workspace, FrictionChange& change) const noexcept {
+  if (workspace.are_all_planes) return workspace.planes.refresh_friction(change);
+  for (const std::size_t number : std::span(workspace.loaded).first(workspace.loaded_count)) {
+    ContactCandidate& candidate = workspace.candidates[number];
     change.refresh(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
   }
+}
+
+double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept {
+  FrictionChange change;
+  refresh_friction(workspace, change);
   return change.relative();
 }
 
@@ -375,6 +405,14 @@ void ContactSet::add_stiffness_of(int rigid, const BodyPose& pose, ContactWorksp
   const Eigen::Index width = padded(rigid + modes());
   std::fill_n(workspace.squares.data(), width * width, 0.0);
   Batch batch;
+  static_assert(kBatch >= kPlaneFactors);
+  for (std::size_t panel = 0; workspace.are_all_planes && panel < workspace.planes.panels().size(); ++panel) {
+    if (batch.count + kPlaneFactors > kBatch) add_squares(rigid, batch, workspace);
+    const auto begin = static_cast<std::size_t>(batch.count);
+    batch.count +=
+        static_cast<int>(workspace.planes.factors(panel, pose, batch.vectors.col(batch.count).data(),
+                                                  batch.rigid.col(batch.count).data(), batch.vertices.data() + begin));
+  }
   for (std::size_t i = 0; i < workspace.loaded_count; ++i) {
     const ContactCandidate& candidate = workspace.candidates[workspace.loaded[i]];
     const StiffnessFactors factors(candidate);
@@ -407,8 +445,10 @@ void ContactSet::add_reduced_stiffness(const BodyPose& pose, ContactWorkspace& w
   add_stiffness_of(0, pose, workspace, stiffness);
 }
 
-void ContactSet::commit(const BodyPose& pose, const ContactWorkspace& workspace, ContactState& state) const noexcept {
+void ContactSet::commit(const BodyPose& pose, ContactWorkspace& workspace, ContactState& state) const noexcept {
   state.count = 0;
+  if (workspace.are_all_planes)
+    for (std::size_t i = 0; i < workspace.candidate_count; ++i) workspace.planes.take(i, workspace.candidates[i]);
   for (std::size_t i = 0; i < workspace.candidate_count; ++i) {
     const ContactCandidate& candidate = workspace.candidates[i];
     const Eigen::Vector3d point = pose.position + candidate.arm;

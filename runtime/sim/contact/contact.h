@@ -8,6 +8,7 @@
 #include "runtime/kernels/aligned_array.h"
 #include "runtime/sim/contact/contact_law.h"
 #include "runtime/sim/contact/deformation_tree.h"
+#include "runtime/sim/contact/plane_contacts.h"
 #include "runtime/sim/contact/vertex_rows.h"
 #include "runtime/sim/frame/placement.h"
 
@@ -68,6 +69,8 @@ struct ContactWorkspace : ContactSums {
   std::vector<char> is_left;        ///< of each: the last evaluation did not look at it
   std::vector<std::size_t> loaded;  ///< the first loaded_count: those with a normal force or friction in the last one
   std::size_t loaded_count = 0;
+  PlaneContacts planes;         ///< the candidates
+  bool are_all_planes = false;  ///< that stand: what evaluations find is in `planes`, until commit()
 
   // Of the last gather().
   int visited_nodes = 0;
@@ -136,7 +139,9 @@ class ContactSet {
   /// W alone [J]; leaves the last evaluation as it is.
   double potential(const BodyPose& pose, ContactWorkspace& workspace) const noexcept;
 
-  /// Takes lambda from the last evaluation. Returns the largest change of mu lambda over the largest mu lambda.
+  /// Takes lambda from the last evaluation.
+  void refresh_friction(ContactWorkspace& workspace, FrictionChange& change) const noexcept;
+  /// The same. Returns the largest change of mu lambda over the largest mu lambda.
   double refresh_friction(ContactWorkspace& workspace) const noexcept;
 
   /// Adds sum_i J_i^T K_i J_i to the lower triangle of `stiffness` [(6 + r) x (6 + r)], J = [I, -[x - position]x,
@@ -147,8 +152,8 @@ class ContactSet {
   void add_reduced_stiffness(const BodyPose& pose, ContactWorkspace& workspace,
                              Eigen::MatrixXd& stiffness) const noexcept;
 
-  /// Writes the contacts of the last evaluation, anchors moved where they slid.
-  void commit(const BodyPose& pose, const ContactWorkspace& workspace, ContactState& state) const noexcept;
+  /// Writes the contacts of the last evaluation, anchors moved where they slid; the candidates are complete after it.
+  void commit(const BodyPose& pose, ContactWorkspace& workspace, ContactState& state) const noexcept;
 
   // Of one vertex.
 
@@ -173,6 +178,7 @@ class ContactSet {
   void freeze_batch(const BodyPose& pose, const BodyVelocity& velocity, const FrameVelocity& expected, double time_step,
                     const ContactState& state, std::size_t& next, Batch& batch,
                     ContactWorkspace& workspace) const noexcept;
+  void evaluate_each(const BodyPose& pose, double way, bool is_first, ContactWorkspace& workspace) const noexcept;
   void evaluate_batch(const BodyPose& pose, bool is_first, Batch& batch, ContactWorkspace& workspace) const noexcept;
   double potential_of(const BodyPose& pose, Batch& batch, ContactWorkspace& workspace) const noexcept;
   void add_squares(int rigid, Batch& batch, ContactWorkspace& workspace) const noexcept;

@@ -173,8 +173,7 @@ double contact_potential(const ContactCandidate& candidate, double gap, const Ei
 
 void FrictionChange::refresh(double friction, ContactCandidate& candidate) noexcept {
   const double force = friction * candidate.normal_force;
-  change = std::max(change, std::abs(force - candidate.friction_force));
-  largest = std::max({largest, force, candidate.friction_force});
+  add(candidate.friction_force, force);
   candidate.friction_force = force;
 }
 

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -141,6 +143,11 @@ double contact_potential(const PlacedObstacle& placed, const ContactCandidate& c
 struct FrictionChange {
   double change = 0, largest = 0;  ///< of mu lambda [N]
 
+  /// Of one contact.
+  void add(double former, double now) noexcept {
+    change = std::max(change, std::abs(now - former));
+    largest = std::max({largest, now, former});
+  }
   /// Takes lambda of a candidate from its last evaluation.
   void refresh(double friction, ContactCandidate& candidate) noexcept;
   double relative() const noexcept { return largest > 0 ? change / largest : 0; }

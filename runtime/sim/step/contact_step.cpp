@@ -79,7 +79,7 @@ void carry_contacts(const StepScene& scene, const Placement& from, const Placeme
   }
 }
 
-void commit_contacts(const Model& model, bool near, const Workspace& workspace, State& state) noexcept {
+void commit_contacts(const Model& model, bool near, Workspace& workspace, State& state) noexcept {
   if (near)
     model.contact->commit(pose_of(model, state), workspace.near->contact, state.contacts);
   else

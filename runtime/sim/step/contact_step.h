@@ -52,6 +52,6 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
 void carry_contacts(const StepScene& scene, const Placement& from, const Placement& to, State& state) noexcept;
 
 /// What the state, already that of the end of the step, remembers of its contacts.
-void commit_contacts(const Model& model, bool near, const Workspace& workspace, State& state) noexcept;
+void commit_contacts(const Model& model, bool near, Workspace& workspace, State& state) noexcept;
 
 }  // namespace exmat::runtime

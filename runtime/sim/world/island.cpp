@@ -259,11 +259,7 @@ namespace {
 double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
   FrictionChange change;
   for (WorldBody* const own : bodies) {
-    ContactWorkspace& contact = own->near().contact;
-    for (std::size_t i = 0; i < contact.candidate_count; ++i) {
-      ContactCandidate& candidate = contact.candidates[i];
-      change.refresh(contact.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
-    }
+    own->contact().refresh_friction(own->near().contact, change);
   }
   for (PairContact* const pair : pairs) pair->refresh_friction(change);
   return change.relative();
