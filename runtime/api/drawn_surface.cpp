@@ -149,8 +149,8 @@ void DensityField::evaluate(const Eigen::VectorXd& q, float* density) noexcept {
 
 ReadSurface read_surface(const Source& source, bool render) {
   const std::string reason = "a surface is asked for";
-  std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", true, 0, reason}};
-  if (render) groups.push_back({"render", true, 0, reason});
+  std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", true, 0, reason}, {"render", true, 0, reason}};
+  if (!render) groups.pop_back();
   const ReducedModel data = read_bundle(source.bundle, {.groups = groups});
   require_same_bundle(source, data);
   return render ? surface_of_render_mesh(data) : surface_of_object(data);

@@ -188,9 +188,21 @@ def crowds(result):
     return table(("", "bodies", *titles), rows)
 
 
+def over_elements(result, bodies=1000):
+    """How many times as long clamped bodies side by side take as the flops of one by itself, whose stiffness is a sum over elements."""
+    found = []
+    for alone in (name for name in result.best if re.fullmatch("crowd/clamped/r[0-9]+/s[0-9]+/threads1/1", name)):
+        together = alone.removesuffix("/1") + f"/{bodies}"
+        if together in result.best:
+            found.append((by_size(alone), result.microseconds(together) / bodies / result.microseconds(alone) * result.ratio(alone)))
+    return ", ".join(f"{number(ratio)} (r = {size[0]}, s = {size[1]})" for size, ratio in sorted(found))
+
+
 def report_crowds(result):
     return (f"Microseconds of wall clock for a step of one body, the best of {CROWD_REPETITIONS} ({result.name}), four examples, table, 1 ms; each is thrown by\n"
-            "a speed of its own, free ones turn. In parentheses how many times as long as its flops at the DGEMM rate of one thread.\n\n" + crowds(result))
+            "a speed of its own, free ones turn. In parentheses how many times as long as its flops at the DGEMM rate of one thread.\n"
+            "Side by side the stiffness is a polynomial where that has fewer flops, and those are counted. Over the flops of one by itself, a sum over elements, 1,000\n"
+            f"clamped bodies take {over_elements(result)}.\n\n" + crowds(result))
 
 
 def worlds(result):

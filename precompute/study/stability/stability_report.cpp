@@ -204,7 +204,8 @@ std::vector<std::pair<std::string, Json>> record(const StabilityRun& run) {
 
 std::string stability_markdown(const std::vector<StabilityRun>& runs) {
   std::string text = headline(runs) + "\n\n" + markdown(summary(runs)) + "\n" + markdown(limits(runs));
-  if (const Table failures = details(runs, Verdict::kFail); !failures.rows.empty()) text += "\n" + markdown(failures);
+  if (const Table failures = details(runs, Verdict::kFail); !failures.rows.empty())
+    text.append("\n").append(markdown(failures));
   return text;
 }
 
@@ -221,8 +222,9 @@ std::string stability_csv(const std::vector<StabilityRun>& runs) {
     const auto members = record(run);
     std::string names, line;
     for (const auto& [name, value] : members) {
-      names += (names.empty() ? "" : ",") + name;
-      line += (line.empty() ? "" : ",") + (value.is_string() ? csv_quoted(value.get<std::string>()) : value.dump());
+      const char* const between = names.empty() ? "" : ",";
+      names.append(between).append(name);
+      line.append(between).append(value.is_string() ? csv_quoted(value.get<std::string>()) : value.dump());
     }
     if (text.empty()) text = names + '\n';
     text += line + '\n';
