@@ -293,6 +293,10 @@ struct Kernels {
   /// rest, with the triangles at `rest_corners` and the point at `rest_point` [3].
   unsigned (*approached_triangles)(const double* corners, const double* point, const double* rest_corners,
                                    const double* rest_point, double share, double limit, double* squared);
+  /// A bit for each, but for those of which a bound without divisions tells that they are nowhere within `limit`, or
+  /// nowhere below share D^2 + beyond, by squared distances, D at rest.
+  unsigned (*approachable_triangles)(const double* corners, const double* point, const double* rest_corners,
+                                     const double* rest_point, double share, double beyond, double limit);
   /// corners as above of the triangles of `vertices` [3 x kLanes] with places `points` [n x 3, by rows], and `box` [6],
   /// numbers kLanes apart, about all of them.
   void (*gather_triangles)(const double* points, const int* vertices, double* corners, double* box);

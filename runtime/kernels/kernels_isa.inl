@@ -1,6 +1,10 @@
 // The kernels for one instruction set. The including file defines EXMAT_SIMD_WIDTH, doubles in a register (2, 4 or 8),
 // EXMAT_SIMD_NAME and EXMAT_SIMD_KERNELS, the name of the table to define.
 
+#if EXMAT_SIMD_WIDTH > 2
+#include <immintrin.h>
+#endif
+
 #include <type_traits>
 #include <utility>
 
@@ -450,6 +454,7 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  plane_factors,
                                  triangle_distances,
                                  approached_triangles,
+                                 approachable_triangles,
                                  gather_triangles,
                                  near_leaves,
                                  lanes_energy,

@@ -9,31 +9,20 @@ using IntVec = decltype(Vec{} > Vec{});
 
 inline Vec select(IntVec mask, Vec yes, Vec no) { return mask ? yes : no; }
 inline Vec larger(Vec a, Vec b) { return select(a > b, a, b); }
-
-inline bool all(IntVec mask) {
-  bool every = true;
-  for (Index i = 0; i < kWidth; ++i) every = every && mask[i] != 0;
-  return every;
-}
-
-inline IntVec lane_bits() {
-  IntVec own;
-#pragma GCC unroll 8
-  for (Index i = 0; i < kWidth; ++i) own[i] = 1LL << i;
-  return own;
-}
+inline Vec smaller(Vec a, Vec b) { return select(a < b, a, b); }
 
 /// A bit for each lane that is true.
 inline unsigned bits(IntVec mask) {
-  IntVec own = mask & lane_bits();
 #if EXMAT_SIMD_WIDTH == 8
-  own |= __builtin_shufflevector(own, own, 4, 5, 6, 7, 0, 1, 2, 3);
-  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1, 6, 7, 4, 5);
+  return _mm512_movepi64_mask(reinterpret_cast<__m512i>(mask));
 #elif EXMAT_SIMD_WIDTH == 4
-  own |= __builtin_shufflevector(own, own, 2, 3, 0, 1);
+  return static_cast<unsigned>(_mm256_movemask_pd(reinterpret_cast<__m256d>(mask)));
+#else
+  return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
 #endif
-  return static_cast<unsigned>(own[0] | own[1]);
 }
+
+inline bool all(IntVec mask) { return bits(mask) == (1U << kWidth) - 1; }
 
 inline Vec square_root(Vec v) {
   alignas(sizeof(Vec)) double lanes[kWidth];

@@ -28,8 +28,10 @@ inline void store3(const Vec* v, Index at, double (*numbers)[kLanes]) {
 
 /// Of vectors by vertices, from `vectors` on.
 inline void gather3(const double* vectors, Vec* v) {
-  for (Index i = 0; i < 3; ++i)
+  for (Index i = 0; i < 3; ++i) {
+    v[i] = zero();
     for (Index lane = 0; lane < kWidth; ++lane) v[i][lane] = vectors[3 * lane + i];
+  }
 }
 
 inline void scatter3(const Vec* v, double* vectors) {

@@ -84,6 +84,31 @@ unsigned approached_triangles(const double* corners, const double* point, const 
   return near;
 }
 
+unsigned approachable_triangles(const double* corners, const double* point, const double* rest_corners,
+                                const double* rest_point, double share, double beyond, double limit) {
+  unsigned near = 0;
+  for (Index at = 0; at < kLanes; at += kWidth) {
+    Vec now[3][3], at_rest[3][3];
+    for (Index corner = 0; corner < 3; ++corner)
+      for (Index axis = 0; axis < 3; ++axis) {
+        const Index begin = (3 * corner + axis) * kLanes + at;
+        now[corner][axis] = load(corners + begin) - point[axis];
+        at_rest[corner][axis] = load(rest_corners + begin) - rest_point[axis];
+      }
+    // Squared distances are quadratic over a triangle: nowhere below the least coefficient in Bernstein's basis.
+    Vec distance = dot3(now[0], now[0]);
+    Vec approach = distance - share * dot3(at_rest[0], at_rest[0]);
+    for (Index i = 1; i < 3; ++i)
+      for (Index j = 0; j <= i; ++j) {
+        const Vec coefficient = dot3(now[i], now[j]);
+        distance = smaller(distance, coefficient);
+        approach = smaller(approach, coefficient - share * dot3(at_rest[i], at_rest[j]));
+      }
+    near |= bits((distance <= limit) & (approach < beyond)) << at;
+  }
+  return near;
+}
+
 void gather_triangles(const double* points, const int* vertices, double* corners, double* box) {
   for (Index corner = 0; corner < 3; ++corner)
     for (Index lane = 0; lane < kLanes; ++lane) {
@@ -142,7 +167,7 @@ Index near_leaves(const LeafBoxes& leaves, const LeafQuery& query, const LeafPan
       const Vec at_rest = squared_spans(leaves.rest + begin, query.rest);
       near &= query.beyond > 0 ? gaps < square(query.share * square_root(at_rest) + query.beyond)
                                : gaps < query.share * query.share * at_rest;
-      if (leaves.velocities != nullptr)
+      if (leaves.velocities != nullptr && bits(near) != 0)
         near &= gaps <= square(query.near +
                                query.time * square_root(squared_spans(leaves.velocities + begin, query.velocities)));
       lanes |= bits(near) << at;

@@ -139,10 +139,7 @@ struct Gathering {
   }
   void test_own(int vertex) {
     if (a.touching.vertex_bounds.row(vertex).dot(a.pose.q.cwiseAbs()) < 1) return;
-    const SurfaceHit& place = b.touching.places[static_cast<std::size_t>(vertex)];
-    const Eigen::Vector3d velocity =
-        is_fast ? b.touching.surface.velocity_of(place, shape) : Eigen::Vector3d(Eigen::Vector3d::Zero());
-    test_own(vertex, a.set.place(vertex, shape.x), velocity, std::nullopt);
+    test_own(vertex, a.set.place(vertex, shape.x), Eigen::Vector3d::Zero(), std::nullopt);
   }
   void test(int vertex) { own ? test_own(vertex) : test_other(vertex); }
 
@@ -295,7 +292,8 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   const bool is_fast = 2 * kContactMarginSteps * way > kFastMargins * margin;
   if (is_fast) {
     surface.place(body.pose.q, body.velocity.v, shape);
-    way = time_step * set.fastest(shape.v);
+    near.own.place(set, surface, touching.places, shape);
+    way = time_step * surface.fastest(shape);
   }
   const double farthest = margin + 2 * kContactMarginSteps * way;
   Gathering gathering{law_, body, body, time_step, farthest, /*anew=*/false, /*own=*/true, held, shape, candidates};
@@ -307,7 +305,7 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
                           .near = gathering.near + gathering.deepest,
                           .time = kContactMarginSteps * time_step,
                           .share = kSurelyApproached};
-    near.own.place(set, surface, touching.places, shape);
+    if (!is_fast) near.own.place(set, surface, touching.places, shape);
     near.own.search(
         set, surface, shape, reach, [&](int vertex) { return approach(vertex) >= 1; },
         [&](const OwnSearch::Found& found) { gathering.test_own(found); });
@@ -336,6 +334,10 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
                           .beyond = near.farther};
     near.own.search(set, surface, shape, reach, wanted, look);
   };
+  if (is_fast) {  // what may have come near until the next search would be far more than what closes in
+    near.radius = -1;
+    return test_all(farthest + gathering.deepest);
+  }
   gather_from(gathering, near, test_all, find);
 }
 

@@ -19,9 +19,12 @@ namespace {
 
 constexpr double kNearlyApproached = (1 + 1e-5) * kApproached;  // but for the rounding of where the nearest point is
 constexpr int kLeafTriangles = kLanes;
-constexpr int kBlockTriangles = 64;  // whose vertices are moved together
-constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
-constexpr double kSameWay = 0.5;     // cosine
+constexpr int kBlockTriangles = 64;           // whose vertices are moved together
+constexpr Eigen::Index kPlacedVertices = 64;  // whose rows stay in the cache from places to velocities
+constexpr int kManyLooks = 64;                // a search costs about half a microsecond, all boxes twenty
+constexpr double kSameWay = 0.5;              // cosine
+// (a + b)^2 <= (1 + kWayShare) a^2 + (1 + 1 / kWayShare) b^2, b the way that is left.
+constexpr double kWayShare = 0.3;
 
 /// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them,
 /// and how it bounds the triangles of a leaf.
@@ -161,11 +164,20 @@ Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noe
 }
 
 void BodySurface::place_all(SurfaceShape& shape) const noexcept {
-  rows_.products_from(0, rest_.rows(), shape.x, shape.positions.data());
+  const Eigen::Index count = rest_.rows();
+  for (Eigen::Index first = 0; first < count; first += kPlacedVertices) {
+    const Eigen::Index some = std::min(kPlacedVertices, count - first);
+    const auto from = static_cast<int>(first);
+    rows_.products_from(from, some, shape.x, shape.positions.row(first).data());
+    if (shape.moves) rows_.products_from(from, some, shape.v, shape.velocities.row(first).data());
+  }
   shape.positions += rest_;
-  if (shape.moves) rows_.products_from(0, rest_.rows(), shape.v, shape.velocities.data());
   std::ranges::fill(shape.position_of, shape.placed);
   leaves_.place_all(shape.positions, shape.moves ? &shape.velocities : nullptr, shape.leaves);
+}
+
+double BodySurface::fastest(const SurfaceShape& shape) const noexcept {
+  return shape.velocities.rows() > 0 ? shape.velocities.rowwise().norm().maxCoeff() : 0;
 }
 
 std::ptrdiff_t BodySurface::near_leaves(const LeafQuery& query, const LeafPanel* panels, std::ptrdiff_t count,
@@ -342,14 +354,11 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
     const DeformationTree::Node& branch = tree_.node(node);
     return is_beyond(bound, (rest - branch.centre).norm() + branch.radius);
   };
-  Eigen::Index corner = 0;
-  const bool is_vertex = place.barycentric.maxCoeff(&corner) == 1;
-  const int own = is_vertex ? triangles_(place.triangle, corner) : -1;
+  const int own = vertex_at(place);
   const auto excludes_triangle = [=, &shape, this](int triangle, double bound) {
     double farthest = 0, fastest = 0;
     for (int c = 0; c < 3; ++c) {
       const int vertex = triangles_(triangle, c);
-      if (vertex == own) return true;
       if (way > 0) farthest = std::max(farthest, (rest - rest_.row(vertex).transpose()).squaredNorm());
       if (closing != nullptr)
         fastest = std::max(fastest, (closing->velocity - shape.velocities.row(vertex).transpose()).squaredNorm());
@@ -357,11 +366,24 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
     if (closing != nullptr && is_far(*closing, bound, std::sqrt(fastest))) return true;
     return way > 0 && is_beyond(bound, std::sqrt(farthest));
   };
-  const auto bound_triangles = [&, way, this](int first, double limit, double* bounds) {
+  const double share =
+      way > 0 ? (1 + kWayShare) * kSurelyApproached * kSurelyApproached : kNearlyApproached * kNearlyApproached;
+  const double beyond = (1 + 1 / kWayShare) * kSurely * way * way;
+  // Most triangles that are near are the vertex's own neighbours, which a bound without divisions excludes.
+  const auto bound_triangles = [&, own, way, share, beyond, this](int first, double limit, double* bounds) -> unsigned {
     const double* const corners = SurfaceLeaves::corners(first, shape.leaves);
-    if (way > 0) return kernels().triangle_distances(corners, point.data(), limit, bounds);
-    return kernels().approached_triangles(corners, point.data(), leaves_.rest_corners(first), rest.data(),
-                                          kNearlyApproached * kNearlyApproached, limit, bounds);
+    const double* const rest_corners = leaves_.rest_corners(first);
+    unsigned near =
+        kernels().approachable_triangles(corners, point.data(), rest_corners, rest.data(), share, beyond, limit);
+    for (unsigned lanes = own >= 0 ? near : 0; lanes != 0; lanes &= lanes - 1) {
+      const int index = std::min(first + std::countr_zero(lanes), static_cast<int>(triangles_.rows()) - 1);
+      const auto corners_of = triangles_.row(tree_.order()[static_cast<std::size_t>(index)]);
+      if ((corners_of.array() == own).any()) near &= ~(lanes & -lanes);
+    }
+    if (near == 0) return 0;
+    if (way > 0) return near & kernels().triangle_distances(corners, point.data(), limit, bounds);
+    return near &
+           kernels().approached_triangles(corners, point.data(), rest_corners, rest.data(), share, limit, bounds);
   };
   return SearchFilter{accepts, excludes, excludes_triangle, bound_triangles};
 }
@@ -389,6 +411,11 @@ double BodySurface::approach_distance(const Eigen::Vector3d& point, const Eigen:
   const auto hit =
       search(point, radius, shape, approach_filter(point, rest, place, way, shape, nullptr, accepts), leaves);
   return hit ? std::abs(hit->distance) : std::numeric_limits<double>::infinity();
+}
+
+int BodySurface::vertex_at(const SurfaceHit& hit) const noexcept {
+  Eigen::Index corner = 0;
+  return hit.barycentric.maxCoeff(&corner) == 1 ? triangles_(hit.triangle, corner) : -1;
 }
 
 Eigen::Vector3d BodySurface::velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept {

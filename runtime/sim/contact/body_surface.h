@@ -87,12 +87,16 @@ class BodySurface {
   void place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept;
   /// After place(): the whole of it at once.
   void place_all(SurfaceShape& shape) const noexcept;
+  /// Of a shape that moves, after place_all(): the largest speed of a vertex in the frame of the body [m/s].
+  double fastest(const SurfaceShape& shape) const noexcept;
   /// Those of some leaves, of all_leaves() at first, where parts of the surface may have come near to some points by
   /// nearest_approached() with a closing point, or approach_distance(), with kSurelyApproached as the share of the
   /// query. After place_all(). Returns how many panels of them are kept; `kept` has room for `count`.
   std::ptrdiff_t near_leaves(const LeafQuery& query, const LeafPanel* panels, std::ptrdiff_t count,
                              const SurfaceShape& shape, LeafPanel* kept) const noexcept;
   const std::vector<LeafPanel>& all_leaves() const noexcept { return leaves_.all(); }
+  /// The vertex of the surface that a hit is at, -1 elsewhere.
+  int vertex_at(const SurfaceHit& hit) const noexcept;
   /// At v in the frame of the body [m/s]; near a search that found something there.
   Eigen::Vector3d velocity_of(const SurfaceHit& hit, SurfaceShape& shape) const noexcept;
 

@@ -87,27 +87,10 @@ double ContactSet::travel_bound(const BodyPose& pose, const BodyVelocity& veloci
   return time_step * (velocity.linear.norm() + velocity.angular.norm() * reach + tree_.movement().of(velocity.v));
 }
 
-double ContactSet::fastest(const AlignedArray& v) const noexcept {
-  double square = 0;
-  Eigen::Matrix<double, 3, kBatch> products;
-  for (int begin = 0; begin < vertices(); begin += kBatch) {
-    const int count = std::min(kBatch, static_cast<int>(vertices()) - begin);
-    rows_.products_from(begin, count, v, products.data());
-    square = std::max(square, products.leftCols(count).colwise().squaredNorm().maxCoeff());
-  }
-  return std::sqrt(square);
-}
-
 Eigen::Vector3d ContactSet::place(int vertex, const AlignedArray& q) const noexcept {
   Eigen::RowVector3d moved;
   rows_.products(&vertex, 1, q, moved.data());
   return (moved + rest_.row(vertex)).transpose();
-}
-
-void ContactSet::place(const AlignedArray& q, VertexArray& points) const noexcept {
-  points.resize(vertices(), 3);
-  rows_.products_from(0, vertices(), q, points.data());
-  points += rest_;
 }
 
 bool ContactSet::may_meet(const PlacedObstacle& obstacle, const BodyPose& pose) const noexcept {

@@ -111,12 +111,7 @@ class ContactSet {
   /// Bound on how far a vertex goes in `time_step` at this velocity [m].
   double travel_bound(const BodyPose& pose, const BodyVelocity& velocity, double time_step) const noexcept;
 
-  /// Speed of the fastest vertex in the frame of a body that moves with v [padded(r)] [m/s].
-  double fastest(const AlignedArray& v) const noexcept;
-
-  /// All vertices at q [padded(r)] in the frame of the body [vertices x 3, m]; allocates where `points` is smaller.
-  void place(const AlignedArray& q, VertexArray& points) const noexcept;
-  /// One of them, to the same bits.
+  /// A vertex at q [padded(r)] in the frame of the body [m].
   Eigen::Vector3d place(int vertex, const AlignedArray& q) const noexcept;
 
   /// False only where nothing of a body that stays at this pose touches the obstacle in the step.

@@ -27,12 +27,20 @@ void extend(const LeafQuery& by, LeafQuery& query) {
 void OwnSearch::place(const ContactSet& set, const BodySurface& surface, const std::vector<SurfaceHit>& places,
                       SurfaceShape& shape) {
   surface.place_all(shape);
-  set.place(shape.x, points_);
-  velocities_.setZero(points_.rows(), 3);
-  chosen_.resize(static_cast<std::size_t>(points_.rows()));
-  if (shape.moves)
-    for (int i = 0; i < points_.rows(); ++i)
-      velocities_.row(i) = surface.velocity_of(places[static_cast<std::size_t>(i)], shape);
+  points_.resize(set.vertices(), 3);
+  velocities_.setZero(set.vertices(), 3);
+  chosen_.resize(static_cast<std::size_t>(set.vertices()));
+  for (int i = 0; i < set.vertices(); ++i) {
+    const SurfaceHit& place = places[static_cast<std::size_t>(i)];
+    const int vertex = place.distance == 0 ? surface.vertex_at(place) : -1;
+    if (vertex >= 0) {
+      points_.row(i) = shape.positions.row(vertex);
+      if (shape.moves) velocities_.row(i) = shape.velocities.row(vertex);
+    } else {
+      points_.row(i) = set.place(i, shape.x);
+      if (shape.moves) velocities_.row(i) = surface.velocity_of(place, shape);
+    }
+  }
 }
 
 LeafQuery OwnSearch::query_of(const ContactSet& set, int vertex) const noexcept {

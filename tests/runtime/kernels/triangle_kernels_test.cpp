@@ -122,6 +122,54 @@ TEST(TriangleKernels, WhatHasNotComeNearIsFar) {
   EXPECT_GT(far, 500);
 }
 
+/// No point of what is left out is near, by the points of a grid.
+TEST(TriangleKernels, WhatIsApproachableIsKept) {
+  constexpr double kShare = 0.25, kBeyond = 0.01, kLimit = 3;
+  constexpr int kGrid = 12;
+  int kept = 0, left = 0;
+  for (std::uint32_t trial = 0; trial < 400; ++trial) {
+    const Triangles triangles(10 * trial), at_rest(10 * trial + 5);
+    const AlignedArray packed = triangles.packed(), rest = at_rest.packed();
+    const Eigen::Vector3d point = query(triangles, trial), rest_point = test::random_vector(3, 5000 + trial);
+    unsigned near = 0;
+    for (int t = 0; t < kLanes; ++t)
+      for (int i = 0; i <= kGrid; ++i)
+        for (int j = 0; i + j <= kGrid; ++j) {
+          const auto place = [&](const Triangles& of) -> Eigen::Vector3d {
+            return (i * of.corner(0).col(t) + j * of.corner(1).col(t) + (kGrid - i - j) * of.corner(2).col(t)) / kGrid;
+          };
+          const double squared = (point - place(triangles)).squaredNorm();
+          const double limit = kShare * (rest_point - place(at_rest)).squaredNorm() + kBeyond;
+          if (squared < (1 - kRounding) * std::min(limit, kLimit)) near |= 1U << t;
+        }
+    for (const Kernels* kernels : available()) {
+      const unsigned found = kernels->approachable_triangles(packed.data(), point.data(), rest.data(),
+                                                             rest_point.data(), kShare, kBeyond, kLimit);
+      EXPECT_EQ(near & ~found, 0U) << kernels->name << ' ' << trial;
+      kept += std::popcount(found);
+      left += static_cast<int>(kLanes) - std::popcount(found);
+    }
+  }
+  EXPECT_GT(kept, 500);
+  EXPECT_GT(left, 500);
+}
+
+/// Where a triangle and its point have moved as one rigid body, nothing is.
+TEST(TriangleKernels, NothingOfARigidMotionIsApproachable) {
+  const Triangles at_rest(7);
+  Triangles triangles = at_rest;
+  const Eigen::Matrix3d rotation = Eigen::AngleAxisd(2.5, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix();
+  for (auto& corner : triangles.corners) corner = rotation * corner;
+  const AlignedArray packed = triangles.packed(), rest = at_rest.packed();
+  // d . d' - share D . D' = (1 - share) D . D' > 0: from so far away all corners are in the same direction.
+  const Eigen::Vector3d rest_point = Eigen::Vector3d(4, 5, 6), point = rotation * rest_point;
+  for (const Kernels* kernels : available())
+    EXPECT_EQ(kernels->approachable_triangles(packed.data(), point.data(), rest.data(), rest_point.data(), 0.25, 0,
+                                              std::numeric_limits<double>::infinity()),
+              0U)
+        << kernels->name;
+}
+
 TEST(TriangleKernels, CornersAreGatheredWithABoxAboutThem) {
   constexpr Eigen::Index kPoints = 30;
   for (std::uint32_t trial = 0; trial < 20; ++trial) {
