@@ -5,7 +5,7 @@ Usage: naming.py ROOT BUILD_FOLDER    prints each violation; exit status 1 if th
 
 Most of the time of clang-tidy goes into the headers of Eigen and the library, once for each source. So sources are read together,
 as many in one unit as have no local names in common, with the include folders and definitions of all of them. Of a unit that does
-not compile, the sources with errors are read again apart from the others.
+not compile, the sources with errors, and those whose local names these are about, are read again apart from the others.
 """
 import json
 import os
@@ -70,7 +70,9 @@ def check(root, flags, sources):
         result = subprocess.run(["clang-tidy", "-quiet", f"--checks={CHECKS}", f"--header-filter=^{root}/({'|'.join(FOLDERS)})/.*[.](h|hpp|cpp)$", str(unit),
                                  "--", *flags], capture_output=True, text=True)
     if "[clang-diagnostic-error]" in result.stdout and len(sources) > 1:
-        apart = [source for source in sources if re.search(rf"^{re.escape(str(source))}:.*\[clang-diagnostic-error\]$", result.stdout, re.M)]
+        errors = [line for line in result.stdout.splitlines() if line.endswith("[clang-diagnostic-error]")]
+        clashing = {name for line in errors for name in re.findall(r"'(\w+)'", line)}
+        apart = [source for source in sources if local_names(source) & clashing or any(line.startswith(f"{source}:") for line in errors)]
         if len(apart) in (0, len(sources)):
             apart = sources[:len(sources) // 2]
         return check(root, flags, apart) | check(root, flags, [source for source in sources if source not in apart])
