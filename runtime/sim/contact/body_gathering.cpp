@@ -290,9 +290,10 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   const BodySurface& surface = touching.surface;
   double way = time_step * set.tree().movement().of(body.velocity.v);
   const bool is_fast = 2 * kContactMarginSteps * way > kFastMargins * margin;
+  const auto place_all = [&] { near.own.place(set, surface, touching.places, shape); };
   if (is_fast) {
     surface.place(body.pose.q, body.velocity.v, shape);
-    near.own.place(set, surface, touching.places, shape);
+    place_all();
     way = time_step * surface.fastest(shape);
   }
   const double farthest = margin + 2 * kContactMarginSteps * way;
@@ -300,12 +301,11 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   gathering.is_fast = is_fast;
   gathering.near = margin + way;
   const auto approach = [&](int vertex) { return touching.vertex_bounds.row(vertex).dot(body.pose.q.cwiseAbs()); };
-  const auto test_all = [&](double radius) {
+  const auto test_placed = [&](double radius) {
     const LeafQuery reach{.radius = radius,
                           .near = gathering.near + gathering.deepest,
                           .time = kContactMarginSteps * time_step,
                           .share = kSurelyApproached};
-    if (!is_fast) near.own.place(set, surface, touching.places, shape);
     near.own.search(
         set, surface, shape, reach, [&](int vertex) { return approach(vertex) >= 1; },
         [&](const OwnSearch::Found& found) { gathering.test_own(found); });
@@ -319,7 +319,7 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
       return now >= 1 ||
              now + std::max(set.tree().movement().most(bounds, half), surface.movement().most(bounds, half)) >= 1;
     };
-    near.own.place(set, surface, touching.places, shape);
+    place_all();
     const auto look = [&](const OwnSearch::Found& found) {
       const SurfaceHit& place = touching.places[static_cast<std::size_t>(found.vertex)];
       const double distance = surface.approach_distance(found.point, set.rest(found.vertex), place, farther,
@@ -336,8 +336,12 @@ void BodyContact::gather_own(const TouchingBody& body, double time_step, double 
   };
   if (is_fast) {  // what may have come near until the next search would be far more than what closes in
     near.radius = -1;
-    return test_all(farthest + gathering.deepest);
+    return test_placed(farthest + gathering.deepest);
   }
+  const auto test_all = [&](double radius) {
+    place_all();
+    test_placed(radius);
+  };
   gather_from(gathering, near, test_all, find);
 }
 

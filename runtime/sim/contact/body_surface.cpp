@@ -177,7 +177,7 @@ void BodySurface::place_all(SurfaceShape& shape) const noexcept {
 }
 
 double BodySurface::fastest(const SurfaceShape& shape) const noexcept {
-  return shape.velocities.rows() > 0 ? shape.velocities.rowwise().norm().maxCoeff() : 0;
+  return shape.velocities.rows() > 0 ? std::sqrt(shape.velocities.rowwise().squaredNorm().maxCoeff()) : 0;
 }
 
 std::ptrdiff_t BodySurface::near_leaves(const LeafQuery& query, const LeafPanel* panels, std::ptrdiff_t count,
@@ -376,6 +376,7 @@ auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vec
     unsigned near =
         kernels().approachable_triangles(corners, point.data(), rest_corners, rest.data(), share, beyond, limit);
     for (unsigned lanes = own >= 0 ? near : 0; lanes != 0; lanes &= lanes - 1) {
+      // The last leaf has the last triangle again.
       const int index = std::min(first + std::countr_zero(lanes), static_cast<int>(triangles_.rows()) - 1);
       const auto corners_of = triangles_.row(tree_.order()[static_cast<std::size_t>(index)]);
       if ((corners_of.array() == own).any()) near &= ~(lanes & -lanes);

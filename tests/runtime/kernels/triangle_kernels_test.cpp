@@ -71,6 +71,20 @@ Eigen::Vector3d query(const Triangles& triangles, std::uint32_t trial) {
   return on;
 }
 
+/// Triangles and a point that were elsewhere at rest.
+struct Moved {
+  explicit Moved(std::uint32_t trial)
+      : triangles(10 * trial),
+        at_rest(10 * trial + 5),
+        packed(triangles.packed()),
+        rest(at_rest.packed()),
+        point(query(triangles, trial)),
+        rest_point(test::random_vector(3, 5000 + trial)) {}
+  Triangles triangles, at_rest;
+  AlignedArray packed, rest;
+  Eigen::Vector3d point, rest_point;
+};
+
 TEST(TriangleKernels, DistancesAreThoseOfOneTriangleAtATime) {
   for (std::uint32_t trial = 0; trial < 400; ++trial) {
     const Triangles triangles(10 * trial);
@@ -97,9 +111,8 @@ TEST(TriangleKernels, WhatHasNotComeNearIsFar) {
   constexpr double kShare = 0.25;
   int near = 0, far = 0;
   for (std::uint32_t trial = 0; trial < 400; ++trial) {
-    const Triangles triangles(10 * trial), at_rest(10 * trial + 5);
-    const AlignedArray packed = triangles.packed(), rest = at_rest.packed();
-    const Eigen::Vector3d point = query(triangles, trial), rest_point = test::random_vector(3, 5000 + trial);
+    const Moved moved(trial);
+    const auto& [triangles, at_rest, packed, rest, point, rest_point] = moved;
     for (const Kernels* kernels : available()) {
       std::array<double, kLanes> squared;
       constexpr double kLimit = 3;
@@ -128,9 +141,8 @@ TEST(TriangleKernels, WhatIsApproachableIsKept) {
   constexpr int kGrid = 12;
   int kept = 0, left = 0;
   for (std::uint32_t trial = 0; trial < 400; ++trial) {
-    const Triangles triangles(10 * trial), at_rest(10 * trial + 5);
-    const AlignedArray packed = triangles.packed(), rest = at_rest.packed();
-    const Eigen::Vector3d point = query(triangles, trial), rest_point = test::random_vector(3, 5000 + trial);
+    const Moved moved(trial);
+    const auto& [triangles, at_rest, packed, rest, point, rest_point] = moved;
     unsigned near = 0;
     for (int t = 0; t < kLanes; ++t)
       for (int i = 0; i <= kGrid; ++i)
