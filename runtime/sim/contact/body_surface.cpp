@@ -19,10 +19,9 @@ namespace {
 
 constexpr double kNearlyApproached = (1 + 1e-5) * kApproached;  // but for the rounding of where the nearest point is
 constexpr int kLeafTriangles = kLanes;
-constexpr int kBlockTriangles = 64;           // whose vertices are moved together
-constexpr Eigen::Index kPlacedVertices = 64;  // whose rows stay in the cache from places to velocities
-constexpr int kManyLooks = 64;                // a search costs about half a microsecond, all boxes twenty
-constexpr double kSameWay = 0.5;              // cosine
+constexpr int kBlockTriangles = 64;  // whose vertices are moved together
+constexpr int kManyLooks = 64;       // a search costs about half a microsecond, all boxes twenty
+constexpr double kSameWay = 0.5;     // cosine
 // (a + b)^2 <= (1 + kWayShare) a^2 + (1 + 1 / kWayShare) b^2, b the way that is left.
 constexpr double kWayShare = 0.3;
 
@@ -164,13 +163,8 @@ Eigen::Vector3d BodySurface::position(int vertex, SurfaceShape& shape) const noe
 }
 
 void BodySurface::place_all(SurfaceShape& shape) const noexcept {
-  const Eigen::Index count = rest_.rows();
-  for (Eigen::Index first = 0; first < count; first += kPlacedVertices) {
-    const Eigen::Index some = std::min(kPlacedVertices, count - first);
-    const auto from = static_cast<int>(first);
-    rows_.products_from(from, some, shape.x, shape.positions.row(first).data());
-    if (shape.moves) rows_.products_from(from, some, shape.v, shape.velocities.row(first).data());
-  }
+  rows_.products_of_all(rest_.rows(), shape.x, shape.positions.data(), shape.moves ? &shape.v : nullptr,
+                        shape.velocities.data());
   shape.positions += rest_;
   std::ranges::fill(shape.position_of, shape.placed);
   leaves_.place_all(shape.positions, shape.moves ? &shape.velocities : nullptr, shape.leaves);
