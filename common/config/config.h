@@ -15,8 +15,8 @@ namespace exmat {
 AssetConfig load_asset(const std::filesystem::path& file);
 SceneConfig load_scene(const std::filesystem::path& file);
 
-/// The same of a scene of several bodies; nothing where it is one of one body. load_scene() refuses those of several.
-std::optional<WorldConfig> load_world(const std::filesystem::path& file);
+/// The same of a scene of any number of bodies. load_scene() refuses those that list them.
+WorldConfig load_world(const std::filesystem::path& file);
 
 /// Of the content of an ASSET.json; `file` is for messages, and paths are relative to it. Throws as load_asset.
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
@@ -24,7 +24,13 @@ AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
 /// Likewise of the content of a SCENE.json of one body. Throws as load_scene.
 SceneConfig scene_of(const Json& json, const std::filesystem::path& file);
 /// Likewise, as load_world().
-std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::path& file);
+WorldConfig world_of(const Json& json, const std::filesystem::path& file);
+
+/// A scene of that body alone, in `instances` places.
+WorldConfig world_of(SceneConfig scene);
+
+/// The file that a run writes in place of the scene's, or none.
+void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world);
 
 /// What a scene needs of its bundle.
 Needs needs_of(const SceneConfig& scene);

@@ -76,6 +76,11 @@ HeightFieldConfig read_height_field(const Json& json, const std::filesystem::pat
 
 }  // namespace
 
+MeetingGroup read_meeting(const Json& json) {
+  const MeetingGroup all;
+  return {json.value("group", all.group), json.value("mask", all.mask)};
+}
+
 ObstacleConfig read_obstacle(const Json& json, const std::filesystem::path& file, const std::string& place) {
   const std::string name = shape_name(json, file, place);
   const std::string shape_place = place + "/" + name;
@@ -97,6 +102,7 @@ ObstacleConfig read_obstacle(const Json& json, const std::filesystem::path& file
   obstacle.damping = json.value("damping", obstacle.damping);
   obstacle.friction = json.value("friction", obstacle.friction);
   obstacle.motion = read_motion(member_or(json, "motion", Json::array()), file, place + "/motion");
+  obstacle.meeting = read_meeting(json);
   return obstacle;
 }
 

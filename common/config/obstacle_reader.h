@@ -8,6 +8,9 @@
 
 namespace exmat {
 
+/// Members `group` and `mask`.
+MeetingGroup read_meeting(const Json& json);
+
 /// Throws InputError unless it names exactly one shape.
 ObstacleConfig read_obstacle(const Json& json, const std::filesystem::path& file, const std::string& place);
 

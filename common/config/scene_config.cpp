@@ -115,6 +115,7 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   const Json obstacles = member_or(shared, "obstacles", Json::array());
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     scene.obstacles.push_back(read_obstacle(obstacles[i], file, fmt::format("/obstacles/{}", i)));
+  scene.meeting = read_meeting(own);
   scene.instances = shared.value("instances", scene.instances);
   const Json output = member_or(shared, "output", Json::object());
   if (output.contains("trajectory")) scene.trajectory = resolve_path(file, output["trajectory"]);
@@ -138,21 +139,22 @@ void refuse_members_of_one_body(const Json& json, const std::filesystem::path& f
   if (json.contains("instances"))
     throw InputError(
         {file.string(), "/instances", "no such member beside bodies", "one", "give a body a \"grid\" or \"poses\""});
-  if (json.value("precision", "double") != "double")
-    throw InputError({file.string(), "/precision", "\"double\" beside bodies", "\"mixed\"",
-                      "it is for bodies of a kind that touch nothing, \"instances\""});
-  if (json.contains("sleep"))
-    throw InputError({file.string(), "/sleep", "no such member beside bodies", "one",
-                      "bodies that touch each other do not sleep: drop it"});
-  if (json.contains("output") && json["output"].value("render", false))
-    throw InputError({file.string(), "/output/render", "false beside bodies", "true",
-                      "render meshes are written for scenes of one body"});
 }
 
 void check_name(const std::string& name, const std::filesystem::path& file, const std::string& place) {
   const auto allowed = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) || c == '_' || c == '-'; };
   if (std::ranges::all_of(name, allowed)) return;
   throw InputError({file.string(), place + "/name", "letters, digits, _ and -", fmt::format("\"{}\"", name), ""});
+}
+
+/// Says of each kind whether others of its own, of another kind or parts of itself may touch its bodies.
+void set_meetings(WorldConfig& world) {
+  for (BodiesConfig& own : world.bodies) {
+    const auto is_met_by = [&](const BodiesConfig& other) {
+      return (&other != &own || own.places.size() > 1) && own.scene.meeting.meets(other.scene.meeting);
+    };
+    own.scene.meets_bodies = world.contact.self || std::ranges::any_of(world.bodies, is_met_by);
+  }
 }
 
 std::vector<BodyPlace> read_grid(const Json& grid) {
@@ -186,11 +188,24 @@ SceneConfig scene_of(const Json& json, const std::filesystem::path& file) {
 
 SceneConfig load_scene(const std::filesystem::path& file) { return scene_of(read_json(file), file); }
 
-std::optional<WorldConfig> load_world(const std::filesystem::path& file) { return world_of(read_json(file), file); }
+WorldConfig load_world(const std::filesystem::path& file) { return world_of(read_json(file), file); }
 
-std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::path& file) {
+WorldConfig world_of(SceneConfig scene) {
+  WorldConfig world;
+  world.file = scene.file;
+  world.is_list = false;
+  world.time_step = scene.time_step;
+  world.steps = scene.steps;
+  world.trajectory = scene.trajectory;
+  world.every = scene.every;
+  std::vector<BodyPlace> places(static_cast<std::size_t>(scene.instances));
+  world.bodies.push_back({"", std::move(scene), std::move(places)});
+  return world;
+}
+
+WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   check_scene(json, file);
-  if (!json.contains("bodies")) return std::nullopt;
+  if (!json.contains("bodies")) return world_of(scene_of(json, file));
   refuse_members_of_one_body(json, file);
   WorldConfig world;
   world.file = file;
@@ -202,7 +217,7 @@ std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::pat
     if (std::ranges::find(world.bodies, bodies.name, &BodiesConfig::name) != world.bodies.end())
       throw InputError(
           {file.string(), place + "/name", "each name once", fmt::format("\"{}\" again", bodies.name), ""});
-    bodies.scene.meets_others = bodies.scene.meets_bodies = true;
+    bodies.scene.instances = static_cast<int>(bodies.places.size());
     world.bodies.push_back(std::move(bodies));
   }
   const SceneConfig& shared = world.bodies.front().scene;
@@ -215,7 +230,13 @@ std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::pat
   world.contact.damping = contact.value("damping", world.contact.damping);
   world.contact.friction = contact.value("friction", world.contact.friction);
   world.contact.self = contact.value("self", world.contact.self);
+  set_meetings(world);
   return world;
+}
+
+void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world) {
+  world.trajectory = file;
+  for (BodiesConfig& bodies : world.bodies) bodies.scene.trajectory = file;
 }
 
 Needs needs_of(const SceneConfig& scene) {
@@ -223,7 +244,7 @@ Needs needs_of(const SceneConfig& scene) {
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
               .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
-              .contact = scene.meets_others || !scene.obstacles.empty(),
+              .contact = scene.meets_others || scene.meets_bodies || !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};
   if (scene.examples) needs.energy_reference = scene.examples->energy_reference;

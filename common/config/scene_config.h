@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/model/choices.h"
+#include "common/model/meeting_group.h"
 
 namespace exmat {
 
@@ -114,6 +115,7 @@ struct ObstacleConfig {
   double damping = 0;                  ///< pressure per approach velocity [N s/m^3]
   double friction = 0;                 ///< Coulomb's coefficient
   std::vector<KeyframeConfig> motion;  ///< of the shape's frame; empty: the world
+  MeetingGroup meeting{};
 };
 
 /// An example's pose, scaled.
@@ -152,8 +154,9 @@ struct SceneConfig {
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact
-  bool meets_others = false;  ///< contact with obstacles that a host adds, or with other bodies; no file sets it
-  bool meets_bodies = false;  ///< one of several bodies; no file sets it
+  MeetingGroup meeting;
+  bool meets_others = false;  ///< contact with obstacles and bodies that a host adds; no file sets it
+  bool meets_bodies = false;  ///< other bodies or parts of itself may touch it; no file sets it
   std::string place;          ///< JSON pointer that forces, regions and body are below; empty: the root
   int instances = 1;          ///< bodies that are stepped; the trajectory shows the first
   std::optional<std::filesystem::path> trajectory;
@@ -185,9 +188,11 @@ struct BodiesConfig {
   std::vector<BodyPlace> places;
 };
 
-/// A scene of several bodies that touch each other.
+/// All bodies of a scene. One that names a single bundle has one kind, without a name, in `instances` places: these
+/// touch obstacles and not each other.
 struct WorldConfig {
   std::filesystem::path file;
+  bool is_list = true;       ///< the file lists its bodies; false: it names a single bundle
   double time_step = 0.001;  ///< [s]
   std::int64_t steps = 1000;
   std::vector<BodiesConfig> bodies;

@@ -17,7 +17,7 @@ BODIES, FRAMES, STEPS = 1000, 50, 20
 def main():
     given = shared.arguments(__doc__, "kappa_sweep.png")
     model = exmat.Model(shared.twisted_bar(given.folder), **shared.SETTINGS)
-    world = exmat.World(model, BODIES)
+    world = exmat.Batch(model, BODIES)
     kappa = np.geomspace(1, 1e5, BODIES)
     world.set_example_stiffness(kappa)
     twist = np.empty((FRAMES, BODIES))

@@ -22,7 +22,7 @@ struct FullSpaceScene {
   runtime::NewtonSettings newton{50, 1e-8};
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]
   std::vector<VertexForceConfig> forces;              ///< vertices of the object
-  std::vector<runtime::Obstacle> obstacles;
+  runtime::Obstacles obstacles;
   std::vector<runtime::ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, forces
 };
 

@@ -41,8 +41,7 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
 
 }  // namespace
 
-FullSpaceScene full_space_scene(const SceneConfig& config, std::vector<runtime::Obstacle> obstacles,
-                                const FullSpaceModel& model) {
+FullSpaceScene full_space_scene(const SceneConfig& config, runtime::Obstacles obstacles, const FullSpaceModel& model) {
   require_supported(config, model);
   FullSpaceScene scene;
   scene.time_step = config.time_step;

@@ -81,7 +81,7 @@ SurfaceContacts::SurfaceContacts(const runtime::ContactLaw& law, MovingSurface& 
   for (auto& contact : ordered) contact.vertex = number[static_cast<std::size_t>(contact.vertex)];
   std::ranges::sort(ordered, {}, &runtime::HeldBodyContact::vertex);
   runtime::NearVertices near;
-  contact_.gather(a.touching(), b.touching(), time_step, margin, anew, ordered, b.shape(), near, candidates_);
+  contact_.gather(a.touching(), b.touching(), {time_step, margin, anew, ordered, b.shape(), near}, candidates_);
   for (const runtime::BodyCandidate& candidate : candidates_.all) {
     Place& place = places_.emplace_back();
     place.vertex = a.object_vertex(candidate.vertex);

@@ -22,11 +22,11 @@ bool VertexContacts::sweeps(const runtime::PlacedObstacle& placed, const Eigen::
   return false;
 }
 
-VertexContacts::Step VertexContacts::begin(const std::vector<runtime::Obstacle>& obstacles, double end_time,
-                                           double time_step, const Eigen::VectorXd& u, const Eigen::VectorXd& v,
-                                           double extra, const runtime::ContactState& held) const {
+VertexContacts::Step VertexContacts::begin(const runtime::Obstacles& obstacles, double end_time, double time_step,
+                                           const Eigen::VectorXd& u, const Eigen::VectorXd& v, double extra,
+                                           const runtime::ContactState& held) const {
   Step step;
-  for (const auto& obstacle : obstacles) step.obstacles.emplace_back(obstacle, end_time, time_step);
+  for (const auto& obstacle : obstacles) step.obstacles.emplace_back(*obstacle, end_time, time_step);
   for (auto& placed : step.obstacles) placed.sweeps = placed.obstacle->motion.moves() && sweeps(placed, u);
   double speed = 0;
   for (const Eigen::Index dof : dofs_) speed = std::max(speed, v.segment<3>(dof).norm());

@@ -33,8 +33,8 @@ class VertexContacts {
 
   /// Candidates for a step that begins with u, the velocity v [f] and what `held` remembers: vertices that are within
   /// kContactMarginSteps of the way of the fastest one, and `extra` [m], of an obstacle.
-  Step begin(const std::vector<runtime::Obstacle>& obstacles, double end_time, double time_step,
-             const Eigen::VectorXd& u, const Eigen::VectorXd& v, double extra, const runtime::ContactState& held) const;
+  Step begin(const runtime::Obstacles& obstacles, double end_time, double time_step, const Eigen::VectorXd& u,
+             const Eigen::VectorXd& v, double extra, const runtime::ContactState& held) const;
 
   /// Forces and their stiffness at u.
   void evaluate(const Eigen::VectorXd& u, Step& step) const;

@@ -1,103 +1,32 @@
 #include <algorithm>
-#include <array>
 #include <cinttypes>
-#include <omp.h>
-#include <span>
 #include <utility>
 
-#include "common/core/timer.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
-#include "runtime/api/body_obstacles.h"
 #include "runtime/api/body_steps.h"
-#include "runtime/api/handles.h"
-#include "runtime/api/startable_threads.h"
 #include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
-namespace {
+namespace exmat::runtime {
 
-void advance(exmat_body& body, Workspace& workspace, std::int64_t steps) noexcept {
-  const Timer timer;
-  begin_steps(body);
-  body.profile = {};
-  workspace.profile = body.profiled ? &body.profile : nullptr;
-  while (body.report.steps < steps && !non_finite(body)) {
-    apply_keys(body);
-    add_step(step(body.model(), body.scene, body.state, workspace), workspace, body);
-  }
-  workspace.profile = nullptr;
-  measure_lost_work(body);
-  body.report.seconds = timer.seconds();
-}
-
-void put_to_rest(exmat_body& body) noexcept {
-  const double time = body.state.time;
+void put_to_start(exmat_body& body) noexcept {
   body.state = body.start;  // vectors of the same lengths: no allocation
   body.load.setZero();
   begin_steps(body);
-  keep_host_obstacles(time, body);
   was_put(body);
 }
 
-/// Whether two bodies may step side by side, and each in the scratch of the first.
-bool are_alike(const exmat_body& first, const exmat_body& body) noexcept {
-  return first.source == body.source && !body.profiled &&
-         body.obstacles.size() == body.source->loaded.scene.obstacles.size() &&
-         can_step_side_by_side(body.model(), body.scene);
-}
+}  // namespace exmat::runtime
 
-/// As advance(), for at most kLanes bodies that are alike.
-void advance_side_by_side(std::span<exmat_body* const> bodies, LaneWorkspace& workspace, std::int64_t steps) noexcept {
-  const Timer timer;
-  std::array<LaneBody, kLanes> lanes;
-  std::array<exmat_body*, kLanes> running;
-  std::array<StepReport, kLanes> reports;
-  for (exmat_body* body : bodies) begin_steps(*body);
-  for (std::int64_t n = 0; n < steps; ++n) {
-    std::size_t count = 0;
-    for (exmat_body* body : bodies) {
-      if (non_finite(*body)) continue;
-      apply_keys(*body);
-      lanes[count] = {&body->scene, &body->state};
-      running[count++] = body;
-    }
-    reports.fill({});
-    step_side_by_side(running.front()->model(), {lanes.data(), count}, workspace, {reports.data(), count});
-    for (std::size_t lane = 0; lane < count; ++lane) add_step(reports[lane], workspace.body(lane), *running[lane]);
-  }
-  for (exmat_body* body : bodies) body->report.seconds = timer.seconds() / static_cast<double>(bodies.size());
-}
+namespace {
 
-/// Whether one may step in the scratch of the other.
-bool lends(const exmat_body* lender, const exmat_body& body) noexcept {
-  return lender != nullptr && lender->source == body.source && lender->obstacles.size() == body.obstacles.size();
-}
-
-/// At most kLanes bodies, side by side as far as they follow each other and are alike. `lender` is one whose scratch is
-/// in the cache, or null.
-void advance_group(std::span<exmat_body* const> group, exmat_body*& lender, std::int64_t steps) noexcept {
-  while (!group.empty()) {
-    exmat_body& first = *group.front();
-    std::size_t count = 0;
-    while (count < group.size() && are_alike(first, *group[count])) ++count;
-    std::unique_ptr<LaneWorkspace> workspace;
-    if (std::cmp_greater_equal(count, kFewestLanes))
-      workspace = first.source->lanes->take(first.model(), first.source->loaded.scene);
-    if (workspace) {
-      advance_side_by_side(group.first(count), *workspace, steps);
-      first.source->lanes->give_back(std::move(workspace));
-    } else {
-      count = std::max<std::size_t>(count, 1);
-      for (exmat_body* body : group.first(count)) {
-        if (!lends(lender, *body)) lender = body;
-        advance(*body, lender->workspace, steps);
-      }
-    }
-    group = group.subspan(count);
-  }
+void put_to_rest(exmat_body& body) noexcept {
+  const double time = body.state.time;
+  put_to_start(body);
+  follow_time(body, time);
 }
 
 }  // namespace
@@ -106,27 +35,30 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start
     : source(std::move(its_source)),
       scene(source->loaded.scene),
       start(std::move(its_start)),
-      workspace(model(), scene),
       drawing(VertexPositions::make_workspace(model().modes())),
       force(Eigen::VectorXd::Zero(model().modes())),
       frame_numbers(model().frame->numbers(start.frame).size()) {
   source->loaded.keys.apply_start(model(), scene);
+  Workspace workspace(model(), scene);
   refresh_weights(model(), scene, start, workspace);
   state = start;
-  for (std::size_t i = 0; i < scene.obstacles.size(); ++i) obstacles.push_back({next_obstacle++, false});
-  contacts.prepare(model(), obstacles.size());
 }
+
+exmat_body::~exmat_body() = default;
 
 exmat_status exmat_body_create(const exmat_model* model, exmat_body** body) noexcept {
   EXMAT_REQUIRE(body);
   *body = nullptr;
   EXMAT_REQUIRE(model);
-  return guarded(__func__,
-                 [&] { *body = std::make_unique<exmat_body>(model->source, model->source->loaded.start).release(); });
+  return guarded(__func__, [&] {
+    auto made = std::make_unique<exmat_body>(model->source, model->source->loaded.start);
+    join_own(*made);
+    *body = made.release();
+  });
 }
 
 void exmat_body_destroy(exmat_body* body) noexcept {
-  if (body != nullptr && body->world != nullptr) leave_world(*body);
+  if (body != nullptr && !body->own && body->world != nullptr) leave_world(*body);
   delete body;
 }
 
@@ -154,68 +86,10 @@ exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const dou
   State& state = body->state;
   state.q = state.q_previous = Eigen::Map<const Eigen::VectorXd>(q, modes);
   state.v = state.v_previous = Eigen::Map<const Eigen::VectorXd>(v, modes);
-  state.elastic_energy = body->model().internal_force.energy(state.q, body->workspace.elasticity);
-  follow_frame(body->model(), body->scene, state, body->workspace);
-  refresh_weights(body->model(), body->scene, state, body->workspace);
+  state.elastic_energy = body->model().internal_force.energy(state.q, scratch_of(*body).elasticity);
+  follow_frame(body->model(), body->scene, state, scratch_of(*body));
+  refresh_weights(body->model(), body->scene, state, scratch_of(*body));
   return EXMAT_OK;
-}
-
-exmat_status exmat_body_step(exmat_body* body, std::int64_t steps, exmat_report* report) noexcept {
-  EXMAT_REQUIRE(body);
-  if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
-  if (report != nullptr)
-    if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
-  if (body->world != nullptr)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body is in a world: exmat_world_step() steps it", __func__);
-  if (!acquire(*body)) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps this body", __func__);
-  advance(*body, body->workspace, steps);
-  const bool finite = !non_finite(*body);
-  if (report != nullptr) give(body->report, report->size, report);
-  const exmat_status status = finite ? EXMAT_OK : fail_non_finite(__func__, "body", *body);
-  release(*body);
-  return status;
-}
-
-exmat_status exmat_bodies_step(exmat_body* const* bodies, std::int64_t count, std::int64_t steps,
-                               std::int32_t threads) noexcept {
-  if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
-  if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
-  if (threads < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: threads = %" PRId32 ": expected >= 0", __func__, threads);
-  if (count == 0) return EXMAT_OK;
-  EXMAT_REQUIRE(bodies);
-  const std::span all(bodies, static_cast<std::size_t>(count));
-  const auto null = std::ranges::find(all, nullptr);
-  if (null != all.end()) return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is NULL", __func__, null - all.begin());
-  const auto hosted = std::ranges::find_if(all, [](const exmat_body* body) { return body->world != nullptr; });
-  if (hosted != all.end())
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is in a world: exmat_world_step() steps it", __func__,
-                hosted - all.begin());
-  const auto taken = std::ranges::find_if(all, [](exmat_body* body) { return !acquire(*body); });
-  if (taken != all.end()) {
-    std::for_each(all.begin(), taken, [](exmat_body* body) { release(*body); });
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: bodies[%td] is listed twice, or another thread steps it", __func__,
-                taken - all.begin());
-  }
-  const int wanted = threads > 0 ? threads : omp_get_num_procs();
-  const int used = startable_threads(static_cast<int>(std::min<std::int64_t>(wanted, count)));
-#pragma omp parallel num_threads(used) if (used > 1)
-  {
-    exmat_body* lender = nullptr;  // of this thread: bodies of one model share the scratch that is in its cache
-#pragma omp for schedule(dynamic)
-    for (std::int64_t first = 0; first < count; first += kLanes)
-      advance_group(all.subspan(static_cast<std::size_t>(first),
-                                static_cast<std::size_t>(std::min<std::int64_t>(kLanes, count - first))),
-                    lender, steps);
-  }
-  exmat_status status = EXMAT_OK;
-  const auto failed = std::ranges::find_if(all, [](const exmat_body* body) { return non_finite(*body); });
-  if (failed != all.end()) {
-    char which[40];
-    std::snprintf(which, sizeof which, "bodies[%td]", failed - all.begin());
-    status = fail_non_finite(__func__, which, **failed);
-  }
-  for (exmat_body* body : all) release(*body);
-  return status;
 }
 
 exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report) noexcept {
@@ -329,7 +203,7 @@ exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion)
                       wanted.angular_velocity.allFinite() && std::isfinite(length);
   if (!finite || !(length > 0))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
-  if (!move_body(body->model(), body->scene, wanted, body->state, body->workspace))
+  if (!move_body(body->model(), body->scene, wanted, body->state, scratch_of(*body)))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
   was_put(*body);
   return EXMAT_OK;

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include "runtime/api/arguments.h"
-#include "runtime/api/body_obstacles.h"
 #include "runtime/api/body_steps.h"
 #include "runtime/api/failures.h"
 #include "runtime/api/state_numbers.h"
@@ -93,7 +92,7 @@ std::vector<double> write_state(const exmat_body& body) {
   return writer.take();
 }
 
-void set_state(std::span<const double> numbers, exmat_body& body) {
+void take_state(std::span<const double> numbers, exmat_body& body) {
   const std::size_t least = size_without_contacts(body);
   if (numbers.size() < least || (numbers.size() - least) % kContactNumbers != 0)
     throw InvalidArgument(fmt::format("count = {}: expected {} and {} for each contact: is it of another model?",
@@ -129,11 +128,15 @@ void set_state(std::span<const double> numbers, exmat_body& body) {
     state.sleep.loads = static_cast<std::uint64_t>(reader.count("loads", kMostSteps));
   }
   read_contacts(reader, contacts, body, state.contacts);
-  const double time = body.state.time;
   body.state = state;  // into the arrays that are there: they are handed out
   begin_steps(body);
-  keep_host_obstacles(time, body);
   was_put(body);
+}
+
+void set_state(std::span<const double> numbers, exmat_body& body) {
+  const double time = body.state.time;
+  take_state(numbers, body);
+  follow_time(body, time);
 }
 
 }  // namespace exmat::runtime

@@ -14,8 +14,10 @@ std::size_t state_size(const exmat_body& body);
 /// step, the steps taken, whether the next one begins anew, the number of contacts.
 std::vector<double> write_state(const exmat_body& body);
 
-/// Takes what write_state() wrote of a body of the same model. Throws InvalidArgument, and the body is as it was, where
-/// numbers are none, or of another model.
+/// Takes what write_state() wrote of a body of the same model; in a world with others the time stays the world's.
+/// Throws InvalidArgument, and the body is as it was, where numbers are none, or of another model.
 void set_state(std::span<const double> numbers, exmat_body& body);
+/// The same with its time, which the caller gives to all bodies of the world.
+void take_state(std::span<const double> numbers, exmat_body& body);
 
 }  // namespace exmat::runtime

@@ -11,7 +11,7 @@ void begin_steps(exmat_body& body) noexcept {
   body.contacts.clear();
 }
 
-void add_step(const StepReport& step, const Workspace& workspace, exmat_body& body) noexcept {
+void add_step(const StepReport& step, exmat_body& body) noexcept {
   exmat_report& sum = body.report;
   sum.status |= step.status;
   sum.newton_iterations += step.newton_iterations;
@@ -20,9 +20,7 @@ void add_step(const StepReport& step, const Workspace& workspace, exmat_body& bo
   sum.projections += step.projections;
   sum.target_iterations += step.target_iterations;
   sum.residual = step.residual;
-  if ((step.status & kStepNonFinite) != 0) return;
-  if ((step.status & kStepAsleep) == 0) body.contacts.add(step, body.model(), body.state, workspace);
-  ++sum.steps;
+  if ((step.status & kStepNonFinite) == 0) ++sum.steps;
 }
 
 exmat_status fail_non_finite(const char* function, const char* which, const exmat_body& body) noexcept {

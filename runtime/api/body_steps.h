@@ -18,8 +18,8 @@ inline void apply_keys(exmat_body& body) noexcept {
   body.source->loaded.keys.apply(body.model(), body.state.step, body.scene);
 }
 
-/// After each of its steps, which left their sums in `workspace`.
-void add_step(const StepReport& step, const Workspace& workspace, exmat_body& body) noexcept;
+/// After each of its steps.
+void add_step(const StepReport& step, exmat_body& body) noexcept;
 
 /// After the last step of a call: the lost work of a body that has a capacity.
 void measure_lost_work(exmat_body& body) noexcept;

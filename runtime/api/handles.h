@@ -2,7 +2,6 @@
 
 #include <atomic>
 #include <cstdint>
-#include <limits>
 #include <memory>
 #include <vector>
 
@@ -14,12 +13,6 @@
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
-
-/// One of a body's obstacles, as its host knows it.
-struct HostedObstacle {
-  std::int64_t id = 0;
-  bool hosted = false;  ///< added or moved by the host, not by the scene
-};
 
 /// Of no steps, and nothing measured.
 inline exmat_report empty_report() noexcept {
@@ -61,25 +54,26 @@ struct exmat_capacity {
 
 struct exmat_body {
   exmat_body(std::shared_ptr<const exmat::runtime::Source> its_source, exmat::runtime::State its_start);
+  ~exmat_body();
+  exmat_body(const exmat_body&) = delete;
+  exmat_body& operator=(const exmat_body&) = delete;
 
   const exmat::runtime::Model& model() const { return *source->loaded.model; }
   Eigen::Index modes() const { return state.q.size(); }
 
   std::shared_ptr<const exmat::runtime::Source> source;
-  exmat::runtime::StepScene scene;                        ///< the model's, and what was set for this body
-  std::vector<exmat::runtime::HostedObstacle> obstacles;  ///< as in scene.obstacles
-  std::int64_t next_obstacle = 0;
+  exmat::runtime::StepScene scene;         ///< the model's, and what was set for this body
+  std::vector<std::int64_t> obstacle_ids;  ///< in its world, of scene.obstacles
   exmat::runtime::State start, state;
-  exmat::runtime::Workspace workspace;
   exmat::runtime::VertexPositions::Workspace drawing;
   Eigen::VectorXd force;      ///< r
   std::size_t frame_numbers;  ///< of the frame's state
   exmat_report report = exmat::runtime::empty_report();
   exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
-  bool profiled = false;
-  exmat::runtime::Profile profile;  ///< of the last call that stepped it, where it is profiled
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
-  exmat_world* world = nullptr;                                  ///< that it is in
+  exmat_world* world = nullptr;                                  ///< that it is in, always one
+  std::int64_t id = 0;                                           ///< in that
+  std::unique_ptr<exmat_world> own;                              ///< the world, where it is the body's own
   std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< where reports hold lost work
   Eigen::VectorXd load;                                          ///< 3n applied forces, there alone; the body's frame
 };

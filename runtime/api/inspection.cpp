@@ -140,20 +140,3 @@ exmat_status exmat_body_read_target(const exmat_body* body, std::int64_t region,
     std::copy_n(pull.data(), modes, q);
   });
 }
-
-exmat_status exmat_body_set_profiled(exmat_body* body, std::int32_t profiled) noexcept {
-  EXMAT_REQUIRE(body);
-  body->profiled = profiled != 0;
-  return EXMAT_OK;
-}
-
-exmat_status exmat_body_read_profile(const exmat_body* body, exmat_profile* profile) noexcept {
-  EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE(profile);
-  if (const exmat_status status = check_size(__func__, profile->size, kProfileSizes)) return status;
-  const auto of = [&](Stage stage) { return body->profile.seconds[static_cast<std::size_t>(stage)]; };
-  give(exmat_profile{0, of(Stage::kWeights), of(Stage::kTarget), of(Stage::kInternalForce), of(Stage::kSolve),
-                     of(Stage::kContact)},
-       profile->size, profile);
-  return EXMAT_OK;
-}

@@ -3,7 +3,7 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
-#include "runtime/api/handles.h"
+#include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -12,11 +12,10 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-/// Null where the body has none of that number.
-const Obstacle* obstacle_of(const exmat_body& body, std::int64_t id) noexcept {
-  const auto found = std::ranges::find(body.obstacles, id, &HostedObstacle::id);
-  if (found == body.obstacles.end()) return nullptr;
-  return &body.scene.obstacles[static_cast<std::size_t>(found - body.obstacles.begin())];
+/// Null where the world has none of that number.
+const Obstacle* obstacle_of(const exmat_world& world, std::int64_t id) noexcept {
+  const auto found = std::ranges::lower_bound(world.obstacles, id, {}, &exmat_world::HostedObstacle::id);
+  return found != world.obstacles.end() && found->id == id ? found->obstacle.get() : nullptr;
 }
 
 std::int64_t count_of(const Shape& shape) noexcept {
@@ -38,17 +37,17 @@ void write_corners(const Triangles& from, const Eigen::Vector3d& position, const
 
 }  // namespace
 
-std::int64_t exmat_body_obstacle_triangles(const exmat_body* body, std::int64_t id) noexcept {
-  const Obstacle* const obstacle = body != nullptr ? obstacle_of(*body, id) : nullptr;
+std::int64_t exmat_world_obstacle_triangles(const exmat_world* world, std::int64_t id) noexcept {
+  const Obstacle* const obstacle = world != nullptr ? obstacle_of(*world, id) : nullptr;
   return obstacle != nullptr ? count_of(obstacle->shape) : -1;
 }
 
-exmat_status exmat_body_read_obstacle_triangles(const exmat_body* body, std::int64_t id, double* corners,
-                                                std::int64_t coordinates) noexcept {
-  EXMAT_REQUIRE(body);
-  const Obstacle* const obstacle = obstacle_of(*body, id);
+exmat_status exmat_world_read_obstacle_triangles(const exmat_world* world, std::int64_t id, double* corners,
+                                                 std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(world);
+  const Obstacle* const obstacle = obstacle_of(*world, id);
   if (obstacle == nullptr)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such obstacle", __func__, id);
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the world has no such obstacle", __func__, id);
   const std::int64_t count = count_of(obstacle->shape);
   EXMAT_REQUIRE_LENGTH(coordinates, 9 * count);
   if (count == 0) return EXMAT_OK;

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <span>
 
-#include "runtime/api/lane_pool.h"
 #include "runtime/scene/scene_loader.h"
 #include "runtime/sim/step/vertex_positions.h"
 
@@ -14,7 +13,6 @@ namespace exmat::runtime {
 struct Source {
   std::filesystem::path bundle;
   LoadedScene loaded;
-  std::shared_ptr<LanePool> lanes = std::make_shared<LanePool>();  ///< of bodies that step side by side
 };
 
 /// The object of a source at rest and, where asked for, its modal basis. Throws InputError, also where the bundle is no

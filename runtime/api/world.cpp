@@ -5,7 +5,6 @@
 #include "common/config/json_file.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
-#include "runtime/api/body_obstacles.h"
 #include "runtime/api/reading.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/scene/world_loader.h"
@@ -17,29 +16,76 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-/// Its place in its world.
-int place_of(const exmat_body& body) noexcept {
-  const auto is_it = [&](const exmat_world::Member& member) { return member.body.get() == &body; };
-  return static_cast<int>(std::ranges::find_if(body.world->members, is_it) - body.world->members.begin());
-}
-
 const exmat_world::Member* member_of(const exmat_world& world, std::int64_t id) noexcept {
   const auto found = std::ranges::lower_bound(world.members, id, {}, &exmat_world::Member::id);
   return found != world.members.end() && found->id == id ? &*found : nullptr;
 }
 
+ContactLaw contact_law_of(const exmat_contact_law& law) noexcept { return {law.stiffness, law.damping, law.friction}; }
+
+exmat_contact_law default_law() noexcept {
+  const BodyContactConfig defaults;
+  return {sizeof(exmat_contact_law), defaults.stiffness, defaults.damping, defaults.friction, defaults.self ? 1 : 0, 0};
+}
+
+exmat_contact_law own_law() noexcept {
+  exmat_contact_law law = default_law();
+  law.apart = 1;
+  return law;
+}
+
+void require_law(const exmat_contact_law& given) {
+  const auto is_positive = [](double number) { return number > 0 && std::isfinite(number); };
+  if (!is_positive(given.stiffness))
+    throw InvalidArgument(fmt::format("law.stiffness = {:g}: expected a finite number above 0", given.stiffness));
+  for (const auto& [number, name] : {std::pair(given.damping, "damping"), std::pair(given.friction, "friction")})
+    if (number != 0 && !is_positive(number))
+      throw InvalidArgument(fmt::format("law.{} = {:g}: expected a finite number >= 0", name, number));
+  for (const auto& [number, name] : {std::pair(given.self, "self"), std::pair(given.apart, "apart")})
+    if (number != 0 && number != 1) throw InvalidArgument(fmt::format("law.{} = {}: expected 0 or 1", name, number));
+  if (given.self == 1 && given.apart == 1)
+    throw InvalidArgument("law.self = 1: expected 0 with law.apart = 1: bodies apart do not touch themselves");
+}
+
 }  // namespace
+
+exmat_world::exmat_world(const exmat_contact_law& its_law) : law(its_law), world(contact_law_of(its_law)) {}
+
+exmat_world::~exmat_world() {
+  if (is_own) return;
+  for (const Member& member : members) delete member.body;
+}
 
 namespace exmat::runtime {
 
+int place_of(const exmat_body& body) noexcept {
+  const auto& members = body.world->members;
+  return static_cast<int>(std::ranges::lower_bound(members, body.id, {}, &exmat_world::Member::id) - members.begin());
+}
+
+double time_of(const exmat_world& world) noexcept {
+  return world.members.empty() ? 0 : static_cast<double>(world.steps) * world.members.front().body->scene.time_step;
+}
+
 void was_put(exmat_body& body) noexcept {
-  if (body.world == nullptr) return;
   exmat_world& world = *body.world;
-  const int place = place_of(body);
-  world.world.forget(place);
-  const std::int64_t id = world.members[static_cast<std::size_t>(place)].id;
+  world.world.forget(place_of(body));
   std::erase_if(world.contacts,
-                [=](const exmat_body_contact& contact) { return contact.body == id || contact.other == id; });
+                [&](const exmat_body_contact& contact) { return contact.body == body.id || contact.other == body.id; });
+}
+
+void follow_times(exmat_world& world, double time_before) noexcept {
+  for (const exmat_world::Member& member : world.members) world.steps = member.body->state.step;
+  const double now = time_of(world);
+  for (exmat_world::HostedObstacle& hosted : world.obstacles)
+    if (hosted.hosted)
+      hosted.obstacle->motion = RigidMotion::going_on(now, hosted.obstacle->motion.sample(time_before));
+}
+
+void follow_time(exmat_body& body, double time_before) noexcept {
+  if (body.own) return follow_times(*body.own, time_before);
+  body.state.step = body.world->steps;
+  body.state.time = static_cast<double>(body.state.step) * body.scene.time_step;
 }
 
 void leave_world(exmat_body& body) noexcept {
@@ -47,70 +93,50 @@ void leave_world(exmat_body& body) noexcept {
   exmat_world& world = *body.world;
   const int place = place_of(body);
   world.world.remove(place);
-  const auto member = world.members.begin() + place;
-  static_cast<void>(member->body.release());
-  world.members.erase(member);
+  world.members.erase(world.members.begin() + place);
   body.world = nullptr;
-  body.scene.meets_bodies = false;
-}
-
-std::int64_t join(exmat_world& world, const std::shared_ptr<const TouchingSurface>& surface, std::string name,
-                  exmat_body& body) {
-  world.members.reserve(world.members.size() + 1);
-  body.scene.meets_bodies = true;
-  try {
-    size_for_contact(body);
-    world.world.add({&body.model(), &body.scene, surface}, body.state, body.workspace);
-  } catch (...) {
-    body.scene.meets_bodies = false;
-    throw;
-  }
-  body.world = &world;
-  world.members.push_back({world.next_id, std::move(name), std::unique_ptr<exmat_body>(&body)});
-  return world.next_id++;
 }
 
 }  // namespace exmat::runtime
 
 namespace {
 
-ContactLaw law_of(const exmat_contact_law& given) {
-  const auto is_positive = [](double number) { return number > 0 && std::isfinite(number); };
-  if (!is_positive(given.stiffness))
-    throw InvalidArgument(fmt::format("law.stiffness = {:g}: expected a finite number above 0", given.stiffness));
-  for (const auto& [number, name] : {std::pair(given.damping, "damping"), std::pair(given.friction, "friction")})
-    if (number != 0 && !is_positive(number))
-      throw InvalidArgument(fmt::format("law.{} = {:g}: expected a finite number >= 0", name, number));
-  if (given.self != 0 && given.self != 1)
-    throw InvalidArgument(fmt::format("law.self = {}: expected 0 or 1", given.self));
-  return {given.stiffness, given.damping, given.friction};
+/// Adds a body that is in no world. Where it throws, it is in none, and the world is as it was.
+void join(exmat_world& world, const std::shared_ptr<const TouchingSurface>& surface, std::string name,
+          exmat_body& body) {
+  world.members.reserve(world.members.size() + 1);
+  world.world.add({&body.model(), &body.scene, surface}, body.state);
+  world.members.push_back({world.next_id, std::move(name), &body});
+  body.world = &world;
+  body.id = world.next_id++;
+  if (world.members.size() == 1) {
+    world.steps = body.state.step;
+  } else {
+    body.state.step = world.steps;
+    body.state.time = time_of(world);
+  }
+  try {
+    meet_obstacles(body);
+  } catch (...) {
+    leave_world(body);
+    throw;
+  }
 }
 
-exmat_contact_law describe(const ContactLaw& law, bool self) noexcept {
-  return {sizeof(exmat_contact_law), law.stiffness, law.damping, law.friction, self ? 1 : 0, 0};
-}
-
-exmat_contact_law default_law() noexcept {
-  const BodyContactConfig defaults;
-  return describe({defaults.stiffness, defaults.damping, defaults.friction}, defaults.self);
-}
-
-/// The surface of a model's bodies, made once in a world. Reads the bundle.
+/// The surface of a model's bodies, made once in a world. Reads the bundle. Null where bodies are apart.
 std::shared_ptr<const TouchingSurface> surface_of(exmat_world& world, const std::shared_ptr<const Source>& source) {
+  if (world.law.apart == 1) return nullptr;
   if (const auto known = world.surfaces.find(source); known != world.surfaces.end()) return known->second;
   const std::lock_guard lock(reading());
-  auto surface = touching_surface(*source->loaded.model, read_rest(*source, /*basis=*/true), world.self);
+  auto surface = touching_surface(*source->loaded.model, read_rest(*source, /*basis=*/true), world.law.self == 1);
   return world.surfaces.emplace(source, std::move(surface)).first->second;
 }
 
 void check_joins(const exmat_world& world, const exmat_body& body) {
-  if (body.world != nullptr) throw InvalidArgument("the body is in a world already");
-  if (!body.model().contact)
+  if (world.is_own) throw InvalidArgument("world: expected one of exmat_world_create(), found a body's own");
+  if (!body.own) throw InvalidArgument("the body is in a world already");
+  if (world.law.apart == 0 && !body.model().contact)
     throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");
-  if (body.scene.sleep.energy > 0)
-    throw InvalidArgument(
-        fmt::format("the body's model has sleep_energy = {:g}: expected 0, bodies of a world do not sleep",
-                    body.scene.sleep.energy));
   if (world.members.empty()) return;
   const double step = world.members.front().body->scene.time_step;
   if (body.scene.time_step != step)
@@ -118,23 +144,23 @@ void check_joins(const exmat_world& world, const exmat_body& body) {
         fmt::format("the body's time step is {:g} s: expected that of the world, {:g} s", body.scene.time_step, step));
 }
 
-std::unique_ptr<exmat_world> load(const std::optional<WorldConfig>& config, const char* path) {
-  if (!config)
-    throw InputError({path, "/", "a scene of several \"bodies\"", "one of a single \"bundle\"",
-                      "exmat_model_create_from_scene() takes it"});
-  LoadedWorld loaded = load_world_run(*config);
-  const BodyContactConfig& contact = config->contact;
+std::unique_ptr<exmat_world> load(const WorldConfig& config) {
+  LoadedWorld loaded = load_world_run(config);
+  const BodyContactConfig& contact = config.contact;
   auto world =
-      std::make_unique<exmat_world>(ContactLaw{contact.stiffness, contact.damping, contact.friction}, contact.self);
+      std::make_unique<exmat_world>(exmat_contact_law{sizeof(exmat_contact_law), contact.stiffness, contact.damping,
+                                                      contact.friction, contact.self ? 1 : 0, config.is_list ? 0 : 1});
+  take_obstacles(loaded.obstacles, *world);
   std::vector<std::shared_ptr<const Source>> sources;
   for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
     LoadedKind& kind = loaded.kinds[i];
     kind.loaded.data = {};
-    sources.push_back(std::make_shared<Source>(Source{config->bodies[i].scene.bundle, std::move(kind.loaded)}));
-    world->surfaces[sources.back()] = kind.surface;
+    sources.push_back(std::make_shared<Source>(Source{config.bodies[i].scene.bundle, std::move(kind.loaded)}));
+    if (kind.surface) world->surfaces[sources.back()] = kind.surface;
   }
   for (LoadedBody& body : loaded.bodies) {
-    auto made = std::make_unique<exmat_body>(sources[body.kind], std::move(body.start));
+    const std::shared_ptr<const Source>& source = sources[body.kind];
+    auto made = std::make_unique<exmat_body>(source, start_of(source->loaded, body.place));
     join(*world, loaded.kinds[body.kind].surface, std::move(body.name), *made);
     static_cast<void>(made.release());
     world->members.back().kind = static_cast<std::int64_t>(body.kind);
@@ -143,6 +169,18 @@ std::unique_ptr<exmat_world> load(const std::optional<WorldConfig>& config, cons
 }
 
 }  // namespace
+
+namespace exmat::runtime {
+
+void join_own(exmat_body& body) {
+  auto world = std::make_unique<exmat_world>(own_law());
+  world->is_own = true;
+  take_obstacles(body.source->loaded.scene.obstacles, *world);
+  join(*world, nullptr, "", body);
+  body.own = std::move(world);
+}
+
+}  // namespace exmat::runtime
 
 exmat_status exmat_contact_law_default(exmat_contact_law* law, std::size_t size) noexcept {
   EXMAT_REQUIRE(law);
@@ -158,7 +196,8 @@ exmat_status exmat_world_create(const exmat_contact_law* law, exmat_world** worl
     if (const exmat_status status = check_size(__func__, law->size, kContactLawSizes)) return status;
   return guarded(__func__, [&] {
     const exmat_contact_law given = law != nullptr ? *law : default_law();
-    *world = new exmat_world(law_of(given), given.self == 1);
+    require_law(given);
+    *world = new exmat_world(given);
   });
 }
 
@@ -168,30 +207,56 @@ exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world**
   EXMAT_REQUIRE(scene_path);
   return guarded(__func__, [&] {
     const std::lock_guard lock(reading());
-    *world = load(load_world(scene_path), scene_path).release();
+    WorldConfig config = load_world(scene_path);
+    set_trajectory(std::nullopt, config);  // positions are read when they are asked for
+    *world = load(config).release();
   });
 }
 
-exmat_status exmat_world_create_from_text(const char* scene, const char* path, exmat_world** world) noexcept {
+exmat_status exmat_world_create_from_text(const char* scene, const char* path, std::int32_t use_contact,
+                                          exmat_world** world) noexcept {
   EXMAT_REQUIRE(world);
   *world = nullptr;
   EXMAT_REQUIRE(scene);
   EXMAT_REQUIRE(path);
+  if (use_contact != 0 && use_contact != 1)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", __func__, use_contact);
   return guarded(__func__, [&] {
     const std::lock_guard lock(reading());
-    *world = load(world_of(parse_json(scene, path), path), path).release();
+    WorldConfig config = world_of(parse_json(scene, path), path);
+    for (BodiesConfig& bodies : config.bodies) bodies.scene.meets_others = use_contact == 1;
+    set_trajectory(std::nullopt, config);
+    *world = load(config).release();
   });
 }
 
-void exmat_world_destroy(exmat_world* world) noexcept { delete world; }
+void exmat_world_destroy(exmat_world* world) noexcept {
+  if (world != nullptr && !world->is_own) delete world;
+}
+
+exmat_world* exmat_body_world(const exmat_body* body) noexcept { return body != nullptr ? body->world : nullptr; }
+
+exmat_status exmat_world_reset(exmat_world* world) noexcept {
+  EXMAT_REQUIRE(world);
+  const double time = time_of(*world);
+  for (const exmat_world::Member& member : world->members) put_to_start(*member.body);
+  follow_times(*world, time);
+  return EXMAT_OK;
+}
+
+double exmat_world_time(const exmat_world* world) noexcept { return world != nullptr ? time_of(*world) : -1; }
 
 exmat_status exmat_world_set_contact_law(exmat_world* world, const exmat_contact_law* law) noexcept {
   EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(law);
   if (const exmat_status status = check_size(__func__, law->size, kContactLawSizes)) return status;
   return guarded(__func__, [&] {
-    world->law = law_of(*law);
-    world->world.set_law(world->law);
+    exmat_contact_law given = *law;
+    given.self = world->law.self;
+    given.apart = world->law.apart;
+    require_law(given);
+    world->law = given;
+    world->world.set_law(contact_law_of(given));
   });
 }
 
@@ -199,7 +264,7 @@ exmat_status exmat_world_read_contact_law(const exmat_world* world, exmat_contac
   EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(law);
   if (const exmat_status status = check_size(__func__, law->size, kContactLawSizes)) return status;
-  give(describe(world->law, world->self), law->size, law);
+  give(world->law, law->size, law);
   return EXMAT_OK;
 }
 
@@ -210,7 +275,15 @@ exmat_status exmat_world_add_body(exmat_world* world, exmat_body* body, std::int
   EXMAT_REQUIRE(body);
   return guarded(__func__, [&] {
     check_joins(*world, *body);
-    *id = join(*world, surface_of(*world, body->source), "", *body);
+    const auto surface = surface_of(*world, body->source);
+    const std::unique_ptr<exmat_world> own = std::move(body->own);
+    try {
+      join(*world, surface, "", *body);
+    } catch (...) {
+      join_own(*body);
+      throw;
+    }
+    *id = body->id;
   });
 }
 
@@ -220,12 +293,36 @@ exmat_status exmat_world_remove_body(exmat_world* world, std::int64_t id, exmat_
   EXMAT_REQUIRE(world);
   return guarded(__func__, [&] {
     const exmat_world::Member* member = member_of(*world, id);
-    if (member == nullptr) throw InvalidArgument(fmt::format("id = {}: expected that of a body of the world", id));
+    if (member == nullptr || world->is_own)
+      throw InvalidArgument(fmt::format("id = {}: expected that of a body that was added to the world", id));
     exmat_body& found = *member->body;
     leave_world(found);
     *body = &found;
-    size_for_contact(found);
+    join_own(found);
   });
+}
+
+exmat_status exmat_body_set_group(exmat_body* body, std::uint32_t group, std::uint32_t mask) noexcept {
+  EXMAT_REQUIRE(body);
+  if (group == 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: group = 0: expected at least one bit", __func__);
+  return guarded(__func__, [&] {
+    const MeetingGroup before = std::exchange(body->scene.meeting, {group, mask});
+    try {
+      meet_obstacles(*body);
+    } catch (...) {
+      body->scene.meeting = before;
+      throw;
+    }
+  });
+}
+
+exmat_status exmat_body_read_group(const exmat_body* body, std::uint32_t* group, std::uint32_t* mask) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(group);
+  EXMAT_REQUIRE(mask);
+  *group = body->scene.meeting.group;
+  *mask = body->scene.meeting.mask;
+  return EXMAT_OK;
 }
 
 std::int64_t exmat_world_bodies(const exmat_world* world) noexcept {
@@ -243,7 +340,7 @@ exmat_status exmat_world_read_body_ids(const exmat_world* world, std::int64_t* i
 
 exmat_body* exmat_world_body(const exmat_world* world, std::int64_t id) noexcept {
   const exmat_world::Member* member = world != nullptr ? member_of(*world, id) : nullptr;
-  return member != nullptr ? member->body.get() : nullptr;
+  return member != nullptr ? member->body : nullptr;
 }
 
 const char* exmat_world_body_name(const exmat_world* world, std::int64_t id) noexcept {

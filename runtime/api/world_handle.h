@@ -13,19 +13,31 @@ struct exmat_world {
   struct Member {
     std::int64_t id = 0;
     std::string name;
-    std::unique_ptr<exmat_body> body;
-    std::int64_t kind = -1;  ///< in the scene
+    exmat_body* body = nullptr;  ///< the world's, unless this is the body's own
+    std::int64_t kind = -1;      ///< in the scene
+  };
+  struct HostedObstacle {
+    std::int64_t id = 0;
+    std::shared_ptr<exmat::runtime::Obstacle> obstacle;
+    bool hosted = false;  ///< added or moved by the host, not by the scene
   };
 
-  exmat_world(const exmat::runtime::ContactLaw& its_law, bool meets_itself)
-      : law(its_law), self(meets_itself), world(its_law) {}
+  explicit exmat_world(const exmat_contact_law& its_law);
+  ~exmat_world();
+  exmat_world(const exmat_world&) = delete;
+  exmat_world& operator=(const exmat_world&) = delete;
 
-  exmat::runtime::ContactLaw law;
-  bool self;
+  exmat_contact_law law;
+  bool is_own = false;  ///< of a body, which keeps it
   exmat::runtime::World world;
   std::vector<Member> members;  ///< in ascending order of ids
   std::int64_t next_id = 0;
+  std::vector<HostedObstacle> obstacles;  ///< in ascending order of ids
+  std::int64_t next_obstacle = 0;
+  std::int64_t steps = 0;                    ///< its time over the time step
   std::vector<exmat_body_contact> contacts;  ///< at the end of the last step
+  bool profiled = false;
+  exmat::runtime::WorldProfile profile;  ///< of the last call that stepped it, where it is profiled
   /// Of the models whose bodies were ever in it.
   std::map<std::shared_ptr<const exmat::runtime::Source>, std::shared_ptr<const exmat::runtime::TouchingSurface>>
       surfaces;
@@ -35,14 +47,36 @@ struct exmat_world {
 
 namespace exmat::runtime {
 
-/// A body was put elsewhere: where it is in a world, that forgets what it touched.
+/// A body's place among the members of its world.
+int place_of(const exmat_body& body) noexcept;
+
+/// Scratch that steps of the body are taken in, to be used between steps.
+inline Workspace& scratch_of(exmat_body& body) noexcept { return body.world->world.scratch(place_of(body)); }
+
+/// [s]
+double time_of(const exmat_world& world) noexcept;
+
+/// At rest where it starts, at its time 0, without applied forces.
+void put_to_start(exmat_body& body) noexcept;
+
+/// A body was put elsewhere: its world forgets what it touched.
 void was_put(exmat_body& body) noexcept;
 
-/// Takes a body out of its world, which no longer owns it.
+/// After the time of the body, or of all bodies of the world, was set: that of a body's own world follows, and its
+/// obstacles of the host stay where they were; a body in another world takes that one's time.
+void follow_time(exmat_body& body, double time_before) noexcept;
+void follow_times(exmat_world& world, double time_before) noexcept;
+
+/// Puts a body into a world of its own. Where it throws, nothing has changed.
+void join_own(exmat_body& body);
+
+/// Takes a body out of a world that is not its own, without giving it another.
 void leave_world(exmat_body& body) noexcept;
 
-/// Adds a body that the world owns from now on. Where it throws, nothing has changed.
-std::int64_t join(exmat_world& world, const std::shared_ptr<const TouchingSurface>& surface, std::string name,
-                  exmat_body& body);
+/// The body meets those obstacles of its world that its group and mask allow; its contacts with others are forgotten.
+void meet_obstacles(exmat_body& body);
+
+/// A world's obstacles from now on: copies of a scene's.
+void take_obstacles(const Obstacles& obstacles, exmat_world& world);
 
 }  // namespace exmat::runtime

@@ -117,15 +117,17 @@ void set_world(std::span<const double> numbers, exmat_world& world) {
   std::vector<bool> anew_before;
   std::vector<HeldPair> held_before = world.world.held();
   for (int i = 0; i < world.world.count(); ++i) anew_before.push_back(world.world.is_anew(i));
+  const double time = time_of(world);
   for (std::size_t i = 0; i < world.members.size(); ++i) try {
-      set_state(state.bodies[i], *world.members[i].body);
+      take_state(state.bodies[i], *world.members[i].body);
     } catch (const InvalidArgument& error) {
-      for (std::size_t k = 0; k < i; ++k) set_state(before[k], *world.members[k].body);
+      for (std::size_t k = 0; k < i; ++k) take_state(before[k], *world.members[k].body);
       world.world.set_memory(std::move(held_before), anew_before);
       throw InvalidArgument(fmt::format("body {}: {}", world.members[i].id, error.what()));
     }
   world.world.set_memory(std::move(state.held), state.anew);
   world.contacts.clear();
+  follow_times(world, time);
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <algorithm>
 #include <cinttypes>
+#include <new>
 #include <omp.h>
 
 #include "common/core/fnv_hash.h"
@@ -24,6 +25,7 @@ void add(const WorldReport& step, exmat_world_report& sum) noexcept {
   sum.touching_pairs = step.touching_pairs;
   sum.islands = step.islands;
   sum.largest_island = std::max<std::int64_t>(sum.largest_island, step.largest_island);
+  sum.asleep = step.asleep;
 }
 
 /// A body that the last step left because of a number that is not finite; null: none.
@@ -66,17 +68,35 @@ class Held {
   std::size_t count_ = 0;
 };
 
+/// Records the contacts of each body.
+class ContactRecorder final : public StepObserver {
+ public:
+  explicit ContactRecorder(exmat_world& world) noexcept : world_(world) {}
+
+  void after_step(int place, const StepReport& report, const Workspace& scratch) noexcept override {
+    exmat_body& body = *world_.members[static_cast<std::size_t>(place)].body;
+    if ((report.status & kStepNonFinite) == 0) body.contacts.add(report, body.model(), body.state, scratch);
+  }
+
+ private:
+  exmat_world& world_;
+};
+
 exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) {
   const Timer timer;
   exmat_world_report report{};
+  ContactRecorder recorder(world);
+  world.profile = {};
+  world.world.set_profile(world.profiled ? &world.profile : nullptr);
   for (const auto& member : world.members) begin_steps(*member.body);
   while (report.steps < steps && failed_of(world) == nullptr) {
     for (const auto& member : world.members) apply_keys(*member.body);
-    add(world.world.step(threads), report);
+    add(world.world.step(threads, &recorder), report);
     for (int i = 0; i < world.world.count(); ++i)
-      add_step(world.world.report(i), world.world.workspace(i), *world.members[static_cast<std::size_t>(i)].body);
+      add_step(world.world.report(i), *world.members[static_cast<std::size_t>(i)].body);
   }
   if (failed_of(world) != nullptr) --report.steps;
+  for (const auto& member : world.members) world.steps = std::max(world.steps, member.body->state.step);
   keep_contacts(world);
   for (const auto& member : world.members) measure_lost_work(*member.body);
   report.seconds = timer.seconds();
@@ -85,6 +105,41 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
 }
 
 }  // namespace
+
+exmat_status exmat_body_step(exmat_body* body, std::int64_t steps, exmat_report* report) noexcept {
+  EXMAT_REQUIRE(body);
+  if (steps < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: steps = %" PRId64 ": expected >= 0", __func__, steps);
+  if (report != nullptr)
+    if (const exmat_status status = check_size(__func__, report->size, kReportSizes)) return status;
+  if (!body->own)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body is in a world: exmat_world_step() steps it", __func__);
+  if (!acquire(*body)) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps this body", __func__);
+  const exmat_status stepped = guarded(__func__, [&] { advance(*body->own, steps, 1); });
+  if (report != nullptr) give(body->report, report->size, report);
+  const exmat_status status = non_finite(*body) ? fail_non_finite(__func__, "body", *body) : stepped;
+  release(*body);
+  return status;
+}
+
+exmat_status exmat_world_set_profiled(exmat_world* world, std::int32_t profiled) noexcept {
+  EXMAT_REQUIRE(world);
+  world->profiled = profiled != 0;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_world_read_profile(const exmat_world* world, exmat_profile* profile) noexcept {
+  EXMAT_REQUIRE(world);
+  EXMAT_REQUIRE(profile);
+  if (const exmat_status status = check_size(__func__, profile->size, kProfileSizes)) return status;
+  const auto of_bodies = [&](Stage stage) { return world->profile.bodies.seconds[static_cast<std::size_t>(stage)]; };
+  const auto of_world = [&](WorldStage stage) { return world->profile.seconds[static_cast<std::size_t>(stage)]; };
+  give(exmat_profile{0, of_bodies(Stage::kWeights), of_bodies(Stage::kTarget), of_bodies(Stage::kInternalForce),
+                     of_bodies(Stage::kSolve), of_bodies(Stage::kContact), of_world(WorldStage::kBroadPhase),
+                     of_world(WorldStage::kCandidates), of_world(WorldStage::kSingleBodies),
+                     of_world(WorldStage::kIslands)},
+       profile->size, profile);
+  return EXMAT_OK;
+}
 
 exmat_status exmat_world_step(exmat_world* world, std::int64_t steps, std::int32_t threads,
                               exmat_world_report* report) noexcept {
@@ -97,7 +152,12 @@ exmat_status exmat_world_step(exmat_world* world, std::int64_t steps, std::int32
   if (!held.all()) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps a body of the world", __func__);
   const std::int64_t most = std::max<std::int64_t>(1, std::ssize(world->members));
   const int wanted = threads > 0 ? threads : omp_get_num_procs();
-  const int used = startable_threads(static_cast<int>(std::min<std::int64_t>(wanted, most)));
+  int used = startable_threads(static_cast<int>(std::min<std::int64_t>(wanted, most)));
+  try {
+    world->world.prepare(used);
+  } catch (const std::bad_alloc&) {
+    used = 1;  // for which there is scratch since the bodies were added
+  }
   const exmat_status status = guarded(__func__, [&] {
     const exmat_world_report did = advance(*world, steps, used);
     if (report != nullptr) give(did, report->size, report);

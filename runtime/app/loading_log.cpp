@@ -3,31 +3,29 @@
 #include <fmt/format.h>
 
 #include "common/core/log.h"
-#include "runtime/scene/keyed_settings.h"
 
 namespace exmat::runtime {
-
-void log_loaded(const LoadedScene& loaded, const SceneConfig& config) {
-  log::info(fmt::format("bundle {}: asset \"{}\", {} vertices, {} tets, r = {}, s = {}", config.bundle.string(),
-                        loaded.summary.asset_name, loaded.summary.vertices, loaded.summary.tets, loaded.summary.modes,
-                        loaded.summary.cubature_elements));
-  for (const ReadRecord& record : loaded.records)
-    log::info(fmt::format("read {}: {} bytes", record.dataset, record.bytes));
-  for (const LedgerEntry& entry : loaded.ledger)
-    log::info(fmt::format("group {}: {}, {} bytes, {}", entry.group, entry.included ? "in" : "out", entry.bytes,
-                          entry.reason));
-  for (const std::string& line : describe_plan(loaded, config)) log::info("plan: " + line);
-}
 
 void log_loaded(const LoadedWorld& loaded, const WorldConfig& config) {
   for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
     const LoadedScene& kind = loaded.kinds[i].loaded;
-    const std::size_t places = config.bodies[i].places.size();
-    log::info(fmt::format("{}: {} of r = {} modes, {} vertices against {} triangles", config.bodies[i].name,
-                          places == 1 ? std::string("a body") : fmt::format("{} bodies", places), kind.model->modes(),
-                          kind.model->contact->vertices(), loaded.kinds[i].surface->surface.triangles()));
-    for (const std::string& line : describe_keys(kind.keys, *kind.model))
-      log::info(fmt::format("plan: {}: {}", config.bodies[i].name, line));
+    const BodiesConfig& bodies = config.bodies[i];
+    log::info(fmt::format("bundle {}: asset \"{}\", {} vertices, {} tets, r = {}, s = {}", bodies.scene.bundle.string(),
+                          kind.summary.asset_name, kind.summary.vertices, kind.summary.tets, kind.summary.modes,
+                          kind.summary.cubature_elements));
+    for (const ReadRecord& record : kind.records)
+      log::info(fmt::format("read {}: {} bytes", record.dataset, record.bytes));
+    for (const LedgerEntry& entry : kind.ledger)
+      log::info(fmt::format("group {}: {}, {} bytes, {}", entry.group, entry.included ? "in" : "out", entry.bytes,
+                            entry.reason));
+    const std::string of_kind = bodies.name.empty() ? "" : bodies.name + ": ";
+    if (config.is_list)
+      log::info(fmt::format("plan: {}{}", of_kind,
+                            bodies.places.size() == 1 ? "a body" : fmt::format("{} bodies", bodies.places.size())));
+    for (const std::string& line : describe_plan(kind, bodies.scene)) log::info("plan: " + of_kind + line);
+    if (loaded.kinds[i].surface)
+      log::info(fmt::format("plan: {}contact of bodies: {} vertices against {} triangles", of_kind,
+                            kind.model->contact->vertices(), loaded.kinds[i].surface->surface.triangles()));
   }
 }
 

@@ -45,31 +45,23 @@ void print_loads(const std::filesystem::path& bundle, const std::vector<NamedLoa
 
 }  // namespace
 
-void print_lost_work(const RunSummary& summary, const SceneConfig& config, bool asked) {
-  const Eigen::Index vertices = summarise_bundle(config.bundle).vertices;
-  std::vector<NamedLoad> loads = scripted_loads(config, vertices);
-  const HardestContact& hardest = summary.hardest_contact;
-  if (hardest.force > 0)
-    loads.push_back(
-        {"contact", fmt::format(" at {:g} s, when it is {:.3g} N", hardest.time, hardest.force), hardest.load});
-  if (loads.empty() && asked) return print("lost work", "none: the scene names no forces, and nothing touched");
-  print_loads(config.bundle, loads, vertices, asked);
-}
-
-void print_lost_work(const WorldSummary& summary, const LoadedWorld& loaded, const WorldConfig& config, bool asked) {
+void print_lost_work(const RunSummary& summary, const LoadedWorld& loaded, const WorldConfig& config, bool asked) {
   bool any = false;
   for (std::size_t kind = 0; kind < loaded.kinds.size(); ++kind) {
     const BodiesConfig& bodies = config.bodies[kind];
     const Eigen::Index vertices = loaded.kinds[kind].loaded.summary.vertices;
     std::vector<NamedLoad> loads = scripted_loads(bodies.scene, vertices);
-    for (NamedLoad& load : loads) load.name = bodies.name + " " + load.name;
-    if (const PressedBody& pressed = summary.most_pressed[kind]; pressed.body >= 0)
-      loads.push_back({loaded.bodies[static_cast<std::size_t>(pressed.body)].name,
-                       fmt::format(" of {:.3g} N that touch it at the end", pressed.force), pressed.load});
+    if (config.is_list)
+      for (NamedLoad& load : loads) load.name = bodies.name + " " + load.name;
+    if (const HardestContact& hardest = summary.hardest_contacts[kind]; hardest.body >= 0) {
+      const std::string& name = loaded.bodies[static_cast<std::size_t>(hardest.body)].name;
+      loads.push_back({name.empty() ? "contact" : name + " contact",
+                       fmt::format(" at {:g} s, when it is {:.3g} N", hardest.time, hardest.force), hardest.load});
+    }
     print_loads(bodies.scene.bundle, loads, vertices, asked);
     any = any || !loads.empty();
   }
-  if (asked && !any) print("lost work", "none: the scene names no forces, and nothing touches");
+  if (asked && !any) print("lost work", "none: the scene names no forces, and nothing touched");
 }
 
 }  // namespace exmat::runtime

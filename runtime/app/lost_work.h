@@ -1,7 +1,6 @@
 #pragma once
 
 #include "runtime/scene/scene_run.h"
-#include "runtime/scene/world_run.h"
 
 namespace exmat::runtime {
 
@@ -9,7 +8,6 @@ namespace exmat::runtime {
 // contacts. Nothing where there are none. A mesh of many vertices is measured only where that is `asked` for: it takes
 // longer than most runs.
 
-void print_lost_work(const RunSummary& summary, const SceneConfig& config, bool asked);
-void print_lost_work(const WorldSummary& summary, const LoadedWorld& loaded, const WorldConfig& config, bool asked);
+void print_lost_work(const RunSummary& summary, const LoadedWorld& loaded, const WorldConfig& config, bool asked);
 
 }  // namespace exmat::runtime

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
@@ -8,37 +9,57 @@
 #include "runtime/app/lost_work.h"
 #include "runtime/app/print.h"
 #include "runtime/scene/scene_run.h"
-#include "runtime/scene/world_run.h"
 
 namespace exmat::runtime {
 namespace {
 
 std::string microseconds(double seconds) { return fmt::format("{:.2f} us", 1e6 * seconds); }
 
-void print_summary(const RunSummary& summary, const LoadedScene& loaded, const SceneConfig& config) {
+bool may_touch_each_other(const LoadedWorld& loaded) {
+  return std::ranges::any_of(loaded.kinds, [](const LoadedKind& kind) { return kind.surface != nullptr; });
+}
+
+void print_times(const RunSummary& summary, const WorldConfig& config) {
+  const bool several = summary.bodies > 1;
   const double mean = summary.step_seconds.mean();
+  const std::string a_body = several ? " a body" : "";
+  print("simulated time", fmt::format("{:g} s", summary.simulated_seconds));
+  print("steps per second", fmt::format("{:.0f}{}", mean > 0 ? 1 / mean : 0, several ? " over all bodies" : ""));
+  print("mean step time", microseconds(mean) + a_body);
+  print("median step time", microseconds(summary.step_seconds.quantile(0.5)) + a_body);
+  print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)) + a_body);
+  print("real-time factor", fmt::format("{:.1f}", mean > 0 ? config.time_step / (mean * summary.bodies) : 0));
+}
+
+void print_summary(const RunSummary& summary, const LoadedWorld& loaded, const WorldConfig& config) {
+  const bool touches = may_touch_each_other(loaded);
+  const auto any_kind = [&](const auto& holds) { return std::ranges::any_of(loaded.kinds, holds); };
   print("steps", std::to_string(summary.steps));
   if (summary.bodies > 1) {
-    print("bodies", fmt::format("{} (energies and trajectory are those of the first)", summary.bodies));
+    print("bodies", std::to_string(summary.bodies) + (config.is_list ? "" : " (the trajectory is that of the first)"));
     print("threads", std::to_string(summary.threads));
   }
-  print("simulated time", fmt::format("{:g} s", summary.simulated_seconds));
-  print("steps per second",
-        fmt::format("{:.0f}{}", mean > 0 ? 1 / mean : 0, summary.bodies > 1 ? " over all bodies" : ""));
-  print("mean step time", microseconds(mean));
-  print("median step time", microseconds(summary.step_seconds.quantile(0.5)));
-  print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)));
-  print("real-time factor", fmt::format("{:.1f}", mean > 0 ? config.time_step / (mean * summary.bodies) : 0));
+  print_times(summary, config);
+  if (touches) {
+    print("touching pairs",
+          fmt::format("{:.1f} a step, at most {}", summary.touching_pairs.mean(), summary.most_pairs));
+    print("largest island", fmt::format("{} bodies solved together", summary.largest_island));
+    print("unconverged islands", std::to_string(summary.unconverged_islands));
+  }
   print("Newton iterations", fmt::format("{:.2f} a step", summary.newton_iterations.mean()));
-  if (runs_examples(loaded.scene))
+  if (any_kind([](const LoadedKind& kind) { return runs_examples(kind.loaded.scene); }))
     print("target iterations", fmt::format("{:.2f} a step", summary.target_iterations.mean()));
   print("projections", std::to_string(summary.projections));
   print("unconverged steps", std::to_string(summary.unconverged_steps));
-  if (loaded.scene.sleep.energy > 0)
+  if (any_kind([](const LoadedKind& kind) { return kind.loaded.scene.sleep.energy > 0; }))
     print("steps asleep", fmt::format("{} of {}", summary.slept_steps, summary.steps * summary.bodies));
-  print("kinetic energy", fmt::format("{:.6g} J", summary.energies.kinetic));
-  print("elastic energy", fmt::format("{:.6g} J", summary.energies.elastic));
-  print("potential energy", fmt::format("{:.6g} J", summary.energies.potential));
+  print("kinetic energy", fmt::format("{:.6g} J", summary.end.kinetic));
+  print("elastic energy", fmt::format("{:.6g} J", summary.end.elastic));
+  print("potential energy", fmt::format("{:.6g} J", summary.end.potential));
+  if (touches) {
+    print("energy at the start", fmt::format("{:.6g} J", summary.start.total()));
+    print("deepest contact", fmt::format("{:.3g} m between bodies at the end", summary.deepest));
+  }
   if (summary.largest_displacement)
     print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
   print("state hash", fmt::format("{:016x}", summary.state_hash));
@@ -54,90 +75,45 @@ void print_stage(std::string_view name, const Samples& seconds) {
              1e6 * seconds.quantile(0.95));
 }
 
-void print_profile(const RunSummary& summary) {
+void print_profile(const RunSummary& summary, bool touches) {
   if (!summary.stage_seconds) return;
   print_stage_heading();
   for (std::size_t stage = 0; stage < kStageNames.size(); ++stage)
-    print_stage(kStageNames[stage], (*summary.stage_seconds)[stage]);
-}
-
-void print_profile(const WorldSummary& summary) {
-  if (!summary.stage_seconds) return;
-  print_stage_heading();
+    print_stage(kStageNames[stage], summary.stage_seconds->of_bodies[stage]);
+  if (!touches) return;
   for (std::size_t stage = 0; stage < kWorldStageNames.size(); ++stage)
-    print_stage(kWorldStageNames[stage], summary.stage_seconds->step[stage]);
-  print_stage("output", summary.stage_seconds->output);
+    print_stage(kWorldStageNames[stage], summary.stage_seconds->of_world[stage]);
 }
 
-void print_world(const WorldSummary& summary, const WorldConfig& config) {
-  const double mean = summary.step_seconds.mean();
-  print("bodies", std::to_string(summary.bodies));
-  print("threads", std::to_string(summary.threads));
-  print("steps", std::to_string(summary.steps));
-  print("simulated time", fmt::format("{:g} s", summary.simulated_seconds));
-  print("body-steps per second", fmt::format("{:.0f}", mean > 0 ? 1 / mean : 0));
-  print("mean step time", microseconds(mean) + " a body");
-  print("median step time", microseconds(summary.step_seconds.quantile(0.5)) + " a body");
-  print("95 percent step time", microseconds(summary.step_seconds.quantile(0.95)) + " a body");
-  print("real-time factor", fmt::format("{:.2f}", mean > 0 ? config.time_step / (mean * summary.bodies) : 0));
-  print("touching pairs", fmt::format("{:.1f} a step, at most {}", summary.touching_pairs.mean(), summary.most_pairs));
-  print("largest island", fmt::format("{} bodies solved together", summary.largest_island));
-  print("Newton iterations", fmt::format("{:.2f} a step, most of an island", summary.newton_iterations.mean()));
-  print("unconverged islands", std::to_string(summary.unconverged_islands));
-  print("unconverged steps", std::to_string(summary.unconverged_steps));
-  print("kinetic energy", fmt::format("{:.6g} J", summary.end.kinetic));
-  print("elastic energy", fmt::format("{:.6g} J", summary.end.elastic));
-  print("potential energy", fmt::format("{:.6g} J", summary.end.potential));
-  print("energy at the start", fmt::format("{:.6g} J", summary.start.total()));
-  print("deepest contact", fmt::format("{:.3g} m between bodies at the end", summary.deepest));
-  if (summary.largest_displacement)
-    print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
-  print("state hash", fmt::format("{:016x}", summary.state_hash));
-  if (config.trajectory) print("trajectory", config.trajectory->string());
-}
-
-RunOptions run_options(const RunCommandOptions& options) {
-  RunOptions run = options.run;
-  run.keeps_contacts = true;
-  return run;
-}
-
-void run_world(WorldConfig config, const RunCommandOptions& options) {
-  if (options.trajectory) config.trajectory = options.trajectory;
-  if (options.steps) config.steps = *options.steps;
-  const LoadedWorld loaded = load_world_run(config);
-  log_loaded(loaded, config);
-  const WorldSummary summary = run(loaded, config, run_options(options));
+void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
   if (summary.unconverged_islands > 0)
     log::warning(
         fmt::format("{} solutions of bodies that touch did not reach the tolerance; a smaller time_step or "
                     "contact stiffness may help",
                     summary.unconverged_islands));
-  print_world(summary, config);
-  print_lost_work(summary, loaded, config, options.load_capacity);
-  if (options.run.dump_state) print("state", options.run.dump_state->string());
-  print_profile(summary);
+  else if (summary.unconverged_steps > 0)
+    log::warning(fmt::format(
+        "{} of {} steps did not reach the tolerance {:g} (target included); a smaller time_step or more "
+        "newton.max_iterations may help",
+        summary.unconverged_steps, summary.steps * summary.bodies, config.bodies.front().scene.newton.tolerance));
 }
 
 }  // namespace
 
 void run_command(const RunCommandOptions& options) {
-  if (std::optional<WorldConfig> world = load_world(options.scene)) return run_world(std::move(*world), options);
-  SceneConfig config = load_scene(options.scene);
-  if (options.trajectory) config.trajectory = options.trajectory;
+  WorldConfig config = load_world(options.scene);
+  if (options.trajectory) set_trajectory(*options.trajectory, config);
   if (options.steps) config.steps = *options.steps;
-  const LoadedScene loaded = load_run(config);
+  const LoadedWorld loaded = load_world_run(config);
   log_loaded(loaded, config);
-  const RunSummary summary = run(loaded, config, run_options(options));
-  if (summary.unconverged_steps > 0)
-    log::warning(
-        fmt::format("{} of {} steps did not reach the tolerance {:g} (target included); a smaller time_step or more "
-                    "newton.max_iterations may help",
-                    summary.unconverged_steps, summary.steps * summary.bodies, config.newton.tolerance));
+  RunOptions run_options = options.run;
+  run_options.keeps_contacts = true;
+  const RunSummary summary = run(loaded, config, run_options);
+  warn_of_steps(summary, config);
   print_summary(summary, loaded, config);
-  print_lost_work(summary, config, options.load_capacity);
+  print_lost_work(summary, loaded, config, options.load_capacity);
   if (options.run.dump_state) print("state", options.run.dump_state->string());
-  print_profile(summary);
+  print_profile(summary, may_touch_each_other(loaded));
 }
 
 }  // namespace exmat::runtime

@@ -13,6 +13,7 @@
 #include "runtime/bench/bench_plan.h"
 #include "runtime/bench/dgemm_rate.h"
 #include "runtime/scene/bodies.h"
+#include "runtime/scene/step_work.h"
 
 namespace exmat::runtime {
 namespace {
@@ -22,16 +23,15 @@ constexpr double kTurnSeconds = 5e-3;  // of steps between two measurements of t
 /// Means per step, added up before they are divided.
 struct Sums {
   double newton_iterations = 0, factorisations = 0, line_search_evaluations = 0, projections = 0, target_iterations = 0;
+  double touching_pairs = 0, islands = 0;
   std::array<double, kBenchStageNames.size()> flops{};
   double bytes = 0;
 };
 
 class Bench {
  public:
-  Bench(const LoadedScene& loaded, const SceneConfig& config)
-      : config_(config), plain_(make_bodies(loaded, config)), profiled_(make_bodies(loaded, config)) {
-    profiled_.set_profiled(true);
-  }
+  Bench(const LoadedWorld& loaded, const WorldConfig& config)
+      : config_(config), plain_(loaded, config), profiled_(loaded, config) {}
 
   void measure(const BenchOptions& options, BenchResult& result) {
     const double step_seconds = warm_up(kWarmUpShare * options.seconds);
@@ -42,9 +42,10 @@ class Bench {
     const std::int64_t samples = plan.samples();
     result.step_seconds = Samples(samples);
     for (BenchStage& stage : result.stages) stage.seconds = Samples(samples);
+    result.world_stages.fill(Samples(samples));
     Progress progress("bench", samples);
     for (std::int64_t round = 0; round < result.rounds; ++round) measure_round(result, progress);
-    conclude(static_cast<double>(samples) * config_.instances, result);
+    conclude(static_cast<double>(samples), result);
   }
 
  private:
@@ -55,12 +56,10 @@ class Bench {
     do {
       plain_.step();
       profiled_.step();
-      require_finite(plain_, config_);
+      plain_.require_finite();
       if (++steps % config_.steps == 0) restart();
     } while (timer.seconds() < seconds);
-    const double mean = timer.seconds() / static_cast<double>(2 * steps);
-    profiled_.take_measured();
-    return mean;
+    return timer.seconds() / static_cast<double>(2 * steps);
   }
 
   void restart() {
@@ -88,38 +87,62 @@ class Bench {
 
   void step_plain(BenchResult& result) {
     const Timer timer;
-    const std::span<const StepReport> reports = plain_.step();
-    result.step_seconds.add(timer.seconds() / config_.instances);
-    require_finite(plain_, config_);
-    for (const StepReport& report : reports) {
-      sums_.newton_iterations += report.newton_iterations;
-      sums_.factorisations += report.factorisations;
-      sums_.line_search_evaluations += report.line_search_evaluations;
-      sums_.projections += report.projections;
-      sums_.target_iterations += report.target_iterations;
+    const WorldReport report = plain_.step();
+    result.step_seconds.add(timer.seconds() / plain_.count());
+    plain_.require_finite();
+    for (int i = 0; i < plain_.count(); ++i) {
+      const StepReport& own = plain_.world().report(i);
+      sums_.newton_iterations += own.newton_iterations;
+      sums_.factorisations += own.factorisations;
+      sums_.line_search_evaluations += own.line_search_evaluations;
+      sums_.projections += own.projections;
+      sums_.target_iterations += own.target_iterations;
     }
+    sums_.touching_pairs += report.touching_pairs;
+    sums_.islands += report.islands;
+    result.most_pairs = std::max(result.most_pairs, report.touching_pairs);
+    result.largest_island = std::max(result.largest_island, report.largest_island);
+    result.unconverged_islands += report.unconverged_islands;
   }
 
   void step_profiled(BenchResult& result) {
+    WorldProfile profile;
+    profiled_.world().set_profile(&profile);
+    const Timer timer;
     profiled_.step();
-    const Bodies::Measured measured = profiled_.take_measured();
-    const Profile& profile = measured.profile;
-    const StepWork& work = measured.work;
+    const double seconds = timer.seconds();
+    profiled_.world().set_profile(nullptr);
+    StepWork work;
+    if (!result.is_world)
+      for (int i = 0; i < profiled_.count(); ++i) {
+        const World& world = profiled_.world();
+        if ((world.report(i).status & kStepAsleep) == 0)
+          work += step_work(world.model(i), world.scene(i), world.report(i));
+      }
+    add_stages(profile.bodies, profile.bodies_seconds, work, result);
+    double& other = profile.seconds[static_cast<std::size_t>(WorldStage::kOther)];
+    other = std::max(0.0, seconds - std::accumulate(profile.seconds.begin(), profile.seconds.end(), 0.0));
+    for (std::size_t stage = 0; stage < profile.seconds.size(); ++stage)
+      result.world_stages[stage].add(profile.seconds[stage] / profiled_.count());
+  }
+
+  void add_stages(const Profile& profile, double seconds, const StepWork& work, BenchResult& result) {
     const double staged = std::accumulate(profile.seconds.begin(), profile.seconds.end(), 0.0);
     for (std::size_t stage = 0; stage < kBenchStageNames.size(); ++stage)
       if (stage != kOtherStage) add(stage, profile.seconds[stage], profile.flops[stage], result);
-    add(kOtherStage, std::max(0.0, measured.seconds - staged), work.other_flops, result);
+    add(kOtherStage, std::max(0.0, seconds - staged), work.other_flops, result);
     sums_.flops[static_cast<std::size_t>(Stage::kWeights)] += work.weights_flops;
     sums_.flops[static_cast<std::size_t>(Stage::kTarget)] += work.target_flops;
     sums_.bytes += work.bytes;
   }
 
   void add(std::size_t stage, double seconds, double flops, BenchResult& result) {
-    result.stages[stage].seconds.add(seconds / config_.instances);
+    result.stages[stage].seconds.add(seconds / profiled_.count());
     sums_.flops[stage] += flops;
   }
 
-  void conclude(double body_steps, BenchResult& result) const {
+  void conclude(double steps, BenchResult& result) const {
+    const double body_steps = steps * plain_.count();
     for (std::size_t stage = 0; stage < kBenchStageNames.size(); ++stage)
       result.stages[stage].flops = sums_.flops[stage] / body_steps;
     result.bytes = sums_.bytes / body_steps;
@@ -128,13 +151,16 @@ class Bench {
     result.line_search_evaluations = sums_.line_search_evaluations / body_steps;
     result.projections = sums_.projections / body_steps;
     result.target_iterations = sums_.target_iterations / body_steps;
+    result.touching_pairs = sums_.touching_pairs / steps;
+    result.islands = sums_.islands / steps;
     result.dgemm_flops_per_second = dgemm_.best();
     result.dgemm_median_per_second = dgemm_.median();
+    result.instances = plain_.count();
     result.threads = plain_.threads();
     result.state_hash = plain_.hash();
   }
 
-  const SceneConfig& config_;
+  const WorldConfig& config_;
   Bodies plain_, profiled_;
   DgemmRate dgemm_;
   Timer since_dgemm_;
@@ -167,62 +193,116 @@ double BenchResult::steps_per_second() const { return 1 / step_seconds.mean(); }
 
 double BenchResult::real_time_factor() const { return time_step / (step_seconds.mean() * instances); }
 
-BenchResult bench(const LoadedScene& loaded, const SceneConfig& config, const BenchOptions& options) {
+BenchResult bench(const LoadedWorld& loaded, const WorldConfig& config, const BenchOptions& options) {
   BenchResult result;
-  const InternalForce& force = loaded.model->internal_force;
-  result.modes = loaded.model->modes();
-  result.elements = force.cubature().elements();
-  result.vertices = loaded.summary.vertices;
-  result.tets = loaded.summary.tets;
-  for (const ExampleModel& examples : loaded.model->examples) result.examples += examples.weights.examples();
-  result.integrator = name_of(config.integrator);
-  result.internal_force = force.polynomial() ? "polynomial" : "cubature";
-  result.target = target_name(loaded);
+  for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
+    const LoadedKind& kind = loaded.kinds[i];
+    const Model& model = *kind.loaded.model;
+    BenchKind& own = result.kinds.emplace_back();
+    own.name = config.bodies[i].name;
+    own.bodies = std::ssize(config.bodies[i].places);
+    own.vertices = kind.loaded.summary.vertices;
+    own.tets = kind.loaded.summary.tets;
+    for (const ExampleModel& examples : model.examples) own.examples += examples.weights.examples();
+    own.modes = model.modes();
+    own.elements = model.internal_force.cubature().elements();
+    own.internal_force = model.internal_force.polynomial() ? "polynomial" : "cubature";
+    own.target = target_name(kind.loaded);
+    if (model.contact) own.contact_vertices = model.contact->vertices();
+    if (kind.surface) own.triangles = kind.surface->surface.triangles();
+    result.is_world = result.is_world || kind.surface != nullptr;
+  }
+  result.integrator = name_of(config.bodies.front().scene.integrator);
   result.instruction_set = kernels().name;
   result.time_step = config.time_step;
-  result.instances = config.instances;
   Bench(loaded, config).measure(options, result);
   return result;
 }
 
-nlohmann::ordered_json to_json(const BenchResult& result) {
+namespace {
+
+/// A single kind's members stand at the root.
+nlohmann::ordered_json to_json(const BenchKind& kind) {
+  return {{"r", kind.modes},
+          {"s", kind.elements},
+          {"internal_force", kind.internal_force},
+          {"target", kind.target},
+          {"examples", kind.examples},
+          {"vertices", kind.vertices},
+          {"tets", kind.tets},
+          {"contact_vertices", kind.contact_vertices},
+          {"triangles", kind.triangles}};
+}
+
+nlohmann::ordered_json stages_to_json(const BenchResult& result) {
   nlohmann::ordered_json stages = nlohmann::ordered_json::object();
   for (std::size_t stage = 0; stage < kBenchStageNames.size(); ++stage) {
-    nlohmann::ordered_json member = times_to_json(result.stages[stage].seconds);
-    member["flops"] = result.stages[stage].flops;
-    stages[std::string(kBenchStageNames[stage])] = std::move(member);
+    nlohmann::ordered_json& member = stages[std::string(kBenchStageNames[stage])];
+    member = times_to_json(result.stages[stage].seconds);
+    if (!result.is_world) member["flops"] = result.stages[stage].flops;
   }
-  return {{"r", result.modes},
-          {"s", result.elements},
-          {"steps", result.steps},
-          {"instances", result.instances},
-          {"step", times_to_json(result.step_seconds)},
-          {"stages", stages},
-          {"flops", result.flops()},
-          {"gflops", 1e-9 * result.flops_per_second()},
-          {"dgemm_gflops", 1e-9 * result.dgemm_flops_per_second},
-          {"limit_ratio", result.limit_ratio()},
-          {"newton_iterations_mean", result.newton_iterations},
-          {"real_time_factor", result.real_time_factor()},
-          {"steps_per_second", result.steps_per_second()},
-          {"limit_us", microseconds(result.limit_seconds())},
-          {"dgemm_median_gflops", 1e-9 * result.dgemm_median_per_second},
-          {"bytes", result.bytes},
-          {"factorisations_mean", result.factorisations},
-          {"line_search_evaluations_mean", result.line_search_evaluations},
-          {"projections_mean", result.projections},
-          {"target_iterations_mean", result.target_iterations},
-          {"rounds", result.rounds},
-          {"threads", result.threads},
-          {"instruction_set", result.instruction_set},
-          {"integrator", result.integrator},
-          {"internal_force", result.internal_force},
-          {"target", result.target},
-          {"examples", result.examples},
-          {"time_step", result.time_step},
-          {"vertices", result.vertices},
-          {"tets", result.tets},
-          {"state_hash", fmt::format("{:016x}", result.state_hash)}};
+  return stages;
+}
+
+nlohmann::ordered_json world_stages_to_json(const BenchResult& result) {
+  nlohmann::ordered_json stages = nlohmann::ordered_json::object();
+  const double whole = std::accumulate(result.world_stages.begin(), result.world_stages.end(), 0.0,
+                                       [](double sum, const Samples& stage) { return sum + stage.mean(); });
+  for (std::size_t stage = 0; stage < kWorldStageNames.size(); ++stage) {
+    nlohmann::ordered_json& member = stages[std::string(kWorldStageNames[stage])];
+    member = times_to_json(result.world_stages[stage]);
+    member["share"] = result.world_stages[stage].mean() / whole;
+  }
+  return stages;
+}
+
+}  // namespace
+
+nlohmann::ordered_json to_json(const BenchResult& result) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  const bool is_one_kind = result.kinds.size() == 1;
+  if (is_one_kind) json = to_json(result.kinds.front());
+  json.update({{"steps", result.steps},
+               {"instances", result.instances},
+               {"step", times_to_json(result.step_seconds)},
+               {"stages", result.is_world ? world_stages_to_json(result) : stages_to_json(result)},
+               {"newton_iterations_mean", result.newton_iterations},
+               {"factorisations_mean", result.factorisations},
+               {"line_search_evaluations_mean", result.line_search_evaluations},
+               {"projections_mean", result.projections},
+               {"target_iterations_mean", result.target_iterations},
+               {"real_time_factor", result.real_time_factor()},
+               {"steps_per_second", result.steps_per_second()},
+               {"dgemm_gflops", 1e-9 * result.dgemm_flops_per_second},
+               {"dgemm_median_gflops", 1e-9 * result.dgemm_median_per_second}});
+  if (!result.is_world)
+    json.update({{"flops", result.flops()},
+                 {"gflops", 1e-9 * result.flops_per_second()},
+                 {"limit_ratio", result.limit_ratio()},
+                 {"limit_us", microseconds(result.limit_seconds())},
+                 {"bytes", result.bytes}});
+  else
+    json.update({{"single_body_stages", stages_to_json(result)},
+                 {"touching_pairs_mean", result.touching_pairs},
+                 {"touching_pairs_most", result.most_pairs},
+                 {"islands_mean", result.islands},
+                 {"largest_island", result.largest_island},
+                 {"unconverged_islands", result.unconverged_islands}});
+  json.update({{"rounds", result.rounds},
+               {"threads", result.threads},
+               {"instruction_set", result.instruction_set},
+               {"integrator", result.integrator},
+               {"time_step", result.time_step}});
+  if (!result.kinds.front().name.empty()) {
+    json["bodies"] = nlohmann::ordered_json::array();
+    for (const BenchKind& kind : result.kinds) {
+      nlohmann::ordered_json own{{"name", kind.name}, {"instances", kind.bodies}};
+      own.update(to_json(kind));
+      json["bodies"].push_back(std::move(own));
+    }
+  }
+  json["state_hash"] = fmt::format("{:016x}", result.state_hash);
+  return json;
 }
 
 }  // namespace exmat::runtime

@@ -6,10 +6,10 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "runtime/scene/samples.h"
-#include "runtime/scene/scene_loader.h"
-#include "runtime/scene/scene_run.h"
+#include "runtime/scene/world_loader.h"
 #include "runtime/sim/solver/profile.h"
 
 namespace exmat::runtime {
@@ -33,19 +33,32 @@ struct BenchStage {
   double flops = 0;  ///< per step of a body
 };
 
+/// The bodies of one kind.
+struct BenchKind {
+  std::string name;  ///< empty: the scene names a single bundle
+  std::int64_t bodies = 0, vertices = 0, tets = 0, examples = 0;
+  Eigen::Index modes = 0, elements = 0;  ///< r, s
+  std::string internal_force, target;
+  std::int64_t contact_vertices = 0, triangles = 0;  ///< that look for contacts, that others touch
+};
+
 /// How long a step takes and what it computes. Times are of steps of all bodies over their number. The steps are those
 /// from rest on; a round measures all of them twice, in turns of a few milliseconds: whole steps without and stages
-/// with clocks inside. In between the DGEMM rate is measured.
+/// with clocks inside. In between the DGEMM rate is measured. Flops and bytes are those of bodies that touch no other.
 struct BenchResult {
-  Eigen::Index modes = 0, elements = 0;  ///< r, s
-  std::int64_t vertices = 0, tets = 0, examples = 0;
-  std::string integrator, internal_force, target, instruction_set;
+  std::vector<BenchKind> kinds;
+  std::string integrator, instruction_set;
   double time_step = 0;  ///< [s]
   std::int64_t steps = 0, rounds = 0;
   int instances = 1, threads = 1;
   Samples step_seconds;
-  std::array<BenchStage, kBenchStageNames.size()> stages;
-  double bytes = 0;                                                ///< per step of a body, see StepWork
+  std::array<BenchStage, kBenchStageNames.size()> stages;     ///< of bodies that touch no other
+  bool is_world = false;                                      ///< some may touch others: then the next members count
+  std::array<Samples, kWorldStageNames.size()> world_stages;  ///< on the wall clock
+  double touching_pairs = 0, islands = 0;                     ///< mean per step
+  int most_pairs = 0, largest_island = 0;                     ///< of all steps
+  std::int64_t unconverged_islands = 0;                       ///< of all steps
+  double bytes = 0;                                           ///< per step of a body, see StepWork
   double dgemm_flops_per_second = 0, dgemm_median_per_second = 0;  ///< of one thread: best and median, see DgemmRate
   double newton_iterations = 0, factorisations = 0;                ///< mean per step of a body, as the next three
   double line_search_evaluations = 0, projections = 0, target_iterations = 0;
@@ -60,7 +73,7 @@ struct BenchResult {
 };
 
 /// Measures a scene without any output, warmed up. Throws WorkError where a state becomes non-finite.
-BenchResult bench(const LoadedScene& loaded, const SceneConfig& config, const BenchOptions& options);
+BenchResult bench(const LoadedWorld& loaded, const WorldConfig& config, const BenchOptions& options);
 
 /// What `exmat-runtime bench --json` prints. docs/performance.md.
 nlohmann::ordered_json to_json(const BenchResult& result);

@@ -213,59 +213,47 @@ XdmfCells BodyFrames::cells() const {
   return {"Tetrahedron", tets_, vertices_, 4, mesh.tet_count(), mesh.vertex_count()};
 }
 
-XdmfCells BodyFrames::render_cells() const {
-  return {
+std::optional<XdmfCells> BodyFrames::render_cells() const {
+  if (!model_.render) return std::nullopt;
+  return XdmfCells{
       "Triangle", render_triangles_, render_vertices_, 3, model_.render->triangles.rows(), model_.render->tets.size()};
 }
 
-TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
-                                   const TrajectoryInfo& info)
-    : model_(model),
-      output_(path),
-      file_(create_file(output_)),
-      frames_(std::make_unique<BodyFrames>(file_, "", model, frame, info)) {}
-
-void TrajectoryWriter::finish() {
-  frames_->finish();
-  file_.close();
-  output_.commit();
-  const std::filesystem::path& target = output_.target();
-  write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
-                        xdmf_text(target, {{model_.asset_name, frames_->cells()}}, frames_->times()));
-  if (!model_.render) return;
-  write_file_atomically(target.parent_path() / (target.stem().string() + "_render.xdmf"),
-                        xdmf_text(target, {{model_.asset_name, frames_->render_cells()}}, frames_->times()));
-}
-
-WorldTrajectoryWriter::WorldTrajectoryWriter(const std::filesystem::path& path, const std::vector<NamedBody>& bodies)
+TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const std::vector<NamedBody>& bodies)
     : output_(path), file_(create_file(output_)) {
   const NamedBody& first = bodies.front();
-  file_.write_attribute("/", "asset_name", std::string());
-  file_.write_attribute("/", "input_sha256", std::string());
-  file_.write_attribute("/", "bundle", std::string());
-  file_.write_attribute("/", "integrator", first.info.integrator);
-  file_.write_attribute("/", "time_step", first.info.time_step);
-  write_group(file_, group_schema("/bodies"), "/bodies");
+  if (!first.name.empty()) {
+    for (const char* name : {"asset_name", "input_sha256", "bundle"}) file_.write_attribute("/", name, std::string());
+    file_.write_attribute("/", "integrator", first.info.integrator);
+    file_.write_attribute("/", "time_step", first.info.time_step);
+    write_group(file_, group_schema("/bodies"), "/bodies");
+  }
   for (const NamedBody& body : bodies) {
-    const std::string group = fill_name("/bodies/{body}", kBodyPlaceholder, body.name);
-    write_group(file_, group_schema("/bodies/{body}"), group);
+    const std::string group = body.name.empty() ? "" : fill_name("/bodies/{body}", kBodyPlaceholder, body.name);
+    if (!group.empty()) write_group(file_, group_schema("/bodies/{body}"), group);
     frames_.push_back(std::make_unique<BodyFrames>(file_, group, body.model, body.frame, body.info));
-    names_.push_back(body.name);
+    names_.push_back(body.name.empty() ? body.model.asset_name : body.name);
   }
 }
 
-void WorldTrajectoryWriter::finish() {
+void TrajectoryWriter::finish() {
   for (const auto& frames : frames_) frames->finish();
   file_.close();
   output_.commit();
   const std::filesystem::path& target = output_.target();
-  std::vector<XdmfPart> parts;
-  for (std::size_t i = 0; i < frames_.size(); ++i) parts.push_back({names_[i], frames_[i]->cells()});
-  write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"),
-                        xdmf_text(target, parts, frames_.front()->times()));
+  std::vector<XdmfPart> parts, drawn;
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    parts.push_back({names_[i], frames_[i]->cells()});
+    if (const std::optional<XdmfCells> cells = frames_[i]->render_cells()) drawn.push_back({names_[i], *cells});
+  }
+  const std::vector<double>& times = frames_.front()->times();
+  write_file_atomically(std::filesystem::path(target).replace_extension(".xdmf"), xdmf_text(target, parts, times));
+  if (drawn.empty()) return;
+  write_file_atomically(target.parent_path() / (target.stem().string() + "_render.xdmf"),
+                        xdmf_text(target, drawn, times));
 }
 
-double WorldTrajectoryWriter::largest_displacement() const {
+double TrajectoryWriter::largest_displacement() const {
   double largest = 0;
   for (const auto& frames : frames_) largest = std::max(largest, frames->largest_displacement());
   return largest;

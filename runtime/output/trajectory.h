@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,7 +47,7 @@ class BodyFrames {
 
   /// What an .xdmf shows of it: the tets, or the render mesh.
   XdmfCells cells() const;
-  XdmfCells render_cells() const;
+  std::optional<XdmfCells> render_cells() const;
 
   /// Of the frames so far [s].
   const std::vector<double>& times() const { return times_; }
@@ -69,52 +70,33 @@ class BodyFrames {
   double largest_displacement_ = 0;
 };
 
-/// Writes the trajectory of a body and an .xdmf beside it, and NAME_render.xdmf where the model holds /render.
-/// docs/bundle_format.md, "Trajectory". All appear under their names in finish() and not before; without it nothing is
-/// left. Two equal runs give the same bytes except /step_time.
-class TrajectoryWriter {
- public:
-  /// As BodyFrames. Throws WorkError.
-  TrajectoryWriter(const std::filesystem::path& path, const ReducedModel& model, const BodyFrame& frame,
-                   const TrajectoryInfo& info);
-
-  /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
-  void append(const State& state, const Energies& energies, double step_seconds) {
-    frames_->append(state, energies, step_seconds);
-  }
-
-  /// To be called after the last frame. Throws WorkError.
-  void finish();
-
-  /// Largest displacement of a vertex in the frames so far [m].
-  double largest_displacement() const { return frames_->largest_displacement(); }
-
- private:
-  const ReducedModel& model_;
-  AtomicFile output_;
-  Hdf5File file_;
-  std::unique_ptr<BodyFrames> frames_;
-};
-
-/// A body of a scene of several.
+/// A body whose frames a trajectory holds.
 struct NamedBody {
-  std::string name;
+  std::string name;  ///< of its group; empty: it is the only one, at the root
   const ReducedModel& model;
   const BodyFrame& frame;
   TrajectoryInfo info;
 };
 
-/// Writes the trajectory of several bodies, a group /bodies/NAME for each that holds what the root holds of one body,
-/// and an .xdmf of all of them beside it. Otherwise as TrajectoryWriter.
-class WorldTrajectoryWriter {
+/// Writes a trajectory: a group /bodies/NAME for each body, or the root of one without a name. Beside it an .xdmf of
+/// all of them, and NAME_render.xdmf where bodies have /render. docs/bundle_format.md, "Trajectory". All appear under
+/// their names in finish() and not before; without it nothing is left. Two equal runs give the same bytes except
+/// /step_time.
+class TrajectoryWriter {
  public:
-  /// One or more bodies, of the same number of frames. Throws WorkError.
-  WorldTrajectoryWriter(const std::filesystem::path& path, const std::vector<NamedBody>& bodies);
+  /// One or more bodies, of the same number of frames, as BodyFrames. Throws WorkError.
+  TrajectoryWriter(const std::filesystem::path& path, const std::vector<NamedBody>& bodies);
 
+  /// The next frame of a body. `step_seconds`: wall-clock time of the step that led to it.
   void append(std::size_t body, const State& state, const Energies& energies, double step_seconds) {
     frames_[body]->append(state, energies, step_seconds);
   }
+
+  /// To be called after the last frame. Throws WorkError.
   void finish();
+
+  std::size_t bodies() const { return frames_.size(); }
+  /// Largest displacement of a vertex in the frames so far [m].
   double largest_displacement() const;
 
  private:

@@ -21,7 +21,7 @@ exmat_report step(BodyObject& body, std::int64_t steps) {
     status = exmat_body_step(body.body.get(), steps, &report);
   }
   body.stepping = false;
-  detail::check(status);
+  check(status);
   return report;
 }
 
@@ -71,16 +71,16 @@ void take_weights(BodyObject& body, const py::object& weights, const py::object&
 // ---- copies
 
 py::tuple kept(BodyObject& body) {
-  return py::make_tuple(body.model.object(), state_of(body), kept_settings(body), kept_obstacles(body));
+  return py::make_tuple(body.model.object(), state_of(body), kept_settings(body), kept_obstacles(obstacles_of(body)));
 }
 
 Shared restored(const py::tuple& from) {
   auto body = std::make_shared<BodyObject>(ModelHold(from[0].cast<std::shared_ptr<ModelObject>>()));
   const auto obstacles = from[3].cast<py::dict>();
   set_settings(*body, from[2].cast<py::tuple>());
-  set_obstacles(*body, obstacles);
+  set_obstacles(obstacles_of(*body), obstacles);
   set_state(*body, from[1].cast<StateObject>());
-  set_obstacle_motions(*body, obstacles);
+  set_obstacle_motions(obstacles_of(*body), obstacles);
   return body;
 }
 
@@ -102,7 +102,8 @@ BodyClass bind_body(py::module_& module) {
       .def_property_readonly(
           "model", [](const BodyObject& body) { return body.model.object(); }, "The model that it is of.")
       .def("step", &step, py::arg("n") = 1,
-           "Takes `n` >= 0 steps. Returns their Report. Raises NonFinite where a step meets NaN or infinity: the body "
+           "Takes `n` >= 0 steps of a body that is in no world. Returns their Report. Raises NonFinite where a step "
+           "meets NaN or infinity: the body "
            "is "
            "then as it was before that step.")
       .def_property_readonly(
@@ -156,11 +157,24 @@ BodyClass bind_body(py::module_& module) {
           [](BodyObject& body, const exmat_motion& motion) { body.get().set_motion(motion); },
           "Motion as a whole. To be set of free bodies alone.")
       .def_property(
-          "state", [](BodyObject& body) { return state_of(body); }, &set_state,
+          "state", [](BodyObject& body) { return state_of(body); },
+          [](BodyObject& body, const StateObject& state) { set_state(body, state); },
           "The whole State, a copy; a State of the same bundle and time step to be set.")
       .def("set_gravity", &set_gravity, py::arg("gravity"),
            "Gravity of this body alone, three numbers [m/s^2]; after an abrupt change restart_integrator() keeps the "
            "impulse exact. reset() keeps it.")
+      .def("set_group", &set_group, py::arg("group"), py::arg("mask"),
+           "Says whom it touches: bodies and obstacles of which each one's mask has a bit of the other's group. 1 and "
+           "all "
+           "bits at first.")
+      .def_property_readonly(
+          "group",
+          [](BodyObject& body) {
+            std::uint32_t group = 0, mask = 0;
+            check(exmat_body_read_group(body.get().get(), &group, &mask));
+            return py::make_tuple(group, mask);
+          },
+          "Group and mask.")
       .def(
           "set_damping",
           [](BodyObject& body, double alpha, double beta) {

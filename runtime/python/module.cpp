@@ -11,7 +11,7 @@ PYBIND11_MODULE(_exmat, module) {
   bind_reports(module);
   bind_states(module);
   BodyClass body = bind_body(module);
-  bind_obstacles(module, body);
-  bind_world(module);
-  bind_touching_world(module);
+  WorldClass world = bind_world(module);
+  BatchClass batch = bind_batch(module);
+  bind_obstacles(module, body, world, batch);
 }

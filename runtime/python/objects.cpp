@@ -15,28 +15,11 @@ std::string shape_text(const py::ssize_t* shape, std::size_t dimensions) {
 
 BodyObject::BodyObject(Body made, ModelHold its_model)
     : own(made.release()), body(own.get()), model(std::move(its_model)) {
-  next_obstacle = exmat_body_obstacles(body.get());
+  obstacles.next = exmat_world_obstacles(body.world().get());
 }
 
-BodyObject::BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<World> its_world)
-    : world(std::move(its_world)), body(its_body), model(std::move(its_model)) {
-  next_obstacle = exmat_body_obstacles(body.get());
-}
-
-WorldObject::WorldObject(std::shared_ptr<ModelObject> its_model, BodyList its_bodies)
-    : model(std::move(its_model)), bodies(std::move(its_bodies)) {
-  for (const auto& body : bodies) handles.push_back(body->body.get());
-}
-
-void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles, std::int64_t steps, int threads) {
-  const Stepping stepping(bodies);
-  const auto count = static_cast<std::int64_t>(handles.size());
-  const exmat_status status = [&] {
-    const py::gil_scoped_release unlocked;
-    return exmat_bodies_step(handles.data(), count, steps, threads);
-  }();
-  detail::check(status);
-}
+BodyObject::BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<WorldHold> its_world)
+    : world(std::move(its_world)), body(its_body), model(std::move(its_model)) {}
 
 void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int64_t region) {
   BodyRef& target = body.get();
@@ -67,6 +50,11 @@ void set_damping(BodyObject& body, const std::array<double, 2>& alpha_and_beta) 
 void set_integrator(BodyObject& body, std::int32_t integrator) {
   body.get().set_integrator(integrator);
   body.integrator = integrator;
+}
+
+void set_group(BodyObject& body, std::uint32_t group, std::uint32_t mask) {
+  body.get().set_group(group, mask);
+  body.group = {group, mask};
 }
 
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region) {

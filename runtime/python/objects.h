@@ -69,10 +69,32 @@ struct ShapeObject {
   py::tuple arguments;          ///< that it was made of
 };
 
-/// One of a body's obstacles that its host added, moved or gave a law.
+/// One of a world's obstacles that its host added, moved or gave a law.
 struct HostedObstacle {
   std::shared_ptr<ShapeObject> shape;  ///< null: the scene's
   std::optional<exmat_motion> moved;   ///< by the last call that moved it
+};
+
+/// The obstacles of a world, as copies have to know them.
+struct ObstacleRecord {
+  std::map<std::int64_t, HostedObstacle> hosted;  ///< by id
+  std::int64_t next = 0;                          ///< no id that was given is this or above
+};
+
+/// A world and its obstacles; its bodies keep it.
+struct WorldHold {
+  explicit WorldHold(World its_world)
+      : world(std::move(its_world)), obstacles{{}, exmat_world_obstacles(world.get())} {}
+
+  /// Throws where another thread steps it.
+  World& get() {
+    if (stepping) throw Error(EXMAT_INVALID_ARGUMENT, "another thread steps this world");
+    return world;
+  }
+
+  World world;
+  ObstacleRecord obstacles;
+  bool stepping = false;
 };
 
 /// A factor of an example force that a body may have of its own.
@@ -82,7 +104,7 @@ struct BodyObject {
   explicit BodyObject(const ModelHold& its_model) : BodyObject(Body(its_model->model), its_model) {}
   BodyObject(Body made, ModelHold its_model);
   /// Of a world, which owns it.
-  BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<World> its_world);
+  BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<WorldHold> its_world);
 
   /// Throws where another thread steps it.
   BodyRef& get() {
@@ -90,8 +112,8 @@ struct BodyObject {
     return body;
   }
 
-  std::shared_ptr<World> world;  ///< that it is in; null: none
-  detail::Owner<exmat_body, exmat_body_destroy> own;
+  std::shared_ptr<WorldHold> world;  ///< that it was added to; null: none
+  Owner<exmat_body, exmat_body_destroy> own;
   BodyRef body;
   ModelHold model;
   bool stepping = false;
@@ -100,18 +122,35 @@ struct BodyObject {
   std::optional<std::array<double, 3>> gravity;                      ///< likewise
   std::optional<std::array<double, 2>> damping;                      ///< likewise
   std::optional<std::int32_t> integrator;                            ///< likewise
-  std::map<std::int64_t, HostedObstacle> obstacles;                  ///< by id
-  std::int64_t next_obstacle = 0;                                    ///< no id that was given is this or above
+  std::optional<std::array<std::uint32_t, 2>> group;                 ///< likewise, and its mask
+  ObstacleRecord obstacles;                                          ///< of a world of its own
 };
 
 using BodyList = std::vector<std::shared_ptr<BodyObject>>;
 
+struct WorldStateObject {
+  std::vector<double> numbers;
+  std::vector<std::string> shas;  ///< of the bodies' bundles
+
+  bool operator==(const WorldStateObject&) const = default;
+};
+
 struct WorldObject {
-  WorldObject(std::shared_ptr<ModelObject> its_model, BodyList its_bodies);
+  explicit WorldObject(World its_world) : hold(std::make_shared<WorldHold>(std::move(its_world))) {}
+
+  World& get() { return hold->get(); }
+
+  std::shared_ptr<WorldHold> hold;
+  std::map<std::int64_t, std::shared_ptr<BodyObject>> bodies;
+  std::int64_t next_id = 0;  ///< no id that was given is this or above
+  exmat_world_report report{};
+};
+
+/// Bodies of one model that are apart, with ids 0, 1, ...
+struct BatchObject : WorldObject {
+  BatchObject(std::shared_ptr<ModelObject> its_model, std::int64_t count);
 
   ModelHold model;
-  BodyList bodies;
-  std::vector<exmat_body*> handles;
 };
 
 /// Marks bodies as being stepped while it lives.
@@ -132,14 +171,25 @@ class Stepping {
   const BodyList& bodies_;
 };
 
-/// Steps them without the interpreter's lock.
-void step_bodies(const BodyList& bodies, const std::vector<exmat_body*>& handles, std::int64_t steps, int threads);
+/// Steps all bodies without the interpreter's lock.
+exmat_world_report step_world(WorldObject& world, std::int64_t steps, int threads);
+/// Back to the start at time 0.
+void reset_world(WorldObject& world);
+/// The body is the world's from now on.
+std::int64_t add_body(WorldObject& world, const std::shared_ptr<BodyObject>& body);
+BodyList bodies_of(const WorldObject& world);
+WorldStateObject state_of(WorldObject& world);
+void set_state(WorldObject& world, const WorldStateObject& state);
+/// All that a world carries and what was set, for pickle, and a world made in the same way that takes it.
+py::dict kept_world(WorldObject& world);
+void restore_world(WorldObject& world, const py::dict& kept);
 
 /// Sets what a body has instead of its model, and remembers it.
 void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int64_t region);
 void set_gravity(BodyObject& body, const std::array<double, 3>& gravity);
 void set_damping(BodyObject& body, const std::array<double, 2>& alpha_and_beta);
 void set_integrator(BodyObject& body, std::int32_t integrator);
+void set_group(BodyObject& body, std::uint32_t group, std::uint32_t mask);
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region);
 
 StateObject state_of(BodyObject& body);
@@ -148,10 +198,23 @@ void set_state(BodyObject& body, const StateObject& state);
 /// What a body has of its own but for its state, for pickle, and a body that takes it.
 py::tuple kept_settings(BodyObject& body);
 void set_settings(BodyObject& body, const py::tuple& kept);
-py::dict kept_obstacles(BodyObject& body);
-void set_obstacles(BodyObject& body, const py::dict& kept);
+
+/// The world of a body or of a world object, and its obstacles.
+struct ObstacleAccess {
+  WorldRef world;
+  ObstacleRecord& record;
+};
+/// To be read; throws where another thread steps it.
+ObstacleAccess obstacles_of(BodyObject& body);
+inline ObstacleAccess obstacles_of(WorldObject& world) { return {world.get(), world.hold->obstacles}; }
+/// To be changed: a body alone has obstacles of its own.
+ObstacleAccess own_obstacles_of(BodyObject& body);
+inline ObstacleAccess own_obstacles_of(WorldObject& world) { return obstacles_of(world); }
+
+py::dict kept_obstacles(const ObstacleAccess& from);
+void set_obstacles(const ObstacleAccess& to, const py::dict& kept);
 /// To be called after the state is set, with which obstacles stay where they are.
-void set_obstacle_motions(BodyObject& body, const py::dict& kept);
+void set_obstacle_motions(const ObstacleAccess& to, const py::dict& kept);
 
 /// A number that is one of `names`.
 std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names);
@@ -193,14 +256,16 @@ inline std::span<const double> read_span(const Numbers& array) {
 }
 
 using BodyClass = py::class_<BodyObject, std::shared_ptr<BodyObject>>;
+using WorldClass = py::class_<WorldObject, std::shared_ptr<WorldObject>>;
+using BatchClass = py::class_<BatchObject, std::shared_ptr<BatchObject>>;
 
 void bind_errors();
 void bind_model(py::module_& module);
 void bind_reports(py::module_& module);
 void bind_states(py::module_& module);
 BodyClass bind_body(py::module_& module);
-void bind_obstacles(py::module_& module, BodyClass& body);
-void bind_world(py::module_& module);
-void bind_touching_world(py::module_& module);
+WorldClass bind_world(py::module_& module);
+BatchClass bind_batch(py::module_& module);
+void bind_obstacles(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch);
 
 }  // namespace exmat::python

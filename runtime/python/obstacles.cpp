@@ -159,53 +159,60 @@ void bind_obstacle(py::module_& module) {
           "motion", [](const ObstacleObject& read) { return read.motion; }, "Of its frame, at the body's time.");
 }
 
-ObstacleObject read_obstacle(BodyObject& body, std::int64_t id) {
-  return {body.get().obstacle(id), body.body.obstacle_motion(id)};
+ObstacleObject read_obstacle(const ObstacleAccess& of, std::int64_t id) {
+  return {of.world.obstacle(id), of.world.obstacle_motion(id)};
 }
 
-std::int64_t add_obstacle(BodyObject& body, const SharedShape& shape, double stiffness, double damping, double friction,
+struct Law {
+  double stiffness = 0, damping = 0, friction = 0;
+  std::uint32_t group = 1, mask = ~0U;
+};
+
+std::int64_t add_obstacle(ObstacleAccess to, const SharedShape& shape, const Law& law,
                           const std::optional<exmat_motion>& motion) {
   exmat_obstacle obstacle = shape->description;
-  obstacle.stiffness = stiffness;
-  obstacle.damping = damping;
-  obstacle.friction = friction;
-  BodyRef& to = body.get();
-  const std::int64_t id = shape->arrays ? to.add_shape(*shape->arrays, obstacle) : to.add_obstacle(obstacle);
-  body.next_obstacle = id + 1;
+  obstacle.stiffness = law.stiffness;
+  obstacle.damping = law.damping;
+  obstacle.friction = law.friction;
+  obstacle.group = law.group;
+  obstacle.mask = law.mask;
+  const std::int64_t id =
+      shape->arrays ? to.world.add_shape(*shape->arrays, obstacle) : to.world.add_obstacle(obstacle);
+  to.record.next = id + 1;
   try {
-    if (motion) to.move_obstacle(id, *motion);
+    if (motion) to.world.move_obstacle(id, *motion);
   } catch (...) {
-    to.remove_obstacle(id);
+    to.world.remove_obstacle(id);
     throw;
   }
-  body.obstacles[id] = {shape, motion};
+  to.record.hosted[id] = {shape, motion};
   return id;
 }
 
-void remove_obstacle(BodyObject& body, std::int64_t id) {
-  body.get().remove_obstacle(id);
-  body.obstacles.erase(id);
+void remove_obstacle(ObstacleAccess from, std::int64_t id) {
+  from.world.remove_obstacle(id);
+  from.record.hosted.erase(id);
 }
 
-void move_obstacle(BodyObject& body, std::int64_t id, const exmat_motion& motion) {
-  body.get().move_obstacle(id, motion);
-  body.obstacles[id].moved = motion;
+void move_obstacle(ObstacleAccess of, std::int64_t id, const exmat_motion& motion) {
+  of.world.move_obstacle(id, motion);
+  of.record.hosted[id].moved = motion;
 }
 
-void set_obstacle_law(BodyObject& body, std::int64_t id, std::optional<double> stiffness, std::optional<double> damping,
-                      std::optional<double> friction) {
-  const exmat_obstacle now = body.get().obstacle(id);
-  body.body.set_obstacle_law(id, stiffness.value_or(now.stiffness), damping.value_or(now.damping),
-                             friction.value_or(now.friction));
+void set_obstacle_law(ObstacleAccess of, std::int64_t id, std::optional<double> stiffness,
+                      std::optional<double> damping, std::optional<double> friction) {
+  const exmat_obstacle now = of.world.obstacle(id);
+  of.world.set_obstacle_law(id, stiffness.value_or(now.stiffness), damping.value_or(now.damping),
+                            friction.value_or(now.friction));
 }
 
-py::array_t<std::int64_t> obstacle_ids(BodyObject& body) {
-  const std::vector<std::int64_t> ids = body.get().obstacle_ids();
+py::array_t<std::int64_t> obstacle_ids(const ObstacleAccess& of) {
+  const std::vector<std::int64_t> ids = of.world.obstacle_ids();
   return py::array_t<std::int64_t>(static_cast<py::ssize_t>(ids.size()), ids.data());
 }
 
-py::array_t<double> obstacle_triangles(BodyObject& body, std::int64_t id) {
-  const std::vector<double> corners = body.get().obstacle_triangles(id);
+py::array_t<double> obstacle_triangles(const ObstacleAccess& of, std::int64_t id) {
+  const std::vector<double> corners = of.world.obstacle_triangles(id);
   return py::array_t<double>({static_cast<py::ssize_t>(corners.size() / 9), py::ssize_t{3}, py::ssize_t{3}},
                              corners.data());
 }
@@ -235,11 +242,11 @@ py::object kept_motion(const HostedObstacle& hosted, const ObstacleObject& now) 
 }
 
 /// Ids up to `id` are given to nobody else.
-void skip_obstacles(BodyObject& body, std::int64_t id) {
-  while (body.next_obstacle < id) {
-    const std::int64_t skipped = body.body.add_obstacle(default_obstacle());
-    body.body.remove_obstacle(skipped);
-    body.next_obstacle = skipped + 1;
+void skip_obstacles(ObstacleAccess of, std::int64_t id) {
+  while (of.record.next < id) {
+    const std::int64_t skipped = of.world.add_obstacle(default_obstacle());
+    of.world.remove_obstacle(skipped);
+    of.record.next = skipped + 1;
   }
 }
 
@@ -260,71 +267,139 @@ exmat_motion read_motion_tuple(const py::tuple& kept) {
   return motion;
 }
 
-py::dict kept_obstacles(BodyObject& body) {
+ObstacleAccess obstacles_of(BodyObject& body) {
+  body.get();
+  if (body.world) return {body.world->get(), body.world->obstacles};
+  return {body.body.world(), body.obstacles};
+}
+
+ObstacleAccess own_obstacles_of(BodyObject& body) {
+  if (body.world)
+    throw Error(EXMAT_INVALID_ARGUMENT, "the body is in a world: its obstacles are added, moved and removed there");
+  return obstacles_of(body);
+}
+
+py::dict kept_obstacles(const ObstacleAccess& from) {
   py::list kept;
-  for (const std::int64_t id : body.get().obstacle_ids()) {
-    const ObstacleObject now = read_obstacle(body, id);
-    const auto hosted = body.obstacles.find(id);
-    const HostedObstacle known = hosted != body.obstacles.end() ? hosted->second : HostedObstacle{};
+  for (const std::int64_t id : from.world.obstacle_ids()) {
+    const ObstacleObject now = read_obstacle(from, id);
+    const auto hosted = from.record.hosted.find(id);
+    const HostedObstacle known = hosted != from.record.hosted.end() ? hosted->second : HostedObstacle{};
     kept.append(py::make_tuple(id, known.shape, now.description.stiffness, now.description.damping,
-                               now.description.friction, kept_motion(known, now)));
+                               now.description.friction, now.description.group, now.description.mask,
+                               kept_motion(known, now)));
   }
   py::dict result;
   result["obstacles"] = kept;
-  result["next"] = body.next_obstacle;
+  result["next"] = from.record.next;
   return result;
 }
 
-void set_obstacles(BodyObject& body, const py::dict& kept) {
-  std::vector<std::int64_t> of_scene = body.get().obstacle_ids();
+void set_obstacles(const ObstacleAccess& to, const py::dict& kept) {
+  WorldRef world = to.world;
+  std::vector<std::int64_t> of_scene = world.obstacle_ids();
   for (const py::handle entry : kept["obstacles"].cast<py::list>()) {
     const auto obstacle = entry.cast<py::tuple>();
     const auto id = obstacle[0].cast<std::int64_t>();
     const auto shape = obstacle[1].cast<SharedShape>();
-    const double law[] = {obstacle[2].cast<double>(), obstacle[3].cast<double>(), obstacle[4].cast<double>()};
+    const Law law{obstacle[2].cast<double>(), obstacle[3].cast<double>(), obstacle[4].cast<double>(),
+                  obstacle[5].cast<std::uint32_t>(), obstacle[6].cast<std::uint32_t>()};
     std::erase(of_scene, id);
     if (shape == nullptr) {
-      body.body.set_obstacle_law(id, law[0], law[1], law[2]);
+      world.set_obstacle_law(id, law.stiffness, law.damping, law.friction);
       continue;
     }
-    skip_obstacles(body, id);
-    add_obstacle(body, shape, law[0], law[1], law[2], std::nullopt);
+    skip_obstacles(to, id);
+    add_obstacle(to, shape, law, std::nullopt);
   }
-  for (const std::int64_t id : of_scene) body.body.remove_obstacle(id);
-  skip_obstacles(body, kept["next"].cast<std::int64_t>());
+  for (const std::int64_t id : of_scene) world.remove_obstacle(id);
+  skip_obstacles(to, kept["next"].cast<std::int64_t>());
 }
 
-void set_obstacle_motions(BodyObject& body, const py::dict& kept) {
+void set_obstacle_motions(const ObstacleAccess& to, const py::dict& kept) {
   for (const py::handle entry : kept["obstacles"].cast<py::list>()) {
     const auto obstacle = entry.cast<py::tuple>();
-    if (!obstacle[5].is_none())
-      move_obstacle(body, obstacle[0].cast<std::int64_t>(), read_motion_tuple(obstacle[5].cast<py::tuple>()));
+    if (!obstacle[7].is_none())
+      move_obstacle(to, obstacle[0].cast<std::int64_t>(), read_motion_tuple(obstacle[7].cast<py::tuple>()));
   }
 }
 
-void bind_obstacles(py::module_& module, BodyClass& body) {
+namespace {
+
+/// Functions of a body alone, of a world and of a batch.
+template <typename Class>
+void bind_obstacle_functions(Class& type, const char* whose) {
+  using Owner = typename Class::type;
+  type.def(
+          "add_obstacle",
+          [](Owner& owner, const SharedShape& shape, double stiffness, double damping, double friction,
+             const std::optional<exmat_motion>& motion, std::uint32_t group, std::uint32_t mask) {
+            return add_obstacle(own_obstacles_of(owner), shape, {stiffness, damping, friction, group, mask}, motion);
+          },
+          py::arg("shape"), py::kw_only(), py::arg("stiffness") = 1e6, py::arg("damping") = 0.0,
+          py::arg("friction") = 0.0, py::arg("motion") = py::none(), py::arg("group") = 1U, py::arg("mask") = ~0U,
+          whose)
+      .def(
+          "remove_obstacle", [](Owner& owner, std::int64_t id) { remove_obstacle(own_obstacles_of(owner), id); },
+          py::arg("id"), "Lets go of what it held by friction.")
+      .def(
+          "move_obstacle",
+          [](Owner& owner, std::int64_t id, const exmat_motion& motion) {
+            move_obstacle(own_obstacles_of(owner), id, motion);
+          },
+          py::arg("id"), py::arg("motion"),
+          "Says where its frame is now, and how it moves on from here until it is moved again. What touches is carried "
+          "along by the velocities and not by a jump of the pose.")
+      .def(
+          "set_obstacle_law",
+          [](Owner& owner, std::int64_t id, std::optional<double> stiffness, std::optional<double> damping,
+             std::optional<double> friction) {
+            set_obstacle_law(own_obstacles_of(owner), id, stiffness, damping, friction);
+          },
+          py::arg("id"), py::kw_only(), py::arg("stiffness") = py::none(), py::arg("damping") = py::none(),
+          py::arg("friction") = py::none(), "None leaves a number as it is.")
+      .def_property_readonly(
+          "obstacles", [](Owner& owner) { return obstacle_ids(obstacles_of(owner)); },
+          "Numbers of all obstacles, the scene's and those added, shape (count,), ascending. A copy.")
+      .def(
+          "obstacle", [](Owner& owner, std::int64_t id) { return read_obstacle(obstacles_of(owner), id); },
+          py::arg("id"), "An Obstacle: what it is, its law and where it is now.")
+      .def(
+          "obstacle_triangles",
+          [](Owner& owner, std::int64_t id) { return obstacle_triangles(obstacles_of(owner), id); }, py::arg("id"),
+          "Corners of the triangles of a mesh or height field in the obstacle's frame, shape (f, 3, 3) [m]; (0, 3, 3) "
+          "of other shapes. A copy.");
+}
+
+template <typename Owner>
+py::tuple obstacle_load(Owner& owner, std::int64_t id) {
+  Vector3 force, torque;
+  owner.get().read_obstacle_load(id, force.data(), torque.data());
+  return py::make_tuple(array_of(force.data(), 3), array_of(torque.data(), 3));
+}
+
+constexpr const char* kAddObstacle =
+    "An obstacle that its frame's `motion` places; its number, which no later one gets. Pressure per depth [N/m^3], "
+    "pressure per approach velocity [N s/m^3], Coulomb's coefficient; `group` and `mask` as Body.set_group(). The "
+    "model "
+    "has to know of contact: use_contact, or a scene with obstacles.";
+constexpr const char* kObstacleLoad =
+    "Contacts of all bodies with an obstacle in the last call that stepped, as a constant force and torque on it, "
+    "about "
+    "its frame's origin, shapes (3,) [N] and (3,) [N m].";
+
+}  // namespace
+
+void bind_obstacles(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch) {
   PYBIND11_NUMPY_DTYPE(exmat_contact, vertex, obstacle, position, normal, force, depth);
   bind_shape(module);
   bind_obstacle(module);
-  body.def("add_obstacle", &add_obstacle, py::arg("shape"), py::kw_only(), py::arg("stiffness") = 1e6,
-           py::arg("damping") = 0.0, py::arg("friction") = 0.0, py::arg("motion") = py::none(),
-           "An obstacle of this body alone, which its frame's `motion` places; its number, which no later one gets. "
-           "Pressure per depth [N/m^3], pressure per approach velocity [N s/m^3], Coulomb's coefficient. The model has "
-           "to know of contact: use_contact, or a scene with obstacles.")
-      .def("remove_obstacle", &remove_obstacle, py::arg("id"), "What it held by friction is let go.")
-      .def("move_obstacle", &move_obstacle, py::arg("id"), py::arg("motion"),
-           "Where its frame is now, and how it moves on from here until it is moved again. What touches is carried "
-           "along by the velocities and not by a jump of the pose.")
-      .def("set_obstacle_law", &set_obstacle_law, py::arg("id"), py::kw_only(), py::arg("stiffness") = py::none(),
-           py::arg("damping") = py::none(), py::arg("friction") = py::none(), "What is None stays.")
-      .def_property_readonly(
-          "obstacles", &obstacle_ids,
-          "Numbers of all obstacles, the scene's and those added, shape (count,), ascending. A copy.")
-      .def("obstacle", &read_obstacle, py::arg("id"), "An Obstacle: what it is, its law and where it is now.")
-      .def("obstacle_triangles", &obstacle_triangles, py::arg("id"),
-           "Corners of the triangles of a mesh or height field in the obstacle's frame, shape (f, 3, 3) [m]; (0, 3, 3) "
-           "of other shapes. A copy.")
-      .def_property_readonly(
+  bind_obstacle_functions(body, kAddObstacle);
+  bind_obstacle_functions(world, kAddObstacle);
+  bind_obstacle_functions(batch, kAddObstacle);
+  world.def("obstacle_load", &obstacle_load<WorldObject>, py::arg("id"), kObstacleLoad);
+  batch.def("obstacle_load", &obstacle_load<BatchObject>, py::arg("id"), kObstacleLoad);
+  body.def_property_readonly(
           "contacts", &contacts,
           "Vertices that touched obstacles at the end of the last step, a structured array of shape (count,): vertex, "
           "obstacle, position [m], normal (away from the obstacle), force on the body [N] and depth [m]. A copy.")

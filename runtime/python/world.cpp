@@ -1,238 +1,354 @@
+#include <algorithm>
 #include <pybind11/stl.h>
 
 #include "runtime/python/objects.h"
 
+// Worlds: world.hpp for Python.
+
 namespace exmat::python {
 namespace {
 
+using SharedBody = std::shared_ptr<BodyObject>;
+
 using Shared = std::shared_ptr<WorldObject>;
 
-py::ssize_t count(const WorldObject& world) { return static_cast<py::ssize_t>(world.bodies.size()); }
-py::ssize_t modes(const WorldObject& world) { return static_cast<py::ssize_t>(world.model->modes); }
-
-Shared make_world(std::shared_ptr<ModelObject> model, std::int64_t count) {
-  if (count < 1) throw Error(EXMAT_INVALID_ARGUMENT, "count: expected at least 1");
-  std::vector<Body> made;
-  {
-    const py::gil_scoped_release unlocked;
-    for (std::int64_t i = 0; i < count; ++i) made.emplace_back(model->model);
-  }
-  const ModelHold hold(model);
-  BodyList bodies;
-  for (Body& body : made) bodies.push_back(std::make_shared<BodyObject>(std::move(body), hold));
-  return std::make_shared<WorldObject>(std::move(model), std::move(bodies));
+template <typename Make>
+Shared made(const Make& make) {
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<WorldObject>(make());
 }
 
-void step(WorldObject& world, std::int64_t steps, int threads) {
-  step_bodies(world.bodies, world.handles, steps, threads);
+Shared empty_world(double stiffness, double damping, double friction, bool self_contact) {
+  exmat_contact_law law = default_contact_law();
+  law.stiffness = stiffness;
+  law.damping = damping;
+  law.friction = friction;
+  law.self = self_contact ? 1 : 0;
+  return made([&] { return World(law); });
 }
 
-/// The bodies of a sequence; the list keeps them.
-BodyList list_of(const py::sequence& bodies) {
-  BodyList list;
-  for (std::size_t i = 0; i < bodies.size(); ++i)
-    list.push_back(py::object(bodies[i]).cast<std::shared_ptr<BodyObject>>());
-  return list;
+Shared of_scene(const std::string& path) {
+  return made([&] { return World::from_scene(path); });
 }
 
-std::vector<exmat_body*> handles_of(const BodyList& bodies) {
-  std::vector<exmat_body*> handles;
-  for (const auto& body : bodies) handles.push_back(body->get().get());
-  return handles;
-}
-
-void step_list(const py::sequence& bodies, std::int64_t steps, int threads) {
-  const BodyList list = list_of(bodies);
-  step_bodies(list, handles_of(list), steps, threads);
+Shared of_text(const std::string& scene, const std::string& path) {
+  return made([&] { return World::from_text(scene, path); });
 }
 
 std::uint64_t hash_of(const py::sequence& bodies) {
-  const BodyList list = list_of(bodies);
-  const std::vector<exmat_body*> handles = handles_of(list);
+  std::vector<exmat_body*> handles;
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const auto body = py::object(bodies[i]).cast<std::shared_ptr<BodyObject>>();
+    if (!body) throw Error(EXMAT_INVALID_ARGUMENT, "bodies: expected bodies, found None");
+    handles.push_back(body->get().get());
+  }
   std::uint64_t hash = 0;
-  detail::check(exmat_bodies_hash(handles.data(), static_cast<std::int64_t>(handles.size()), &hash));
+  check(exmat_bodies_hash(handles.data(), static_cast<std::int64_t>(handles.size()), &hash));
   return hash;
 }
 
-/// Rows of `width` numbers, one of each body, by read(body, span).
-template <typename Number, typename Read>
-py::array_t<Number> gather(WorldObject& world, const py::object& out, std::vector<py::ssize_t> shape,
-                           const Read& read) {
-  shape.insert(shape.begin(), count(world));
-  auto rows = target_array<Number>(out, shape);
-  const std::size_t width = static_cast<std::size_t>(rows.size()) / world.bodies.size();
-  Number* row = rows.mutable_data();
-  for (const auto& body : world.bodies) {
-    read(body->get(), std::span<Number>(row, width));
-    row += width;
-  }
-  return rows;
+// ---- bodies
+
+std::shared_ptr<ModelObject> model_of_kind(WorldObject& world, std::int64_t kind) {
+  for (const std::int64_t id : world.get().ids())
+    if (world.hold->world.kind(id) == kind) return std::make_shared<ModelObject>(world.hold->world.body(id).model());
+  throw Error(EXMAT_INVALID_ARGUMENT, "kind: the world has no such body");
 }
 
-py::array_t<double> displacements(WorldObject& world, const py::object& out) {
-  return gather<double>(world, out, {modes(world)},
-                        [](BodyRef& body, std::span<double> row) { body.read_displacement(row); });
+std::int64_t kinds(WorldObject& world) {
+  std::int64_t last = -1;
+  for (const std::int64_t id : world.get().ids()) last = std::max(last, world.hold->world.kind(id));
+  return last + 1;
 }
 
-py::array_t<double> velocities(WorldObject& world, const py::object& out) {
-  return gather<double>(world, out, {modes(world)},
-                        [](BodyRef& body, std::span<double> row) { body.read_velocity(row); });
-}
-
-py::array_t<double> weights(WorldObject& world) {
-  return gather<double>(world, py::none(), {static_cast<py::ssize_t>(world.model->examples)},
-                        [](BodyRef& body, std::span<double> row) { body.read_weights(row); });
-}
-
-py::array_t<double> energies(WorldObject& world) {
-  return gather<double>(world, py::none(), {3}, [](BodyRef& body, std::span<double> row) {
-    const exmat_energies now = body.energies();
-    row[0] = now.kinetic;
-    row[1] = now.elastic;
-    row[2] = now.potential;
-  });
-}
-
-py::array_t<double> times(WorldObject& world) {
-  return gather<double>(world, py::none(), {}, [](BodyRef& body, std::span<double> row) { row[0] = body.time(); });
-}
-
-py::array_t<std::uint32_t> status(WorldObject& world) {
-  return gather<std::uint32_t>(world, py::none(), {},
-                               [](BodyRef& body, std::span<std::uint32_t> row) { row[0] = body.report().status; });
-}
-
-py::array_t<float> positions(WorldObject& world, const PointsObject& points, const py::object& out) {
-  return gather<float>(world, out, {static_cast<py::ssize_t>(points.count), 3},
-                       [&](BodyRef& body, std::span<float> row) { body.read_positions(points.points, row); });
-}
-
-void set_reduced(WorldObject& world, const Numbers& q, const Numbers& v) {
-  require_shape(q, "q", {count(world), modes(world)});
-  require_shape(v, "v", {count(world), modes(world)});
-  for (const auto& body : world.bodies) body->get();
-  const std::size_t width = world.model->modes;
-  for (std::size_t i = 0; i < world.bodies.size(); ++i)
-    world.bodies[i]->body.set_reduced(read_span(q).subspan(i * width, width), read_span(v).subspan(i * width, width));
-}
-
-/// Of shape (k, 3), the same for all, or (N, k, 3).
-void apply_forces(WorldObject& world, const PointsObject& points, const Numbers& forces) {
-  const auto k = static_cast<py::ssize_t>(points.count);
-  if (forces.ndim() == 2)
-    require_shape(forces, "forces", {k, 3});
-  else
-    require_shape(forces, "forces", {count(world), k, 3});
-  const std::size_t step = forces.ndim() == 2 ? 0 : 3 * points.count;
-  for (std::size_t i = 0; i < world.bodies.size(); ++i)
-    world.bodies[i]->get().apply_forces(points.points, read_span(forces).subspan(i * step, 3 * points.count));
-}
-
-void take_stiffness(WorldObject& world, const Numbers& kappa) {
-  if (kappa.ndim() > 0) require_shape(kappa, "kappa", {count(world)});
-  for (std::size_t i = 0; i < world.bodies.size(); ++i)
-    set_factor(*world.bodies[i], ExampleFactor::kStiffness, kappa.data()[kappa.ndim() > 0 ? i : 0], -1);
-}
-
-void take_weights(WorldObject& world, const py::object& given) {
-  if (given.is_none()) {
-    for (const auto& body : world.bodies) set_weights(*body, {}, -1);
-    return;
-  }
-  const auto rows = given.cast<Numbers>();
-  const auto width = static_cast<py::ssize_t>(world.model->examples);
-  if (rows.ndim() == 1)
-    require_shape(rows, "weights", {width});
-  else
-    require_shape(rows, "weights", {count(world), width});
-  for (std::size_t i = 0; i < world.bodies.size(); ++i) {
-    const double* row = rows.data() + (rows.ndim() == 1 ? 0 : static_cast<py::ssize_t>(i) * width);
-    set_weights(*world.bodies[i], {row, row + width}, -1);
+/// Of a world of a scene, which has the bodies but not yet their models' Python objects, by kind.
+void take_models(WorldObject& world, const std::vector<std::shared_ptr<ModelObject>>& models) {
+  for (const std::int64_t id : world.get().ids()) {
+    const auto kind = static_cast<std::size_t>(world.hold->world.kind(id));
+    world.bodies[id] = std::make_shared<BodyObject>(world.hold->world.body(id), ModelHold(models.at(kind)), world.hold);
+    world.next_id = id + 1;
   }
 }
 
-std::vector<StateObject> states(WorldObject& world) {
-  std::vector<StateObject> result;
-  for (const auto& body : world.bodies) result.push_back(state_of(*body));
-  return result;
+SharedBody body_at(WorldObject& world, std::int64_t id) {
+  const auto found = world.bodies.find(id);
+  if (found == world.bodies.end()) throw py::key_error("the world has no body " + std::to_string(id));
+  return found->second;
 }
 
-void set_states(WorldObject& world, const std::vector<StateObject>& given) {
-  if (given.size() != world.bodies.size()) throw Error(EXMAT_INVALID_ARGUMENT, "states: expected one for each body");
-  for (std::size_t i = 0; i < given.size(); ++i) set_state(*world.bodies[i], given[i]);
+SharedBody remove(WorldObject& world, std::int64_t id) {
+  World& from = world.get();
+  SharedBody body = body_at(world, id);
+  body->get();
+  body->own.reset(from.remove(id).release());
+  body->world = nullptr;
+  body->obstacles = {{}, exmat_world_obstacles(body->body.world().get())};
+  world.bodies.erase(id);
+  return body;
 }
 
-std::shared_ptr<BodyObject> body_at(WorldObject& world, py::ssize_t index) {
-  if (index < 0) index += count(world);
-  if (index < 0 || index >= count(world)) throw py::index_error("there is no such body");
-  return world.bodies[static_cast<std::size_t>(index)];
+py::array_t<std::int64_t> ids(const WorldObject& world) {
+  py::array_t<std::int64_t> ids(static_cast<py::ssize_t>(world.bodies.size()));
+  std::ranges::transform(world.bodies, ids.mutable_data(), [](const auto& member) { return member.first; });
+  return ids;
 }
 
-Shared restored(const py::tuple& kept) {
-  return std::make_shared<WorldObject>(kept[0].cast<std::shared_ptr<ModelObject>>(), kept[1].cast<BodyList>());
+// ---- steps, and what is read
+
+py::array_t<exmat_body_contact> contacts(WorldObject& world) {
+  const std::vector<exmat_body_contact> contacts = world.get().contacts();
+  return py::array_t<exmat_body_contact>(static_cast<py::ssize_t>(contacts.size()), contacts.data());
+}
+
+void set_law(WorldObject& world, std::optional<double> stiffness, std::optional<double> damping,
+             std::optional<double> friction) {
+  exmat_contact_law law = world.get().contact_law();
+  law.stiffness = stiffness.value_or(law.stiffness);
+  law.damping = damping.value_or(law.damping);
+  law.friction = friction.value_or(law.friction);
+  world.hold->world.set_contact_law(law);
+}
+
+void bind_world_state(py::module_& module) {
+  py::class_<WorldStateObject>(
+      module, "WorldState",
+      "All that the bodies of a world carry from step to step and what their contacts remember, copied. A world of as "
+      "many such bodies takes it and goes on to the last bit. It can be pickled and compared.")
+      .def_property_readonly(
+          "numbers",
+          [](const py::object& self) {
+            const auto& state = self.cast<const WorldStateObject&>();
+            return view(state.numbers.data(), state.numbers.size(), self);
+          },
+          "The state as numbers, shape (size,): read-only, without a copy.")
+      .def_readonly("input_sha256", &WorldStateObject::shas, "Of the bundle of each body, in the order of their ids.")
+      .def(
+          "__eq__", [](const WorldStateObject& state, const WorldStateObject& other) { return state == other; },
+          py::is_operator())
+      .def("__copy__", [](const WorldStateObject& state) { return state; })
+      .def(
+          "__deepcopy__", [](const WorldStateObject& state, const py::dict&) { return state; }, py::arg("memo"))
+      .def(py::pickle(
+          [](const WorldStateObject& state) {
+            return py::make_tuple(array_of(state.numbers.data(), state.numbers.size()), state.shas);
+          },
+          [](const py::tuple& kept) {
+            const auto numbers = kept[0].cast<Numbers>();
+            return WorldStateObject{{numbers.data(), numbers.data() + numbers.size()},
+                                    kept[1].cast<std::vector<std::string>>()};
+          }))
+      .attr("__hash__") = py::none();
+}
+
+// ---- copies
+
+void bind_copies(py::module_& module, WorldClass& type) {
+  using ModelClass = py::class_<ModelObject, std::shared_ptr<ModelObject>>;
+  py::reinterpret_borrow<ModelClass>(module.attr("Model"))
+      .def(py::init(&model_of_kind), py::arg("world"), py::arg("kind"));
+  type.def_property_readonly("_kinds", &kinds)
+      .def("_take_models", &take_models, py::arg("models"))
+      .def("_kept", &kept_world)
+      .def("_restore", &restore_world, py::arg("kept"));
 }
 
 }  // namespace
 
-void bind_world(py::module_& module) {
-  py::class_<WorldObject, Shared>(
-      module, "World",
-      "N bodies of one model, stepped together: arrays have N as their first dimension. No body touches another. "
-      "Results do not depend on the number of threads.")
-      .def(py::init(&make_world), py::arg("model"), py::arg("count"), "`count` = N >= 1 bodies, each at its start.")
-      .def_property_readonly(
-          "model", [](const WorldObject& world) { return world.model.object(); }, "The model that they are of.")
-      .def("__len__", &count)
-      .def("__getitem__", &body_at, py::arg("index"), "The Body of this index itself.")
+std::int64_t add_body(WorldObject& world, const SharedBody& body) {
+  World& to = world.get();
+  exmat_body* const handle = body->get().get();
+  std::int64_t id = -1;
+  const exmat_status status = [&] {
+    const py::gil_scoped_release unlocked;
+    return exmat_world_add_body(to.get(), handle, &id);
+  }();
+  check(status);
+  static_cast<void>(body->own.release());
+  body->world = world.hold;
+  world.bodies[id] = body;
+  world.next_id = id + 1;
+  return id;
+}
+
+BodyList bodies_of(const WorldObject& world) {
+  BodyList list;
+  for (const auto& [id, body] : world.bodies) list.push_back(body);
+  return list;
+}
+
+exmat_world_report step_world(WorldObject& world, std::int64_t steps, int threads) {
+  World& stepped = world.get();
+  const BodyList bodies = bodies_of(world);
+  const Stepping stepping(bodies);
+  exmat_world_report report{};
+  report.size = sizeof report;
+  world.hold->stepping = true;
+  const exmat_status status = [&] {
+    const py::gil_scoped_release unlocked;
+    return exmat_world_step(stepped.get(), steps, threads, &report);
+  }();
+  world.hold->stepping = false;
+  if (status == EXMAT_OK || status == EXMAT_NON_FINITE) world.report = report;
+  check(status);
+  return report;
+}
+
+void reset_world(WorldObject& world) {
+  for (const auto& [id, body] : world.bodies) body->get();
+  world.get().reset();
+}
+
+// ---- states
+
+namespace {
+
+std::vector<std::string> shas_of(const WorldObject& world) {
+  std::vector<std::string> shas;
+  for (const auto& [id, body] : world.bodies) shas.push_back(body->model->sha);
+  return shas;
+}
+
+}  // namespace
+
+WorldStateObject state_of(WorldObject& world) { return {world.get().state(), shas_of(world)}; }
+
+void set_state(WorldObject& world, const WorldStateObject& state) {
+  for (const auto& [id, body] : world.bodies) body->get();
+  if (state.shas != shas_of(world))
+    throw Error(EXMAT_INVALID_ARGUMENT,
+                "state: it is of bodies of other bundles; take a world of the bodies that it was read with");
+  world.get().set_state(state.numbers);
+}
+
+// ---- copies
+
+py::dict kept_world(WorldObject& world) {
+  const exmat_contact_law law = world.get().contact_law();
+  py::list bodies;
+  for (const auto& [id, body] : world.bodies) {
+    const bool of_scene = world.hold->world.kind(id) >= 0;
+    bodies.append(py::make_tuple(id, of_scene ? py::none() : body->model.object(), kept_settings(*body)));
+  }
+  py::dict result;
+  result["law"] = py::make_tuple(law.stiffness, law.damping, law.friction);
+  result["next"] = world.next_id;
+  result["bodies"] = bodies;
+  result["obstacles"] = kept_obstacles(obstacles_of(world));
+  result["state"] = state_of(world);
+  return result;
+}
+
+namespace {
+
+/// Ids up to `id` are given to nobody else: a body of this model comes and goes.
+void skip_ids(WorldObject& world, std::int64_t id, const ModelHold& model) {
+  while (world.next_id < id) {
+    const std::int64_t skipped = world.get().add(Body(model->model));
+    static_cast<void>(world.get().remove(skipped));
+    world.next_id = skipped + 1;
+  }
+}
+
+void restore_bodies(WorldObject& world, const py::list& kept) {
+  std::vector<std::int64_t> gone;
+  for (const auto& member : world.bodies) gone.push_back(member.first);
+  for (const py::handle entry : kept) {
+    const auto body = entry.cast<py::tuple>();
+    const auto id = body[0].cast<std::int64_t>();
+    if (std::erase(gone, id) == 0) {
+      const ModelHold model(body[1].cast<std::shared_ptr<ModelObject>>());
+      skip_ids(world, id, model);
+      add_body(world, std::make_shared<BodyObject>(model));
+    }
+    set_settings(*body_at(world, id), body[2].cast<py::tuple>());
+  }
+  for (const std::int64_t id : gone) remove(world, id);
+}
+
+}  // namespace
+
+void restore_world(WorldObject& world, const py::dict& kept) {
+  const auto law = kept["law"].cast<py::tuple>();
+  const auto bodies = kept["bodies"].cast<py::list>();
+  const auto obstacles = kept["obstacles"].cast<py::dict>();
+  set_law(world, law[0].cast<double>(), law[1].cast<double>(), law[2].cast<double>());
+  restore_bodies(world, bodies);
+  if (!world.bodies.empty()) skip_ids(world, kept["next"].cast<std::int64_t>(), world.bodies.begin()->second->model);
+  set_obstacles(obstacles_of(world), obstacles);
+  set_state(world, kept["state"].cast<const WorldStateObject&>());
+  set_obstacle_motions(obstacles_of(world), obstacles);
+}
+
+WorldClass bind_world(py::module_& module) {
+  PYBIND11_NUMPY_DTYPE(exmat_body_contact, body, other, vertex, position, normal, force, depth);
+  bind_world_state(module);
+  WorldClass type(module, "World", "The base of exmat.World.");
+  type.def(py::init(&empty_world), py::arg("stiffness"), py::arg("damping"), py::arg("friction"),
+           py::arg("self_contact"))
+      .def(py::init(&of_scene), py::arg("path"))
+      .def(py::init(&of_text), py::arg("scene"), py::arg("path"))
+      .def("__len__", [](const WorldObject& world) { return world.bodies.size(); })
       .def(
-          "step", &step, py::arg("n") = 1, py::arg("threads") = 0,
-          "Takes `n` steps of each body by up to `threads` threads, 0: one for each processor. Raises NonFinite, which "
-          "names the first such body; the others have taken all their steps.")
-      .def_property_readonly(
-          "q", [](WorldObject& world) { return displacements(world, py::none()); },
-          "Reduced displacements, shape (N, r) [kg^(1/2) m]. A copy.")
-      .def_property_readonly(
-          "v", [](WorldObject& world) { return velocities(world, py::none()); },
-          "Reduced velocities, shape (N, r) [kg^(1/2) m/s]. A copy.")
-      .def("displacements", &displacements, py::arg("out") = py::none(), "As q, into `out` (N, r) float64.")
-      .def("velocities", &velocities, py::arg("out") = py::none(), "As v, into `out` (N, r) float64.")
-      .def_property_readonly("weights", &weights, "Weights of the examples, shape (N, K). A copy.")
-      .def_property_readonly("energies", &energies, "Kinetic, elastic and potential, shape (N, 3) [J]. A copy.")
-      .def_property_readonly("time", &times, "Shape (N,) [s]. A copy.")
-      .def_property_readonly("status", &status, "Bits of Report.status of the last call, shape (N,), uint32. A copy.")
-      .def("positions", &positions, py::arg("points"), py::arg("out") = py::none(),
-           "World positions of k points, shape (N, k, 3), float32 [m], into `out` or a new array.")
-      .def("set_reduced", &set_reduced, py::arg("q"), py::arg("v"),
-           "Each body as Body.set_reduced(), by the rows of `q` and `v`, shapes (N, r).")
+          "__contains__", [](const WorldObject& world, std::int64_t id) { return world.bodies.contains(id); },
+          py::arg("id"))
+      .def("__getitem__", &body_at, py::arg("id"), "The Body of this id itself.")
       .def(
-          "reset",
-          [](WorldObject& world) {
-            for (const auto& body : world.bodies) body->get().reset();
+          "__iter__", [](const WorldObject& world) { return py::iter(ids(world).attr("tolist")()); },
+          "Over the ids, ascending.")
+      .def_property_readonly("ids", &ids, "Of all bodies, shape (N,), ascending. A copy.")
+      .def_property_readonly("bodies", &bodies_of, "All bodies, in the order of their ids: a list of the Body of each.")
+      .def("add", &add_body, py::arg("body"),
+           "The body is the world's from now on, as it is and where it is: its id, which no later one gets. What it "
+           "overlaps pushes it out. Its functions serve as before, but for those that step it.")
+      .def("remove", &remove, py::arg("id"), "Takes a body out and returns it.")
+      .def(
+          "name",
+          [](WorldObject& world, std::int64_t id) {
+            body_at(world, id);
+            return world.get().name(id);
           },
-          "All back to their start at time 0.")
-      .def("apply_forces", &apply_forces, py::arg("points"), py::arg("forces"),
-           "Forces [N] on k points as Body.apply_forces(): of shape (N, k, 3), or (k, 3) for all alike.")
+          py::arg("id"), "Of a body of a scene, with its number where there are several: \"teddy_12\"; else \"\".")
       .def(
-          "clear_forces",
-          [](WorldObject& world) {
-            for (const auto& body : world.bodies) body->get().clear_forces();
+          "kind",
+          [](WorldObject& world, std::int64_t id) {
+            body_at(world, id);
+            return world.get().kind(id);
           },
-          "Ends all applied forces.")
-      .def("set_example_stiffness", &take_stiffness, py::arg("kappa"),
-           "kappa [1/s^2] of each body, shape (N,), or one for all.")
-      .def("set_example_weights", &take_weights, py::arg("weights"),
-           "Weights as Body.set_example_weights(), shape (N, K), or (K,) for all; None: those of the poses again.")
-      .def_property("states", &states, &set_states, "The State of each body, a list of N copies; likewise to be set.")
-      .def(py::pickle([](const WorldObject& world) { return py::make_tuple(world.model.object(), world.bodies); },
-                      &restored));
-  module.def(
-      "step", &step_list, py::arg("bodies"), py::arg("n") = 1, py::arg("threads") = 0,
-      "Takes `n` steps of each of some different bodies, of any models, by up to `threads` threads, 0: one for each "
-      "processor. Raises as World.step().");
+          py::arg("id"), "Of a body of a scene its place among the scene's \"bodies\"; -1 of one that was added.")
+      .def_property_readonly(
+          "contact_law", [](WorldObject& world) { return world.get().contact_law(); },
+          "How bodies touch: a ContactLaw.")
+      .def("set_contact_law", &set_law, py::kw_only(), py::arg("stiffness") = py::none(),
+           py::arg("damping") = py::none(), py::arg("friction") = py::none(), "What is None stays.")
+      .def("step", &step_world, py::arg("n") = 1, py::arg("threads") = 0,
+           "Takes `n` steps of all bodies by up to `threads` threads, 0: one for each processor; the results do not "
+           "depend on their number. Returns a WorldReport. Raises NonFinite, which names the first such body: it and "
+           "what touches it are as they were before that step.")
+      .def_property_readonly(
+          "report", [](WorldObject& world) { return world.get(), world.report; },
+          "WorldReport of the last call that stepped, also where it raised.")
+      .def_property_readonly(
+          "contacts", &contacts,
+          "Vertices that touched another body, or their own, at the end of the last step, a structured array of shape "
+          "(count,): body, other (ids), vertex, position [m], normal (away from the other), force on the body [N] and "
+          "depth [m]. A copy.")
+      .def_property_readonly(
+          "energies", [](WorldObject& world) { return world.get().energies(); }, "Of all bodies together.")
+      .def_property_readonly(
+          "state_hash", [](WorldObject& world) { return world.get().hash(); }, "As state_hash(world.bodies).")
+      .def("reset", &reset_world, "All bodies back to their start at time 0, without applied forces.")
+      .def_property_readonly(
+          "time", [](WorldObject& world) { return world.get().time(); }, "That of all its bodies [s].")
+      .def_property(
+          "state", [](WorldObject& world) { return state_of(world); },
+          [](WorldObject& world, const WorldStateObject& state) { set_state(world, state); },
+          "The whole WorldState, a copy; likewise to be set.");
   module.def(
       "state_hash", &hash_of, py::arg("bodies"),
       "Hash over the bits of the states of some bodies, in order: as a hexadecimal number of 16 digits it is the state "
       "hash that `exmat-runtime run` prints.");
+  bind_copies(module, type);
+  return type;
 }
 
 }  // namespace exmat::python

@@ -84,12 +84,24 @@ RigidMotion make_motion(const std::vector<KeyframeConfig>& keys) {
   return RigidMotion(frames);
 }
 
-std::vector<Obstacle> make_obstacles(const SceneConfig& config) {
-  std::vector<Obstacle> obstacles;
-  for (const ObstacleConfig& obstacle : config.obstacles)
-    obstacles.push_back({std::visit([](const auto& shape) { return make_shape(shape); }, obstacle.shape),
-                         make_motion(obstacle.motion), obstacle.stiffness, obstacle.damping, obstacle.friction});
+Obstacles make_obstacles(const std::vector<ObstacleConfig>& configs) {
+  Obstacles obstacles;
+  for (const ObstacleConfig& obstacle : configs)
+    obstacles.push_back(Obstacle{std::visit([](const auto& shape) { return make_shape(shape); }, obstacle.shape),
+                                 make_motion(obstacle.motion), obstacle.stiffness, obstacle.damping, obstacle.friction,
+                                 obstacle.meeting});
   return obstacles;
+}
+
+Obstacles obstacles_of(const MeetingGroup& body, const Obstacles& all) {
+  Obstacles met;
+  std::ranges::copy_if(all, std::back_inserter(met),
+                       [&](const SharedObstacle& obstacle) { return obstacle->meeting.meets(body); });
+  return met;
+}
+
+Obstacles make_obstacles(const SceneConfig& config) {
+  return obstacles_of(config.meeting, make_obstacles(config.obstacles));
 }
 
 void check_body(const SceneConfig& config, bool constrained) {

@@ -12,7 +12,11 @@ RigidMotion make_motion(const std::vector<KeyframeConfig>& keys);
 
 /// Reads the files of meshes and height fields. Throws InputError where one is not what it is to be: a mesh without
 /// thickness has to be closed.
-std::vector<Obstacle> make_obstacles(const SceneConfig& config);
+Obstacles make_obstacles(const std::vector<ObstacleConfig>& configs);
+/// Those of them that a body meets.
+Obstacles obstacles_of(const MeetingGroup& body, const Obstacles& all);
+/// Those that the body of the scene meets.
+Obstacles make_obstacles(const SceneConfig& config);
 
 /// Throws InputError where the scene gives a constrained body a rigid state or a free one a motion.
 void check_body(const SceneConfig& config, bool constrained);

@@ -123,7 +123,7 @@ ExampleSettings example_settings(const ExampleForceConfig& config) {
   return settings;
 }
 
-StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
+StepScene step_scene(const SceneConfig& config, const Obstacles* obstacles, LoadedScene& loaded) {
   StepScene scene;
   scene.time_step = config.time_step;
   scene.integrator = config.integrator;
@@ -132,8 +132,8 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
   scene.precision = config.precision;
   scene.sleep = {config.sleep.energy, config.sleep.time};
-  scene.obstacles = make_obstacles(config);
-  scene.meets_bodies = config.meets_bodies;
+  scene.meeting = config.meeting;
+  scene.obstacles = obstacles != nullptr ? obstacles_of(config.meeting, *obstacles) : make_obstacles(config);
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
@@ -146,7 +146,7 @@ StepScene step_scene(const SceneConfig& config, LoadedScene& loaded) {
 State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   const Eigen::Index modes = loaded.model->modes();
   State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
-  prepare_contacts(*loaded.model, config.obstacles.size(), state);
+  prepare_contacts(*loaded.model, loaded.scene.obstacles.size(), state);
   const BodyFrame& frame = *loaded.model->frame;
   FrameWorkspace workspace = frame.make_workspace();
   frame.follow(loaded.scene, state.time, state.q, state.v, workspace, state.frame);
@@ -219,7 +219,7 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
 
 }  // namespace
 
-LoadedScene load_run(const SceneConfig& config) {
+LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   LoadedScene loaded;
   loaded.summary = summarise_bundle(config.bundle);
   check_body(config, loaded.summary.constrained);
@@ -239,7 +239,7 @@ LoadedScene load_run(const SceneConfig& config) {
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   loaded.model = prepare(config, loaded.data);
   loaded.keys = make_keys(config, *loaded.model);
-  loaded.scene = step_scene(config, loaded);
+  loaded.scene = step_scene(config, obstacles, loaded);
   loaded.start = start_state(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
   loaded.poses = named_poses(loaded);

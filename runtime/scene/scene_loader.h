@@ -35,7 +35,8 @@ struct LoadedScene {
 /// Reads of the bundle what the scene needs, no more: positions only if it writes a trajectory. Throws InputError: a
 /// group that the scene needs and the bundle lacks, a vertex out of range, an example that inverts an
 /// element.
-LoadedScene load_run(const SceneConfig& config);
+/// `obstacles`: those of the scene, where bodies share them; else they are made anew.
+LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles = nullptr);
 
 /// The plan of the step: one line for each stage, with its sizes, or why it is left out. docs/overview.md.
 std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneConfig& config);

@@ -1,128 +1,202 @@
 #include "runtime/scene/scene_run.h"
 
-#include <fmt/format.h>
+#include <algorithm>
+#include <memory>
+#include <mutex>
 
-#include "common/core/error.h"
 #include "common/core/progress.h"
 #include "common/core/timer.h"
+#include "runtime/output/trajectory.h"
+#include "runtime/scene/contact_load.h"
 #include "runtime/scene/state_file.h"
 
 namespace exmat::runtime {
 namespace {
 
-void add_reports(std::span<const StepReport> reports, double seconds, RunSummary& summary) {
-  const auto bodies = static_cast<double>(reports.size());
-  std::int64_t newton = 0, target = 0;
-  for (const StepReport& report : reports) {
-    newton += report.newton_iterations;
-    target += report.target_iterations;
-    summary.projections += report.projections;
-    if ((report.status & kStepUnconverged) != 0) ++summary.unconverged_steps;
-    if ((report.status & kStepAsleep) != 0) ++summary.slept_steps;
-  }
-  ++summary.steps;
-  summary.step_seconds.add(seconds / bodies);
-  summary.newton_iterations.add(static_cast<double>(newton) / bodies);
-  summary.target_iterations.add(static_cast<double>(target) / bodies);
-}
-
-void add_profile(const Profile& profile, const Profile& output, int bodies,
-                 std::array<Samples, kStageNames.size()>& stages) {
-  for (std::size_t stage = 0; stage < stages.size(); ++stage)
-    stages[stage].add(profile.seconds[stage] / bodies + output.seconds[stage]);
-}
-
-RunSummary empty_summary(std::int64_t steps, const Bodies& bodies, bool profiled) {
-  RunSummary summary;
-  summary.bodies = bodies.count();
-  summary.threads = bodies.threads();
-  summary.step_seconds = summary.newton_iterations = summary.target_iterations = Samples(steps);
-  if (profiled) summary.stage_seconds.emplace().fill(Samples(steps));
-  return summary;
-}
-
-void keep_hardest(const Bodies& bodies, const StepReport& report, Eigen::Index vertices, HardestContact& hardest) {
-  const double force = report.contact_force.norm();
-  if (bodies.count() > 1 || !(force > hardest.force)) return;
-  hardest.force = force;
-  hardest.time = bodies[0].time;
-  hardest.load.setZero(3 * vertices);
-  bodies.add_contact_load(hardest.load);
-}
-
-std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedScene& loaded, const SceneConfig& config) {
-  if (!config.trajectory) return nullptr;
-  return std::make_unique<TrajectoryWriter>(*config.trajectory, loaded.data, *loaded.model->frame,
-                                            trajectory_info(loaded, config));
-}
-
-}  // namespace
-
-TrajectoryInfo trajectory_info(const LoadedScene& loaded, const SceneConfig& config) {
+TrajectoryInfo trajectory_info(const LoadedScene& kind, const SceneConfig& scene, const WorldConfig& config) {
   const std::filesystem::path folder = std::filesystem::absolute(*config.trajectory).parent_path();
   const std::string bundle =
-      std::filesystem::proximate(std::filesystem::absolute(config.bundle), folder).generic_string();
-  TrajectoryInfo info{std::string(name_of(config.integrator)), bundle, config.time_step,
+      std::filesystem::proximate(std::filesystem::absolute(scene.bundle), folder).generic_string();
+  TrajectoryInfo info{std::string(name_of(scene.integrator)), bundle, config.time_step,
                       1 + config.steps / config.every};
-  for (std::size_t i = 0; i < loaded.scene.examples.size(); ++i) {
-    const ExampleModel& examples = loaded.model->examples[i];
-    if (acts(loaded.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
+  for (std::size_t i = 0; i < kind.scene.examples.size(); ++i) {
+    const ExampleModel& examples = kind.model->examples[i];
+    if (acts(kind.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
   }
   return info;
 }
 
-Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config) {
-  return {*loaded.model, loaded.scene, loaded.start, config.instances, loaded.keys};
+std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedWorld& loaded, const WorldConfig& config) {
+  if (!config.trajectory) return nullptr;
+  std::vector<NamedBody> bodies;
+  for (const LoadedBody& body : loaded.bodies) {
+    const LoadedScene& kind = loaded.kinds[body.kind].loaded;
+    bodies.push_back(
+        {body.name, kind.data, *kind.model->frame, trajectory_info(kind, config.bodies[body.kind].scene, config)});
+    if (!config.is_list) break;
+  }
+  return std::make_unique<TrajectoryWriter>(*config.trajectory, bodies);
 }
 
-void require_finite(const Bodies& bodies, const SceneConfig& config) {
-  const std::optional<int> body = bodies.first_non_finite();
-  if (!body) return;
-  const State& state = bodies[*body];
-  throw WorkError(fmt::format(
-      "{}: step {} (t = {:g} s), body {} of {}: the state is no longer finite; try a smaller time_step (now {:g} s), "
-      "smaller loads or example stiffness, or the integrator backward_euler. No trajectory was written",
-      config.file.string(), state.step + 1, state.time + config.time_step, *body + 1, bodies.count(),
-      config.time_step));
+/// Finds the contacts of each kind when they press a body most.
+class ContactKeeper final : public StepObserver {
+ public:
+  explicit ContactKeeper(const Bodies& bodies) : bodies_(bodies), hardest_(bodies.loaded().kinds.size()) {}
+
+  /// Whatever the order of bodies is, the first of those that are pressed alike is found.
+  void after_step(int body, const StepReport& report, const Workspace& scratch) noexcept override {
+    const double force = report.contact_force.norm();
+    if (!(force > 0)) return;
+    const LoadedWorld& loaded = bodies_.loaded();
+    const std::size_t kind = loaded.bodies[static_cast<std::size_t>(body)].kind;
+    const std::scoped_lock lock(mutex_);
+    HardestContact& hardest = hardest_[kind];
+    const bool is_first = is_new_ && force == hardest.force && body < hardest.body;
+    if (!(force > hardest.force) && !is_first) return;
+    is_new_ = true;
+    hardest = {body, force, bodies_.world().state(body).time, std::move(hardest.load)};
+    hardest.load.setZero(3 * loaded.kinds[kind].loaded.summary.vertices);
+    add_contact_load(bodies_.world().model(body), bodies_.world().state(body), scratch, hardest.load);
+    changed_.push_back(kind);
+  }
+
+  /// After each step of all bodies: what other bodies press by.
+  void add_touches() {
+    is_new_ = false;
+    if (changed_.empty()) return;
+    const World& world = bodies_.world();
+    world.read_touches(touches_);
+    std::ranges::sort(changed_);
+    changed_.erase(std::ranges::unique(changed_).begin(), changed_.end());
+    for (const std::size_t kind : changed_) {
+      HardestContact& hardest = hardest_[kind];
+      const Eigen::Matrix3d to_own =
+          world.model(hardest.body).frame->placement(world.state(hardest.body).frame).rotation.transpose();
+      for (const BodyTouch& touch : touches_)
+        if (touch.body == hardest.body)
+          hardest.load.segment<3>(3 * static_cast<Eigen::Index>(touch.vertex)) += to_own * touch.force;
+    }
+    changed_.clear();
+  }
+
+  std::vector<HardestContact> hardest() && { return std::move(hardest_); }
+
+ private:
+  const Bodies& bodies_;
+  std::mutex mutex_;
+  std::vector<HardestContact> hardest_;
+  std::vector<std::size_t> changed_;
+  std::vector<BodyTouch> touches_;
+  bool is_new_ = false;
+};
+
+double deepest_of(const World& world) {
+  double deepest = 0;
+  for (const HeldPair& pair : world.held())
+    for (const auto& side : pair.held)
+      for (const HeldBodyContact& contact : side) deepest = std::max(deepest, -contact.gap);
+  return deepest;
 }
 
-RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOptions& options) {
-  Bodies bodies = make_bodies(loaded, config);
-  if (options.from_state) read_states(*options.from_state, loaded, bodies);
-  bodies.set_profiled(options.profiled);
-  const State& shown = bodies[0];
-  const std::int64_t first = shown.step;
-  RunSummary summary = empty_summary(config.steps, bodies, options.profiled);
+void add(const WorldReport& step, const World& world, double seconds, RunSummary& summary) {
+  const auto bodies = static_cast<double>(world.count());
+  std::int64_t newton = 0, target = 0;
+  for (int i = 0; i < world.count(); ++i) {
+    const StepReport& report = world.report(i);
+    newton += report.newton_iterations;
+    target += report.target_iterations;
+    summary.projections += report.projections;
+    if ((report.status & kStepUnconverged) != 0) ++summary.unconverged_steps;
+  }
+  ++summary.steps;
+  summary.slept_steps += step.asleep;
+  summary.step_seconds.add(seconds / bodies);
+  summary.newton_iterations.add(static_cast<double>(newton) / bodies);
+  summary.target_iterations.add(static_cast<double>(target) / bodies);
+  summary.touching_pairs.add(step.touching_pairs);
+  summary.most_pairs = std::max(summary.most_pairs, step.touching_pairs);
+  summary.largest_island = std::max(summary.largest_island, step.largest_island);
+  summary.unconverged_islands += step.unconverged_islands;
+}
+
+/// `whole` and `output` [s]: of the step of all bodies and of the frame after it.
+void add(const WorldProfile& profile, double whole, double output, int bodies, StageSamples& stages) {
+  for (std::size_t stage = 0; stage < kStageNames.size(); ++stage) {
+    const bool is_output = stage == static_cast<std::size_t>(Stage::kOutput);
+    stages.of_bodies[stage].add(is_output ? output : profile.bodies.seconds[stage] / bodies);
+  }
+  double staged = 0;
+  for (std::size_t stage = 0; stage < kWorldStageNames.size(); ++stage) {
+    if (stage == static_cast<std::size_t>(WorldStage::kOther)) continue;
+    staged += profile.seconds[stage];
+    stages.of_world[stage].add(profile.seconds[stage] / bodies);
+  }
+  stages.of_world[static_cast<std::size_t>(WorldStage::kOther)].add(std::max(0.0, whole - staged) / bodies);
+}
+
+RunSummary empty_summary(const WorldConfig& config, const Bodies& bodies, bool profiled) {
+  RunSummary summary;
+  summary.bodies = bodies.count();
+  summary.threads = bodies.threads();
+  summary.step_seconds = summary.newton_iterations = summary.target_iterations = summary.touching_pairs =
+      Samples(config.steps);
+  summary.start = bodies.world().energies();
+  if (!profiled) return summary;
+  StageSamples& stages = summary.stage_seconds.emplace();
+  stages.of_bodies.fill(Samples(config.steps));
+  stages.of_world.fill(Samples(config.steps));
+  return summary;
+}
+
+}  // namespace
+
+RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOptions& options) {
+  Bodies bodies(loaded, config);
+  World& world = bodies.world();
+  if (options.from_state) bodies.take_up(read_state(*options.from_state, loaded, config));
+  RunSummary summary = empty_summary(config, bodies, options.profiled);
   const auto trajectory = open_trajectory(loaded, config);
   const auto append = [&](double seconds) {
-    trajectory->append(shown, energies(*loaded.model, bodies.scene(), shown), seconds);
+    for (std::size_t i = 0; i < trajectory->bodies(); ++i) {
+      const auto body = static_cast<int>(i);
+      trajectory->append(i, world.state(body), energies(world.model(body), world.scene(body), world.state(body)),
+                         seconds);
+    }
   };
   if (trajectory) append(0);
-
+  ContactKeeper contacts(bodies);
+  BodiesMemory before;  // the step, for the state file of one that fails
   Progress progress("steps", config.steps);
-  while (shown.step - first < config.steps) {
+  while (summary.steps < config.steps) {
+    if (options.dump_state) bodies.remember(before);
+    WorldProfile profile;
+    world.set_profile(options.profiled ? &profile : nullptr);
     const Timer timer;
-    const std::span<const StepReport> reports = bodies.step();
+    const WorldReport report = bodies.step(options.keeps_contacts ? &contacts : nullptr);
     const double seconds = timer.seconds();
-    if (options.dump_state && bodies.first_non_finite()) write_states(bodies, loaded, *options.dump_state);
-    require_finite(bodies, config);
-    add_reports(reports, seconds, summary);
-    if (options.keeps_contacts) keep_hardest(bodies, reports.front(), loaded.summary.vertices, summary.hardest_contact);
-    Profile output;
-    if (trajectory && (shown.step - first) % config.every == 0) {
-      const StageTimer stage(options.profiled ? &output : nullptr, Stage::kOutput);
-      append(seconds / bodies.count());
-    }
-    if (options.profiled) add_profile(bodies.take_measured().profile, output, bodies.count(), *summary.stage_seconds);
+    if (options.dump_state && !bodies.is_finite()) write_state(before, loaded, config, *options.dump_state);
+    bodies.require_finite();
+    if (options.keeps_contacts) contacts.add_touches();
+    add(report, world, seconds, summary);
+    const Timer output;
+    const bool written = trajectory && summary.steps % config.every == 0;
+    if (written) append(seconds / world.count());
+    if (options.profiled) add(profile, seconds, written ? output.seconds() : 0, world.count(), *summary.stage_seconds);
     progress.advance();
   }
+  world.set_profile(nullptr);
   if (trajectory) {
     trajectory->finish();
     summary.largest_displacement = trajectory->largest_displacement();
   }
-  if (options.dump_state) write_states(bodies, loaded, *options.dump_state);
+  if (options.dump_state) {
+    bodies.remember(before);
+    write_state(before, loaded, config, *options.dump_state);
+  }
   summary.simulated_seconds = static_cast<double>(config.steps) * config.time_step;
-  summary.energies = energies(*loaded.model, bodies.scene(), shown);
+  summary.end = world.energies();
+  summary.deepest = deepest_of(world);
+  if (options.keeps_contacts) summary.hardest_contacts = std::move(contacts).hardest();
   summary.state_hash = bodies.hash();
   return summary;
 }

@@ -4,19 +4,26 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
-#include "runtime/output/trajectory.h"
 #include "runtime/scene/bodies.h"
 #include "runtime/scene/samples.h"
-#include "runtime/scene/scene_loader.h"
 
 namespace exmat::runtime {
 
-/// The contacts of a body when they pressed it most.
+/// The contacts of a body of a kind when they pressed it most.
 struct HardestContact {
-  double force = 0;      ///< their sum [N]; 0: nothing touched
+  int body = -1;         ///< -1: nothing touched any
+  double force = 0;      ///< their sum [N]
   double time = 0;       ///< [s]
-  Eigen::VectorXd load;  ///< [3n] in the body's own frame
+  Eigen::VectorXd load;  ///< [3n] of obstacles and of other bodies, in the body's own frame
+};
+
+/// Times of the stages of a step, over the number of bodies.
+struct StageSamples {
+  std::array<Samples, kStageNames.size()> of_bodies;      ///< of bodies that touch no other, by the threads' clocks;
+                                                          ///< output per frame
+  std::array<Samples, kWorldStageNames.size()> of_world;  ///< on the wall clock
 };
 
 /// What a run did.
@@ -25,39 +32,35 @@ struct RunSummary {
   int bodies = 1;
   int threads = 1;  ///< that shared the bodies
   double simulated_seconds = 0;
-  Samples step_seconds;                        ///< wall clock of a step of all bodies over their number, without output
-  Samples newton_iterations;                   ///< mean of the bodies
-  Samples target_iterations;                   ///< likewise
-  std::int64_t projections = 0;                ///< of all bodies
-  std::int64_t unconverged_steps = 0;          ///< residual above the tolerance; of all bodies
-  std::int64_t slept_steps = 0;                ///< that bodies slept through; of all bodies
-  Energies energies;                           ///< of the first body, at the end
-  std::uint64_t state_hash = 0;                ///< of all bodies, at the end; see Bodies::hash
-  std::optional<double> largest_displacement;  ///< over the written frames [m]; only with a trajectory
-  HardestContact hardest_contact;              ///< with obstacles, of a single body; only if asked for
-  /// Per step of a body, as the threads' clocks add up; output per frame. Only if asked for.
-  std::optional<std::array<Samples, kStageNames.size()>> stage_seconds;
+  Samples step_seconds;                ///< wall clock of a step of all bodies over their number, without output
+  Samples newton_iterations;           ///< mean of the bodies
+  Samples target_iterations;           ///< likewise
+  std::int64_t projections = 0;        ///< of all bodies
+  std::int64_t unconverged_steps = 0;  ///< residual above the tolerance; of all bodies
+  std::int64_t slept_steps = 0;        ///< that bodies slept through; of all bodies
+  Samples touching_pairs;              ///< of bodies near enough to touch
+  int most_pairs = 0;
+  int largest_island = 0;                        ///< bodies solved together
+  std::int64_t unconverged_islands = 0;          ///< of all steps
+  double deepest = 0;                            ///< that a vertex is inside another body at the end [m]
+  Energies start, end;                           ///< of all bodies
+  std::uint64_t state_hash = 0;                  ///< of all bodies, at the end; see Bodies::hash
+  std::optional<double> largest_displacement;    ///< over the written frames [m]; only with a trajectory
+  std::vector<HardestContact> hardest_contacts;  ///< of each kind; only if asked for
+  std::optional<StageSamples> stage_seconds;     ///< only if asked for
 };
 
 struct RunOptions {
   bool profiled = false;                              ///< measure each stage
-  bool keeps_contacts = false;                        ///< remember the hardest, or of several bodies those of the end
+  bool keeps_contacts = false;                        ///< remember the hardest
   std::optional<std::filesystem::path> from_state{};  ///< a state file to begin at, instead of the scene's start
   std::optional<std::filesystem::path> dump_state{};  ///< a state file to write at the end, or before a bad step
 };
 
-/// Steps the bodies of a loaded scene from its start, as many steps as it says, and writes the trajectory of the first,
-/// if it names one. Throws WorkError where a state becomes non-finite (see require_finite; no trajectory is left) or a
-/// file cannot be written, InputError where the state file does not fit.
-RunSummary run(const LoadedScene& loaded, const SceneConfig& config, const RunOptions& options = {});
-
-/// What the trajectory of a scene says of its run; the scene names one.
-TrajectoryInfo trajectory_info(const LoadedScene& loaded, const SceneConfig& config);
-
-/// The scene's bodies as they start; refers to `loaded`.
-Bodies make_bodies(const LoadedScene& loaded, const SceneConfig& config);
-
-/// WorkError where the last step was not finite: names step, time, body and what to try.
-void require_finite(const Bodies& bodies, const SceneConfig& config);
+/// Steps all bodies of a loaded scene from its start or from a state file, as many steps as it says, and writes the
+/// trajectory, if it names one: of all bodies that it lists, or of the first of the `instances`. As many threads as
+/// OpenMP gives. Throws WorkError where a state becomes non-finite (see Bodies::require_finite; no trajectory is left)
+/// or a file cannot be written, InputError where the state file does not fit.
+RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOptions& options = {});
 
 }  // namespace exmat::runtime

@@ -123,8 +123,8 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
   return body;
 }
 
-void read_state(const std::filesystem::path& file, const std::string& place, const Json& body,
-                const LoadedScene& loaded, State& state) {
+void read_body_state(const std::filesystem::path& file, const std::string& place, const Json& body,
+                     const LoadedScene& loaded, State& state) {
   BodyReader(file, place, body, loaded).read(state);
 }
 

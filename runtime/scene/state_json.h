@@ -20,7 +20,7 @@ nlohmann::ordered_json state_to_json(const State& state, const BodyFrame& frame)
 
 /// Puts `state`, one of the same model and scene, into that of `body` at `place` of the file, which follows the schema.
 /// Throws InputError where it does not fit the scene.
-void read_state(const std::filesystem::path& file, const std::string& place, const nlohmann::json& body,
-                const LoadedScene& loaded, State& state);
+void read_body_state(const std::filesystem::path& file, const std::string& place, const nlohmann::json& body,
+                     const LoadedScene& loaded, State& state);
 
 }  // namespace exmat::runtime

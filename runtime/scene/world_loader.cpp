@@ -3,29 +3,29 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
+#include "runtime/scene/obstacle_loader.h"
 
 namespace exmat::runtime {
 namespace {
 
-/// The start of a body of a kind at one of its places.
-State start_at(const LoadedScene& loaded, const BodyPlace& place) {
-  State state = loaded.start;
-  FrameMotion motion = loaded.model->frame->motion(state.frame);
-  motion.position += place.position;
-  motion.orientation = place.orientation * motion.orientation;
-  FrameWorkspace workspace = loaded.model->frame->make_workspace();
-  loaded.model->frame->set_motion(motion, state.q, state.v, workspace, state.frame);
-  return state;
-}
-
-void check_places(const BodiesConfig& bodies, bool constrained) {
-  if (!constrained || bodies.places.size() == 1) return;
+void check_places(const WorldConfig& config, const BodiesConfig& bodies, bool constrained) {
+  if (!config.is_list || !constrained || bodies.places.size() == 1) return;
   throw InputError({bodies.scene.file.string(), bodies.scene.place, "one place for a body with fixed vertices",
                     fmt::format("{} places", bodies.places.size()),
                     "an asset without \"fixed\" makes free bodies, which a grid may place"});
 }
 
 }  // namespace
+
+State start_of(const LoadedScene& kind, const BodyPlace& place) {
+  State state = kind.start;
+  if (place.position.isZero(0) && place.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs()) return state;
+  FrameMotion motion = kind.model->frame->motion(state.frame);
+  motion.position += place.position;
+  motion.orientation = place.orientation * motion.orientation;
+  set_motion(*kind.model, motion, state);
+  return state;
+}
 
 std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, const ReducedModel& data,
                                                         bool meets_itself) {
@@ -38,28 +38,19 @@ std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, cons
 LoadedWorld load_world_run(const WorldConfig& config) {
   LoadedWorld world;
   world.kinds.reserve(config.bodies.size());
+  world.obstacles = make_obstacles(config.bodies.front().scene.obstacles);
   for (const BodiesConfig& bodies : config.bodies) {
-    LoadedKind& kind = world.kinds.emplace_back(LoadedKind{load_run(bodies.scene), nullptr});
+    LoadedKind& kind = world.kinds.emplace_back(LoadedKind{load_run(bodies.scene, &world.obstacles), nullptr});
     const LoadedScene& loaded = kind.loaded;
-    check_places(bodies, loaded.summary.constrained);
-    kind.surface = touching_surface(*loaded.model, loaded.data, config.contact.self);
+    check_places(config, bodies, loaded.summary.constrained);
+    if (bodies.scene.meets_bodies) kind.surface = touching_surface(*loaded.model, loaded.data, config.contact.self);
     for (std::size_t i = 0; i < bodies.places.size(); ++i) {
-      const bool alone = bodies.places.size() == 1;
-      world.bodies.push_back({alone ? bodies.name : fmt::format("{}_{}", bodies.name, i), world.kinds.size() - 1,
-                              start_at(loaded, bodies.places[i])});
+      const bool has_number = config.is_list && bodies.places.size() > 1;
+      world.bodies.push_back(
+          {has_number ? fmt::format("{}_{}", bodies.name, i) : bodies.name, world.kinds.size() - 1, bodies.places[i]});
     }
   }
   return world;
-}
-
-World make_world(const LoadedWorld& loaded, const WorldConfig& config, std::span<const StepScene> scenes) {
-  std::vector<WorldBodyStart> bodies;
-  for (const LoadedBody& body : loaded.bodies) {
-    const LoadedKind& kind = loaded.kinds[body.kind];
-    const StepScene& scene = scenes.empty() ? kind.loaded.scene : scenes[body.kind];
-    bodies.push_back({{kind.loaded.model.get(), &scene, kind.surface}, body.start});
-  }
-  return {std::move(bodies), {config.contact.stiffness, config.contact.damping, config.contact.friction}};
 }
 
 }  // namespace exmat::runtime

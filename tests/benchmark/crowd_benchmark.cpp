@@ -1,9 +1,7 @@
 #include <algorithm>
 #include <fmt/format.h>
-#include <numeric>
-#include <omp.h>
 
-#include "runtime/scene/bodies.h"
+#include "tests/benchmark/many_bodies.h"
 #include "tests/benchmark/models.h"
 #include "tests/benchmark/register.h"
 
@@ -13,10 +11,10 @@ namespace {
 constexpr int kCycle = 100;  // steps, then all start anew
 
 /// Each thrown by a speed of its own, and turning where it is free.
-void start_apart(const runtime::Model& model, runtime::Bodies& bodies) {
+void start_apart(const runtime::Model& model, ManyBodies& bodies) {
   bodies.restart();
-  for (int body = 0; body < bodies.count(); ++body) {
-    runtime::State& state = bodies[body];
+  for (int body = 0; body < bodies.world().count(); ++body) {
+    runtime::State& state = bodies.world().state(body);
     const double own = static_cast<double>(body % 97) / 97;
     for (Eigen::Index c = 0; c < std::min<Eigen::Index>(4, model.modes()); ++c) state.v[c] = 0.3 * own - 0.1;
     state.begins_anew = true;
@@ -26,25 +24,20 @@ void start_apart(const runtime::Model& model, runtime::Bodies& bodies) {
   }
 }
 
-/// Of a body's step, of the mean of a few bodies.
+/// Of a body's step, the mean of a few bodies.
 double flops_of_a_step(const runtime::Model& model, const runtime::StepScene& scene, int count) {
-  runtime::Bodies bodies(model, scene, make_state(model), count);
+  ManyBodies bodies(model, scene, make_state(model), count);
   start_apart(model, bodies);
-  bodies.set_profiled(true);
-  for (int step = 0; step < kCycle; ++step) bodies.step();
-  const auto [seconds, profile, work] = bodies.take_measured();
-  const double counted = std::accumulate(profile.flops.begin(), profile.flops.end(), 0.0);
-  return (counted + work.weights_flops + work.target_flops + work.other_flops) / kCycle / count;
+  return bodies.work_of(kCycle).flops;
 }
 
 void time_crowd(::benchmark::State& state, int modes, int elements, bool free, int threads, int count,
                 Precision precision) {
-  omp_set_num_threads(threads);
   const auto model = prepare(bar_model(modes, elements, free), Target::kTable, false);
   runtime::StepScene scene = swing(*model, Target::kTable);
   scene.precision = precision;
   const double flops = flops_of_a_step(*model, scene, std::min(count, 96));
-  runtime::Bodies bodies(*model, scene, make_state(*model), count);
+  ManyBodies bodies(*model, scene, make_state(*model), count);
   std::int64_t steps = 0;
   for (auto _ : state) {
     if (steps++ % kCycle == 0) {
@@ -52,7 +45,7 @@ void time_crowd(::benchmark::State& state, int modes, int elements, bool free, i
       start_apart(*model, bodies);
       state.ResumeTiming();
     }
-    bodies.step();
+    bodies.world().step(threads);
   }
   state.counters["bodies"] = count;
   compare_with_dgemm(state, flops * count);

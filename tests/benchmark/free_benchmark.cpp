@@ -79,7 +79,7 @@ void time_contact(::benchmark::State& state, int vertices, bool flying, Floor ki
   runtime::StepScene scene = swing(*model, Target::kNone);
   scene.gravity = Eigen::Vector3d(0, 0, -9.81);
   const double floor = data.contact->positions.col(2).minCoeff() - (flying ? kFlyingAt : 0);
-  scene.obstacles.push_back({floor_of(kind, floor), runtime::RigidMotion(), 1e6, 1e3, 0.5});
+  scene.obstacles.push_back(runtime::Obstacle{floor_of(kind, floor), runtime::RigidMotion(), 1e6, 1e3, 0.5});
   runtime::State start = make_state(*model);
   runtime::prepare_contacts(*model, 1, start);
   time_steps(state, *model, scene, start);

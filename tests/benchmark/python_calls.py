@@ -61,7 +61,7 @@ def positions(model):
 def worlds(build, folder, scene):
     path = folder / "world.json"
     path.write_text(json.dumps({**scene, "instances": BODIES}))
-    world = exmat.World(exmat.Model.from_scene(path), BODIES)
+    world = exmat.Batch(exmat.Model.from_scene(path), BODIES)
     bench, ours = [], []
 
     def stepped():

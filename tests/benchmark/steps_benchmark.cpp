@@ -1,6 +1,7 @@
-#include <numeric>
+#include <algorithm>
+#include <omp.h>
 
-#include "runtime/scene/bodies.h"
+#include "tests/benchmark/many_bodies.h"
 #include "tests/benchmark/models.h"
 #include "tests/benchmark/steps.h"
 
@@ -8,22 +9,6 @@ namespace exmat::benchmarks {
 namespace {
 
 constexpr int kCycle = 500;
-
-struct MeanWork {
-  double flops = 0, newton_iterations = 0;
-};
-
-/// Of one step of one body, over the cycle.
-MeanWork mean_work(const runtime::Model& model, const runtime::StepScene& scene, const runtime::State& start) {
-  runtime::Bodies body(model, scene, start, 1);
-  body.set_profiled(true);
-  MeanWork mean;
-  for (int i = 0; i < kCycle; ++i) mean.newton_iterations += body.step().front().newton_iterations / double{kCycle};
-  const auto [seconds, profile, work] = body.take_measured();
-  const double counted = std::accumulate(profile.flops.begin(), profile.flops.end(), 0.0);
-  mean.flops = (counted + work.weights_flops + work.target_flops + work.other_flops) / kCycle;
-  return mean;
-}
 
 std::string step_name(int modes, const std::string& force, Target target) {
   return "step/r" + std::to_string(modes) + "/" + force + "/" + name_of(target);
@@ -41,15 +26,16 @@ void add_step(int modes, int elements, bool polynomial, Target target) {
 
 void time_steps(::benchmark::State& state, const runtime::Model& model, const runtime::StepScene& scene,
                 const runtime::State& start, int count) {
-  const MeanWork mean = mean_work(model, scene, start);
-  runtime::Bodies bodies(model, scene, start, count);
+  const ManyBodies::Work mean = ManyBodies(model, scene, start, 1).work_of(kCycle);
+  ManyBodies bodies(model, scene, start, count);
+  const int threads = std::min(count, omp_get_max_threads());
   int steps = 0;
   for (auto _ : state) {
     if (steps++ == kCycle) {
       bodies.restart();
       steps = 1;
     }
-    bodies.step();
+    bodies.world().step(threads);
   }
   state.SetItemsProcessed(count * state.iterations());
   state.counters["newton_iterations"] = mean.newton_iterations;

@@ -12,7 +12,7 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   } catch (const InputError&) {
   }
   try {
-    needs_of(load_scene(file));
+    for (const BodiesConfig& bodies : load_world(file).bodies) needs_of(bodies.scene);
   } catch (const InputError&) {
   }
   return 0;

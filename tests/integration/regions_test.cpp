@@ -9,8 +9,8 @@
 #include "common/hdf5/hdf5_file.h"
 #include "precompute/shape_space/laplace_basis.h"
 #include "precompute/shape_space/region_view.h"
-#include "runtime/scene/scene_run.h"
 #include "tests/integration/support.h"
+#include "tests/support/scene_run.h"
 
 namespace exmat {
 namespace {
@@ -69,11 +69,10 @@ class Regions : public testing::Test {
   }
   // Reduced coordinates after so many steps of a scene.
   Eigen::VectorXd run(const Json& scene) {
-    const SceneConfig config = load_scene(test::write_scene(folder_, scene));
-    const runtime::LoadedScene loaded = runtime::load_run(config);
-    auto bodies = runtime::make_bodies(loaded, config);
-    while (bodies[0].step < config.steps) bodies.step();
-    return bodies[0].q;
+    const test::LoadedRun loaded(load_scene(test::write_scene(folder_, scene)));
+    runtime::Bodies bodies = loaded.bodies();
+    while (bodies.steps() < loaded.config.steps) bodies.step();
+    return bodies.world().state(0).q;
   }
 
   test::TemporaryFolder folder_;
@@ -232,8 +231,7 @@ TEST_F(Regions, HaveTheirWeightsInTheTrajectory) {
       load_scene(test::write_scene(folder_, {{"regions", {{{"name", "outer"}, {"stiffness", 100}, {"bias", 0.5}}}},
                                              {"steps", 3},
                                              {"output", {{"trajectory", "run.h5"}, {"every", 1}}}}));
-  const auto loaded = runtime::load_run(config);
-  runtime::run(loaded, config);
+  test::run(config);
   auto file = Hdf5File::open(folder_.path("run.h5"));
   EXPECT_TRUE(file.has_dataset("/regions/outer/weights"));
   EXPECT_FALSE(file.has_group("/examples"));

@@ -53,7 +53,7 @@ PLANTED = [
     ("viewer", "runtime/viewer/app/x.cpp", '#include "runtime/sim/step/state.h"\n'),
     ("viewer", "runtime/viewer/view/x.cpp", "#include <epoxy/gl.h>\n"),
     ("viewer", "runtime/app/x.cpp", "#include <imgui.h>\n"),
-    ("length", "common/core/x.cpp", "// line\n" * 501),
+    ("one_header", "runtime/sim/contact/x.cpp", ""),
     ("mirrored_tests", "tests/runtime/sim/nowhere/x_test.cpp", "\n"),
     ("references", "common/core/x.h", "/// As method.md, section 3, says.\n"),
     ("references", "common/core/x.h", "// See the page of\n// docs/nothing.md.\n"),

@@ -10,7 +10,6 @@
 #include "common/core/timer.h"
 #include "precompute/full_space/scene_setup.h"
 #include "precompute/study/baseline/surface_targets.h"
-#include "runtime/scene/bodies.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/samples.h"
 #include "runtime/sim/frame/world_vertices.h"

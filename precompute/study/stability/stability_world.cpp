@@ -34,8 +34,9 @@ class WorldRun {
       swing();
     }
     if (test.ground == Ground::kPlane)
-      scene_.obstacles.push_back({runtime::Plane{{0, 0, -kClearance}, Eigen::Vector3d::UnitZ()}, runtime::RigidMotion(),
-                                  test.contact_stiffness, damping(), test.friction});
+      scene_.obstacles.push_back(runtime::Obstacle{runtime::Plane{{0, 0, -kClearance}, Eigen::Vector3d::UnitZ()},
+                                                   runtime::RigidMotion(), test.contact_stiffness, damping(),
+                                                   test.friction});
     kind_ = kind_of(body, scene_);
     place(carried);
     plan_steps();
@@ -81,7 +82,6 @@ void WorldRun::make_scene(const StudyBody& body, runtime::StepScene& scene) cons
   scene.gravity = Eigen::Vector3d(0, 0, -test_.gravity);
   scene.gravity_force = runtime::gravity_force(*body.model, scene.gravity);
   scene.examples.assign(body.model->examples.size(), test_.examples);
-  scene.meets_bodies = true;
 }
 
 runtime::BodyKind WorldRun::kind_of(const StudyBody& body, const runtime::StepScene& scene) const {

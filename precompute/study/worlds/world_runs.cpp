@@ -109,7 +109,8 @@ struct FullKind {
 
 WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>& times) {
   const runtime::LoadedWorld loaded = runtime::load_world_run(config);
-  runtime::World world = runtime::make_world(loaded, config);
+  runtime::Bodies bodies(loaded, config);
+  runtime::World& world = bodies.world();
   WorldRun result;
   for (const runtime::LoadedBody& body : loaded.bodies) {
     result.names.push_back(body.name);
@@ -181,7 +182,8 @@ std::vector<StepTimes> time_worlds(const std::vector<WorldConfig>& scenes, const
   Progress progress("timing", config.rounds * std::ssize(scenes));
   for (int round = 0; round < config.rounds; ++round)
     for (std::size_t i = 0; i < scenes.size(); ++i) {
-      runtime::World world = runtime::make_world(loaded[i], scenes[i]);
+      runtime::Bodies bodies(loaded[i], scenes[i]);
+      runtime::World& world = bodies.world();
       const Timer all;
       for (std::int64_t step = 0; step < config.steps; ++step) {
         if (step >= kFewestSteps && all.seconds() > kRoundSeconds) break;

@@ -97,7 +97,7 @@ class WorldStudy {
 };
 
 WorldStudy::WorldStudy(const StudyConfig& config, const StudyOptions& options)
-    : config_(config), options_(options), world_(load_world(config.scene).value()) {
+    : config_(config), options_(options), world_(load_world(config.scene)) {
   if (config.steps) world_.steps = *config.steps;
   for (BodiesConfig& bodies : world_.bodies) bodies.scene.steps = world_.steps;
   require_measurable();
@@ -466,7 +466,7 @@ std::size_t WorldStudyResult::failures() const {
       std::ranges::count_if(points, [](const auto& point) { return !point.failure.empty(); }));
 }
 
-bool is_of_bodies(const StudyConfig& config) { return load_world(config.scene).has_value(); }
+bool is_of_bodies(const StudyConfig& config) { return load_world(config.scene).is_list; }
 
 WorldStudyResult run_world_study(const StudyConfig& config, const StudyOptions& options) {
   return WorldStudy(config, options).run();

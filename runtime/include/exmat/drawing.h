@@ -71,13 +71,13 @@ EXMAT_API exmat_status exmat_points_read_rest(const exmat_points* points, double
                                               int64_t coordinates) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_points_read_basis(const exmat_points* points, float* rows, int64_t count) EXMAT_NOEXCEPT;
 
-/* The triangles of an obstacle of a body that is made of arrays, EXMAT_MESH or EXMAT_HEIGHT_FIELD: f, 0 of other
-   shapes, negative where `body` is NULL or has no such obstacle. And the three corners of each into `corners`
+/* The triangles of an obstacle of a world that is made of arrays, EXMAT_MESH or EXMAT_HEIGHT_FIELD: f, 0 of other
+   shapes, negative where `world` is NULL or has no such obstacle. And the three corners of each into `corners`
    [coordinates = 9f] [m], outward, in the obstacle's frame, which its motion moves. Of a
    shell they are its middle. */
-EXMAT_API int64_t exmat_body_obstacle_triangles(const exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_body_read_obstacle_triangles(const exmat_body* body, int64_t id, double* corners,
-                                                          int64_t coordinates) EXMAT_NOEXCEPT;
+EXMAT_API int64_t exmat_world_obstacle_triangles(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_world_read_obstacle_triangles(const exmat_world* world, int64_t id, double* corners,
+                                                           int64_t coordinates) EXMAT_NOEXCEPT;
 
 /* `placement` [12]: three rows of four numbers, the rotation R and the shift t of x = R (X + U q) + t. */
 EXMAT_API exmat_status exmat_body_read_placement(const exmat_body* body, double* placement) EXMAT_NOEXCEPT;
@@ -98,13 +98,16 @@ EXMAT_API exmat_status exmat_model_read_example_pose(const exmat_model* model, i
 EXMAT_API exmat_status exmat_body_read_target(const exmat_body* body, int64_t region, double* q,
                                               int64_t modes) EXMAT_NOEXCEPT;
 
-/* Where the time of the last call that stepped the body went, of one that is profiled; sums over its steps [s]. */
+/* Where the time of the last call that stepped the world went, of one that is profiled; sums over its steps [s]. The
+   first five are the stages of bodies that touch no other, as the threads' clocks add up; the rest are those of the
+   world, on the wall clock. */
 typedef struct exmat_profile {
   size_t size; /* sizeof(exmat_profile), set by the caller */
   double weights, target, internal_force, solve, contact;
+  double broad_phase, candidates, single_bodies, islands;
 } exmat_profile;
-EXMAT_API exmat_status exmat_body_set_profiled(exmat_body* body, int32_t profiled) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_body_read_profile(const exmat_body* body, exmat_profile* profile) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_world_set_profiled(exmat_world* world, int32_t profiled) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_world_read_profile(const exmat_world* world, exmat_profile* profile) EXMAT_NOEXCEPT;
 
 /* ---- load capacity ---------------------------------------------------------------------------------------------- */
 

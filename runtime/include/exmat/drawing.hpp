@@ -15,13 +15,13 @@ namespace exmat {
 inline exmat_bundle_info bundle_info(const std::string& bundle) {
   exmat_bundle_info info;
   info.size = sizeof info;
-  detail::check(exmat_bundle_read_info(bundle.c_str(), &info));
+  check(exmat_bundle_read_info(bundle.c_str(), &info));
   return info;
 }
 
 inline std::string bundle_region_name(const std::string& bundle, std::size_t region) {
   char name[256];
-  detail::check(exmat_bundle_read_region_name(bundle.c_str(), static_cast<std::int64_t>(region), name, sizeof name));
+  check(exmat_bundle_read_region_name(bundle.c_str(), static_cast<std::int64_t>(region), name, sizeof name));
   return name;
 }
 
@@ -30,7 +30,7 @@ class Surface {
  public:
   explicit Surface(const Model& model, std::int32_t kind = EXMAT_SURFACE_AUTO) {
     exmat_surface* surface = nullptr;
-    detail::check(exmat_surface_create(model.get(), kind, &surface));
+    check(exmat_surface_create(model.get(), kind, &surface));
     handle_.reset(surface);
   }
 
@@ -40,25 +40,25 @@ class Surface {
   /// [3f]
   std::vector<std::int32_t> triangles() const {
     std::vector<std::int32_t> corners(3 * static_cast<std::size_t>(exmat_surface_triangles(get())));
-    detail::check(exmat_surface_read_triangles(get(), corners.data(), static_cast<std::int64_t>(corners.size())));
+    check(exmat_surface_read_triangles(get(), corners.data(), static_cast<std::int64_t>(corners.size())));
     return corners;
   }
   /// [k], of the object.
   std::vector<std::int64_t> vertices() const {
     std::vector<std::int64_t> ids(points());
-    detail::check(exmat_surface_read_vertices(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
+    check(exmat_surface_read_vertices(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
     return ids;
   }
   /// [3k] X, at rest.
   std::vector<double> rest() const {
     std::vector<double> xyz(3 * points());
-    detail::check(exmat_points_read_rest(handle(), xyz.data(), static_cast<std::int64_t>(xyz.size())));
+    check(exmat_points_read_rest(handle(), xyz.data(), static_cast<std::int64_t>(xyz.size())));
     return xyz;
   }
   /// [3k x r] U, of a model with so many modes.
   std::vector<float> basis(std::size_t modes) const {
     std::vector<float> rows(3 * points() * modes);
-    detail::check(exmat_points_read_basis(handle(), rows.data(), static_cast<std::int64_t>(rows.size())));
+    check(exmat_points_read_basis(handle(), rows.data(), static_cast<std::int64_t>(rows.size())));
     return rows;
   }
 
@@ -67,7 +67,7 @@ class Surface {
   exmat_surface* get() const noexcept { return handle_.get(); }
 
  private:
-  detail::Owner<exmat_surface, exmat_surface_destroy> handle_;
+  Owner<exmat_surface, exmat_surface_destroy> handle_;
 };
 
 inline Points Points::on_surface(const Surface& surface, std::span<const std::int64_t> triangles,
@@ -75,17 +75,17 @@ inline Points Points::on_surface(const Surface& surface, std::span<const std::in
   if (shares.size() != 3 * triangles.size())
     throw Error(EXMAT_INVALID_ARGUMENT, "on_surface: expected three shares for each triangle");
   exmat_points* points = nullptr;
-  detail::check(exmat_points_create_on_surface(surface.get(), triangles.data(), shares.data(),
-                                               detail::length(triangles), &points));
+  check(exmat_points_create_on_surface(surface.get(), triangles.data(), shares.data(), detail::length(triangles),
+                                       &points));
   return Points(points);
 }
 
 inline void BodyRef::read_positions(const Surface& surface, std::span<float> xyz) {
-  detail::check(exmat_body_read_positions(get(), surface.handle(), xyz.data(), detail::length(xyz)));
+  check(exmat_body_read_positions(get(), surface.handle(), xyz.data(), detail::length(xyz)));
 }
 
 inline void BodyRef::read_energy_density(Surface& surface, std::span<float> density) const {
-  detail::check(exmat_body_read_energy_density(get(), surface.get(), density.data(), detail::length(density)));
+  check(exmat_body_read_energy_density(get(), surface.get(), density.data(), detail::length(density)));
 }
 
 /// What the modes of a model lose of forces. `spread` [m] as in exmat_capacity_create().
@@ -93,7 +93,7 @@ class Capacity {
  public:
   Capacity(const Model& model, double spread) {
     exmat_capacity* capacity = nullptr;
-    detail::check(exmat_capacity_create(model.get(), spread, &capacity));
+    check(exmat_capacity_create(model.get(), spread, &capacity));
     handle_.reset(capacity);
   }
 
@@ -101,24 +101,23 @@ class Capacity {
   /// In [0, 1], of `forces` [3k] on points.
   double lost(const BodyRef& body, const Points& points, std::span<const double> forces) const {
     double lost = 0;
-    detail::check(
-        exmat_capacity_read_lost(get(), body.get(), points.get(), forces.data(), detail::length(forces), &lost));
+    check(exmat_capacity_read_lost(get(), body.get(), points.get(), forces.data(), detail::length(forces), &lost));
     return lost;
   }
   double contact_lost(const BodyRef& body) const {
     double lost = 0;
-    detail::check(exmat_capacity_read_contact_lost(get(), body.get(), &lost));
+    check(exmat_capacity_read_contact_lost(get(), body.get(), &lost));
     return lost;
   }
 
   const exmat_capacity* get() const noexcept { return handle_.get(); }
 
  private:
-  detail::Owner<exmat_capacity, exmat_capacity_destroy> handle_;
+  Owner<exmat_capacity, exmat_capacity_destroy> handle_;
 };
 
 inline void BodyRef::set_capacity(const Capacity* capacity) {
-  detail::check(exmat_body_set_capacity(get(), capacity != nullptr ? capacity->get() : nullptr));
+  check(exmat_body_set_capacity(get(), capacity != nullptr ? capacity->get() : nullptr));
 }
 
 }  // namespace exmat

@@ -9,9 +9,9 @@
  * not said to allow it, and a length that does not fit, are EXMAT_INVALID_ARGUMENT. Lengths count numbers, not points
  * or bytes.
  *
- * Memory: only ..._create... functions allocate (and those of states and of obstacles, and the first
- * exmat_bodies_step() with more threads than before, which starts them). What they create is the caller's, to be given
- * to the matching ..._destroy, in any order: a body or a set of points keeps what it needs of its model.
+ * Memory: only ..._create... functions allocate (and those of states, of obstacles and of the bodies of worlds, and the
+ * first exmat_world_step() with more threads than before, which starts them). What they create is the caller's, to be
+ * given to the matching ..._destroy, in any order: a body or a set of points keeps what it needs of its model.
  * ..._destroy(NULL) does nothing.
  *
  * Threads: models and points never change: any number of threads may use them. A body is for one thread at a time.
@@ -82,11 +82,11 @@ typedef struct exmat_settings {
   int32_t example_target;    /* EXMAT_TARGET_AUTO: by the table where the bundle has one */
   int32_t target_iterations; /* most in one step, 1 to 1000; 4 */
   int32_t energy_reference;  /* EXMAT_ENERGY_REFERENCE_EXAMPLE */
-  int32_t use_contact;       /* 1: bodies can touch obstacles of exmat_body_add_obstacle(); 0 */
-  double sleep_energy;       /* > 0: a body is left alone once its kinetic energy has been below this [J]; 0: never. Not
-                                for bodies of a world */
+  int32_t use_contact;       /* 1: bodies can touch obstacles and each other; 0 */
+  double sleep_energy;       /* > 0: a body is left alone once its kinetic energy has been below this [J]; 0: never.
+                                Bodies that touch each other fall asleep and wake together */
   double sleep_time;         /* for so long, > 0 [s]; 0.5 */
-  int32_t precision;         /* EXMAT_PRECISION_DOUBLE; of exmat_bodies_step() */
+  int32_t precision;         /* EXMAT_PRECISION_DOUBLE; of bodies that go side by side, exmat_world_step() */
 } exmat_settings;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
@@ -100,7 +100,7 @@ EXMAT_API exmat_status exmat_model_create(const char* bundle_path, const exmat_s
 EXMAT_API exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) EXMAT_NOEXCEPT;
 
 /* The same of the text of a scene file; `path` names it in messages, and names in it are relative to that path's
-   folder. `use_contact` 1: bodies can touch obstacles of exmat_body_add_obstacle() also where the scene has none. */
+   folder. `use_contact` 1: bodies can touch obstacles and each other also where the scene has no obstacles. */
 EXMAT_API exmat_status exmat_model_create_from_text(const char* scene, const char* path, int32_t use_contact,
                                                     exmat_model** model) EXMAT_NOEXCEPT;
 
@@ -148,7 +148,14 @@ EXMAT_API exmat_status exmat_points_distances(const exmat_points* points, double
 
 /* ---- bodies ---------------------------------------------------------------------------------------------------- */
 
-/* One body: its state, the forces on it and the scratch of its steps. */
+/* Bodies of any models with the same time step, stepped together: they may touch each other and the world's obstacles.
+   All have the time of the world. Those that touch each other are solved together; of the others those of one model are
+   stepped eight at a time, side by side in the lanes of registers. All functions of a body serve bodies of a world,
+   too, but for exmat_body_step(). A world is for one thread at a time, and so are its bodies. */
+typedef struct exmat_world exmat_world;
+
+/* One body: its state and the forces on it. It is always in a world: in one of its own, which has the obstacles of the
+   model's scene, or in one that exmat_world_add_body() put it into. */
 typedef struct exmat_body exmat_body;
 
 /* At rest at time 0. */
@@ -158,7 +165,7 @@ EXMAT_API void exmat_body_destroy(exmat_body* body) EXMAT_NOEXCEPT;
 /* The model that it was made of, as a handle of the caller's own. */
 EXMAT_API exmat_status exmat_body_model(const exmat_body* body, exmat_model** model) EXMAT_NOEXCEPT;
 
-/* Back to rest at time 0, without applied forces. */
+/* Back to rest, without applied forces, at time 0; in a world with others at the time of the world. */
 EXMAT_API exmat_status exmat_body_reset(exmat_body* body) EXMAT_NOEXCEPT;
 
 /* As reset, at the reduced displacement `q` with the velocity `v`, [modes = r] each. */
@@ -193,17 +200,8 @@ typedef struct exmat_report {
   double lost_applied, lost_contact;
 } exmat_report;
 
-/* Takes `steps` >= 0 steps, fewer with EXMAT_NON_FINITE. `report` may be NULL. */
+/* Takes `steps` >= 0 steps of a body in a world of its own, fewer with EXMAT_NON_FINITE. `report` may be NULL. */
 EXMAT_API exmat_status exmat_body_step(exmat_body* body, int64_t steps, exmat_report* report) EXMAT_NOEXCEPT;
-
-/* The same for `count` different bodies, of any models, by up to `threads` threads (0: as many as there are
-   processors), and never more than there are bodies and processors, or than the system lets start. Each body is stepped
-   by one of them: the results do not depend on their number. Bodies of one model that follow each other are stepped
-   eight at a time, side by side in the lanes of registers: their results are those of exmat_body_step() to rounding, as
-   sums are taken in another order. EXMAT_NON_FINITE names the first such body; the others
-   have taken all their steps. */
-EXMAT_API exmat_status exmat_bodies_step(exmat_body* const* bodies, int64_t count, int64_t steps,
-                                         int32_t threads) EXMAT_NOEXCEPT;
 
 /* Of the last call that stepped this body. */
 EXMAT_API exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report) EXMAT_NOEXCEPT;
@@ -305,81 +303,7 @@ EXMAT_API exmat_status exmat_body_set_example_bias(exmat_body* body, int64_t reg
 EXMAT_API exmat_status exmat_body_set_example_weights(exmat_body* body, int64_t region, const double* weights,
                                                       int64_t count) EXMAT_NOEXCEPT;
 
-/* ---- obstacles of one body ------------------------------------------------------------------------------------- */
-
-/* What a body may touch: those of its scene, and those that its host adds, moves and removes between steps. The model
-   has to know of contact: use_contact, or a scene with obstacles. Obstacles are each body's own and have a number,
-   `id` >= 0, that no later one gets. exmat_body_reset() and states keep the host's where they are. */
-
-/* Shapes. The last two are made of arrays: exmat_body_add_shape(). */
-enum { EXMAT_PLANE = 0, EXMAT_SPHERE = 1, EXMAT_BOX = 2, EXMAT_CAPSULE = 3, EXMAT_MESH = 4, EXMAT_HEIGHT_FIELD = 5 };
-
-/* Its shape, in its own frame, which is the world until the obstacle is moved, and its law: pressures on the body's
-   surface. Members that the shape does not name are not looked at. */
-typedef struct exmat_obstacle {
-  size_t size;     /* sizeof(exmat_obstacle) where the caller was compiled */
-  double point[3]; /* of the plane; centre of sphere and box; where the capsule's axis begins; origin of the axes of a
-                      shape made of arrays [m]; 0 */
-  double
-      direction[3]; /* the plane's, away from the solid; from the beginning to the end of the capsule's axis [m]; z */
-  double half_extents[3]; /* of the box, > 0 [m]; 1 */
-  double orientation[4];  /* of the box, or of those axes, a quaternion, w first; 1 0 0 0 */
-  double radius;          /* of sphere and capsule, > 0 [m]; 1 */
-  double stiffness;       /* pressure per depth, > 0 [N/m^3]; 1e6 */
-  double damping;         /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
-  double friction;        /* Coulomb's coefficient, >= 0; 0 */
-  int32_t shape;          /* EXMAT_PLANE */
-  int32_t reserved;       /* 0 */
-} exmat_obstacle;
-
-/* Sets all members to their defaults; `size` is sizeof(exmat_obstacle). */
-EXMAT_API exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, size_t size) EXMAT_NOEXCEPT;
-
-EXMAT_API exmat_status exmat_body_add_obstacle(exmat_body* body, const exmat_obstacle* obstacle,
-                                               int64_t* id) EXMAT_NOEXCEPT;
-/* Meshes and height fields are made of arrays once, which are copied, and any number of obstacles of any bodies share
-   them: a level has one. Immutable; may be destroyed while obstacles are made of it. */
-typedef struct exmat_shape exmat_shape;
-
-/* `vertices` [coordinates = 3k] [m] and `triangles` [corners = 3f], 0-based. Vertices at one place are one. With
-   thickness 0 it is solid: each edge belongs to two triangles, and they look away from the solid; what is open or
-   turned is refused in words. With a thickness > 0 [m] it is a shell about the triangles, on both sides, and may be
-   open. */
-EXMAT_API exmat_status exmat_shape_create_mesh(const double* vertices, int64_t coordinates, const int32_t* triangles,
-                                               int64_t corners, double thickness, exmat_shape** shape) EXMAT_NOEXCEPT;
-
-/* Ground: `heights` [rows x columns] along z [m], row by row, 2 or more of each; `spacing` [2]: of columns along x and
-   of rows along y, > 0 [m]. Solid below, nothing beyond the border. */
-EXMAT_API exmat_status exmat_shape_create_height_field(const double* heights, int64_t rows, int64_t columns,
-                                                       const double* spacing, exmat_shape** shape) EXMAT_NOEXCEPT;
-
-EXMAT_API void exmat_shape_destroy(exmat_shape* shape) EXMAT_NOEXCEPT;
-
-/* As exmat_body_add_obstacle(), of that shape: of `obstacle` its law, point and orientation. Moved, read, changed and
-   removed as others are. */
-EXMAT_API exmat_status exmat_body_add_shape(exmat_body* body, const exmat_shape* shape, const exmat_obstacle* obstacle,
-                                            int64_t* id) EXMAT_NOEXCEPT;
-
-/* What it held by friction is let go. */
-EXMAT_API exmat_status exmat_body_remove_obstacle(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
-
-/* How many there are; negative where `body` is NULL. And `ids` [count] of all, in ascending order. */
-EXMAT_API int64_t exmat_body_obstacles(const exmat_body* body) EXMAT_NOEXCEPT;
-EXMAT_API exmat_status exmat_body_read_obstacle_ids(const exmat_body* body, int64_t* ids, int64_t count) EXMAT_NOEXCEPT;
-
-/* Where the obstacle's frame is now and how it moves on from here, straight and about a fixed axis, until it is moved
-   again: to be called before each step, or each few, with the pose and the velocities of the host's rigid body. What
-   touches is carried along by the velocities and not by a jump of the pose. */
-EXMAT_API exmat_status exmat_body_move_obstacle(exmat_body* body, int64_t id,
-                                                const exmat_motion* motion) EXMAT_NOEXCEPT;
-
-/* Either may be NULL. `motion` is that at the body's time. */
-EXMAT_API exmat_status exmat_body_read_obstacle(const exmat_body* body, int64_t id, exmat_obstacle* obstacle,
-                                                exmat_motion* motion) EXMAT_NOEXCEPT;
-
-/* Changes the law alone: stiffness > 0, damping >= 0, friction >= 0, as in exmat_obstacle. */
-EXMAT_API exmat_status exmat_body_set_obstacle_law(exmat_body* body, int64_t id, double stiffness, double damping,
-                                                   double friction) EXMAT_NOEXCEPT;
+/* ---- contacts of one body ---------------------------------------------------------------------------------------- */
 
 /* A vertex of the object that touched at the end of the last step. */
 typedef struct exmat_contact {

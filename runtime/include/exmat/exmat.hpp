@@ -27,11 +27,12 @@ class Error : public std::runtime_error {
   exmat_status status_;
 };
 
-namespace detail {
-
+/// Throws an Error unless a function of exmat.h returned EXMAT_OK.
 inline void check(exmat_status status) {
   if (status != EXMAT_OK) throw Error(status, exmat_last_error());
 }
+
+namespace detail {
 
 template <auto Destroy>
 struct Destroyer {
@@ -41,9 +42,6 @@ struct Destroyer {
   }
 };
 
-template <typename Handle, auto Destroy>
-using Owner = std::unique_ptr<Handle, Destroyer<Destroy>>;
-
 template <typename T>
 std::int64_t length(std::span<T> numbers) noexcept {
   return static_cast<std::int64_t>(numbers.size());
@@ -51,15 +49,19 @@ std::int64_t length(std::span<T> numbers) noexcept {
 
 }  // namespace detail
 
+/// A handle that is destroyed by the matching function.
+template <typename Handle, auto Destroy>
+using Owner = std::unique_ptr<Handle, detail::Destroyer<Destroy>>;
+
 inline exmat_settings default_settings() {
   exmat_settings settings;
-  detail::check(exmat_settings_default(&settings, sizeof settings));
+  check(exmat_settings_default(&settings, sizeof settings));
   return settings;
 }
 
 inline exmat_obstacle default_obstacle() {
   exmat_obstacle obstacle;
-  detail::check(exmat_obstacle_default(&obstacle, sizeof obstacle));
+  check(exmat_obstacle_default(&obstacle, sizeof obstacle));
   return obstacle;
 }
 
@@ -69,19 +71,19 @@ class Model {
   explicit Model(const std::string& bundle) : Model(bundle, default_settings()) {}
   Model(const std::string& bundle, const exmat_settings& settings) {
     exmat_model* model = nullptr;
-    detail::check(exmat_model_create(bundle.c_str(), &settings, &model));
+    check(exmat_model_create(bundle.c_str(), &settings, &model));
     handle_.reset(model);
   }
   static Model from_scene(const std::string& scene) {
     exmat_model* model = nullptr;
-    detail::check(exmat_model_create_from_scene(scene.c_str(), &model));
+    check(exmat_model_create_from_scene(scene.c_str(), &model));
     return Model(model);
   }
 
   /// Of the text of a scene file; `path` names it.
   static Model from_text(const std::string& scene, const std::string& path, bool use_contact = false) {
     exmat_model* model = nullptr;
-    detail::check(exmat_model_create_from_text(scene.c_str(), path.c_str(), use_contact ? 1 : 0, &model));
+    check(exmat_model_create_from_text(scene.c_str(), path.c_str(), use_contact ? 1 : 0, &model));
     return Model(model);
   }
 
@@ -104,14 +106,14 @@ class Model {
   /// [r]
   std::vector<double> example_pose(std::int64_t region, std::size_t example) const {
     std::vector<double> q(modes());
-    detail::check(exmat_model_read_example_pose(get(), region, static_cast<std::int64_t>(example), q.data(),
-                                                static_cast<std::int64_t>(q.size())));
+    check(exmat_model_read_example_pose(get(), region, static_cast<std::int64_t>(example), q.data(),
+                                        static_cast<std::int64_t>(q.size())));
     return q;
   }
   /// [s], of the cubature elements.
   std::vector<double> element_weights() const {
     std::vector<double> weights(static_cast<std::size_t>(exmat_model_elements(get())));
-    detail::check(exmat_model_read_element_weights(get(), weights.data(), static_cast<std::int64_t>(weights.size())));
+    check(exmat_model_read_element_weights(get(), weights.data(), static_cast<std::int64_t>(weights.size())));
     return weights;
   }
   double time_step() const noexcept { return exmat_model_time_step(get()); }
@@ -123,30 +125,31 @@ class Model {
   explicit Model(exmat_model* model) noexcept : handle_(model) {}
 
  private:
-  detail::Owner<exmat_model, exmat_model_destroy> handle_;
+  Owner<exmat_model, exmat_model_destroy> handle_;
 };
 
 class Surface;
 class Capacity;
+class WorldRef;
 
 /// k material points of a model's body.
 class Points {
  public:
   static Points vertices(const Model& model, std::span<const std::int64_t> ids) {
     exmat_points* points = nullptr;
-    detail::check(exmat_points_create_vertices(model.get(), ids.data(), detail::length(ids), &points));
+    check(exmat_points_create_vertices(model.get(), ids.data(), detail::length(ids), &points));
     return Points(points);
   }
   /// To be read, not to be pushed.
   static Points all_vertices(const Model& model) {
     exmat_points* points = nullptr;
-    detail::check(exmat_points_create_all_vertices(model.get(), &points));
+    check(exmat_points_create_all_vertices(model.get(), &points));
     return Points(points);
   }
   /// `xyz` [3k], in the rest shape.
   static Points at(const Model& model, std::span<const double> xyz) {
     exmat_points* points = nullptr;
-    detail::check(exmat_points_create_at(model.get(), xyz.data(), detail::length(xyz), &points));
+    check(exmat_points_create_at(model.get(), xyz.data(), detail::length(xyz), &points));
     return Points(points);
   }
 
@@ -156,7 +159,7 @@ class Points {
   /// Centroids of the cubature elements.
   static Points elements(const Model& model) {
     exmat_points* points = nullptr;
-    detail::check(exmat_points_create_elements(model.get(), &points));
+    check(exmat_points_create_elements(model.get(), &points));
     return Points(points);
   }
 
@@ -164,19 +167,19 @@ class Points {
   /// [3k] X, at rest.
   std::vector<double> rest() const {
     std::vector<double> xyz(3 * size());
-    detail::check(exmat_points_read_rest(get(), xyz.data(), static_cast<std::int64_t>(xyz.size())));
+    check(exmat_points_read_rest(get(), xyz.data(), static_cast<std::int64_t>(xyz.size())));
     return xyz;
   }
   /// [3k x r] U, of a model with so many modes.
   std::vector<float> basis(std::size_t modes) const {
     std::vector<float> rows(3 * size() * modes);
-    detail::check(exmat_points_read_basis(get(), rows.data(), static_cast<std::int64_t>(rows.size())));
+    check(exmat_points_read_basis(get(), rows.data(), static_cast<std::int64_t>(rows.size())));
     return rows;
   }
   /// [k], from the object at rest.
   std::vector<double> distances() const {
     std::vector<double> distances(size());
-    detail::check(exmat_points_distances(get(), distances.data(), static_cast<std::int64_t>(distances.size())));
+    check(exmat_points_distances(get(), distances.data(), static_cast<std::int64_t>(distances.size())));
     return distances;
   }
 
@@ -184,7 +187,7 @@ class Points {
 
  private:
   explicit Points(exmat_points* points) : handle_(points) {}
-  detail::Owner<exmat_points, exmat_points_destroy> handle_;
+  Owner<exmat_points, exmat_points_destroy> handle_;
 };
 
 /// A mesh or a height field made of arrays, which any number of obstacles share.
@@ -193,15 +196,15 @@ class Shape {
   /// Closed, or with a thickness > 0 [m] a shell: `vertices` [3k] [m], `triangles` [3f].
   static Shape mesh(std::span<const double> vertices, std::span<const std::int32_t> triangles, double thickness = 0) {
     exmat_shape* shape = nullptr;
-    detail::check(exmat_shape_create_mesh(vertices.data(), detail::length(vertices), triangles.data(),
-                                          detail::length(triangles), thickness, &shape));
+    check(exmat_shape_create_mesh(vertices.data(), detail::length(vertices), triangles.data(),
+                                  detail::length(triangles), thickness, &shape));
     return Shape(shape);
   }
   /// `heights` [rows x columns] [m], `spacing` of columns and of rows [m].
   static Shape height_field(std::span<const double> heights, std::int64_t columns, std::array<double, 2> spacing) {
     exmat_shape* shape = nullptr;
     const std::int64_t rows = columns > 0 ? detail::length(heights) / columns : 0;
-    detail::check(exmat_shape_create_height_field(heights.data(), rows, columns, spacing.data(), &shape));
+    check(exmat_shape_create_height_field(heights.data(), rows, columns, spacing.data(), &shape));
     return Shape(shape);
   }
 
@@ -209,7 +212,7 @@ class Shape {
 
  private:
   explicit Shape(exmat_shape* shape) : handle_(shape) {}
-  detail::Owner<exmat_shape, exmat_shape_destroy> handle_;
+  Owner<exmat_shape, exmat_shape_destroy> handle_;
 };
 
 /// A body that something else owns: a Body, or a World. Copied as a reference is.
@@ -219,92 +222,89 @@ class BodyRef {
 
   Model model() const {
     exmat_model* model = nullptr;
-    detail::check(exmat_body_model(get(), &model));
+    check(exmat_body_model(get(), &model));
     return Model(model);
   }
 
-  void reset() { detail::check(exmat_body_reset(get())); }
+  /// The world that it is in: its own, where it is in no other.
+  WorldRef world() const noexcept;
+  void set_group(std::uint32_t group, std::uint32_t mask) { check(exmat_body_set_group(get(), group, mask)); }
+
+  void reset() { check(exmat_body_reset(get())); }
   void set_reduced(std::span<const double> q, std::span<const double> v) {
     if (q.size() != v.size()) throw Error(EXMAT_INVALID_ARGUMENT, "set_reduced: q and v differ in length");
-    detail::check(exmat_body_set_reduced(get(), q.data(), v.data(), detail::length(q)));
+    check(exmat_body_set_reduced(get(), q.data(), v.data(), detail::length(q)));
   }
 
   exmat_report step(std::int64_t steps = 1) {
     exmat_report report;
     report.size = sizeof report;
-    detail::check(exmat_body_step(get(), steps, &report));
+    check(exmat_body_step(get(), steps, &report));
     return report;
   }
   /// Of the last steps, also where they threw.
   exmat_report report() const {
     exmat_report report;
     report.size = sizeof report;
-    detail::check(exmat_body_read_report(get(), &report));
+    check(exmat_body_read_report(get(), &report));
     return report;
   }
 
   /// `forces` [3k].
   void apply_forces(const Points& points, std::span<const double> forces) {
-    detail::check(exmat_body_apply_forces(get(), points.get(), forces.data(), detail::length(forces)));
+    check(exmat_body_apply_forces(get(), points.get(), forces.data(), detail::length(forces)));
   }
-  void clear_forces() { detail::check(exmat_body_clear_forces(get())); }
-  void restart_integrator() { detail::check(exmat_body_restart_integrator(get())); }
+  void clear_forces() { check(exmat_body_clear_forces(get())); }
+  void restart_integrator() { check(exmat_body_restart_integrator(get())); }
 
   exmat_motion motion() const {
     exmat_motion motion;
     motion.size = sizeof motion;
-    detail::check(exmat_body_read_motion(get(), &motion));
+    check(exmat_body_read_motion(get(), &motion));
     return motion;
   }
   /// Sets motion.size itself.
   void set_motion(exmat_motion motion) {
     motion.size = sizeof motion;
-    detail::check(exmat_body_set_motion(get(), &motion));
+    check(exmat_body_set_motion(get(), &motion));
   }
 
   /// `xyz` [3k].
   void read_positions(const Points& points, std::span<float> xyz) {
-    detail::check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
+    check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
   }
   void read_positions(const Surface& surface, std::span<float> xyz);
   /// [12] three rows of a rotation and a shift.
   void read_placement(std::span<double, 12> placement) const {
-    detail::check(exmat_body_read_placement(get(), placement.data()));
+    check(exmat_body_read_placement(get(), placement.data()));
   }
   /// `density` [k] [J/m^3].
   void read_energy_density(Surface& surface, std::span<float> density) const;
   /// `q` [r].
   void read_target(std::span<double> q, std::int64_t region = -1) const {
-    detail::check(exmat_body_read_target(get(), region, q.data(), detail::length(q)));
-  }
-  void set_profiled(bool profiled) { detail::check(exmat_body_set_profiled(get(), profiled ? 1 : 0)); }
-  exmat_profile profile() const {
-    exmat_profile profile;
-    profile.size = sizeof profile;
-    detail::check(exmat_body_read_profile(get(), &profile));
-    return profile;
+    check(exmat_body_read_target(get(), region, q.data(), detail::length(q)));
   }
   /// `q` [r].
   void read_displacement(std::span<double> q) const {
-    detail::check(exmat_body_read_reduced(get(), q.data(), nullptr, detail::length(q)));
+    check(exmat_body_read_reduced(get(), q.data(), nullptr, detail::length(q)));
   }
   /// `v` [r].
   void read_velocity(std::span<double> v) const {
-    detail::check(exmat_body_read_reduced(get(), nullptr, v.data(), detail::length(v)));
+    check(exmat_body_read_reduced(get(), nullptr, v.data(), detail::length(v)));
   }
   /// `weights` [K].
   void read_weights(std::span<double> weights) const {
-    detail::check(exmat_body_read_weights(get(), weights.data(), detail::length(weights)));
+    check(exmat_body_read_weights(get(), weights.data(), detail::length(weights)));
   }
   /// `weights` [K of the region].
   void read_region_weights(std::size_t region, std::span<double> weights) const {
     const auto index = static_cast<std::int64_t>(region);
-    detail::check(exmat_body_read_region_weights(get(), index, weights.data(), detail::length(weights)));
+    check(exmat_body_read_region_weights(get(), index, weights.data(), detail::length(weights)));
   }
   exmat_energies energies() const {
     exmat_energies energies;
     energies.size = sizeof energies;
-    detail::check(exmat_body_read_energies(get(), &energies));
+    check(exmat_body_read_energies(get(), &energies));
     return energies;
   }
   double time() const noexcept { return exmat_body_time(get()); }
@@ -316,91 +316,44 @@ class BodyRef {
   std::span<const double> velocity(std::size_t modes) const noexcept { return {exmat_body_velocity(get()), modes}; }
   std::span<const double> weights(std::size_t examples) const noexcept { return {exmat_body_weights(get()), examples}; }
 
-  void set_gravity(std::span<const double, 3> gravity) { detail::check(exmat_body_set_gravity(get(), gravity.data())); }
-  void set_damping(double alpha, double beta) { detail::check(exmat_body_set_damping(get(), alpha, beta)); }
-  void set_integrator(std::int32_t integrator) { detail::check(exmat_body_set_integrator(get(), integrator)); }
+  void set_gravity(std::span<const double, 3> gravity) { check(exmat_body_set_gravity(get(), gravity.data())); }
+  void set_damping(double alpha, double beta) { check(exmat_body_set_damping(get(), alpha, beta)); }
+  void set_integrator(std::int32_t integrator) { check(exmat_body_set_integrator(get(), integrator)); }
   /// `region` -1: the whole body.
   void set_example_stiffness(double kappa, std::int64_t region = -1) {
-    detail::check(exmat_body_set_example_stiffness(get(), region, kappa));
+    check(exmat_body_set_example_stiffness(get(), region, kappa));
   }
   void set_example_damping(double c_kappa, std::int64_t region = -1) {
-    detail::check(exmat_body_set_example_damping(get(), region, c_kappa));
+    check(exmat_body_set_example_damping(get(), region, c_kappa));
   }
   void set_example_bias(double bias, std::int64_t region = -1) {
-    detail::check(exmat_body_set_example_bias(get(), region, bias));
+    check(exmat_body_set_example_bias(get(), region, bias));
   }
   /// Empty: those of the pose again.
   void set_example_weights(std::span<const double> weights, std::int64_t region = -1) {
-    detail::check(exmat_body_set_example_weights(get(), region, weights.data(), detail::length(weights)));
+    check(exmat_body_set_example_weights(get(), region, weights.data(), detail::length(weights)));
   }
 
-  /// Its id. Sets obstacle.size itself, as the functions below do.
-  std::int64_t add_obstacle(exmat_obstacle obstacle) {
-    obstacle.size = sizeof obstacle;
-    std::int64_t id = -1;
-    detail::check(exmat_body_add_obstacle(get(), &obstacle, &id));
-    return id;
-  }
-  /// Of that shape: its law, point and orientation are those of `obstacle`.
-  std::int64_t add_shape(const Shape& shape, exmat_obstacle obstacle) {
-    obstacle.size = sizeof obstacle;
-    std::int64_t id = -1;
-    detail::check(exmat_body_add_shape(get(), shape.get(), &obstacle, &id));
-    return id;
-  }
-  void remove_obstacle(std::int64_t id) { detail::check(exmat_body_remove_obstacle(get(), id)); }
-  void move_obstacle(std::int64_t id, exmat_motion motion) {
-    motion.size = sizeof motion;
-    detail::check(exmat_body_move_obstacle(get(), id, &motion));
-  }
-  void set_obstacle_law(std::int64_t id, double stiffness, double damping, double friction) {
-    detail::check(exmat_body_set_obstacle_law(get(), id, stiffness, damping, friction));
-  }
-  std::vector<std::int64_t> obstacle_ids() const {
-    std::vector<std::int64_t> ids(static_cast<std::size_t>(exmat_body_obstacles(get())));
-    detail::check(exmat_body_read_obstacle_ids(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
-    return ids;
-  }
-  exmat_obstacle obstacle(std::int64_t id) const {
-    exmat_obstacle obstacle;
-    obstacle.size = sizeof obstacle;
-    detail::check(exmat_body_read_obstacle(get(), id, &obstacle, nullptr));
-    return obstacle;
-  }
-  exmat_motion obstacle_motion(std::int64_t id) const {
-    exmat_motion motion;
-    motion.size = sizeof motion;
-    detail::check(exmat_body_read_obstacle(get(), id, nullptr, &motion));
-    return motion;
-  }
-  /// [9f], three corners of each triangle of a mesh or of ground, in the obstacle's frame; empty of other shapes.
-  std::vector<double> obstacle_triangles(std::int64_t id) const {
-    const std::int64_t triangles = exmat_body_obstacle_triangles(get(), id);
-    std::vector<double> corners(9 * static_cast<std::size_t>(triangles > 0 ? triangles : 0));
-    detail::check(
-        exmat_body_read_obstacle_triangles(get(), id, corners.data(), static_cast<std::int64_t>(corners.size())));
-    return corners;
-  }
   std::vector<exmat_contact> contacts() const {
     std::vector<exmat_contact> contacts(static_cast<std::size_t>(exmat_body_contacts(get())));
-    detail::check(exmat_body_read_contacts(get(), contacts.data(), static_cast<std::int64_t>(contacts.size()),
-                                           sizeof(exmat_contact)));
+    check(exmat_body_read_contacts(get(), contacts.data(), static_cast<std::int64_t>(contacts.size()),
+                                   sizeof(exmat_contact)));
     return contacts;
   }
   /// Reports hold lost work from now on; null: no longer.
   void set_capacity(const Capacity* capacity);
-  /// On an obstacle, or, -1, on the body; force and torque [3] each, either may be null.
+  /// On an obstacle of its world, or, -1, on the body; force and torque [3] each, either may be null.
   void read_contact_load(std::int64_t id, double* force, double* torque) const {
-    detail::check(exmat_body_read_contact_load(get(), id, force, torque));
+    check(exmat_body_read_contact_load(get(), id, force, torque));
   }
 
   std::vector<double> state() const {
     std::vector<double> numbers(static_cast<std::size_t>(exmat_body_state_size(get())));
-    detail::check(exmat_body_read_state(get(), numbers.data(), static_cast<std::int64_t>(numbers.size())));
+    check(exmat_body_read_state(get(), numbers.data(), static_cast<std::int64_t>(numbers.size())));
     return numbers;
   }
   void set_state(std::span<const double> numbers) {
-    detail::check(exmat_body_set_state(get(), numbers.data(), detail::length(numbers)));
+    check(exmat_body_set_state(get(), numbers.data(), detail::length(numbers)));
   }
 
   exmat_body* get() const noexcept { return body_; }
@@ -412,7 +365,7 @@ class BodyRef {
 class Body : public BodyRef {
  public:
   explicit Body(const Model& model) : BodyRef(nullptr) {
-    detail::check(exmat_body_create(model.get(), &body_));
+    check(exmat_body_create(model.get(), &body_));
     handle_.reset(body_);
   }
   /// Takes it over.
@@ -432,35 +385,7 @@ class Body : public BodyRef {
   }
 
  private:
-  detail::Owner<exmat_body, exmat_body_destroy> handle_;
-};
-
-/// Bodies that are stepped together and do not touch each other.
-class Bodies {
- public:
-  void add(Body body) {
-    handles_.reserve(bodies_.size() + 1);
-    bodies_.push_back(std::move(body));
-    handles_.push_back(bodies_.back().get());
-  }
-
-  std::size_t size() const noexcept { return bodies_.size(); }
-  Body& operator[](std::size_t i) noexcept { return bodies_[i]; }
-  const Body& operator[](std::size_t i) const noexcept { return bodies_[i]; }
-
-  /// By up to `threads` threads, 0: as many as there are processors.
-  void step(std::int64_t steps = 1, int threads = 0) {
-    detail::check(exmat_bodies_step(handles_.data(), static_cast<std::int64_t>(handles_.size()), steps, threads));
-  }
-  std::uint64_t hash() const {
-    std::uint64_t hash = 0;
-    detail::check(exmat_bodies_hash(handles_.data(), static_cast<std::int64_t>(handles_.size()), &hash));
-    return hash;
-  }
-
- private:
-  std::vector<Body> bodies_;
-  std::vector<exmat_body*> handles_;
+  Owner<exmat_body, exmat_body_destroy> handle_;
 };
 
 }  // namespace exmat

@@ -1,5 +1,6 @@
 /*
- * Bodies that touch each other. A part of exmat.h, which includes it and says what all of it has in common.
+ * Worlds: bodies that are stepped together, and the obstacles that they touch. A part of exmat.h, which includes it and
+ * says what all of it has in common.
  */
 #ifndef EXMAT_WORLD_H
 #define EXMAT_WORLD_H
@@ -14,19 +15,14 @@ extern "C" {
 
 /* ---- worlds ---------------------------------------------------------------------------------------------------- */
 
-/* Bodies that touch each other, stepped together: those of any models that know of contact (use_contact, or a scene
-   with obstacles) and have the same time step. All functions of a body serve bodies of a world, too, but for those that
-   step it. A world is for one thread at a time, and so are its bodies. */
-typedef struct exmat_world exmat_world;
-
-/* How bodies touch, all per area of their surfaces. */
+/* How bodies touch each other, all per area of their surfaces. */
 typedef struct exmat_contact_law {
   size_t size;      /* sizeof(exmat_contact_law) where the caller was compiled */
   double stiffness; /* pressure per depth, > 0 [N/m^3]; 1e6 */
   double damping;   /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
   double friction;  /* Coulomb's coefficient, >= 0; 0 */
   int32_t self;     /* 1: a body also touches itself; 0. Takes time for each body's model when it is added */
-  int32_t reserved; /* 0 */
+  int32_t apart;    /* 1: bodies touch neither each other nor themselves, obstacles alone; 0 */
 } exmat_contact_law;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_contact_law). */
@@ -35,26 +31,39 @@ EXMAT_API exmat_status exmat_contact_law_default(exmat_contact_law* law, size_t 
 /* Without bodies; `law` NULL: the defaults. */
 EXMAT_API exmat_status exmat_world_create(const exmat_contact_law* law, exmat_world** world) EXMAT_NOEXCEPT;
 
-/* Of a scene file with "bodies": all of them, where they start. Ids are 0, 1, ... in its order. */
+/* Of a scene file: all its bodies, where they start, and its obstacles. Ids of either are 0, 1, ... in its order. The
+   `instances` of a scene with a single "bundle" are apart. */
 EXMAT_API exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world** world) EXMAT_NOEXCEPT;
 
 /* The same of the text of a scene file; `path` names it in messages, and names in it are relative to that path's
-   folder. */
-EXMAT_API exmat_status exmat_world_create_from_text(const char* scene, const char* path,
+   folder. `use_contact` 1: its bodies can touch obstacles also where the scene has none. */
+EXMAT_API exmat_status exmat_world_create_from_text(const char* scene, const char* path, int32_t use_contact,
                                                     exmat_world** world) EXMAT_NOEXCEPT;
 
-/* With the bodies that are in it. */
+/* With the bodies that are in it; nothing where it is a body's own. */
 EXMAT_API void exmat_world_destroy(exmat_world* world) EXMAT_NOEXCEPT;
 
-/* Changes stiffness, damping and friction; whether bodies touch themselves stays. */
+/* The world that a body is in; one of its own is there as long as the body and not in another. NULL where `body` is
+   NULL. */
+EXMAT_API exmat_world* exmat_body_world(const exmat_body* body) EXMAT_NOEXCEPT;
+
+/* All bodies back to rest at time 0, without applied forces. Obstacles of the scene go back, too. */
+EXMAT_API exmat_status exmat_world_reset(exmat_world* world) EXMAT_NOEXCEPT;
+
+/* Its steps times the time step [s]; negative where `world` is NULL. */
+EXMAT_API double exmat_world_time(const exmat_world* world) EXMAT_NOEXCEPT;
+
+/* Changes stiffness, damping and friction; `self` and `apart` stay. */
 EXMAT_API exmat_status exmat_world_set_contact_law(exmat_world* world, const exmat_contact_law* law) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_contact_law(const exmat_world* world, exmat_contact_law* law) EXMAT_NOEXCEPT;
 
-/* The world's from now on, as it is and where it is. `id` >= 0 is a number that no later body of the world gets. What
-   it overlaps pushes it out. Reads the surface of a model's first body. exmat_body_destroy() takes a body out, too. */
+/* The world's from now on, as it is and where it is, at the time of the world, which is the first body's. `id` >= 0 is
+   a number that no later body of the world gets. What it overlaps pushes it out; obstacles of the world that it had of
+   its own stay behind. Unless bodies are apart, its model has to know of contact, and the surface of a model's first
+   body is read. exmat_body_destroy() takes a body out, too. */
 EXMAT_API exmat_status exmat_world_add_body(exmat_world* world, exmat_body* body, int64_t* id) EXMAT_NOEXCEPT;
 
-/* Takes a body out and gives it back: `body` is the caller's again. */
+/* Takes a body out and gives it back: `body` is the caller's again, in a world of its own. */
 EXMAT_API exmat_status exmat_world_remove_body(exmat_world* world, int64_t id, exmat_body** body) EXMAT_NOEXCEPT;
 
 /* How many there are; negative where `world` is NULL. And `ids` [count] of all, in ascending order. */
@@ -69,6 +78,11 @@ EXMAT_API const char* exmat_world_body_name(const exmat_world* world, int64_t id
    body that was added, and where there is none. */
 EXMAT_API int64_t exmat_world_body_kind(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
 
+/* Who touches whom: two bodies, or a body and an obstacle, if each one's mask has a bit of the other's group. 1 and all
+   bits of a body that was created, those of its scene where that says. */
+EXMAT_API exmat_status exmat_body_set_group(exmat_body* body, uint32_t group, uint32_t mask) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_group(const exmat_body* body, uint32_t* group, uint32_t* mask) EXMAT_NOEXCEPT;
+
 /* What the steps of one call did. */
 typedef struct exmat_world_report {
   size_t size;                 /* sizeof(exmat_world_report), set by the caller */
@@ -80,10 +94,13 @@ typedef struct exmat_world_report {
   int64_t islands;             /* bodies that touch and were solved together in the last step */
   int64_t largest_island;      /* most bodies of an island in any step */
   double seconds;              /* wall clock */
+  int64_t asleep;              /* bodies that slept through the last step */
 } exmat_world_report;
 
-/* Takes `steps` >= 0 steps of all bodies, by up to `threads` threads as in exmat_bodies_step(); the results do not
-   depend on their number. EXMAT_NON_FINITE names the first such body: it, and what touches it, are as they were before
+/* Takes `steps` >= 0 steps of all bodies, by up to `threads` threads (0: as many as there are processors), and never
+   more than there are bodies and processors, or than the system lets start; the results do not depend on their number.
+   Those of bodies that go side by side are those of exmat_body_step() to rounding, as sums are taken in another order.
+   EXMAT_NON_FINITE names the first such body: it, and what touches it, are as they were before
    that step, which the others have taken. `report` may be NULL. Allocates where more touches than ever before. */
 EXMAT_API exmat_status exmat_world_step(exmat_world* world, int64_t steps, int32_t threads,
                                         exmat_world_report* report) EXMAT_NOEXCEPT;
@@ -116,6 +133,92 @@ EXMAT_API exmat_status exmat_world_hash(const exmat_world* world, uint64_t* hash
 EXMAT_API int64_t exmat_world_state_size(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_state(const exmat_world* world, double* numbers, int64_t count) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_set_state(exmat_world* world, const double* numbers, int64_t count) EXMAT_NOEXCEPT;
+
+/* ---- obstacles ------------------------------------------------------------------------------------------------- */
+
+/* Obstacles are a world's: those of its scene, and those that its host adds, moves and removes between steps. All its
+   bodies touch them whose models know of contact (use_contact, or a scene with obstacles) and whose group and mask
+   allow it. An obstacle has a number, `id` >= 0, that no later one of the world gets. exmat_body_reset() and states
+   keep the host's where they are. */
+
+/* Shapes. The last two are made of arrays: exmat_world_add_shape(). */
+enum { EXMAT_PLANE = 0, EXMAT_SPHERE = 1, EXMAT_BOX = 2, EXMAT_CAPSULE = 3, EXMAT_MESH = 4, EXMAT_HEIGHT_FIELD = 5 };
+
+/* Its shape, in its own frame, which is the world until the obstacle is moved, and its law: pressures on the body's
+   surface. Members that the shape does not name are not looked at. */
+typedef struct exmat_obstacle {
+  size_t size;     /* sizeof(exmat_obstacle) where the caller was compiled */
+  double point[3]; /* of the plane; centre of sphere and box; where the capsule's axis begins; origin of the axes of a
+                      shape made of arrays [m]; 0 */
+  double
+      direction[3]; /* the plane's, away from the solid; from the beginning to the end of the capsule's axis [m]; z */
+  double half_extents[3]; /* of the box, > 0 [m]; 1 */
+  double orientation[4];  /* of the box, or of those axes, a quaternion, w first; 1 0 0 0 */
+  double radius;          /* of sphere and capsule, > 0 [m]; 1 */
+  double stiffness;       /* pressure per depth, > 0 [N/m^3]; 1e6 */
+  double damping;         /* pressure per approach velocity, >= 0 [N s/m^3]; 0 */
+  double friction;        /* Coulomb's coefficient, >= 0; 0 */
+  int32_t shape;          /* EXMAT_PLANE */
+  uint32_t group;         /* bits that it has; 1 */
+  uint32_t mask;          /* bits of the groups of bodies that touch it; all: two touch if each mask has a bit of the
+                             other's group */
+  uint32_t reserved;      /* 0 */
+} exmat_obstacle;
+
+/* Sets all members to their defaults; `size` is sizeof(exmat_obstacle). */
+EXMAT_API exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, size_t size) EXMAT_NOEXCEPT;
+
+EXMAT_API exmat_status exmat_world_add_obstacle(exmat_world* world, const exmat_obstacle* obstacle,
+                                                int64_t* id) EXMAT_NOEXCEPT;
+/* Meshes and height fields are made of arrays once, which are copied, and any number of obstacles of any worlds share
+   them: a level has one. Immutable; may be destroyed while obstacles are made of it. */
+typedef struct exmat_shape exmat_shape;
+
+/* `vertices` [coordinates = 3k] [m] and `triangles` [corners = 3f], 0-based. Vertices at one place are one. With
+   thickness 0 it is solid: each edge belongs to two triangles, and they look away from the solid; what is open or
+   turned is refused in words. With a thickness > 0 [m] it is a shell about the triangles, on both sides, and may be
+   open. */
+EXMAT_API exmat_status exmat_shape_create_mesh(const double* vertices, int64_t coordinates, const int32_t* triangles,
+                                               int64_t corners, double thickness, exmat_shape** shape) EXMAT_NOEXCEPT;
+
+/* Ground: `heights` [rows x columns] along z [m], row by row, 2 or more of each; `spacing` [2]: of columns along x and
+   of rows along y, > 0 [m]. Solid below, nothing beyond the border. */
+EXMAT_API exmat_status exmat_shape_create_height_field(const double* heights, int64_t rows, int64_t columns,
+                                                       const double* spacing, exmat_shape** shape) EXMAT_NOEXCEPT;
+
+EXMAT_API void exmat_shape_destroy(exmat_shape* shape) EXMAT_NOEXCEPT;
+
+/* As exmat_world_add_obstacle(), of that shape: of `obstacle` its law, point and orientation. Moved, read, changed and
+   removed as others are. */
+EXMAT_API exmat_status exmat_world_add_shape(exmat_world* world, const exmat_shape* shape,
+                                             const exmat_obstacle* obstacle, int64_t* id) EXMAT_NOEXCEPT;
+
+/* What it held by friction is let go. */
+EXMAT_API exmat_status exmat_world_remove_obstacle(exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
+
+/* How many there are; negative where `world` is NULL. And `ids` [count] of all, in ascending order. */
+EXMAT_API int64_t exmat_world_obstacles(const exmat_world* world) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_world_read_obstacle_ids(const exmat_world* world, int64_t* ids,
+                                                     int64_t count) EXMAT_NOEXCEPT;
+
+/* Where the obstacle's frame is now and how it moves on from here, straight and about a fixed axis, until it is moved
+   again: to be called before each step, or each few, with the pose and the velocities of the host's rigid body. What
+   touches is carried along by the velocities and not by a jump of the pose. */
+EXMAT_API exmat_status exmat_world_move_obstacle(exmat_world* world, int64_t id,
+                                                 const exmat_motion* motion) EXMAT_NOEXCEPT;
+
+/* Either may be NULL. `motion` is that at the world's time. */
+EXMAT_API exmat_status exmat_world_read_obstacle(const exmat_world* world, int64_t id, exmat_obstacle* obstacle,
+                                                 exmat_motion* motion) EXMAT_NOEXCEPT;
+
+/* Changes the law alone: stiffness > 0, damping >= 0, friction >= 0, as in exmat_obstacle. */
+EXMAT_API exmat_status exmat_world_set_obstacle_law(exmat_world* world, int64_t id, double stiffness, double damping,
+                                                    double friction) EXMAT_NOEXCEPT;
+
+/* What the contacts of all bodies with an obstacle did to it in the last call that stepped the world, as a constant
+   force [3] [N] and torque [3] [N m] about the origin of its frame, world. Either may be NULL. */
+EXMAT_API exmat_status exmat_world_read_obstacle_load(const exmat_world* world, int64_t id, double* force,
+                                                      double* torque) EXMAT_NOEXCEPT;
 
 #ifdef __cplusplus
 }

@@ -29,7 +29,7 @@ class Model(_exmat.Model):
     example_target       "auto", "table" or "solve"
     target_iterations    most in one step, 1 to 1000; 4
     energy_reference     "example" or "rest"
-    use_contact          whether bodies can touch obstacles of add_obstacle() and each other in a TouchingWorld; False
+    use_contact          whether bodies can touch obstacles of add_obstacle() and each other in a World; False
     sleep_energy         a body is left alone once its kinetic energy has been below this [J]; 0: never
     sleep_time           for so long, > 0 [s]; 0.5
     precision            "double", or "mixed": of bodies side by side, with their stiffness in single precision
@@ -77,7 +77,7 @@ class Model(_exmat.Model):
 
         Paths in members are relative to the current folder. Steps, instances and output are not the model's business.
         With `use_contact` bodies can touch also where the scene has no obstacles. A scene of several bodies is for
-        TouchingWorld.from_scene().
+        World.from_scene().
         """
         model = cls.__new__(cls)
         if isinstance(scene, Mapping):
@@ -101,7 +101,7 @@ class Model(_exmat.Model):
         self._recipe = ("members", scene, {"use_contact": use_contact})
 
     @classmethod
-    def _of_kind(cls, world: _exmat.TouchingWorld, kind: int, recipe: Any) -> "Model":
+    def _of_kind(cls, world: _exmat.World, kind: int, recipe: Any) -> "Model":
         """That of the bodies of a kind in a new world, which `recipe` makes."""
         model = cls.__new__(cls)
         _exmat.Model.__init__(model, world, kind)
@@ -142,7 +142,7 @@ def _reload(recipe: Tuple[str, Any, Optional[Dict[str, Any]]], sha: str) -> Mode
     elif kind == "text":
         model._load_text(*what)
     elif kind == "world":
-        from .touching_world import world_of
+        from .world import world_of
 
         made, place = what
         model = Model._of_kind(world_of(made), place, made)

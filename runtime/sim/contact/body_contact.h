@@ -4,9 +4,9 @@
 #include <array>
 #include <vector>
 
-#include "runtime/sim/contact/body_surface.h"
 #include "runtime/sim/contact/contact.h"
 #include "runtime/sim/contact/own_search.h"
+#include "runtime/sim/contact/touching_surface.h"
 
 namespace exmat::runtime {
 
@@ -64,29 +64,22 @@ struct NearVertices {
   OwnSearch own;  ///< of a body with itself: scratch
 };
 
-/// The surface of a body that touches others, and how its vertices look.
-struct TouchingSurface {
-  TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself = false);
-
-  /// Whether parts of it may have come near to each other at q [r], moving at v [r/s], within a step of `time_step`
-  /// [s]. O(r); never, where it does not meet itself.
-  bool may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step) const noexcept;
-
-  BodySurface surface;
-  VertexArray normals;  ///< of the vertices of the set at rest, unit, outward
-
-  // Empty where it does not meet itself.
-  std::vector<SurfaceHit> places;   ///< of the vertices of the set on the surface
-  RowMatrix vertex_bounds;          ///< [vertices x r] BodySurface::approach_bounds() of them
-  Eigen::VectorXd approach_bounds;  ///< [r] the largest of each mode
-};
-
 /// One body of a pair: what it is, where, and how it moves.
 struct TouchingBody {
   const ContactSet& set;
   const TouchingSurface& touching;
   BodyPose pose;
   BodyVelocity velocity;
+};
+
+/// A search for the candidates of a step.
+struct CandidateSearch {
+  double time_step = 0;                      ///< [s]
+  double margin = 0;                         ///< from the surface, outside [m]
+  bool anew = false;                         ///< there is no last step
+  const std::vector<HeldBodyContact>& held;  ///< vertices that were inside in the last step
+  SurfaceShape& shape;                       ///< that of b, placed
+  NearVertices& near;                        ///< found by earlier searches; the candidates are the same without
 };
 
 /// Contact of the vertices of one body, `a`, with the surface of another, `b`, which may be the same kind of body.
@@ -99,19 +92,16 @@ class BodyContact {
   /// `law` of one direction: where both are looked at, each has half of the stiffness and damping.
   explicit BodyContact(const ContactLaw& law) : law_(law) {}
 
-  /// Finds and freezes the candidates: vertices less than `margin` [m] outside, and those inside: that were so in the
-  /// last step, `held`, or of any depth where `anew`, that is without a last step. `shape` is that of b, placed. `near`
-  /// is what earlier calls found of the same two bodies; the candidates are the same without.
-  void gather(const TouchingBody& a, const TouchingBody& b, double time_step, double margin, bool anew,
-              const std::vector<HeldBodyContact>& held, SurfaceShape& shape, NearVertices& near,
+  /// Finds and freezes the candidates: vertices less than the margin outside, and those inside: that were so in the
+  /// last step, or of any depth where there is none.
+  void gather(const TouchingBody& a, const TouchingBody& b, const CandidateSearch& search,
               BodyCandidates& candidates) const;
 
   /// The same of a body with itself: vertices that parts of its surface which are farther away at rest have come near
-  /// to from outside: nearer than `margin` [m] and two steps of the way that they go against each other; where these
-  /// are fast, also one step of the fastest vertex, since what is hit may take its speed. What overlaps at the start
-  /// never pushes.
-  void gather_own(const TouchingBody& body, double time_step, double margin, const std::vector<HeldBodyContact>& held,
-                  SurfaceShape& shape, NearVertices& near, BodyCandidates& candidates) const;
+  /// to from outside: nearer than the margin and two steps of the way that they go against each other; where these are
+  /// fast, also one step of the fastest vertex, since what is hit may take its speed. What overlaps at the start never
+  /// pushes.
+  void gather_own(const TouchingBody& body, const CandidateSearch& search, BodyCandidates& candidates) const;
 
   /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone. `way`:
   /// how far vertices and surface have gone, at most, from where they were when set_clearances() was called [m].

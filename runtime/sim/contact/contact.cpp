@@ -185,13 +185,14 @@ void ContactSet::search(const BodyPose& pose, double q_norm, double margin, doub
   }
 }
 
-void ContactSet::gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
+void ContactSet::gather(const Obstacles& obstacles, double end_time, double time_step, const BodyPose& pose,
                         double margin, NearPlanes& near_planes, ContactWorkspace& workspace) const noexcept {
   workspace.candidate_count = 0;
   workspace.visited_nodes = workspace.tested_vertices = 0;
   if (tree_.empty()) return;
+  workspace.obstacles.resize(obstacles.size());  // within what it was sized for
   for (std::size_t i = 0; i < obstacles.size(); ++i)
-    workspace.obstacles[i] = PlacedObstacle(obstacles[i], end_time, time_step);
+    workspace.obstacles[i] = PlacedObstacle(*obstacles[i], end_time, time_step);
   workspace.are_all_planes = NearPlanes::serve(workspace.obstacles);
   const double q_norm = pose.q.norm();
   find_sweeping(pose, workspace);

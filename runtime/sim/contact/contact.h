@@ -57,7 +57,8 @@ struct ContactSums {
   }
 };
 
-/// Scratch of one step of one body, sized once; holds nothing from step to step. Sums are of the last evaluation.
+/// Scratch of one step of one body, sized once for as many obstacles as it may have; holds nothing from step to step.
+/// Sums are of the last evaluation.
 struct ContactWorkspace : ContactSums {
   ContactWorkspace() = default;
   ContactWorkspace(const ContactSet& set, std::size_t obstacle_count);
@@ -120,8 +121,8 @@ class ContactSet {
   /// Finds the candidates: vertices of this pose, that of the beginning, at most `margin` [m] away from the
   /// obstacles as they are at `end_time` [s]. Costs O(obstacles + r) where the whole body is farther away.
   /// `near_planes` is what earlier calls found of the same body; the candidates are the same without.
-  void gather(const std::vector<Obstacle>& obstacles, double end_time, double time_step, const BodyPose& pose,
-              double margin, NearPlanes& near_planes, ContactWorkspace& workspace) const noexcept;
+  void gather(const Obstacles& obstacles, double end_time, double time_step, const BodyPose& pose, double margin,
+              NearPlanes& near_planes, ContactWorkspace& workspace) const noexcept;
 
   /// After gather() at the same pose: sets what the step keeps of each candidate; `expected` is the velocity
   /// that the loads of the step make of it.

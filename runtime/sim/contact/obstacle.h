@@ -2,8 +2,11 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <utility>
 #include <variant>
+#include <vector>
 
+#include "common/model/meeting_group.h"
 #include "runtime/sim/contact/height_field.h"
 #include "runtime/sim/contact/rigid_mesh.h"
 #include "runtime/sim/contact/surface_point.h"
@@ -70,7 +73,24 @@ struct Obstacle {
   double stiffness = 0;  ///< pressure per depth, > 0 [N/m^3]
   double damping = 0;    ///< pressure per approach velocity, >= 0 [N s/m^3]
   double friction = 0;   ///< Coulomb's coefficient, >= 0
+  MeetingGroup meeting{};
 };
+
+/// An obstacle that any number of bodies may touch. Whoever made it may change it between steps.
+class SharedObstacle {
+ public:
+  SharedObstacle(Obstacle obstacle)  // NOLINT(google-explicit-constructor): an obstacle serves as one of a list
+      : obstacle_(std::make_shared<Obstacle>(std::move(obstacle))) {}
+  SharedObstacle(std::shared_ptr<const Obstacle> obstacle)  // NOLINT(google-explicit-constructor)
+      : obstacle_(std::move(obstacle)) {}
+
+  const Obstacle& operator*() const noexcept { return *obstacle_; }
+  const Obstacle* operator->() const noexcept { return obstacle_.get(); }
+
+ private:
+  std::shared_ptr<const Obstacle> obstacle_;
+};
+using Obstacles = std::vector<SharedObstacle>;
 
 /// An obstacle at the end of a step.
 struct PlacedObstacle {

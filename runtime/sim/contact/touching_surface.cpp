@@ -1,8 +1,7 @@
-#include <Eigen/Core>
+#include "runtime/sim/contact/touching_surface.h"
+
 #include <limits>
 #include <utility>
-
-#include "runtime/sim/contact/body_contact.h"
 
 namespace exmat::runtime {
 

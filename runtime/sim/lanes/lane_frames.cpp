@@ -6,9 +6,9 @@ namespace {
 const FreeMotionWorkspace& free_motion(const Workspace& body) { return *std::get_if<FreeMotionWorkspace>(&body.frame); }
 
 template <class Work>
-void each(std::span<Workspace> bodies, const LaneNumbers& chosen, Work work) {
+void each(std::span<Workspace* const> bodies, const LaneNumbers& chosen, Work work) {
   for (std::size_t l = 0; l < bodies.size(); ++l)
-    if (chosen[static_cast<Eigen::Index>(l)] != 0) work(bodies[l], static_cast<Eigen::Index>(l));
+    if (chosen[static_cast<Eigen::Index>(l)] != 0) work(*bodies[l], static_cast<Eigen::Index>(l));
 }
 
 }  // namespace
@@ -28,7 +28,7 @@ void LaneFrames::begin(const LaneNumbers& velocity_factor, const LaneVectors& ve
   if (rotation_) rotation_->begin(velocity_factor, velocity_centre);
 }
 
-LaneNumbers LaneFrames::update(std::span<Workspace> bodies, const LaneNumbers& chosen, const LaneVectors& q,
+LaneNumbers LaneFrames::update(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& q,
                                LaneVectors& gradient) noexcept {
   LaneNumbers found = LaneNumbers::Ones();
   if (rotation_) {
@@ -44,7 +44,8 @@ LaneNumbers LaneFrames::update(std::span<Workspace> bodies, const LaneNumbers& c
   return found;
 }
 
-void LaneFrames::add_stiffness(std::span<Workspace> bodies, const LaneNumbers& chosen, AlignedArray& hessian) noexcept {
+void LaneFrames::add_stiffness(std::span<Workspace* const> bodies, const LaneNumbers& chosen,
+                               AlignedArray& hessian) noexcept {
   if (rotation_) {
     rotation_->add_stiffness(chosen, hessian);
     return;
@@ -57,16 +58,16 @@ void LaneFrames::add_stiffness(std::span<Workspace> bodies, const LaneNumbers& c
   });
 }
 
-LaneNumbers LaneFrames::gyroscopic_ratios(std::span<Workspace> bodies) const noexcept {
+LaneNumbers LaneFrames::gyroscopic_ratios(std::span<Workspace* const> bodies) const noexcept {
   if (rotation_) return rotation_->gyroscopic_ratio();
   LaneNumbers ratios = LaneNumbers::Zero();
   for (std::size_t l = 0; l < bodies.size(); ++l)
-    ratios[static_cast<Eigen::Index>(l)] = frame_->gyroscopic_ratio(bodies[l].form.velocity_factor, bodies[l].frame);
+    ratios[static_cast<Eigen::Index>(l)] = frame_->gyroscopic_ratio(bodies[l]->form.velocity_factor, bodies[l]->frame);
   return ratios;
 }
 
-void LaneFrames::gyroscopic_products(std::span<Workspace> bodies, const LaneNumbers& chosen, const LaneVectors& x,
-                                     LaneVectors& products) noexcept {
+void LaneFrames::gyroscopic_products(std::span<Workspace* const> bodies, const LaneNumbers& chosen,
+                                     const LaneVectors& x, LaneVectors& products) noexcept {
   if (rotation_) {
     rotation_->gyroscopic_product(x, products);
     return;

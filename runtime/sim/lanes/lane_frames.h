@@ -26,11 +26,11 @@ class LaneFrames {
   // Of those that are chosen (not zero).
 
   /// `gradient` [r] = minus the forces at q; 1 where a frame has a motion for it, else 0.
-  LaneNumbers update(std::span<Workspace> bodies, const LaneNumbers& chosen, const LaneVectors& q,
+  LaneNumbers update(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& q,
                      LaneVectors& gradient) noexcept;
-  void add_stiffness(std::span<Workspace> bodies, const LaneNumbers& chosen, AlignedArray& hessian) noexcept;
-  LaneNumbers gyroscopic_ratios(std::span<Workspace> bodies) const noexcept;
-  void gyroscopic_products(std::span<Workspace> bodies, const LaneNumbers& chosen, const LaneVectors& x,
+  void add_stiffness(std::span<Workspace* const> bodies, const LaneNumbers& chosen, AlignedArray& hessian) noexcept;
+  LaneNumbers gyroscopic_ratios(std::span<Workspace* const> bodies) const noexcept;
+  void gyroscopic_products(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& x,
                            LaneVectors& products) noexcept;
 
   /// What the end of a body's step is made of.

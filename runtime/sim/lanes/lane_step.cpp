@@ -44,7 +44,10 @@ class LaneStep {
         offset_(vectors(workspace.offset_)),
         external_(vectors(forms_.external)),
         velocity_centre_(vectors(forms_.velocity_centre)),
-        acceleration_centre_(vectors(forms_.acceleration_centre)) {}
+        acceleration_centre_(vectors(forms_.acceleration_centre)) {
+    for (std::size_t l = 0; l < bodies.size(); ++l)
+      own_[l] = bodies[l].workspace != nullptr ? bodies[l].workspace : &workspace.bodies_[l];
+  }
 
   void take(std::span<StepReport> reports) noexcept {
     begin();
@@ -57,7 +60,7 @@ class LaneStep {
     }
     for (std::size_t l = 0; l < bodies_.size(); ++l) {
       const LaneBody& body = bodies_[l];
-      Workspace& own = workspace_.bodies_[l];
+      Workspace& own = *own_[l];
       if (alone_[l]) {
         reports[l] = step(model_, *body.scene, *body.state, own);
         continue;
@@ -88,8 +91,8 @@ class LaneStep {
   double force_flops() const noexcept { return model_.internal_force.force_flops(); }
   double all_flops() const noexcept { return force_flops() + elements_.lanes_stiffness_flops(); }
   LaneFrames& frames() const noexcept { return workspace_.frames_; }
-  std::span<Workspace> own() const noexcept { return std::span(workspace_.bodies_).first(bodies_.size()); }
-  Profile* profile() const noexcept { return workspace_.bodies_.front().profile; }
+  std::span<Workspace* const> own() const noexcept { return std::span(own_).first(bodies_.size()); }
+  Profile* profile() const noexcept { return own_.front()->profile; }
 
   bool runs(std::size_t l) const noexcept { return l < bodies_.size() && !alone_[l] && !done_[l]; }
 
@@ -111,7 +114,7 @@ class LaneStep {
       alone_[l] = sleeps(model_, *body.scene, *body.state);
       if (alone_[l]) continue;
       first_awake_ = std::min(l, first_awake_);
-      steps_[l].emplace(model_, *body.scene, *body.state, workspace_.bodies_[l]);
+      steps_[l].emplace(model_, *body.scene, *body.state, *own_[l]);
       steps_[l]->begin(/*touches_others=*/false);
       alone_[l] = steps_[l]->is_near();
     }
@@ -124,8 +127,8 @@ class LaneStep {
       const auto lane = static_cast<Eigen::Index>(l);
       const StepScene& scene = *bodies_[from].scene;
       const State& state = *bodies_[from].state;
-      forms_.set(lane, scene, state, workspace_.bodies_[from]);
-      frames().set_problem(lane, workspace_.bodies_[from]);
+      forms_.set(lane, scene, state, *own_[from]);
+      frames().set_problem(lane, *own_[from]);
       for (Eigen::Index c = 0; c < model_.modes(); ++c) trial_(lane, c) = state.q[c] + scene.time_step * state.v[c];
       tolerance_[lane] = scene.newton.tolerance;
       energy_at_start_[lane] = state.elastic_energy;
@@ -186,7 +189,7 @@ class LaneStep {
       return;
     }
     each([&](std::size_t l, Eigen::Index lane) {
-      Workspace& own = workspace_.bodies_[l];
+      Workspace& own = *own_[l];
       own.q = q_.row(lane).matrix();
       if (!steps_[l]->find_targets()) alone_[l] = true;
       for (std::size_t i = 0; i < own.examples.size(); ++i)
@@ -208,7 +211,7 @@ class LaneStep {
           examples.give_weights(lane, settings.given_weights);
         else
           examples.apply_bias(lane, settings.bias);
-        workspace_.bodies_[l].examples[i].weights = examples.weights().row(lane);
+        own_[l]->examples[i].weights = examples.weights().row(lane);
       });
     }
     const StageTimer timer(profile(), Stage::kTarget);
@@ -454,7 +457,7 @@ class LaneStep {
       const double before = report.residual;
       report.residual = there_.residual[lane];
       const NewtonSettings& settings = bodies_[l].scene->newton;
-      state_[l] = detail::factor_serves(settings, before, report.residual, settings.tolerance * here_.scale[lane])
+      state_[l] = factor_serves(settings, before, report.residual, settings.tolerance * here_.scale[lane])
                       ? Hessian::kFactorised
                       : Hessian::kStale;
     });
@@ -473,6 +476,7 @@ class LaneStep {
   LaneForms& forms_;
   LaneVectors start_, q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_,
       next_frozen_, offset_, external_, velocity_centre_, acceleration_centre_;
+  std::array<Workspace*, kLanes> own_{};
   std::array<std::optional<BodyStep>, kLanes> steps_;
   std::array<bool, kLanes> alone_{}, done_{}, below_rounding_{};
   std::size_t first_awake_ = kLanes, fetched_ = 0;

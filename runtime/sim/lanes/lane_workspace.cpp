@@ -1,12 +1,11 @@
-#include <utility>
+#include "runtime/sim/lanes/lane_workspace.h"
 
-#include "runtime/sim/lanes/lane_step.h"
-#include "runtime/sim/step/stepper.h"
+#include <utility>
 
 namespace exmat::runtime {
 
 bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept {
-  if (model.internal_force.polynomial() || scene.meets_bodies) return false;
+  if (model.internal_force.polynomial()) return false;
   for (std::size_t i = 0; i < scene.examples.size(); ++i) {
     const ExampleSettings& examples = scene.examples[i];
     if (elastic_factor(examples) > 0) return false;
@@ -31,16 +30,6 @@ LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::si
 
 void LaneWorkspace::set_profile(Profile* profile) {
   for (Workspace& body : bodies_) body.profile = profile;
-}
-
-void step_side_by_side(const Model& model, std::span<const LaneBody> bodies, LaneWorkspace& workspace,
-                       std::span<StepReport> reports, std::span<const LaneBody> next) noexcept {
-  if (std::ssize(bodies) >= kFewestLanes) {
-    step_in_lanes(model, bodies, workspace, reports, next);
-    return;
-  }
-  for (std::size_t l = 0; l < bodies.size(); ++l)
-    reports[l] = step(model, *bodies[l].scene, *bodies[l].state, workspace.body(l));
 }
 
 }  // namespace exmat::runtime

@@ -84,6 +84,12 @@ struct NewtonWorkspace {
   std::optional<Eigen::PartialPivLU<Eigen::MatrixXd>> lu;  ///< only for problems with a gyroscopic() part
 };
 
+/// True if the factor at hand brings the residual to its limit for less than a new Hessian costs.
+inline bool factor_serves(const NewtonSettings& settings, double before, double now, double limit) {
+  const double rate = now / before;
+  return rate <= settings.chord_rate && std::log(now / limit) <= -settings.chord_steps * std::log(rate);
+}
+
 namespace detail {
 
 inline constexpr int kShifts = 12;
@@ -174,12 +180,6 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
     }
   }
   return workspace.gradient.dot(direction);
-}
-
-/// Whether the factor at hand brings the residual to its limit for less than a new Hessian costs.
-inline bool factor_serves(const NewtonSettings& settings, double before, double now, double limit) {
-  const double rate = now / before;
-  return rate <= settings.chord_rate && std::log(now / limit) <= -settings.chord_steps * std::log(rate);
 }
 
 }  // namespace detail
@@ -273,8 +273,7 @@ NewtonReport newton_minimise(Problem& problem, const NewtonSettings& settings, E
     const double before = report.residual;
     report.residual = gradient.norm();
     const double next_limit = settings.tolerance * here.force_scale;
-    state =
-        detail::factor_serves(settings, before, report.residual, next_limit) ? Hessian::kFactorised : Hessian::kStale;
+    state = factor_serves(settings, before, report.residual, next_limit) ? Hessian::kFactorised : Hessian::kStale;
   }
 }
 

@@ -25,7 +25,11 @@ struct StageProfile {
   std::array<double, kCount> flops{};
 };
 using Profile = StageProfile<Stage, kStageNames.size()>;
-using WorldProfile = StageProfile<WorldStage, kWorldStageNames.size()>;
+/// The stages on the wall clock; and those of the steps of single bodies, as the threads' clocks add up.
+struct WorldProfile : StageProfile<WorldStage, kWorldStageNames.size()> {
+  Profile bodies;
+  double bodies_seconds = 0;  ///< of whole steps of these
+};
 
 /// Adds the time of its own life and `flops` to one stage; without a profile it does not look at the clock.
 template <typename AnyProfile>

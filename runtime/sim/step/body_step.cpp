@@ -205,7 +205,7 @@ StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
     const Energies now = energies(model_, scene_, state_);
     limit_kinetic_energy(before.total() - now.elastic - now.potential);
   }
-  fall_asleep(model_, scene_, state_, workspace_, report_);
+  if (rests(model_, scene_, report_, state_)) put_to_sleep(model_, state_, workspace_);
   return report_;
 }
 

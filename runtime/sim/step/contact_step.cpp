@@ -73,7 +73,7 @@ void carry_contacts(const StepScene& scene, const Placement& from, const Placeme
   const Eigen::Matrix3d turn = to.rotation * from.rotation.transpose();
   for (std::size_t i = 0; i < state.contacts.count; ++i) {
     HeldContact& held = state.contacts.held[i];
-    const MotionSample pose = scene.obstacles[static_cast<std::size_t>(held.obstacle)].motion.sample(state.time);
+    const MotionSample pose = scene.obstacles[static_cast<std::size_t>(held.obstacle)]->motion.sample(state.time);
     held.anchor = pose.to_frame(to.position + turn * (pose.to_world(held.anchor) - from.position));
     held.way_out.setZero();
   }

@@ -40,8 +40,8 @@ struct StepScene : WorldLoads {
   NewtonSettings newton;
   Precision precision = Precision::kDouble;  ///< of bodies side by side, the same for all of them
   SleepSettings sleep;
-  std::vector<Obstacle> obstacles;
-  bool meets_bodies = false;              ///< whether the body is one of a World, whose bodies touch each other
+  MeetingGroup meeting;
+  Obstacles obstacles;                    ///< that the body meets
   std::vector<ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, example forces
   bool begins_anew = false;  ///< something of it has jumped since the last step, which is no smooth past then
 };
@@ -68,11 +68,6 @@ inline bool runs_examples(const StepScene& scene) noexcept { return std::ranges:
 /// Whether steps look for contacts with obstacles.
 inline bool touches(const Model& model, const StepScene& scene) noexcept {
   return model.contact && !scene.obstacles.empty();
-}
-
-/// Whether a step may be one near something, obstacles or bodies.
-inline bool may_touch(const Model& model, const StepScene& scene) noexcept {
-  return touches(model, scene) || (model.contact && scene.meets_bodies);
 }
 
 /// [r] generalised force of gravity [m/s^2].

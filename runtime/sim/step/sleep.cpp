@@ -47,25 +47,12 @@ std::uint64_t hash_of_loads(const StepScene& scene, const State& state) noexcept
 bool is_met(const Model& model, const StepScene& scene, const State& state) noexcept {
   if (!touches(model, scene)) return false;
   const double end = static_cast<double>(state.step + 1) * scene.time_step;
-  return std::ranges::any_of(scene.obstacles, [&](const Obstacle& obstacle) {
-    if (!obstacle.motion.moves()) return false;
-    const PlacedObstacle placed(obstacle, end, scene.time_step);
+  return std::ranges::any_of(scene.obstacles, [&](const SharedObstacle& obstacle) {
+    if (!obstacle->motion.moves()) return false;
+    const PlacedObstacle placed(*obstacle, end, scene.time_step);
     if (placed.start.position == placed.pose.position && placed.start.rotation == placed.pose.rotation) return false;
     return model.contact->may_meet(placed, {model.frame->placement(state.frame), state.q});
   });
-}
-
-/// The body stands still where it is.
-void stop(const Model& model, State& state, Workspace& workspace) noexcept {
-  state.q_previous = state.q;
-  state.v.setZero();
-  state.v_previous.setZero();
-  state.a.setZero();
-  FrameMotion motion = model.frame->motion(state.frame);
-  motion.linear_velocity.setZero();
-  motion.angular_velocity.setZero();
-  model.frame->set_motion(motion, state.q, state.v, workspace.frame, state.frame);
-  state.begins_anew = false;
 }
 
 }  // namespace
@@ -77,7 +64,7 @@ void wake(State& state) noexcept {
 
 bool sleeps(const Model& model, const StepScene& scene, State& state) noexcept {
   if (!state.sleep.asleep) return false;
-  const bool is_left_alone = scene.sleep.energy > 0 && !scene.meets_bodies && !begins_anew(model, scene, state) &&
+  const bool is_left_alone = scene.sleep.energy > 0 && !begins_anew(model, scene, state) &&
                              hash_of_loads(scene, state) == state.sleep.loads && !is_met(model, scene, state);
   if (!is_left_alone) wake(state);
   return is_left_alone;
@@ -91,9 +78,8 @@ StepReport sleep_through(const StepScene& scene, State& state) noexcept {
   return report;
 }
 
-void fall_asleep(const Model& model, const StepScene& scene, State& state, Workspace& workspace,
-                 StepReport& report) noexcept {
-  if (scene.sleep.energy == 0 || scene.meets_bodies || model.frame->is_driven()) return;
+bool rests(const Model& model, const StepScene& scene, const StepReport& report, State& state) noexcept {
+  if (scene.sleep.energy == 0 || model.frame->is_driven()) return false;
   const bool is_solved = (report.status & (kStepNonFinite | kStepUnconverged)) == 0;
   const std::uint64_t loads = hash_of_loads(scene, state);
   const bool is_still = is_solved && loads == state.sleep.loads &&
@@ -101,9 +87,19 @@ void fall_asleep(const Model& model, const StepScene& scene, State& state, Works
                         !is_met(model, scene, state);
   state.sleep.loads = loads;
   state.sleep.still_steps = is_still ? state.sleep.still_steps + 1 : 0;
-  if (static_cast<double>(state.sleep.still_steps) * scene.time_step < scene.sleep.time) return;
-  if (state.sleep.still_steps == 0) return;
-  stop(model, state, workspace);
+  return is_still && static_cast<double>(state.sleep.still_steps) * scene.time_step >= scene.sleep.time;
+}
+
+void put_to_sleep(const Model& model, State& state, Workspace& workspace) noexcept {
+  state.q_previous = state.q;
+  state.v.setZero();
+  state.v_previous.setZero();
+  state.a.setZero();
+  FrameMotion motion = model.frame->motion(state.frame);
+  motion.linear_velocity.setZero();
+  motion.angular_velocity.setZero();
+  model.frame->set_motion(motion, state.q, state.v, workspace.frame, state.frame);
+  state.begins_anew = false;
   state.sleep.asleep = true;
 }
 

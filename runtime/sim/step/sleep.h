@@ -20,8 +20,10 @@ StepReport sleep_through(const StepScene& scene, State& state) noexcept;
 /// After something was done to the body that no step would see.
 void wake(State& state) noexcept;
 
-/// After a step: counts how long the body has been still, and puts it to sleep.
-void fall_asleep(const Model& model, const StepScene& scene, State& state, Workspace& workspace,
-                 StepReport& report) noexcept;
+/// After a step that reports this: counts how long the body has been still. True once it has been for long enough.
+bool rests(const Model& model, const StepScene& scene, const StepReport& report, State& state) noexcept;
+
+/// It stands still, and sleeps from the next step on.
+void put_to_sleep(const Model& model, State& state, Workspace& workspace) noexcept;
 
 }  // namespace exmat::runtime

@@ -25,14 +25,14 @@ ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(m
   force.centre = force.pull = target;
 }
 
-Workspace::Workspace(const Model& model, const StepScene& scene)
+Workspace::Workspace(const Model& model, const StepScene& scene, bool meets_bodies)
     : newton(model.modes()), elasticity(model.internal_force.make_workspace()), frame(model.frame->make_workspace()) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.modes());
   form.velocity_centre = form.acceleration_centre = zero;
   q = v = external_force = internal_force = acceleration = offset = linear = zero;
   frozen_force = next_frozen_force = zero;
   if (model.frame->exerts_forces()) newton.lu.emplace(model.modes());
-  if (may_touch(model, scene)) near.emplace(model, scene);
+  if (touches(model, scene) || (model.contact && meets_bodies)) near.emplace(model, scene);
   product.setZero(padded(model.modes()));
   quadratic.setZero(padded(model.modes()), model.modes());
   for (std::size_t i = 0; i < scene.examples.size(); ++i) examples.emplace_back(model.examples[i]);

@@ -41,10 +41,10 @@ struct ExampleWorkspace {
   ExampleForce force;
 };
 
-/// Scratch of one step, sized once for a model and a scene; holds nothing from step to step that a result depends on.
-/// One per thread.
+/// Scratch of one step, sized once for a model and a scene, of a body that may meet other bodies or not; holds nothing
+/// from step to step that a result depends on. One per thread.
 struct Workspace {
-  Workspace(const Model& model, const StepScene& scene);
+  Workspace(const Model& model, const StepScene& scene, bool meets_bodies = false);
 
   Profile* profile = nullptr;  ///< times every stage, if set
 

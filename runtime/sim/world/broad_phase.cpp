@@ -1,25 +1,23 @@
 #include "runtime/sim/world/broad_phase.h"
 
 #include <algorithm>
-#include <numeric>
 
 namespace exmat::runtime {
 
-void overlapping_pairs(const std::vector<DeformationTree::Ball>& balls, std::vector<int>& order,
-                       std::vector<std::pair<int, int>>& pairs) {
+void overlapping_pairs(const std::vector<DeformationTree::Ball>& balls, const std::vector<int>& chosen,
+                       std::vector<int>& order, std::vector<std::pair<int, int>>& pairs) {
   pairs.clear();
-  if (balls.empty()) return;
-  Eigen::Vector3d low = balls.front().centre, high = low;
-  for (const DeformationTree::Ball& ball : balls) {
-    low = low.cwiseMin(ball.centre);
-    high = high.cwiseMax(ball.centre);
+  if (chosen.empty()) return;
+  const auto ball = [&](int index) -> const DeformationTree::Ball& { return balls[static_cast<std::size_t>(index)]; };
+  Eigen::Vector3d low = ball(chosen.front()).centre, high = low;
+  for (const int index : chosen) {
+    low = low.cwiseMin(ball(index).centre);
+    high = high.cwiseMax(ball(index).centre);
   }
   Eigen::Index axis = 0;
   (high - low).maxCoeff(&axis);
-  const auto ball = [&](int index) -> const DeformationTree::Ball& { return balls[static_cast<std::size_t>(index)]; };
   const auto start = [&](int index) { return ball(index).centre[axis] - ball(index).radius; };
-  order.resize(balls.size());
-  std::iota(order.begin(), order.end(), 0);
+  order = chosen;
   std::ranges::sort(order, [&](int a, int b) { return start(a) != start(b) ? start(a) < start(b) : a < b; });
   for (std::size_t i = 0; i < order.size(); ++i) {
     const int a = order[i];

@@ -8,9 +8,9 @@
 
 namespace exmat::runtime {
 
-/// Pairs (i, j), i < j, in ascending order, of balls that overlap: sorted along the axis along which they are spread
-/// the widest, then swept. `order` is scratch that keeps its memory.
-void overlapping_pairs(const std::vector<DeformationTree::Ball>& balls, std::vector<int>& order,
-                       std::vector<std::pair<int, int>>& pairs);
+/// Pairs (i, j), i < j, in ascending order, of those balls that are `chosen` and overlap: sorted along the axis along
+/// which they are spread the widest, then swept. `order` is scratch that keeps its memory.
+void overlapping_pairs(const std::vector<DeformationTree::Ball>& balls, const std::vector<int>& chosen,
+                       std::vector<int>& order, std::vector<std::pair<int, int>>& pairs);
 
 }  // namespace exmat::runtime

@@ -5,7 +5,9 @@
 #include <limits>
 
 #include "runtime/sim/step/contact_step.h"
+#include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
+#include "runtime/sim/world/for_all.h"
 #include "runtime/sim/world/island_momenta.h"
 
 namespace exmat::runtime {
@@ -14,18 +16,6 @@ namespace {
 constexpr Eigen::Index kDenseUnknowns = 160;  // a factorisation of more takes longer than conjugate gradients
 constexpr double kSolutionError = 1e-3;       // of conjugate gradients, in the norm of the preconditioner
 constexpr int kMostGradients = 400;
-
-/// Calls work(i) for i < count, each once.
-template <class Work>
-void for_all(std::size_t count, int threads, const Work& work) {
-  const auto end = static_cast<std::ptrdiff_t>(count);
-  if (threads == 1 || end < 2) {
-    for (std::ptrdiff_t i = 0; i < end; ++i) work(static_cast<std::size_t>(i));
-    return;
-  }
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads)
-  for (std::ptrdiff_t i = 0; i < end; ++i) work(static_cast<std::size_t>(i));
-}
 
 }  // namespace
 
@@ -392,7 +382,13 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   for (WorldBody* const own : bodies) own->step->take(newton);
   const auto is_finite = [](const WorldBody* own) { return (own->step->report().status & kStepNonFinite) == 0; };
   if (!converged && std::ranges::all_of(bodies, is_finite)) limit_energy(bodies, pairs, begin, energy);
-  for (WorldBody* const own : bodies) own->report = own->step->report();
+  bool rest = true;
+  for (WorldBody* const own : bodies) {
+    own->report = own->step->report();
+    rest = rests(own->model, own->scene, own->report, own->state) && rest;
+  }
+  if (rest)
+    for (WorldBody* const own : bodies) put_to_sleep(own->model, own->state, own->workspace);
   return newton;
 }
 

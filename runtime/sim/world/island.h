@@ -75,8 +75,8 @@ class IslandProblem {
   int conjugate_gradients_ = 0;
 };
 
-/// One step of the bodies of an island, from BodyStep's begin() to its report. Returns Newton's report, the same for
-/// all of them.
+/// One step of the bodies of an island, from BodyStep's begin() to its report; they fall asleep together. Returns
+/// Newton's report, the same for all of them.
 NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                          std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
 

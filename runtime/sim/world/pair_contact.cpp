@@ -38,11 +38,11 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
   const auto at = static_cast<std::size_t>(side);
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);
+  const CandidateSearch search{own.scene.time_step, margin, own.anew || other.anew, held, other.shape, near_[at]};
   if (is_own())
-    contact.gather_own(touching(own), own.scene.time_step, margin, held, other.shape, near_[at], candidates_[at]);
+    contact.gather_own(touching(own), search, candidates_[at]);
   else
-    contact.gather(touching(own), touching(other), own.scene.time_step, margin, own.anew || other.anew, held,
-                   other.shape, near_[at], candidates_[at]);
+    contact.gather(touching(own), touching(other), search, candidates_[at]);
 }
 
 double PairContact::way_since_first(const WorldBody& first, const WorldBody& second) const noexcept {

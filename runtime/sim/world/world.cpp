@@ -4,14 +4,16 @@
 #include <numeric>
 
 #include "runtime/sim/step/contact_step.h"
-#include "runtime/sim/step/stepper.h"
+#include "runtime/sim/step/sleep.h"
 #include "runtime/sim/world/broad_phase.h"
+#include "runtime/sim/world/for_all.h"
 
 namespace exmat::runtime {
 namespace {
 
 constexpr double kOwnMargin = 1e-3;        // of the body's radius: a part at rest may speed up within a step
 constexpr std::size_t kSharedIsland = 32;  // bodies; a larger one is shared by the threads
+constexpr int kSleepersAtOnce = 256, kBoundsAtOnce = 32;  // bodies that a thread takes at a time
 
 Eigen::Vector3d linear_velocity(const WorldBody& body) { return body.model.frame->velocity(body.state.frame).linear; }
 
@@ -29,25 +31,35 @@ int root_of(std::vector<int>& parents, int body) {
 
 World::World(std::vector<WorldBodyStart> bodies, const ContactLaw& law) : law_(law) {
   for (WorldBodyStart& body : bodies) {
-    Owned& owned = *owned_.emplace_back(std::make_unique<Owned>(body.kind, std::move(body.state)));
-    refresh_weights(*body.kind.model, *body.kind.scene, owned.state, owned.workspace);
-    add(body.kind, owned.state, owned.workspace);
+    State& state = *owned_.emplace_back(std::make_unique<State>(std::move(body.state)));
+    add(body.kind, state);
   }
 }
 
-void World::add(const BodyKind& kind, State& state, Workspace& workspace) {
-  bodies_.push_back(std::make_unique<WorldBody>(kind, state, workspace));
-  resize();
+void World::add(const BodyKind& kind, State& state) {
+  Member member{kind, &state};
+  if (kind.surface) member.touching = std::make_unique<WorldBody>(kind, state);
+  bodies_.reserve(bodies_.size() + 1);
+  margins_.resize(bodies_.size() + 1);
+  balls_.resize(bodies_.size() + 1);
+  against_.resize(bodies_.size() + 1);
+  if (kind.surface) touching_.push_back(count());
+  member.crowd_kind = crowd_.add(*kind.model, *kind.scene);
+  bodies_.push_back(std::move(member));
 }
 
-void World::resize() {
-  balls_.resize(bodies_.size());
-  margins_.resize(bodies_.size());
-  against_.resize(bodies_.size());
+void World::wake_neighbours(int body) {
+  for (const HeldPair& held : held_) {
+    if (held.first == body) wake(state(held.second));
+    if (held.second == body) wake(state(held.first));
+  }
 }
 
 void World::forget(int body) {
-  at(body).anew = true;
+  if (!at(body).touching) return;
+  wake_neighbours(body);
+  touching(body).anew = true;
+  at(body).is_bounded = false;
   std::erase_if(held_, [=](const HeldPair& held) { return held.first == body || held.second == body; });
   for (std::size_t p = 0; p < near_.size(); ++p)
     if (near_[p].first == body || near_[p].second == body) pairs_[p]->reset(0, 0, nullptr);
@@ -55,9 +67,12 @@ void World::forget(int body) {
 
 void World::remove(int body) {
   forget(body);
+  crowd_.remove(at(body).crowd_kind);
   bodies_.erase(bodies_.begin() + body);
-  resize();
   const auto renumber = [=](int& number) { number -= number > body ? 1 : 0; };
+  std::erase(touching_, body);
+  for (int& number : touching_) renumber(number);
+  for (Member& member : bodies_) member.is_bounded = false;
   for (HeldPair& held : held_) {
     renumber(held.first);
     renumber(held.second);
@@ -73,8 +88,18 @@ void World::remove(int body) {
   near_.resize(kept);
 }
 
+void World::fit(int body) {
+  Member& own = at(body);
+  crowd_.fit(own.crowd_kind, *own.kind.scene);
+  if (own.touching) own.touching->workspace.near.emplace(*own.kind.model, *own.kind.scene);
+  prepare_contacts(*own.kind.model, own.kind.scene->obstacles.size(), *own.state);
+}
+
 void World::set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew) {
-  for (int i = 0; i < count(); ++i) at(i).anew = anew[static_cast<std::size_t>(i)];
+  for (const int body : touching_) {
+    touching(body).anew = anew[static_cast<std::size_t>(body)];
+    at(body).is_bounded = false;
+  }
   held_ = std::move(held);
   near_.clear();
 }
@@ -83,19 +108,24 @@ void World::read_touches(std::vector<BodyTouch>& touches) const {
   touches.clear();
   for (std::size_t p = 0; p < near_.size(); ++p) {
     const auto [first, second] = near_[p];
-    pairs_[p]->read_touches(0, at(first), first, second, touches);
-    pairs_[p]->read_touches(1, at(second), second, first, touches);
+    pairs_[p]->read_touches(0, touching(first), first, second, touches);
+    pairs_[p]->read_touches(1, touching(second), second, first, touches);
   }
 }
 
-WorldReport World::step(int threads) {
-  find_pairs(threads);
-  gather(threads);
-  make_islands();
+Workspace& World::scratch(int body) noexcept {
+  return at(body).touching ? at(body).touching->workspace : crowd_.scratch(at(body).crowd_kind);
+}
+
+WorldReport World::step(int threads, StepObserver* observer) {
+  prepare(threads);
+  find_sleepers(threads);
+  find_contacts(threads);
+  step_crowd(threads, observer);
+  step_islands(threads, observer);
   WorldReport report;
+  report.asleep = static_cast<int>(std::ranges::count_if(bodies_, &Member::asleep));
   report.pairs = static_cast<int>(near_.size());
-  step_single_bodies(threads);
-  step_islands(threads);
   for (std::size_t i = 0; i < island_count_; ++i) {
     const Island& island = *islands_[i];
     ++report.islands;
@@ -104,55 +134,102 @@ WorldReport World::step(int threads) {
     report.newton_iterations = std::max(report.newton_iterations, island.newton.iterations);
     if (island.newton.status != NewtonStatus::kConverged) ++report.unconverged_islands;
   }
-  remember();
   return report;
 }
 
-void World::step_single_bodies(int threads) {
-  const StageTimer timer(profile_, WorldStage::kSingleBodies);
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (island_of_[i] >= 0) continue;
-    WorldBody& own = *bodies_[i];
-    own.report = runtime::step(own.model, own.scene, own.state, own.workspace);
-  }
-}
-
-void World::step_islands(int threads) {
-  const StageTimer timer(profile_, WorldStage::kIslands);
-  const auto is_large = [](const Island& island) { return island.bodies.size() > kSharedIsland; };
-  const auto solve = [](Island& island, int own_threads) {
-    island.newton = step_island(island.bodies, island.pairs, island.incidences, own_threads, island.workspace);
+void World::find_sleepers(int threads) {
+  const auto look = [this](std::size_t i) {
+    Member& own = bodies_[i];
+    own.asleep = own.state->sleep.asleep && sleeps(*own.kind.model, *own.kind.scene, *own.state);
   };
-#pragma omp parallel for schedule(dynamic, 1) num_threads(threads) if (threads > 1)
-  for (std::size_t i = 0; i < island_count_; ++i)
-    if (!is_large(*islands_[i])) solve(*islands_[i], 1);
-  for (std::size_t i = 0; i < island_count_; ++i)
-    if (is_large(*islands_[i])) solve(*islands_[i], threads);
+  for_all(bodies_.size(), threads, look, kSleepersAtOnce);
 }
 
-/// Pairs of bodies whose bounds, wider by how far they may go, overlap.
+/// Who touches whom. If all sleep that may touch anybody, nobody does.
+void World::find_contacts(int threads) {
+  island_count_ = 0;
+  island_of_.clear();
+  found_contacts_ = false;
+  if (std::ranges::all_of(touching_, [&](int body) { return at(body).asleep; })) return;
+  found_contacts_ = true;
+  find_pairs(threads);
+  gather(threads);
+  make_islands(threads);
+}
+
+void World::step_crowd(int threads, StepObserver* observer) {
+  const StageTimer timer(profile_, WorldStage::kSingleBodies);
+  crowd_.begin();
+  for (const Member& own : bodies_) crowd_.count(own.crowd_kind, *own.kind.scene);
+  for (int i = 0; i < count(); ++i) {
+    Member& own = at(i);
+    const bool in_island = !island_of_.empty() && island_of_[static_cast<std::size_t>(i)] >= 0;
+    if (!in_island && !own.asleep) {
+      Workspace* const scratch = own.touching ? &own.touching->workspace : nullptr;
+      crowd_.take({i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report});
+      continue;
+    }
+    crowd_.leave(own.crowd_kind, *own.kind.scene);
+    if (own.asleep) own.report = sleep_through(*own.kind.scene, *own.state);
+  }
+  crowd_.step(threads, observer, profile_);
+}
+
+void World::step_islands(int threads, StepObserver* observer) {
+  if (!found_contacts_) return;
+  {
+    const StageTimer timer(profile_, WorldStage::kIslands);
+    const auto is_large = [](const Island& island) { return island.bodies.size() > kSharedIsland; };
+    const auto solve = [&](Island& island, int own_threads) {
+      island.newton = step_island(island.bodies, island.pairs, island.incidences, own_threads, island.workspace);
+      for (std::size_t i = 0; i < island.bodies.size(); ++i) {
+        const WorldBody& body = *island.bodies[i];
+        at(island.numbers[i]).report = body.report;
+        if (observer != nullptr) observer->after_step(island.numbers[i], body.report, body.workspace);
+      }
+    };
+    const auto solve_small = [&](std::size_t i) {
+      if (!is_large(*islands_[i])) solve(*islands_[i], 1);
+    };
+    for_all(island_count_, threads, solve_small, 1);
+    for (std::size_t i = 0; i < island_count_; ++i)
+      if (is_large(*islands_[i])) solve(*islands_[i], threads);
+  }
+  remember();
+}
+
+/// A ball that holds the body at the end of the step, too. Of a body that sleeps it stays what it is.
+void World::bound(int body) {
+  Member& member = at(body);
+  if (member.asleep && member.is_bounded) return;
+  member.is_bounded = member.asleep;
+  const WorldBody& own = *member.touching;
+  const double dt = own.scene.time_step;
+  const BodyPose pose = pose_of(own.model, own.state);
+  const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
+  const double travel = own.contact().travel_bound(pose, velocity, dt);
+  const double straight = dt * velocity.linear.norm();
+  const auto index = static_cast<std::size_t>(body);
+  margins_[index] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene.gravity.norm();
+  const DeformationTree::Ball ball = own.surface.bound(own.state.q);
+  balls_[index] = {pose.position + pose.rotation * ball.centre,
+                   ball.radius + margins_[index] + kContactMarginSteps * straight};
+}
+
+/// Pairs of bodies that meet and whose bounds, wider by how far they may go, overlap.
 void World::find_pairs(int threads) {
   const StageTimer timer(profile_, WorldStage::kBroadPhase);
-#pragma omp parallel for schedule(static) num_threads(threads) if (threads > 1)
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    WorldBody& own = *bodies_[i];
-    const double dt = own.scene.time_step;
-    const BodyPose pose = pose_of(own.model, own.state);
-    const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
-    const double travel = own.contact().travel_bound(pose, velocity, dt);
-    const double straight = dt * velocity.linear.norm();
-    margins_[i] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene.gravity.norm();
-    const DeformationTree::Ball ball = own.surface.bound(own.state.q);
-    balls_[i] = {pose.position + pose.rotation * ball.centre,
-                 ball.radius + margins_[i] + kContactMarginSteps * straight};
-  }
+  for_all(
+      touching_.size(), threads, [this](std::size_t i) { bound(touching_[i]); }, kBoundsAtOnce);
   last_near_.swap(near_);
-  overlapping_pairs(balls_, order_, near_);
+  overlapping_pairs(balls_, touching_, order_, near_);
+  std::erase_if(near_, [&](const auto& pair) {
+    return !at(pair.first).kind.scene->meeting.meets(at(pair.second).kind.scene->meeting);
+  });
   const std::size_t others = near_.size();
-  for (int i = 0; i < count(); ++i) {
-    const WorldBody& own = at(i);
-    if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(i, i);
+  for (const int body : touching_) {
+    const WorldBody& own = touching(body);
+    if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(body, body);
   }
   if (near_.size() > others) std::ranges::sort(near_);
   keep_pairs();
@@ -173,8 +250,10 @@ void World::keep_pairs() {
     while (left < last_pairs_.size() && !last_pairs_[left]) ++left;
     pair = left < last_pairs_.size() ? std::move(last_pairs_[left]) : std::make_unique<PairContact>();
     pair->forget();
+    pair->reset(0, 0, nullptr);
   }
   last_pairs_.clear();
+  is_gathered_.assign(near_.size(), false);
 }
 
 const HeldPair* World::held_of(int first, int second) const {
@@ -185,53 +264,89 @@ const HeldPair* World::held_of(int first, int second) const {
 
 /// How far apart vertices of one body and the surface of another, or of its own, may be and yet touch in the step [m].
 double World::margin_between(int own, int other) const noexcept {
-  const WorldBody &a = at(own), &b = at(other);
+  const WorldBody &a = touching(own), &b = touching(other);
   if (own == other) return kOwnMargin * balls_[static_cast<std::size_t>(own)].radius;
   const double straight = kContactMarginSteps * b.scene.time_step * (linear_velocity(a) - linear_velocity(b)).norm();
   return margins_[static_cast<std::size_t>(own)] + margins_[static_cast<std::size_t>(other)] + straight;
 }
 
-/// Candidates, the surface of one body at a time: what is computed of its shape serves all that are near.
+/// Candidates of pairs of which one is awake, the surface of one body at a time: what is computed of its shape serves
+/// all that are near.
 void World::gather(int threads) {
   const StageTimer timer(profile_, WorldStage::kCandidates);
   for (std::vector<Incidence>& pairs : against_) pairs.clear();
   for (std::size_t p = 0; p < near_.size(); ++p) {
     const auto [first, second] = near_[p];
+    if (is_gathered_[p] || (at(first).asleep && at(second).asleep)) continue;
+    is_gathered_[p] = true;
     pairs_[p]->reset(first, second, held_of(first, second));
     against_[static_cast<std::size_t>(second)].push_back({static_cast<int>(p), 0});
     if (first != second) against_[static_cast<std::size_t>(first)].push_back({static_cast<int>(p), 1});
   }
-#pragma omp parallel for schedule(dynamic, 4) num_threads(threads) if (threads > 1)
-  for (std::size_t i = 0; i < bodies_.size(); ++i) {
-    if (against_[i].empty()) continue;
-    WorldBody& other = *bodies_[i];
+  for_all(bodies_.size(), threads, [this](std::size_t i) {
+    if (against_[i].empty()) return;
+    WorldBody& other = touching(static_cast<int>(i));
     other.surface.place(other.state.q, other.shape);
     for (const auto& [index, side] : against_[i]) {
       PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
       const int own = pair.body(side);
-      pair.gather(law_, side, at(own), other, margin_between(own, static_cast<int>(i)));
+      pair.gather(law_, side, touching(own), other, margin_between(own, static_cast<int>(i)));
     }
-  }
+  });
 }
 
-/// Bodies that touch, directly or through others, in ascending order of their first body.
-void World::make_islands() {
+/// True if the two bodies of a pair step together: they may touch, or they sleep in touch.
+bool World::is_linked(std::size_t pair) const {
+  return is_gathered_[pair] ? !pairs_[pair]->empty() : held_of(near_[pair].first, near_[pair].second) != nullptr;
+}
+
+void World::unite() {
   parents_.resize(bodies_.size());
   std::iota(parents_.begin(), parents_.end(), 0);
-  island_of_.assign(bodies_.size(), -1);
-  place_in_island_.assign(bodies_.size(), -1);
-  island_count_ = 0;
   for (std::size_t p = 0; p < near_.size(); ++p) {
-    if (pairs_[p]->empty()) continue;
+    if (!is_linked(p)) continue;
     const int a = root_of(parents_, near_[p].first), b = root_of(parents_, near_[p].second);
     parents_[static_cast<std::size_t>(std::max(a, b))] = std::min(a, b);
   }
+}
+
+/// Wakes all that an awake body is linked to. True if anybody woke.
+bool World::wake_islands() {
+  std::vector<int>& awake = place_in_island_;  // of each root
+  awake.assign(bodies_.size(), 0);
+  for (const int body : touching_)
+    if (!at(body).asleep) awake[static_cast<std::size_t>(root_of(parents_, body))] = 1;
+  bool any = false;
+  for (const int body : touching_) {
+    if (!at(body).asleep || awake[static_cast<std::size_t>(root_of(parents_, body))] == 0) continue;
+    wake(state(body));
+    at(body).asleep = false;
+    any = true;
+  }
+  return any;
+}
+
+void World::make_islands(int threads) {
+  unite();
+  while (wake_islands()) {
+    gather(threads);
+    unite();
+  }
+  collect_islands();
+}
+
+/// Bodies that touch, directly or through others, in ascending order of their first body.
+void World::collect_islands() {
+  island_of_.assign(bodies_.size(), -1);
+  place_in_island_.assign(bodies_.size(), -1);
+  const auto is_used = [&](std::size_t p) { return is_gathered_[p] && !pairs_[p]->empty(); };
   const auto add_body = [&](int body) {
     const auto root = static_cast<std::size_t>(root_of(parents_, body));
     if (island_of_[root] < 0) {
       if (island_count_ == islands_.size()) islands_.push_back(std::make_unique<Island>());
       Island& fresh = *islands_[island_count_];
       fresh.bodies.clear();
+      fresh.numbers.clear();
       fresh.pairs.clear();
       island_of_[root] = static_cast<int>(island_count_++);
     }
@@ -240,10 +355,11 @@ void World::make_islands() {
     if (place_in_island_[index] >= 0) return;
     Island& island = *islands_[static_cast<std::size_t>(island_of_[index])];
     place_in_island_[index] = static_cast<int>(island.bodies.size());
-    island.bodies.push_back(bodies_[index].get());
+    island.bodies.push_back(at(body).touching.get());
+    island.numbers.push_back(body);
   };
   for (std::size_t p = 0; p < near_.size(); ++p) {
-    if (pairs_[p]->empty()) continue;
+    if (!is_used(p)) continue;
     add_body(near_[p].first);
     add_body(near_[p].second);
   }
@@ -253,7 +369,7 @@ void World::make_islands() {
     for (std::vector<Incidence>& pairs : incidences) pairs.clear();
   }
   for (std::size_t p = 0; p < near_.size(); ++p) {
-    if (pairs_[p]->empty()) continue;
+    if (!is_used(p)) continue;
     const auto first = static_cast<std::size_t>(near_[p].first), second = static_cast<std::size_t>(near_[p].second);
     Island& island = *islands_[static_cast<std::size_t>(island_of_[first])];
     const auto index = static_cast<int>(island.pairs.size());
@@ -264,28 +380,39 @@ void World::make_islands() {
   }
 }
 
-/// What the next step has to know of the contacts of this one.
+/// Keeps the contacts of this step for the next one; those of bodies that slept through it stay.
 void World::remember() {
   std::size_t kept = 0;
   std::vector<HeldPair>& next = next_held_;
-  for (std::size_t p = 0; p < near_.size(); ++p) {
-    if (pairs_[p]->empty()) continue;
+  const auto add = [&]() -> HeldPair& {
     if (kept == next.size()) next.emplace_back();
-    HeldPair& held = next[kept];
-    pairs_[p]->commit(at(near_[p].first), at(near_[p].second), held);
-    held.first = near_[p].first;
-    held.second = near_[p].second;
+    return next[kept];
+  };
+  for (std::size_t p = 0; p < near_.size(); ++p) {
+    const auto [first, second] = near_[p];
+    if (!is_gathered_[p]) {
+      const HeldPair* const last = held_of(first, second);
+      if (last == nullptr) continue;
+      add() = *last;
+      ++kept;
+      continue;
+    }
+    if (pairs_[p]->empty()) continue;
+    HeldPair& held = add();
+    pairs_[p]->commit(touching(first), touching(second), held);
+    held.first = first;
+    held.second = second;
     if (!held.held[0].empty() || !held.held[1].empty()) ++kept;
   }
   next.resize(kept);
   held_.swap(next);
-  for (const auto& body : bodies_) body->anew = false;
+  for (const int body : touching_) touching(body).anew = false;
 }
 
 Energies World::energies() const {
   Energies sum;
-  for (const auto& body : bodies_) {
-    const Energies own = runtime::energies(body->model, body->scene, body->state);
+  for (const Member& body : bodies_) {
+    const Energies own = runtime::energies(*body.kind.model, *body.kind.scene, *body.state);
     sum.kinetic += own.kinetic;
     sum.elastic += own.elastic;
     sum.potential += own.potential;

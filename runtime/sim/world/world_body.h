@@ -10,22 +10,22 @@
 
 namespace exmat::runtime {
 
-/// What bodies of a world are of: prepared once, shared by all of a kind.
+/// Properties shared by the bodies of one kind. Model and scene outlive the world.
 struct BodyKind {
-  const Model* model = nullptr;      ///< with contact
-  const StepScene* scene = nullptr;  ///< that meets bodies
-  std::shared_ptr<const TouchingSurface> surface;
+  const Model* model = nullptr;                    ///< with contact, where there is a surface
+  const StepScene* scene = nullptr;                ///< may change between steps
+  std::shared_ptr<const TouchingSurface> surface;  ///< null: its bodies touch no other body and not themselves
 };
 
-/// A body of a World. Its state and the scratch of its steps are another's.
+/// A body of a World that may touch others or itself. Its state is another's.
 struct WorldBody {
-  WorldBody(const BodyKind& kind, State& its_state, Workspace& its_workspace)
+  WorldBody(const BodyKind& kind, State& its_state)
       : model(*kind.model),
         scene(*kind.scene),
         touching(kind.surface),
         surface(kind.surface->surface),
         state(its_state),
-        workspace(its_workspace),
+        workspace(model, scene, /*meets_bodies=*/true),
         shape(surface.make_shape()) {}
 
   const Model& model;
@@ -33,10 +33,11 @@ struct WorldBody {
   std::shared_ptr<const TouchingSurface> touching;
   const BodySurface& surface;
   State& state;
-  Workspace& workspace;
+  Workspace workspace;
   SurfaceShape shape;
   StepReport report;
-  bool anew = true;  ///< no step has led to where it is: what it overlaps was not watched coming
+  bool anew = true;     ///< no step has led to where it is: what it overlaps was not watched coming
+  bool asleep = false;  ///< in this step
 
   // Of one step.
   std::optional<BodyStep> step;

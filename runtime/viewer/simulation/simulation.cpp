@@ -61,36 +61,25 @@ Simulation::Simulation(std::vector<SceneDocument> documents, int surface_kind)
   take(make(documents_));
 }
 
+/// The bodies of the first document, and one of each other one.
 Simulation::Made Simulation::make(const std::vector<SceneDocument>& documents) const {
-  return documents.front().is_world() ? make_world(documents.front()) : make_apart(documents);
-}
-
-Simulation::Made Simulation::make_world(const SceneDocument& document) const {
-  World world = World::from_text(document.text(), document.path().string());
+  const SceneDocument& first = documents.front();
+  World world = World::from_text(first.text(), first.path().string(), has_contact_);
   Made made;
   for (const std::int64_t id : world.ids()) {
     const auto kind = static_cast<std::size_t>(world.kind(id));
-    if (kind == made.kinds.size()) made.kinds.push_back(make_kind(document, kind, kind, world.body(id).model()));
+    if (kind == made.kinds.size()) made.kinds.push_back(make_kind(first, kind, kind, world.body(id).model()));
     made.slots.push_back({kind, Eigen::Vector3d::Zero()});
   }
-  made.bodies = SteppedBodies(std::move(world));
-  return made;
-}
-
-Simulation::Made Simulation::make_apart(const std::vector<SceneDocument>& documents) const {
-  Made made;
-  Bodies bodies;
-  for (std::size_t i = 0; i < documents.size(); ++i) {
-    const SceneDocument& document = documents[i];
-    made.kinds.push_back(
-        make_kind(document, 0, i, Model::from_text(document.text(), document.path().string(), has_contact_)));
+  for (std::size_t i = 1; i < documents.size(); ++i) {
+    const std::size_t kind = made.kinds.size();
+    made.kinds.push_back(make_kind(documents[i], 0, kind,
+                                   Model::from_text(documents[i].text(), documents[i].path().string(), has_contact_)));
     made.kinds.back().document = i;
-    for (int instance = 0; instance < (i == 0 ? document.instances() : 1); ++instance) {
-      made.slots.push_back({i, Eigen::Vector3d::Zero()});
-      bodies.add(Body(made.kinds.back().model));
-    }
+    made.slots.push_back({kind, Eigen::Vector3d::Zero()});
+    world.add(Body(made.kinds.back().model));
   }
-  made.bodies = SteppedBodies(std::move(bodies));
+  made.bodies = SteppedBodies(std::move(world));
   return made;
 }
 
@@ -117,13 +106,14 @@ void Simulation::take(Made made) {
   kinds_ = std::move(made.kinds);
   slots_ = std::move(made.slots);
   bodies_ = std::move(made.bodies);
-  if (!bodies_.is_world()) place_side_by_side();
-  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].set_profiled(true);
+  if (!is_world()) place_side_by_side();
+  World& world = bodies_.world();
+  world.set_profiled(true);
   obstacles_.clear();
   std::int64_t number = 0;
-  for (const std::int64_t id : bodies_[0].obstacle_ids())
-    obstacles_.push_back({id, number++, false, std::nullopt,
-                          std::make_shared<const std::vector<double>>(bodies_[0].obstacle_triangles(id))});
+  for (const std::int64_t id : world.obstacle_ids())
+    obstacles_.push_back(
+        {id, number++, false, std::nullopt, std::make_shared<const std::vector<double>>(world.obstacle_triangles(id))});
 }
 
 void Simulation::place_side_by_side() {
@@ -198,7 +188,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
   const std::vector<MovedObstacle> obstacles = obstacles_;
   std::vector<std::pair<exmat_obstacle, exmat_motion>> stood;
   for (const MovedObstacle& obstacle : obstacles)
-    stood.emplace_back(bodies_[0].obstacle(obstacle.id), bodies_[0].obstacle_motion(obstacle.id));
+    stood.emplace_back(bodies_.world().obstacle(obstacle.id), bodies_.world().obstacle_motion(obstacle.id));
   const bool goes_on = std::ranges::none_of(documents, &SceneDocument::has_scripted_motion);
   grips_.clear();
   documents_ = std::move(documents);
@@ -207,8 +197,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
     if (obstacles[i].of_scene < 0) add_obstacle(stood[i].first);
     if (!obstacles[i].moved) continue;
-    for (std::size_t body = 0; body < bodies_.size(); ++body)
-      bodies_[body].move_obstacle(obstacles_[i].id, stood[i].second);
+    bodies_.world().move_obstacle(obstacles_[i].id, stood[i].second);
     obstacles_[i].moved = true;
   }
   for (std::size_t i = 0; goes_on && i < bodies_.size(); ++i) {
@@ -219,7 +208,7 @@ void Simulation::rebuild(std::size_t kind, const Settings& settings) {
 }
 
 void Simulation::reset() {
-  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].reset();
+  bodies_.world().reset();
   grips_.clear();
   steps_ = 0;
   failure_.clear();
@@ -241,13 +230,12 @@ void Simulation::prepare_step() {
 void Simulation::move_obstacles() {
   for (MovedObstacle& moved : obstacles_) {
     if (!moved.target) continue;
-    const exmat_motion now = bodies_[0].obstacle_motion(moved.id);
+    const exmat_motion now = bodies_.world().obstacle_motion(moved.id);
     const Eigen::Vector3d from(now.position);
     const Eigen::Vector3d way = (1 - std::exp(-time_step() / kObstacleDelay)) * (*moved.target - from);
     const bool arrived = way.norm() < kArrived;
-    for (std::size_t i = 0; i < bodies_.size(); ++i)
-      bodies_[i].move_obstacle(
-          moved.id, motion_at(from, now, arrived ? Eigen::Vector3d::Zero() : Eigen::Vector3d(way / time_step())));
+    bodies_.world().move_obstacle(
+        moved.id, motion_at(from, now, arrived ? Eigen::Vector3d::Zero() : Eigen::Vector3d(way / time_step())));
     if (arrived) moved.target.reset();
   }
 }
@@ -270,15 +258,15 @@ void Simulation::add_times(std::int64_t steps, double seconds) {
   times_.seconds += seconds;
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const exmat_report report = bodies_[i].report();
-    const exmat_profile profile = bodies_[i].profile();
     times_.newton_iterations += report.newton_iterations;
     times_.status |= report.status;
-    times_.stages.weights += profile.weights;
-    times_.stages.target += profile.target;
-    times_.stages.internal_force += profile.internal_force;
-    times_.stages.solve += profile.solve;
-    times_.stages.contact += profile.contact;
   }
+  const exmat_profile profile = bodies_.world().profile();
+  times_.stages.weights += profile.weights;
+  times_.stages.target += profile.target;
+  times_.stages.internal_force += profile.internal_force;
+  times_.stages.solve += profile.solve;
+  times_.stages.contact += profile.contact;
 }
 
 void Simulation::advance(std::int64_t steps) {
@@ -324,13 +312,12 @@ bool Simulation::throw_body(std::size_t body, const Eigen::Vector3d& velocity, c
 }
 
 void Simulation::add_obstacle(const exmat_obstacle& obstacle) {
-  std::int64_t id = 0;
-  for (std::size_t i = 0; i < bodies_.size(); ++i) id = bodies_[i].add_obstacle(obstacle);
+  const std::int64_t id = bodies_.world().add_obstacle(obstacle);
   obstacles_.push_back({id, -1, false, std::nullopt, std::make_shared<const std::vector<double>>()});
 }
 
 void Simulation::remove_obstacle(std::size_t obstacle) {
-  for (std::size_t i = 0; i < bodies_.size(); ++i) bodies_[i].remove_obstacle(obstacles_[obstacle].id);
+  bodies_.world().remove_obstacle(obstacles_[obstacle].id);
   obstacles_.erase(obstacles_.begin() + static_cast<std::ptrdiff_t>(obstacle));
 }
 
@@ -340,8 +327,7 @@ void Simulation::move_obstacle(std::size_t obstacle, const Eigen::Vector3d& posi
 }
 
 void Simulation::set_obstacle_law(std::size_t obstacle, double stiffness, double damping, double friction) {
-  for (std::size_t i = 0; i < bodies_.size(); ++i)
-    bodies_[i].set_obstacle_law(obstacles_[obstacle].id, stiffness, damping, friction);
+  bodies_.world().set_obstacle_law(obstacles_[obstacle].id, stiffness, damping, friction);
 }
 
 /// Bodies that something touches, those with the largest forces first, no more than are measured.
@@ -386,7 +372,7 @@ void Simulation::save_scene(const std::filesystem::path& file) const {
   std::vector<PlacedObstacle> placed;
   for (const MovedObstacle& moved : obstacles_)
     placed.push_back(
-        {moved.of_scene, moved.moved, bodies_[0].obstacle(moved.id), bodies_[0].obstacle_motion(moved.id)});
+        {moved.of_scene, moved.moved, bodies_.world().obstacle(moved.id), bodies_.world().obstacle_motion(moved.id)});
   const SceneDocument& document = documents_.front();
   document.save(file, steps_ > 0 ? steps_ : document.steps(), placed);
 }

@@ -30,7 +30,7 @@ class Simulation {
   std::shared_ptr<const BodyShape> shape(std::size_t kind) const { return kinds_[kind].shape; }
   const std::string& kind_name(std::size_t kind) const { return kinds_[kind].name; }
   /// Whether bodies touch each other.
-  bool is_world() const { return bodies_.is_world(); }
+  bool is_world() const { return bodies_.world().contact_law().apart == 0; }
   bool has_contact() const { return has_contact_; }
 
   const Settings& settings(std::size_t kind) const { return kinds_[kind].settings; }
@@ -48,7 +48,7 @@ class Simulation {
   double time() const { return static_cast<double>(steps_) * time_step(); }
   double time_step() const { return kinds_.front().settings.time_step; }
   const std::string& failure() const { return failure_; }
-  std::uint64_t hash() const { return bodies_.hash(); }
+  std::uint64_t hash() const { return bodies_.world().hash(); }
 
   // Hands. Places in the world are without the body's offset.
   int grab(std::size_t body, const SurfaceHit& place);
@@ -59,7 +59,7 @@ class Simulation {
   /// Of a free body; false where it is none.
   bool throw_body(std::size_t body, const Eigen::Vector3d& velocity, const Eigen::Vector3d& spin);
 
-  // Obstacles, the same of all bodies, by their place in the list.
+  // Obstacles, by their place in the list.
   void add_obstacle(const exmat_obstacle& obstacle);
   void remove_obstacle(std::size_t obstacle);
   /// Goes there smoothly [m].
@@ -107,8 +107,6 @@ class Simulation {
   };
 
   Made make(const std::vector<SceneDocument>& documents) const;
-  Made make_world(const SceneDocument& document) const;
-  Made make_apart(const std::vector<SceneDocument>& documents) const;
   Kind make_kind(const SceneDocument& document, std::size_t of_document, std::size_t number, Model model) const;
   void take(Made made);
   void place_side_by_side();

@@ -101,7 +101,7 @@ Snapshot Simulation::snapshot(const SnapshotRequest& request) {
   }
   for (const MovedObstacle& moved : obstacles_)
     snapshot.obstacles.push_back(
-        {moved.id, bodies_[0].obstacle(moved.id), bodies_[0].obstacle_motion(moved.id), moved.corners});
+        {moved.id, bodies_.world().obstacle(moved.id), bodies_.world().obstacle_motion(moved.id), moved.corners});
   snapshot.times = times_;
   times_ = {};
   snapshot.failure = failure_;

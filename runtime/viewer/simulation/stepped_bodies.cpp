@@ -26,29 +26,17 @@ int threads_of_steps() {
 
 }  // namespace
 
-SteppedBodies::SteppedBodies(Bodies bodies) : apart_(std::move(bodies)) {
-  for (std::size_t i = 0; i < apart_.size(); ++i) bodies_.emplace_back(apart_[i].get());
-}
-
 SteppedBodies::SteppedBodies(World world) : world_(std::move(world)) {
-  for (const std::int64_t id : world_->ids()) bodies_.push_back(world_->body(id));
+  for (const std::int64_t id : world_.ids()) bodies_.push_back(world_.body(id));
 }
 
-void SteppedBodies::step(std::int64_t steps) {
-  if (world_)
-    world_->step(steps, threads_of_steps());
-  else
-    apart_.step(steps, threads_of_steps());
-}
-
-std::uint64_t SteppedBodies::hash() const { return world_ ? world_->hash() : apart_.hash(); }
+void SteppedBodies::step(std::int64_t steps) { world_.step(steps, threads_of_steps()); }
 
 std::vector<std::vector<exmat_contact>> SteppedBodies::contacts() const {
   std::vector<std::vector<exmat_contact>> contacts;
   for (const BodyRef& body : bodies_) contacts.push_back(body.contacts());
-  if (world_)
-    for (const exmat_body_contact& contact : world_->contacts())
-      contacts[static_cast<std::size_t>(contact.body)].push_back(as_with_obstacle(contact));
+  for (const exmat_body_contact& contact : world_.contacts())
+    contacts[static_cast<std::size_t>(contact.body)].push_back(as_with_obstacle(contact));
   return contacts;
 }
 

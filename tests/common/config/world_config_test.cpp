@@ -41,42 +41,75 @@ TEST_F(WorldConfigTest, BodiesShareWhatIsNotTheirOwn) {
     "obstacles": [{"plane": {"normal": [0, 0, 1]}}], "output": {"trajectory": "w.h5", "every": 3},
     "bodies": [{"name": "a", "bundle": "a.h5", "grid": {"counts": [2, 1, 3], "spacing": [1, 2, 4]}},
                {"name": "b", "bundle": "b.h5", "body": {"linear_velocity": [1, 0, 0]}}]})"));
-  ASSERT_TRUE(world);
-  EXPECT_EQ(world->time_step, 0.002);
-  EXPECT_EQ(world->steps, 7);
-  EXPECT_EQ(world->every, 3);
-  EXPECT_EQ(*world->trajectory, folder_.path() / "w.h5");
-  EXPECT_EQ(world->contact.stiffness, 3e6);
-  EXPECT_EQ(world->contact.damping, 20);
-  EXPECT_EQ(world->contact.friction, 0.4);
-  ASSERT_EQ(world->bodies.size(), 2u);
-  ASSERT_EQ(world->bodies[0].places.size(), 6u);
-  EXPECT_EQ(world->bodies[0].places[5].position, Eigen::Vector3d(1, 0, 8));
-  ASSERT_EQ(world->bodies[1].places.size(), 1u);
-  for (const BodiesConfig& bodies : world->bodies) {
+  EXPECT_TRUE(world.is_list);
+  EXPECT_EQ(world.time_step, 0.002);
+  EXPECT_EQ(world.steps, 7);
+  EXPECT_EQ(world.every, 3);
+  EXPECT_EQ(*world.trajectory, folder_.path() / "w.h5");
+  EXPECT_EQ(world.contact.stiffness, 3e6);
+  EXPECT_EQ(world.contact.damping, 20);
+  EXPECT_EQ(world.contact.friction, 0.4);
+  ASSERT_EQ(world.bodies.size(), 2u);
+  ASSERT_EQ(world.bodies[0].places.size(), 6u);
+  EXPECT_EQ(world.bodies[0].places[5].position, Eigen::Vector3d(1, 0, 8));
+  ASSERT_EQ(world.bodies[1].places.size(), 1u);
+  for (const BodiesConfig& bodies : world.bodies) {
     EXPECT_EQ(bodies.scene.gravity, Eigen::Vector3d(0, 0, -1));
     EXPECT_EQ(bodies.scene.obstacles.size(), 1u);
     EXPECT_EQ(bodies.scene.time_step, 0.002);
     EXPECT_TRUE(needs_of(bodies.scene).contact);
   }
-  EXPECT_EQ(world->bodies[1].scene.bundle, folder_.path() / "b.h5");
-  EXPECT_EQ(*world->bodies[1].scene.body.linear_velocity, Eigen::Vector3d(1, 0, 0));
+  EXPECT_EQ(world.bodies[1].scene.bundle, folder_.path() / "b.h5");
+  EXPECT_EQ(*world.bodies[1].scene.body.linear_velocity, Eigen::Vector3d(1, 0, 0));
 }
 
 TEST_F(WorldConfigTest, ABodyMayHaveItsOwnGravityAndKeys) {
   const auto world = load_world(write("w.json", R"({"gravity": {"keys": [{"time": 2, "value": [0, 0, -1]}]},
     "bodies": [{"name": "a", "bundle": "a.h5"}, {"name": "b", "bundle": "b.h5", "gravity": [1, 0, 0],
       "examples": {"stiffness": {"keys": [{"time": 0, "value": 7}]}}}]})"));
-  EXPECT_EQ(world->bodies[0].scene.gravity_keys.times.size(), 1u);
-  EXPECT_EQ(world->bodies[1].scene.gravity, Eigen::Vector3d(1, 0, 0));
-  EXPECT_TRUE(world->bodies[1].scene.gravity_keys.empty());
-  EXPECT_EQ(place_of_keys(world->bodies[1].scene), "/bodies/1/examples");
+  EXPECT_EQ(world.bodies[0].scene.gravity_keys.times.size(), 1u);
+  EXPECT_EQ(world.bodies[1].scene.gravity, Eigen::Vector3d(1, 0, 0));
+  EXPECT_TRUE(world.bodies[1].scene.gravity_keys.empty());
+  EXPECT_EQ(place_of_keys(world.bodies[1].scene), "/bodies/1/examples");
   EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "gravity": {"keys": [
       {"time": 1, "value": [0, 0, 0]}, {"time": 0, "value": [0, 0, 0]}]}}]})"),
               HasSubstr("/bodies/0/gravity/keys/1/time"));
 }
 
-TEST_F(WorldConfigTest, ASceneOfOneBodyIsNone) { EXPECT_FALSE(load_world(write("s.json", R"({"bundle": "a.h5"})"))); }
+TEST_F(WorldConfigTest, ASingleBundleIsAShortSpelling) {
+  const auto world = load_world(write("s.json", R"({"bundle": "a.h5", "instances": 3, "steps": 5})"));
+  EXPECT_FALSE(world.is_list);
+  EXPECT_EQ(world.steps, 5);
+  ASSERT_EQ(world.bodies.size(), 1u);
+  EXPECT_EQ(world.bodies[0].name, "");
+  EXPECT_EQ(world.bodies[0].places.size(), 3u);
+  EXPECT_FALSE(world.bodies[0].scene.meets_bodies);
+}
+
+TEST_F(WorldConfigTest, GroupsAndMasksSayWhoMeetsWhom) {
+  const auto meets = [&](const std::string& bodies, const std::string& more = "") {
+    std::vector<bool> found;
+    for (const BodiesConfig& kind : load_world(write("w.json", R"({"bodies": [)" + bodies + "]" + more + "}")).bodies)
+      found.push_back(kind.scene.meets_bodies);
+    return found;
+  };
+  const std::string a = R"({"name": "a", "bundle": "a.h5")", b = R"({"name": "b", "bundle": "b.h5")";
+  EXPECT_EQ(meets(a + "}"), std::vector<bool>{false}) << "there is no other";
+  EXPECT_EQ(meets(a + R"(, "grid": {"counts": [2, 1, 1], "spacing": [1, 0, 0]}})"), std::vector<bool>{true});
+  EXPECT_EQ(meets(a + "}", R"(, "contact": {"self": true})"), std::vector<bool>{true});
+  EXPECT_EQ(meets(a + "}, " + b + "}"), (std::vector<bool>{true, true}));
+  EXPECT_EQ(meets(a + R"(, "mask": 0}, )" + b + "}"), (std::vector<bool>{false, false}));
+  EXPECT_EQ(meets(a + R"(, "group": 2, "mask": 4}, )" + b + R"(, "group": 4, "mask": 2})"),
+            (std::vector<bool>{true, true}));
+  const auto world = load_world(write("w.json", R"({"bodies": [)" + a + R"(, "group": 6}], "obstacles": [
+    {"plane": {"normal": [0, 0, 1]}, "group": 8, "mask": 2}, {"plane": {"normal": [0, 0, 1]}, "mask": 1}]})"));
+  EXPECT_EQ(world.bodies[0].scene.meeting.group, 6u);
+  const std::vector<ObstacleConfig>& obstacles = world.bodies[0].scene.obstacles;
+  EXPECT_TRUE(world.bodies[0].scene.meeting.meets(obstacles[0].meeting));
+  EXPECT_FALSE(world.bodies[0].scene.meeting.meets(obstacles[1].meeting));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + a + R"(, "group": 0}]})"), HasSubstr("/bodies/0/group"));
+  EXPECT_THAT(failure_of(R"({"bodies": [)" + a + R"(, "mask": -1}]})"), HasSubstr("/bodies/0/mask"));
+}
 
 TEST_F(WorldConfigTest, MistakesAreNamed) {
   const std::string body = R"({"name": "a", "bundle": "a.h5"})";
@@ -84,10 +117,6 @@ TEST_F(WorldConfigTest, MistakesAreNamed) {
   EXPECT_THAT(failure_of(R"({"bodies": [)" + body + "," + body + "]}"), HasSubstr("/bodies/1/name"));
   EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "forces": []})"), HasSubstr("/forces"));
   EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "instances": 3})"), HasSubstr("grid"));
-  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "sleep": {"energy": 1}})"),
-              HasSubstr("/sleep: expected no such"));
-  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "precision": "mixed"})"), HasSubstr("/precision: expected"));
-  EXPECT_THAT(failure_of(R"({"bodies": [)" + body + R"(], "output": {"render": true}})"), HasSubstr("/output/render"));
   EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a/b", "bundle": "a.h5"}]})"), HasSubstr("/bodies/0/name"));
   EXPECT_THAT(failure_of(R"({"bodies": [{"name": "a", "bundle": "a.h5", "colour": 1}]})"),
               HasSubstr("/bodies/0/colour"));

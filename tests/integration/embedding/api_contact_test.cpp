@@ -72,8 +72,8 @@ TEST_F(ApiContactTest, ObstaclesOfTheHostAreThoseOfASceneBitForBit) {
   ball.point[0] = 0.5;
   ball.point[1] = ball.point[2] = 0.1;
   ball.radius = 0.08;
-  EXPECT_EQ(body.add_obstacle(floor()), 0);
-  EXPECT_EQ(body.add_obstacle(ball), 1);
+  EXPECT_EQ(body.world().add_obstacle(floor()), 0);
+  EXPECT_EQ(body.world().add_obstacle(ball), 1);
   for (Body* each : {&body, &expected}) {
     exmat_motion motion = at(0, 0, 0.05);
     motion.linear_velocity[0] = 1;
@@ -92,7 +92,7 @@ TEST_F(ApiContactTest, ObstaclesOfTheHostAreThoseOfASceneBitForBit) {
 TEST_F(ApiContactTest, ContactsAndLoadsAddUpToTheWeight) {
   const Model model = this->model();
   Body body(model);
-  const std::int64_t id = body.add_obstacle(floor());
+  const std::int64_t id = body.world().add_obstacle(floor());
   body.step(3000);
   const double weight = mass() * kGravity;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero(), on_body, on_floor, turns, of_floor;
@@ -125,7 +125,7 @@ TEST_F(ApiContactTest, ContactsAndLoadsAddUpToTheWeight) {
 TEST_F(ApiContactTest, TheLoadIsTheChangeOfMomentumOverTheCall) {
   const Model model = this->model();
   Body body(model);
-  body.add_obstacle(floor());
+  body.world().add_obstacle(floor());
   exmat_motion motion = at(0, 0, 0.02);
   motion.linear_velocity[0] = 1;
   motion.linear_velocity[2] = -2;
@@ -154,64 +154,64 @@ TEST_F(ApiContactTest, MovedObstaclesCarryAndRemovedOnesLetGo) {
   plate.half_extents[0] = plate.half_extents[1] = 2;
   plate.half_extents[2] = 0.1;
   plate.point[2] = -0.1;
-  const std::int64_t ball = body.add_obstacle([] {
+  const std::int64_t ball = body.world().add_obstacle([] {
     exmat_obstacle shape = default_obstacle();
     shape.shape = EXMAT_SPHERE;
     shape.point[0] = 50;
     return shape;
   }());
-  const std::int64_t id = body.add_obstacle(plate);
+  const std::int64_t id = body.world().add_obstacle(plate);
   body.step(1500);
   const double start = body.motion().position[0];
   constexpr double kVelocity = 0.3;
   for (int i = 0; i < 1000; ++i) {  // as an engine does: pose and velocity before each step
     exmat_motion motion = at(kVelocity * kTimeStep * i, 0, 0);
     motion.linear_velocity[0] = kVelocity;
-    body.move_obstacle(id, motion);
+    body.world().move_obstacle(id, motion);
     body.step(1);
   }
-  EXPECT_NEAR(body.obstacle_motion(id).position[0], kVelocity * kTimeStep * 1000, 1e-12);
+  EXPECT_NEAR(body.world().obstacle_motion(id).position[0], kVelocity * kTimeStep * 1000, 1e-12);
   // Dragged along but for what it slid until it had the velocity: v^2 / (2 mu g) = 4.6e-3 m, and the damping of mass.
   EXPECT_NEAR(body.motion().linear_velocity[0], kVelocity, 0.02 * kVelocity);
   EXPECT_NEAR(body.motion().position[0] - start, kVelocity * kTimeStep * 1000, 0.02);
-  body.remove_obstacle(ball);
+  body.world().remove_obstacle(ball);
   const std::size_t touching = body.contacts().size();
   body.step(1);
-  EXPECT_THAT(body.obstacle_ids(), ::testing::ElementsAre(id));
+  EXPECT_THAT(body.world().obstacle_ids(), ::testing::ElementsAre(id));
   EXPECT_GT(body.contacts().size(), 3);
   EXPECT_EQ(touching, 0);  // those of the last call went with the obstacle
   const double height = body.motion().position[2];
-  body.remove_obstacle(id);
+  body.world().remove_obstacle(id);
   body.step(100);
   EXPECT_TRUE(body.contacts().empty());
   EXPECT_LT(body.motion().position[2], height - 0.1);
-  EXPECT_EQ(body.add_obstacle(plate), 2);
+  EXPECT_EQ(body.world().add_obstacle(plate), 2);
 }
 
 TEST_F(ApiContactTest, ResetAndStatesKeepTheHostsObstaclesWhereTheyAre) {
   const Model model = this->model();
   Body body(model);
-  const std::int64_t id = body.add_obstacle(floor());
+  const std::int64_t id = body.world().add_obstacle(floor());
   exmat_motion rising = at(0, 0, -0.05);
   rising.linear_velocity[2] = 0.2;
-  body.move_obstacle(id, rising);
+  body.world().move_obstacle(id, rising);
   body.step(100);
   const std::vector<double> state = body.state();
-  const double height = body.obstacle_motion(id).position[2];
+  const double height = body.world().obstacle_motion(id).position[2];
   EXPECT_NEAR(height, -0.05 + 0.2 * 100 * kTimeStep, 1e-12);
   body.step(50);
   const auto twice = [&] {
     body.set_state(state);
-    exmat_motion motion = body.obstacle_motion(id);
+    exmat_motion motion = body.world().obstacle_motion(id);
     motion.position[2] = height;
-    body.move_obstacle(id, motion);
+    body.world().move_obstacle(id, motion);
     body.step(50);
     return body.state();
   };
   EXPECT_EQ(twice(), twice());
-  const double before = body.obstacle_motion(id).position[2];
+  const double before = body.world().obstacle_motion(id).position[2];
   body.reset();
-  EXPECT_EQ(body.obstacle_motion(id).position[2], before);
+  EXPECT_EQ(body.world().obstacle_motion(id).position[2], before);
 }
 
 TEST_F(ApiContactTest, WhatWasAddedIsRead) {
@@ -223,9 +223,9 @@ TEST_F(ApiContactTest, WhatWasAddedIsRead) {
   capsule.direction[0] = -2;
   capsule.radius = 0.25;
   capsule.friction = 0.3;
-  const std::int64_t id = body.add_obstacle(capsule);
-  body.set_obstacle_law(id, 2e5, 10, 0.7);
-  const exmat_obstacle found = body.obstacle(id);
+  const std::int64_t id = body.world().add_obstacle(capsule);
+  body.world().set_obstacle_law(id, 2e5, 10, 0.7);
+  const exmat_obstacle found = body.world().obstacle(id);
   EXPECT_EQ(found.shape, EXMAT_CAPSULE);
   EXPECT_EQ(found.point[1], 3);
   EXPECT_EQ(found.direction[0], -2);
@@ -254,21 +254,21 @@ TEST_F(ApiContactTest, MeshesAndHeightFieldsCarryAsABoxDoes) {
   law.point[2] = -0.1;
   law.half_extents[0] = law.half_extents[1] = 1;
   law.half_extents[2] = 0.1;
-  on_box.add_obstacle(law);
+  on_box.world().add_obstacle(law);
   law = floor();
   std::int64_t id = -1;
   {
     const Shape mesh = table_mesh();
-    id = on_mesh.add_shape(mesh, law);
+    id = on_mesh.world().add_shape(mesh, law);
     const std::vector<double> heights(9, 0.5);
     law.point[0] = law.point[1] = -1;
     law.point[2] = -0.5;
-    on_heights.add_shape(Shape::height_field(heights, 3, {1, 1}), law);
+    on_heights.world().add_shape(Shape::height_field(heights, 3, {1, 1}), law);
     law = floor();
     law.point[2] = -0.05;
     const std::vector<double> corners{-1, -1, 0, 1, -1, 0, 1, 1, 0, -1, 1, 0};
     const std::vector<std::int32_t> sheet{0, 1, 2, 0, 2, 3};
-    on_shell.add_shape(Shape::mesh(corners, sheet, 0.1), law);
+    on_shell.world().add_shape(Shape::mesh(corners, sheet, 0.1), law);
   }
   for (Body* body : {&on_box, &on_mesh, &on_heights, &on_shell}) {
     body->step(400);
@@ -277,14 +277,14 @@ TEST_F(ApiContactTest, MeshesAndHeightFieldsCarryAsABoxDoes) {
   for (Body* body : {&on_mesh, &on_heights, &on_shell})
     for (int axis = 0; axis < 3; ++axis)
       EXPECT_NEAR(body->motion().position[axis], on_box.motion().position[axis], 1e-9);
-  EXPECT_EQ(on_mesh.obstacle(id).shape, EXMAT_MESH);
-  EXPECT_EQ(on_mesh.obstacle(id).friction, 0.5);
+  EXPECT_EQ(on_mesh.world().obstacle(id).shape, EXMAT_MESH);
+  EXPECT_EQ(on_mesh.world().obstacle(id).friction, 0.5);
   exmat_motion up = at(0, 0, 0);
   up.linear_velocity[2] = 0.5;
-  on_mesh.move_obstacle(id, up);
+  on_mesh.world().move_obstacle(id, up);
   on_mesh.step(100);
   EXPECT_NEAR(on_mesh.motion().position[2] - on_box.motion().position[2], 100 * kTimeStep * 0.5, 2e-3);
-  on_mesh.remove_obstacle(id);
+  on_mesh.world().remove_obstacle(id);
   on_mesh.step(10);
   EXPECT_TRUE(on_mesh.contacts().empty());
 }
@@ -299,8 +299,8 @@ TEST_F(ApiContactTest, AStateRemembersTheSideThatABodyCameInBy) {
   law.stiffness = 1e6;
   law.damping = 0;
   Body body(model), other(model);
-  body.add_shape(shell, law);
-  other.add_shape(shell, law);
+  body.world().add_shape(shell, law);
+  other.world().add_shape(shell, law);
   exmat_motion fall = at(0, 0, 0);
   fall.linear_velocity[2] = -50;
   body.set_motion(fall);
@@ -341,12 +341,13 @@ TEST_F(ApiContactTest, WrongShapesAreRefusedInWords) {
   exmat_obstacle obstacle = floor();
   obstacle.shape = EXMAT_MESH;
   std::int64_t id = 0;
-  EXPECT_EQ(exmat_body_add_obstacle(body.get(), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
-  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_body_add_shape()"));
+  EXPECT_EQ(exmat_world_add_obstacle(exmat_body_world(body.get()), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("exmat_world_add_shape()"));
   obstacle.friction = -1;
-  EXPECT_EQ(exmat_body_add_shape(body.get(), table_mesh().get(), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_world_add_shape(exmat_body_world(body.get()), table_mesh().get(), &obstacle, &id),
+            EXMAT_INVALID_ARGUMENT);
   EXPECT_THAT(exmat_last_error(), HasSubstr("obstacle.friction"));
-  EXPECT_TRUE(body.obstacle_ids().empty());
+  EXPECT_TRUE(body.world().obstacle_ids().empty());
 }
 
 TEST_F(ApiContactTest, WrongObstaclesAreRefusedInWords) {
@@ -356,9 +357,9 @@ TEST_F(ApiContactTest, WrongObstaclesAreRefusedInWords) {
     exmat_obstacle obstacle = default_obstacle();
     change(obstacle);
     std::int64_t id = 0;
-    EXPECT_EQ(exmat_body_add_obstacle(body.get(), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
+    EXPECT_EQ(exmat_world_add_obstacle(exmat_body_world(body.get()), &obstacle, &id), EXMAT_INVALID_ARGUMENT);
     EXPECT_EQ(id, -1);
-    EXPECT_TRUE(body.obstacle_ids().empty());
+    EXPECT_TRUE(body.world().obstacle_ids().empty());
     return std::string(exmat_last_error());
   };
   EXPECT_THAT(refused([](auto& o) { o.shape = 9; }), HasSubstr("obstacle.shape = 9: expected 0 to 3"));
@@ -369,13 +370,13 @@ TEST_F(ApiContactTest, WrongObstaclesAreRefusedInWords) {
   EXPECT_THAT(refused([](auto& o) { o.shape = EXMAT_SPHERE, o.radius = -2; }), HasSubstr("obstacle.radius = -2"));
   EXPECT_THAT(refused([](auto& o) { o.shape = EXMAT_BOX, o.orientation[0] = 0; }), HasSubstr("quaternion"));
   EXPECT_THAT(refused([](auto& o) { o.size = 3; }), HasSubstr("size = 3"));
-  EXPECT_EQ(exmat_body_remove_obstacle(body.get(), 4), EXMAT_INVALID_ARGUMENT);
-  EXPECT_THAT(exmat_last_error(), HasSubstr("id = 4: the body has no such obstacle"));
+  EXPECT_EQ(exmat_world_remove_obstacle(exmat_body_world(body.get()), 4), EXMAT_INVALID_ARGUMENT);
+  EXPECT_THAT(exmat_last_error(), HasSubstr("id = 4: the world has no such obstacle"));
   exmat_settings plain = settings();
   plain.use_contact = 0;
   Body other(Model(files_.bundle(), plain));
   try {
-    other.add_obstacle(floor());
+    other.world().add_obstacle(floor());
     FAIL() << "added";
   } catch (const Error& error) {
     EXPECT_THAT(error.what(), HasSubstr("use_contact"));
@@ -402,7 +403,7 @@ TEST_F(ApiContactTest, StepsAndReadsOfContactsDoNotAllocate) {
   if (!AllocationCounter::works()) GTEST_SKIP() << "a sanitizer owns malloc";
   const Model model = this->model();
   Body body(model);
-  const std::int64_t id = body.add_obstacle(floor());
+  const std::int64_t id = body.world().add_obstacle(floor());
   body.step(200);
   std::vector<exmat_contact> contacts(body.contacts().size() + 64);
   std::array<double, 6> load{};
@@ -413,7 +414,7 @@ TEST_F(ApiContactTest, StepsAndReadsOfContactsDoNotAllocate) {
   const std::int64_t count = exmat_body_contacts(body.get());
   status |= exmat_body_read_contacts(body.get(), contacts.data(), count, sizeof(exmat_contact));
   status |= exmat_body_read_contact_load(body.get(), id, load.data(), load.data() + 3);
-  status |= exmat_body_move_obstacle(body.get(), id, &motion);
+  status |= exmat_world_move_obstacle(exmat_body_world(body.get()), id, &motion);
   status |= exmat_body_set_gravity(body.get(), load.data());
   status |= exmat_body_reset(body.get());
   EXPECT_EQ(counter.count(), 0u);
@@ -423,7 +424,9 @@ TEST_F(ApiContactTest, StepsAndReadsOfContactsDoNotAllocate) {
 
 /// Leaves room for no more than some bytes beyond what the process has, and steps many bodies by many threads.
 [[noreturn]] void step_with_little_memory(const Model& model, rlim_t room) {
-  Bodies bodies;
+  exmat_contact_law law = default_contact_law();
+  law.apart = 1;
+  World bodies(law);
   for (int i = 0; i < 64; ++i) bodies.add(Body(model));
   std::ifstream memory("/proc/self/statm");
   rlim_t pages = 0;
@@ -432,7 +435,7 @@ TEST_F(ApiContactTest, StepsAndReadsOfContactsDoNotAllocate) {
   const rlimit limits{limit, limit};
   setrlimit(RLIMIT_AS, &limits);
   bodies.step(2, 1500);
-  std::_Exit(bodies[63].report().steps == 2 ? 0 : 1);
+  std::_Exit(bodies.body(63).report().steps == 2 ? 0 : 1);
 }
 
 // OpenMP ends the process where a thread does not start; the library asks for no more than do.

@@ -175,7 +175,6 @@ TEST_F(ApiTest, WrongArgumentsAreCodes) {
   const std::array<std::int64_t, 2> bad_ids{0, files_.vertices()};
   const std::array<double, 6> bad_numbers{0, 0, 0, 0, kNaN, 0};
   exmat_body* const b = body.get();
-  const std::array<exmat_body*, 2> twice{b, b}, with_null{b, nullptr};
   const char* const bundle = files_.bundle().c_str();
 
   EXPECT_EQ(exmat_settings_default(nullptr, sizeof settings), EXMAT_INVALID_ARGUMENT);
@@ -220,14 +219,6 @@ TEST_F(ApiTest, WrongArgumentsAreCodes) {
   EXPECT_EQ(exmat_body_set_reduced(b, q.data(), bad_q.data(), r), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_step(nullptr, 1, nullptr), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_step(b, -1, nullptr), EXMAT_INVALID_ARGUMENT);
-  EXPECT_EQ(exmat_bodies_step(nullptr, 1, 1, 1), EXMAT_INVALID_ARGUMENT);
-  EXPECT_EQ(exmat_bodies_step(nullptr, 0, 1, 1), EXMAT_OK);
-  EXPECT_EQ(exmat_bodies_step(&b, -1, 1, 1), EXMAT_INVALID_ARGUMENT);
-  EXPECT_EQ(exmat_bodies_step(&b, 1, -1, 1), EXMAT_INVALID_ARGUMENT);
-  EXPECT_EQ(exmat_bodies_step(&b, 1, 1, -1), EXMAT_INVALID_ARGUMENT);
-  EXPECT_EQ(exmat_bodies_step(with_null.data(), 2, 1, 1), EXMAT_INVALID_ARGUMENT);
-  EXPECT_EQ(exmat_bodies_step(twice.data(), 2, 1, 1), EXMAT_INVALID_ARGUMENT);
-  EXPECT_THAT(exmat_last_error(), HasSubstr("bodies[1] is listed twice"));
   EXPECT_EQ(exmat_body_read_report(nullptr, &report), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_read_report(b, nullptr), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_body_apply_forces(nullptr, points.get(), numbers.data(), 6), EXMAT_INVALID_ARGUMENT);

@@ -14,13 +14,13 @@ auto span_of(Matrix& matrix) {
   return std::span(matrix.data(), static_cast<std::size_t>(matrix.size()));
 }
 
-inline Eigen::VectorXd displacement(const Body& body, std::size_t modes) {
+inline Eigen::VectorXd displacement(const BodyRef& body, std::size_t modes) {
   Eigen::VectorXd q(static_cast<Eigen::Index>(modes));
   body.read_displacement(span_of(q));
   return q;
 }
 
-inline Eigen::VectorXd velocity(const Body& body, std::size_t modes) {
+inline Eigen::VectorXd velocity(const BodyRef& body, std::size_t modes) {
   Eigen::VectorXd v(static_cast<Eigen::Index>(modes));
   body.read_velocity(span_of(v));
   return v;
@@ -45,6 +45,12 @@ class ApiTest : public ::testing::Test {
   }
 
   Model model() const { return Model(files_.bundle(), damped_examples()); }
+  /// The same bundle without forces, in steps as long.
+  Model plain_model() const {
+    exmat_settings settings = default_settings();
+    settings.time_step = damped_examples().time_step;
+    return Model(files_.bundle(), settings);
+  }
 
   BarFiles files_;
 };

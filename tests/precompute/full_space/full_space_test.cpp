@@ -280,7 +280,7 @@ struct Dropped {
     scene.gravity = kGravity * Eigen::Vector3d(std::sin(slope), 0, -std::cos(slope));
     scene.mass_damping = 2;
     scene.stiffness_damping = 2e-3;
-    scene.obstacles.push_back({runtime::Plane{}, {}, 1e7, 2e4, friction});
+    scene.obstacles.push_back(runtime::Obstacle{runtime::Plane{}, {}, 1e7, 2e4, friction});
     state = at_rest(model);
   }
   double mass() const { return model.frame->mass(); }

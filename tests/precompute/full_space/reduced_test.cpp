@@ -58,7 +58,8 @@ class ReducedTwin {
         examples.elastic = true;
       }
     full_scene_.examples = reduced_scene_.examples;
-    if (options.floor) reduced_scene_.obstacles = {{runtime::Plane{{0, -0.05, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
+    if (options.floor)
+      reduced_scene_.obstacles = {runtime::Obstacle{runtime::Plane{{0, -0.05, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     full_scene_.obstacles = reduced_scene_.obstacles;
     set_loads();
   }

@@ -36,7 +36,7 @@ class StepPotentialTest : public testing::TestWithParam<std::tuple<bool, bool>> 
     if (is_elastic())
       scene_.examples = {{.stiffness = 0.7, .damping = 20, .bias = 0.5, .elastic = true},
                          {.stiffness = 2, .elastic = true}};
-    scene_.obstacles = {{runtime::Plane{{0, 0.02, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
+    scene_.obstacles = {runtime::Obstacle{runtime::Plane{{0, 0.02, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
     state_ = at_rest(model_);
     state_.v = 0.3 * test::random_vector(model_.size(), 1);
     if (is_free()) turn();

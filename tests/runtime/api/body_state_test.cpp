@@ -7,7 +7,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
-#include "runtime/scene/scene_run.h"
+#include "tests/support/scene_run.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -90,9 +90,9 @@ TEST_P(BodyStates, TheHashIsThatOfARun) {
   body.step(40);
   second.step(40);
   SceneConfig config = load_scene(scene_);
-  EXPECT_EQ(hash_of({body.get()}), run(load_run(config), config, {}).state_hash);
+  EXPECT_EQ(hash_of({body.get()}), test::run(config).state_hash);
   config.instances = 2;
-  EXPECT_EQ(hash_of({body.get(), second.get()}), run(load_run(config), config, {}).state_hash);
+  EXPECT_EQ(hash_of({body.get(), second.get()}), test::run(config).state_hash);
   EXPECT_EQ(exmat_bodies_hash(nullptr, 1, nullptr), EXMAT_INVALID_ARGUMENT);
 }
 

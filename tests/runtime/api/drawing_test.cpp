@@ -265,10 +265,10 @@ TEST_F(Drawing, ProfilesAddUpToLessThanTheCallTook) {
   const exmat::Model model = make(R"(, "gravity": [0, 0, -2])");
   exmat::Body body(model);
   body.step(20);
-  EXPECT_EQ(body.profile().solve, 0);
-  body.set_profiled(true);
+  EXPECT_EQ(body.world().profile().solve, 0);
+  body.world().set_profiled(true);
   const exmat_report report = body.step(20);
-  const exmat_profile profile = body.profile();
+  const exmat_profile profile = body.world().profile();
   EXPECT_GT(profile.internal_force, 0);
   EXPECT_LE(profile.weights + profile.target + profile.internal_force + profile.solve + profile.contact,
             report.seconds);
@@ -290,8 +290,8 @@ TEST_F(Drawing, BundlesSayWhatTheyHold) {
 TEST_F(Drawing, TouchWhatIsAddedWhereTheTextIsToldSo) {
   const std::string text = R"({"bundle": "bar.h5"})", path = (folder_ / "scene.json").string();
   exmat::Body with(exmat::Model::from_text(text, path, true)), without(exmat::Model::from_text(text, path));
-  with.add_obstacle(exmat::default_obstacle());
-  EXPECT_THROW(without.add_obstacle(exmat::default_obstacle()), exmat::Error);
+  with.world().add_obstacle(exmat::default_obstacle());
+  EXPECT_THROW(without.world().add_obstacle(exmat::default_obstacle()), exmat::Error);
 }
 
 }  // namespace

@@ -41,12 +41,12 @@ TEST_F(ObstacleReading, TrianglesOfAMeshEncloseItWhereItStands) {
   exmat_obstacle placed = default_obstacle();
   placed.point[1] = 7;
   placed.orientation[0] = placed.orientation[2] = std::sqrt(0.5);  // z becomes x
-  const std::int64_t id = body.add_shape(exmat::Shape::mesh(vertices, triangles), placed);
+  const std::int64_t id = body.world().add_shape(exmat::Shape::mesh(vertices, triangles), placed);
   exmat_motion motion{};
   motion.position[2] = 100;  // is not that of the obstacle's frame
   motion.orientation[0] = 1;
-  body.move_obstacle(id, motion);
-  const std::vector<double> corners = body.obstacle_triangles(id);
+  body.world().move_obstacle(id, motion);
+  const std::vector<double> corners = body.world().obstacle_triangles(id);
   ASSERT_EQ(corners.size(), 9 * 12U);
   double volume = 0, area = 0;
   Eigen::AlignedBox3d box;
@@ -69,8 +69,8 @@ TEST_F(ObstacleReading, TrianglesOfGroundAreItsCells) {
   const exmat::Model model = this->model();
   exmat::Body body(model);
   const std::int64_t id =
-      body.add_shape(exmat::Shape::height_field(heights, kColumns, {0.5, 0.25}), default_obstacle());
-  const std::vector<double> corners = body.obstacle_triangles(id);
+      body.world().add_shape(exmat::Shape::height_field(heights, kColumns, {0.5, 0.25}), default_obstacle());
+  const std::vector<double> corners = body.world().obstacle_triangles(id);
   ASSERT_EQ(corners.size(), 9U * 2 * (kColumns - 1) * (kRows - 1));
   double area = 0;
   for (std::size_t i = 0; i < corners.size() / 3; i += 3) {
@@ -89,14 +89,14 @@ TEST_F(ObstacleReading, TrianglesOfGroundAreItsCells) {
 TEST_F(ObstacleReading, OtherShapesHaveNoTriangles) {
   const exmat::Model model = this->model();
   exmat::Body body(model);
-  const std::int64_t id = body.add_obstacle(default_obstacle());
-  EXPECT_EQ(exmat_body_obstacle_triangles(body.get(), id), 0);
-  EXPECT_TRUE(body.obstacle_triangles(id).empty());
-  EXPECT_EQ(exmat_body_obstacle_triangles(body.get(), id + 1), -1);
-  EXPECT_EQ(exmat_body_obstacle_triangles(nullptr, id), -1);
-  EXPECT_THROW(body.obstacle_triangles(id + 1), exmat::Error);
+  const std::int64_t id = body.world().add_obstacle(default_obstacle());
+  EXPECT_EQ(exmat_world_obstacle_triangles(exmat_body_world(body.get()), id), 0);
+  EXPECT_TRUE(body.world().obstacle_triangles(id).empty());
+  EXPECT_EQ(exmat_world_obstacle_triangles(exmat_body_world(body.get()), id + 1), -1);
+  EXPECT_EQ(exmat_world_obstacle_triangles(nullptr, id), -1);
+  EXPECT_THROW(body.world().obstacle_triangles(id + 1), exmat::Error);
   double one = 0;
-  EXPECT_EQ(exmat_body_read_obstacle_triangles(body.get(), id, &one, 1), EXMAT_INVALID_ARGUMENT);
+  EXPECT_EQ(exmat_world_read_obstacle_triangles(exmat_body_world(body.get()), id, &one, 1), EXMAT_INVALID_ARGUMENT);
 }
 
 // Reports of a body that has a capacity, beside what the capacity says of the same forces.
@@ -120,7 +120,7 @@ TEST_F(ObstacleReading, ReportsOfAPressedBodyHoldItsLostWork) {
     press.shape = EXMAT_SPHERE;
     for (int axis = 0; axis < 3; ++axis) press.point[axis] = tip.rest()[static_cast<std::size_t>(axis)];
     press.point[0] += 0.98;
-    body.add_obstacle(press);
+    body.world().add_obstacle(press);
     report = body.step(3);
     EXPECT_GT(report.lost_contact, 0.01);
     EXPECT_EQ(report.lost_contact, capacity.contact_lost(body));

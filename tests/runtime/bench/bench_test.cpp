@@ -8,6 +8,7 @@
 
 #include "common/config/config.h"
 #include "common/core/error.h"
+#include "tests/support/scene_run.h"
 #include "tests/support/scenes.h"
 #include "tests/support/temporary_folder.h"
 
@@ -35,7 +36,8 @@ class BenchTest : public ::testing::Test {
 
   BenchResult measured(const std::string& members, std::optional<std::int64_t> steps = 25) const {
     const SceneConfig config = scene(members);
-    return bench(load_run(config), config, {.steps = steps, .seconds = 0.02});
+    const test::LoadedRun loaded(config);
+    return bench(loaded.world, loaded.config, {.steps = steps, .seconds = 0.02});
   }
 
   test::TemporaryFolder folder_;
@@ -95,19 +97,19 @@ TEST_F(BenchTest, NumbersAreConsistent) {
 
 TEST_F(BenchTest, CountsTheFlopsOfTheInternalForce) {
   const SceneConfig config = scene(", \"internal_force\": \"polynomial\"");
-  const LoadedScene loaded = load_run(config);
-  const BenchResult result = bench(loaded, config, {.steps = 10, .seconds = 0.01});
-  EXPECT_EQ(result.internal_force, "polynomial");
+  const test::LoadedRun loaded(config);
+  const BenchResult result = bench(loaded.world, loaded.config, {.steps = 10, .seconds = 0.01});
+  EXPECT_EQ(result.kinds.front().internal_force, "polynomial");
   const double evaluations = 1 + result.newton_iterations + result.line_search_evaluations;
-  const double expected = evaluations * loaded.model->internal_force.force_flops();
+  const double expected = evaluations * loaded.kind().model->internal_force.force_flops();
   EXPECT_GE(result.stages[2].flops, expected * (1 - kRounding));
   EXPECT_LE(result.stages[2].flops, 2 * expected);
-  EXPECT_GE(result.bytes, evaluations * loaded.model->internal_force.bytes());
+  EXPECT_GE(result.bytes, evaluations * loaded.kind().model->internal_force.bytes());
 }
 
 TEST_F(BenchTest, StagesThatAreLeftOutCostNothing) {
   const BenchResult result = measured("");
-  EXPECT_EQ(result.target, "none");
+  EXPECT_EQ(result.kinds.front().target, "none");
   for (const std::size_t stage : {0U, 1U}) {
     EXPECT_EQ(result.stages[stage].flops, 0);
     EXPECT_EQ(result.stages[stage].seconds.mean(), 0);
@@ -116,18 +118,19 @@ TEST_F(BenchTest, StagesThatAreLeftOutCostNothing) {
 }
 
 TEST_F(BenchTest, TheTargetIsThatOfTheScene) {
-  EXPECT_EQ(measured(kExamples).target, "table");
+  EXPECT_EQ(measured(kExamples).kinds.front().target, "table");
   const BenchResult solved = measured(", \"examples\": {\"stiffness\": 300, \"bias\": 0.5, \"target\": \"solve\"}");
-  EXPECT_EQ(solved.target, "solve");
+  EXPECT_EQ(solved.kinds.front().target, "solve");
   EXPECT_GT(solved.target_iterations, 0);
 }
 
 TEST_F(BenchTest, ARoundIsARunOfTheScene) {
   for (const char* members : {", \"instances\": 3", ""}) {
     SceneConfig config = scene(kExamples + members);
-    const BenchResult result = bench(load_run(config), config, {.steps = 17, .seconds = 0.02});
+    const test::LoadedRun loaded(config);
+    const BenchResult result = bench(loaded.world, loaded.config, {.steps = 17, .seconds = 0.02});
     config.steps = 17;
-    const RunSummary summary = run(load_run(config), config);
+    const RunSummary summary = test::run(config);
     EXPECT_EQ(result.steps, 17);
     EXPECT_EQ(result.instances, config.instances);
     EXPECT_EQ(result.threads, std::min(config.instances, omp_get_max_threads()));
@@ -146,8 +149,8 @@ TEST_F(BenchTest, StepsThatAreGivenAreTaken) {
 
 TEST_F(BenchTest, ANonFiniteStepIsAFailure) {
   const SceneConfig config = scene(", \"forces\": [{\"vertices\": {\"ids\": [15]}, \"force\": [0, 1e300, 0]}]");
-  const LoadedScene loaded = load_run(config);
-  EXPECT_THROW(bench(loaded, config, {.seconds = 0.01}), WorkError);
+  const test::LoadedRun loaded(config);
+  EXPECT_THROW(bench(loaded.world, loaded.config, {.seconds = 0.01}), WorkError);
 }
 
 }  // namespace

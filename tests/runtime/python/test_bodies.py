@@ -19,14 +19,14 @@ def hash_of(bodies):
 def test_state_hash_is_that_of_the_program(bundle, runtime, scene_file):
     scene = scene_file(bundle=bundle, steps=200, gravity=[0, 0, -1], damping={"mass": 0.2, "stiffness": 0.01}, instances=3,
                        examples={"stiffness": 4000, "damping": 10, "bias": 0.2})
-    world = exmat.World(exmat.Model.from_scene(scene), 3)
+    world = exmat.Batch(exmat.Model.from_scene(scene), 3)
     world.step(200)
     assert hash_of(world) == runtime("run", scene)["state hash"].strip()
     settings = exmat.Model(bundle, gravity=(0, 0, -1), mass_damping=0.2, stiffness_damping=0.01, example_stiffness=4000, example_damping=10,
                            example_bias=0.2)
     bodies = [exmat.Body(settings) for _ in range(3)]
-    for _ in range(200):
-        exmat.step(bodies, 1, threads=2)
+    for body in bodies:
+        body.step(200)
     assert hash_of(bodies) == hash_of(world)
 
 

@@ -83,7 +83,7 @@ def hug(teddy, bundle, folder):
 
 def depths_at_the_end(teddy, hug, stiffness, self_contact):
     """Pulled to the pose alone, until it lies still."""
-    world = exmat.TouchingWorld.from_scene({
+    world = exmat.World.from_scene({
         "bodies": [{"name": "teddy", "bundle": hug, "examples": {"stiffness": STIFFNESS, "damping": 20, "weights": [0, 1]}}],
         "contact": {"stiffness": stiffness, "damping": stiffness / 100, "self": self_contact},
         "damping": {"mass": 1, "stiffness": 0.01}, "time_step": 0.004})

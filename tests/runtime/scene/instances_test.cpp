@@ -1,7 +1,9 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <omp.h>
 #include <optional>
 
+#include "common/core/error.h"
 #include "runtime/scene/bodies.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/scenes.h"
@@ -28,7 +30,7 @@ enum class Target { kNone, kTable, kSolve };
 /// Another push on each body, so that no two are alike.
 void push(Bodies& bodies, const StepScene& scene) {
   for (int body = 0; body < bodies.count(); ++body)
-    bodies[body].applied_force = 0.1 * body * scene.gravity_force.reverse();
+    bodies.world().state(body).applied_force = 0.1 * body * scene.gravity_force.reverse();
 }
 
 class InstancesTest : public ::testing::TestWithParam<std::tuple<Target, bool>> {
@@ -36,14 +38,20 @@ class InstancesTest : public ::testing::TestWithParam<std::tuple<Target, bool>> 
   InstancesTest() {
     const auto [target, polynomial] = GetParam();
     const test::Bar bar = full_bar({.cells = {3, 1, 1}, .linear_modes = 4, .eigenfunctions = 3, .examples = 3});
-    model_ = prepared(bar, {.target_table = target == Target::kTable, .polynomial = polynomial});
+    LoadedScene& kind = loaded_.kinds.emplace_back().loaded;
+    kind.model = prepared(bar, {.target_table = target == Target::kTable, .polynomial = polynomial});
+    model_ = kind.model.get();
+    kind.start = make_state(*model_);
     scene_ = free_scene(*model_, Integrator::kBdf2, 0.005);
     scene_.mass_damping = 0.05;
     scene_.gravity_force = gravity_force(*model_, {0, -9.81, 0});
     if (target != Target::kNone) scene_.examples = {ExampleSettings{300, 0.1, 0.5, 4}};
+    kind.scene = scene_;
+    loaded_.bodies.resize(kBodies);
+    config_.time_step = scene_.time_step;
   }
 
-  Bodies make_bodies() const { return {*model_, scene_, make_state(*model_), kBodies}; }
+  Bodies make_bodies() const { return {loaded_, config_}; }
 
   std::uint64_t hash_after(int steps, int threads) const {
     const ThreadCount limited(threads);
@@ -51,11 +59,13 @@ class InstancesTest : public ::testing::TestWithParam<std::tuple<Target, bool>> 
     EXPECT_EQ(bodies.threads(), threads);
     push(bodies, scene_);
     for (int i = 0; i < steps; ++i) bodies.step();
-    EXPECT_FALSE(bodies.first_non_finite());
+    EXPECT_TRUE(bodies.is_finite());
     return bodies.hash();
   }
 
-  std::unique_ptr<const Model> model_;
+  LoadedWorld loaded_;
+  WorldConfig config_;
+  const Model* model_ = nullptr;
   StepScene scene_;
 };
 
@@ -87,15 +97,15 @@ TEST_P(InstancesTest, EachBodyMovesAsIfAlone) {
   for (int body = 0; body < kBodies; ++body) {
     State alone = make_state(*model_);
     refresh_weights(*model_, scene_, alone, workspace);
-    alone.applied_force = bodies[body].applied_force;
+    alone.applied_force = bodies.world().state(body).applied_force;
     for (int i = 0; i < 50; ++i) step(*model_, scene_, alone, workspace);
-    EXPECT_LE((alone.q - bodies[body].q).norm(), rounding * alone.q.norm()) << body;
-    EXPECT_LE((alone.v - bodies[body].v).norm(), rounding * alone.v.norm()) << body;
+    EXPECT_LE((alone.q - bodies.world().state(body).q).norm(), rounding * alone.q.norm()) << body;
+    EXPECT_LE((alone.v - bodies.world().state(body).v).norm(), rounding * alone.v.norm()) << body;
     if (!scene_.examples.empty()) {
-      EXPECT_LE((alone.examples[0].weights - bodies[body].examples[0].weights).norm(), rounding) << body;
+      EXPECT_LE((alone.examples[0].weights - bodies.world().state(body).examples[0].weights).norm(), rounding) << body;
     }
     if (body > 0) {
-      EXPECT_NE(bodies[body].q, bodies[body - 1].q);
+      EXPECT_NE(bodies.world().state(body).q, bodies.world().state(body - 1).q);
     }
   }
 }
@@ -115,7 +125,8 @@ TEST_P(InstancesTest, RestartTakesAllBodiesBack) {
 TEST_P(InstancesTest, MeasuringChangesNothingAndAllocatesNothing) {
   const ThreadCount limited(1);
   Bodies plain = make_bodies(), profiled = make_bodies();
-  profiled.set_profiled(true);
+  WorldProfile measured;
+  profiled.world().set_profile(&measured);
   std::size_t allocations = 0;
   {
     const test::AllocationCounter counter;
@@ -129,19 +140,22 @@ TEST_P(InstancesTest, MeasuringChangesNothingAndAllocatesNothing) {
     EXPECT_EQ(allocations, 0U);
   }
   EXPECT_EQ(plain.hash(), profiled.hash());
-  EXPECT_EQ(plain.take_measured().seconds, 0);
-  const Bodies::Measured measured = profiled.take_measured();
-  EXPECT_GT(measured.seconds, 0);
-  EXPECT_GT(measured.work.bytes, 0);
-  EXPECT_EQ(measured.work.target_flops > 0, !scene_.examples.empty());
-  EXPECT_EQ(profiled.take_measured().seconds, 0) << "taken means gone";
+  EXPECT_GT(measured.bodies_seconds, 0);
+  EXPECT_GT(measured.seconds[static_cast<std::size_t>(WorldStage::kSingleBodies)], 0);
+  EXPECT_GT(measured.bodies.flops[static_cast<std::size_t>(Stage::kInternalForce)], 0);
+  EXPECT_EQ(measured.bodies.seconds[static_cast<std::size_t>(Stage::kTarget)] > 0, !scene_.examples.empty());
 }
 
 TEST_P(InstancesTest, ABodyThatIsNotFiniteIsNamed) {
   Bodies bodies = make_bodies();
-  bodies[3].applied_force[0] = 1e300;
+  bodies.world().state(3).applied_force[0] = 1e300;
   bodies.step();
-  EXPECT_EQ(bodies.first_non_finite(), 3);
+  try {
+    bodies.require_finite();
+    FAIL();
+  } catch (const WorkError& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("body 4 of 5"));
+  }
 }
 
 }  // namespace

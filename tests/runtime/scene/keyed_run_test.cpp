@@ -6,7 +6,7 @@
 #include "common/core/error.h"
 #include "runtime/bench/bench.h"
 #include "runtime/scene/scene_run.h"
-#include "runtime/scene/world_bodies.h"
+#include "tests/support/scene_run.h"
 #include "tests/support/scenes.h"
 #include "tests/support/temporary_folder.h"
 
@@ -43,8 +43,9 @@ class KeyedRun : public ::testing::Test {
 
 TEST_F(KeyedRun, IsTheRunOfAHostThatSetsThem) {
   const SceneConfig config = scene(std::string(kKeyed) + R"(, "instances": 3)");
-  const LoadedScene loaded = load_run(config);
-  const std::uint64_t keyed = run(loaded, config).state_hash;
+  const test::LoadedRun whole(config);
+  const LoadedScene& loaded = whole.kind();
+  const std::uint64_t keyed = whole.run().state_hash;
   StepScene set = loaded.scene;
   State state = loaded.start;
   Workspace workspace(*loaded.model, set);
@@ -67,13 +68,14 @@ TEST_F(KeyedRun, IsTheRunOfAHostThatSetsThem) {
 
 TEST_F(KeyedRun, IsTakenUpToTheLastBitAndMeasured) {
   const SceneConfig whole = scene(kKeyed);
-  const std::uint64_t hash = run(load_run(whole), whole).state_hash;
+  const std::uint64_t hash = test::run(whole).state_hash;
   for (const int first : {14, 15, 16}) {  // gravity jumps between
     const SceneConfig before = scene(kKeyed, first), after = scene(kKeyed, 40 - first);
-    run(load_run(before), before, {.dump_state = folder_.path("state.json")});
-    EXPECT_EQ(run(load_run(after), after, {.from_state = folder_.path("state.json")}).state_hash, hash) << first;
+    test::run(before, {.dump_state = folder_.path("state.json")});
+    EXPECT_EQ(test::run(after, {.from_state = folder_.path("state.json")}).state_hash, hash) << first;
   }
-  EXPECT_EQ(bench(load_run(whole), whole, {.steps = 40, .seconds = 0.02}).state_hash, hash);
+  const test::LoadedRun loaded(whole);
+  EXPECT_EQ(bench(loaded.world, loaded.config, {.steps = 40, .seconds = 0.02}).state_hash, hash);
 }
 
 TEST_F(KeyedRun, ThePlanNamesThem) {
@@ -89,36 +91,37 @@ TEST_F(KeyedRun, OfSeveralBodiesIsThatOfEach) {
   const std::string examples = std::string(kKeyed).substr(std::string(kKeyed).find("\"examples\""));
   const std::string own =
       R"("gravity": {"keys": [{"time": 0, "value": [1, 0, 0]}, {"time": 0.3, "value": [0, 2, 0]}]})";
-  const WorldConfig config = *load_world(file(R"("steps": 40, "gravity": [0, -1, 0], "bodies": [
+  const WorldConfig config = load_world(file(R"("steps": 40, "gravity": [0, -1, 0], "bodies": [
     {"name": "plain", "bundle": "bar.h5"},
     {"name": "keyed", "bundle": "bar.h5", "body": {"motion": [{"time": 0, "position": [90, 0, 0]}]}, )" +
-                                              own + ", " + examples + "}]"));
+                                             own + ", " + examples + "}]"));
   const LoadedWorld loaded = load_world_run(config);
-  WorldBodies bodies(loaded, config);
+  Bodies bodies(loaded, config);
   for (int i = 0; i < 40; ++i) bodies.step();
   const SceneConfig plain = scene(R"("gravity": [0, -1, 0])");
   const SceneConfig keyed =
       scene(R"("body": {"motion": [{"time": 0, "position": [90, 0, 0]}]}, )" + own + ", " + examples);
   for (const auto& [number, alone] : {std::pair(0, plain), std::pair(1, keyed)}) {
-    const LoadedScene single = load_run(alone);
-    Bodies body = make_bodies(single, alone);
+    const test::LoadedRun single(alone);
+    Bodies body = single.bodies();
     for (int i = 0; i < 40; ++i) body.step();
-    EXPECT_EQ(bodies.world().state(number).q, body[0].q) << number;
-    EXPECT_EQ(bodies.world().state(number).v, body[0].v) << number;
-    EXPECT_GT(body[0].q.norm(), 0);
+    EXPECT_EQ(bodies.world().state(number).q, body.world().state(0).q) << number;
+    EXPECT_EQ(bodies.world().state(number).v, body.world().state(0).v) << number;
+    EXPECT_GT(body.world().state(0).q.norm(), 0);
   }
 }
 
 TEST_F(KeyedRun, WeightsAreThoseThatAreGiven) {
   const SceneConfig config = scene(R"("examples": {"stiffness": 300, "target": "solve", "weights":
     {"keys": [{"time": 0, "value": [1, 0, 0]}, {"time": 0.2, "value": [0, 0.25, 0.75]}]}})");
-  const LoadedScene loaded = load_run(config);
-  Bodies bodies = make_bodies(loaded, config);
-  EXPECT_EQ(bodies[0].examples[0].weights, Eigen::Vector3d(1, 0, 0));
+  const test::LoadedRun loaded(config);
+  Bodies bodies = loaded.bodies();
+  const State& state = bodies.world().state(0);
+  EXPECT_EQ(state.examples[0].weights, Eigen::Vector3d(1, 0, 0));
   for (int i = 0; i < 10; ++i) bodies.step();
-  EXPECT_LE((bodies[0].examples[0].weights - Eigen::Vector3d(0.5, 0.125, 0.375)).norm(), 1e-15);
+  EXPECT_LE((state.examples[0].weights - Eigen::Vector3d(0.5, 0.125, 0.375)).norm(), 1e-15);
   for (int i = 0; i < 30; ++i) bodies.step();
-  EXPECT_EQ(bodies[0].examples[0].weights, Eigen::Vector3d(0, 0.25, 0.75));
+  EXPECT_EQ(state.examples[0].weights, Eigen::Vector3d(0, 0.25, 0.75));
   try {
     load_run(scene(R"("examples": {"stiffness": 300, "weights": [0.5, 0.5]})"));
     FAIL();

@@ -56,7 +56,7 @@ std::string cube(bool open, bool turned = false, bool inward = false) {
   return text;
 }
 
-std::vector<Obstacle> with_mesh(const std::filesystem::path& file, double scale, double thickness) {
+Obstacles with_mesh(const std::filesystem::path& file, double scale, double thickness) {
   SceneConfig scene = config();
   MeshConfig mesh;
   mesh.file = file;
@@ -70,7 +70,7 @@ std::vector<Obstacle> with_mesh(const std::filesystem::path& file, double scale,
 
 TEST(ObstacleLoader, MakesMeshes) {
   const test::TemporaryFolder folder;
-  const Shape mesh = with_mesh(folder.write("a.obj", cube(false)), 0.5, 0).front().shape;
+  const Shape mesh = with_mesh(folder.write("a.obj", cube(false)), 0.5, 0).front()->shape;
   const Box box{{0, 0, 5},
                 Eigen::Vector3d::Constant(0.5),
                 Eigen::AngleAxisd(0.3, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix()};
@@ -85,7 +85,7 @@ TEST(ObstacleLoader, RefusesMeshesThatAreNotClosedUnlessTheyAreShells) {
                                HasSubstr("\"thickness\"")));
   EXPECT_THAT(refusal([&] { with_mesh(folder.write("b.obj", cube(false, true)), 1, 0); }),
               HasSubstr("4 edges whose two triangles look opposite ways"));
-  const Shape shell = with_mesh(folder.path("a.obj"), 1, 0.2).front().shape;
+  const Shape shell = with_mesh(folder.path("a.obj"), 1, 0.2).front()->shape;
   EXPECT_NEAR(signed_distance(shell, Eigen::Vector3d(0, 0, 5)), 0.9, 1e-14);
   EXPECT_THAT(refusal([&] { with_mesh(folder.path("none.obj"), 1, 0); }), HasSubstr("none.obj"));
   EXPECT_THAT(refusal([&] { with_mesh(folder.path("a.glb"), 1, 0); }), HasSubstr(".obj, .ply or .stl"));
@@ -97,7 +97,7 @@ TEST(ObstacleLoader, WarnsOfFacesThatLookInward) {
   const test::TemporaryFolder folder;
   std::string warned;
   const log::Sink former = log::set_sink([&](log::Level, std::string_view message) { warned += message; });
-  const Shape room = with_mesh(folder.write("room.obj", cube(false, false, true)), 1, 0).front().shape;
+  const Shape room = with_mesh(folder.write("room.obj", cube(false, false, true)), 1, 0).front()->shape;
   log::set_sink(former);
   EXPECT_THAT(warned, HasSubstr("room.obj: its faces look inward"));
   EXPECT_NEAR(signed_distance(room, Eigen::Vector3d(0, 0, 5)), 1, 1e-14);
@@ -113,10 +113,10 @@ TEST(ObstacleLoader, MakesHeightFieldsOfAFileOrOfTheScene) {
   scene.obstacles.push_back({field, 1e6, 0, 0, {}});
   field.file = folder.write("a.csv", "1,1,1\n1,1,1\n");
   scene.obstacles.push_back({field, 1e6, 0, 0, {}});
-  const std::vector<Obstacle> obstacles = make_obstacles(scene);
-  EXPECT_NEAR(signed_distance(obstacles[0].shape, Eigen::Vector3d(1, 0.5, 5)), 3, 1e-15);
-  EXPECT_NEAR(signed_distance(obstacles[0].shape, Eigen::Vector3d(5, 0.5, 2)), 3, 1e-15);
-  EXPECT_NEAR(signed_distance(obstacles[1].shape, Eigen::Vector3d(3, 0.5, 1.5)), -0.5, 1e-15);
+  const Obstacles obstacles = make_obstacles(scene);
+  EXPECT_NEAR(signed_distance(obstacles[0]->shape, Eigen::Vector3d(1, 0.5, 5)), 3, 1e-15);
+  EXPECT_NEAR(signed_distance(obstacles[0]->shape, Eigen::Vector3d(5, 0.5, 2)), 3, 1e-15);
+  EXPECT_NEAR(signed_distance(obstacles[1]->shape, Eigen::Vector3d(3, 0.5, 1.5)), -0.5, 1e-15);
 }
 
 TEST(ObstacleLoader, MakesObstacles) {
@@ -129,15 +129,15 @@ TEST(ObstacleLoader, MakesObstacles) {
                              {{0, {0, 5, 0}, Eigen::Quaterniond::Identity()}}});
   scene.obstacles.push_back({SphereConfig{{0, 0, 1}, 0.5}, 1e6, 0, 0, {}});
   scene.obstacles.push_back({CapsuleConfig{{0, 0, 0}, {0, 0, 1}, 0.5}, 1e6, 0, 0, {}});
-  const std::vector<Obstacle> obstacles = make_obstacles(scene);
+  const Obstacles obstacles = make_obstacles(scene);
   ASSERT_EQ(obstacles.size(), 4u);
   const Eigen::Vector3d point(0, 4, 0);
-  EXPECT_EQ(obstacles[0].stiffness, 2e5);
-  EXPECT_EQ(obstacles[0].damping, 30);
-  EXPECT_EQ(obstacles[0].friction, 0.4);
+  EXPECT_EQ(obstacles[0]->stiffness, 2e5);
+  EXPECT_EQ(obstacles[0]->damping, 30);
+  EXPECT_EQ(obstacles[0]->friction, 0.4);
   const double expected[] = {5, 0, std::sqrt(17) - 0.5, 3.5};
   for (std::size_t i = 0; i < 4; ++i)
-    EXPECT_NEAR(PlacedObstacle(obstacles[i], 1, 0.1).signed_distance(point), expected[i], 1e-14) << i;
+    EXPECT_NEAR(PlacedObstacle(*obstacles[i], 1, 0.1).signed_distance(point), expected[i], 1e-14) << i;
 }
 
 TEST(ObstacleLoader, StartsWhereTheSceneSays) {

@@ -8,7 +8,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
 #include "common/core/error.h"
-#include "runtime/scene/scene_run.h"
+#include "tests/support/scene_run.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -70,11 +70,11 @@ class StateFile : public ::testing::TestWithParam<Case> {
 // The bits of all bodies, of frames and contacts too: of 40 steps in one run, and in two with a file between them.
 TEST_P(StateFile, ARunThatIsTakenUpIsTheWholeRunToTheLastBit) {
   make(GetParam());
-  const std::uint64_t whole = run(load_run(scene(GetParam().members, 40)), scene(GetParam().members, 40)).state_hash;
+  const std::uint64_t whole = test::run(scene(GetParam().members, 40)).state_hash;
   for (const int first : {1, 19, 20}) {
     const SceneConfig before = scene(GetParam().members, first), after = scene(GetParam().members, 40 - first);
-    run(load_run(before), before, {.dump_state = state()});
-    const RunSummary summary = run(load_run(after), after, {.from_state = state()});
+    test::run(before, {.dump_state = state()});
+    const RunSummary summary = test::run(after, {.from_state = state()});
     EXPECT_EQ(summary.state_hash, whole) << first;
     EXPECT_EQ(summary.steps, 40 - first);
   }
@@ -83,11 +83,10 @@ TEST_P(StateFile, ARunThatIsTakenUpIsTheWholeRunToTheLastBit) {
 TEST_P(StateFile, WhatIsWrittenAgainIsTheSame) {
   make(GetParam());
   const SceneConfig config = scene(GetParam().members);
-  const LoadedScene loaded = load_run(config);
-  run(loaded, config, {.dump_state = state()});
-  Bodies bodies = make_bodies(loaded, config);
-  read_states(state(), loaded, bodies);
-  write_states(bodies, loaded, folder_.path() / "again.json");
+  const test::LoadedRun loaded(config);
+  loaded.run({.dump_state = state()});
+  const BodiesMemory memory = read_state(state(), loaded.world, loaded.config);
+  write_state(memory, loaded.world, loaded.config, folder_.path() / "again.json");
   EXPECT_EQ(test::read_file(folder_.path() / "again.json"), test::read_file(state()));
 }
 
@@ -99,30 +98,29 @@ using BadStateFile = StateFile;
 TEST_F(BadStateFile, ContactsAreThere) {
   make(cases()[2]);
   const SceneConfig config = scene(cases()[2].members, 30);
-  run(load_run(config), config, {.dump_state = state()});
+  test::run(config, {.dump_state = state()});
   EXPECT_FALSE(Json::parse(test::read_file(state()))["bodies"][0]["contacts"].empty());
 }
 
 TEST_F(BadStateFile, IsRefusedWithThePlace) {
   make(cases()[2]);
   const SceneConfig config = scene(cases()[2].members, 30);
-  const LoadedScene loaded = load_run(config);
-  run(loaded, config, {.dump_state = state()});
+  const test::LoadedRun loaded(config);
+  loaded.run({.dump_state = state()});
   const Json good = Json::parse(test::read_file(state()));
-  Bodies bodies = make_bodies(loaded, config);
-  const std::uint64_t before = bodies.hash();
   const auto refusal = [&](const char* pointer, const Json& value) -> std::string {
     Json bad = good;
     bad[Json::json_pointer(pointer)] = value;
     test::write_file(state(), bad.dump());
     try {
-      read_states(state(), loaded, bodies);
+      read_state(state(), loaded.world, loaded.config);
     } catch (const InputError& error) {
-      EXPECT_EQ(bodies.hash(), before) << pointer;
       return error.what();
     }
     return "none";
   };
+  EXPECT_THAT(refusal("/format_version", 2),
+              HasSubstr("state.json: /format_version: expected a state of a scene of one"));
   EXPECT_THAT(refusal("/format", "exmat-report"), HasSubstr("state.json: /format: expected"));
   EXPECT_THAT(refusal("/bundle_input_sha256", "b"), HasSubstr("state.json: /bundle_input_sha256: expected \"aaaa"));
   EXPECT_THAT(refusal("/time_step", 0.02), HasSubstr("state.json: /time_step: expected 0.01"));
@@ -141,9 +139,9 @@ TEST_F(BadStateFile, HoldsTheStateBeforeAStepThatFails) {
   make({"clamped", {}, false, ""});
   const std::string members = R"(, "forces": [{"vertices": {"ids": [62]}, "force": [0, 1e300, 0], "start": 0.1}])";
   const SceneConfig config = scene(members);
-  EXPECT_THROW(run(load_run(config), config, {.dump_state = state()}), WorkError);
+  EXPECT_THROW(test::run(config, {.dump_state = state()}), WorkError);
   EXPECT_EQ(Json::parse(test::read_file(state()))["bodies"][0]["step"], 10);
-  EXPECT_THROW(run(load_run(config), config, {.from_state = state()}), WorkError);
+  EXPECT_THROW(test::run(config, {.from_state = state()}), WorkError);
 }
 
 }  // namespace

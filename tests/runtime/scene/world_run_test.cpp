@@ -1,5 +1,3 @@
-#include "runtime/scene/world_run.h"
-
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +7,8 @@
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "common/hdf5/hdf5_file.h"
-#include "runtime/scene/world_state_file.h"
+#include "runtime/scene/scene_run.h"
+#include "runtime/scene/state_file.h"
 #include "tests/support/synthetic_model.h"
 #include "tests/support/temporary_folder.h"
 
@@ -35,7 +34,7 @@ class WorldRunTest : public ::testing::Test {
     std::ofstream(file) << R"({"time_step": 0.002, "steps": 60, "gravity": [0, 0, -9.81],
       "contact": {"stiffness": 1e7, "damping": 2e4, "friction": 0.4}, "bodies": [)"
                         << bodies << "]" << more << "}";
-    return *load_world(file);
+    return load_world(file);
   }
 
   test::TemporaryFolder folder_;
@@ -48,7 +47,7 @@ constexpr const char* kTwoKinds = R"({"name": "shelf", "bundle": "clamped.h5"},
 TEST_F(WorldRunTest, WritesAGroupForEachBodyAndRunsTheSameEachTime) {
   WorldConfig config = world(kTwoKinds, R"(, "output": {"trajectory": "w.h5", "every": 20})");
   const LoadedWorld loaded = load_world_run(config);
-  const WorldSummary summary = run(loaded, config);
+  const RunSummary summary = run(loaded, config);
   EXPECT_EQ(summary.bodies, 3);
   EXPECT_EQ(summary.steps, 60);
   EXPECT_EQ(summary.unconverged_steps, 0);
@@ -102,8 +101,8 @@ TEST_F(WorldRunTest, ARunThatIsTakenUpIsTheWholeRunToTheLastBit) {
     EXPECT_EQ(run(loaded, config, {.from_state = state}).state_hash, whole) << first;
   }
   EXPECT_GE(pairs, 1U) << "some touch where a run is taken up";
-  const WorldMemory memory = read_world_state(state, loaded, config);
-  write_world_state(memory, loaded, config, folder_.path() / "again.json");
+  const BodiesMemory memory = read_state(state, loaded, config);
+  write_state(memory, loaded, config, folder_.path() / "again.json");
   EXPECT_EQ(test::read_file(folder_.path() / "again.json"), test::read_file(state));
 }
 
@@ -119,13 +118,14 @@ TEST_F(WorldRunTest, AStateFileThatDoesNotFitIsRefusedWithThePlace) {
     bad[nlohmann::json::json_pointer(pointer)] = value;
     test::write_file(state, bad.dump());
     try {
-      read_world_state(state, loaded, config);
+      read_state(state, loaded, config);
     } catch (const InputError& error) {
       return error.what();
     }
     return "none";
   };
-  EXPECT_THAT(refusal("/format_version", 1), HasSubstr("state.json: /format_version: expected a state of a scene of"));
+  EXPECT_THAT(refusal("/format_version", 1),
+              HasSubstr("state.json: /format_version: expected a state of a scene that lists"));
   EXPECT_THAT(refusal("/time_step", 0.1), HasSubstr("state.json: /time_step: expected 0.002"));
   EXPECT_THAT(refusal("/bodies/3", good["bodies"][0]), HasSubstr("state.json: /bodies: expected 3"));
   EXPECT_THAT(refusal("/bodies/1/name", "shelf"), HasSubstr("state.json: /bodies/1/name: expected \"block_0\""));
@@ -144,11 +144,11 @@ TEST_F(WorldRunTest, AStateFileThatDoesNotFitIsRefusedWithThePlace) {
 
 TEST_F(WorldRunTest, StagesOfARunAddUpToItsSteps) {
   WorldConfig config = world(kTwoKinds);
-  const WorldSummary summary = run(load_world_run(config), config, {.profiled = true});
+  const RunSummary summary = run(load_world_run(config), config, {.profiled = true});
   double sum = 0;
-  for (const Samples& stage : summary.stage_seconds->step) sum += stage.mean();
+  for (const Samples& stage : summary.stage_seconds->of_world) sum += stage.mean();
   EXPECT_NEAR(sum, summary.step_seconds.mean(), 1e-12);
-  EXPECT_GT(summary.stage_seconds->step[static_cast<std::size_t>(WorldStage::kIslands)].mean(), 0);
+  EXPECT_GT(summary.stage_seconds->of_world[static_cast<std::size_t>(WorldStage::kIslands)].mean(), 0);
 }
 
 }  // namespace

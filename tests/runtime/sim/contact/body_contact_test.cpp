@@ -33,7 +33,7 @@ struct Overlap {
                          {start_b, qb},
                          {FrameVelocity{{1, 0, 0}, Eigen::Vector3d::Zero()}, vb}};
     NearVertices near;
-    contact.gather(a, b, kTimeStep, 0.01, true, {}, shape, near, candidates);
+    contact.gather(a, b, {kTimeStep, 0.01, true, {}, shape, near}, candidates);
   }
 
   /// W after the rigid unknowns (translation, rotation about the position) and q of either changed.
@@ -142,8 +142,8 @@ TEST(BodyContact, FindsWhatIsNearAndWhatWasInside) {
   overlap.contact.commit(a.pose, b.pose, overlap.candidates, held);
   BodyCandidates closest, again;
   NearVertices near;
-  overlap.contact.gather(a, b, 1e-3, 1e-6, false, {}, shape, near, closest);
-  overlap.contact.gather(a, b, 1e-3, 0.01, false, held, shape, near, again);
+  overlap.contact.gather(a, b, {1e-3, 1e-6, false, {}, shape, near}, closest);
+  overlap.contact.gather(a, b, {1e-3, 0.01, false, held, shape, near}, again);
   EXPECT_LT(closest.all.size(), all);
   EXPECT_EQ(again.all.size(), all);
 }
@@ -165,7 +165,7 @@ TEST(BodyContact, WhatIsDeepWithoutHavingComeInDoesNotPush) {
                          {FrameVelocity{}, still}};
     BodyCandidates found;
     NearVertices near;
-    overlap.contact.gather(a, b, kTimeStep, 0.1, anew, {}, shape, near, found);
+    overlap.contact.gather(a, b, {kTimeStep, 0.1, anew, {}, shape, near}, found);
     ContactSums sums;
     sums.set_zero(overlap.qa.size());
     overlap.contact.evaluate(a.set, a.pose, b.pose, 0, found, sums, sums);
@@ -213,8 +213,8 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
     const double before = kept.radius;
     const Placement from = kept.a_in_b;
     NearVertices none;
-    overlap.contact.gather(a, b, 1e-3, kMargin, false, {}, shape, kept, with);
-    overlap.contact.gather(a, b, 1e-3, kMargin, false, {}, shape, none, without);
+    overlap.contact.gather(a, b, {1e-3, kMargin, false, {}, shape, kept}, with);
+    overlap.contact.gather(a, b, {1e-3, kMargin, false, {}, shape, none}, without);
     if (before < 0 || from.position != kept.a_in_b.position) ++searches;
     if (kept.radius >= 0 && kept.served > 1) ++served;
     const double deepest = 0.01 * surface.bound(qb).radius;  // that may have come in, at rest
@@ -257,7 +257,7 @@ TEST(BodyContact, WhatMovesFastAgainstItselfFindsWhatComesNear) {
       touching.surface.place(state.q, shape);
       BodyCandidates candidates;
       NearVertices near;
-      contact.gather_own(body, kStep, kMargin, {}, shape, near, candidates);
+      contact.gather_own(body, {kStep, kMargin, false, {}, shape, near}, candidates);
       std::vector<bool> found(static_cast<std::size_t>(set.vertices()));
       for (const BodyCandidate& candidate : candidates.all) found[static_cast<std::size_t>(candidate.vertex)] = true;
       const double step = std::min(kStep, 0.5 * gap / speed);  // none is inside yet
@@ -299,8 +299,8 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
     touching.surface.place(q, shape);
     BodyCandidates with, without;
     NearVertices none;
-    contact.gather_own(body, 1e-3, kMargin, {}, shape, kept, with);
-    contact.gather_own(body, 1e-3, kMargin, {}, shape, none, without);
+    contact.gather_own(body, {1e-3, kMargin, false, {}, shape, kept}, with);
+    contact.gather_own(body, {1e-3, kMargin, false, {}, shape, none}, without);
     if (searched.size() == 0 || searched != kept.q_a) ++searches;
     searched = kept.q_a;
     if (kept.radius >= 0 && kept.served > 1) ++served;

@@ -39,7 +39,7 @@ Obstacle obstacle(Shape shape, double damping = 0, double friction = 0, RigidMot
 Plane floor_at(double height) { return {{0, height, 0}, {0, 1, 0}}; }
 
 /// Around and under the ball, all within reach, with damping and friction.
-std::vector<Obstacle> many_obstacles(double damping = 300) {
+Obstacles many_obstacles(double damping = 300) {
   const RigidMotion motion({{0, {0, 0, 0}, Eigen::Quaterniond::Identity()},
                             {1, {0.1, 0, 0}, Eigen::Quaterniond(Eigen::AngleAxisd(1, Eigen::Vector3d::UnitX()))}});
   return {obstacle(floor_at(-0.4), damping, 0.5), obstacle(Sphere{{0.9, 0, 0}, 0.4}, damping, 0.3),
@@ -49,7 +49,7 @@ std::vector<Obstacle> many_obstacles(double damping = 300) {
 
 /// A body in the middle of a step.
 struct Scenario {
-  explicit Scenario(const std::vector<Obstacle>& given, std::uint32_t seed = 5)
+  explicit Scenario(const Obstacles& given, std::uint32_t seed = 5)
       : obstacles(given),
         set(ball_data(), {0.2, 0, 0}),
         workspace(set, given.size()),
@@ -76,7 +76,7 @@ struct Scenario {
   void evaluate() { set.evaluate(pose(), workspace); }
 
   static constexpr double kTime = 0.5, kTimeStep = 1e-3;
-  std::vector<Obstacle> obstacles;
+  Obstacles obstacles;
   ContactSet set;
   ContactWorkspace workspace;
   ContactState state;
@@ -117,7 +117,7 @@ Eigen::VectorXd force_after(const Scenario& scenario, const Eigen::VectorXd& z) 
 
 Eigen::VectorXd unit_step(Eigen::Index i, double size) { return size * Eigen::VectorXd::Unit(6 + kModes, i); }
 
-void expect_descent(const std::vector<Obstacle>& obstacles, int least_touching) {
+void expect_descent(const Obstacles& obstacles, int least_touching) {
   constexpr double kStep = 1e-7;
   Scenario scenario(obstacles);
   scenario.begin();
@@ -222,7 +222,7 @@ TEST(Contact, NeverPullsAndStaysInTheFrictionCone) {
     scenario.evaluate();
     for (std::size_t i = 0; i < scenario.workspace.candidate_count; ++i) {
       const ContactCandidate& candidate = scenario.workspace.candidates[i];
-      const double friction = scenario.obstacles[static_cast<std::size_t>(candidate.obstacle)].friction;
+      const double friction = scenario.obstacles[static_cast<std::size_t>(candidate.obstacle)]->friction;
       const double normal = candidate.force.dot(candidate.normal);
       const Eigen::Vector3d tangential = candidate.force - normal * candidate.normal;
       EXPECT_GE(normal, -1e-12);
@@ -249,7 +249,7 @@ std::set<std::pair<int, int>> brute_force(const Scenario& scenario, double margi
     const Eigen::Vector3d point =
         scenario.position + scenario.rotation * (X + data.basis.middleRows(3 * id, 3) * scenario.q);
     for (std::size_t i = 0; i < scenario.obstacles.size(); ++i)
-      if (PlacedObstacle(scenario.obstacles[i], Scenario::kTime, Scenario::kTimeStep).signed_distance(point) <= margin)
+      if (PlacedObstacle(*scenario.obstacles[i], Scenario::kTime, Scenario::kTimeStep).signed_distance(point) <= margin)
         pairs.emplace(id, static_cast<int>(i));
   }
   return pairs;
@@ -342,7 +342,7 @@ TEST(Contact, OfNoVerticesOrObstaclesDoesNothing) {
 /// One vertex of mass 1 kg and area 1 m^2 that only translates, by backward Euler.
 class Particle {
  public:
-  explicit Particle(std::vector<Obstacle> given)
+  explicit Particle(Obstacles given)
       : obstacles(std::move(given)),
         set(data()),
         workspace(set, obstacles.size()),
@@ -370,7 +370,7 @@ class Particle {
   }
 
   static constexpr double kStep = 1e-3;
-  std::vector<Obstacle> obstacles;
+  Obstacles obstacles;
   ContactSet set;
   ContactWorkspace workspace;
   ContactState state;

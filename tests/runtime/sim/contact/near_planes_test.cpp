@@ -34,9 +34,9 @@ ContactData ball() {
 }
 
 /// A floor and a wall.
-std::vector<Obstacle> corner(double height) {
-  return {{Plane{{0, height, 0}, {0, 1, 0}}, RigidMotion(), 1e4},
-          {Plane{{-1, 0, 0}, Eigen::Vector3d(1, 0.1, 0).normalized()}, RigidMotion(), 1e4}};
+Obstacles corner(double height) {
+  return {Obstacle{Plane{{0, height, 0}, {0, 1, 0}}, RigidMotion(), 1e4},
+          Obstacle{Plane{{-1, 0, 0}, Eigen::Vector3d(1, 0.1, 0).normalized()}, RigidMotion(), 1e4}};
 }
 
 using Pairs = std::set<std::pair<int, int>>;  // vertex and obstacle
@@ -48,11 +48,11 @@ Pairs found(const ContactWorkspace& workspace) {
   return pairs;
 }
 
-Pairs brute_force(const ContactSet& set, const BodyPose& pose, const std::vector<Obstacle>& obstacles) {
+Pairs brute_force(const ContactSet& set, const BodyPose& pose, const Obstacles& obstacles) {
   Pairs pairs;
   for (int vertex = 0; vertex < set.vertices(); ++vertex)
     for (std::size_t i = 0; i < obstacles.size(); ++i)
-      if (signed_distance(obstacles[i].shape, pose.position + set.world_arm(vertex, pose)) <= kMargin)
+      if (signed_distance(obstacles[i]->shape, pose.position + set.world_arm(vertex, pose)) <= kMargin)
         pairs.emplace(vertex, static_cast<int>(i));
   return pairs;
 }
@@ -73,7 +73,7 @@ TEST(NearPlanes, ChangeNoCandidate) {
     if (step / 300 % 2 == 1) place.position.x() += 0.05;
     place.rotation = Eigen::AngleAxisd(3 * t, Eigen::Vector3d(1, -1, 2).normalized()).toRotationMatrix();
     const Eigen::VectorXd q = 0.1 * (1 + std::sin(11 * t)) * random_vector(kModes, 7);
-    const std::vector<Obstacle> obstacles = corner(step / 700 % 2 == 1 ? 0.02 : 0);
+    const Obstacles obstacles = corner(step / 700 % 2 == 1 ? 0.02 : 0);
     const BodyPose pose{place, q};
     set.gather(obstacles, step * kTimeStep, kTimeStep, pose, kMargin, near, workspace);
     if (workspace.visited_nodes == 0) ++served;
@@ -91,7 +91,7 @@ TEST(NearPlanes, GiveUpForABodyThatTheyDoNotServe) {
   const ContactSet set(ball());
   NearPlanes near = set.make_state(2).near_planes;
   ContactWorkspace workspace(set, 2);
-  const std::vector<Obstacle> obstacles = corner(0);
+  const Obstacles obstacles = corner(0);
   const Eigen::VectorXd q = Eigen::VectorXd::Zero(kModes);
   int plain = 0;
   for (int step = 0; step < 100; ++step) {

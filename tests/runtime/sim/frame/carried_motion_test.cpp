@@ -197,8 +197,8 @@ TEST(CarriedMotion, OntoAFloorIsAFloorOntoTheBody) {
     const Eigen::Vector3d way(0, 0, floor_moves ? 0.1 : -0.1);
     const RigidMotion motion(std::vector<Keyframe>{{0, Eigen::Vector3d::Zero()}, {0.2, way}});
     const double bottom = bar.model.object->mesh.vertices.col(2).minCoeff();
-    scene.obstacles.push_back({Plane{Eigen::Vector3d(0, 0, bottom - 0.02), Eigen::Vector3d::UnitZ()},
-                               floor_moves ? motion : RigidMotion(), 1e6, 0, 0});
+    scene.obstacles.push_back(Obstacle{Plane{Eigen::Vector3d(0, 0, bottom - 0.02), Eigen::Vector3d::UnitZ()},
+                                       floor_moves ? motion : RigidMotion(), 1e6, 0, 0});
     State state = make_state(*model);
     prepare_contacts(*model, 1, state);
     if (!floor_moves) scene.carrier = motion;

@@ -23,8 +23,8 @@ struct Dropped {
     scene.gravity = Eigen::Vector3d(0, 0, -kGravity);
     scene.gravity_force = gravity_force(*model, scene.gravity);
     if (free) scene.gravity_force.setZero();
-    scene.obstacles.push_back(
-        {Plane{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ()}, RigidMotion(), stiffness, damping, friction});
+    scene.obstacles.push_back(Obstacle{Plane{Eigen::Vector3d::Zero(), Eigen::Vector3d::UnitZ()}, RigidMotion(),
+                                       stiffness, damping, friction});
     state = make_state(*model);
     prepare_contacts(*model, 1, state);
   }
@@ -223,7 +223,9 @@ TEST(ContactStep, AClampedBodyRestsOnAnObstacle) {
   Dropped bar(2e-3, 1e7, 0, 2e4, /*free=*/false);
   bar.scene.gravity_force = gravity_force(*bar.model, Eigen::Vector3d(0, 0, -200));
   bar.scene.mass_damping = 20;
-  bar.scene.obstacles[0].shape = Plane{Eigen::Vector3d(0, 0, -0.005), Eigen::Vector3d::UnitZ()};
+  Obstacle lower = *bar.scene.obstacles[0];
+  lower.shape = Plane{Eigen::Vector3d(0, 0, -0.005), Eigen::Vector3d::UnitZ()};
+  bar.scene.obstacles[0] = lower;
   Workspace workspace(*bar.model, bar.scene);
   StepReport report;
   for (int i = 0; i < 2000; ++i) report = step(*bar.model, bar.scene, bar.state, workspace);

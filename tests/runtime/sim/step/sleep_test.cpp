@@ -2,10 +2,10 @@
 
 #include <functional>
 #include <gtest/gtest.h>
-#include <omp.h>
 
 #include "runtime/scene/bodies.h"
 #include "runtime/sim/lanes/lane_step.h"
+#include "runtime/sim/world/world.h"
 #include "tests/support/allocation_counter.h"
 #include "tests/support/scenes.h"
 
@@ -103,7 +103,6 @@ TEST(Sleep, WhatActsOnABodyWakesIt) {
       {"a jump", [](Hanging& body) { body.scene.begins_anew = true; }},
       {"a state that was set", [](Hanging& body) { body.state.begins_anew = true; }},
       {"the setting", [](Hanging& body) { body.scene.sleep = {}; }},
-      {"a world", [](Hanging& body) { body.scene.meets_bodies = true; }},
       {"a call", [](Hanging& body) { wake(body.state); }}};
   Hanging rested({.examples = 3});
   ASSERT_TRUE(rested.rests_within(2000));
@@ -196,19 +195,20 @@ TEST(Sleep, AFreeBodyWakesByItsForcesAndTorques) {
 
 /// Bodies that are thrown one by one, so that each comes to rest at another time.
 std::uint64_t hash_of_crowd(const Hanging& kind, int count, int threads, std::int64_t& slept) {
-  omp_set_num_threads(threads);
-  Bodies bodies(*kind.model, kind.scene, make_state(*kind.model), count);
+  const WorldBodyStart start{{kind.model.get(), &kind.scene, nullptr}, make_state(*kind.model)};
+  World world(std::vector<WorldBodyStart>(static_cast<std::size_t>(count), start), {1, 0, 0});
   slept = 0;
   for (int n = 0; n < 600; ++n) {
     if (n % 40 == 0) {
-      const int thrown = n / 40 * 5 % count;
-      bodies[thrown].v[0] += 0.1;
-      bodies[thrown].begins_anew = true;
+      State& thrown = world.state(n / 40 * 5 % count);
+      thrown.v[0] += 0.1;
+      thrown.begins_anew = true;
     }
-    for (const StepReport& report : bodies.step()) slept += (report.status & kStepAsleep) != 0;
+    slept += world.step(threads).asleep;
   }
-  omp_set_num_threads(omp_get_num_procs());
-  return bodies.hash();
+  FnvHash hash;
+  for (int i = 0; i < count; ++i) add_to_hash(*kind.model, world.state(i), hash);
+  return hash.value();
 }
 
 // In lanes, with a last group that is large enough for them, too small, and of none.
@@ -240,7 +240,7 @@ TEST(Sleep, LanesOfSleepersChangeNothing) {
     std::vector<LaneBody> bodies;
     for (State& state : all) bodies.push_back({&kind.scene, &state});
     const test::AllocationCounter allocations;
-    step_side_by_side(*kind.model, bodies, workspace, std::span(reports).first(all.size()));
+    step_in_lanes(*kind.model, bodies, workspace, std::span(reports).first(all.size()));
     EXPECT_EQ(allocations.count(), 0);
   };
   for (int n = 0; n < 20; ++n) {

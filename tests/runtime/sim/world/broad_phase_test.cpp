@@ -1,6 +1,8 @@
 #include "runtime/sim/world/broad_phase.h"
 
+#include <algorithm>
 #include <gtest/gtest.h>
+#include <numeric>
 #include <random>
 
 namespace exmat::runtime {
@@ -20,9 +22,15 @@ TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
         const auto &a = balls[static_cast<std::size_t>(i)], &b = balls[static_cast<std::size_t>(j)];
         if ((a.centre - b.centre).norm() <= a.radius + b.radius) expected.emplace_back(i, j);
       }
-    std::vector<int> order;
-    overlapping_pairs(balls, order, found);
+    std::vector<int> order, all(balls.size()), even;
+    std::iota(all.begin(), all.end(), 0);
+    overlapping_pairs(balls, all, order, found);
     EXPECT_EQ(found, expected);
+    std::ranges::copy_if(all, std::back_inserter(even), [](int i) { return i % 2 == 0; });
+    std::vector<std::pair<int, int>> found_even;
+    overlapping_pairs(balls, even, order, found_even);
+    std::erase_if(expected, [](const auto& pair) { return pair.first % 2 != 0 || pair.second % 2 != 0; });
+    EXPECT_EQ(found_even, expected);
     EXPECT_FALSE(found.empty());
   }
 }
@@ -30,7 +38,7 @@ TEST(BroadPhase, FindsThePairsThatBruteForceFinds) {
 TEST(BroadPhase, OfNothingIsNothing) {
   std::vector<int> order;
   std::vector<std::pair<int, int>> pairs{{1, 2}};
-  overlapping_pairs({}, order, pairs);
+  overlapping_pairs({}, {}, order, pairs);
   EXPECT_TRUE(pairs.empty());
 }
 

@@ -50,7 +50,6 @@ Pressed press(const HalfSphere& sphere, const Eigen::MatrixXd& shapes, double ap
   StepScene scene;
   scene.time_step = 100;  // each step ends at rest, whatever the inertia
   scene.integrator = Integrator::kBackwardEuler;
-  scene.meets_bodies = true;
   scene.gravity_force = Eigen::VectorXd::Zero(shapes.cols());
   const double radius = sphere.options().radius;
   const HeldBody lower(sphere.body(shapes, 0, /*upwards=*/true), scene),

@@ -40,7 +40,6 @@ struct BendingBar {
     bar.model.contact = exmat::test::surface_contact(bar.model);
     model = build_model(bar.model, {}).model;
     scene.time_step = time_step;
-    scene.meets_bodies = true;
     scene.mass_damping = 4;
     scene.gravity_force = Eigen::VectorXd::Zero(kArcs);
     surface = std::make_shared<TouchingSurface>(

@@ -17,7 +17,6 @@ struct Blocks {
     bar.model.contact = exmat::test::surface_contact(bar.model);
     model = build_model(bar.model, {}).model;
     scene.time_step = time_step;
-    scene.meets_bodies = true;
     scene.gravity_force = Eigen::VectorXd::Zero(model->modes());
     const ObjectData& object = *bar.model.object;
     surface = std::make_shared<TouchingSurface>(
@@ -32,7 +31,7 @@ struct Blocks {
 
   void set_gravity(double acceleration) { scene.gravity = Eigen::Vector3d(0, 0, -acceleration); }
   void add_floor(double stiffness, double friction, double damping) {
-    scene.obstacles.push_back({Plane{}, RigidMotion(), stiffness, damping, friction});
+    scene.obstacles.push_back(Obstacle{Plane{}, RigidMotion(), stiffness, damping, friction});
   }
 
   /// Moved from where it was meshed.

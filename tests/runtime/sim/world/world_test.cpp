@@ -88,7 +88,9 @@ TEST(World, AnIslandThatDoesNotConvergeKeepsItsMomentaAndGainsNoEnergy) {
 TEST(World, BodiesThatDoNotMeetTakeTheStepOfASingleBody) {
   Blocks blocks(1e-3);
   std::vector<WorldBodyStart> bodies;
-  for (int i = 0; i < 5; ++i) bodies.push_back(blocks.body({2.0 * i, 0, 0}, {1, 0.1 * i, 0}, {0, i * 1.0, 1}));
+  constexpr int kBodies =
+      10;  // eight go side by side, where sums have another order: 1e-13 of a step; two by themselves
+  for (int i = 0; i < kBodies; ++i) bodies.push_back(blocks.body({2.0 * i, 0, 0}, {1, 0.01 * i, 0}, {0, 0.5 * i, 1}));
   World world(bodies, {1e7, 0, 0.5});
   Blocks alone(1e-3);
   Workspace workspace(*alone.model, alone.scene);
@@ -97,10 +99,11 @@ TEST(World, BodiesThatDoNotMeetTakeTheStepOfASingleBody) {
     EXPECT_EQ(report.islands, 0);
     for (WorldBodyStart& body : bodies) step(*alone.model, alone.scene, body.state, workspace);
   }
-  for (int i = 0; i < 5; ++i) {
+  for (int i = 0; i < kBodies; ++i) {
+    const double rounding = i < 8 ? 100 * 1e-13 : 0;
     const State& other = bodies[static_cast<std::size_t>(i)].state;
-    EXPECT_EQ(world.state(i).q, other.q);
-    EXPECT_EQ(free_state(world.state(i)).position, free_state(other).position);
+    EXPECT_LE((world.state(i).q - other.q).norm(), rounding * other.q.norm()) << i;
+    EXPECT_EQ(free_state(world.state(i)).position, free_state(other).position) << i;
   }
 }
 
@@ -148,7 +151,7 @@ TEST(World, APileComesToRest) {
   blocks.add_floor(kStiffness, 0.5, kDamping);
   for (const auto& [x, y] : {std::pair(1, 0), {-1, 0}, {0, 1}, {0, -1}})
     blocks.scene.obstacles.push_back(
-        {Plane{{-0.9 * x, -0.9 * y, 0}, {0.8 * x, 0.8 * y, 0.6}}, RigidMotion(), kStiffness, kDamping, 0.3});
+        Obstacle{Plane{{-0.9 * x, -0.9 * y, 0}, {0.8 * x, 0.8 * y, 0.6}}, RigidMotion(), kStiffness, kDamping, 0.3});
   std::vector<WorldBodyStart> bodies;
   for (int i = 0; i < 30; ++i) {
     const Eigen::Vector4d turn = exmat::test::random_vector(4, static_cast<std::uint32_t>(i)).normalized();

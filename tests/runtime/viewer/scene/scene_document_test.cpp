@@ -87,7 +87,7 @@ TEST_F(Documents, OfSeveralBodiesAreSavedAsScenesOfTheRunTime) {
   std::filesystem::create_directories(folder_ / "sub");
   folder_.write("sub/a.txt", "1 2 3\n4 5 6\n");
   scene.save(folder_ / "other/saved.json", 7, {});
-  const WorldConfig saved = load_world(folder_ / "other/saved.json").value();
+  const WorldConfig saved = load_world(folder_ / "other/saved.json");
   EXPECT_EQ(saved.steps, 7);
   EXPECT_EQ(saved.bodies[0].places.size(), 2U);
   EXPECT_EQ(saved.bodies[0].scene.gravity, Eigen::Vector3d(0, 0, -1));

@@ -26,11 +26,10 @@ class Simulations : public ::testing::Test {
   }
   /// Of a world by the library alone.
   static std::uint64_t hash_of(const std::filesystem::path& scene, std::size_t bodies, std::int64_t steps) {
-    const Model model = Model::from_scene(scene.string());
-    Bodies all;
-    for (std::size_t i = 0; i < bodies; ++i) all.add(Body(model));
-    all.step(steps);
-    return all.hash();
+    World world = World::from_scene(scene.string());
+    EXPECT_EQ(world.size(), bodies);
+    world.step(steps);
+    return world.hash();
   }
   static SurfaceHit tip(const Simulation& simulation) {
     const auto shape = simulation.shape(0);

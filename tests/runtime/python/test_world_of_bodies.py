@@ -28,7 +28,7 @@ def body_at(model, position, velocity=(0, 0, 0)):
 @pytest.fixture
 def world(model):
     """Two bars that are about to meet, off centre."""
-    world = exmat.TouchingWorld(**LAW)
+    world = exmat.World(**LAW)
     world.add(body_at(model, (0, 0, 0), (0, 0, 2)))
     world.add(body_at(model, (0.1, 0.07, 1.05), (0, 0, -2)))
     return world
@@ -49,7 +49,7 @@ def run_hash(runtime, path, tmp_path):
 
 def test_a_world_of_a_scene_is_that_of_the_program(scene, scene_file, runtime, tmp_path):
     path = scene_file(**scene)
-    worlds = exmat.TouchingWorld.from_scene(path), exmat.TouchingWorld.from_scene(scene)
+    worlds = exmat.World.from_scene(path), exmat.World.from_scene(scene)
     for world in worlds:
         assert world.ids.tolist() == list(world) == [0, 1, 2] and len(world) == 3
         assert [world.name(id) for id in world] == ["low", "high_0", "high_1"] and [world.kind(id) for id in world] == [0, 1, 1]
@@ -61,14 +61,13 @@ def test_a_world_of_a_scene_is_that_of_the_program(scene, scene_file, runtime, t
 
 
 def test_a_world_by_hand_is_that_of_a_scene(scene, free_bundle):
-    expected = exmat.TouchingWorld.from_scene(scene)
+    expected = exmat.World.from_scene(scene)
     settings = dict(time_step=STEP, gravity=(0, 0, -9.81), use_contact=True)
     plain, elastic = exmat.Model(free_bundle, **settings), exmat.Model(free_bundle, example_stiffness=7, **settings)
-    world = exmat.TouchingWorld(**LAW)
+    world = exmat.World(**LAW)
     for model, z, x in ((plain, 0.05, 0), (elastic, 1.1, 0.2), (elastic, 2.2, 0.2)):
-        body = body_at(model, (x, x / 2, z))
-        body.add_obstacle(exmat.Shape.plane((0, 0, 1)), stiffness=1e7, damping=2e4, friction=0.5)
-        world.add(body)
+        world.add(body_at(model, (x, x / 2, z)))
+    world.add_obstacle(exmat.Shape.plane((0, 0, 1)), stiffness=1e7, damping=2e4, friction=0.5)
     world[0].set_gravity((0, 0, -5))
     for id in (1, 2):
         world[id].set_example_stiffness(100)
@@ -105,7 +104,7 @@ def test_bodies_come_and_go(world, model):
     with pytest.raises(exmat.InvalidArgument, match="world"):
         body.step()
     with pytest.raises(exmat.InvalidArgument, match="in a world already"):
-        exmat.TouchingWorld().add(body)
+        exmat.World().add(body)
     with pytest.raises(KeyError, match="no body 2"):
         world[2]
     world.step(20)
@@ -114,7 +113,7 @@ def test_bodies_come_and_go(world, model):
     assert taken is body and len(world.contacts) == 0 and list(world) == [1] and world.name(1) == "" and world.kind(1) == -1
     taken.step(3)
     assert world.add(taken) == 2 and world.ids.tolist() == [1, 2]
-    assert world[2].time == pytest.approx(23 * STEP) and world[1].time == pytest.approx(20 * STEP)
+    assert world[2].time == world[1].time == world.time == pytest.approx(20 * STEP), "that of the world"
 
 
 def test_a_body_outlives_its_world(world):
@@ -131,7 +130,7 @@ def test_the_law_is_changed_and_read(world):
     world.set_contact_law(stiffness=5e6)
     law = world.contact_law
     assert (law.stiffness, law.damping, law.friction, law.self_contact) == (5e6, 2e4, 0.4, False)
-    assert exmat.TouchingWorld(self_contact=True).contact_law.self_contact
+    assert exmat.World(self_contact=True).contact_law.self_contact
     other = copy.copy(world)
     other.set_contact_law(stiffness=5e7)
     deepest = []
@@ -145,7 +144,7 @@ def test_the_law_is_changed_and_read(world):
     with pytest.raises(exmat.InvalidArgument, match="law.friction = -1"):
         world.set_contact_law(friction=-1)
     with pytest.raises(exmat.InvalidArgument, match="law.stiffness = 0"):
-        exmat.TouchingWorld(stiffness=0)
+        exmat.World(stiffness=0)
 
 
 def test_states_go_back_to_the_last_bit(world, model):
@@ -172,7 +171,7 @@ def test_a_copied_world_goes_on_to_the_last_bit(world, model, duplicate):
     world.remove(world.add(body_at(model, (5, 5, 5))))
     world[0].set_gravity((0, 0, 1))
     world[1].set_example_stiffness(300)
-    world[1].add_obstacle(exmat.Shape.sphere(1, center=(0.5, 0, 3)), motion=exmat.Motion(position=(0, 0, -0.2)), **LAW)
+    world.add_obstacle(exmat.Shape.sphere(1, center=(0.5, 0, 3)), motion=exmat.Motion(position=(0, 0, -0.2)), **LAW)
     world.set_contact_law(friction=0.2)
     world.step(20)
     assert len(world.contacts)
@@ -186,12 +185,12 @@ def test_a_copied_world_goes_on_to_the_last_bit(world, model, duplicate):
 
 def test_a_copied_world_of_a_scene_goes_on_to_the_last_bit(scene, scene_file, model):
     for given in (scene, scene_file(**scene)):
-        world = exmat.TouchingWorld.from_scene(given)
+        world = exmat.World.from_scene(given)
         taken = world.remove(1)
         world.add(body_at(model, (0.2, 0.1, 1.1)))
         world.add(taken)
-        world[2].remove_obstacle(0)
-        world[2].add_obstacle(exmat.Shape.plane((0, 0, 1)), stiffness=1e7)
+        world.remove_obstacle(0)
+        world.add_obstacle(exmat.Shape.plane((0, 0, 1)), stiffness=1e7)
         world.step(60, threads=1)
         other = pickle.loads(pickle.dumps(world))
         assert list(other) == [0, 2, 3, 4] and other.name(2) == "high_1" and other.name(4) == "" and other[2].obstacles.tolist() == [1]
@@ -205,9 +204,9 @@ def test_a_world_that_was_pickled_wants_the_same_bundles(scene, free_bundle, tmp
     moved.write_bytes(free_bundle.read_bytes())
     for member in scene["bodies"]:
         member["bundle"] = str(moved)
-    kept = pickle.dumps(exmat.TouchingWorld.from_scene(scene))
+    kept = pickle.dumps(exmat.World.from_scene(scene))
     assert len(pickle.loads(kept)) == 3
-    kept_body = pickle.dumps(exmat.TouchingWorld.from_scene(scene)[2])
+    kept_body = pickle.dumps(exmat.World.from_scene(scene)[2])
     assert pickle.loads(kept_body).model.input_sha256 == exmat.Model(free_bundle).input_sha256
     with h5py.File(moved, "r+") as file:
         file.attrs.modify("input_sha256", file.attrs["input_sha256"].translate(bytes.maketrans(b"0123", b"3210")))
@@ -249,10 +248,8 @@ def test_what_cannot_touch_is_refused(world, free_bundle, scene):
                            ("time step", exmat.Model(free_bundle, time_step=0.001, use_contact=True))):
         with pytest.raises(exmat.InvalidArgument, match=message):
             world.add(exmat.Body(model))
-    with pytest.raises(exmat.BadInput, match="several \"bodies\""):
-        exmat.TouchingWorld.from_scene({"bundle": free_bundle})
     with pytest.raises(exmat.BadInput, match="nowhere"):
-        exmat.TouchingWorld.from_scene("nowhere.json")
+        exmat.World.from_scene("nowhere.json")
     with pytest.raises(exmat.BadInput):
         exmat.Model.from_scene(scene)
 
@@ -260,13 +257,13 @@ def test_what_cannot_touch_is_refused(world, free_bundle, scene):
 @pytest.mark.parametrize("make", [lambda bundle: exmat.Model(bundle, use_contact=True), lambda bundle: exmat.Model.from_scene({"bundle": bundle}, use_contact=True)])
 def test_what_is_of_a_model_keeps_it(free_bundle, make):
     body, points = exmat.Body(make(free_bundle)), exmat.Points(make(free_bundle), [0])
-    world = exmat.World(make(free_bundle), 2)
+    batch = exmat.Batch(make(free_bundle), 2)
     gc.collect()
-    assert isinstance(body.model, exmat.Model) and isinstance(points.model, exmat.Model) and isinstance(world.model, exmat.Model)
+    assert isinstance(body.model, exmat.Model) and isinstance(points.model, exmat.Model) and isinstance(batch.model, exmat.Model)
     body.step(3)
     other = pickle.loads(pickle.dumps(body))
     assert exmat.state_hash([other]) == exmat.state_hash([body]) and other.model.input_sha256 == body.model.input_sha256
-    assert len(pickle.loads(pickle.dumps(world))) == 2
+    assert len(pickle.loads(pickle.dumps(batch))) == 2
     other.add_obstacle(exmat.Shape.sphere(1))
 
 
@@ -278,3 +275,35 @@ def test_a_scene_file_may_know_of_contact(free_bundle, scene_file):
     assert body.add_obstacle(exmat.Shape.sphere(1)) == 0
     with pytest.raises(exmat.BadInput, match="nowhere"):
         exmat.Model.from_scene("nowhere.json", use_contact=True)
+
+
+def test_a_scene_with_one_bundle_is_a_world_of_its_instances(free_bundle, scene_file, runtime, tmp_path):
+    path = scene_file(bundle=free_bundle, gravity=[0, 0, -9.81], instances=5, steps=60, time_step=STEP,
+                      obstacles=[{"plane": {"normal": [0, 0, 1], "point": [0, 0, -0.6]}, "stiffness": 1e6}], output={"every": 60})
+    world = exmat.World.from_scene(path)
+    assert list(world) == [0, 1, 2, 3, 4] and world.obstacles.tolist() == [0]
+    world.step(60)
+    assert world.state_hash == run_hash(runtime, path, tmp_path)
+    world.reset()
+    assert world.time == 0 and world[3].time == 0
+    world.step(60, threads=2)
+    assert world.state_hash == run_hash(runtime, path, tmp_path)
+
+
+def test_a_pile_falls_asleep_and_wakes_as_a_whole(free_bundle):
+    model = exmat.Model(free_bundle, time_step=STEP, gravity=(0, 0, -9.81), mass_damping=8, stiffness_damping=0.01, use_contact=True,
+                        sleep_energy=1e-3, sleep_time=0.1)
+    world = exmat.World(stiffness=1e6, damping=1e5, friction=0.5)
+    world.add_obstacle(exmat.Shape.plane((0, 0, 1), point=(0, 0, -0.01)), stiffness=1e6, damping=1e5, friction=0.5)
+    for z in (0, 1.02):
+        world.add(body_at(model, (0, 0, z)))
+    for _ in range(200):
+        if world.step(20).asleep == 2:
+            break
+    assert world.report.asleep == 2 and world.report.islands == 0
+    at_rest = world.state_hash
+    world.step(50)
+    assert world.state_hash == at_rest
+    points = exmat.Points(model, [0])
+    world[1].apply_forces(points, [[0, 0, 1]])
+    assert world.step(1).asleep == 0, "what it lies on wakes with it"

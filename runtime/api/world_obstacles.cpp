@@ -1,5 +1,3 @@
-#include "runtime/api/body_obstacles.h"
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cinttypes>
@@ -9,31 +7,12 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
+#include "runtime/api/world_handle.h"
+#include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/sleep.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
-
-namespace exmat::runtime {
-
-void keep_host_obstacles(double time_before, exmat_body& body) noexcept {
-  for (std::size_t i = 0; i < body.obstacles.size(); ++i) {
-    RigidMotion& motion = body.scene.obstacles[i].motion;
-    if (body.obstacles[i].hosted) motion = RigidMotion::going_on(body.state.time, motion.sample(time_before));
-  }
-}
-
-void size_for_contact(exmat_body& body) {
-  const std::size_t count = body.scene.obstacles.size();
-  prepare_contacts(body.model(), count, body.state);
-  prepare_contacts(body.model(), count, body.start);
-  body.workspace.near.reset();
-  if (may_touch(body.model(), body.scene)) body.workspace.near.emplace(body.model(), body.scene);
-  body.contacts.prepare(body.model(), count);
-  wake(body.state);
-}
-
-}  // namespace exmat::runtime
 
 namespace {
 
@@ -45,6 +24,8 @@ exmat_obstacle default_obstacle() noexcept {
   obstacle.orientation[0] = 1;
   obstacle.radius = 1;
   obstacle.stiffness = 1e6;
+  obstacle.group = MeetingGroup().group;
+  obstacle.mask = MeetingGroup().mask;
   return obstacle;
 }
 
@@ -92,11 +73,16 @@ Shape shape_of(const exmat_obstacle& obstacle) {
     case EXMAT_MESH:
     case EXMAT_HEIGHT_FIELD:
       throw InvalidArgument(
-          fmt::format("obstacle.shape = {}: it is made of arrays: expected exmat_body_add_shape()", obstacle.shape));
+          fmt::format("obstacle.shape = {}: it is made of arrays: expected exmat_world_add_shape()", obstacle.shape));
     default:
       throw InvalidArgument(fmt::format("obstacle.shape = {}: expected {} to {}", obstacle.shape,
                                         static_cast<int>(EXMAT_PLANE), static_cast<int>(EXMAT_CAPSULE)));
   }
+}
+
+MeetingGroup meeting_of(const exmat_obstacle& given) {
+  if (given.group == 0) throw InvalidArgument("obstacle.group = 0: expected at least one bit");
+  return {given.group, given.mask};
 }
 
 void set_law(double stiffness, double damping, double friction, Obstacle& obstacle) {
@@ -106,7 +92,7 @@ void set_law(double stiffness, double damping, double friction, Obstacle& obstac
 }
 
 Obstacle obstacle_of(const exmat_obstacle& given) {
-  Obstacle obstacle{shape_of(given), {}, 0, 0, 0};
+  Obstacle obstacle{shape_of(given), {}, 0, 0, 0, meeting_of(given)};
   set_law(given.stiffness, given.damping, given.friction, obstacle);
   return obstacle;
 }
@@ -158,6 +144,8 @@ exmat_obstacle description_of(const Obstacle& obstacle) {
   description.stiffness = obstacle.stiffness;
   description.damping = obstacle.damping;
   description.friction = obstacle.friction;
+  description.group = obstacle.meeting.group;
+  description.mask = obstacle.meeting.mask;
   return description;
 }
 
@@ -181,11 +169,29 @@ MotionSample sample_of(const exmat_motion& motion) {
   return sample;
 }
 
-/// Its place among the body's.
-std::size_t place_of(const exmat_body& body, std::int64_t id) {
-  const auto found = std::ranges::find(body.obstacles, id, &HostedObstacle::id);
-  if (found == body.obstacles.end()) throw InvalidArgument(fmt::format("id = {}: the body has no such obstacle", id));
-  return static_cast<std::size_t>(found - body.obstacles.begin());
+exmat_world::HostedObstacle* find_obstacle(exmat_world& world, std::int64_t id) noexcept {
+  const auto found = std::ranges::lower_bound(world.obstacles, id, {}, &exmat_world::HostedObstacle::id);
+  return found != world.obstacles.end() && found->id == id ? &*found : nullptr;
+}
+
+exmat_world::HostedObstacle& hosted_of(exmat_world& world, std::int64_t id) {
+  exmat_world::HostedObstacle* const found = find_obstacle(world, id);
+  if (found == nullptr) throw InvalidArgument(fmt::format("id = {}: the world has no such obstacle", id));
+  return *found;
+}
+const exmat_world::HostedObstacle& hosted_of(const exmat_world& world, std::int64_t id) {
+  return hosted_of(const_cast<exmat_world&>(world), id);
+}
+
+/// Wakes the bodies that the obstacle may touch where it is now.
+void wake_near(exmat_world& world, const Obstacle& obstacle) noexcept {
+  const double now = time_of(world);
+  for (const exmat_world::Member& member : world.members) {
+    exmat_body& body = *member.body;
+    if (!body.state.sleep.asleep || !body.model().contact || !obstacle.meeting.meets(body.scene.meeting)) continue;
+    const PlacedObstacle placed(obstacle, now, body.scene.time_step);
+    if (body.model().contact->may_meet(placed, pose_of(body.model(), body.state))) wake(body.state);
+  }
 }
 
 /// Contacts with the obstacle at `place` are forgotten, and those with later ones follow them down.
@@ -199,21 +205,61 @@ void forget(std::size_t place, ContactState& contacts) {
     if (contact.obstacle > gone) --contact.obstacle;
 }
 
+/// After the list of its obstacles has changed: what is sized by their number follows.
+void fit(exmat_body& body) {
+  const std::size_t count = body.scene.obstacles.size();
+  body.contacts.prepare(body.model(), count);
+  prepare_contacts(body.model(), count, body.start);
+  body.world->world.fit(place_of(body));
+}
+
+void meet(exmat_body& body, const exmat_world::HostedObstacle& hosted) {
+  body.obstacle_ids.reserve(body.obstacle_ids.size() + 1);
+  body.scene.obstacles.emplace_back(hosted.obstacle);
+  body.obstacle_ids.push_back(hosted.id);
+  fit(body);
+}
+
+void part(exmat_body& body, std::int64_t id) {
+  const auto found = std::ranges::find(body.obstacle_ids, id);
+  if (found == body.obstacle_ids.end()) return;
+  const auto place = found - body.obstacle_ids.begin();
+  body.obstacle_ids.erase(found);
+  body.scene.obstacles.erase(body.scene.obstacles.begin() + place);
+  forget(static_cast<std::size_t>(place), body.state.contacts);
+  fit(body);
+}
+
+/// Takes an obstacle out of the world.
+void remove(exmat_world& world, std::int64_t id) {
+  for (const exmat_world::Member& member : world.members) part(*member.body, id);
+  std::erase_if(world.obstacles, [=](const exmat_world::HostedObstacle& hosted) { return hosted.id == id; });
+}
+
 /// Its id.
-std::int64_t add_obstacle(const Obstacle& made, exmat_body& body) {
-  if (!body.model().contact)
+std::int64_t add_obstacle(const Obstacle& made, exmat_world& world) {
+  const bool touch =
+      std::ranges::any_of(world.members, [](const auto& member) { return member.body->model().contact.has_value(); });
+  if (!world.members.empty() && !touch)
     throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");
-  body.obstacles.reserve(body.obstacles.size() + 1);
-  body.scene.obstacles.push_back(made);
+  world.obstacles.push_back({world.next_obstacle, std::make_shared<Obstacle>(made), true});
+  const exmat_world::HostedObstacle hosted = world.obstacles.back();
   try {
-    size_for_contact(body);
+    for (const exmat_world::Member& member : world.members)
+      if (made.meeting.meets(member.body->scene.meeting)) meet(*member.body, hosted);
   } catch (...) {
-    body.scene.obstacles.pop_back();
+    remove(world, hosted.id);
     throw;
   }
-  const std::int64_t id = body.next_obstacle++;
-  body.obstacles.push_back({id, true});
-  return id;
+  wake_near(world, made);
+  return world.next_obstacle++;
+}
+
+/// What the contacts of a body did to an obstacle of its world; nothing, where it does not meet it.
+ContactLoad load_on(const exmat_body& body, std::int64_t id) noexcept {
+  const auto found = std::ranges::find(body.obstacle_ids, id);
+  if (found == body.obstacle_ids.end()) return {};
+  return body.contacts.on_obstacle(static_cast<std::size_t>(found - body.obstacle_ids.begin()));
 }
 
 Shape placed_shape(const exmat_shape& shape, const exmat_obstacle& obstacle) {
@@ -225,6 +271,30 @@ Shape placed_shape(const exmat_shape& shape, const exmat_obstacle& obstacle) {
 
 }  // namespace
 
+namespace exmat::runtime {
+
+void meet_obstacles(exmat_body& body) {
+  Obstacles obstacles;
+  std::vector<std::int64_t> ids;
+  for (const exmat_world::HostedObstacle& hosted : body.world->obstacles) {
+    if (!hosted.obstacle->meeting.meets(body.scene.meeting)) continue;
+    obstacles.emplace_back(hosted.obstacle);
+    ids.push_back(hosted.id);
+  }
+  body.scene.obstacles.swap(obstacles);
+  body.obstacle_ids.swap(ids);
+  if (body.obstacle_ids != ids) body.state.contacts.count = 0;
+  fit(body);
+  wake(body.state);
+}
+
+void take_obstacles(const Obstacles& obstacles, exmat_world& world) {
+  for (const SharedObstacle& obstacle : obstacles)
+    world.obstacles.push_back({world.next_obstacle++, std::make_shared<Obstacle>(*obstacle), false});
+}
+
+}  // namespace exmat::runtime
+
 exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, std::size_t size) noexcept {
   EXMAT_REQUIRE(obstacle);
   if (const exmat_status status = check_size(__func__, size, kObstacleSizes)) return status;
@@ -232,92 +302,106 @@ exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, std::size_t size) 
   return EXMAT_OK;
 }
 
-exmat_status exmat_body_add_obstacle(exmat_body* body, const exmat_obstacle* obstacle, std::int64_t* id) noexcept {
+exmat_status exmat_world_add_obstacle(exmat_world* world, const exmat_obstacle* obstacle, std::int64_t* id) noexcept {
   EXMAT_REQUIRE(id);
   *id = -1;
-  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(obstacle);
   if (const exmat_status status = check_size(__func__, obstacle->size, kObstacleSizes)) return status;
-  return guarded(__func__, [&] { *id = add_obstacle(obstacle_of(*obstacle), *body); });
+  return guarded(__func__, [&] { *id = add_obstacle(obstacle_of(*obstacle), *world); });
 }
 
-exmat_status exmat_body_add_shape(exmat_body* body, const exmat_shape* shape, const exmat_obstacle* obstacle,
-                                  std::int64_t* id) noexcept {
+exmat_status exmat_world_add_shape(exmat_world* world, const exmat_shape* shape, const exmat_obstacle* obstacle,
+                                   std::int64_t* id) noexcept {
   EXMAT_REQUIRE(id);
   *id = -1;
-  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(shape);
   EXMAT_REQUIRE(obstacle);
   if (const exmat_status status = check_size(__func__, obstacle->size, kObstacleSizes)) return status;
   return guarded(__func__, [&] {
-    Obstacle made{placed_shape(*shape, *obstacle), {}, 0, 0, 0};
+    Obstacle made{placed_shape(*shape, *obstacle), {}, 0, 0, 0, meeting_of(*obstacle)};
     set_law(obstacle->stiffness, obstacle->damping, obstacle->friction, made);
-    *id = add_obstacle(made, *body);
+    *id = add_obstacle(made, *world);
   });
 }
 
-exmat_status exmat_body_remove_obstacle(exmat_body* body, std::int64_t id) noexcept {
-  EXMAT_REQUIRE(body);
+exmat_status exmat_world_remove_obstacle(exmat_world* world, std::int64_t id) noexcept {
+  EXMAT_REQUIRE(world);
   return guarded(__func__, [&] {
-    const std::size_t place = place_of(*body, id);
-    const auto offset = static_cast<std::ptrdiff_t>(place);
-    body->obstacles.erase(body->obstacles.begin() + offset);
-    body->scene.obstacles.erase(body->scene.obstacles.begin() + offset);
-    forget(place, body->state.contacts);
-    size_for_contact(*body);
+    wake_near(*world, *hosted_of(*world, id).obstacle);
+    remove(*world, id);
   });
 }
 
-std::int64_t exmat_body_obstacles(const exmat_body* body) noexcept {
-  return body != nullptr ? static_cast<std::int64_t>(body->obstacles.size()) : -1;
+std::int64_t exmat_world_obstacles(const exmat_world* world) noexcept {
+  return world != nullptr ? std::ssize(world->obstacles) : -1;
 }
 
-exmat_status exmat_body_read_obstacle_ids(const exmat_body* body, std::int64_t* ids, std::int64_t count) noexcept {
-  EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE_LENGTH(count, body->obstacles.size());
+exmat_status exmat_world_read_obstacle_ids(const exmat_world* world, std::int64_t* ids, std::int64_t count) noexcept {
+  EXMAT_REQUIRE(world);
+  EXMAT_REQUIRE_LENGTH(count, world->obstacles.size());
   if (count == 0) return EXMAT_OK;
   EXMAT_REQUIRE(ids);
-  std::ranges::transform(body->obstacles, ids, &HostedObstacle::id);
+  std::ranges::transform(world->obstacles, ids, &exmat_world::HostedObstacle::id);
   return EXMAT_OK;
 }
 
-exmat_status exmat_body_move_obstacle(exmat_body* body, std::int64_t id, const exmat_motion* motion) noexcept {
-  EXMAT_REQUIRE(body);
+exmat_status exmat_world_move_obstacle(exmat_world* world, std::int64_t id, const exmat_motion* motion) noexcept {
+  EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(motion);
   if (const exmat_status status = check_size(__func__, motion->size, kMotionSizes)) return status;
   return guarded(__func__, [&] {
-    const std::size_t place = place_of(*body, id);
-    body->scene.obstacles[place].motion = RigidMotion::going_on(body->state.time, sample_of(*motion));
-    body->obstacles[place].hosted = true;
-    wake(body->state);
+    exmat_world::HostedObstacle& hosted = hosted_of(*world, id);
+    const RigidMotion moved = RigidMotion::going_on(time_of(*world), sample_of(*motion));
+    wake_near(*world, *hosted.obstacle);
+    hosted.obstacle->motion = moved;
+    hosted.hosted = true;
+    wake_near(*world, *hosted.obstacle);
   });
 }
 
-exmat_status exmat_body_read_obstacle(const exmat_body* body, std::int64_t id, exmat_obstacle* obstacle,
-                                      exmat_motion* motion) noexcept {
-  EXMAT_REQUIRE(body);
+exmat_status exmat_world_read_obstacle(const exmat_world* world, std::int64_t id, exmat_obstacle* obstacle,
+                                       exmat_motion* motion) noexcept {
+  EXMAT_REQUIRE(world);
   if (obstacle != nullptr)
     if (const exmat_status status = check_size(__func__, obstacle->size, kObstacleSizes)) return status;
   if (motion != nullptr)
     if (const exmat_status status = check_size(__func__, motion->size, kMotionSizes)) return status;
   return guarded(__func__, [&] {
-    const Obstacle& found = body->scene.obstacles[place_of(*body, id)];
+    const Obstacle& found = *hosted_of(*world, id).obstacle;
     if (obstacle != nullptr) give(description_of(found), obstacle->size, obstacle);
-    if (motion != nullptr) give(motion_of(found.motion.sample(body->state.time)), motion->size, motion);
+    if (motion != nullptr) give(motion_of(found.motion.sample(time_of(*world))), motion->size, motion);
   });
 }
 
-exmat_status exmat_body_set_obstacle_law(exmat_body* body, std::int64_t id, double stiffness, double damping,
-                                         double friction) noexcept {
-  EXMAT_REQUIRE(body);
+exmat_status exmat_world_set_obstacle_law(exmat_world* world, std::int64_t id, double stiffness, double damping,
+                                          double friction) noexcept {
+  EXMAT_REQUIRE(world);
   return guarded(__func__, [&] {
+    Obstacle& obstacle = *hosted_of(*world, id).obstacle;
     Obstacle changed{Plane{}, {}, 0, 0, 0};
     set_law(stiffness, damping, friction, changed);
-    Obstacle& obstacle = body->scene.obstacles[place_of(*body, id)];
     obstacle.stiffness = stiffness;
     obstacle.damping = damping;
     obstacle.friction = friction;
-    wake(body->state);
+    wake_near(*world, obstacle);
+  });
+}
+
+exmat_status exmat_world_read_obstacle_load(const exmat_world* world, std::int64_t id, double* force,
+                                            double* torque) noexcept {
+  EXMAT_REQUIRE(world);
+  return guarded(__func__, [&] {
+    hosted_of(*world, id);
+    ContactLoad sum;
+    for (const exmat_world::Member& member : world->members) {
+      const ContactLoad load = load_on(*member.body, id);
+      sum.force += load.force;
+      sum.torque += load.torque;
+    }
+    if (force != nullptr) std::copy_n(sum.force.data(), 3, force);
+    if (torque != nullptr) std::copy_n(sum.torque.data(), 3, torque);
   });
 }
 
@@ -337,7 +421,7 @@ exmat_status exmat_body_read_contacts(const exmat_body* body, exmat_contact* con
   for (const ContactRecord::Touch& touch : touches) {
     exmat_contact contact{};
     contact.vertex = touch.vertex;
-    contact.obstacle = body->obstacles[static_cast<std::size_t>(touch.obstacle)].id;
+    contact.obstacle = body->obstacle_ids[static_cast<std::size_t>(touch.obstacle)];
     copy(touch.position, contact.position);
     copy(touch.normal, contact.normal);
     copy(touch.force, contact.force);
@@ -352,7 +436,8 @@ exmat_status exmat_body_read_contact_load(const exmat_body* body, std::int64_t i
                                           double* torque) noexcept {
   EXMAT_REQUIRE(body);
   return guarded(__func__, [&] {
-    const ContactLoad load = id == -1 ? body->contacts.on_body() : body->contacts.on_obstacle(place_of(*body, id));
+    if (id != -1) hosted_of(*body->world, id);
+    const ContactLoad load = id == -1 ? body->contacts.on_body() : load_on(*body, id);
     if (force != nullptr) std::copy_n(load.force.data(), 3, force);
     if (torque != nullptr) std::copy_n(load.torque.data(), 3, torque);
   });
