@@ -24,7 +24,6 @@ STUDIES = {
     "reduction-bar": "reduction/bar_study.json",
     "reduction-cross": "reduction/cross_study.json",
 }
-PAPER_SCENES = list(STUDIES)[:6]
 
 HEAD = """# Studies
 
@@ -32,7 +31,7 @@ Written by `examples/tools/studies.py`, by `exmat-precompute study` for each sce
 ([definitions](../error_metrics.md)). Pages to open in a browser: {pages}.
 
 [The six scenes beside their full space](accuracy.md) has the recommended assets, with what each approximation adds to their errors, and [loads that training has not seen](other_loads.md) what
-bases are worth elsewhere. The tables below are of the paper's assets.
+bases are worth elsewhere. Times of their steps stand in [the paper's Table 2](../paper_table.md). The table below is of the paper's assets.
 """
 
 ERRORS = """
@@ -44,18 +43,6 @@ against all elements ("of all"). The scenes of the reduction alone have no examp
 | scene | m | r | all elements | {columns} |
 | --- | ---: | ---: | ---: | {rules} |
 """
-
-TIMES = """
-## Times beside the baseline and the paper
-
-How many times as long the full-space method of Zhu et al. takes: t_interp / t_total. The first column of ratios is the paper's own. The others compare
-the baseline, which is that method as we wrote it, with ours in one run on {processor}, with the paper's m, r and s. All are medians, the baseline's over its
-first 50 steps (`timing.baseline_steps`). Times of a step of ours stand in [the paper's Table 2](../paper_table.md).
-
-| scene | Zhu et al. by the paper | baseline here [ms] | baseline by ours, solve | baseline by ours, table |
-| --- | ---: | ---: | ---: | ---: |
-"""
-
 
 def percent(share):
     return "-" if share is None else f"{100 * share:.2g} %"
@@ -88,34 +75,10 @@ def error_table(results):
     return text
 
 
-def own_times(result):
-    """Times of the files' own settings by the target that the run took [us]."""
-    own = {k: v for k, v in result["points"][result["own"]]["settings"].items() if k != "target"}
-    return {p["target"]: p["times"] for p in result["points"]
-            if not p["failure"] and "times" in p and {k: v for k, v in p["settings"].items() if k != "target"} == own}
-
-
-def pair(first, second, form="{:.3g}"):
-    return f"{form.format(first)} / {form.format(second)}"
-
-
-def time_row(name, result):
-    paper, baseline, ours = result["paper"], result["baseline"], own_times(result)
-    if paper is None:
-        return ""
-    cells = [name, pair(paper["zhu_interp_ms"] / paper["interp_ms"], paper["zhu_total_ms"] / paper["total_ms"])]
-    cells.append(pair(1e-3 * baseline["interp_us"], 1e-3 * baseline["median_us"]) if baseline else "-")
-    for target in ("solve", "table"):
-        times = ours.get(target)
-        both = times and baseline and times["interp_us"] > 0
-        cells.append(pair(baseline["interp_us"] / times["interp_us"], baseline["median_us"] / times["median_us"], "{:.0f}") if both else "-")
-    return "| " + " | ".join(cells) + " |\n"
-
-
 def failures(results):
     lines = []
     for name, result in results.items():
-        texts = [p["failure"] for p in result["points"] if p["failure"]] + [result["baseline_failure"]] * bool(result["baseline_failure"])
+        texts = [p["failure"] for p in result["points"] if p["failure"]]
         lines += [f"- {name}: {len(texts)} failed, the first: {texts[0]}" for _ in texts[:1]]
     return "\n## What failed\n\n" + "\n".join(lines) + "\n" if lines else ""
 
@@ -124,9 +87,6 @@ def write_page(folder, docs):
     results = {name: json.loads((folder / name / "results.json").read_text())
                for name in STUDIES if (folder / name / "results.json").exists()}
     text = HEAD.format(pages=", ".join(f"[{name}]({name}.html)" for name in results)) + error_table(results)
-    times = "".join(time_row(name, results[name]) for name in PAPER_SCENES if name in results)
-    if times:
-        text += TIMES.format(processor=next(iter(results.values()))["processor"]) + times
     (docs / "README.md").write_text(text + failures(results))
 
 

@@ -45,8 +45,7 @@ void full_space_command(const FullSpaceCommandOptions& options) {
   if (options.steps) config.steps = *options.steps;
   if (options.every) config.every = *options.every;
   require_own_file(config, options.trajectory);
-  const precompute::FullSpaceSummary summary =
-      precompute::write_full_space(config, options.trajectory, options.baseline);
+  const precompute::FullSpaceSummary summary = precompute::write_full_space(config, options.trajectory);
   if (summary.unconverged > 0)
     log::warning(fmt::format("{} of {} steps did not reach the tolerance; a smaller time_step may help",
                              summary.unconverged, summary.steps));

@@ -9,7 +9,6 @@ namespace exmat {
 struct FullSpaceCommandOptions {
   std::string scene, trajectory;
   std::optional<std::int64_t> steps, every;  ///< > 0; absent: the scene's
-  bool baseline = false;                     ///< targets by the energy of the surface, forces elastic
 };
 
 /// Steps a scene in full space, writes its trajectory and prints what it was like.

@@ -82,8 +82,9 @@ int run(std::vector<char*> words) {
       app.add_subcommand("check", "read and check the inputs and align the examples, compute nothing else");
   check_command->add_option("ASSET", check_options.asset, asset_text)->required();
   const auto add_alignment_report = [](CLI::App* command, std::string& folder) {
-    command->add_option("--alignment-report", folder,
-                        "folder to write each transferred pose beside its example into (.vtk and .svg)");
+    command->add_option(
+        "--alignment-report", folder,
+        "folder to write each transferred pose beside its example into (.vtk), and a page with pictures");
   };
   add_alignment_report(bundle_command_line, options.alignment_report);
   add_alignment_report(check_command, check_options.alignment_report);
@@ -106,15 +107,14 @@ int run(std::vector<char*> words) {
   auto* subject = study_command_line->add_option_group("subject", "what to measure");
   subject->require_option(1);
   subject->add_option("STUDY", study_options.study, "study file (JSON)");
-  subject->add_flag(
-      "--stability", study_options.stability,
-      "instead of a study: thousands of runs at the ends of every range, of stiffness, loads, starts, spin, "
-      "contact, examples; status 1 if one fails that is no known limit");
-  study_command_line->add_flag("--quick", study_options.quick, "with --stability: the part that the tests run");
+  subject->add_option(
+      "--stability", study_options.scene,
+      "scene file (JSON) to run with other time steps, loads, speeds, stiffnesses and starts: how far each "
+      "is safe; status 1 if the scene fails as it is");
   study_command_line
       ->add_option(
           "-o,--output", study_options.folder,
-          "folder for report.html, results.csv, results.json and what a resumed study needs; of --stability for "
+          "folder for report.html, results.csv, results.json and what a resumed study needs; with --stability for "
           "stability.html, .md, .csv and .json")
       ->required();
   study_command_line
@@ -128,7 +128,7 @@ int run(std::vector<char*> words) {
       ->check(CLI::PositiveNumber);
   study_command_line
       ->add_option("--jobs", study_options.jobs,
-                   "processes that run points; times are measured by one. Of --stability runs at a time")
+                   "processes that run points; times are measured by one. With --stability runs at a time")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
 
@@ -146,14 +146,7 @@ int run(std::vector<char*> words) {
   full_space_command_line
       ->add_option("--every", full_space_options.every, "write a frame every so many steps instead of the scene's")
       ->check(count_range);
-  full_space_command_line->add_flag(
-      "--baseline", full_space_options.baseline,
-      "the method that the paper compares with: targets by the energy of the surface, and "
-      "elastic example forces");
-
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
-    if (study_options.stability && common.log_level == "info")
-      common.log_level = "error";  // of hundreds of small bodies
     apply(common);
     precompute::configure_solvers(solvers);
     if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
@@ -162,7 +155,7 @@ int run(std::vector<char*> words) {
     if (mesh_command_line->parsed()) mesh_command(mesh_options);
     if (full_space_command_line->parsed()) full_space_command(full_space_options);
     if (study_command_line->parsed())
-      study_options.stability ? stability_command(study_options) : study_command(study_options);
+      study_options.scene.empty() ? study_command(study_options) : stability_command(study_options);
   });
 }
 

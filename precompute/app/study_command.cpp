@@ -6,7 +6,7 @@
 
 #include "common/core/error.h"
 #include "common/core/log.h"
-#include "precompute/study/stability/stability_report.h"
+#include "precompute/study/stability/scene_study.h"
 #include "precompute/study/sweep/report.h"
 #include "precompute/study/sweep/study.h"
 #include "precompute/study/worlds/world_study.h"
@@ -78,23 +78,16 @@ void study_command(const StudyCommandOptions& options) {
   if (result.recommended) fmt::print("\n{}\n", recommendation);
   if (result.sources && result.sources->failure.empty()) print_sources(*result.sources, result.headline());
   if (const std::size_t failed = result.failures(); failed > 0)
-    throw WorkError(fmt::format("{}: {} of {} points, their baseline or the sources of errors failed; see the report",
-                                options.study, failed, result.points.size()));
+    throw WorkError(fmt::format("{}: {} of {} points or the sources of errors failed; see the report", options.study,
+                                failed, result.points.size()));
   if (!recommendation.empty() && !result.recommended) throw WorkError(recommendation);
 }
 
 void stability_command(const StudyCommandOptions& options) {
-  precompute::write_stability_report({}, options.folder);  // better refused now than after the work
-  const auto runs =
-      options.quick
-          ? precompute::run_stability(precompute::short_stability_suite(), {precompute::kShortSteps, options.jobs})
-          : precompute::run_stability(precompute::long_stability_suite(), {precompute::kLongSteps, options.jobs});
-  precompute::write_stability_report(runs, options.folder);
-  fmt::print("{}", precompute::stability_markdown(runs));
-  const auto failed = precompute::runs_with(runs, precompute::Verdict::kFail).size();
-  if (failed > 0)
-    throw WorkError(fmt::format("{} of {} runs of the stability suite failed; see {}/stability.html", failed,
-                                runs.size(), options.folder));
+  const precompute::SceneStudy study = precompute::study_scene(options.scene, options.jobs);
+  precompute::write_scene_study(study, options.folder);
+  fmt::print("{}", precompute::scene_study_markdown(study));
+  if (!study.runs.front().passes()) throw WorkError(study.headline());
 }
 
 }  // namespace exmat

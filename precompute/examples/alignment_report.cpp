@@ -1,11 +1,10 @@
 #include "precompute/examples/alignment_report.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <fmt/format.h>
-#include <numeric>
 #include <vector>
 
 #include "common/core/atomic_file.h"
@@ -13,13 +12,14 @@
 #include "common/core/log.h"
 #include "common/core/markup.h"
 #include "common/mesh/geometry.h"
-#include "precompute/examples/alignment_page.h"
+#include "precompute/alignment/surface_tree.h"
+#include "precompute/drawing/surface_picture.h"
+#include "precompute/drawing/table.h"
 
 namespace exmat::precompute {
 namespace {
 
-constexpr double kPanel = 320, kMargin = 16, kTitle = 28;  // of the picture [px]
-constexpr int kTetCell = 10;                               // VTK's number of a tetrahedron
+constexpr int kTetCell = 10;  // VTK's number of a tetrahedron
 
 // A name as a part of a file's name.
 std::string file_name(std::string name) {
@@ -28,28 +28,78 @@ std::string file_name(std::string name) {
   return name;
 }
 
-// The triangles that face the viewer, the farthest first, shaded by their slope.
-std::string panel(const TetMesh& mesh, int axis, double scale, const Eigen::Vector2d& middle, const char* tint) {
-  const int right = (axis + 1) % 3, up = (axis + 2) % 3;
-  const TriangleArray triangles = surface_triangles(mesh.tets);
-  const Eigen::RowVector3d centre = 0.5 * (mesh.vertices.colwise().maxCoeff() + mesh.vertices.colwise().minCoeff());
-  std::vector<Eigen::Index> order(static_cast<std::size_t>(triangles.rows()));
-  std::iota(order.begin(), order.end(), Eigen::Index{0});
-  const auto depth = [&](Eigen::Index k) { return mesh.vertices(triangles.row(k), axis).mean(); };
-  std::ranges::stable_sort(order, {}, depth);
-  std::string text = fmt::format("<g stroke=\"#333\" stroke-width=\"0.3\" fill=\"{}\">\n", tint);
-  for (const Eigen::Index k : order) {
-    const Eigen::Vector3d a = mesh.vertices.row(triangles(k, 0)), b = mesh.vertices.row(triangles(k, 1)),
-                          c = mesh.vertices.row(triangles(k, 2));
-    const double slope = (b - a).cross(c - a).normalized()[axis];
-    if (!(slope > 0)) continue;
-    std::string points;
-    for (const Eigen::Vector3d& x : {a, b, c})
-      points += fmt::format("{:.1f},{:.1f} ", middle[0] + scale * (x[right] - centre[right]),
-                            middle[1] - scale * (x[up] - centre[up]));
-    text += fmt::format("<polygon points=\"{}\" fill-opacity=\"{:.2f}\"/>\n", points, 0.35 + 0.65 * slope);
+constexpr double kTilt = 0.35;         // of the view, out of the principal axis [rad]
+constexpr double kFarthest = 0.1;      // of the body's size: the end of the colours
+constexpr double kLostWarning = 0.25;  // of the displacement, by the eigenfunctions
+const Eigen::Vector3d kNear(225, 225, 225), kFar(200, 0, 0), kRest(170, 170, 170), kTransferred(224, 128, 64),
+    kGiven(64, 128, 224);
+
+PaintedSurface by_distance(const VertexArray& vertices, const TriangleArray& triangles,
+                           const Eigen::VectorXd& distances, double farthest) {
+  PaintedSurface painted(vertices, triangles, kNear);
+  for (std::size_t k = 0; k < painted.colours.size(); ++k) {
+    const double share = std::min(1.0, distances[static_cast<Eigen::Index>(k)] / farthest);
+    painted.colours[k] = (1 - share) * kNear + share * kFar;
   }
-  return text + "</g>\n";
+  return painted;
+}
+
+/// Views along the thinnest and along the middle principal axis of the body at rest, a little from above.
+std::vector<PictureView> views_of(const TetMesh& rest, const std::vector<const VertexArray*>& shown) {
+  const VertexArray centred = rest.vertices.rowwise() - rest.vertices.colwise().mean();
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(centred.transpose() * centred);
+  std::vector<PictureView> views;
+  for (const int along : {0, 1}) {
+    const Eigen::Vector3d right = principal.eigenvectors().col(2), to_viewer = principal.eigenvectors().col(along);
+    Eigen::Matrix3d axes;
+    axes << right.transpose(), to_viewer.cross(right).transpose(), to_viewer.transpose();
+    axes = Eigen::AngleAxisd(kTilt, Eigen::Vector3d::UnitX()) *
+           Eigen::AngleAxisd(kTilt, Eigen::Vector3d::UnitY()).toRotationMatrix() * axes;
+    views.emplace_back(axes, shown);
+  }
+  return views;
+}
+
+std::string what_to_change(const AlignmentOutcome& outcome) {
+  if (outcome.verdict != AlignmentVerdict::kGood) return outcome.message;
+  if (outcome.shape_space_error > kLostWarning)
+    return fmt::format(
+        "the pose came over well, but the eigenfunctions lose {:.0f} % of it; more "
+        "shape_space.eigenfunctions hold more",
+        100 * outcome.shape_space_error);
+  return "nothing to change";
+}
+
+std::string section(const TetMesh& rest, const ReportedPose& pose) {
+  const double size = bounding_box_diagonal(rest.vertices);
+  const Eigen::VectorXd there = surface_distances(pose.transferred, pose.given);
+  const Eigen::VectorXd back = surface_distances(pose.given, pose.transferred);
+  const TriangleArray own = surface_triangles(rest.tets), others = surface_triangles(pose.given.tets);
+  const VertexArray &transferred = pose.transferred.vertices, &given = pose.given.vertices;
+  const std::vector<std::pair<std::string, PaintedSurface>> columns{
+      {"object at rest", {rest.vertices, own, kRest}},
+      {"pose on the object", {transferred, own, kTransferred}},
+      {"pose as given", {given, others, kGiven}},
+      {fmt::format("on the object: up to {:.1f} % from the given", 100 * there.maxCoeff() / size),
+       by_distance(transferred, own, there, kFarthest * size)},
+      {fmt::format("given: up to {:.1f} % from that on the object", 100 * back.maxCoeff() / size),
+       by_distance(given, others, back, kFarthest * size)}};
+  const AlignmentOutcome& outcome = pose.outcome;
+  std::string text = fmt::format(
+      "<section class=\"{0}\">\n<h2>{1} <span>{0}</span></h2>\n<p><b>{2}.</b></p>\n"
+      "<p>{3}, doubt {4:.2f}, residual {5:.1f} % of the body's size, {6:.1f} % of the volume inside out, {7:.0f} % "
+      "lost by "
+      "the eigenfunctions</p>\n<table>\n<tr>",
+      name_of(outcome.verdict), escaped(outcome.name), escaped(what_to_change(outcome)), escaped(outcome.method),
+      outcome.doubt, 100 * outcome.residual, 100 * outcome.inverted_fraction, 100 * outcome.shape_space_error);
+  for (const auto& [label, painted] : columns) text += fmt::format("<th>{}</th>", label);
+  text += "</tr>\n";
+  for (const PictureView& view : views_of(rest, {&rest.vertices, &transferred, &given})) {
+    text += "<tr>\n";
+    for (const auto& [label, painted] : columns) text += "<td>" + surface_svg(painted, view) + "</td>\n";
+    text += "</tr>\n";
+  }
+  return text + "</table>\n</section>\n";
 }
 
 }  // namespace
@@ -68,23 +118,35 @@ std::string vtk_text(const TetMesh& mesh, const VertexArray& displacement, const
   return text;
 }
 
-std::string svg_text(const TetMesh& left, const TetMesh& right, const std::string& title) {
-  const double size =
-      std::max({(left.vertices.colwise().maxCoeff() - left.vertices.colwise().minCoeff()).maxCoeff(),
-                (right.vertices.colwise().maxCoeff() - right.vertices.colwise().minCoeff()).maxCoeff(), 1e-300});
-  const double scale = (kPanel - 2 * kMargin) / size, width = 2 * kPanel, height = 3 * kPanel + kTitle;
-  std::string text = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{0:.0f}\" height=\"{1:.0f}\" viewBox=\"0 0 {0:.0f} "
-      "{1:.0f}\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"white\"/>\n"
-      "<text x=\"8\" y=\"19\" font-family=\"sans-serif\" font-size=\"14\">{2}</text>\n",
-      width, height, escaped(title));
-  for (int axis = 0; axis < 3; ++axis) {
-    const double row = kTitle + (axis + 0.5) * kPanel;
-    text += panel(left, axis, scale, {0.5 * kPanel, row}, "#e08040");
-    text += panel(right, axis, scale, {1.5 * kPanel, row}, "#4080e0");
+Eigen::VectorXd surface_distances(const TetMesh& from, const TetMesh& to) {
+  const VertexArray middles = triangle_samples(from.vertices, surface_triangles(from.tets)).centres;
+  const SurfaceTree tree(to.vertices, surface_triangles(to.tets));
+  Eigen::VectorXd distances(middles.rows());
+#pragma omp parallel for schedule(static)
+  for (Eigen::Index k = 0; k < middles.rows(); ++k) {
+    const Eigen::Vector3d middle = middles.row(k).transpose();
+    distances[k] = (tree.nearest(middle).position - middle).norm();
   }
-  return text + "</svg>\n";
+  return distances;
+}
+
+std::string alignment_page(const std::string& title, const TetMesh& rest, const std::vector<ReportedPose>& poses) {
+  const auto colour = [](const Eigen::Vector3d& c) {
+    return fmt::format("rgb({:.0f}, {:.0f}, {:.0f})", c[0], c[1], c[2]);
+  };
+  const std::string style = fmt::format(
+      "section {{ border-left: 6px solid #4a4; padding-left: 1em; margin-bottom: 2em; overflow-x: auto; }}\n"
+      "section.doubtful {{ border-color: #e90; }} section.refused {{ border-color: #c00; }} section svg {{ max-width: "
+      "none; }}\nh2 span {{ font-size: 60%; font-weight: normal; }} th {{ font-weight: normal; text-align: left; }}\n"
+      ".scale {{ display: inline-block; width: 16em; height: 0.8em; vertical-align: middle;\n"
+      "  background: linear-gradient(to right, {}, {}); }}\n",
+      colour(kNear), colour(kFar));
+  std::string body = fmt::format(
+      "<p>Distance of the surfaces: 0 <span class=\"scale\"></span> {:.0f} % of the body's size and more. The last "
+      "picture of a row shows what the pose has and the object lacks, such as a limb.</p>\n",
+      100 * kFarthest);
+  for (const ReportedPose& pose : poses) body += section(rest, pose);
+  return html_page(title + ": alignment of the examples", body, style);
 }
 
 void write_alignment_report(const std::string& asset, const TetMesh& object, const ExampleInput& input,
@@ -105,10 +167,8 @@ void write_alignment_report(const std::string& asset, const TetMesh& object, con
     const double step = 1.2 * bounding_box_diagonal(object.vertices);
     beside.vertices.col(2).array() += step;
     const std::string base = file_name(pose.name);
-    const auto title = fmt::format("{}: transferred to the object (left), the example (right)", pose.name);
     write_file_atomically(folder / (base + ".vtk"), vtk_text(transferred, displacement, pose.name + ", transferred"));
     write_file_atomically(folder / (base + "_example.vtk"), vtk_text(beside, {}, pose.name + ", the example"));
-    write_file_atomically(folder / (base + ".svg"), svg_text(transferred, original, title));
     const auto outcome = std::ranges::find(stage.alignments, pose.name, &AlignmentOutcome::name);
     if (outcome != stage.alignments.end()) page.push_back({*outcome, transferred, original});
   }

@@ -160,9 +160,8 @@ void FullSpaceStep::solve_target(std::size_t group, ExampleState& examples) {
 }
 
 void FullSpaceStep::solve_by_method(const TargetMethod& method, ExampleState& examples) {
-  const MinimiserReport solved = method.solve(examples.weights, examples.target);
+  const TargetMethod::Solved solved = method.solve(examples.weights, examples.target);
   report_.target_iterations += solved.iterations;
-  report_.target_evaluations += solved.evaluations;
   examples.target_converged = solved.converged;
   if (!examples.target.allFinite()) report_.status |= runtime::kStepNonFinite;
 }

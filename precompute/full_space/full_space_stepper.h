@@ -41,7 +41,6 @@ struct FullSpaceWorkspace {
 
 /// What one step did, and how long it took.
 struct FullSpaceReport : runtime::StepReport {
-  int target_evaluations = 0;      ///< of the energy of a TargetMethod
   Eigen::Index inverted_tets = 0;  ///< that an elastic example force leaves out, since the target inverts them
   double target_seconds = 0;       ///< weights and target: t_interp of the paper's Table 2
   double seconds = 0;              ///< all of it: t_total

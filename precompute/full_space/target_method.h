@@ -2,8 +2,6 @@
 
 #include <Eigen/Core>
 
-#include "precompute/solvers/minimiser.h"
-
 namespace exmat::precompute {
 
 /// Another way to find targets than the elastic energy of all tets (FullSpaceExamples::target()): what a method that
@@ -13,8 +11,12 @@ class TargetMethod {
  public:
   virtual ~TargetMethod() = default;
 
+  struct Solved {
+    bool converged = false;
+    int iterations = 0;
+  };
   /// Improves z [d] for the weights [K] >= 0, not all 0.
-  virtual MinimiserReport solve(const Eigen::VectorXd& weights, Eigen::VectorXd& z) const = 0;
+  virtual Solved solve(const Eigen::VectorXd& weights, Eigen::VectorXd& z) const = 0;
 };
 
 }  // namespace exmat::precompute

@@ -29,7 +29,7 @@ PLANTED = [
     ("direction", "precompute/study/measure/x.cpp", '#include "precompute/study/sweep/study.h"\n'),
     ("direction", "precompute/study/measure/x.cpp", '#include "runtime/api/settings.h"\n'),
     ("direction", "precompute/cache/x.cpp", '#include "precompute/examples/example_stage.h"\n'),
-    ("direction", "precompute/full_space/x.h", '#include "precompute/study/baseline/surface_targets.h"\n'),
+    ("direction", "precompute/full_space/x.h", '#include "precompute/study/measure/runs.h"\n'),
     ("direction", "runtime/sim/contact/x.h", '#include "runtime/sim/step/state.h"\n'),
     ("direction", "runtime/sim/solver/x.h", '#include "runtime/sim/frame/spin.h"\n'),
     ("direction", "runtime/output/x.cpp", '#include "runtime/scene/bodies.h"\n'),

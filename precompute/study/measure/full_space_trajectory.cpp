@@ -183,9 +183,9 @@ void FullSpaceTrajectory::finish() {
                         xdmf_text(output_.target(), {{data_.asset_name, body}}, times_));
 }
 
-FullSpaceSummary write_full_space(const SceneConfig& config, const std::filesystem::path& file, bool baseline) {
+FullSpaceSummary write_full_space(const SceneConfig& config, const std::filesystem::path& file) {
   const ReducedModel data = read_bundle(config.bundle);
-  FullSpaceRun body(config, data, baseline);
+  FullSpaceRun body(config, data);
   FullSpaceSummary summary;
   summary.steps = config.steps;
   summary.frames = 1 + config.steps / config.every;

@@ -56,9 +56,9 @@ struct FullSpaceSummary {
   InvertedTets inverted;                           ///< of the frames
 };
 
-/// Steps a scene in full space, or the baseline of FullSpaceRun, config.steps of them, and writes every config.every-th
+/// Steps a scene in full space, config.steps of them, and writes every config.every-th
 /// frame. Reads its whole bundle. Throws InputError: a bundle that lacks a group, a scene that the full space cannot
 /// run; WorkError at a number that is not finite, or where the file cannot be written.
-FullSpaceSummary write_full_space(const SceneConfig& config, const std::filesystem::path& file, bool baseline = false);
+FullSpaceSummary write_full_space(const SceneConfig& config, const std::filesystem::path& file);
 
 }  // namespace exmat::precompute

@@ -9,7 +9,6 @@
 #include "common/core/error.h"
 #include "common/core/timer.h"
 #include "precompute/full_space/scene_setup.h"
-#include "precompute/study/baseline/surface_targets.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/samples.h"
 #include "runtime/sim/frame/world_vertices.h"
@@ -89,13 +88,11 @@ BodyFrames run(double time_step, const std::vector<double>& times, Take take, Re
   return frames;
 }
 
-FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data, bool baseline,
+FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data,
                         const std::vector<PoseCoordinates>& coordinates) {
   FullSpaceOptions options = full_space_options(config);
   options.coordinates = coordinates;
-  FullSpaceModel model = build_full_space_model(data, options);
-  if (baseline) use_surface_targets(*data.object, model);
-  return model;
+  return build_full_space_model(data, options);
 }
 
 // [n] shares of the mass in the motion of the centre [kg].
@@ -105,9 +102,8 @@ Eigen::VectorXd vertex_masses(const ReducedModel& data) {
 }
 
 // [3n] deformation.
-Eigen::VectorXd start_of(const SceneConfig& config, const ReducedModel& data, bool baseline) {
+Eigen::VectorXd start_of(const SceneConfig& config, const ReducedModel& data) {
   const RowMatrix& basis = data.modal->basis;
-  if (baseline) return Eigen::VectorXd::Zero(basis.rows());
   return basis * runtime::start_coordinates(config, data, basis.cols());
 }
 
@@ -179,16 +175,12 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
   return result;
 }
 
-FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline,
+FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
                            const std::vector<PoseCoordinates>& coordinates)
-    : model(model_of(config, data, baseline, coordinates)),
+    : model(model_of(config, data, coordinates)),
       scene(full_space_scene(config, runtime::make_obstacles(config), model)),
-      state(full_space_start(config, model, start_of(config, data, baseline))),
-      workspace(model) {
-  if (!baseline) return;
-  for (runtime::ExampleSettings& examples : scene.examples)
-    if (!examples.elastic) examples = {.stiffness = 1, .bias = examples.bias, .elastic = true};
-}
+      state(full_space_start(config, model, start_of(config, data))),
+      workspace(model) {}
 
 FullSpaceReport FullSpaceRun::sound_step() {
   const FullSpaceReport report = step(model, scene, state, workspace);
@@ -198,7 +190,7 @@ FullSpaceReport FullSpaceRun::sound_step() {
 
 BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, const std::vector<double>& times,
                           const std::vector<PoseCoordinates>& coordinates) {
-  FullSpaceRun body(config, data, false, coordinates);
+  FullSpaceRun body(config, data, coordinates);
   CentreVelocity centre;
   if (!config.obstacles.empty() && body.model.frame)
     centre = [&, weights = vertex_masses(data)]() -> Eigen::Vector3d {

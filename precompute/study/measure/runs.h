@@ -41,9 +41,8 @@ BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, c
 
 /// A body in full space, ready to step.
 struct FullSpaceRun {
-  /// As run_full_space() steps it, or the baseline of the paper's Table 2: that of surface targets, from rest. Its
-  /// example forces are elastic, as the scene has them; in place of linear ones, with the factor 1 and no damping.
-  FullSpaceRun(const SceneConfig& config, const ReducedModel& data, bool baseline,
+  /// As run_full_space() steps it.
+  FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
                const std::vector<PoseCoordinates>& coordinates = {});
 
   /// Throws WorkError at a number that is not finite.

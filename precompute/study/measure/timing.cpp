@@ -5,6 +5,8 @@
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/scene/samples.h"
+#include "runtime/scene/scene_loader.h"
+#include "runtime/sim/step/stepper.h"
 
 namespace exmat::precompute {
 namespace {
@@ -95,44 +97,22 @@ class TimedScene {
   std::array<Samples, kTimedStages.size()> stages_;
 };
 
-class TimedBaseline {
- public:
-  explicit TimedBaseline(FullSpaceRun* body) : body_(body) {}
-
-  void measure(int steps) {
-    for (int i = 0; body_ != nullptr && i < steps; ++i) {
-      const FullSpaceReport report = body_->sound_step();
-      samples_.add_step(report.seconds);
-      if (report.target_iterations > 0) samples_.add_interpolation(report.target_seconds);
-    }
-  }
-  StepTimes times() const { return samples_.times(); }
-
- private:
-  FullSpaceRun* body_;
-  StepSamples samples_;
-};
-
 }  // namespace
 
-Timings time_steps(const std::vector<SceneConfig>& scenes, const TimingConfig& config, FullSpaceRun* baseline) {
+std::vector<StepTimes> time_steps(const std::vector<SceneConfig>& scenes, const TimingConfig& config) {
   std::vector<TimedScene> timed;
   timed.reserve(scenes.size());
   for (const SceneConfig& scene : scenes) timed.emplace_back(scene, std::min(config.steps, scene.steps));
-  TimedBaseline timed_baseline(baseline);
   for (TimedScene& scene : timed) scene.warm_up();
   Progress progress("timing", config.rounds * std::ssize(timed));
-  for (int round = 0; round < config.rounds; ++round) {
+  for (int round = 0; round < config.rounds; ++round)
     for (std::size_t i = 0; i < timed.size(); ++i) {
       timed[(i + static_cast<std::size_t>(round)) % timed.size()].measure();  // none is always the first
       progress.advance();
     }
-    timed_baseline.measure(config.baseline_steps);
-  }
-  Timings timings;
-  for (const TimedScene& scene : timed) timings.points.push_back(scene.times());
-  timings.baseline = timed_baseline.times();
-  return timings;
+  std::vector<StepTimes> times;
+  for (const TimedScene& scene : timed) times.push_back(scene.times());
+  return times;
 }
 
 }  // namespace exmat::precompute

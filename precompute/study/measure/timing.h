@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "common/config/scene_config.h"
-#include "precompute/study/measure/runs.h"
 #include "runtime/sim/solver/profile.h"
 
 namespace exmat::precompute {
@@ -15,7 +14,6 @@ namespace exmat::precompute {
 struct TimingConfig {
   int rounds = 5;             ///< over all points; > 0
   std::int64_t steps = 2000;  ///< most of a point in a round, which ends after a quarter of a second; > 0
-  int baseline_steps = 10;    ///< of the baseline in a round; > 0
 };
 
 /// Stages of a step without output.
@@ -30,13 +28,8 @@ struct StepTimes {
   std::int64_t steps = 0;                            ///< that were measured
 };
 
-struct Timings {
-  std::vector<StepTimes> points;
-  StepTimes baseline;  ///< interpolation: of the steps that solved for a target; no stages
-};
-
-/// Times the steps of each scene and, if it is not null, of the baseline, in turns, so that drift of the machine falls
-/// on all alike. Whole steps are measured without clocks inside, stages in turns of their own.
-Timings time_steps(const std::vector<SceneConfig>& scenes, const TimingConfig& config, FullSpaceRun* baseline);
+/// Times the steps of each scene, in turns, so that drift of the machine falls on all alike. Whole steps are measured
+/// without clocks inside, stages in turns of their own.
+std::vector<StepTimes> time_steps(const std::vector<SceneConfig>& scenes, const TimingConfig& config);
 
 }  // namespace exmat::precompute

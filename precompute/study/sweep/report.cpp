@@ -9,56 +9,17 @@
 #include <vector>
 
 #include "common/core/markup.h"
-#include "precompute/study/drawing/svg.h"
+#include "precompute/drawing/chart.h"
+#include "precompute/drawing/surface_picture.h"
+#include "precompute/drawing/table.h"
 #include "precompute/study/sources/split_text.h"
 
 namespace exmat::precompute {
 namespace {
 
-constexpr const char* kStyle = R"(
-:root { color-scheme: light dark; --line: #8886; --soft: #8882; }
-body { font: 15px/1.5 system-ui, sans-serif; max-width: 1100px; margin: 2em auto; padding: 0 1em; background: Canvas; color: CanvasText; }
-h1 { font-size: 1.6em; margin-bottom: 0; } h2 { font-size: 1.2em; margin-top: 2em; }
-table { border-collapse: collapse; font-size: 12px; font-variant-numeric: tabular-nums; }
-td, th { padding: 2px 7px; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
-th { vertical-align: bottom; background: var(--soft); } .l { text-align: left; white-space: normal; }
-tr.front { font-weight: 600; } tr.chosen { background: #2a82; }
-.wide { overflow-x: auto; } svg { max-width: 100%; height: auto; } svg text { font: 12px system-ui, sans-serif; fill: currentColor; }
-.grid { stroke: var(--line); stroke-width: .5; } .bad { color: #d33; } p.note { font-size: 13px; }
-)";
-
-std::string percent(double share) {
-  if (!std::isfinite(share)) return "-";
-  const double value = 100 * share;
-  if (value == 0) return "0";
-  return value < 0.01 ? fmt::format("{:.1e}", value)
-                      : fmt::format("{:.{}f}", value,
-                                    value < 1    ? 3
-                                    : value < 10 ? 2
-                                                 : 1);
-}
-
 std::string microseconds(double seconds) {
   const double value = 1e6 * seconds;
   return fmt::format("{:.{}f}", value, value < 10 ? 2 : value < 1000 ? 1 : 0);
-}
-
-std::string cell(const std::string& text, const char* attributes = "") {
-  return fmt::format("<td{}>{}</td>", attributes, text);
-}
-
-std::string header(const std::vector<std::string>& names) {
-  std::string html = "<tr>";
-  for (const std::string& name : names) html += "<th>" + name + "</th>";
-  return html + "</tr>\n";
-}
-
-std::string shades(const char* kind, double hue) {
-  std::string css;
-  for (int i = 0; i < 8; ++i)
-    css += fmt::format(".{0} .s{1}{{fill:hsl({2} 55% {3}%);stroke:hsl({2} 55% {3}%);stroke-width:.4}}\n", kind, i, hue,
-                       24 + 6 * i);
-  return css;
 }
 
 bool is_measured(const PointResult& point) { return point.failure.empty() && point.times.has_value(); }
@@ -223,145 +184,118 @@ bool has_mixed(const StudyResult& result) {
   return std::ranges::any_of(result.points, [](const PointResult& p) { return p.from_double.has_value(); });
 }
 
-std::vector<std::string> error_names(const StudyResult& result) {
-  std::vector<std::string> names;
-  for (const char* part : {"mean", "max", "end", "settled", "nearest<br>phase"})
-    names.push_back(fmt::format("{},<br>{} [%]", result.headline(), part));
-  if (result.free_body) names.emplace_back("position<br>[%]");
-  if (rebounds(result)) names.emplace_back("rebound<br>[%]");
-  for (const char* name : {"velocity<br>[%]", "energy<br>[%]", "from all<br>elements [%]"}) names.emplace_back(name);
-  if (has_mixed(result)) names.emplace_back("mixed, from<br>double [%]");
-  return names;
+/// Columns of the errors of a point, and its cells in them.
+void add_error_columns(const StudyResult& result, std::vector<Table::Column>& columns) {
+  for (const char* part : {"mean", "max", "end", "settled", "nearest phase"})
+    columns.push_back({fmt::format("{}, {} [%]", result.headline(), part)});
+  if (result.free_body) columns.push_back({"position [%]"});
+  if (rebounds(result)) columns.push_back({"rebound [%]"});
+  for (const char* name : {"velocity [%]", "energy [%]", "from all elements [%]"}) columns.push_back({name});
+  if (has_mixed(result)) columns.push_back({"mixed, from double [%]"});
 }
 
-// In the order of error_names().
-std::string error_cells(const StudyResult& result, const PointResult& point) {
+void add_errors(const StudyResult& result, const PointResult& point, std::vector<std::string>& cells) {
   const TrajectoryErrors& e = point.errors;
   const RelativeError& chosen = e.headline();
-  std::string html = cell(percent(chosen.mean)) + cell(percent(chosen.max)) + cell(percent(chosen.end)) +
-                     cell(percent(chosen.settled)) + cell(percent(e.nearest_phase.mean));
-  if (result.free_body) html += cell(percent(e.position.mean));
-  if (rebounds(result)) html += cell(e.rebound ? percent(*e.rebound) : "-");
-  html += cell(percent(e.velocity.mean)) + cell(percent(e.energy));
-  html += cell(point.from_all_elements ? percent(point.from_all_elements->mean) : "-");
-  if (has_mixed(result)) html += cell(point.from_double ? percent(point.from_double->mean) : "-");
-  return html;
+  for (const double share : {chosen.mean, chosen.max, chosen.end, chosen.settled, e.nearest_phase.mean})
+    cells.push_back(percent(share));
+  if (result.free_body) cells.push_back(percent(e.position.mean));
+  if (rebounds(result)) cells.push_back(e.rebound ? percent(*e.rebound) : "-");
+  cells.push_back(percent(e.velocity.mean));
+  cells.push_back(percent(e.energy));
+  cells.push_back(point.from_all_elements ? percent(point.from_all_elements->mean) : "-");
+  if (has_mixed(result)) cells.push_back(point.from_double ? percent(point.from_double->mean) : "-");
 }
 
-std::string point_row(const StudyResult& result, std::size_t i) {
+Table::Row point_row(const StudyResult& result, std::size_t i) {
   const PointResult& point = result.points[i];
   const PointSettings& s = point.settings;
-  const bool front = std::ranges::find(result.front, i) != result.front.end();
-  std::string html = fmt::format("<tr class=\"{}{}\">", front ? "front " : "", result.recommended == i ? "chosen" : "");
-  const char* mark = point.failure.empty() && !result.has_truth(point) ? " (no truth)" : "";
-  html += cell(std::to_string(i + 1) + mark) + cell(std::to_string(s.eigenfunctions)) +
-          cell(std::to_string(s.basis_size)) + cell(std::to_string(s.linear_modes)) + cell(s.training, " class=\"l\"");
-  html += cell(point.failure.empty() ? std::to_string(point.elements) : "-") + cell(s.material, " class=\"l\"");
-  html += cell(fmt::format("{:g}", 1e3 * s.time_step)) + cell(s.integrator, " class=\"l\"");
+  const bool failed = !point.failure.empty(), front = std::ranges::find(result.front, i) != result.front.end();
   const auto as_run = [](const std::string& asked, const std::string& taken) {
     return asked == "auto" && !taken.empty() ? "auto: " + taken : asked;
   };
-  html += cell(as_run(s.internal_force, point.internal_force), " class=\"l\"") +
-          cell(as_run(s.target, point.target), " class=\"l\"") +
-          cell(s.elastic_stiffness ? fmt::format("{:g}", *s.elastic_stiffness) : "-");
-  if (!point.failure.empty())
-    return html + fmt::format("<td class=\"l bad\" colspan=\"19\">{}</td></tr>\n", escaped(point.failure));
-  html += error_cells(result, point);
-  html += cell(all_elements(point) ? "-" : percent(point.heldout_error));
-  if (point.times)
-    html += cell(microseconds(point.times->median)) + cell(microseconds(point.times->p95)) +
-            cell(microseconds(point.times->interpolation));
-  html += cell(fmt::format("{:.1f}", point.precompute_seconds)) + cell(fmt::format("{:.2f}", point.newton_iterations));
-  return html + cell(std::to_string(point.unconverged_steps)) + "</tr>\n";
+  std::vector<std::string> cells{std::to_string(i + 1) + (!failed && !result.has_truth(point) ? " (no truth)" : ""),
+                                 std::to_string(s.eigenfunctions),
+                                 std::to_string(s.basis_size),
+                                 std::to_string(s.linear_modes),
+                                 s.training,
+                                 failed ? "-" : std::to_string(point.elements),
+                                 s.material,
+                                 fmt::format("{:g}", 1e3 * s.time_step),
+                                 s.integrator,
+                                 as_run(s.internal_force, point.internal_force),
+                                 as_run(s.target, point.target),
+                                 s.elastic_stiffness ? fmt::format("{:g}", *s.elastic_stiffness) : "-"};
+  if (failed) {
+    cells.push_back(point.failure);
+    return {std::move(cells)};
+  }
+  add_errors(result, point, cells);
+  cells.push_back(all_elements(point) ? "-" : percent(point.heldout_error));
+  const StepTimes times = point.times.value_or(StepTimes());
+  for (const double seconds : {times.median, times.p95, times.interpolation})
+    cells.push_back(point.times ? microseconds(seconds) : "-");
+  cells.push_back(fmt::format("{:.1f}", point.precompute_seconds));
+  cells.push_back(fmt::format("{:.2f}", point.newton_iterations));
+  cells.push_back(std::to_string(point.unconverged_steps));
+  return {std::move(cells), std::string(front ? "front " : "") + (result.recommended == i ? "chosen" : "")};
 }
 
 std::string points_table(const StudyResult& result) {
-  std::vector<std::string> names{
-      "#",        "m",          "r",          "linear<br>modes", "training", "s",
-      "material", "dt<br>[ms]", "integrator", "internal force",  "target",   "elastic<br>force"};
-  for (std::string& name : error_names(result)) names.push_back(std::move(name));
-  for (const char* name : {"held-out<br>[%]", "step<br>[us]", "p95<br>[us]", "interp<br>[us]", "precompute<br>[s]",
-                           "Newton", "above<br>tolerance"})
-    names.emplace_back(name);
-  std::string html =
-      "<h2>Points</h2>\n<p class=\"note\">Bold: on the front. Settled: mean of the last tenth of the time. Nearest "
-      "phase: mean, against the full space up to 5 % of the duration earlier or later; where it is much below the "
-      "mean, "
-      "the body moves as it should, but too early or too late. Held-out: error of the cubature's force. Newton: "
-      "iterations a step; the last column counts steps.</p>\n"
-      "<div class=\"wide\"><table>\n" +
-      header(names);
-  for (std::size_t i = 0; i < result.points.size(); ++i) html += point_row(result, i);
-  return html + "</table></div>\n";
+  Table table{{{"#"},
+               {"m"},
+               {"r"},
+               {"linear modes"},
+               {"training", true},
+               {"s"},
+               {"material", true},
+               {"dt [ms]"},
+               {"integrator", true},
+               {"internal force", true},
+               {"target", true},
+               {"elastic force"}},
+              {}};
+  add_error_columns(result, table.columns);
+  for (const char* name :
+       {"held-out [%]", "step [us]", "p95 [us]", "interp [us]", "precompute [s]", "Newton", "above tolerance"})
+    table.columns.push_back({name});
+  for (std::size_t i = 0; i < result.points.size(); ++i) table.rows.push_back(point_row(result, i));
+  return "<h2>Points</h2>\n<p class=\"note\">Bold: on the front. Settled: mean of the last tenth of the time. Nearest "
+         "phase: mean, against the full space up to 5 % of the duration earlier or later; where it is much below the "
+         "mean, the body moves as it should, but too early or too late. Held-out: error of the cubature's force. "
+         "Newton: "
+         "iterations a step; the last column counts steps.</p>\n" +
+         to_html(table);
 }
 
 std::string references_table(const StudyResult& result) {
-  std::string html = "<h2>Full space</h2>\n<div class=\"wide\"><table>\n" +
-                     header({"m", "material", "dt [ms]", "integrator", "steps", "step, median [ms]", "Newton",
-                             "factorisations", "above tolerance", "inverted tets, most", "at the end"});
+  Table table{{{"m"},
+               {"material", true},
+               {"dt [ms]"},
+               {"integrator", true},
+               {"steps"},
+               {"step, median [ms]"},
+               {"Newton"},
+               {"factorisations"},
+               {"above tolerance"},
+               {"inverted tets, most"},
+               {"at the end"}},
+              {}};
   for (const ReferenceResult& r : result.references) {
-    html += "<tr>" + cell(r.eigenfunctions > 0 ? std::to_string(r.eigenfunctions) : "-") +
-            cell(r.material, " class=\"l\"") + cell(fmt::format("{:g}", 1e3 * r.time_step)) +
-            cell(r.integrator, " class=\"l\"");
-    if (!r.failure.empty()) {
-      html += fmt::format("<td class=\"l bad\" colspan=\"7\">{}</td></tr>\n", escaped(r.failure));
-      continue;
-    }
-    html += cell(std::to_string(r.steps)) + cell(fmt::format("{:.3f}", 1e3 * r.step_seconds)) +
-            cell(fmt::format("{:.2f}", r.newton_iterations)) + cell(fmt::format("{:.3f}", r.factorisations)) +
-            cell(std::to_string(r.unconverged_steps));
-    const char* attributes = r.inverted.any() ? " class=\"bad\"" : "";
-    html += cell(std::to_string(r.inverted.most), attributes) + cell(std::to_string(r.inverted.last), attributes) +
-            "</tr>\n";
+    std::vector<std::string> cells{r.eigenfunctions > 0 ? std::to_string(r.eigenfunctions) : "-", r.material,
+                                   fmt::format("{:g}", 1e3 * r.time_step), r.integrator};
+    if (!r.failure.empty())
+      cells.push_back(r.failure);
+    else
+      for (std::string text :
+           {std::to_string(r.steps), fmt::format("{:.3f}", 1e3 * r.step_seconds),
+            fmt::format("{:.2f}", r.newton_iterations), fmt::format("{:.3f}", r.factorisations),
+            std::to_string(r.unconverged_steps), std::to_string(r.inverted.most), std::to_string(r.inverted.last)})
+        cells.push_back(std::move(text));
+    table.rows.push_back({std::move(cells), r.inverted.any() ? "bad" : ""});
   }
-  return html +
-         "</table></div>\n<p class=\"note\">Times of the full space are of one run, beside whatever else ran.</p>\n";
-}
-
-std::string ratio(double slow, double fast) { return fast > 0 ? fmt::format("{:.1f}", slow / fast) : "-"; }
-
-// Ours with the files' own settings, whatever the target.
-std::vector<std::size_t> own_points(const StudyResult& result) {
-  std::vector<std::size_t> points;
-  for (std::size_t i = 0; i < result.points.size(); ++i) {
-    PointSettings settings = result.points[i].settings;
-    settings.target = result.points[result.own].settings.target;
-    if (is_measured(result.points[i]) && settings == result.points[result.own].settings) points.push_back(i);
-  }
-  return points;
-}
-
-std::string baseline_table(const StudyResult& result) {
-  if (!result.config.baseline && !result.config.paper) return "";
-  std::string html = "<h2>Beside the baseline and the paper</h2>\n";
-  if (!result.baseline_failure.empty())
-    html += fmt::format("<p class=\"bad\">baseline: {}</p>\n", escaped(result.baseline_failure));
-  html += "<table>\n" + header({"", "t_interp [ms]", "ratio", "t_total [ms]", "ratio"});
-  const auto row = [](const std::string& name, double interp, double total, const std::string& first,
-                      const std::string& second) {
-    return "<tr>" + cell(name, " class=\"l\"") + cell(fmt::format("{:.4g}", interp)) + cell(first) +
-           cell(fmt::format("{:.4g}", total)) + cell(second) + "</tr>\n";
-  };
-  const auto& paper = result.config.paper;
-  if (paper) html += row("Zhu et al., as the paper measured it", paper->zhu_interp, paper->zhu_total, "", "");
-  if (paper)
-    html += row("the paper", paper->interp, paper->total, ratio(paper->zhu_interp, paper->interp),
-                ratio(paper->zhu_total, paper->total));
-  const auto& baseline = result.baseline;
-  if (baseline) html += row("the baseline here", 1e3 * baseline->interpolation, 1e3 * baseline->median, "", "");
-  for (const std::size_t i : own_points(result)) {
-    const PointResult& point = result.points[i];
-    const StepTimes& times = *point.times;
-    html += row(fmt::format("exmat, point {}, target: {}", i + 1, point.target), 1e3 * times.interpolation,
-                1e3 * times.median, baseline ? ratio(baseline->interpolation, times.interpolation) : "",
-                baseline ? ratio(baseline->median, times.median) : "");
-  }
-  html +=
-      "</table>\n<p class=\"note\">Medians. A ratio is the time of the full-space method above by this one's; the "
-      "paper's "
-      "times are of its own machine";
-  if (baseline) html += fmt::format("; {} steps of the baseline were measured", baseline->steps);
-  return html + ".</p>\n";
+  return "<h2>Full space</h2>\n" + to_html(table) +
+         "<p class=\"note\">Times of the full space are of one run, beside whatever else ran.</p>\n";
 }
 
 std::string pictures(const StudyResult& result) {
@@ -375,7 +309,7 @@ std::string pictures(const StudyResult& result) {
     html += fmt::format("<p>Point {} ({}) at {:.4g} s: {} % of the RMS {}</p>\n", frame.point + 1,
                         escaped(describe(point.settings)), point.worst_time, percent(point.errors.headline().max),
                         result.free_body ? "deformation" : "displacement");
-    html += bodies_svg(result.surface, frame.full, frame.reduced, result.up, fmt::format("p{}", frame.point + 1));
+    html += poses_svg(result.surface, frame.full, frame.reduced, result.up, fmt::format("p{}", frame.point + 1));
   }
   return html;
 }
@@ -433,15 +367,10 @@ std::string sources_point(const StudyResult& result) {
 }
 
 std::string report_html(const StudyResult& result) {
-  return fmt::format(
-             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta "
-             "charset=\"utf-8\">\n<title>{0}</title>\n<style>{1}{2}{3}"
-             "</style>\n</head>\n<body>\n<h1>{0}</h1>\n",
-             escaped(result.config.name), kStyle, shades("full", 212), shades("reduced", 24)) +
-         summary(result) + plots(result) +
-         (result.sources ? split_html(*result.sources, sources_point(result), result.headline()) : "") +
-         baseline_table(result) + pictures(result) + points_table(result) + references_table(result) +
-         warnings(result) + "</body>\n</html>\n";
+  return html_page(result.config.name,
+                   summary(result) + plots(result) +
+                       (result.sources ? split_html(*result.sources, sources_point(result), result.headline()) : "") +
+                       pictures(result) + points_table(result) + references_table(result) + warnings(result));
 }
 
 }  // namespace exmat::precompute

@@ -1,14 +1,13 @@
 #include "precompute/study/sweep/results_files.h"
 
 #include <algorithm>
-#include <cmath>
 #include <fmt/format.h>
-#include <functional>
 #include <nlohmann/json.hpp>
 #include <utility>
 #include <vector>
 
 #include "common/core/atomic_file.h"
+#include "precompute/drawing/table.h"
 #include "precompute/study/sources/split_text.h"
 #include "precompute/study/sweep/report.h"
 
@@ -16,98 +15,6 @@ namespace exmat::precompute {
 namespace {
 
 using Ordered = nlohmann::ordered_json;
-
-std::string quoted(const std::string& text) {
-  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
-  std::string result = "\"";
-  for (const char c : text) result += c == '"' ? "\"\"" : std::string(1, c);
-  return result + '"';
-}
-
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "inf"; }
-
-struct Column {
-  std::string name;
-  std::function<std::string(const PointResult&)> text;
-  bool of_failed = false;  // is there without a result
-};
-
-// The numbers of an error.
-void add_error(std::vector<Column>& columns, const std::string& name,
-               std::function<const RelativeError*(const PointResult&)> error) {
-  constexpr std::array<std::pair<const char*, double RelativeError::*>, 4> kMembers{
-      {{"_mean", &RelativeError::mean},
-       {"_max", &RelativeError::max},
-       {"_end", &RelativeError::end},
-       {"_settled", &RelativeError::settled}}};
-  for (const auto& [suffix, member] : kMembers)
-    columns.push_back({name + suffix, [error, member = member](const PointResult& point) {
-                         const RelativeError* found = error(point);
-                         return found == nullptr ? "" : number(found->*member);
-                       }});
-}
-
-void add_time(std::vector<Column>& columns, const char* name, double StepTimes::*member) {
-  columns.push_back(
-      {name, [member](const PointResult& p) { return p.times ? number(1e6 * ((*p.times).*member)) : ""; }});
-}
-
-void add_inverted(std::vector<Column>& columns, const char* name, Eigen::Index InvertedTets::*member,
-                  const StudyResult& result) {
-  columns.push_back({name, [&result, member](const PointResult& point) {
-                       const ReferenceResult* reference = result.reference_of(point);
-                       return reference == nullptr ? "" : std::to_string(reference->inverted.*member);
-                     }});
-}
-
-std::vector<Column> settings_columns() {
-  return {
-      {"key", [](const PointResult& p) { return p.key; }, true},
-      {"eigenfunctions", [](const PointResult& p) { return std::to_string(p.settings.eigenfunctions); }, true},
-      {"basis_size", [](const PointResult& p) { return std::to_string(p.settings.basis_size); }, true},
-      {"linear_modes", [](const PointResult& p) { return std::to_string(p.settings.linear_modes); }, true},
-      {"training", [](const PointResult& p) { return p.settings.training; }, true},
-      {"cubature_elements", [](const PointResult& p) { return std::to_string(p.elements); }},
-      {"material", [](const PointResult& p) { return p.settings.material; }, true},
-      {"time_step_s", [](const PointResult& p) { return number(p.settings.time_step); }, true},
-      {"integrator", [](const PointResult& p) { return p.settings.integrator; }, true},
-      {"internal_force", [](const PointResult& p) { return p.settings.internal_force; }, true},
-      {"target", [](const PointResult& p) { return p.settings.target; }, true},
-      {"precision", [](const PointResult& p) { return p.settings.precision; }, true},
-      {"elastic_stiffness",
-       [](const PointResult& p) { return p.settings.elastic_stiffness ? number(*p.settings.elastic_stiffness) : ""; },
-       true},
-  };
-}
-
-std::vector<Column> columns(const StudyResult& result) {
-  std::vector<Column> columns = settings_columns();
-  add_error(columns, "position_error", [](const PointResult& p) { return &p.errors.position; });
-  add_error(columns, "velocity_error", [](const PointResult& p) { return &p.errors.velocity; });
-  columns.push_back({"energy_error_max", [](const PointResult& p) { return number(p.errors.energy); }});
-  add_error(columns, "shape_error", [](const PointResult& p) { return p.errors.shape ? &*p.errors.shape : nullptr; });
-  add_error(columns, "nearest_phase_error", [](const PointResult& p) { return &p.errors.nearest_phase; });
-  columns.push_back(
-      {"rebound_error", [](const PointResult& p) { return p.errors.rebound ? number(*p.errors.rebound) : ""; }});
-  add_error(columns, "from_all_elements_error",
-            [](const PointResult& p) { return p.from_all_elements ? &*p.from_all_elements : nullptr; });
-  add_error(columns, "from_double_error",
-            [](const PointResult& p) { return p.from_double ? &*p.from_double : nullptr; });
-  columns.push_back({"cubature_heldout_error", [](const PointResult& p) { return number(p.heldout_error); }});
-  add_time(columns, "step_median_us", &StepTimes::median);
-  add_time(columns, "step_p95_us", &StepTimes::p95);
-  add_time(columns, "interp_median_us", &StepTimes::interpolation);
-  columns.push_back({"precompute_s", [](const PointResult& p) { return number(p.precompute_seconds); }});
-  columns.push_back({"newton_iterations_mean", [](const PointResult& p) { return number(p.newton_iterations); }});
-  columns.push_back({"factorisations_mean", [](const PointResult& p) { return number(p.factorisations); }});
-  columns.push_back({"steps", [](const PointResult& p) { return std::to_string(p.steps); }});
-  columns.push_back({"unconverged_steps", [](const PointResult& p) { return std::to_string(p.unconverged_steps); }});
-  add_inverted(columns, "reference_inverted_tets_most", &InvertedTets::most, result);
-  add_inverted(columns, "reference_inverted_tets_last", &InvertedTets::last, result);
-  columns.push_back({"no_truth", [&](const PointResult& p) { return result.has_truth(p) ? "0" : "1"; }});
-  columns.push_back({"failure", [](const PointResult& p) { return p.failure; }, true});
-  return columns;
-}
 
 Ordered to_json(const ReferenceResult& reference) {
   return {{"key", reference.key},
@@ -136,17 +43,23 @@ void write_or_remove(const std::filesystem::path& file, const std::optional<std:
 }  // namespace
 
 std::string results_csv(const StudyResult& result) {
-  const auto all = columns(result);
-  std::string text;
-  for (const Column& column : all) text += column.name + ",";
-  text += "on_front\n";
+  std::vector<Ordered> records;
   for (std::size_t i = 0; i < result.points.size(); ++i) {
     const PointResult& point = result.points[i];
-    for (const Column& column : all)
-      text += (column.of_failed || point.failure.empty() ? quoted(column.text(point)) : "") + ",";
-    text += std::ranges::find(result.front, i) == result.front.end() ? "0\n" : "1\n";
+    Ordered record = to_json(point.settings);
+    record["on_front"] = std::ranges::find(result.front, i) == result.front.end() ? 0 : 1;
+    if (point.failure.empty()) {
+      Ordered json = to_json(point);
+      json.erase("settings");
+      record.update(json);
+      record["no_truth"] = result.has_truth(point) ? 0 : 1;
+      if (const ReferenceResult* reference = result.reference_of(point))
+        record["reference_inverted_tets"] = {{"most", reference->inverted.most}, {"last", reference->inverted.last}};
+    }
+    record["failure"] = point.failure;
+    records.push_back(std::move(record));
   }
-  return text;
+  return to_csv(records);
 }
 
 Ordered results_json(const StudyResult& result) {
@@ -167,14 +80,6 @@ Ordered results_json(const StudyResult& result) {
   for (const ReferenceResult& reference : result.references) json["references"].push_back(to_json(reference));
   json["front"] = result.front;
   json["own"] = result.own;
-  json["baseline"] = result.baseline ? to_json(*result.baseline) : Ordered(nullptr);
-  json["baseline_failure"] = result.baseline_failure;
-  json["paper"] = nullptr;
-  if (const auto& paper = result.config.paper)
-    json["paper"] = {{"interp_ms", paper->interp},
-                     {"total_ms", paper->total},
-                     {"zhu_interp_ms", paper->zhu_interp},
-                     {"zhu_total_ms", paper->zhu_total}};
   json["budget"] = {{"seconds", limit(result.budget.seconds)}, {"error", limit(result.budget.error)}};
   json["sources"] = result.sources ? to_json(*result.sources) : Ordered(nullptr);
   json["recommended"] = result.recommended ? Ordered(*result.recommended) : Ordered(nullptr);

@@ -15,6 +15,7 @@
 #include "common/config/json_file.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "precompute/study/measure/runs.h"
 #include "precompute/study/sweep/results_files.h"
 #include "precompute/study/sweep/study_plan.h"
 #include "precompute/study/sweep/study_sources.h"
@@ -63,7 +64,6 @@ class Study {
   void collect();
   void measure_times();
   void measure_times(const std::vector<std::size_t>& sound, const std::filesystem::path& file);
-  std::unique_ptr<FullSpaceRun> baseline();
   void decide();
   void add_worst_frame(std::size_t point);
   void add_worst_frames();
@@ -283,42 +283,26 @@ void Study::collect() {
   result_.own = found == plan_.points.end() ? 0 : static_cast<std::size_t>(found - plan_.points.begin());
 }
 
-std::unique_ptr<FullSpaceRun> Study::baseline() {
-  const PointPlan& own = plan_.points[result_.own];
-  if (!config_.baseline || !result_.points[result_.own].failure.empty()) return nullptr;
-  try {
-    const SceneConfig scene = scene_of(own, result_.points[result_.own].bundle);
-    return std::make_unique<FullSpaceRun>(scene, read_bundle(scene.bundle), true);
-  } catch (const std::exception& error) {
-    result_.baseline_failure = error.what();
-    log::error(fmt::format("baseline: {}", error.what()));
-    return nullptr;
-  }
-}
-
 void Study::measure_times(const std::vector<std::size_t>& sound, const std::filesystem::path& file) {
   std::vector<SceneConfig> scenes;
   for (const std::size_t i : sound) scenes.push_back(scene_of(plan_.points[i], result_.points[i].bundle));
-  const auto body = baseline();
-  const Timings timings = time_steps(scenes, config_.timing, body.get());
+  const std::vector<StepTimes> times = time_steps(scenes, config_.timing);
   Ordered json = Ordered::object();
   Ordered& points = json["points"] = Ordered::object();
   for (std::size_t k = 0; k < sound.size(); ++k) {
-    result_.points[sound[k]].times = timings.points[k];
-    points[plan_.points[sound[k]].key] = to_json(timings.points[k]);
+    result_.points[sound[k]].times = times[k];
+    points[plan_.points[sound[k]].key] = to_json(times[k]);
   }
-  if (body) result_.baseline = timings.baseline;
-  if (body) json["baseline"] = to_json(timings.baseline);
-  json["baseline_failure"] = result_.baseline_failure;
   write_sealed(file, json);
 }
 
 // Times compare only with those of the same run, so that all are measured again where one is new.
 void Study::measure_times() {
   std::vector<std::size_t> sound;
-  Ordered identity{{"processor", result_.processor},  {"instructions", result_.instruction_set},
-                   {"rounds", config_.timing.rounds}, {"steps", config_.timing.steps},
-                   {"baseline", config_.baseline},    {"baseline_steps", config_.timing.baseline_steps}};
+  Ordered identity{{"processor", result_.processor},
+                   {"instructions", result_.instruction_set},
+                   {"rounds", config_.timing.rounds},
+                   {"steps", config_.timing.steps}};
   for (std::size_t i = 0; i < plan_.points.size(); ++i) {
     if (!result_.points[i].failure.empty()) continue;
     sound.push_back(i);
@@ -330,8 +314,6 @@ void Study::measure_times() {
   if (!measured) return measure_times(sound, file);
   for (const std::size_t i : sound)
     result_.points[i].times = times_from_json(measured->at("points").at(plan_.points[i].key));
-  if (measured->contains("baseline")) result_.baseline = times_from_json(measured->at("baseline"));
-  result_.baseline_failure = measured->at("baseline_failure").get<std::string>();
 }
 
 void Study::decide() {
@@ -387,8 +369,7 @@ StudyResult Study::run() {
 
 std::size_t StudyResult::failures() const {
   const auto failed = [](const auto& item) { return !item.failure.empty(); };
-  return static_cast<std::size_t>(std::ranges::count_if(points, failed) + !baseline_failure.empty() +
-                                  (sources && !sources->failure.empty()));
+  return static_cast<std::size_t>(std::ranges::count_if(points, failed) + (sources && !sources->failure.empty()));
 }
 
 const ReferenceResult* StudyResult::reference_of(const PointResult& point) const {

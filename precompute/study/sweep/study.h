@@ -47,10 +47,8 @@ struct StudyResult {
   std::vector<double> times;         ///< of the frames [s]
   std::vector<PointResult> points;
   std::vector<ReferenceResult> references;
-  std::vector<std::size_t> front;     ///< of `points`, ascending in time
-  std::size_t own = 0;                ///< the point of the files' own settings, else the first
-  std::optional<StepTimes> baseline;  ///< of the settings of `own`
-  std::string baseline_failure;       ///< empty: none
+  std::vector<std::size_t> front;  ///< of `points`, ascending in time
+  std::size_t own = 0;             ///< the point of the files' own settings, else the first
   Budget budget;
   std::optional<std::size_t> recommended, nearest;
   std::optional<ErrorSplit> sources;     ///< of the recommended point, else of `own`
@@ -59,7 +57,7 @@ struct StudyResult {
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity
   std::string processor, instruction_set;
 
-  std::size_t failures() const;  ///< points, baseline and sources of errors
+  std::size_t failures() const;  ///< points and sources of errors
 
   /// What points are chosen by, TrajectoryErrors::headline(): "shape" or "position".
   const char* headline() const { return free_body ? "shape" : "position"; }

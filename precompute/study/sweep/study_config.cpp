@@ -60,12 +60,6 @@ StudyConfig load_study(const std::filesystem::path& file) {
   const Json timing = member_or(json, "timing", Json::object());
   study.timing.rounds = timing.value("rounds", study.timing.rounds);
   study.timing.steps = timing.value("steps", study.timing.steps);
-  study.timing.baseline_steps = timing.value("baseline_steps", study.timing.baseline_steps);
-  study.baseline = json.value("baseline", study.baseline);
-  if (json.contains("paper")) {
-    const Json& paper = json["paper"];
-    study.paper = PaperTimes{paper["interp_ms"], paper["total_ms"], paper["zhu_interp_ms"], paper["zhu_total_ms"]};
-  }
   return study;
 }
 

@@ -39,11 +39,6 @@ struct SourcesConfig {
   std::optional<std::filesystem::path> exact_examples;  ///< asset file whose poses correspond exactly to the object
 };
 
-/// Times of the paper's Table 2 [ms].
-struct PaperTimes {
-  double interp = 0, total = 0, zhu_interp = 0, zhu_total = 0;
-};
-
 /// The asset of one of several bodies.
 struct BodyAsset {
   std::string body;  ///< its name in the scene
@@ -63,8 +58,6 @@ struct StudyConfig {
   ReferenceConfig reference;
   std::optional<SourcesConfig> sources;
   TimingConfig timing;
-  bool baseline = false;
-  std::optional<PaperTimes> paper;
 };
 
 /// Reads STUDY.json and validates it against schemas/study.json. Throws InputError.

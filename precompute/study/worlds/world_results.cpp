@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "precompute/drawing/table.h"
 #include "precompute/study/measure/error_json.h"
 #include "precompute/study/worlds/world_study.h"
 
@@ -40,14 +41,6 @@ Ordered point_json(const WorldPointResult& point, const WorldStudyResult& result
   return json;
 }
 
-std::string number(double value) { return std::isfinite(value) ? fmt::format("{:.9g}", value) : "inf"; }
-
-std::string numbers(const std::optional<RelativeError>& error) {
-  if (!error) return ",,,";
-  return fmt::format("{},{},{},{}", number(error->mean), number(error->max), number(error->end),
-                     number(error->settled));
-}
-
 }  // namespace
 
 Ordered to_json(const WorldStudyResult& result) {
@@ -69,20 +62,18 @@ Ordered to_json(const WorldStudyResult& result) {
 }
 
 std::string world_results_csv(const WorldStudyResult& result) {
-  std::string csv = "point,body";
-  for (const char* error : {"position", "velocity", "shape"})
-    for (const char* part : {"mean", "max", "end", "settled"}) csv += fmt::format(",{}_{}", error, part);
-  csv += ",energy,body_step_us,body_step_p95_us,unconverged_steps,failure\r\n";
+  std::vector<Ordered> records;
   for (std::size_t i = 0; i < result.points.size(); ++i) {
-    const WorldPointResult& point = result.points[i];
-    for (const WorldError& error : point.errors)
-      csv += fmt::format("{},{},{},{},{},{},{:.3f},{:.3f},{},\r\n", i + 1, error.name, numbers(error.position),
-                         numbers(error.velocity), numbers(error.shape), number(error.energy),
-                         point.times ? 1e6 * point.times->median : 0, point.times ? 1e6 * point.times->p95 : 0,
-                         point.unconverged_steps);
-    if (!point.failure.empty()) csv += fmt::format("{},{},{},{},{},,,,,failed\r\n", i + 1, "all", ",,,", ",,,", ",,,");
+    const Ordered point = point_json(result.points[i], result);
+    const Ordered errors = point.value("errors", Ordered{{"all", Ordered::object()}});
+    for (const auto& [body, error] : errors.items()) {
+      Ordered& record = records.emplace_back(Ordered{{"point", i + 1}, {"body", body}});
+      record.update(error);
+      for (const char* member : {"times", "unconverged_steps", "failure"})
+        if (point.contains(member)) record[member] = point[member];
+    }
   }
-  return csv;
+  return to_csv(records);
 }
 
 }  // namespace exmat::precompute

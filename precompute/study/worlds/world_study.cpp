@@ -121,9 +121,7 @@ void WorldStudy::require_measurable() const {
       refuse(config_.file, member, "no such member with a scene of several bodies", "one",
              "measure each body in a scene of its own for it");
   };
-  refuse_member(config_.baseline, "/baseline");
   refuse_member(config_.sources.has_value(), "/sources");
-  refuse_member(config_.paper.has_value(), "/paper");
   refuse_member(std::ranges::any_of(config_.sweeps, [](const SweepConfig& sweep) { return !sweep.precision.empty(); }),
                 "/sweeps/precision");
 }

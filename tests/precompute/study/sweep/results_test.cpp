@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "common/mesh/geometry.h"
-#include "precompute/study/drawing/svg.h"
+#include "precompute/drawing/surface_picture.h"
 #include "precompute/study/sweep/report.h"
 #include "precompute/study/sweep/results_files.h"
 #include "tests/support/box_mesh.h"
@@ -134,20 +134,20 @@ TEST(ResultsCsv, HasALineOfAllFieldsForEachPoint) {
     return lines.at(line).at(static_cast<std::size_t>(found - lines[0].begin()));
   };
   EXPECT_EQ(field(2, "basis_size"), "20");
-  EXPECT_EQ(std::stod(field(2, "shape_error_end")), 0.06);
-  EXPECT_EQ(std::stod(field(2, "shape_error_settled")), 0.08);
-  EXPECT_EQ(std::stod(field(2, "nearest_phase_error_mean")), 0.01);
+  EXPECT_EQ(std::stod(field(2, "errors_shape_end")), 0.06);
+  EXPECT_EQ(std::stod(field(2, "errors_shape_settled")), 0.08);
+  EXPECT_EQ(std::stod(field(2, "errors_nearest_phase_mean")), 0.01);
   EXPECT_EQ(field(2, "linear_modes"), "15");
-  EXPECT_EQ(field(2, "velocity_error_max"), "inf");
-  EXPECT_EQ(std::stod(field(2, "step_median_us")), 30);
-  EXPECT_EQ(std::stod(field(2, "position_error_max")), 0.6);
-  EXPECT_EQ(field(1, "rebound_error") + field(2, "rebound_error"), "0.25") << "where there was one";
+  EXPECT_EQ(field(2, "errors_velocity_max"), "") << "not finite";
+  EXPECT_EQ(std::stod(field(2, "times_median_us")), 30);
+  EXPECT_EQ(std::stod(field(2, "errors_position_max")), 0.6);
+  EXPECT_EQ(field(1, "errors_rebound") + field(2, "errors_rebound"), "0.25") << "where there was one";
   EXPECT_EQ(field(1, "no_truth") + field(2, "no_truth"), "01");
   EXPECT_EQ(field(2, "reference_inverted_tets_most") + field(2, "reference_inverted_tets_last"), "73");
-  EXPECT_EQ(field(2, "from_all_elements_error_mean"), "");
+  EXPECT_EQ(field(2, "errors_from_all_elements_mean"), "");
   EXPECT_EQ(field(1, "on_front") + field(2, "on_front") + field(3, "on_front") + field(4, "on_front"), "1100");
   EXPECT_EQ(field(4, "failure"), "went \"wrong\", badly\nindeed");
-  EXPECT_EQ(field(4, "step_median_us") + field(4, "position_error_mean"), "");
+  EXPECT_EQ(field(4, "times_median_us") + field(4, "errors_position_mean"), "");
 }
 
 TEST(ResultsJson, HoldsAll) {
@@ -230,7 +230,6 @@ TEST(Report, IsOnePageInItself) {
   const TetMesh mesh = test::box_mesh({2, 2, 2}, {1, 1, 1});
   result.surface = surface_triangles(mesh.tets);
   result.worst_frames = {{1, mesh.vertices, 1.1 * mesh.vertices}};
-  result.config.paper = PaperTimes{1, 2, 3, 4};
   const std::string html = report_html(result);
   EXPECT_THAT(html, HasSubstr("&lt;study&gt;"));
   EXPECT_THAT(html, Not(HasSubstr("<study>")));
@@ -291,7 +290,7 @@ TEST(BodiesPicture, IsSmall) {
   const TetMesh mesh = test::box_mesh({22, 22, 11}, {2, 2, 1});
   const TriangleArray surface = surface_triangles(mesh.tets);
   ASSERT_GT(surface.rows(), 3500);
-  const std::string svg = bodies_svg(surface, mesh.vertices, 1.05 * mesh.vertices, Eigen::Vector3d::UnitZ(), "p");
+  const std::string svg = poses_svg(surface, mesh.vertices, 1.05 * mesh.vertices, Eigen::Vector3d::UnitZ(), "p");
   EXPECT_LT(svg.size(), 60000U);
   EXPECT_GT(svg.size(), 10000U);
 }

@@ -20,7 +20,7 @@ TEST(StudyFile, FillsInDefaultsAndResolvesPaths) {
   EXPECT_FALSE(study.sources) << "which takes as long as the study";
   const auto asked = folder.write("b.json", R"({"name": "s", "asset": "a", "scene": "b", "sources": {}})");
   EXPECT_EQ(load_study(asked).sources.value().time_steps, 2);
-  EXPECT_FALSE(study.steps || study.paper || study.baseline || study.reference.time_step);
+  EXPECT_FALSE(study.steps || study.reference.time_step);
   EXPECT_EQ(study.frames, 200);
   ASSERT_EQ(study.sweeps.size(), 1U) << "the files' own settings";
   EXPECT_TRUE(study.sweeps[0].basis_size.empty() && study.sweeps[0].target.empty());
@@ -45,14 +45,13 @@ TEST(StudyFile, ReadsTheAssetsOfSeveralBodies) {
 TEST(StudyFile, ReadsEveryMember) {
   const test::TemporaryFolder folder;
   const StudyConfig study = load_study(folder.write("study.json", R"({
-    "name": "s", "asset": "a.json", "scene": "b.json", "steps": 7, "frames": 3, "baseline": true,
+    "name": "s", "asset": "a.json", "scene": "b.json", "steps": 7, "frames": 3,
     "sweeps": [ {"eigenfunctions": [1, 2], "basis_size": [3], "linear_modes": [6, 7], "training": ["none", "scene"],
                  "cubature_elements": [4, 5], "material": ["corotational"],
                  "time_step": [0.01], "integrator": ["newmark"], "internal_force": ["all_elements"], "target": ["solve"], "elastic_stiffness": [0.5, 2], "precision": ["mixed"]} ],
     "reference": {"time_step": 0.002, "integrator": "bdf2"},
     "sources": {"eigenfunctions": 40, "time_steps": 4, "exact_examples": "c.json"},
-    "timing": {"rounds": 2, "steps": 8, "baseline_steps": 9},
-    "paper": {"interp_ms": 1, "total_ms": 2, "zhu_interp_ms": 3, "zhu_total_ms": 4} })"));
+    "timing": {"rounds": 2, "steps": 8} })"));
   const SweepConfig& sweep = study.sweeps.at(0);
   EXPECT_EQ(sweep.eigenfunctions, (std::vector<int>{1, 2}));
   EXPECT_EQ(sweep.linear_modes, (std::vector<int>{6, 7}));
@@ -69,9 +68,7 @@ TEST(StudyFile, ReadsEveryMember) {
   EXPECT_EQ(study.sources.value().eigenfunctions, 40);
   EXPECT_EQ(study.sources->time_steps, 4);
   EXPECT_EQ(study.sources->exact_examples, folder.path("c.json"));
-  EXPECT_EQ(study.timing.baseline_steps, 9);
-  EXPECT_TRUE(study.baseline);
-  EXPECT_EQ(study.paper.value().zhu_total, 4);
+  EXPECT_EQ(study.timing.steps, 8);
 }
 
 TEST(StudyFile, IsRefusedWithThePlaceAndWhatToDo) {
@@ -92,8 +89,7 @@ TEST(StudyFile, IsRefusedWithThePlaceAndWhatToDo) {
       {head + R"("sources": {"exact_example": "a.json"}})", "did you mean \"exact_examples\"?"},
       {head + R"("sweeps": [{"basis_size": [3, 3]}]})", "each element once"},
       {head + R"("sweeps": [{"internal_force": ["auto"]}]})", "\"all_elements\""},
-      {head + R"("timing": {"rounds": 0}})", "/timing/rounds"},
-      {head + R"("paper": {"interp_ms": 1}})", "/paper/total_ms"}};
+      {head + R"("timing": {"rounds": 0}})", "/timing/rounds"}};
   for (const auto& [text, message] : cases) {
     try {
       load_study(folder.write("study.json", text));
