@@ -26,6 +26,9 @@ SceneConfig scene_of(const Json& json, const std::filesystem::path& file);
 /// Likewise, as load_world().
 std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::path& file);
 
+/// Throws InputError that names the scene's member where the bundle is not there.
+void require_bundle(const SceneConfig& scene);
+
 /// What a scene needs of its bundle.
 Needs needs_of(const SceneConfig& scene);
 

@@ -218,6 +218,12 @@ std::optional<WorldConfig> world_of(const Json& json, const std::filesystem::pat
   return world;
 }
 
+void require_bundle(const SceneConfig& scene) {
+  if (std::filesystem::exists(scene.bundle)) return;
+  throw InputError({scene.file.string(), scene.place + "/bundle", "a bundle", "no such file: " + scene.bundle.string(),
+                    "make it with exmat-precompute bundle ASSET.json -o " + scene.bundle.filename().string()});
+}
+
 Needs needs_of(const SceneConfig& scene) {
   Needs needs{.examples = scene.examples || scene.body.pose,
               .carried = !scene.body.motion.empty(),
