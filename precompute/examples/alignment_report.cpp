@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/core/markup.h"
@@ -85,6 +86,14 @@ std::string svg_text(const TetMesh& left, const TetMesh& right, const std::strin
     text += panel(right, axis, scale, {1.5 * kPanel, row}, "#4080e0");
   }
   return text + "</svg>\n";
+}
+
+void claim_alignment_report(const AssetConfig& asset, const std::filesystem::path& folder) {
+  claim_output(folder / "index.html", "--alignment-report");
+  for (const ExampleConfig& example : asset.examples)
+    for (const char* ending : {".vtk", "_example.vtk", ".svg"})
+      claim_output(folder / (file_name(example.name) + ending),
+                   fmt::format("--alignment-report, example {}", example.name));
 }
 
 void write_alignment_report(const std::string& asset, const TetMesh& object, const ExampleInput& input,

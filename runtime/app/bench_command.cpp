@@ -85,6 +85,7 @@ void print_world(const WorldBenchResult& result) {
 void bench_world(WorldConfig config, const BenchCommandOptions& options) {
   config.trajectory.reset();
   for (BodiesConfig& bodies : config.bodies) bodies.scene.trajectory.reset();
+  for (const BodiesConfig& bodies : config.bodies) require_bundle(bodies.scene);
   const LoadedWorld loaded = load_world_run(config);
   log_loaded(loaded, config);
   const WorldBenchResult result = bench(loaded, config, {.steps = options.steps});
@@ -100,6 +101,7 @@ void bench_command(const BenchCommandOptions& options) {
   if (std::optional<WorldConfig> world = load_world(options.scene)) return bench_world(std::move(*world), options);
   SceneConfig config = load_scene(options.scene);
   config.trajectory.reset();
+  require_bundle(config);
   const LoadedScene loaded = load_run(config);
   log_loaded(loaded, config);
   const BenchResult result = bench(loaded, config, {.steps = options.steps});

@@ -1,8 +1,10 @@
 #include <fmt/format.h>
 
 #include "common/config/config.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/hdf5/xdmf.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
 #include "runtime/app/lost_work.h"
@@ -96,6 +98,12 @@ void print_world(const WorldSummary& summary, const WorldConfig& config) {
   if (config.trajectory) print("trajectory", config.trajectory->string());
 }
 
+void claim_outputs(const std::optional<std::filesystem::path>& trajectory, const RunCommandOptions& options) {
+  if (trajectory) claim_trajectory(*trajectory, options.trajectory ? "-o" : "output.trajectory of the scene");
+  if (options.run.dump_state) claim_output(*options.run.dump_state, "--dump-state");
+  if (options.run.from_state) check_input(*options.run.from_state, "a state file");
+}
+
 RunOptions run_options(const RunCommandOptions& options) {
   RunOptions run = options.run;
   run.keeps_contacts = true;
@@ -105,6 +113,8 @@ RunOptions run_options(const RunCommandOptions& options) {
 void run_world(WorldConfig config, const RunCommandOptions& options) {
   if (options.trajectory) config.trajectory = options.trajectory;
   if (options.steps) config.steps = *options.steps;
+  claim_outputs(config.trajectory, options);
+  for (const BodiesConfig& bodies : config.bodies) require_bundle(bodies.scene);
   const LoadedWorld loaded = load_world_run(config);
   log_loaded(loaded, config);
   const WorldSummary summary = run(loaded, config, run_options(options));
@@ -126,6 +136,8 @@ void run_command(const RunCommandOptions& options) {
   SceneConfig config = load_scene(options.scene);
   if (options.trajectory) config.trajectory = options.trajectory;
   if (options.steps) config.steps = *options.steps;
+  claim_outputs(config.trajectory, options);
+  require_bundle(config);
   const LoadedScene loaded = load_run(config);
   log_loaded(loaded, config);
   const RunSummary summary = run(loaded, config, run_options(options));
