@@ -3,15 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <fmt/format.h>
+#include <map>
 #include <set>
+#include <string>
 
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/config/json_values.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 
 namespace exmat {
 namespace {
+
+const std::map<std::string, double> kUnits{{"m", 1},     {"dm", 0.1},    {"cm", 0.01},
+                                           {"mm", 1e-3}, {"in", 0.0254}, {"ft", 0.3048}};  // [m]
 
 // Names in /examples of the bundle that are no examples, and what HDF5 takes for the group itself.
 constexpr std::array<std::string_view, 5> kReservedNames = {"gram", "h0", "hq", ".", ".."};
@@ -69,6 +75,7 @@ class AssetReader {
     if (has_mesh == has_surface) refuse("/object", "mesh (tets) or surface (triangles)", has_mesh ? "both" : "neither");
     asset.object_mesh = resolve_path(file_, json[has_mesh ? "mesh" : "surface"]);
     if (has_surface) asset.object_surface = asset.object_mesh;
+    asset.length_unit = kUnits.at(json.value("unit", "m")) * json.value("scale", 1.0);
     asset.cells = optional_member<int>(json, "cells");
     asset.cell_size = optional_member<double>(json, "cell_size");
     for (const char* member : {"cells", "cell_size"})
@@ -137,7 +144,7 @@ class AssetReader {
     const bool of_object = has_surface && (!example.surface || example.frame);
     if (of_object && !asset.object_surface)
       refuse(place, "object.surface, whose vertices a morph target or a point cache moves", "object.mesh");
-    const bool is_cache = example.surface && example.surface->extension() == ".pc2";
+    const bool is_cache = example.surface && lower_extension(*example.surface) == ".pc2";
     if (is_cache != example.frame.has_value())
       refuse(place, is_cache ? "the frame of the point cache" : "no frame but of a point cache (.pc2)",
              is_cache ? "none" : "a frame");

@@ -32,6 +32,9 @@ WorldConfig world_of(SceneConfig scene);
 /// The file that a run writes in place of the scene's, or none.
 void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world);
 
+/// Throws InputError that names the scene's member where the bundle is not there.
+void require_bundle(const SceneConfig& scene);
+
 /// What a scene needs of its bundle.
 Needs needs_of(const SceneConfig& scene);
 

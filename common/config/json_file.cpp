@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <fmt/format.h>
-#include <fstream>
 #include <set>
-#include <system_error>
 #include <vector>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 
 namespace exmat {
 namespace {
@@ -117,22 +116,20 @@ class StructureCheck : public nlohmann::json_sax<Json> {
 
 }  // namespace
 
-std::string read_text(const std::filesystem::path& file, const std::string& what) {
-  std::error_code ignored;
-  const auto status = std::filesystem::status(file, ignored);
-  if (!std::filesystem::exists(status)) throw InputError({file.string(), "", "", "", "there is no such file"});
-  if (std::filesystem::is_directory(status)) throw InputError({file.string(), "", what, "a folder", ""});
-  std::ifstream stream(file, std::ios::binary);
-  std::string text{std::istreambuf_iterator<char>(stream), {}};
-  if (!stream) throw InputError({file.string(), "", "", "", "the file cannot be read"});
-  return text;
-}
-
 nlohmann::json read_json(const std::filesystem::path& file) {
-  return parse_json(read_text(file, "a JSON file"), file.string());
+  const std::string text = read_text_file(file, "a JSON file");
+  if (const std::string_view kind = kind_of_file(text); !kind.empty())
+    throw InputError(
+        {file.string(), "", "a JSON file", std::string(kind),
+         "a scene names its bundle in a JSON file, an asset its mesh; exmat-precompute bundle takes a surface "
+         "(.glb, .obj) by itself"});
+  return parse_json(text, file.string());
 }
 
 nlohmann::json parse_json(const std::string& text, const std::string& name) {
+  // nlohmann would end the text there and leave the rest unread.
+  if (const auto nul = text.find('\0'); nul != std::string::npos)
+    throw InputError({name, line_and_column(text, nul + 1), "text", "character U+0000", "is the file damaged?"});
   StructureCheck check(name, text);
   Json::sax_parse(text, &check);
   return Json::parse(text);

@@ -6,16 +6,12 @@
 
 namespace exmat {
 
-/// Reads and parses a JSON file (RFC 8259). Throws InputError: no such file, a syntax error with line and column, a
-/// repeated member, more than 64 nested levels, numbers beyond double, control characters in strings.
+/// Reads and parses a JSON file (RFC 8259). Throws InputError: no such file, a syntax error with line and column, bytes
+/// after the end, a repeated member, more than 64 nested levels, numbers beyond double, control characters in strings.
 nlohmann::json read_json(const std::filesystem::path& file);
 
 /// The same of a text; `name` is for messages.
 nlohmann::json parse_json(const std::string& text, const std::string& name);
-
-/// Text of a file. Throws InputError where it cannot be read; `what` says in the message what it should be ("a text
-/// file").
-std::string read_text(const std::filesystem::path& file, const std::string& what);
 
 /// Throws InputError unless the document follows schemas/NAME.json: at the first fault, with its JSON pointer, what was
 /// expected and found. An unknown member suggests the nearest name; what the schema lists as x-later is refused as not

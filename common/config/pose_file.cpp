@@ -5,8 +5,8 @@
 #include <string>
 #include <string_view>
 
-#include "common/config/json_file.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 
 namespace exmat {
 namespace {
@@ -32,7 +32,7 @@ std::vector<double> numbers_of(const std::string& line, const std::filesystem::p
 }  // namespace
 
 std::vector<BodyPlace> read_poses(const std::filesystem::path& file) {
-  const std::string text = read_text(file, "a text file of poses");
+  const std::string text = read_text_file(file, "a text file of poses");
   std::vector<BodyPlace> places;
   std::size_t start = 0;
   for (int number = 1; start < text.size(); ++number) {

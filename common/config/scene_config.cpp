@@ -239,6 +239,12 @@ void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfi
   for (BodiesConfig& bodies : world.bodies) bodies.scene.trajectory = file;
 }
 
+void require_bundle(const SceneConfig& scene) {
+  if (std::filesystem::exists(scene.bundle)) return;
+  throw InputError({scene.file.string(), scene.place + "/bundle", "a bundle", "no such file: " + scene.bundle.string(),
+                    "make it with exmat-precompute bundle ASSET.json -o " + scene.bundle.filename().string()});
+}
+
 Needs needs_of(const SceneConfig& scene) {
   Needs needs{.examples = scene.examples || scene.body.pose,
               .carried = !scene.body.motion.empty(),

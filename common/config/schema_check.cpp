@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <fmt/format.h>
-#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
@@ -13,6 +12,7 @@
 #include "common/config/embedded_schema.h"
 #include "common/config/json_file.h"
 #include "common/core/error.h"
+#include "common/core/nearest_name.h"
 
 // valijson decides whether a document is valid. Its messages name schema keywords, so the first fault is then looked up
 // here in the words of the schema's own descriptions.
@@ -25,34 +25,6 @@ using Adapter = valijson::adapters::NlohmannJsonAdapter;
 
 constexpr std::size_t kLongestValue = 60;
 constexpr const char* kLater = "x-later";
-
-std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::size_t> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), std::size_t{0});
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    std::size_t diagonal = std::exchange(row[0], i + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t replaced = diagonal + (a[i] == b[j] ? 0 : 1);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, diagonal + 1, row[j] + 1});
-    }
-  }
-  return row.back();
-}
-
-// Empty where nothing is near: more than a third of the name would have to change.
-std::string nearest_name(const std::string& name, const Json& members) {
-  std::string nearest;
-  std::size_t least = std::max<std::size_t>(2, name.size() / 3) + 1;
-  for (const auto& [candidate, schema] : members.items()) {
-    const std::size_t distance = edit_distance(name, candidate);
-    if (distance < std::min(least, candidate.size())) {
-      least = distance;
-      nearest = candidate;
-    }
-  }
-  return nearest;
-}
 
 std::string show(const Json& value) {
   std::string text = value.dump(-1, ' ', false, Json::error_handler_t::replace);
@@ -199,7 +171,9 @@ class FaultFinder {
   static std::optional<Complaint> unknown_member(const Json& schema, const std::string& name,
                                                  const Json::json_pointer& place) {
     if (schema.contains(kLater) && contains(schema[kLater], name)) return not_yet(Json(name), place / name);
-    const std::string nearest = nearest_name(name, schema.at("properties"));
+    std::vector<std::string> members;
+    for (const auto& [member, definition] : schema.at("properties").items()) members.push_back(member);
+    const std::string nearest = nearest_name(name, members);
     const std::string advice = nearest.empty() ? fmt::format("members here are {}", member_names(schema))
                                                : fmt::format("did you mean {}?", show(Json(nearest)));
     return Complaint{"", (place / name).to_string(), "", "",

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <unordered_set>
 
-#include "common/config/json_file.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 
 namespace exmat {
 namespace {
@@ -31,7 +31,7 @@ std::int64_t parse_id(std::string_view word, std::int64_t largest, std::string_v
 
 std::vector<std::int64_t> read_vertex_ids(const std::filesystem::path& file, std::int64_t largest,
                                           std::string_view noun) {
-  const std::string text = read_text(file, fmt::format("a text file of {} ids", noun));
+  const std::string text = read_text_file(file, fmt::format("a text file of {} ids", noun));
   std::vector<std::int64_t> ids;
   std::unordered_set<std::int64_t> seen;
   std::size_t line_number = 0;

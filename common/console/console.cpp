@@ -1,6 +1,13 @@
 #include "common/console/console.h"
 
+#include <cerrno>
+#include <csignal>
 #include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <fmt/format.h>
+#include <iostream>
+#include <limits>
 #include <memory>
 #include <new>
 #include <nlohmann/json.hpp>
@@ -9,8 +16,11 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/core/nearest_name.h"
 #include "common/core/progress.h"
 
 namespace exmat {
@@ -70,7 +80,63 @@ ProgressSink make_progress_sink(const std::string& mode) {
   return print_plain;
 }
 
+/// Signals of a terminal, of a supervisor and of limits. One that the program was started to ignore, as by nohup, stays
+/// ignored.
+void catch_signals() {
+  for (const int signal : {SIGINT, SIGTERM, SIGHUP, SIGQUIT, SIGPIPE, SIGXCPU})
+    if (std::signal(signal, end_by_signal) == SIG_IGN) std::signal(signal, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);  // a write then fails, with a reason
+}
+
+void refuse_empty_values(const CLI::App& app) {
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& value : option->results())
+      if (value.empty())
+        throw InputError({option->get_name(), "", "a value", "an empty one", "give one, or leave the option out"});
+  for (const CLI::App* command : app.get_subcommands()) refuse_empty_values(*command);
+}
+
+void flush_output() {
+  const bool written = std::fflush(stdout) == 0 && std::ferror(stdout) == 0;
+  if (!written) throw WorkError(fmt::format("cannot write to standard output: {}", std::strerror(errno)));
+}
+
+/// The parser's message, with all names of an option that is missing, and with the command that a word may have meant.
+std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
+  std::string message = error.what();
+  const auto commands = app.get_subcommands([](const CLI::App*) { return true; });
+  for (const CLI::App* command : commands)
+    for (const CLI::Option* option : command->get_options())
+      if (message == option->get_name() + " is required") message = option->get_name(false, true) + " is required";
+  if (!app.get_subcommands().empty()) return message;
+  std::vector<std::string> names;
+  for (const CLI::App* command : commands) names.push_back(command->get_name());
+  for (const std::string& word : app.remaining()) {
+    if (word.starts_with("-")) continue;
+    const std::string nearest = nearest_name(word, names);
+    return fmt::format("there is no command '{}'; {}", word,
+                       nearest.empty() ? fmt::format("commands are {}", fmt::join(names, ", "))
+                                       : fmt::format("did you mean {}?", nearest));
+  }
+  return message;
+}
+
 }  // namespace
+
+CLI::Validator number_between(double low, double high) {
+  const auto check = [low, high](const std::string& text) {
+    char* end = nullptr;
+    const double value = std::strtod(text.c_str(), &end);
+    const bool is_number = !text.empty() && *end == '\0';
+    if (is_number && value >= low && value <= high) return std::string();  // not-a-number is in no range
+    return fmt::format("expected a number from {:g} to {:g}, found '{}'", low, high, text);
+  };
+  return {check, fmt::format("FLOAT in [{:g} - {:g}]", low, high)};
+}
+
+CLI::Validator positive_number() {
+  return number_between(std::numeric_limits<double>::min(), std::numeric_limits<double>::max()).description("POSITIVE");
+}
 
 void add_common_options(CLI::App& app, CommonOptions& options) {
   app.fallthrough();
@@ -97,13 +163,25 @@ void apply(const CommonOptions& options) {
 }
 
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action) {
+  catch_signals();
+  const CommandFiles files;
   try {
     app.parse(argc, argv);
+    refuse_empty_values(app);
     action();
+    flush_output();
     return static_cast<int>(ExitStatus::kDone);
   } catch (const CLI::ParseError& error) {
-    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
-    std::fputs((app.get_name() + ": " + error.what() + "; see " + app.get_name() + " --help\n").c_str(), stderr);
+    if (error.get_exit_code() == 0) {  // --help, --version
+      app.exit(error);
+      std::cout.flush();
+      if (std::cout.good() && std::fflush(stdout) == 0) return static_cast<int>(ExitStatus::kDone);
+      std::fputs((app.get_name() + ": cannot write to standard output\n").c_str(), stderr);
+      return static_cast<int>(ExitStatus::kFailure);
+    }
+    std::fputs(
+        fmt::format("{}: {}; see {} --help\n", app.get_name(), usage_message(app, error), app.get_name()).c_str(),
+        stderr);
     return static_cast<int>(ExitStatus::kBadInput);
   } catch (const InputError& error) {
     std::fputs((app.get_name() + ": " + error.what() + "\n").c_str(), stderr);
@@ -111,7 +189,11 @@ int run_program(CLI::App& app, int argc, char** argv, const std::function<void()
   } catch (const std::bad_alloc&) {
     std::fputs((app.get_name() + ": not enough memory\n").c_str(), stderr);
   } catch (const std::exception& error) {
-    std::fputs((app.get_name() + ": " + error.what() + "\n").c_str(), stderr);
+    // Where printing fails, the library names no file.
+    const bool printing = std::ferror(stdout) != 0 && dynamic_cast<const WorkError*>(&error) == nullptr;
+    std::fputs(
+        (app.get_name() + ": " + (printing ? "cannot write to standard output: " : "") + error.what() + "\n").c_str(),
+        stderr);
   }
   return static_cast<int>(ExitStatus::kFailure);
 }

@@ -20,8 +20,13 @@ void add_common_options(CLI::App& app, CommonOptions& options);
 /// are parsed.
 void apply(const CommonOptions& options);
 
+/// A check for options: a finite number in [low, high], or one above 0.
+CLI::Validator number_between(double low, double high);
+CLI::Validator positive_number();
+
 /// Parses, runs `action` and turns what it throws into one message on stderr and an exit status: 0 done (also --help
-/// and --version), 1 a failure while working, 2 bad usage or bad input.
+/// and --version), 1 a failure while working or in writing to stdout, 2 bad usage or bad input. Signals that end the
+/// program leave no temporary file; a file that grows beyond its limit (ulimit -f) is a failure.
 int run_program(CLI::App& app, int argc, char** argv, const std::function<void()>& action);
 
 }  // namespace exmat

@@ -1,10 +1,14 @@
 #include "common/core/atomic_file.h"
 
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cerrno>
 #include <charconv>
+#include <climits>
 #include <csignal>
 #include <cstdint>
+#include <cstring>
 #include <fcntl.h>
 #include <random>
 #include <string>
@@ -14,6 +18,7 @@
 #include <unistd.h>
 #include <utility>
 
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/fnv_hash.h"
 
@@ -107,6 +112,40 @@ class Descriptor {
   int value_;
 };
 
+/// A temporary file that a signal handler removes: plain memory that is never freed.
+struct PendingFile {
+  std::atomic<pid_t> process{0};  // 0: free, -1: being filled in
+  std::array<char, PATH_MAX> temporary{}, target{};
+};
+
+std::array<PendingFile, 16> pending_files;
+static_assert(std::atomic<pid_t>::is_always_lock_free);
+
+void copy_path(std::array<char, PATH_MAX>& to, const std::filesystem::path& path) {
+  std::strncpy(to.data(), path.c_str(), to.size() - 1);
+}
+
+/// The slot of the files; -1 where all are taken or a name is too long.
+int add_pending(const std::filesystem::path& temporary, const std::filesystem::path& target) {
+  if (std::max(temporary.native().size(), target.native().size()) >= PATH_MAX) return -1;
+  for (std::size_t slot = 0; slot < pending_files.size(); ++slot) {
+    PendingFile& file = pending_files[slot];
+    pid_t expected = 0;
+    if (!file.process.compare_exchange_strong(expected, -1)) continue;
+    copy_path(file.temporary, temporary);
+    copy_path(file.target, target);
+    file.process = ::getpid();
+    return static_cast<int>(slot);
+  }
+  return -1;
+}
+
+void remove_pending(int slot) {
+  if (slot >= 0) pending_files[static_cast<std::size_t>(slot)].process = 0;
+}
+
+void say(const char* text) { static_cast<void>(!::write(STDERR_FILENO, text, std::strlen(text))); }
+
 // Some file systems cannot flush a folder; the rename is then as durable as they make it.
 void flush_folder(const std::filesystem::path& folder) {
   const Descriptor descriptor(folder, O_RDONLY | O_DIRECTORY);
@@ -115,24 +154,26 @@ void flush_folder(const std::filesystem::path& folder) {
 
 }  // namespace
 
-AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)) {
-  check_target(target_);
-  remove_left_behind(target_);
+AtomicFile::AtomicFile(std::filesystem::path target) : target_(std::move(target)), file_(link_target(target_)) {
+  check_target(file_);
+  remove_left_behind(file_);
   for (int attempt = 0; attempt < kNameAttempts; ++attempt) {
-    temporary_ = target_;
+    temporary_ = file_;
     temporary_ += own_suffix();
+    slot_ = add_pending(temporary_, target_);
     const Descriptor descriptor(temporary_, O_WRONLY | O_CREAT | O_EXCL);
-    if (descriptor.get() >= 0) {
-      pending_ = true;
-      return;
-    }
-    if (errno != EEXIST) fail(target_, errno);
+    const int error_number = errno;
+    pending_ = descriptor.get() >= 0;
+    if (pending_) return;
+    remove_pending(std::exchange(slot_, -1));
+    if (error_number != EEXIST) fail(target_, error_number);
   }
   fail(target_, EEXIST);
 }
 
 AtomicFile::~AtomicFile() {
   if (pending_) ::unlink(temporary_.c_str());
+  remove_pending(slot_);
 }
 
 void AtomicFile::commit() {
@@ -140,9 +181,31 @@ void AtomicFile::commit() {
     const Descriptor descriptor(temporary_, O_RDWR);
     if (descriptor.get() < 0 || ::fsync(descriptor.get()) != 0) fail(target_, errno);
   }
-  if (::rename(temporary_.c_str(), target_.c_str()) != 0) fail(target_, errno);
+  if (::rename(temporary_.c_str(), file_.c_str()) != 0) fail(target_, errno);
   pending_ = false;
-  flush_folder(folder_of(target_));
+  remove_pending(std::exchange(slot_, -1));
+  flush_folder(folder_of(file_));
+}
+
+void end_by_signal(int signal) {
+  const char* const name = ::sigabbrev_np(signal);
+  bool said = false;
+  const auto say_name = [&] {
+    if (std::exchange(said, true)) return;
+    say("ended by SIG");
+    say(name != nullptr ? name : "?");
+  };
+  if (signal != SIGPIPE) say_name();  // whoever reads no more of a summary needs no word of it
+  for (const PendingFile& file : pending_files) {
+    if (file.process != ::getpid()) continue;
+    ::unlink(file.temporary.data());
+    say_name();
+    say("; not written: ");
+    say(file.target.data());
+  }
+  if (said) say("\n");
+  std::signal(signal, SIG_DFL);
+  std::raise(signal);
 }
 
 void write_file_atomically(const std::filesystem::path& target, std::string_view content) {

@@ -11,8 +11,9 @@ namespace exmat {
 ///     write_somehow(output.temporary());
 ///     output.commit();                 // fsync, rename
 ///
-/// Without commit() the destructor removes the temporary file and leaves the target as it was. What a killed process
-/// left behind beside the same target is removed by the next one on this machine.
+/// Without commit() the destructor removes the temporary file and leaves the target as it was. A target that is a
+/// symbolic link stays one: the file that it leads to is replaced. What a killed process left behind beside the same
+/// target is removed by the next one on this machine.
 class AtomicFile {
  public:
   /// Creates TARGET.MACHINE-PID-RANDOM.tmp. Throws WorkError: no such folder, not writable, target is a folder, disk
@@ -31,9 +32,15 @@ class AtomicFile {
 
  private:
   std::filesystem::path target_;
+  std::filesystem::path file_;  // what target_ leads to
   std::filesystem::path temporary_;
+  int slot_ = -1;  // among those that end_by_signal() removes
   bool pending_ = false;
 };
+
+/// Handles a signal that ends the program: removes the temporary files of this process, says on standard error which
+/// targets are not written, and ends by the signal's default action. Async-signal-safe.
+void end_by_signal(int signal);
 
 /// Writes a whole text file through an AtomicFile.
 void write_file_atomically(const std::filesystem::path& target, std::string_view content);

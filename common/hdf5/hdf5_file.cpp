@@ -9,6 +9,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/hdf5/hdf5_access.h"
 
@@ -89,11 +90,8 @@ Superblock read_superblock(const std::filesystem::path& file) {
 // HDF5's own messages about these are of no help.
 void check_before_opening(const std::filesystem::path& file) {
   const std::string name = file.string();
+  check_input(file, "an HDF5 file");
   std::error_code ignored;
-  const auto status = std::filesystem::status(file, ignored);
-  if (!std::filesystem::exists(status)) throw InputError({name, "", "", "", "there is no such file"});
-  if (!std::filesystem::is_regular_file(status))
-    throw InputError({name, "", "an HDF5 file", "what is not a regular file", ""});
   const std::uint64_t size = std::filesystem::file_size(file, ignored);
   const Superblock superblock = read_superblock(file);
   if (superblock.size == 0) throw InputError({name, "", "an HDF5 file", "an empty file", ""});
@@ -160,8 +158,22 @@ Hdf5File Hdf5File::open(const std::filesystem::path& file) {
   prepare_hdf5();
   check_before_opening(file);
   const auto access = access_properties();
-  auto handle = make_handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
-  if (handle.get() < 0) fail_damaged(file.string(), "");
+  Hdf5Handle handle;
+  std::string reason;
+  // Within one process HDF5 opens a file a second time only with the settings of the first, which may be the host's.
+  constexpr std::array<std::pair<unsigned, unsigned>, 4> kLocks{{{0, 1}, {1, 1}, {1, 0}, {0, 0}}};
+  for (const auto degree : {H5F_CLOSE_STRONG, H5F_CLOSE_WEAK, H5F_CLOSE_SEMI})
+    for (const auto& [locks, best_effort] : kLocks) {
+      if (handle.get() >= 0 || (!reason.empty() && reason.find("match") == std::string::npos)) continue;
+      H5Pset_fclose_degree(access.get(), degree);
+      H5Pset_file_locking(access.get(), locks, best_effort);
+      handle = make_handle(H5Fopen(file.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
+      if (handle.get() < 0) reason = hdf5_reason();
+    }
+  if (handle.get() < 0 && (reason.find("lock") != std::string::npos || reason.find("match") != std::string::npos))
+    throw InputError({file.string(), "", "a file that no other part of this program has open, or locks",
+                      "one that is open or locked (" + reason + ")", "close it there first"});
+  if (handle.get() < 0) fail_damaged(file.string(), "", reason);
   return {std::move(handle), file.string()};
 }
 

@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "common/core/command_files.h"
+#include "common/core/error.h"
 #include "common/core/markup.h"
 
 namespace exmat {
@@ -37,6 +39,16 @@ std::string xdmf_frame(const std::string& h5, const XdmfPart& part, std::size_t 
 }
 
 }  // namespace
+
+void claim_trajectory(const std::filesystem::path& trajectory, const std::string& role) {
+  if (trajectory.extension() == ".xdmf")
+    throw InputError({trajectory.string(), role, "an HDF5 file, beside which the .xdmf is written", "\".xdmf\"",
+                      "give it the extension .h5"});
+  claim_output(trajectory, role);
+  const std::filesystem::path beside = trajectory.parent_path() / trajectory.stem();
+  claim_output(beside.string() + ".xdmf", "the .xdmf beside " + role);
+  claim_output(beside.string() + "_render.xdmf", "the .xdmf of the render mesh beside " + role);
+}
 
 std::string xdmf_text(const std::filesystem::path& trajectory, const std::vector<XdmfPart>& parts,
                       const std::vector<double>& times) {

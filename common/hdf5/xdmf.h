@@ -20,6 +20,10 @@ struct XdmfPart {
   XdmfCells drawn;
 };
 
+/// Claims a trajectory and the .xdmf files beside it as outputs of the command; `role` as for claim_output(). Throws
+/// InputError, also where the trajectory has the extension .xdmf.
+void claim_trajectory(const std::filesystem::path& trajectory, const std::string& role);
+
 /// Text of the .xdmf beside `trajectory`, in its folder: one grid for each time [s], whose vertices are float32
 /// [times x vertices x 3]; of several parts a collection of such grids.
 std::string xdmf_text(const std::filesystem::path& trajectory, const std::vector<XdmfPart>& parts,

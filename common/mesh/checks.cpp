@@ -246,6 +246,14 @@ std::int32_t largest_component(const TetMesh& mesh, const std::vector<std::int32
                                    volume_of_root.begin());
 }
 
+/// Vertices at exactly the place of another one, beyond the first there.
+Index coincident_vertices(const TetMesh& mesh) {
+  std::vector<std::array<double, 3>> places;
+  for (const auto& x : mesh.vertices.rowwise()) places.push_back({x[0], x[1], x[2]});
+  std::sort(places.begin(), places.end());
+  return std::ssize(places) - std::distance(places.begin(), std::unique(places.begin(), places.end()));
+}
+
 void mend_components(TetMesh& mesh, const std::string& file, bool drop, MeshReport& report) {
   const auto roots = component_of_tets(mesh);
   const std::int32_t largest = largest_component(mesh, roots);
@@ -260,6 +268,12 @@ void mend_components(TetMesh& mesh, const std::string& file, bool drop, MeshRepo
   }
   report.dropped_components = components - 1;
   if (components == 1) return;
+  const Index coincident = drop ? 0 : coincident_vertices(mesh);
+  if (coincident > 0)
+    throw InputError({file, outside.place("tet", "tets"), "one component, its tets joined by faces",
+                      std::to_string(components) + " components, and " + std::to_string(coincident) +
+                          " vertices at places where another one is",
+                      "merge vertices at the same place, as 'gmsh' does by Coherence Mesh"});
   if (!drop)
     throw InputError(
         {file, outside.place("tet", "tets"), "one component, its tets joined by faces",
@@ -289,9 +303,17 @@ void compact_vertices(TetMesh& mesh, MeshReport& report) {
 
 }  // namespace
 
+void require_extent(const VertexArray& vertices, const std::string& file) {
+  const double length = (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).maxCoeff();
+  if (length >= 1e-100 && length <= 1e100) return;
+  throw InputError({file, "vertices", "a longest edge of the bounding box from 1e-100 to 1e100 m", to_text(length),
+                    "scale the mesh, as object.unit or object.scale of the asset does"});
+}
+
 MeshReport check_mesh(TetMesh& mesh, const std::string& file, const MeshCheckOptions& options) {
   require_content(mesh, file);
   require_finite(mesh, file);
+  require_extent(mesh.vertices, file);
   require_indices_in_range(mesh, file);
   // Before tets are dropped: a vertex that only they use goes with them.
   if (!options.drop_unreferenced_vertices) require_referenced_vertices(mesh, file);

@@ -24,10 +24,13 @@ struct MeshReport {
   std::vector<std::int32_t> kept_tets;      ///< new index -> index in the file
 };
 
-/// Makes a mesh sound: inverted tets are re-oriented; NaN, out-of-range indices, repeated corners, degenerate tets
-/// (volume at most 1e-12 times the cube of the longest edge), duplicate tets, unreferenced vertices and several
-/// components (joined by faces) are an InputError that names the first one and the number of them, or dropped as
-/// `options` say. `file` is for the message.
+/// Throws InputError unless the bounding box's longest edge is from 1e-100 to 1e100 m: volumes beyond overflow.
+void require_extent(const VertexArray& vertices, const std::string& file);
+
+/// Makes a mesh sound: inverted tets are re-oriented; NaN, no extent, out-of-range indices, repeated corners,
+/// degenerate tets (volume at most 1e-12 times the cube of the longest edge), duplicate tets, unreferenced vertices and
+/// several components (joined by faces) are an InputError that names the first one and the number of them, or dropped
+/// as `options` say. `file` is for the message.
 MeshReport check_mesh(TetMesh& mesh, const std::string& file, const MeshCheckOptions& options);
 
 }  // namespace exmat

@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 
 namespace exmat {
 namespace {
@@ -26,7 +27,7 @@ void fail_at(const FileLine& line, const std::string& expected, const std::strin
 double read_real(const FileLine& line, Fields& fields, std::string_view what) {
   const std::string_view field = fields.next();
   const auto value = parse_real(field);
-  if (!value) fail_at(line, fmt::format("{}, a finite number", what), quote(field));
+  if (!value) fail_at(line, fmt::format("{}, a finite number", what), quote(field), advice_for_number(field));
   return *value;
 }
 
@@ -74,7 +75,7 @@ std::optional<FileLine> CommentedLines::next_plain_line() {
 }
 
 void CommentedLines::open(const std::filesystem::path& file) {
-  files_.push_back({file, read_whole_file(file, kind_)});
+  files_.push_back({file, read_text_file(file, kind_)});
   open_.push_back(&files_.back());
 }
 

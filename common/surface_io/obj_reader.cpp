@@ -7,6 +7,7 @@
 
 #include "common/surface_io/commented_lines.h"
 #include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/polygon_faces.h"
 #include "common/surface_io/surface_parts.h"
 #include "common/surface_io/text_input.h"
 
@@ -45,7 +46,7 @@ class ObjReader {
 
   CommentedLines lines_;
   std::vector<std::array<double, 3>> vertices_;
-  std::vector<std::array<std::int32_t, 3>> triangles_;
+  PolygonFaces faces_;
   // The largest index so far and its line: vertices may follow the faces.
   std::int64_t largest_ = -1;
   FileLine line_of_largest_;
@@ -63,13 +64,14 @@ SurfaceFile ObjReader::read() {
     read_statement(line);
   }
   if (vertices_.empty()) lines_.fail("vertices ('v x y z')");
-  if (triangles_.empty()) lines_.fail("faces ('f 1 2 3')");
+  if (faces_.triangles().empty()) lines_.fail("faces ('f 1 2 3')");
   if (largest_ >= std::ssize(vertices_))
     fail_at(line_of_largest_, fmt::format("vertices 1 to {}, which the file has", vertices_.size()),
             std::to_string(largest_ + 1));
+  faces_.cut_ears(vertices_, lines_.files().front());
   for (Naming& naming : namings_) name_part(naming, {});
   SurfaceFile surface;
-  surface.mesh = {vertex_array(vertices_), triangle_array(triangles_)};
+  surface.mesh = {vertex_array(vertices_), triangle_array(faces_.triangles())};
   surface.files = lines_.files();
   parts_.finish(surface, bytes_);
   return surface;
@@ -88,7 +90,7 @@ std::string ObjReader::whole_statement() {
 }
 
 void ObjReader::read_statement(const FileLine& line) {
-  Fields fields(line.text);
+  Fields fields(line.text, Fields::Separators::kBlanks);
   const std::string_view keyword = fields.next();
   if (keyword == "v") read_vertex(line, fields);
   if (keyword == "f") read_face(line, fields);
@@ -99,9 +101,9 @@ void ObjReader::read_statement(const FileLine& line) {
 }
 
 void ObjReader::name_part(Naming& naming, std::vector<std::string> names) {
-  for (const std::string& name : naming.names) parts_.add_triangles(name, naming.begin, triangles_.size());
+  for (const std::string& name : naming.names) parts_.add_triangles(name, naming.begin, faces_.triangles().size());
   naming.names = std::move(names);
-  naming.begin = triangles_.size();
+  naming.begin = faces_.triangles().size();
 }
 
 // A weight or a colour may follow.
@@ -116,7 +118,7 @@ void ObjReader::read_face(const FileLine& line, Fields fields) {
   std::vector<std::int32_t> polygon;
   for (auto field = fields.next(); !field.empty(); field = fields.next()) polygon.push_back(read_corner(line, field));
   if (polygon.size() < 3) fail_at(line, "a face of at least 3 vertices", std::to_string(polygon.size()));
-  add_fan(polygon, triangles_);
+  faces_.add(polygon);
 }
 
 // 'vertex', 'vertex/texture', 'vertex//normal' or 'vertex/texture/normal'.

@@ -9,7 +9,9 @@
 #include <string>
 #include <utility>
 
+#include "common/core/input_file.h"
 #include "common/surface_io/mesh_arrays.h"
+#include "common/surface_io/polygon_faces.h"
 #include "common/surface_io/text_input.h"
 #include "common/surface_io/value_cursor.h"
 
@@ -49,8 +51,8 @@ struct Element {
 
 class PlyReader {
  public:
-  PlyReader(std::string file, std::string_view bytes)
-      : cursor_(std::move(file), bytes, ValueCursor::Layout::kAnywhere) {}
+  PlyReader(const std::filesystem::path& file, std::string_view bytes)
+      : file_(file), cursor_(file.string(), bytes, ValueCursor::Layout::kAnywhere) {}
 
   SurfaceFile read();
 
@@ -66,11 +68,12 @@ class PlyReader {
   void read_list(const Element& element, const Property& property);
   void check_faces() const;
 
+  std::filesystem::path file_;
   ValueCursor cursor_;
   bool binary_ = false, swap_ = false;
   std::vector<Element> elements_;
   std::vector<std::array<double, 3>> vertices_;
-  std::vector<std::array<std::int32_t, 3>> triangles_;
+  PolygonFaces faces_;
   std::vector<std::array<double, 3>> colours_;  // of each vertex, where all three properties are there
 };
 
@@ -100,10 +103,15 @@ SurfaceFile PlyReader::read() {
     cursor_.fail("the end of the file", quote(extra), "check the counts of the header");
   }
   if (vertices_.empty()) cursor_.fail("vertices", "none");
-  if (triangles_.empty()) cursor_.fail("faces of at least 3 vertices", "none");
+  if (faces_.triangles().empty()) {
+    const bool strips = std::ranges::find(elements_, "tristrips", &Element::name) != elements_.end();
+    cursor_.fail("faces of at least 3 vertices", strips ? "triangle strips (the element tristrips)" : "none",
+                 strips ? "save it with faces, as MeshLab or Blender does" : "");
+  }
   check_faces();
+  faces_.cut_ears(vertices_, file_);
   SurfaceFile surface;
-  surface.mesh = {vertex_array(vertices_), triangle_array(triangles_)};
+  surface.mesh = {vertex_array(vertices_), triangle_array(faces_.triangles())};
   surface.colours = vertex_array(colours_);
   return surface;
 }
@@ -233,11 +241,11 @@ void PlyReader::read_list(const Element& element, const Property& property) {
     polygon.push_back(static_cast<std::int32_t>(index));
   }
   if (count < 3) cursor_.fail("a face of at least 3 vertices", fmt::format("{}", count));
-  add_fan(polygon, triangles_);
+  faces_.add(polygon);
 }
 
 void PlyReader::check_faces() const {
-  for (const auto& triangle : triangles_)
+  for (const auto& triangle : faces_.triangles())
     for (const auto corner : triangle)
       if (corner >= std::ssize(vertices_))
         cursor_.fail(fmt::format("faces of vertices from 0 to {}", vertices_.size() - 1), fmt::format("{}", corner));
@@ -246,8 +254,8 @@ void PlyReader::check_faces() const {
 }  // namespace
 
 SurfaceFile read_ply(const std::filesystem::path& file) {
-  const std::string bytes = read_whole_file(file, "a .ply file");
-  SurfaceFile surface = PlyReader(file.string(), bytes).read();
+  const std::string bytes = read_text_file(file, "a .ply file");
+  SurfaceFile surface = PlyReader(file, bytes).read();
   surface.files = {file};
   return surface;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <unordered_map>
 
+#include "common/core/input_file.h"
 #include "common/surface_io/mesh_arrays.h"
 #include "common/surface_io/surface_parts.h"
 #include "common/surface_io/text_input.h"
@@ -147,7 +148,7 @@ void StlReader::add_triangle(const std::array<Point, 3>& corners) {
 }  // namespace
 
 SurfaceFile read_stl(const std::filesystem::path& file) {
-  const std::string bytes = read_whole_file(file, "a .stl file");
+  const std::string bytes = read_text_file(file, "a .stl file");
   SurfaceFile surface = StlReader(file.string(), bytes).read();
   surface.files = {file};
   return surface;

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -32,8 +30,5 @@ struct SurfaceFile {
   std::vector<std::filesystem::path> files;  ///< every file that was read, the named one first
   std::vector<std::string> remarks;          ///< what a user should know of how the file was read, a sentence each
 };
-
-/// Appends the triangles of a polygon of at least three corners.
-void add_fan(const std::vector<std::int32_t>& polygon, std::vector<std::array<std::int32_t, 3>>& triangles);
 
 }  // namespace exmat

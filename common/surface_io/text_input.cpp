@@ -1,13 +1,8 @@
 #include "common/surface_io/text_input.h"
 
 #include <algorithm>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
-#include <cstring>
-#include <fstream>
-
-#include "common/core/error.h"
 
 namespace exmat {
 namespace {
@@ -33,26 +28,11 @@ std::optional<Number> parse_whole(std::string_view field) {
 
 }  // namespace
 
-std::string read_whole_file(const std::filesystem::path& file, const std::string& expected) {
-  const auto refuse = [&](const std::string& found) { throw InputError({file.string(), "", expected, found, ""}); };
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status)) refuse("no such file");
-  if (std::filesystem::is_directory(status)) refuse("a folder");
-  if (!std::filesystem::is_regular_file(status)) refuse("something that is not a regular file");
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) refuse(std::string("a file that cannot be opened (") + std::strerror(errno) + ")");
-  std::string bytes(std::filesystem::file_size(file), '\0');
-  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (!stream) refuse("a file that cannot be read to its end");
-  if (bytes.empty()) refuse("an empty file");
-  return bytes;
-}
-
 std::string_view Fields::next() {
-  const std::size_t begin = std::min(rest_.find_first_not_of(kSeparators), rest_.size());
+  const std::string_view between = separators_ == Separators::kBlanks ? kBlanks : kSeparators;
+  const std::size_t begin = std::min(rest_.find_first_not_of(between), rest_.size());
   rest_.remove_prefix(begin);
-  const std::size_t length = std::min(rest_.find_first_of(kSeparators), rest_.size());
+  const std::size_t length = std::min(rest_.find_first_of(between), rest_.size());
   const std::string_view field = rest_.substr(0, length);
   rest_.remove_prefix(length);
   return field;
@@ -64,6 +44,12 @@ std::optional<double> parse_real(std::string_view field) {
 }
 
 std::optional<std::int64_t> parse_integer(std::string_view field) { return parse_whole<std::int64_t>(field); }
+
+std::string advice_for_number(std::string_view field) {
+  std::string pointed(field);
+  std::ranges::replace(pointed, ',', '.');
+  return pointed != field && parse_real(pointed) ? "write numbers with decimal points" : "";
+}
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t begin = text.find_first_not_of(kBlanks);

@@ -47,7 +47,7 @@ double ValueCursor::read_real(std::string_view what) {
   if (!binary_) {
     const std::string_view word = read_word();
     const auto value = parse_real(word);
-    if (!value) fail(fmt::format("{}, a finite number", what), describe(word));
+    if (!value) fail(fmt::format("{}, a finite number", what), describe(word), advice_for_number(word));
     return *value;
   }
   const double value = read_binary<double>(what);

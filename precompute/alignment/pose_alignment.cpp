@@ -54,7 +54,8 @@ struct Fit {
   std::string start;
   Registered registered;
   VertexArray displacement;
-  double size = 0;  // of the displacement
+  double size = 0;    // of the displacement
+  double motion = 0;  // the same with the rotation of the whole pose
 };
 
 class PoseAligner {
@@ -96,6 +97,7 @@ class PoseAligner {
   std::vector<Fit> distinct_poses(std::vector<Fit> fits) const;
   std::vector<Fit> symmetric_copies(const Fit& taken) const;
   double limit(const std::vector<Fit>& fits) const;
+  double way_from_rest(const Fit& pose) const { return hints_.frame_unsaid ? pose.motion : pose.size; }
   const Fit& choose(const std::vector<Fit>& poses) const;
   Registered turn_to_landmarks(VertexArray positions) const;
   Registered settle(const VertexArray& positions) const;
@@ -240,11 +242,12 @@ std::vector<Start> PoseAligner::distinct(std::vector<Start> starts) const {
 
 Fit PoseAligner::fit(const std::string& start, Registered registered) const {
   VertexArray positions = centred(registered.positions);
+  const double motion = norm(positions - rest_.mesh.vertices);
   if (hints_.free_frame)
     positions *= procrustes_rotation(rest_.mesh.vertices.transpose() * (rest_.basis.mass * positions)).transpose();
   VertexArray displacement = positions - rest_.mesh.vertices;
   const double size = norm(displacement);
-  return {start, std::move(registered), std::move(displacement), size};
+  return {start, std::move(registered), std::move(displacement), size, motion};
 }
 
 // All are begun. Those that are sure and the best of the others are gone on with.
@@ -286,13 +289,14 @@ double PoseAligner::limit(const std::vector<Fit>& poses) const {
   return std::max(kCompeting * least, least + kCompetingFloor);
 }
 
-// Of the poses that fit, the one nearest to rest; with landmarks, the one that fits best.
+// Of the poses that fit, the one nearest to rest, as it stands where the frame is not said; with landmarks, the one
+// that fits best.
 const Fit& PoseAligner::choose(const std::vector<Fit>& poses) const {
   if (has_landmarks()) return poses.front();
   const double most = limit(poses);
   const Fit* taken = &poses.front();
   for (const Fit& pose : poses)
-    if (pose.registered.objective() <= most && pose.size < taken->size) taken = &pose;
+    if (pose.registered.objective() <= most && way_from_rest(pose) < way_from_rest(*taken)) taken = &pose;
   return *taken;
 }
 

@@ -22,6 +22,7 @@ struct AlignmentHints {
   bool free_frame = false;          ///< the pose may be rotated in space
   Correspondences correspondences;  ///< landmarks, or a dense map
   bool landmarks_alone = false;     ///< no starts but from the correspondences
+  bool frame_unsaid = false;        ///< of free_frame: nobody says so, and of poses that fit the least moved is meant
 };
 
 /// A landmark that contradicts the others.

@@ -17,10 +17,7 @@ AssetConfig asset_from(const std::filesystem::path& asset_or_surface, const std:
                         asset_or_surface.string(), ""});
     return load_asset(asset_or_surface);
   }
-  const auto text = [&](const std::filesystem::path& folder) {
-    return precompute::assumed_asset(asset_or_surface, folder);
-  };
-  const Json assumed = text(asset_or_surface.parent_path());
+  const Json assumed = precompute::assumed_asset(asset_or_surface, asset_or_surface.parent_path());
   AssetConfig asset = asset_of(assumed, asset_or_surface);
   const auto& material = asset.material;
   log::info(
@@ -29,11 +26,20 @@ AssetConfig asset_from(const std::filesystem::path& asset_or_surface, const std:
                   asset_or_surface.string(), asset.examples.size(), *asset.cells, *material.youngs_modulus,
                   *material.poisson_ratio, *material.density, asset.fixed ? "clamped at _FIXED" : "a free body",
                   write_to.empty() ? "; --write-asset FILE writes them down" : ""));
-  if (!write_to.empty()) {
-    write_file_atomically(write_to, text(write_to.parent_path()).dump(2) + "\n");
-    log::info(fmt::format("{}: written", write_to.string()));
-  }
+  for (const ExampleConfig& example : asset.examples)
+    if (example.name != *example.morph)
+      log::info(fmt::format("the morph target \"{}\" is the example \"{}\"", *example.morph, example.name));
+  if (asset.examples.empty())
+    log::info(
+        fmt::format("{}: no morph target that moves a vertex, so the bundle has no examples; add shape keys to the "
+                    "file, or name poses in an asset file",
+                    asset_or_surface.string()));
   return asset;
+}
+
+void write_assumed_asset(const std::filesystem::path& surface, const std::filesystem::path& write_to) {
+  write_file_atomically(write_to, precompute::assumed_asset(surface, write_to.parent_path()).dump(2) + "\n");
+  log::info(fmt::format("{}: written", write_to.string()));
 }
 
 }  // namespace exmat

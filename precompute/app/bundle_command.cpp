@@ -8,12 +8,15 @@
 #include "common/bundle/bundle.h"
 #include "common/bundle/file_schemas.h"
 #include "common/config/config.h"
+#include "common/config/json_file.h"
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/hdf5/schema.h"
 #include "common/mesh/geometry.h"
 #include "precompute/app/asset_input.h"
+#include "precompute/examples/alignment_report.h"
 #include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/pipeline/depfile.h"
 #include "precompute/pipeline/run_report.h"
@@ -99,6 +102,7 @@ bool is_up_to_date(const BundleOptions& options, const AssetConfig& asset, const
   if (!std::filesystem::exists(options.bundle)) return false;
   precompute::read_inputs(asset, needs, report, build);
   try {
+    const OwnOutputRead own;
     const BundleSummary summary = summarise_bundle(options.bundle);
     return summary.input_sha256 == report.input_sha256 && summary.format_version == bundle_schema().format_version;
   } catch (const InputError& error) {
@@ -114,21 +118,44 @@ void write_depfile(const BundleOptions& options, const BuildReport& report) {
   write_file_atomically(options.depfile, precompute::depfile_text(options.bundle, files));
 }
 
-// Better refused now than after the work.
-void require_writable(const BundleOptions& options) {
-  for (const std::string& file : {options.bundle, options.depfile})
-    if (!file.empty()) const AtomicFile writable(file);
+void claim_writable(const std::string& file, const char* role) {
+  if (file.empty()) return;
+  claim_output(file, role);
+  const AtomicFile writable(file);
+}
+
+/// Refuses now what would fail, or destroy an input, after the work.
+void claim_outputs(const BundleOptions& options) {
+  check_input(options.asset, "an asset file or a surface");
+  if (!options.scene.empty()) check_input(options.scene, "a scene file");
+  claim_writable(options.bundle, "-o");
+  claim_writable(options.depfile, "--depfile");
+  claim_writable(options.write_asset, "--write-asset");
+  if (!options.depfile.empty()) precompute::depfile_text(options.bundle, {options.asset, options.scene});
+}
+
+/// Claims what depends on the asset, and names inputs that are read late.
+void claim_outputs(const BundleOptions& options, const AssetConfig& asset, const std::optional<SceneConfig>& scene) {
+  if (!options.alignment_report.empty()) precompute::claim_alignment_report(asset, options.alignment_report);
+  if (!scene) return;
+  for (const ObstacleConfig& obstacle : scene->obstacles) {
+    if (const auto* mesh = std::get_if<MeshConfig>(&obstacle.shape)) check_input(mesh->file, "a surface");
+    if (const auto* heights = std::get_if<HeightFieldConfig>(&obstacle.shape); heights && heights->file)
+      check_input(*heights->file, "a text file of heights");
+  }
 }
 
 /// Sets `model` where it makes one.
 void make_bundle(const BundleOptions& options, RunReport& report, std::optional<ReducedModel>& model) {
+  claim_outputs(options);
   const AssetConfig asset = asset_from(options.asset, options.write_asset);
   std::optional<SceneConfig> scene;
   if (!options.scene.empty()) scene = load_scene(options.scene);
+  claim_outputs(options, asset, scene);
+  if (!options.write_asset.empty()) write_assumed_asset(options.asset, options.write_asset);
   const Needs needs = precompute::resolve_needs(asset, scene_needs(options, scene, asset));
   const precompute::BuildOptions build{options.alignment_report, options.cache, scene ? &*scene : nullptr,
                                        options.training_budget};
-  require_writable(options);
   if (options.if_changed && is_up_to_date(options, asset, needs, build, report.build)) {
     log::info(fmt::format("{}: its inputs have not changed, nothing to do", options.bundle));
     write_depfile(options, report.build);
@@ -170,6 +197,19 @@ void save(const BundleOptions& options, const RunReport& report, const std::opti
           "\n");
 }
 
+/// True where nothing but a report of an earlier run is replaced. A run that failed may not have read all its inputs
+/// yet: another file of that name could be one of them.
+bool replaces_report_alone(const std::string& report) {
+  if (!std::filesystem::exists(report)) return true;
+  try {
+    const OwnOutputRead own;
+    check_against_schema(read_json(report), "report", report);
+  } catch (const InputError&) {
+    return false;
+  }
+  return true;
+}
+
 // The failure itself is what the program ends with, even where its report cannot be written.
 void save_failure(const BundleOptions& options, RunReport& report, const std::exception& failure,
                   const std::optional<ReducedModel>& model) {
@@ -178,6 +218,8 @@ void save_failure(const BundleOptions& options, RunReport& report, const std::ex
   report.exit_status = static_cast<int>(dynamic_cast<const InputError*>(&failure) != nullptr ? ExitStatus::kBadInput
                                                                                              : ExitStatus::kFailure);
   try {
+    if (!replaces_report_alone(options.report))
+      throw WorkError(fmt::format("the report is not written: {} is no report of this version", options.report));
     save(options, report, model);
   } catch (const std::exception& error) {
     log::error(error.what());
@@ -190,7 +232,7 @@ void bundle_command(const BundleOptions& options) {
   RunReport report{.asset = options.asset, .bundle = options.bundle};
   std::optional<ReducedModel> model;
   if (options.report.empty()) return make_bundle(options, report, model);
-  { const AtomicFile writable(options.report); }
+  claim_writable(options.report, "--report");
   const WarningRecorder recorder(report.warnings);
   try {
     make_bundle(options, report, model);

@@ -1,11 +1,10 @@
 #include "precompute/app/full_space_command.h"
 
-#include <filesystem>
 #include <fmt/format.h>
 
 #include "common/config/config.h"
-#include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/hdf5/xdmf.h"
 #include "precompute/study/measure/full_space_trajectory.h"
 
 namespace exmat {
@@ -28,23 +27,14 @@ void print_summary(const precompute::FullSpaceSummary& summary, const SceneConfi
   print("trajectory", fmt::format("{}, {} frames", trajectory, summary.frames));
 }
 
-// What would be written over: the bundle, or the trajectory by its own .xdmf.
-void require_own_file(const SceneConfig& config, const std::filesystem::path& trajectory) {
-  std::error_code ignored;
-  if (trajectory.extension() == ".xdmf")
-    throw InputError({trajectory.string(), "", "an HDF5 file, beside which the .xdmf is written", "\".xdmf\"",
-                      "give it the extension .h5"});
-  if (std::filesystem::equivalent(config.bundle, trajectory, ignored))
-    throw InputError({trajectory.string(), "", "another file than the bundle of the scene", "the bundle", ""});
-}
-
 }  // namespace
 
 void full_space_command(const FullSpaceCommandOptions& options) {
+  claim_trajectory(options.trajectory, "-o");
   SceneConfig config = load_scene(options.scene);
+  require_bundle(config);
   if (options.steps) config.steps = *options.steps;
   if (options.every) config.every = *options.every;
-  require_own_file(config, options.trajectory);
   const precompute::FullSpaceSummary summary = precompute::write_full_space(config, options.trajectory);
   if (summary.unconverged > 0)
     log::warning(fmt::format("{} of {} steps did not reach the tolerance; a smaller time_step may help",

@@ -12,6 +12,7 @@
 #include "precompute/app/mesh_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
+#include "precompute/examples/alignment_report.h"
 #include "precompute/pipeline/build_reduced_model.h"
 #include "precompute/solvers/ranks.h"
 #include "precompute/solvers/semidefinite_solver.h"
@@ -37,6 +38,7 @@ void print_alignments(const std::vector<precompute::AlignmentOutcome>& outcomes)
 void check(const CheckOptions& options) {
   precompute::BuildReport report;
   const AssetConfig asset = asset_from(options.asset);
+  if (!options.alignment_report.empty()) precompute::claim_alignment_report(asset, options.alignment_report);
   const auto outcomes = precompute::check_inputs(asset, options.alignment_report, report);
   if (!outcomes.empty()) print_alignments(outcomes);
   precompute::require_aligned(asset, outcomes, report.warnings);
@@ -73,7 +75,7 @@ int run(std::vector<char*> words) {
   bundle_command_line
       ->add_option("--training-budget", options.training_budget,
                    "seconds after which no run of training begins; the bundle then depends on the machine's speed")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   bundle_command_line->add_flag("--if-changed", options.if_changed,
                                 "do nothing where the bundle was made of the same inputs by this version");
 
@@ -98,7 +100,7 @@ int run(std::vector<char*> words) {
                     ->check(CLI::Range(50, 2000000));
   mesh_command_line
       ->add_option("--cell-size", mesh_options.settings.cell_size, "radius of the sphere about a tet, at most [m]")
-      ->check(CLI::PositiveNumber)
+      ->check(positive_number())
       ->excludes(cells);
 
   StudyCommandOptions study_options;
@@ -120,12 +122,12 @@ int run(std::vector<char*> words) {
   study_command_line
       ->add_option("--budget-us", study_options.budget_us,
                    "recommend the most accurate point of at most so many us a step")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   study_command_line
       ->add_option(
           "--max-error", study_options.max_error,
           "recommend the fastest point of at most so many percent of error: of shape of a free body, else of position")
-      ->check(CLI::PositiveNumber);
+      ->check(positive_number());
   study_command_line
       ->add_option("--jobs", study_options.jobs,
                    "processes that run points; times are measured by one. With --stability runs at a time")

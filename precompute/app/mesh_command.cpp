@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "common/core/timer.h"
 #include "common/mesh/geometry.h"
@@ -34,8 +36,9 @@ void print_cage(const MeshCommandOptions& options, const SurfaceFile& surface, c
 }  // namespace
 
 void mesh_command(const MeshCommandOptions& options) {
+  claim_output(options.mesh, "-o");
   { const AtomicFile writable(options.mesh); }
-  if (std::filesystem::path(options.mesh).extension() != ".msh")
+  if (lower_extension(options.mesh) != ".msh")
     throw InputError({options.mesh, "", "a mesh to write with the extension .msh", "another", ""});
   const SurfaceFile surface = precompute::read_surface_file(options.surface);
   for (const std::string& remark : surface.remarks) log::info(fmt::format("{}: {}", options.surface, remark));

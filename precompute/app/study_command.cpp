@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <string>
 
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "precompute/study/stability/scene_study.h"
@@ -64,6 +65,9 @@ void world_study_command(const StudyCommandOptions& options, const precompute::S
 }  // namespace
 
 void study_command(const StudyCommandOptions& options) {
+  for (const char* name : {"report.html", "results.csv", "results.json", "sources.md", "sources.csv", "sources.svg",
+                           "recommended_asset.json", "recommended_scene.json"})
+    claim_output(std::filesystem::path(options.folder) / name, "-o");
   precompute::StudyOptions how{.folder = options.folder, .jobs = options.jobs, .budget = {}};
   if (options.budget_us) how.budget.seconds = 1e-6 * *options.budget_us;
   if (options.max_error) how.budget.error = 1e-2 * *options.max_error;

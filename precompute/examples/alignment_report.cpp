@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/core/markup.h"
@@ -147,6 +148,14 @@ std::string alignment_page(const std::string& title, const TetMesh& rest, const 
       100 * kFarthest);
   for (const ReportedPose& pose : poses) body += section(rest, pose);
   return html_page(title + ": alignment of the examples", body, style);
+}
+
+void claim_alignment_report(const AssetConfig& asset, const std::filesystem::path& folder) {
+  claim_output(folder / "index.html", "--alignment-report");
+  for (const ExampleConfig& example : asset.examples)
+    for (const char* ending : {".vtk", "_example.vtk", ".svg"})
+      claim_output(folder / (file_name(example.name) + ending),
+                   fmt::format("--alignment-report, example {}", example.name));
 }
 
 void write_alignment_report(const std::string& asset, const TetMesh& object, const ExampleInput& input,

@@ -17,6 +17,9 @@ namespace exmat::precompute {
 void write_alignment_report(const std::string& asset, const TetMesh& object, const ExampleInput& input,
                             const ShapeStage& stage, const std::filesystem::path& folder);
 
+/// Claims the files that write_alignment_report() will write, as outputs of the command. Throws InputError.
+void claim_alignment_report(const AssetConfig& asset, const std::filesystem::path& folder);
+
 /// Legacy VTK text of a tet mesh, with a vector field at its vertices [n x 3] where it has rows.
 std::string vtk_text(const TetMesh& mesh, const VertexArray& displacement, const std::string& title);
 

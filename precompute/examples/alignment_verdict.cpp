@@ -24,8 +24,21 @@ constexpr double kNoPose = 0.03;
 const std::string kLandmarks = "alignment.landmarks (8 vertices that do not lie in a plane)";
 const std::string kSameMesh = "a pose of the rest example's own mesh, which needs no alignment";
 
-void judge_competitors(const PoseAlignment& alignment, bool free_frame, AlignmentOutcome& outcome) {
+// A surface that is met this well is that of the rest example's body: what is left to doubt is which of its poses it
+// is.
+constexpr double kMet = 0.05;
+
+// Examples stand alike as a rule, so the least moved pose is meant unless the asset says that frames are free.
+void judge_competitors(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame,
+                       AlignmentOutcome& outcome) {
   if (!alignment.ambiguous) return;
+  if (frame != AlignmentFrame::kFree && alignment.residual <= kMet)
+    return object_to(
+        outcome, AlignmentVerdict::kDoubtful,
+        fmt::format("{} other pose{} as well, for the body is nearly symmetric; taken is the one nearest to "
+                    "the rest example as it stands. If it is another one, give {}, or {}",
+                    alignment.competing_maps, alignment.competing_maps == 1 ? " fits" : "s fit", kLandmarks,
+                    kSameMesh));
   const std::string others = alignment.competing_maps == 1
                                  ? "another pose fits as well"
                                  : fmt::format("{} other poses fit as well", alignment.competing_maps);
@@ -109,8 +122,9 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
   outcome.doubt = alignment.doubt;
   outcome.inverted_fraction = alignment.inverted_fraction;
   outcome.competing_maps = alignment.competing_maps;
+  const bool met = frame != AlignmentFrame::kFree && alignment.residual <= kMet;
   if (alignment.mirrored)
-    object_to(outcome, AlignmentVerdict::kRefused,
+    object_to(outcome, met ? AlignmentVerdict::kDoubtful : AlignmentVerdict::kRefused,
               fmt::format("the mirror image of the rest example fits: its surface is {:.1f} % from the pose's (of the "
                           "body's size), the rest example's own {:.1f} %; mirror the example back, or give {}",
                           100 * alignment.mirror_residual, 100 * alignment.residual, kSameMesh));
@@ -122,7 +136,7 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
           : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
   judge_doubt(outcome, advice);
   judge_residual(outcome, advice);
-  judge_competitors(alignment, free_frame, outcome);
+  judge_competitors(alignment, frame, free_frame, outcome);
   judge_revolution(alignment, outcome);
   if (frame == AlignmentFrame::kAuto && !free_frame) judge_turn(alignment, outcome);
 }

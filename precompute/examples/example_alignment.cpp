@@ -205,7 +205,8 @@ std::vector<Eigen::Index> ExampleAligner::landmark_numbers(const PoseInput& pose
 }
 
 AlignedPose ExampleAligner::registered(const AlignedRest& rest, const PoseInput& pose, const Placing& placing) {
-  AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != AlignmentMethod::kAuto};
+  AlignmentHints hints{rest.free_poses, correspondences(rest, pose), asset_.alignment.method != AlignmentMethod::kAuto,
+                       rest.free_poses && asset_.alignment.frame == AlignmentFrame::kAuto};
   const bool is_mapped = pose.on_object.size() > 0;
   hints.landmarks_alone = hints.landmarks_alone || is_mapped;
   const AlignedShape shape = aligned_shape(pose.mesh, 0, pose.name, placing);

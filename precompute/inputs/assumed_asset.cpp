@@ -4,10 +4,13 @@
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
+#include <set>
 #include <string>
 #include <string_view>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
+#include "common/core/log.h"
 #include "precompute/mesh_io/surface_file.h"
 #include "precompute/meshing/cage.h"
 
@@ -17,6 +20,7 @@ namespace {
 constexpr std::array<std::string_view, 5> kExtensions = {".glb", ".gltf", ".obj", ".ply", ".stl"};
 constexpr double kDensity = 1000, kGravity = 9.81;  // [kg/m^3], [m/s^2]
 constexpr const char* kClamp = "_FIXED";
+constexpr std::size_t kLongestName = 64, kMostExamples = 64;  // of schemas/asset.json
 
 // With two digits: what is assumed is no measurement.
 double rounded(double value) {
@@ -33,17 +37,46 @@ double assumed_modulus(const VertexArray& vertices, const std::filesystem::path&
   return rounded(modulus);
 }
 
+// As many bytes at most, cut between characters of UTF-8.
+std::string cut(const std::string& text, std::size_t bytes) {
+  if (text.size() <= bytes) return text;
+  while (bytes > 0 && (static_cast<unsigned char>(text[bytes]) & 0xc0U) == 0x80U) --bytes;
+  return text.substr(0, bytes);
+}
+
 }  // namespace
 
+std::vector<std::string> example_names(const std::vector<std::string>& morphs) {
+  constexpr std::array<std::string_view, 5> kReserved{".", "..", "gram", "h0", "hq"};
+  std::set<std::string> taken(morphs.begin(), morphs.end());  // a safe name goes to the target that has it
+  std::vector<std::string> names;
+  for (const std::string& morph : morphs) {
+    std::string name = morph;
+    for (char& c : name)
+      if (c == '/' || static_cast<unsigned char>(c) < 0x20 || c == 0x7f) c = '_';
+    name = cut(name, kLongestName);
+    if (std::ranges::find(kReserved, name) != kReserved.end()) name += '_';
+    if (name == morph && std::ranges::find(names, name) == names.end()) {
+      names.push_back(name);
+      continue;
+    }
+    const std::string stem = cut(name, kLongestName - 6);
+    for (int number = 2; taken.contains(name); ++number) name = fmt::format("{} {}", stem, number);
+    taken.insert(name);
+    names.push_back(name);
+  }
+  return names;
+}
+
 bool is_surface_file(const std::filesystem::path& file) {
-  return std::ranges::find(kExtensions, file.extension().string()) != kExtensions.end();
+  return std::ranges::find(kExtensions, lower_extension(file)) != kExtensions.end();
 }
 
 Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::path& folder) {
   const SurfaceFile file = read_surface_file(surface);
   const auto here = std::filesystem::current_path();  // absolute() refuses an empty path
   const auto path = (here / surface).lexically_normal().lexically_proximate((here / folder).lexically_normal());
-  Json asset = {{"name", surface.stem().string().substr(0, 64)},
+  Json asset = {{"name", cut(surface.stem().string(), kLongestName)},
                 {"object",
                  {{"surface", path.string()},
                   {"cells", kDefaultCells},
@@ -58,7 +91,15 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                 {"seed", 1}};
   if (file.parts.contains(kClamp)) asset["object"]["fixed"] = {{"part", kClamp}};
   Json examples = Json::array();
-  for (const MorphTarget& morph : file.morphs) examples.push_back({{"name", morph.name}, {"morph", morph.name}});
+  std::vector<std::string> morphs;
+  for (const MorphTarget& morph : file.morphs) morphs.push_back(morph.name);
+  if (morphs.size() > kMostExamples) {
+    log::info(fmt::format("{}: of {} morph targets the first {} are examples; an asset file may name others",
+                          surface.string(), morphs.size(), kMostExamples));
+    morphs.resize(kMostExamples);
+  }
+  const std::vector<std::string> names = example_names(morphs);
+  for (std::size_t k = 0; k < names.size(); ++k) examples.push_back({{"name", names[k]}, {"morph", morphs[k]}});
   if (!examples.empty()) asset["examples"] = examples;
   return asset;
 }

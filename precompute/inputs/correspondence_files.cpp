@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/surface_io/text_input.h"
 
 namespace exmat::precompute {
@@ -65,7 +66,7 @@ class LineReader {
 }  // namespace
 
 IndexMatrix read_landmarks(const std::filesystem::path& file, const std::vector<Eigen::Index>& sizes) {
-  const std::string text = read_whole_file(file, "a text file of landmarks");
+  const std::string text = read_text_file(file, "a text file of landmarks");
   const auto lines = lines_of(text);
   if (lines.empty()) throw InputError({file.string(), "", "lines of vertex numbers", "none", ""});
   const LineReader reader(file);
@@ -79,7 +80,7 @@ IndexMatrix read_landmarks(const std::filesystem::path& file, const std::vector<
 }
 
 IndexVector read_vertex_map(const std::filesystem::path& file, Eigen::Index object_size, Eigen::Index example_size) {
-  const std::string text = read_whole_file(file, "a text file of vertex numbers");
+  const std::string text = read_text_file(file, "a text file of vertex numbers");
   const auto lines = lines_of(text);
   if (std::ssize(lines) != object_size)
     throw InputError({file.string(), "", fmt::format("{} lines, one for each vertex of the object", object_size),

@@ -11,6 +11,7 @@
 #include "precompute/cache/sha256.h"
 #include "precompute/inputs/correspondence_files.h"
 #include "precompute/inputs/object_materials.h"
+#include "precompute/inputs/object_size.h"
 #include "precompute/inputs/object_surface.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/surface_file.h"
@@ -46,8 +47,9 @@ void log_report(const std::string& name, const TetMesh& mesh, const MeshReport& 
     log::warning(fmt::format("{}: dropped {} smaller components", name, report.dropped_components));
 }
 
-MeshFile read_recorded(const std::filesystem::path& path, InputFiles& files) {
+MeshFile read_recorded(const std::filesystem::path& path, const AssetConfig& asset, InputFiles& files) {
   MeshFile file = read_mesh(path);
+  file.mesh.vertices *= asset.length_unit;
   files.insert(files.end(), file.files.begin(), file.files.end());
   return file;
 }
@@ -206,9 +208,8 @@ void ExampleReader::read_rest() {
 
 // Tets of a file, or those that enclose a surface of its own.
 MeshFile ExampleReader::read_tets(const ExampleConfig& example) {
-  if (!example.surface) return read_recorded(example.mesh, files_);
-  const SurfaceFile surface = read_surface_file(*example.surface);
-  files_.insert(files_.end(), surface.files.begin(), surface.files.end());
+  if (!example.surface) return read_recorded(example.mesh, asset_, files_);
+  const SurfaceFile surface = read_recorded_surface(*example.surface, asset_, files_);
   SurfaceMesh mesh = surface.mesh;
   if (example.morph) mesh.vertices = morph_target(surface, *example.morph, *example.surface);
   MeshFile file;
@@ -265,6 +266,7 @@ void ExampleReader::read_pose(const ExampleConfig& example) {
     meshes_[example.name] = {{rest_numbers_.kept, file.mesh.vertex_count()}, file.mesh.vertices};
     if (!pose.mesh.vertices.allFinite())
       throw InputError({path.string(), "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
+    require_extent(pose.mesh.vertices, path.string());
     const Eigen::VectorXd volumes = tet_volumes(pose.mesh);
     pose.inverted_fraction = (-volumes).cwiseMax(0).sum() / volumes.cwiseAbs().sum();
     refuse_inverted(pose);
@@ -389,7 +391,7 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
     object.surface = std::make_shared<const ObjectSurface>(asset, files, cache);
     file.mesh = object.surface->cage().mesh;
   } else {
-    file = read_recorded(asset.object_mesh, files);
+    file = read_recorded(asset.object_mesh, asset, files);
   }
   const auto checked = check(std::move(file), asset.object_mesh, asset.object_drop);
   const VertexFlagger flag(asset, checked, object.surface, files);
@@ -399,6 +401,7 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
   object.materials =
       object_materials(object.surface ? with_tets_of_surface(asset, *object.surface, file_mesh) : asset, file_mesh,
                        checked.file.tet_sets, checked.file.materials, checked.report.kept_tets, files);
+  require_numbers(object.mesh, object.materials, asset.file.string());
   object.fixed = flag(asset.fixed, 0);
   object.contact = flag(asset.contact_vertices, 1);
   if (asset.training.loads)
@@ -424,8 +427,8 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
                             std::vector<std::string>& warnings) {
   const std::string name = asset.render_mesh->string();
   const bool is_object = object.surface && asset.render_mesh == asset.object_surface;
-  SurfaceMesh surface = is_object ? object.surface->file().mesh : read_surface(*asset.render_mesh);
-  if (!is_object) files.push_back(*asset.render_mesh);
+  SurfaceMesh surface =
+      is_object ? object.surface->file().mesh : read_recorded_surface(*asset.render_mesh, asset, files).mesh;
   const Embedding embedding =
       is_object ? object.surface->embedding() : embed_points(object.mesh, surface.vertices, name);
   const double share = embedding.farthest / bounding_box_diagonal(object.mesh.vertices);

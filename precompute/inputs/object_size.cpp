@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
 
@@ -10,15 +11,23 @@ namespace {
 
 constexpr double kGravity = 9.81;  // [m/s^2]
 
+/// Of the bounding box [m].
+double longest_edge(const TetMesh& mesh) {
+  return (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).maxCoeff();
+}
+
 }  // namespace
 
 std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
-  const double length = (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).maxCoeff();
+  const double length = longest_edge(mesh);
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   const double density = materials.density.dot(volumes) / volumes.sum(),
                modulus = materials.youngs_modulus.dot(volumes) / volumes.sum();
   const double strain = density * kGravity * length / modulus;
-  const std::string advice = "are its numbers millimetres? They are read as metres, its material as kg/m^3 and Pa";
+  const std::string advice =
+      "are its numbers millimetres or centimetres? Then say so by object.unit of the asset, \"mm\" or \"cm\" "
+      "(--write-asset "
+      "FILE writes the asset of a surface); they are read as metres, its material as kg/m^3 and Pa";
   if (strain > 1)
     return fmt::format(
         "the object is {:.3g} m long and too soft to bear its own weight ({:.3g} kg/m^3 x 9.81 m/s^2 x "
@@ -26,6 +35,20 @@ std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
         length, density, strain, modulus, advice);
   if (length > kLargest) return fmt::format("the object is {:.3g} m long; {}", length, advice);
   return {};
+}
+
+void require_numbers(const TetMesh& mesh, const TetMaterials& materials, const std::string& file) {
+  const double length = longest_edge(mesh);
+  const auto require = [&](const char* member, const Eigen::VectorXd& values, double factor, const char* product) {
+    for (const double value : {values.minCoeff(), values.maxCoeff()}) {
+      if (value * factor >= 1e-60 && value * factor <= 1e60) continue;
+      throw InputError({file, std::string("/object/material/") + member,
+                        fmt::format("a number whose {} is from 1e-60 to 1e60", product),
+                        fmt::format("{:g} of a body {:.3g} m long", value, length), "mend the number or its unit"});
+    }
+  };
+  require("density", materials.density, length * length * length, "product with the cube of the length");
+  require("youngs_modulus", materials.youngs_modulus, length, "product with the length");
 }
 
 void warn_of_size(const ObjectInput& object, const std::string& name, std::vector<std::string>& warnings) {

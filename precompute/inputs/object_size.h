@@ -12,6 +12,10 @@ namespace exmat::precompute {
 /// as high as the body is long, is below 1 (Galilei 1638). Stiff ones, which bear any, are at most kLargest long.
 std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials);
 
+/// Throws InputError where masses or stiffnesses of the body are beyond what numbers of 16 digits and their products
+/// hold: density x length^3 and Young's modulus x length from 1e-60 to 1e60. `file` of the asset.
+void require_numbers(const TetMesh& mesh, const TetMaterials& materials, const std::string& file);
+
 /// Warns (in the log and in `warnings`) of that. `name` of the object's file.
 void warn_of_size(const ObjectInput& object, const std::string& name, std::vector<std::string>& warnings);
 

@@ -8,13 +8,6 @@
 namespace exmat::precompute {
 namespace {
 
-SurfaceFile read_recorded(const std::filesystem::path& path, InputFiles& files) {
-  SurfaceFile file = read_surface_file(path);
-  files.insert(files.end(), file.files.begin(), file.files.end());
-  for (const std::string& remark : file.remarks) log::info(fmt::format("{}: {}", path.string(), remark));
-  return file;
-}
-
 Cage cached_cage(const SurfaceMesh& surface, const AssetConfig& asset, const std::string& name, StageCache& cache) {
   const CageSettings settings{asset.cells, asset.cell_size};
   return cache.get(
@@ -36,9 +29,18 @@ std::string list_of(const Named& named, const char* none) {
 
 }  // namespace
 
+SurfaceFile read_recorded_surface(const std::filesystem::path& path, const AssetConfig& asset, InputFiles& files) {
+  SurfaceFile file = read_surface_file(path);
+  file.mesh.vertices *= asset.length_unit;
+  for (MorphTarget& morph : file.morphs) morph.positions *= asset.length_unit;
+  files.insert(files.end(), file.files.begin(), file.files.end());
+  for (const std::string& remark : file.remarks) log::info(fmt::format("{}: {}", path.string(), remark));
+  return file;
+}
+
 ObjectSurface::ObjectSurface(const AssetConfig& asset, InputFiles& files, StageCache& cache)
     : asset_(asset),
-      file_(read_recorded(*asset.object_surface, files)),
+      file_(read_recorded_surface(*asset.object_surface, asset, files)),
       cage_(cached_cage(file_.mesh, asset, asset.object_surface->string(), cache)),
       embedding_(embed_points(cage_.mesh, file_.mesh.vertices, asset.object_surface->string())),
       tree_(file_.mesh.vertices, file_.mesh.triangles) {}
@@ -79,10 +81,13 @@ IdSelection ObjectSurface::nearest_to(const Eigen::VectorXd& marks, const Vertex
 std::optional<VertexArray> ObjectSurface::posed(const ExampleConfig& example, InputFiles& files) const {
   if (example.frame) {
     files.push_back(*example.surface);
-    return read_point_cache_frame(*example.surface, *example.frame, file_.mesh.vertices.rows());
+    VertexArray posed = read_point_cache_frame(*example.surface, *example.frame, file_.mesh.vertices.rows());
+    posed *= asset_.length_unit;
+    settle_loose_vertices(file_.mesh.triangles, posed);
+    return posed;
   }
   if (!example.surface) return morph_target(file_, *example.morph, *asset_.object_surface);
-  const SurfaceFile other = read_recorded(*example.surface, files);
+  const SurfaceFile other = read_recorded_surface(*example.surface, asset_, files);
   if (other.mesh.vertices.rows() != file_.mesh.vertices.rows() || other.mesh.triangles != file_.mesh.triangles)
     return std::nullopt;
   return example.morph ? morph_target(other, *example.morph, *example.surface) : other.mesh.vertices;

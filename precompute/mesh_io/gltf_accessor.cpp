@@ -119,9 +119,7 @@ RowMatrix GltfAccessors::read(int accessor, bool normalized) const {
   const tinygltf::Accessor& source = at(accessor);
   const std::string place = place_of(accessor);
   const int components = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(source.type));
-  if (source.bufferView < 0 && !source.sparse.isSparse)
-    fail(place, "a view of a buffer", "none", "if the mesh is compressed, export without compression");
-  Rows rows;
+  Rows rows;  // an accessor without a view is zeros, but for its sparse rows
   if (source.bufferView >= 0)
     rows = rows_of(source.bufferView, source.byteOffset, source.count, source.componentType, components, place);
   RowMatrix values = RowMatrix::Zero(static_cast<Eigen::Index>(source.count), components);
@@ -182,8 +180,9 @@ std::vector<std::uint32_t> GltfAccessors::read_indices(int accessor, std::size_t
   if (!is_scalar(accessor) || !is_index_type(source.componentType))
     fail(place, "SCALAR of unsigned integers, of corners", "another type");
   if (source.sparse.isSparse) fail(place, "corners that are not sparse", "sparse ones");
-  const Rows rows = rows_of(source.bufferView, source.byteOffset, source.count, source.componentType, 1, place);
   std::vector<std::uint32_t> indices(source.count);
+  if (source.bufferView < 0) return indices;
+  const Rows rows = rows_of(source.bufferView, source.byteOffset, source.count, source.componentType, 1, place);
   for (std::size_t k = 0; k < indices.size(); ++k) {
     indices[k] = index(rows.at(k), source.componentType);
     if (indices[k] >= end) fail(place, fmt::format("vertices below {}", end), std::to_string(indices[k]));

@@ -11,7 +11,8 @@
 namespace exmat::precompute {
 
 /// The arrays of a glTF file. What an accessor says is checked before anything is read or allocated: views, strides,
-/// types, sparse parts; the caller bounds the count. Faults are InputErrors of the accessor's JSON pointer.
+/// types, sparse parts; the caller bounds the count. An accessor without a view is zeros. Faults are InputErrors of the
+/// accessor's JSON pointer.
 class GltfAccessors {
  public:
   /// Both must outlive it.
@@ -27,6 +28,8 @@ class GltfAccessors {
   Eigen::VectorXd read_scalars(int accessor) const;
   /// Of a SCALAR of unsigned integers; each is below `end`.
   std::vector<std::uint32_t> read_indices(int accessor, std::size_t end) const;
+  /// Whether it has no numbers of its own.
+  bool is_zeros(int accessor) const { return at(accessor).bufferView < 0 && !at(accessor).sparse.isSparse; }
   /// Whether it has one number a row.
   bool is_scalar(int accessor) const { return at(accessor).type == TINYGLTF_TYPE_SCALAR; }
 

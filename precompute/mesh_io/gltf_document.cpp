@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/surface_io/text_input.h"
 #include "common/surface_io/value_cursor.h"
 #include "precompute/mesh_io/gltf_json.h"

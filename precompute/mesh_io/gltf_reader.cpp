@@ -37,6 +37,13 @@ std::vector<Triangle> triangles_of(const std::vector<std::uint32_t>& corners, in
   return triangles;
 }
 
+/// The name, or with the first number from 2 on that makes it another than those taken.
+std::string unique_name(const std::string& name, const std::set<std::string>& taken) {
+  std::string unique = name;
+  for (int number = 2; taken.contains(unique); ++number) unique = fmt::format("{} {}", name, number);
+  return unique;
+}
+
 class GltfReader {
  public:
   explicit GltfReader(const std::filesystem::path& file)
@@ -138,7 +145,9 @@ void GltfReader::name_targets(Instance& instance) {
   std::set<std::string> own;
   for (std::size_t k = 0; k < count; ++k) {
     std::string name = k < names.ArrayLen() ? names.Get(static_cast<int>(k)).Get<std::string>() : "";
-    if (name.empty() || !own.insert(name).second) name = fmt::format("target {}", k);
+    if (name.empty()) name = fmt::format("target {}", k);
+    name = unique_name(name, own);
+    own.insert(name);
     const auto [known, is_new] = morph_of_name_.try_emplace(name, morph_names_.size());
     instance.morphs.push_back(known->second);
     if (is_new) morph_names_.push_back(std::move(name));
@@ -195,6 +204,9 @@ std::size_t GltfReader::add_vertices(Instance& instance, const tinygltf::Primiti
     fail_in_gltf(file_, place + "/attributes", "an attribute POSITION", "none");
 
   const int accessor = primitive.attributes.at("POSITION");
+  if (accessors_.is_zeros(accessor))
+    fail_in_gltf(file_, fmt::format("/accessors/{}", accessor), "a view of a buffer with the positions", "none",
+                 "if the mesh is compressed, export without compression");
   const std::size_t count = accessors_.count(accessor), first = vertices_.size();
   spend(count, primitive.attributes.size() + primitive.targets.size(), place);
   const VertexArray base = accessors_.read_positions(accessor), positions = to_scene(base, instance);
@@ -278,9 +290,15 @@ void GltfReader::add_morphs(SurfaceFile& surface) {
   for (const std::string& name : morph_names_) surface.morphs.push_back({name, surface.mesh.vertices});
   for (const Block& block : blocks_)
     surface.morphs[block.morph].positions.middleRows(block.first, block.positions.rows()) = block.positions;
-  for (const MorphTarget& morph : surface.morphs)
-    if (morph.positions == surface.mesh.vertices)
-      surface.remarks.push_back(fmt::format("no vertex moves in the morph target \"{}\"", morph.name));
+  // Many exporters write the rest shape as a target, with the noise of its numbers.
+  constexpr double kNoise = 1e-6;
+  const auto& rest = surface.mesh.vertices;
+  const double size = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).maxCoeff();
+  std::erase_if(surface.morphs, [&](const MorphTarget& morph) {
+    if ((morph.positions - rest).cwiseAbs().maxCoeff() > kNoise * size) return false;
+    surface.remarks.push_back(fmt::format("the morph target \"{}\" moves no vertex and is left out", morph.name));
+    return true;
+  });
 }
 
 void GltfReader::add_remarks(SurfaceFile& surface) const {

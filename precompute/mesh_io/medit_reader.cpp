@@ -5,6 +5,7 @@
 #include <cctype>
 #include <fmt/format.h>
 
+#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "common/surface_io/mesh_arrays.h"
 #include "common/surface_io/text_input.h"
@@ -35,6 +36,7 @@ class MeditReader {
   std::vector<std::array<double, 3>> vertices_;
   std::vector<std::array<std::int32_t, 4>> tets_;
   std::vector<std::int64_t> references_;
+  std::string others_;  // volume elements that are left out
 };
 
 bool is_keyword(std::string_view word) { return std::isalpha(static_cast<unsigned char>(word[0])) != 0; }
@@ -43,7 +45,9 @@ MeshFile MeditReader::read() {
   read_header();
   for (auto keyword = next_keyword(); keyword != "End";) keyword = read_section(keyword);
   if (vertices_.empty()) cursor_.fail("Vertices before End", "none");
-  if (tets_.empty()) cursor_.fail("Tetrahedra before End", "none");
+  if (tets_.empty())
+    cursor_.fail("Tetrahedra before End", others_.empty() ? "none" : others_,
+                 others_.empty() ? "" : "fill the volume with tetrahedra");
   const std::string_view extra = cursor_.read_word();
   if (!extra.empty()) cursor_.fail("nothing after End", quote(extra));
   MeshFile result;
@@ -80,6 +84,7 @@ std::string_view MeditReader::read_section(std::string_view keyword) {
   if (std::ranges::find(kOtherVolumes, keyword) != kOtherVolumes.end()) {
     const std::uint64_t count = cursor_.read_size(fmt::format("the number of {}", keyword));
     log::warning(fmt::format("{}: {} {} are left out; only tetrahedra are used", file_.string(), count, keyword));
+    others_ += fmt::format("{}{} {}", others_.empty() ? "" : ", ", count, keyword);
   }
   return skip_values();
 }
@@ -131,7 +136,7 @@ std::string_view MeditReader::skip_values() {
 }  // namespace
 
 MeshFile read_medit(const std::filesystem::path& file) {
-  const std::string bytes = read_whole_file(file, "a MEDIT .mesh file");
+  const std::string bytes = read_text_file(file, "a MEDIT .mesh file");
   return MeditReader(file, bytes).read();
 }
 

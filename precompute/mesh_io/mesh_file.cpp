@@ -1,7 +1,6 @@
 #include "precompute/mesh_io/mesh_file.h"
 
-#include "common/core/error.h"
-#include "common/surface_io/text_input.h"
+#include "common/core/input_file.h"
 #include "precompute/mesh_io/medit_reader.h"
 #include "precompute/mesh_io/msh_reader.h"
 #include "precompute/mesh_io/tetgen_reader.h"
@@ -11,14 +10,13 @@
 namespace exmat::precompute {
 
 MeshFile read_mesh(const std::filesystem::path& file) {
-  const std::string extension = file.extension().string();
+  const std::string extension = lower_extension(file);
   if (extension == ".veg") return read_veg(file);
   if (extension == ".msh") return read_msh(file);
   if (extension == ".node" || extension == ".ele") return read_tetgen(file);
   if (extension == ".mesh") return read_medit(file);
   if (extension == ".vtk") return read_vtk(file);
-  throw InputError({file.string(), "", "a mesh file with the extension .veg, .msh, .node, .ele, .mesh or .vtk",
-                    extension.empty() ? "no extension" : quote(extension), ""});
+  refuse_extension(file, "a mesh file with the extension .veg, .msh, .node, .ele, .mesh or .vtk");
 }
 
 }  // namespace exmat::precompute

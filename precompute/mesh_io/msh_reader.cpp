@@ -6,6 +6,7 @@
 #include <limits>
 #include <set>
 
+#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "common/surface_io/mesh_arrays.h"
 #include "common/surface_io/text_input.h"
@@ -26,15 +27,16 @@ void read_byte_order(MshCursor& cursor) {
   cursor.set_binary(one == kForeignOne);
 }
 
+constexpr const char* kConvert = "convert it with 'gmsh IN.msh -save -format msh41 -o OUT.msh'";
+
 Version read_format(MshCursor& cursor) {
-  if (cursor.begin_section() != "MeshFormat")
-    cursor.fail("$MeshFormat", "another beginning", "is this a Gmsh .msh file?");
+  const std::string_view first = cursor.begin_section();
+  if (first == "NOD" || first == "PARA") cursor.fail("version 2.2 or 4.1", "version 1", kConvert);
+  if (first != "MeshFormat") cursor.fail("$MeshFormat", "another beginning", "is this a Gmsh .msh file?");
   Fields fields(cursor.read_text_line("'version file-type data-size'"));
   const auto version_field = fields.next();
   const auto version = parse_real(version_field);
-  if (version != 2.2 && version != 4.1)
-    cursor.fail("version 2.2 or 4.1", quote(version_field),
-                "convert it with 'gmsh IN.msh -save -format msh41 -o OUT.msh'");
+  if (version != 2.2 && version != 4.1) cursor.fail("version 2.2 or 4.1", quote(version_field), kConvert);
   const auto type_field = fields.next();
   const auto type = parse_integer(type_field);
   if (type != 0 && type != 1) cursor.fail("file type 0 (text) or 1 (binary)", quote(type_field));
@@ -92,6 +94,29 @@ void read_section(MshCursor& cursor, std::string_view section, Version version, 
   cursor.end_section(section);
 }
 
+/// Names of the volume elements that are no tetrahedra (Gmsh's manual, "MSH file format").
+std::string cell_name(std::int32_t type) {
+  switch (type) {
+    case 5:
+    case 12:
+    case 17:
+      return fmt::format("hexahedra (element type {})", type);
+    case 6:
+    case 13:
+    case 18:
+      return fmt::format("prisms (element type {})", type);
+    default:
+      return fmt::format("pyramids (element type {})", type);
+  }
+}
+
+std::string other_cells(const MshContents& contents) {
+  std::string text;
+  for (const auto& [type, count] : contents.skipped_volume_elements)
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, cell_name(type));
+  return text;
+}
+
 MshContents read_contents(MshCursor& cursor) {
   const Version version = read_format(cursor);
   MshContents contents;
@@ -102,14 +127,19 @@ MshContents read_contents(MshCursor& cursor) {
   }
   for (const auto required : {"Nodes", "Elements"})
     if (!sections.contains(required)) cursor.fail(fmt::format("a ${} section", required), "the end of the file");
-  if (contents.tets.empty()) cursor.fail("tetrahedra (element type 4)", "none", "make the volume mesh with 'gmsh -3'");
+  if (contents.tets.empty()) {
+    const std::string cells = other_cells(contents);
+    cursor.fail("tetrahedra (element type 4)", cells.empty() ? "none" : cells,
+                cells.empty() ? "make the volume mesh with 'gmsh -3'"
+                              : "fill the volume with tetrahedra: 'gmsh -3' without recombination or extruded layers");
+  }
   return contents;
 }
 
 void warn_of_skipped(const std::filesystem::path& file, const MshContents& contents) {
   for (const auto& [type, count] : contents.skipped_volume_elements)
-    log::warning(fmt::format("{}: {} volume elements of type {} are left out; only tetrahedra are used", file.string(),
-                             count, type));
+    log::warning(
+        fmt::format("{}: {} {} are left out; only tetrahedra are used", file.string(), count, cell_name(type)));
 }
 
 MeshFile to_mesh_file(const std::filesystem::path& file, MshContents contents) {
@@ -129,7 +159,7 @@ MeshFile to_mesh_file(const std::filesystem::path& file, MshContents contents) {
 }  // namespace
 
 MeshFile read_msh(const std::filesystem::path& file) {
-  const std::string bytes = read_whole_file(file, "a .msh file");
+  const std::string bytes = read_text_file(file, "a .msh file");
   MshCursor cursor(file.string(), bytes);
   MshContents contents = read_contents(cursor);
   warn_of_skipped(file, contents);

@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/surface_io/text_input.h"
 #include "common/surface_io/value_cursor.h"
 #include "precompute/mesh_io/surface_file.h"

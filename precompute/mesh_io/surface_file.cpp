@@ -1,24 +1,43 @@
 #include "precompute/mesh_io/surface_file.h"
 
-#include "common/core/error.h"
+#include <fmt/format.h>
+
+#include "common/core/input_file.h"
 #include "common/surface_io/obj_reader.h"
 #include "common/surface_io/ply_reader.h"
 #include "common/surface_io/stl_reader.h"
-#include "common/surface_io/text_input.h"
 #include "precompute/mesh_io/gltf_reader.h"
 
 namespace exmat::precompute {
 
-SurfaceFile read_surface_file(const std::filesystem::path& file) {
-  const std::string extension = file.extension().string();
+namespace {
+
+SurfaceFile read_as_it_is(const std::filesystem::path& file) {
+  const std::string extension = lower_extension(file);
   if (extension == ".glb" || extension == ".gltf") return read_gltf(file);
   if (extension == ".obj") return read_obj(file);
   if (extension == ".ply") return read_ply(file);
   if (extension == ".stl") return read_stl(file);
-  throw InputError({file.string(), "", "a surface with the extension .glb, .gltf, .obj, .ply or .stl",
-                    extension.empty() ? "no extension" : quote(extension), ""});
+  refuse_extension(file, "a surface with the extension .glb, .gltf, .obj, .ply or .stl");
 }
 
-SurfaceMesh read_surface(const std::filesystem::path& file) { return std::move(read_surface_file(file).mesh); }
+}  // namespace
+
+Eigen::Index settle_loose_vertices(const TriangleArray& triangles, VertexArray& vertices) {
+  FlagVector used = FlagVector::Zero(vertices.rows());
+  for (const auto corner : triangles.reshaped()) used[corner] = 1;
+  for (Eigen::Index v = 0; v < vertices.rows(); ++v)
+    if (used[v] == 0) vertices.row(v) = vertices.row(triangles(0, 0));
+  return (used.array() == 0).count();
+}
+
+SurfaceFile read_surface_file(const std::filesystem::path& file) {
+  SurfaceFile surface = read_as_it_is(file);
+  const TriangleArray& triangles = surface.mesh.triangles;
+  if (const auto loose = settle_loose_vertices(triangles, surface.mesh.vertices); loose > 0)
+    surface.remarks.push_back(fmt::format("{} vertices of no triangle are left out of account", loose));
+  for (MorphTarget& morph : surface.morphs) settle_loose_vertices(triangles, morph.positions);
+  return surface;
+}
 
 }  // namespace exmat::precompute

@@ -8,16 +8,18 @@
 namespace exmat::precompute {
 
 /// Reads by extension: .glb and .gltf (glTF 2.0), .obj (Wavefront), .ply (text and binary), .stl (text and binary).
-/// Polygons become fans of triangles about their first corner. Parts are the vertices of a glTF file's materials,
-/// meshes, nodes and custom attributes, of an .obj's `o`, `g` and `usemtl`, and of a text .stl's solids; those of one
-/// name are one. Throws InputError with file, place (line, byte or JSON pointer), expected and found.
+/// Polygons become triangles (common/surface_io/polygon_faces.h). Vertices of no triangle are settled. Parts are the
+/// vertices of a glTF file's materials, meshes, nodes and custom attributes, of an .obj's `o`, `g` and `usemtl`, and of
+/// a text .stl's solids; those of one name are one. Throws InputError with file, place (line, byte or JSON pointer),
+/// expected and found.
 SurfaceFile read_surface_file(const std::filesystem::path& file);
-
-/// The mesh of read_surface_file.
-SurfaceMesh read_surface(const std::filesystem::path& file);
 
 /// One frame, 0-based, of a point cache (.pc2): `vertices` x 3. Throws InputError that names the frames and vertices
 /// that the file has, where it has no such frame or another number of vertices.
 VertexArray read_point_cache_frame(const std::filesystem::path& file, std::int64_t frame, Eigen::Index vertices);
+
+/// Moves every vertex that no triangle has onto the first triangle's first corner, so that it counts in no size and in
+/// no distance. Returns how many there are.
+Eigen::Index settle_loose_vertices(const TriangleArray& triangles, VertexArray& vertices);
 
 }  // namespace exmat::precompute

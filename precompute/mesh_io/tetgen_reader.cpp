@@ -27,9 +27,10 @@ std::vector<std::int64_t> regions_of(const std::vector<std::string_view>& column
 }  // namespace
 
 MeshFile read_tetgen(const std::filesystem::path& file) {
+  const bool capitals = file.extension() == ".NODE" || file.extension() == ".ELE";
   std::filesystem::path node_file = file, element_file = file;
-  node_file.replace_extension(".node");
-  element_file.replace_extension(".ele");
+  node_file.replace_extension(capitals ? ".NODE" : ".node");
+  element_file.replace_extension(capitals ? ".ELE" : ".ele");
   MeshTables tables;
   CommentedLines nodes(node_file, "TetGen's .node file, beside its .ele file");
   tables.read_vertices(nodes);

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "common/surface_io/mesh_arrays.h"
 #include "common/surface_io/text_input.h"
@@ -23,6 +24,20 @@ constexpr std::uint64_t kMostComponents = 1000;
 // Attributes with a name and a type, and the numbers of each point or cell.
 constexpr std::array<std::pair<std::string_view, std::uint64_t>, 6> kTypedAttributes{
     {{"VECTORS", 3}, {"NORMALS", 3}, {"TENSORS", 9}, {"TENSORS6", 6}, {"GLOBAL_IDS", 1}, {"PEDIGREE_IDS", 1}}};
+
+std::string cell_name(std::int64_t type) {
+  constexpr std::array<std::pair<std::int64_t, const char*>, 8> kNamed{{{3, "lines"},
+                                                                        {5, "triangles"},
+                                                                        {7, "polygons"},
+                                                                        {9, "quadrilaterals"},
+                                                                        {11, "voxels"},
+                                                                        {12, "hexahedra"},
+                                                                        {13, "prisms"},
+                                                                        {14, "pyramids"}}};
+  for (const auto& [known, name] : kNamed)
+    if (known == type) return fmt::format("{} (cell type {})", name, type);
+  return fmt::format("cells of type {}", type);
+}
 
 class VtkReader {
  public:
@@ -256,11 +271,16 @@ void VtkReader::read_array(std::string_view name, std::uint64_t components, std:
 void VtkReader::check_tets() const {
   std::map<std::int64_t, std::size_t> counts;
   for (const std::int64_t type : types_) ++counts[type];
-  if (!counts.contains(kTetCell)) cursor_.fail("tets (cell type 10)", "none");
+  if (!counts.contains(kTetCell)) {
+    std::string cells;
+    for (const auto& [type, count] : counts)
+      cells += fmt::format("{}{} {}", cells.empty() ? "" : ", ", count, cell_name(type));
+    cursor_.fail("tets (cell type 10)", cells.empty() ? "none" : cells, "fill the volume with tetrahedra");
+  }
   for (const auto& [type, count] : counts)
     if (type > kFirstVolumeCell)
       log::warning(
-          fmt::format("{}: {} cells of type {} are left out; only tetrahedra are used", file_.string(), count, type));
+          fmt::format("{}: {} {} are left out; only tetrahedra are used", file_.string(), count, cell_name(type)));
 }
 
 MeshFile VtkReader::result() const {
@@ -286,7 +306,7 @@ MeshFile VtkReader::result() const {
 }  // namespace
 
 MeshFile read_vtk(const std::filesystem::path& file) {
-  const std::string bytes = read_whole_file(file, "a legacy .vtk file");
+  const std::string bytes = read_text_file(file, "a legacy .vtk file");
   return VtkReader(file, bytes).read();
 }
 

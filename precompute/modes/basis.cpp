@@ -35,6 +35,14 @@ Eigen::MatrixXd scaled_snapshots(const BasisInput& input) {
 
 // Leading principal components in the M product, at most `size` of them.
 Eigen::MatrixXd principal_components(const SparseMatrix& mass, const Eigen::MatrixXd& columns, Eigen::Index size) {
+  if (columns.cols() > columns.rows()) {  // of a small mesh: the smaller of the two matrices of products
+    const Eigen::LLT<Eigen::MatrixXd> factor{Eigen::MatrixXd(mass)};
+    const Eigen::MatrixXd scaled = factor.matrixU() * columns;
+    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> products(scaled * scaled.transpose());
+    const Eigen::VectorXd values = products.eigenvalues().reverse();
+    const Eigen::Index rank = (values.array() > kRankTolerance * kRankTolerance * values[0]).count();
+    return factor.matrixU().solve(products.eigenvectors().rowwise().reverse().leftCols(std::min(size, rank)));
+  }
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> gram(columns.transpose() * (mass * columns));
   const Eigen::VectorXd values = gram.eigenvalues().reverse();
   const double smallest = kRankTolerance * kRankTolerance * values[0];

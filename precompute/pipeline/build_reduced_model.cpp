@@ -296,7 +296,16 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const PlannedTr
            fmt::format("training: {} of {} runs were left out, by --training-budget or since they did "
                        "not stay finite",
                        runs.skipped, runs.skipped + runs.segments));
-    if (runs.snapshots.cols() == 0) result.reset();
+    constexpr double kMoved = 1e-12;  // of the body's size: less is rounding
+    const double least = kMoved * bounding_box_diagonal(object_.mesh.vertices);
+    const double moved = runs.snapshots.size() > 0 ? runs.snapshots.cwiseAbs().maxCoeff() : 0;
+    if (runs.snapshots.cols() > 0 && !(moved > least))
+      warn(
+          report_.warnings,
+          fmt::format("training: the loads move no vertex by more than {:.1g} m, so the basis is that of linear modes; "
+                      "do they act on vertices that are free to move?",
+                      moved));
+    if (!(moved > least)) result.reset();
     return result;
   });
 }

@@ -3,10 +3,15 @@
 #include <set>
 #include <string_view>
 
+#include "common/core/error.h"
+
 namespace exmat::precompute {
 namespace {
 
 std::string escaped(const std::string& name) {
+  if (name.find_first_of("\n\r") != std::string::npos)
+    throw InputError({name, "--depfile", "paths without line ends, which no depfile can hold", "one that has one",
+                      "rename the file or its folder, or leave --depfile out"});
   std::string text;
   std::size_t backslashes = 0;  // just before this character
   for (const char c : name) {

@@ -280,6 +280,22 @@ void refine_where_coarse(const SparseMatrix& stiffness, const SparseMatrix& mass
           "the backward error");
 }
 
+/// All eigenpairs of the matrices as dense ones, less the null space: what searches of a few pairs end with where most
+/// of them are asked for.
+Eigenpairs dense_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass, const SemidefiniteSolver& solver,
+                            Eigen::Index count) {
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> all{Eigen::MatrixXd(stiffness),
+                                                                      Eigen::MatrixXd(mass)};
+  const Eigen::Index soft = solver.share().border, found = std::min(count, solver.size() - soft);
+  if (found < count)
+    throw WorkError("eigensolver: expected " + std::to_string(count) + " eigenpairs, found " + std::to_string(found) +
+                    "; ask for fewer, or refine the mesh");
+  Polished polished = polish(stiffness, mass, solver, all.eigenvectors().middleCols(soft, count));
+  refine_where_coarse(stiffness, mass, solver, polished);
+  fix_signs(polished.pairs.vectors);
+  return std::move(polished.pairs);
+}
+
 }  // namespace
 
 EigenShare::EigenShare(const Call& call, SolverShare& used) : solver(used) { id = call.object; }
@@ -304,6 +320,7 @@ Eigen::MatrixXd EigenShare::search(const Eigen::MatrixXd& fields, Eigen::Index f
 
 Eigenpairs smallest_eigenpairs(const SparseMatrix& stiffness, const SparseMatrix& mass,
                                const SemidefiniteSolver& solver, Eigen::Index count) {
+  if (2 * (count + solver.share().border) >= solver.size()) return dense_eigenpairs(stiffness, mass, solver, count);
   const TeamProblem problem(stiffness, mass, solver);
   Eigen::MatrixXd found = problem.search(Eigen::MatrixXd(solver.size(), 0), count);
   Polished polished = polish(stiffness, mass, solver, found);

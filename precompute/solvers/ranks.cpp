@@ -1,9 +1,11 @@
 #include "precompute/solvers/ranks.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdlib>
 #include <dlfcn.h>
+#include <filesystem>
 #include <malloc.h>
 #include <map>
 #include <memory>
@@ -11,6 +13,7 @@
 #include <string>
 #include <string_view>
 #include <sys/resource.h>
+#include <system_error>
 #include <thread>
 
 #include "precompute/solvers/solver_access.h"
@@ -225,6 +228,15 @@ void return_freed_memory() {
   mallopt(M_TRIM_THRESHOLD, 2 * kOwnPages);
 }
 
+/// PETSc asks for the path of the current folder, and ends the program where there is none.
+void require_current_folder() {
+  std::error_code error;
+  static_cast<void>(std::filesystem::current_path(error));
+  if (error)
+    throw InputError({"current folder", "", "a folder that exists", error.message(),
+                      "it was removed or moved: change to another folder, and name files from there"});
+}
+
 }  // namespace
 
 // PETSc and MPI cannot be started a second time, so they end with the program.
@@ -232,7 +244,14 @@ void start_solvers() {
   static const bool started = [] {
     set_environment();
     prepare_blas();
-    check_petsc(SlepcInitializeNoArguments(), "initialisation");
+    require_current_folder();
+    for (const char* name : {"PETSC_OPTIONS", "PETSC_OPTIONS_YAML"}) unsetenv(name);
+    // A file .petscrc beside the user could load a library. Signals are the program's matter (common/console).
+    std::array<char*, 4> words{const_cast<char*>("exmat"), const_cast<char*>("-skip_petscrc"),
+                               const_cast<char*>("-no_signal_handler"), nullptr};
+    int count = static_cast<int>(words.size()) - 1;
+    char** arguments = words.data();
+    check_petsc(SlepcInitialize(&count, &arguments, nullptr, nullptr), "initialisation");
     return_freed_memory();
     check_petsc(PetscPushErrorHandler(remember_error, nullptr), "error handler");
     std::atexit([] { SlepcFinalize(); });

@@ -4,7 +4,9 @@
 #include <numbers>
 
 #include "common/bundle/bundle.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/mesh/geometry.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/print.h"
@@ -201,7 +203,8 @@ void export_gltf(const ExportOptions& options) {
 }  // namespace
 
 void export_command(const ExportOptions& options) {
-  const std::string extension = options.output.extension().string();
+  const std::string extension = lower_extension(options.output);
+  claim_output(options.output, "-o");
   if (extension == ".pc2") return export_point_cache(options);
   if (extension == ".usda") return export_usd(options);
   if (extension == ".glb") return export_gltf(options);

@@ -55,7 +55,7 @@ int main(int argc, char** argv) {
   export_command
       .add_option("--frame-rate", export_options.frame_rate,
                   "Frames a second of the animation; default: 24 of a .usda, of a .pc2 a sample is a frame")
-      ->check(CLI::Range(1e-3, 1e6));
+      ->check(number_between(1e-3, 1e6));
   const std::map<std::string, runtime::UpAxis> axes{{"y", runtime::UpAxis::kY}, {"z", runtime::UpAxis::kZ}};
   export_command.add_option("--up", export_options.up, "Axis of the object that points up, y (default) or z")
       ->transform(CLI::CheckedTransformer(axes, CLI::ignore_case));

@@ -2,8 +2,10 @@
 #include <fmt/format.h>
 
 #include "common/config/config.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/hdf5/xdmf.h"
 #include "runtime/app/commands.h"
 #include "runtime/app/loading_log.h"
 #include "runtime/app/lost_work.h"
@@ -85,6 +87,13 @@ void print_profile(const RunSummary& summary, bool touches) {
     print_stage(kWorldStageNames[stage], summary.stage_seconds->of_world[stage]);
 }
 
+void claim_outputs(const WorldConfig& config, const RunCommandOptions& options) {
+  if (config.trajectory)
+    claim_trajectory(*config.trajectory, options.trajectory ? "-o" : "output.trajectory of the scene");
+  if (options.run.dump_state) claim_output(*options.run.dump_state, "--dump-state");
+  if (options.run.from_state) check_input(*options.run.from_state, "a state file");
+}
+
 void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
   if (summary.unconverged_islands > 0)
     log::warning(
@@ -104,6 +113,7 @@ void run_command(const RunCommandOptions& options) {
   WorldConfig config = load_world(options.scene);
   if (options.trajectory) set_trajectory(*options.trajectory, config);
   if (options.steps) config.steps = *options.steps;
+  claim_outputs(config, options);
   const LoadedWorld loaded = load_world_run(config);
   log_loaded(loaded, config);
   RunOptions run_options = options.run;

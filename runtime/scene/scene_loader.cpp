@@ -220,6 +220,7 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
 }  // namespace
 
 LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
+  require_bundle(config);
   LoadedScene loaded;
   loaded.summary = summarise_bundle(config.bundle);
   check_body(config, loaded.summary.constrained);

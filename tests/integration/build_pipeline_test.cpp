@@ -67,6 +67,13 @@ TEST_F(BuildPipeline, NinjaReadsTheDepfile) {
   }
 }
 
+TEST_F(BuildPipeline, NoDepfileHoldsALineEnd) {
+  for (const char* name : {"a\nb.veg", "a\rb.veg"}) {
+    EXPECT_THROW(precompute::depfile_text("a.h5", {name}), InputError);
+    EXPECT_THROW(precompute::depfile_text(name, {"a.veg"}), InputError);
+  }
+}
+
 TEST_F(BuildPipeline, TheDepfileNamesEveryFileThatWasRead) {
   // The bar's mesh in a file of its own, included by another; fixed vertices by a file.
   const auto asset = write_small_bar(folder_, Json::parse(R"({ "object": { "mesh": "bar.veg", "fixed": null } })"));

@@ -146,6 +146,39 @@ class Surfaces(unittest.TestCase):
             self.assertLess(fixed[:, 0].max(), 0.3 + 0.5)  # within a cell of the mark
             self.assertEqual(a["render"].attrs["outside"], 0)
 
+    def test_targets_as_exporters_write_them(self):
+        """The rest shape as a target, names that no bundle can hold, vertices of no triangle."""
+        posed = bent(self.points, 90)
+        write_glb(self.folder / "tube.glb", self.points, self.triangles,
+                  {"rest": self.points, "left/smile": posed, "h0": posed, "left_smile": posed, 40 * "\u00e9": posed})
+        printed = self.run_program("check", "tube.glb")
+        self.assertIn('the morph target "rest" moves no vertex and is left out', printed)
+        self.assertIn('the morph target "left/smile" is the example "left_smile 2"', printed)
+        for name in ("left_smile 2", "h0_", "left_smile", 32 * "\u00e9"):
+            self.assertRegex(printed, rf"{name} +same_connectivity")
+        write_glb(self.folder / "plain.glb", self.points, self.triangles)
+        self.assertIn("has no examples", self.run_program("check", "plain.glb"))
+        # A vertex far away would make tets of 100 m.
+        loose = np.concatenate([self.points, [[1000, 0, 0]]])
+        write_glb(self.folder / "loose.glb", loose, self.triangles)
+        sizes = [self.run_program("mesh", name, "-o", "a.msh").split("tets")[1].split()[0] for name in ("plain.glb", "loose.glb")]
+        self.assertEqual(sizes[0], sizes[1])
+        self.assertIn("1 vertices of no triangle", self.run_program("mesh", "loose.glb", "-o", "a.msh"))
+
+    def test_lengths_in_another_unit(self):
+        """In centimetres the same body; a body of 300 m is asked for its unit."""
+        write_glb(self.folder / "large.glb", 100 * self.points, self.triangles, {"bend": 100 * bent(self.points, 90)}, {"_FIXED": self.clamp})
+        bend = [{"name": "bend", "morph": "bend"}]
+        found = {}
+        for unit, changes in (("cm", {"surface": "large.glb", "unit": "cm"}), ("m", {})):
+            file, _ = self.bundle(object=changes, examples=bend)
+            with file:
+                found[unit] = [np.ptp(file[name][:]) for name in ("render/vertices", "object/vertices", "examples/bend/pose")]
+                self.assertLess(file["examples/bend"].attrs["surface_rms"], 0.01)
+        np.testing.assert_allclose(found["cm"], found["m"], rtol=0.02)
+        printed = self.run_program("check", self.asset(object={"surface": "large.glb"}, examples=bend))
+        self.assertIn('object.unit of the asset, "mm" or "cm"', printed)
+
     def test_check_takes_a_surface(self):
         printed = self.run_program("check", "tube.glb")
         for name in ("bend", "twist"):

@@ -267,7 +267,7 @@ class Viewer(unittest.TestCase):
         self.assertRegex(self.view(scene, "--frames", 1, status=1, MESA_GL_VERSION_OVERRIDE="2.1"), "OpenGL 3.3 is needed, found 2.1")
         self.assertIn("ffmpeg", self.view(scene, "--record", self.folder / "m.mp4", status=2, PATH="/nonexistent"))
         self.assertIn("a folder, or a movie", self.view(scene, "--record", self.folder / "m.avi", status=2))
-        self.assertIn("there is no such file", self.view(self.folder / "none.json", "--frames", 1, status=2))
+        self.assertIn("no such file", self.view(self.folder / "none.json", "--frames", 1, status=2))
         bad = self.write("bad.json", {"actions": [{"time": 0, "grab": {"hand": "a"}}]})
         self.assertIn("/actions/0/grab", self.view(scene, "--script", bad, status=2))
 

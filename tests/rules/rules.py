@@ -26,7 +26,8 @@ OUTER = {"runtime/include", "runtime/python"}
 SEEN_FROM = {"common": (), "runtime": ("common/",), "precompute": ("common/", "runtime/sim/", "runtime/kernels")}
 LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime/kernels", "runtime/sim")
 LEAN_INCLUDES = LEAN + ("exmat",)
-POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of core/atomic_file alone
+POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of these sources alone
+POSIX_SOURCES = {"common/core/atomic_file.cpp", "common/core/command_files.cpp"}
 STREAMS = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "cstdio"}
 PRIVATE_HEADERS = {f"precompute/solvers/{name}.h": "precompute/solvers" for name in ("petsc_handles", "solver_access", "team")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
@@ -87,7 +88,7 @@ def lean(root):
         for number, header in includes(path):
             own = OWN.match(header) and header.startswith(LEAN_INCLUDES)
             standard = re.fullmatch(r"[a-z_0-9]+", header)
-            posix = header in POSIX and name == "common/core/atomic_file.cpp"
+            posix = header in POSIX and name in POSIX_SOURCES
             threads = header == "omp.h" and name.startswith("runtime/sim/world/")
             if not (own or standard or posix or threads or header.startswith(("Eigen/", "unsupported/Eigen/", "exmat/"))):
                 yield f"{name}:{number}: includes {header}"

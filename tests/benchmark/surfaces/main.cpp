@@ -121,7 +121,7 @@ void renew(const std::string& page_name, const std::string& part, const std::str
 
 int run(int argc, char** argv) {
   if (argc < 2) throw WorkError("usage: exmat-surfaces-benchmark SURFACE.obj [PAGE.md]");
-  const SurfaceMesh teddy = centred(precompute::read_surface(argv[1]));
+  const SurfaceMesh teddy = centred(precompute::read_surface_file(argv[1]).mesh);
   const std::string cages = cages_table(teddy),
                     poses = poses_table(
                         {{"bar", centred(test::box_surface({40, 10, 10}, {4, 1, 1})), 0, 1}, {"teddy", teddy, 2, 1}});

@@ -331,7 +331,7 @@ TEST(ValidateBundle, ReportsWhatTheReaderIgnores) {
 
 TEST(ValidateBundle, ReportsAFileThatIsNone) {
   const TemporaryFolder folder;
-  EXPECT_THAT(validate_bundle(folder / "none.h5"), ::testing::ElementsAre(HasSubstr("there is no such file")));
+  EXPECT_THAT(validate_bundle(folder / "none.h5"), ::testing::ElementsAre(HasSubstr("no such file")));
 }
 
 }  // namespace

@@ -37,6 +37,18 @@ TEST(LoadAsset, FillsInDefaults) {
   EXPECT_EQ(asset.seed, 1u);
 }
 
+TEST(LoadAsset, MultipliesUnitAndScale) {
+  const TemporaryFolder folder;
+  const auto unit = [&](const std::string& members) {
+    return load(folder, load_asset, R"({"name": "a", "object": {"mesh": "m.veg")" + members + "}}").length_unit;
+  };
+  EXPECT_EQ(unit(""), 1);
+  EXPECT_EQ(unit(R"(, "unit": "mm")"), 1e-3);
+  EXPECT_EQ(unit(R"(, "unit": "in")"), 0.0254);
+  EXPECT_EQ(unit(R"(, "scale": 3)"), 3);
+  EXPECT_EQ(unit(R"(, "unit": "cm", "scale": 50)"), 0.5);
+}
+
 TEST(LoadAsset, ReadsEveryMember) {
   const TemporaryFolder folder;
   const AssetConfig asset = load(folder, load_asset, R"({

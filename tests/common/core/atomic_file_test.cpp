@@ -1,5 +1,6 @@
 #include "common/core/atomic_file.h"
 
+#include <csignal>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -86,6 +87,41 @@ TEST(WriteFileAtomically, LeavesTheOldFileWhenTheDiskIsFull) {
   }
   EXPECT_EQ(read_file(folder / "a.txt"), "old");
   EXPECT_EQ(folder.size(), 1u);
+}
+
+TEST(AtomicFile, ReplacesWhatALinkLeadsTo) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "sub");
+  write_file(folder / "sub/old.txt", "old");
+  std::filesystem::create_symlink("sub/old.txt", folder / "link");
+  std::filesystem::create_symlink("sub/new.txt", folder / "link_to_nothing");
+  for (const char* name : {"link", "link_to_nothing"}) {
+    write_file_atomically(folder / name, "new");
+    EXPECT_TRUE(std::filesystem::is_symlink(folder / name));
+  }
+  EXPECT_EQ(read_file(folder / "sub/old.txt"), "new");
+  EXPECT_EQ(read_file(folder / "sub/new.txt"), "new");
+  EXPECT_EQ(folder.size(), 3u);
+}
+
+TEST(EndBySignal, RemovesTheFilesOfThisProcessAlone) {
+  const TemporaryFolder folder;
+  write_file(folder / "a.txt", "old");
+  const AtomicFile of_parent(folder / "b.txt");
+  const pid_t child = fork();
+  if (child == 0) {
+    const AtomicFile first(folder / "a.txt");
+    AtomicFile second(folder / "c.txt");
+    second.commit();
+    std::signal(SIGTERM, end_by_signal);
+    std::raise(SIGTERM);
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status) && WTERMSIG(status) == SIGTERM);
+  EXPECT_EQ(read_file(folder / "a.txt"), "old");
+  EXPECT_EQ(folder.names(), (std::set<std::string>{"a.txt", "c.txt", of_parent.temporary().filename()}));
 }
 
 // A process that is killed while it writes.

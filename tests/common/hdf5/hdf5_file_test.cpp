@@ -3,6 +3,7 @@
 #include <cstdlib>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
 #include "common/bundle/bundle.h"
 #include "common/bundle/file_schemas.h"
@@ -49,6 +50,25 @@ TEST(Hdf5File, SaysWhenThereIsNone) {
   const TemporaryFolder folder;
   EXPECT_THROW(Hdf5File::open(folder / "none.h5"), InputError);
   EXPECT_THROW(Hdf5File::open(folder.path()), InputError);
+}
+
+// A host program may have the file open by the same library, with locks or without.
+TEST(Hdf5File, OpensWhatTheHostHasOpen) {
+  const TemporaryFolder folder;
+  auto written = Hdf5File::create(folder / "a.h5", "a.h5");
+  written.write_attribute("/", "number", 0.5);
+  written.close();
+  for (const auto degree : {H5F_CLOSE_DEFAULT, H5F_CLOSE_WEAK, H5F_CLOSE_SEMI, H5F_CLOSE_STRONG})
+    for (const auto& [locks, best_effort] : {std::pair{1, 1}, {1, 0}, {0, 1}, {0, 0}}) {
+      const hid_t access = H5Pcreate(H5P_FILE_ACCESS);
+      H5Pset_fclose_degree(access, degree);
+      H5Pset_file_locking(access, locks, best_effort);
+      const hid_t host = H5Fopen((folder / "a.h5").c_str(), H5F_ACC_RDONLY, access);
+      ASSERT_GE(host, 0);
+      EXPECT_EQ(std::get<double>(Hdf5File::open(folder / "a.h5").read_attribute("/", "number")), 0.5);
+      H5Fclose(host);
+      H5Pclose(access);
+    }
 }
 
 TEST(RowWriter, WritesADatasetRowByRow) {

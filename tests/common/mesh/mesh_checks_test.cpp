@@ -51,6 +51,27 @@ TetMesh cube_and_tet() {
   return mesh;
 }
 
+/// The same tets, each with vertices of its own.
+TetMesh exploded(const TetMesh& mesh) {
+  TetMesh result{VertexArray(4 * mesh.tet_count(), 3), TetArray(mesh.tet_count(), 4)};
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    for (int corner = 0; corner < 4; ++corner) {
+      result.tets(t, corner) = static_cast<std::int32_t>(4 * t + corner);
+      result.vertices.row(4 * t + corner) = mesh.vertices.row(mesh.tets(t, corner));
+    }
+  return result;
+}
+
+// Dropping all but the largest component would leave one tet.
+TEST(CheckMesh, AdvisesToMergeVerticesAtOnePlace) {
+  const TetMesh cube = cube_grid(2);
+  const Complaint complaint = complaint_of(exploded(cube));
+  EXPECT_EQ(complaint.found,
+            "48 components, and " + std::to_string(4 * 48 - 27) + " vertices at places where another one is");
+  EXPECT_THAT(complaint.advice, HasSubstr("merge"));
+  EXPECT_THAT(complaint.advice, testing::Not(HasSubstr("drop")));
+}
+
 TEST(CheckMesh, LeavesASoundMeshAlone) {
   TetMesh mesh = cube_grid(2);
   const TetMesh before = mesh;
@@ -186,7 +207,7 @@ TEST(CheckMesh, JudgesVolumesRelativeToEdges) {
 }
 
 TEST(CheckMesh, RefusesVolumesThatOverflow) {
-  EXPECT_THAT(complaint_of(cube_grid(1, 1e120)).expected, HasSubstr("a volume above"));
+  EXPECT_THAT(complaint_of(cube_grid(1, 1e120)).expected, HasSubstr("to 1e100 m"));
 }
 
 TEST(CheckMesh, RefusesRepeatedTets) {

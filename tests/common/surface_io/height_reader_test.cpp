@@ -40,6 +40,10 @@ TEST(HeightReader, NamesTheLineOfAFault) {
               HasSubstr("c.csv: line 1: expected 2 or more heights in a row, found 1"));
   EXPECT_THAT(refusal(folder.write("d.csv", "1 2\n")), HasSubstr("expected 2 or more rows of heights"));
   EXPECT_THAT(refusal(folder.write("e.csv", "1 nan\n2 3\n")), HasSubstr("line 1: expected height 2"));
+  EXPECT_THAT(
+      refusal(folder.write("f.txt", "0,5 1,5\n1,0 2,0\n")),
+      HasSubstr("line 1: expected numbers between commas, or between blanks, found '0,5 1,5'; write numbers with "
+                "decimal points"));
   EXPECT_THAT(refusal(folder.path() / "none.csv"), HasSubstr("none.csv: expected a text file of heights"));
 }
 

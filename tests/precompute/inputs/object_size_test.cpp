@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/core/error.h"
 #include "tests/support/box_mesh.h"
 
 namespace exmat::precompute {
@@ -27,7 +28,8 @@ TEST(ObjectSize, MillimetresAreRemarkedOn) {
                                                  {0.1, 2e11, 7800.0},
                                                  {4.0, 6e6, 1000.0}}) {
     EXPECT_EQ(remark(length, modulus, density), "") << length;
-    EXPECT_THAT(remark(1000 * length, modulus, density), HasSubstr("are its numbers millimetres?")) << length;
+    EXPECT_THAT(remark(1000 * length, modulus, density), HasSubstr("are its numbers millimetres or centimetres?"))
+        << length;
   }
 }
 
@@ -36,6 +38,29 @@ TEST(ObjectSize, TheReasonIsNamed) {
   EXPECT_THAT(remark(40, 1e5),
               AllOf(HasSubstr("40 m long"), HasSubstr("is 3.92 times its Young's modulus of 1e+05 Pa")));
   EXPECT_THAT(remark(60, 1e9), HasSubstr("the object is 60 m long; "));
+}
+
+// Whatever is beyond would end in a solver, without a word of the number that it came from.
+TEST(RequireNumbers, NamesNumbersThatDoublePrecisionCannotHold) {
+  const TetMesh mesh = test::box_mesh({4, 1, 1}, {2, 0.5, 0.5});
+  const auto refusal = [&](double density, double modulus) -> std::string {
+    TetMaterials materials;
+    materials.density = Eigen::VectorXd::Constant(mesh.tet_count(), density);
+    materials.youngs_modulus = Eigen::VectorXd::Constant(mesh.tet_count(), modulus);
+    try {
+      require_numbers(mesh, materials, "asset.json");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  EXPECT_EQ(refusal(1000, 1e6), "");
+  EXPECT_EQ(refusal(1e-20, 1e20), "");
+  EXPECT_THAT(refusal(1e300, 1e6),
+              HasSubstr("asset.json: /object/material/density: expected a number whose product with "));
+  EXPECT_THAT(refusal(1e-300, 1e6), HasSubstr("found 1e-300 of a body 2 m long"));
+  EXPECT_THAT(refusal(1000, 1e300), HasSubstr("/object/material/youngs_modulus"));
+  EXPECT_THAT(refusal(1000, 1e-300), HasSubstr("/object/material/youngs_modulus"));
 }
 
 }  // namespace

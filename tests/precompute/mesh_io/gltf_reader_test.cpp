@@ -3,6 +3,7 @@
 #include <functional>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <set>
 
 #include "tests/precompute/mesh_io/gltf_samples.h"
 #include "tests/precompute/mesh_io/mesh_samples.h"
@@ -86,12 +87,55 @@ TEST_F(ReadGltf, TakesMorphTargetsByName) {
   primitive(writer)["targets"] = {{{"POSITION", writer.positions(up)}}, json::object()};
   writer.json["meshes"][0]["extras"]["targetNames"] = {"raise"};
   const SurfaceFile surface = read(writer);
-  ASSERT_EQ(surface.morphs.size(), 2);
+  ASSERT_EQ(surface.morphs.size(), 1);
   EXPECT_EQ(surface.morphs[0].name, "raise");
   EXPECT_EQ(surface.morphs[0].positions, rows(kSquare) + rows(up));
-  EXPECT_EQ(surface.morphs[1].name, "target 1");
-  EXPECT_EQ(surface.morphs[1].positions, rows(kSquare));
-  EXPECT_THAT(surface.remarks, ElementsAre(HasSubstr("no vertex moves in the morph target \"target 1\"")));
+  EXPECT_THAT(surface.remarks, ElementsAre("the morph target \"target 1\" moves no vertex and is left out"));
+}
+
+// The rest shape as a target: of zeros, of the noise of its numbers, of an accessor without a view.
+TEST_F(ReadGltf, LeavesOutTargetsThatMoveNothing) {
+  GltfWriter writer = square();
+  const int zeros = writer.positions(std::vector<double>(12, 0)),
+            noise = writer.positions(std::vector<double>(12, 3e-7)),
+            little = writer.positions(std::vector<double>(12, 3e-6));
+  writer.json["accessors"].push_back({{"componentType", 5126}, {"count", 4}, {"type", "VEC3"}});
+  primitive(writer)["targets"] = {{{"POSITION", zeros}},
+                                  {{"POSITION", noise}},
+                                  {{"POSITION", writer.json["accessors"].size() - 1}},
+                                  {{"POSITION", little}}};
+  const SurfaceFile surface = read(writer);
+  ASSERT_EQ(surface.morphs.size(), 1);
+  EXPECT_EQ(surface.morphs[0].name, "target 3");
+  EXPECT_EQ(surface.remarks.size(), 3);
+}
+
+TEST_F(ReadGltf, TakesAccessorsWithoutAViewAsZeros) {
+  GltfWriter writer = square();
+  writer.json["accessors"].push_back({{"componentType", 5126}, {"count", 4}, {"type", "SCALAR"}});
+  primitive(writer)["attributes"]["_NONE"] = writer.json["accessors"].size() - 1;
+  const SurfaceFile surface = read(writer);
+  EXPECT_EQ(surface.mesh.vertices, rows(kSquare));
+  EXPECT_FALSE(surface.parts.contains("_NONE"));
+}
+
+TEST_F(ReadGltf, KeepsTargetsOfOneNameInOneMeshApart) {
+  GltfWriter writer = square();
+  json& targets = primitive(writer)["targets"];
+  for (int k = 1; k <= 4; ++k) {
+    std::vector<double> up(12, 0);
+    up[2] = k;
+    targets.push_back({{"POSITION", writer.positions(up)}});
+  }
+  writer.json["meshes"][0]["extras"]["targetNames"] = {"a", "a", "a 2", "a"};
+  const SurfaceFile surface = read(writer);
+  ASSERT_EQ(surface.morphs.size(), 4);
+  std::set<std::string> names;
+  for (std::size_t k = 0; k < 4; ++k) {
+    names.insert(surface.morphs[k].name);
+    EXPECT_EQ(surface.morphs[k].positions(0, 2), static_cast<double>(k + 1));
+  }
+  EXPECT_EQ(names.size(), 4);
 }
 
 TEST_F(ReadGltf, TakesTargetsOfOneNameInSeveralMeshesAsOne) {

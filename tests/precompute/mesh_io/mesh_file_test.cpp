@@ -1,5 +1,9 @@
 #include "precompute/mesh_io/mesh_file.h"
 
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <fmt/format.h>
 #include <fstream>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -79,6 +83,23 @@ TEST_P(EachFlavour, IsReadInAnyLocale) {
   EXPECT_TRUE(test::same_mesh(result.mesh, sample.mesh));
 }
 
+TEST_P(EachFlavour, IsReadWithItsExtensionInCapitals) {
+  const MeshFile sample = test::sample_mesh(1);
+  std::string extension = GetParam().extension;
+  for (char& c : extension) c = static_cast<char>(std::toupper(c));
+  EXPECT_TRUE(
+      test::same_mesh(read_mesh(folder_.write("MESH" + extension, GetParam().write(sample))).mesh, sample.mesh));
+}
+
+TEST_P(EachFlavour, IsReadWithAByteOrderMarkAndOtherEndsOfLines) {
+  const MeshFile sample = test::sample_mesh(1);
+  std::string text = GetParam().write(sample);
+  if (text.find('\0') != std::string::npos) GTEST_SKIP() << "it is binary";
+  EXPECT_TRUE(test::same_mesh(read_mesh(write("\xef\xbb\xbf" + text)).mesh, sample.mesh));
+  std::ranges::replace(text, '\n', '\r');
+  EXPECT_TRUE(test::same_mesh(read_mesh(write(text)).mesh, sample.mesh));
+}
+
 TEST_P(EachFlavour, IsRefusedAtEveryTruncation) {
   const MeshFile sample = test::sample_mesh(1);
   const std::string whole = GetParam().write(sample);
@@ -134,6 +155,40 @@ TEST_P(EachFlavour, RefusesBytesAfterTheEnd) {
 
 INSTANTIATE_TEST_SUITE_P(Mesh, EachFlavour, testing::ValuesIn(test::flavours()),
                          [](const auto& param) { return param.param.name; });
+
+// A cube as one hexahedron, in each format that has such cells.
+TEST(ReadMesh, NamesTheCellsOfAMeshWithoutTets) {
+  const TemporaryFolder folder;
+  constexpr std::array<std::array<int, 3>, 8> kCube{
+      {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {1, 1, 1}, {0, 1, 1}}};
+  std::string msh, vtk, medit;
+  for (std::size_t k = 0; k < kCube.size(); ++k) {
+    const std::string place = fmt::format("{} {} {}", kCube[k][0], kCube[k][1], kCube[k][2]);
+    msh += fmt::format("{} {}\n", k + 1, place);
+    vtk += place + "\n";
+    medit += place + " 0\n";
+  }
+  const auto found_in = [&](const char* name, const std::string& text) {
+    return complaint_of_reading(folder.write(name, text)).found;
+  };
+  EXPECT_EQ(found_in("a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n" + msh +
+                                  "$EndNodes\n$Elements\n2\n1 5 0 1 2 3 4 5 6 7 8\n2 6 0 1 2 3 4 5 6\n$EndElements\n"),
+            "1 hexahedra (element type 5), 1 prisms (element type 6)");
+  EXPECT_EQ(found_in("a.vtk", "# vtk DataFile Version 3.0\ncube\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n" +
+                                  vtk + "CELLS 2 15\n8 0 1 2 3 4 5 6 7\n5 0 1 2 3 4\nCELL_TYPES 2\n12 14\n"),
+            "1 hexahedra (cell type 12), 1 pyramids (cell type 14)");
+  EXPECT_EQ(found_in("a.mesh", "MeshVersionFormatted 1\nDimension 3\nVertices\n8\n" + medit +
+                                   "Hexahedra\n1\n1 2 3 4 5 6 7 8 0\nEnd\n"),
+            "1 Hexahedra");
+}
+
+TEST(ReadMesh, TellsHowToConvertTheFirstFormatOfGmsh) {
+  const TemporaryFolder folder;
+  const Complaint complaint =
+      complaint_of_reading(folder.write("a.msh", "$NOD\n1\n1 0 0 0\n$ENDNOD\n$ELM\n0\n$ENDELM\n"));
+  EXPECT_EQ(complaint.found, "version 1");
+  EXPECT_THAT(complaint.advice, HasSubstr("-format msh41"));
+}
 
 TEST(ReadMesh, TakesWindowsLineEnds) {
   const TemporaryFolder folder;

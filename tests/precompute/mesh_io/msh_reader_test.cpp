@@ -128,7 +128,7 @@ TEST_F(ReadMsh, WarnsOfVolumeElementsLeftOut) {
   log::set_sink([&](log::Level, std::string_view message) { warnings.emplace_back(message); });
   read(edited(kSound22, "3 2 0 10 20 30", "3 7 0 10 20 30 40 10"));
   log::set_sink({});
-  EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 volume elements of type 7 are left out")));
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 pyramids (element type 7) are left out")));
 }
 
 struct MalformedMsh {

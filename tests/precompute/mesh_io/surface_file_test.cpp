@@ -1,7 +1,9 @@
 #include "precompute/mesh_io/surface_file.h"
 
+#include <algorithm>
 #include <array>
 #include <bit>
+#include <cctype>
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,6 +17,8 @@
 
 namespace exmat::precompute {
 namespace {
+
+SurfaceMesh read_surface(const std::filesystem::path& file) { return read_surface_file(file).mesh; }
 
 using test::ByteWriter;
 using test::complaint_of;
@@ -164,7 +168,10 @@ TEST_P(EachSurfaceFlavour, IsRefusedAtEveryTruncationOrHasFewerFaces) {
   for (std::size_t length = 0; length < whole.size(); ++length) try {
       const SurfaceMesh result = read(std::string_view(whole).substr(0, length));
       ++accepted;
-      EXPECT_EQ(result.vertices, GetParam().surface().vertices) << length;
+      const VertexArray expected = GetParam().surface().vertices;
+      ASSERT_EQ(result.vertices.rows(), expected.rows());
+      for (const auto corner : result.triangles.reshaped())
+        EXPECT_EQ(result.vertices.row(corner), expected.row(corner)) << length;
     } catch (const InputError& error) {
       EXPECT_FALSE(error.complaint().expected.empty());
     }
@@ -209,6 +216,21 @@ INSTANTIATE_TEST_SUITE_P(
 TEST_P(EachSurfaceFlavour, IsReadInAnyLocale) {
   const test::DecimalComma comma;
   EXPECT_TRUE(same_surface(read(GetParam().write(GetParam().surface())), GetParam().surface()));
+}
+
+TEST_P(EachSurfaceFlavour, IsReadWithItsExtensionInCapitals) {
+  std::string extension = GetParam().extension;
+  for (char& c : extension) c = static_cast<char>(std::toupper(c));
+  const auto file = folder_.write("BODY" + extension, GetParam().write(GetParam().surface()));
+  EXPECT_TRUE(same_surface(read_surface(file), GetParam().surface()));
+}
+
+TEST_P(EachSurfaceFlavour, IsReadWithAByteOrderMarkAndOtherEndsOfLines) {
+  std::string text = GetParam().write(GetParam().surface());
+  if (text.find('\0') != std::string::npos) GTEST_SKIP() << "it is binary";
+  EXPECT_TRUE(same_surface(read("\xef\xbb\xbf" + text), GetParam().surface()));
+  std::ranges::replace(text, '\n', '\r');
+  EXPECT_TRUE(same_surface(read(text), GetParam().surface()));
 }
 
 constexpr auto kObj = R"(# a square and a triangle
@@ -365,6 +387,39 @@ constexpr std::array kMalformed{
 
 INSTANTIATE_TEST_SUITE_P(Malformed, RefusesSurface, testing::ValuesIn(kMalformed),
                          [](const auto& param) { return std::string(param.param.name); });
+
+TEST(ReadSurface, VerticesOfNoTriangleAreOfNoSize) {
+  const TemporaryFolder folder;
+  const SurfaceFile surface =
+      read_surface_file(folder.write("a.obj", "v 99 99 99\nv 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 -50\nf 2 3 4\n"));
+  EXPECT_EQ(surface.mesh.vertices.rows(), 5);
+  EXPECT_EQ((surface.mesh.vertices.colwise().maxCoeff() - surface.mesh.vertices.colwise().minCoeff()).eval(),
+            Eigen::RowVector3d(1, 2, 0));
+  EXPECT_EQ(surface.mesh.triangles.row(0), Eigen::RowVector3i(1, 2, 3));
+  EXPECT_THAT(surface.remarks, testing::ElementsAre("2 vertices of no triangle are left out of account"));
+}
+
+// As three numbers "0,5 0,5 0,5" would be (0, 5, 0).
+TEST(ReadSurface, RefusesDecimalCommas) {
+  const TemporaryFolder folder;
+  for (const auto& [name, text] : {std::pair("a.obj", edited(kObj, "v 0 1 0", "v 0,5 1,5 0,5")),
+                                   std::pair("a.ply", edited(kPly, "0 1 0\n", "0,5 1,5 0,5\n"))}) {
+    const Complaint complaint = complaint_of([&, name = name, text = text] { read_surface(folder.write(name, text)); });
+    EXPECT_EQ(complaint.found, "'0,5'") << name;
+    EXPECT_EQ(complaint.advice, "write numbers with decimal points");
+  }
+}
+
+TEST(ReadSurface, NamesTriangleStripsOfPly) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("a.ply",
+                                 "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+                                 "property float z\nelement tristrips 1\nproperty list int int vertex_indices\n"
+                                 "end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+  const Complaint complaint = complaint_of([&] { read_surface(file); });
+  EXPECT_THAT(complaint.found, HasSubstr("triangle strips"));
+  EXPECT_THAT(complaint.advice, HasSubstr("save it with faces"));
+}
 
 TEST(ReadSurface, NamesTheKnownExtensions) {
   const Complaint complaint = complaint_of([] { read_surface("body.fbx"); });

@@ -121,7 +121,7 @@ TEST_F(ReadVtk, WarnsOfVolumeCellsLeftOut) {
   read(edited(edited(edited(kRows, "CELLS 2 9", "CELLS 3 18"), "3 0 1 2\n", "3 0 1 2\n8 0 1 2 3 0 1 2 3\n"),
               "CELL_TYPES 2\n5\n", "CELL_TYPES 3\n5\n12\n"));
   log::set_sink({});
-  EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 cells of type 12 are left out")));
+  EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 hexahedra (cell type 12) are left out")));
 }
 
 // Of each type its largest and smallest values, in the file's byte order.

@@ -139,5 +139,26 @@ TEST_P(FlatTets, GiveTheLaplacianTheEigenvaluesOfLongDouble) {
 
 INSTANTIATE_TEST_SUITE_P(, FlatTets, testing::Values(1e-3, 1e-5, 1e-8));
 
+// Most of all eigenpairs: the sums of all values and of their squares are traces of M^-1 K.
+TEST(Eigenpairs, NearlyAllOfASmallBodyAreFound) {
+  const TetMesh mesh = test::box_mesh({3, 2, 2}, {3, 2, 1});  // 36 vertices
+  for (const bool clamped : {false, true}) {
+    const ElasticSystem system = system_of(mesh, clamped);
+    const Eigen::Index all = system.mass.rows() - system.null_space.cols();
+    const SemidefiniteSolver solver(system.stiffness, system.mass * system.null_space, "body", system.rigid);
+    const Eigenpairs most = smallest_eigenpairs(system.stiffness, system.mass, solver, all - 2),
+                     whole = smallest_eigenpairs(system.stiffness, system.mass, solver, all);
+    const Eigen::MatrixXd product = Eigen::MatrixXd(system.mass).llt().solve(Eigen::MatrixXd(system.stiffness));
+    EXPECT_NEAR(whole.values.sum(), product.trace(), 1e-9 * product.trace());
+    EXPECT_NEAR(whole.values.squaredNorm(), (product * product).trace(), 1e-9 * (product * product).trace());
+    EXPECT_LT((most.values - whole.values.head(all - 2)).cwiseAbs().maxCoeff(), 1e-9 * whole.values[0]);
+    const Eigen::MatrixXd residual =
+        system.stiffness * most.vectors - system.mass * most.vectors * most.values.asDiagonal();
+    EXPECT_LT(residual.colwise().norm().maxCoeff(),
+              1e-9 * (system.stiffness * most.vectors).colwise().norm().maxCoeff());
+    EXPECT_THROW(smallest_eigenpairs(system.stiffness, system.mass, solver, all + 1), WorkError);
+  }
+}
+
 }  // namespace
 }  // namespace exmat::precompute

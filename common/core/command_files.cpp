@@ -1,0 +1,124 @@
+#include "common/core/command_files.h"
+
+#include <algorithm>
+#include <mutex>
+#include <string>
+#include <sys/stat.h>
+#include <utility>
+#include <vector>
+
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+/// One file, whatever it is called.
+struct Identity {
+  bool exists = false;
+  dev_t device = 0;
+  ino_t number = 0;
+  std::filesystem::path path;  // of a file that does not exist
+
+  bool operator==(const Identity&) const = default;
+};
+
+Identity identity_of(const std::filesystem::path& file) {
+  struct stat status {};
+  if (::stat(file.c_str(), &status) == 0) return {true, status.st_dev, status.st_ino, {}};
+  std::error_code ignored;
+  const auto target = link_target(file);
+  const auto folder = std::filesystem::weakly_canonical(
+      target.has_parent_path() ? target.parent_path() : std::filesystem::path("."), ignored);
+  return {false, 0, 0, folder / target.filename()};
+}
+
+struct Known {
+  Identity identity;
+  std::filesystem::path file;
+  std::string role;
+};
+
+struct Registry {
+  std::mutex mutex;
+  int commands = 0, own_reads = 0;
+  std::vector<Known> outputs, inputs;
+};
+
+Registry& registry() {
+  static Registry files;
+  return files;
+}
+
+const Known* find(const std::vector<Known>& files, const Identity& identity) {
+  const auto found = std::ranges::find(files, identity, &Known::identity);
+  return found == files.end() ? nullptr : &*found;
+}
+
+[[noreturn]] void refuse_output(const std::filesystem::path& file, const std::string& role,
+                                const std::filesystem::path& input) {
+  throw InputError({file.string(), role, "a file that this command does not read",
+                    input == file ? "one of its inputs" : "its input " + input.string(), "choose another name"});
+}
+
+}  // namespace
+
+CommandFiles::CommandFiles() {
+  const std::lock_guard lock(registry().mutex);
+  ++registry().commands;
+}
+
+CommandFiles::~CommandFiles() {
+  const std::lock_guard lock(registry().mutex);
+  if (--registry().commands > 0) return;
+  registry().outputs.clear();
+  registry().inputs.clear();
+}
+
+OwnOutputRead::OwnOutputRead() {
+  const std::lock_guard lock(registry().mutex);
+  ++registry().own_reads;
+}
+
+OwnOutputRead::~OwnOutputRead() {
+  const std::lock_guard lock(registry().mutex);
+  --registry().own_reads;
+}
+
+void claim_output(const std::filesystem::path& file, const std::string& role) {
+  const std::lock_guard lock(registry().mutex);
+  if (registry().commands == 0) return;
+  const Identity identity = identity_of(file);
+  if (const Known* input = find(registry().inputs, identity)) refuse_output(file, role, input->file);
+  if (const Known* output = find(registry().outputs, identity))
+    throw InputError({file.string(), role, "a file of its own",
+                      "that of " + output->role + (output->file == file ? "" : ", " + output->file.string()),
+                      "choose another name"});
+  registry().outputs.push_back({identity, file, role});
+}
+
+void check_input(const std::filesystem::path& file, const std::string& expected) {
+  std::error_code ignored;
+  const auto status = std::filesystem::status(file, ignored);
+  if (!std::filesystem::exists(status)) throw InputError({file.string(), "", expected, "no such file", ""});
+  if (std::filesystem::is_directory(status)) throw InputError({file.string(), "", expected, "a folder", ""});
+  if (!std::filesystem::is_regular_file(status))
+    throw InputError({file.string(), "", expected, "a pipe or a device, no regular file", "write it to a file first"});
+  const std::lock_guard lock(registry().mutex);
+  if (registry().commands == 0 || registry().own_reads > 0) return;
+  const Identity identity = identity_of(file);
+  if (const Known* output = find(registry().outputs, identity)) refuse_output(output->file, output->role, file);
+  if (find(registry().inputs, identity) == nullptr) registry().inputs.push_back({identity, file, ""});
+}
+
+std::filesystem::path link_target(std::filesystem::path target) {
+  constexpr int kMostLinks = 40;  // as Linux follows
+  std::error_code error;
+  for (int links = 0; links < kMostLinks; ++links) {
+    const auto next = std::filesystem::read_symlink(target, error);
+    if (error) return target;
+    target = target.parent_path() / next;
+  }
+  return target;
+}
+
+}  // namespace exmat

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace exmat {
+
+/// The files of one command. While an object lives, no file is both read and written, and no two outputs are one file;
+/// links, hard links and relative spellings count as the file that they lead to. Programs keep one around a command.
+/// Without one, as in a host program, check_input() looks at the file alone and claim_output() does nothing.
+class CommandFiles {
+ public:
+  CommandFiles();
+  ~CommandFiles();
+  CommandFiles(const CommandFiles&) = delete;
+  CommandFiles& operator=(const CommandFiles&) = delete;
+};
+
+/// Announces that the command writes `file`; `role` names it in messages, as "-o". Throws InputError where the command
+/// has read the file, or claims it for another output. Call it before any work.
+void claim_output(const std::filesystem::path& file, const std::string& role);
+
+/// Announces that `file` is about to be read; `expected` is for messages ("a JSON file"). Throws InputError where there
+/// is no such file, where it is a folder, a pipe or a device, and where the command claims it as an output.
+void check_input(const std::filesystem::path& file, const std::string& expected);
+
+/// Lets the command read its own output while an object lives, as to see whether it is up to date.
+class OwnOutputRead {
+ public:
+  OwnOutputRead();
+  ~OwnOutputRead();
+  OwnOutputRead(const OwnOutputRead&) = delete;
+  OwnOutputRead& operator=(const OwnOutputRead&) = delete;
+};
+
+/// The file that a write to `target` changes: symbolic links are followed, also to a file that does not exist.
+std::filesystem::path link_target(std::filesystem::path target);
+
+}  // namespace exmat

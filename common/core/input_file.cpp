@@ -1,0 +1,118 @@
+#include "common/core/input_file.h"
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <string_view>
+#include <utility>
+
+#include "common/core/command_files.h"
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+bool is_text(char c) { return (c >= 0x20 && c < 0x7f) || c == '\t' || c == '\r' || c == '\n'; }
+
+constexpr std::array<std::pair<std::string_view, std::string_view>, 11> kBeginnings{
+    {{"\x89HDF", "an HDF5 file (a bundle or a trajectory?)"},
+     {"glTF", "a glTF file (.glb)"},
+     {"Kaydara FBX", "an FBX file"},
+     {"; FBX", "an FBX file"},
+     {"BLENDER", "a Blender file"},
+     {"PK\3\4", "a ZIP archive (.npz, .3mf or .usdz?)"},
+     {"\x93NUMPY", "a NumPy array"},
+     {"$MeshFormat", "a Gmsh mesh"},
+     {"# vtk", "a VTK file"},
+     {"MeshVersionFormatted", "a MEDIT mesh"},
+     {"ply", "a PLY surface"}}};
+
+constexpr std::string_view kFromBlender = "export it as .glb, as Blender does",
+                           kFromMeshio = "convert it, as 'meshio convert IN OUT.msh' does",
+                           kFromGmsh = "make tets of it, as 'gmsh -3 IN -o OUT.msh' does",
+                           kFromPython = "arrays go in from Python: exmat.write_msh or exmat.bundle";
+constexpr std::array<std::pair<std::string_view, std::string_view>, 26> kWays{
+    {{".fbx", kFromBlender},
+     {".blend", kFromBlender},
+     {".dae", kFromBlender},
+     {".3ds", kFromBlender},
+     {".usd", kFromBlender},
+     {".usda", kFromBlender},
+     {".usdc", kFromBlender},
+     {".usdz", kFromBlender},
+     {".abc", kFromBlender},
+     {".3mf", kFromBlender},
+     {".off", kFromMeshio},
+     {".vtu", kFromMeshio},
+     {".xdmf", kFromMeshio},
+     {".inp", kFromMeshio},
+     {".unv", kFromMeshio},
+     {".med", kFromMeshio},
+     {".bdf", kFromMeshio},
+     {".step", kFromGmsh},
+     {".stp", kFromGmsh},
+     {".iges", kFromGmsh},
+     {".igs", kFromGmsh},
+     {".brep", kFromGmsh},
+     {".npz", kFromPython},
+     {".npy", kFromPython},
+     {".h5", "a bundle or a trajectory is no mesh: name the file that it was made of"},
+     {".json", "an asset file is no mesh: name the file that it names"}}};
+
+bool is_utf16(std::string_view bytes) {
+  if (bytes.size() < 4) return false;
+  return (bytes.starts_with("\xff\xfe") && is_text(bytes[2]) && bytes[3] == '\0') ||
+         (bytes.starts_with("\xfe\xff") && is_text(bytes[3]) && bytes[2] == '\0');
+}
+
+}  // namespace
+
+std::string read_whole_file(const std::filesystem::path& file, const std::string& expected) {
+  const auto refuse = [&](const std::string& found) { throw InputError({file.string(), "", expected, found, ""}); };
+  check_input(file, expected);
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) refuse(std::string("a file that cannot be opened (") + std::strerror(errno) + ")");
+  std::string bytes(std::filesystem::file_size(file), '\0');
+  stream.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  if (!stream) refuse("a file that cannot be read to its end");
+  if (bytes.empty()) refuse("an empty file");
+  return bytes;
+}
+
+std::string read_text_file(const std::filesystem::path& file, const std::string& expected) {
+  constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";
+  std::string bytes = read_whole_file(file, expected);
+  if (is_utf16(bytes))
+    throw InputError(
+        {file.string(), "", expected, "text in UTF-16", "save it as UTF-8, as iconv -f UTF-16 -t UTF-8 does"});
+  if (bytes.starts_with(kByteOrderMark) && bytes.size() > kByteOrderMark.size() &&
+      is_text(bytes[kByteOrderMark.size()]))
+    bytes.erase(0, kByteOrderMark.size());
+  const bool is_binary = bytes.find('\0') != std::string::npos;
+  if (!is_binary && bytes.find('\n') == std::string::npos) std::ranges::replace(bytes, '\r', '\n');
+  return bytes;
+}
+
+std::string_view kind_of_file(std::string_view bytes) {
+  for (const auto& [beginning, kind] : kBeginnings)
+    if (bytes.starts_with(beginning)) return kind;
+  return {};
+}
+
+std::string lower_extension(const std::filesystem::path& file) {
+  std::string extension = file.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
+void refuse_extension(const std::filesystem::path& file, const std::string& expected) {
+  const std::string extension = lower_extension(file);
+  const auto way = std::ranges::find(kWays, extension, &std::pair<std::string_view, std::string_view>::first);
+  throw InputError({file.string(), "", expected, extension.empty() ? "no extension" : "'" + extension + "'",
+                    way == kWays.end() ? "" : std::string(way->second)});
+}
+
+}  // namespace exmat

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+namespace exmat {
+
+/// The bytes of a regular, non-empty file. Throws InputError that says `expected` where it is missing, a folder, a
+/// pipe, a device, unreadable, empty, or an output of the running command (common/core/command_files.h).
+std::string read_whole_file(const std::filesystem::path& file, const std::string& expected);
+
+/// The same of a file that is text, or begins with text: without a byte order mark, and with '\n' for line ends that
+/// are
+/// '\r' alone. Throws InputError where the text is UTF-16.
+std::string read_text_file(const std::filesystem::path& file, const std::string& expected);
+
+/// The file that begins with these bytes, for messages: "an HDF5 file"; empty where it is of no known kind.
+std::string_view kind_of_file(std::string_view bytes);
+
+/// The extension in lower case, with its point: ".obj" of "A.OBJ".
+std::string lower_extension(const std::filesystem::path& file);
+
+/// Refuses a file whose extension is none of those expected, with the way to one of them where it is known.
+[[noreturn]] void refuse_extension(const std::filesystem::path& file, const std::string& expected);
+
+}  // namespace exmat

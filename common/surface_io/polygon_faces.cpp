@@ -1,0 +1,116 @@
+#include "common/surface_io/polygon_faces.h"
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <numeric>
+#include <string>
+
+#include "common/core/error.h"
+
+namespace exmat {
+namespace {
+
+constexpr std::size_t kMostCorners = 5000;  // of a face that is no fan: ears take the square of them
+
+constexpr double kRounding = 1e-12;  // of areas of a face of unit size
+
+using Point = Eigen::Vector2d;
+
+/// Twice the signed area of a triangle.
+double area(const Point& a, const Point& b, const Point& c) {
+  const Point u = b - a, v = c - a;
+  return u[0] * v[1] - u[1] * v[0];
+}
+
+/// The corners in the plane of the face's Newell normal, counterclockwise, about the first and of about unit size.
+std::vector<Point> flattened(const std::vector<Eigen::Vector3d>& corners) {
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();
+  double size = 0;
+  for (const auto& corner : corners) size = std::max(size, (corner - corners[0]).cwiseAbs().maxCoeff());
+  const auto local = [&](std::size_t k) -> Eigen::Vector3d { return (corners[k] - corners[0]) / size; };
+  for (std::size_t k = 2; k < corners.size(); ++k) normal += local(k - 1).cross(local(k));
+  const Eigen::Vector3d right = normal.unitOrthogonal(), up = normal.cross(right).normalized();
+  std::vector<Point> points;
+  for (std::size_t k = 0; k < corners.size(); ++k) points.emplace_back(local(k).dot(right), local(k).dot(up));
+  return points;
+}
+
+/// True where the first corner sees all others: every triangle of its fan has an area. Also of a face without a plane.
+bool fan_serves(const std::vector<Point>& points) {
+  for (std::size_t k = 2; k < points.size(); ++k)
+    if (area(points[0], points[k - 1], points[k]) <= kRounding) return false;
+  return true;
+}
+
+/// The rest of a polygon while its ears are cut off.
+class EarCutter {
+ public:
+  explicit EarCutter(const std::vector<Point>& points) : points_(points), rest_(points.size()) {
+    std::iota(rest_.begin(), rest_.end(), std::size_t{0});
+  }
+
+  /// Triangles of indices into the points.
+  std::vector<std::array<std::size_t, 3>> cut() {
+    std::vector<std::array<std::size_t, 3>> triangles;
+    std::size_t at = 0, refused = 0;
+    while (rest_.size() > 3) {
+      at %= rest_.size();
+      // A face that crosses itself may have no ear: its next corner goes all the same.
+      if (!is_ear(at) && ++refused <= rest_.size()) {
+        ++at;
+        continue;
+      }
+      refused = 0;
+      triangles.push_back({before(at), rest_[at], after(at)});
+      rest_.erase(rest_.begin() + static_cast<std::ptrdiff_t>(at));
+      ++at;  // the next ear is elsewhere, which makes no fan of slivers
+    }
+    triangles.push_back({rest_[0], rest_[1], rest_[2]});
+    return triangles;
+  }
+
+ private:
+  std::size_t before(std::size_t at) const { return rest_[(at + rest_.size() - 1) % rest_.size()]; }
+  std::size_t after(std::size_t at) const { return rest_[(at + 1) % rest_.size()]; }
+
+  bool is_ear(std::size_t at) const {
+    const Point &a = points_[before(at)], &b = points_[rest_[at]], &c = points_[after(at)];
+    if (!(area(a, b, c) > kRounding)) return false;
+    return std::ranges::none_of(rest_, [&](std::size_t other) {
+      const Point& p = points_[other];
+      if (p == a || p == b || p == c) return false;
+      return area(a, b, p) >= -kRounding && area(b, c, p) >= -kRounding && area(c, a, p) >= -kRounding;
+    });
+  }
+
+  const std::vector<Point>& points_;
+  std::vector<std::size_t> rest_;
+};
+
+}  // namespace
+
+void PolygonFaces::add(const std::vector<std::int32_t>& polygon) {
+  if (polygon.size() > 3) polygons_.emplace_back(triangles_.size(), polygon.size());
+  for (std::size_t corner = 2; corner < polygon.size(); ++corner)
+    triangles_.push_back({polygon[0], polygon[corner - 1], polygon[corner]});
+}
+
+void PolygonFaces::cut_ears(const std::vector<std::array<double, 3>>& vertices, const std::filesystem::path& file) {
+  for (const auto& [first, count] : polygons_) {
+    std::vector<std::int32_t> polygon{triangles_[first][0], triangles_[first][1]};
+    for (std::size_t k = 0; k + 2 < count; ++k) polygon.push_back(triangles_[first + k][2]);
+    std::vector<Eigen::Vector3d> corners;
+    for (const auto corner : polygon) corners.emplace_back(vertices[static_cast<std::size_t>(corner)].data());
+    const std::vector<Point> points = flattened(corners);
+    if (fan_serves(points)) continue;
+    if (count > kMostCorners)
+      throw InputError({file.string(), "faces",
+                        "faces of at most " + std::to_string(kMostCorners) + " corners where they are not convex",
+                        "one of " + std::to_string(count), "export the mesh triangulated"});
+    std::size_t next = first;
+    for (const auto& [a, b, c] : EarCutter(points).cut()) triangles_[next++] = {polygon[a], polygon[b], polygon[c]};
+  }
+}
+
+}  // namespace exmat

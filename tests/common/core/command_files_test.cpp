@@ -1,0 +1,131 @@
+#include "common/core/command_files.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <optional>
+#include <sys/stat.h>
+
+#include "common/core/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace exmat {
+namespace {
+
+using test::TemporaryFolder;
+using testing::AllOf;
+using testing::HasSubstr;
+
+template <typename Action>
+std::string refusal_of(Action action) {
+  try {
+    action();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+std::string refusal_of_output(const std::filesystem::path& file, const std::string& role = "-o") {
+  return refusal_of([&] { claim_output(file, role); });
+}
+
+std::string refusal_of_input(const std::filesystem::path& file) {
+  return refusal_of([&] { check_input(file, "a mesh"); });
+}
+
+/// Names that lead to one file `mesh` in the folder.
+std::vector<std::filesystem::path> names_of(const TemporaryFolder& folder, const std::filesystem::path& mesh) {
+  std::filesystem::create_symlink("mesh", folder.path() / "link");
+  std::filesystem::create_symlink(folder.path() / "link", folder.path() / "link_of_link");
+  std::filesystem::create_hard_link(mesh, folder.path() / "hard");
+  std::filesystem::create_directory(folder.path() / "sub");
+  std::filesystem::create_directory_symlink(folder.path(), folder.path() / "sub" / "back");
+  return {mesh,
+          folder.path() / "sub/../mesh",
+          folder.path() / "./mesh",
+          folder.path() / "link",
+          folder.path() / "link_of_link",
+          folder.path() / "hard",
+          folder.path() / "sub/back/mesh",
+          std::filesystem::proximate(mesh)};
+}
+
+TEST(CommandFiles, RefuseAnOutputThatWasRead) {
+  const TemporaryFolder folder;
+  const auto mesh = folder.write("mesh", "x");
+  const CommandFiles files;
+  check_input(mesh, "a mesh");
+  for (const auto& name : names_of(folder, mesh))
+    EXPECT_THAT(refusal_of_output(name), HasSubstr("does not read")) << name;
+  EXPECT_EQ(refusal_of_output(folder.path() / "other"), "");
+}
+
+TEST(CommandFiles, RefuseToReadAnOutput) {
+  const TemporaryFolder folder;
+  const auto mesh = folder.write("mesh", "x"), other = folder.write("other", "x");
+  for (const auto& name : names_of(folder, mesh)) {
+    const CommandFiles files;
+    claim_output(name, "--report");
+    EXPECT_THAT(refusal_of_input(mesh), AllOf(HasSubstr(name.string()), HasSubstr("--report"))) << name;
+    EXPECT_EQ(refusal_of_input(other), "");
+    const OwnOutputRead own;
+    EXPECT_EQ(refusal_of_input(mesh), "");
+  }
+}
+
+TEST(CommandFiles, RefuseTwoOutputsOfOneFile) {
+  const TemporaryFolder folder;
+  const auto mesh = folder.write("mesh", "x");
+  for (const auto& name : names_of(folder, mesh)) {
+    const CommandFiles files;
+    claim_output(mesh, "-o");
+    EXPECT_THAT(refusal_of_output(name, "--depfile"), AllOf(HasSubstr("--depfile"), HasSubstr("that of -o"))) << name;
+  }
+}
+
+TEST(CommandFiles, KnowOutputsThatDoNotExist) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.path() / "sub");
+  std::filesystem::create_symlink("new", folder.path() / "link");  // to a file that does not exist
+  for (const char* name : {"new", "sub/../new", "./new", "link"}) {
+    const CommandFiles files;
+    claim_output(folder.path() / "new", "-o");
+    EXPECT_NE(refusal_of_output(folder.path() / name, "--report"), "") << name;
+    EXPECT_EQ(refusal_of_output(folder.path() / "sub/new", "--report"), "");
+  }
+}
+
+TEST(CommandFiles, AreForgottenWithTheCommandAndNoneOfAHost) {
+  const TemporaryFolder folder;
+  const auto mesh = folder.write("mesh", "x");
+  {
+    const CommandFiles files;
+    check_input(mesh, "a mesh");
+  }
+  EXPECT_EQ(refusal_of_output(mesh), "");
+  EXPECT_EQ(refusal_of_input(mesh), "");
+  const CommandFiles files;
+  EXPECT_EQ(refusal_of_output(mesh), "");
+}
+
+TEST(CheckInput, RefusesWhatIsNoFile) {
+  const TemporaryFolder folder;
+  ASSERT_EQ(mkfifo((folder.path() / "pipe").c_str(), 0600), 0);
+  EXPECT_THAT(refusal_of_input(folder.path() / "none"), HasSubstr("expected a mesh, found no such file"));
+  EXPECT_THAT(refusal_of_input(folder.path()), HasSubstr("found a folder"));
+  EXPECT_THAT(refusal_of_input(folder.path() / "pipe"), HasSubstr("a pipe or a device"));
+  EXPECT_THAT(refusal_of_input("/dev/zero"), HasSubstr("a pipe or a device"));
+}
+
+TEST(LinkTarget, IsThePathThatAWriteChanges) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder.path() / "sub");
+  std::filesystem::create_symlink("../new", folder.path() / "sub/link");
+  std::filesystem::create_symlink("loop", folder.path() / "loop");
+  EXPECT_EQ(link_target(folder.path() / "plain"), folder.path() / "plain");
+  EXPECT_EQ(link_target(folder.path() / "sub/link"), folder.path() / "sub/../new");
+  EXPECT_EQ(link_target(folder.path() / "loop"), folder.path() / "loop");  // and ends
+}
+
+}  // namespace
+}  // namespace exmat

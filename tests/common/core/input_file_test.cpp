@@ -1,0 +1,70 @@
+#include "common/core/input_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/core/error.h"
+#include "tests/support/temporary_folder.h"
+
+namespace exmat {
+namespace {
+
+using namespace std::string_literals;
+using test::TemporaryFolder;
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string text_of(const std::string& bytes) {
+  const TemporaryFolder folder;
+  return read_text_file(folder.write("a", bytes), "a text");
+}
+
+TEST(ReadTextFile, LeavesOutTheByteOrderMark) {
+  EXPECT_EQ(text_of("\xef\xbb\xbfv 1\n"), "v 1\n");
+  EXPECT_EQ(text_of("v \xef\xbb\xbf\n"), "v \xef\xbb\xbf\n");
+}
+
+TEST(ReadTextFile, TakesEndsOfLinesOfAllSystems) {
+  EXPECT_EQ(text_of("a\rb\r"), "a\nb\n");
+  EXPECT_EQ(text_of("a\r\nb\r\n"), "a\r\nb\r\n");  // readers pass over the blank before an end
+  EXPECT_EQ(text_of("a\0\rb"s), "a\0\rb"s);        // binary
+}
+
+TEST(ReadTextFile, RefusesUtf16) {
+  for (const std::string& bytes : {"\xff\xfev\0 \0"s, "\xfe\xff\0v\0 "s}) try {
+      text_of(bytes);
+      ADD_FAILURE();
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), AllOf(HasSubstr("UTF-16"), HasSubstr("save it as UTF-8")));
+    }
+}
+
+TEST(KindOfFile, IsToldByTheFirstBytes) {
+  EXPECT_THAT(kind_of_file("\x89HDF\r\n\x1a\n"), HasSubstr("HDF5"));
+  EXPECT_THAT(kind_of_file("glTF\2\0\0\0"), HasSubstr("glTF"));
+  EXPECT_THAT(kind_of_file("PK\3\4"), HasSubstr("ZIP"));
+  EXPECT_EQ(kind_of_file("{}"), "");
+  EXPECT_EQ(kind_of_file(""), "");
+}
+
+TEST(RefuseExtension, SaysTheWayToOneThatIsRead) {
+  const auto refusal = [](const char* file) {
+    try {
+      refuse_extension(file, "a mesh");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_THAT(refusal("a.FBX"), AllOf(HasSubstr("'.fbx'"), HasSubstr("export it as .glb")));
+  EXPECT_THAT(refusal("a.step"), HasSubstr("gmsh -3"));
+  EXPECT_THAT(refusal("a.npz"), HasSubstr("from Python"));
+  EXPECT_THAT(refusal("a"), HasSubstr("no extension"));
+}
+
+TEST(LowerExtension, IsOfTheLastPoint) {
+  EXPECT_EQ(lower_extension("A.B.OBJ"), ".obj");
+  EXPECT_EQ(lower_extension("folder.X/a"), "");
+}
+
+}  // namespace
+}  // namespace exmat

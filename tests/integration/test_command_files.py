@@ -1,0 +1,246 @@
+#!/usr/bin/python3
+"""Commands and their files: no output over an input or over another output, nothing left after a signal, a full limit or a
+full standard output, and nothing taken from the folder that a user happens to stand in.
+
+Usage: test_command_files.py FOLDER_OF_PROGRAMS
+"""
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))
+from programs import bar, write_json  # noqa: E402
+
+PROGRAMS = Path(sys.argv.pop(1)).resolve()
+PRECOMPUTE, RUNTIME = PROGRAMS / "exmat-precompute", PROGRAMS / "exmat-runtime"
+SURFACE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+
+
+class Commands(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        cls.made = Path(holder.name)
+        mesh, clamped = bar()
+        (cls.made / "bar.veg").write_text(mesh)
+        asset = {"name": "bar", "object": {"mesh": "bar.veg", "fixed": {"ids": clamped},
+                                           "material": {"youngs_modulus": 1e6, "poisson_ratio": 0.3, "density": 1000}},
+                 "basis": {"size": 3, "linear_modes": 2}, "cubature": {"elements": 3, "training_poses": 10}}
+        write_json(cls.made / "asset.json", asset)
+        (cls.made / "ground.obj").write_text("v -9 -9 -3\nv 9 -9 -3\nv 0 9 -3\nf 1 2 3\n")
+        (cls.made / "surface.obj").write_text(SURFACE)
+        write_json(cls.made / "scene.json", {"bundle": "bar.h5", "steps": 3, "gravity": [0, 0, -9.81], "output": {"every": 1}})
+        contact = {"bundle": "bar.h5", "steps": 3, "obstacles": [{"mesh": {"file": "ground.obj", "thickness": 0.1}}]}
+        write_json(cls.made / "contact.json", contact)
+        cls.command(cls, "bundle", "asset.json", "-o", "bar.h5", folder=cls.made)
+
+    def setUp(self):
+        holder = tempfile.TemporaryDirectory()
+        self.addCleanup(holder.cleanup)
+        self.folder = Path(holder.name).resolve()
+        shutil.copytree(self.made, self.folder, dirs_exist_ok=True)
+
+    def command(self, name, *words, folder=None, status=0, **options):
+        program = RUNTIME if name in ("run", "bench", "export", "info", "validate") else PRECOMPUTE
+        done = subprocess.run([program, name, *map(str, words)], cwd=folder or self.folder, text=True, timeout=120,
+                              **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options})
+        assert done.returncode == status, f"{name} {words}: status {done.returncode}, expected {status}\n{done.stdout}{done.stderr}"
+        return done.stderr
+
+    def contents(self):
+        return {path.name: path.read_bytes() for path in self.folder.rglob("*") if path.is_file()}
+
+    def refused(self, *words, said=()):
+        """The command ends with status 2, one message, and every file as it was."""
+        before = self.contents()
+        errors = self.command(*words, status=2)
+        self.assertEqual(self.contents(), before, words)
+        messages = [line for line in errors.splitlines() if line.startswith("exmat-")]
+        self.assertEqual(len(messages), 1, errors)
+        for text in said:
+            self.assertIn(text, messages[0])
+
+    def test_no_output_is_written_over_an_input(self):
+        bundle = self.folder / "bar.h5"
+        (self.folder / "link.h5").symlink_to("bar.h5")
+        (self.folder / "hard.h5").hardlink_to(bundle)
+        (self.folder / "sub").mkdir()
+        for name in ("bar.h5", bundle, "./sub/../bar.h5", "link.h5", "hard.h5"):
+            self.refused("run", "scene.json", "-o", name, said=["does not read", "-o"])
+            self.refused("run", "scene.json", "--dump-state", name, said=["--dump-state"])
+            self.refused("full-space", "scene.json", "-o", name, said=["-o"])
+        for option in ("-o", "--dump-state"):
+            self.refused("run", "scene.json", option, "scene.json", said=["scene.json", option])
+            self.refused("run", "contact.json", option, "ground.obj", said=["ground.obj", option])
+        self.refused("full-space", "scene.json", "-o", "scene.json")
+        for words in (["-o", "bar.veg"], ["-o", "asset.json"], ["-o", "new.h5", "--report", "bar.veg"],
+                      ["-o", "new.h5", "--report", "asset.json"], ["-o", "new.h5", "--depfile", "bar.veg"],
+                      ["-o", "new.h5", "--scene", "contact.json", "--depfile", "contact.json"],
+                      ["-o", "ground.obj", "--scene", "contact.json"]):
+            self.refused("bundle", "asset.json", *words, said=["does not read"])
+        self.refused("bundle", "surface.obj", "-o", "new.h5", "--write-asset", "surface.obj", said=["--write-asset"])
+        (self.folder / "surface.msh").symlink_to("surface.obj")
+        self.refused("mesh", "surface.obj", "-o", "surface.msh", said=["-o"])
+        self.command("run", "scene.json", "-o", "t.h5")
+        shutil.copy(self.folder / "t.h5", self.folder / "t.glb")
+        self.refused("export", "t.glb", "-o", "t.glb", said=["-o"])
+        (self.folder / "bar.glb").symlink_to("bar.h5")
+        self.refused("export", "t.h5", "-o", "bar.glb", said=["-o"])
+
+    def test_a_study_keeps_its_inputs(self):
+        study = {"asset": "recommended_asset.json", "scene": "scene.json", "sweep": {"basis.size": [3]}}
+        shutil.copy(self.folder / "asset.json", self.folder / "recommended_asset.json")
+        write_json(self.folder / "results.json", study)
+        self.refused("study", "results.json", "-o", ".", said=["results.json", "does not read"])
+        write_json(self.folder / "study.json", study)
+        self.refused("study", "study.json", "-o", ".", said=["recommended_asset.json", "does not read"])
+
+    def test_a_failure_writes_its_report_over_no_other_file(self):
+        """The asset fails before the mesh of the report's name is read."""
+        (self.folder / "broken.json").write_text('{"name": "x", "object": {"mesh": "bar.veg"}, "bass": 1}')
+        before = self.contents()
+        self.assertIn("is no report", self.command("bundle", "broken.json", "-o", "new.h5", "--report", "bar.veg", status=2))
+        self.assertEqual(self.contents(), before)
+        for _ in range(2):  # the second replaces that of the first
+            self.command("bundle", "broken.json", "-o", "new.h5", "--report", "report.json", status=2)
+        self.assertIn("bass", (self.folder / "report.json").read_text())
+
+    def test_no_two_outputs_are_one_file(self):
+        self.refused("bundle", "asset.json", "-o", "new.h5", "--depfile", "./new.h5", said=["--depfile", "-o"])
+        self.refused("bundle", "asset.json", "-o", "new", "--report", "new", said=["--report"])
+        self.refused("run", "scene.json", "-o", "t.h5", "--dump-state", "t.xdmf", said=["--dump-state", ".xdmf"])
+        self.refused("run", "scene.json", "-o", "t.h5", "--dump-state", "t.h5", said=["--dump-state"])
+        self.refused("run", "scene.json", "-o", "t.xdmf", said=[".xdmf", ".h5"])
+        self.refused("full-space", "scene.json", "-o", "t.xdmf", said=[".xdmf", ".h5"])
+        (self.folder / "to").symlink_to("t.h5")
+        self.refused("run", "scene.json", "-o", "t.h5", "--dump-state", "to", said=["--dump-state"])
+
+    def test_an_unchanged_bundle_is_its_own_output(self):
+        self.assertIn("nothing to do", self.command("bundle", "asset.json", "-o", "bar.h5", "--if-changed"))
+
+    def test_a_link_stays_a_link(self):
+        (self.folder / "link.h5").symlink_to("real.h5")
+        for _ in range(2):
+            self.command("run", "scene.json", "-o", "link.h5")
+            self.assertTrue((self.folder / "link.h5").is_symlink())
+            self.assertGreater((self.folder / "real.h5").stat().st_size, 1000)
+
+    def test_nothing_comes_from_the_current_folder_or_the_environment(self):
+        """PETSc would load a library and write a file where these options reached it."""
+        options = "-dll_append ./evil.so\n-log_view :log.txt\n-options_view\n-no_such_option\n"
+        for name in (".petscrc", "petscrc", ".slepcrc"):
+            (self.folder / name).write_text(options)
+        before = set(self.contents())
+        errors = self.command("bundle", "asset.json", "-o", "new.h5",
+                              env={**os.environ, "HOME": str(self.folder), "PETSC_OPTIONS": options.replace("\n", " ")})
+        self.assertEqual(set(self.contents()) - before, {"new.h5"})
+        self.assertNotIn("PETSc", errors)
+
+    def test_a_folder_that_is_gone_is_said(self):
+        gone = self.folder / "gone"
+        gone.mkdir()
+        script = 'rmdir "$1"; exec "$2" bundle "$3"/asset.json -o "$3"/new.h5'
+        done = subprocess.run(["bash", "-c", script, "bash", gone, PRECOMPUTE, self.folder], cwd=gone, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertIn("current folder: expected a folder that exists", done.stderr)
+        self.assertFalse((self.folder / "new.h5").exists())
+
+    def test_a_full_standard_output_is_a_failure(self):
+        with open("/dev/full", "w") as full:
+            for words in (["run", "scene.json"], ["info", "bar.h5"], ["validate", "bar.h5"], ["bench", "scene.json", "--steps", 3],
+                          ["check", "asset.json"], ["bundle", "asset.json", "-o", "new.h5"], ["run", "--help"], ["mesh", "--help"]):
+                errors = self.command(*words, status=1, stdout=full)
+                self.assertIn("standard output", errors, words)
+
+    def test_signals_leave_no_temporary_file(self):
+        write_json(self.folder / "long.json", {"bundle": "bar.h5", "steps": 10 ** 9, "output": {"every": 10 ** 6}})
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            process = subprocess.Popen([RUNTIME, "run", "long.json", "-o", "t.h5"], cwd=self.folder, stdout=subprocess.DEVNULL,
+                                       stderr=subprocess.PIPE, text=True)
+            for _ in range(500):
+                if list(self.folder.glob("t.h5*.tmp")):
+                    break
+                time.sleep(0.02)
+            process.send_signal(number)
+            errors = process.communicate(timeout=60)[1]
+            self.assertEqual(process.returncode, -number)
+            self.assertIn(f"ended by {number.name}; not written: t.h5", errors)
+            self.assertEqual(list(self.folder.glob("t.*")), [])
+
+    def test_a_limit_of_file_sizes_is_a_failure(self):
+        def limit():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (20000, 20000))
+        before = set(self.contents())
+        for words in (["bundle", "asset.json", "-o", "new.h5"], ["run", "scene.json", "-o", "t.h5"]):
+            self.assertIn("File too large", self.command(*words, status=1, preexec_fn=limit))
+            self.assertEqual(set(self.contents()), before)
+
+    def test_pipes_and_devices_are_no_inputs(self):
+        os.mkfifo(self.folder / "pipe.json")
+        os.mkfifo(self.folder / "pipe.veg")
+        for name in ("pipe.json", "/dev/zero"):
+            for command in ("run", "bench", "info"):
+                self.assertIn("a pipe or a device", self.command(command, name, status=2))
+            for command in (["check", name], ["bundle", "asset.json", "-o", "new.h5", "--scene", name], ["study", name, "-o", "s"]):
+                self.assertIn("a pipe or a device", self.command(*command, status=2))
+        write_json(self.folder / "piped.json", {"name": "bar", "object": {"mesh": "pipe.veg"}})
+        self.assertIn("a pipe or a device", self.command("check", "piped.json", status=2))
+
+    def test_json_ends_with_its_text(self):
+        whole = (self.folder / "scene.json").read_bytes()
+        for tail in (b"\0", b"\0 garbage", b" garbage", b"\x1a", b"}"):
+            (self.folder / "tail.json").write_bytes(whole + tail)
+            self.assertIn("tail.json: line 1, column", self.command("run", "tail.json", status=2))
+
+    def test_values_that_are_none_are_refused(self):
+        for option in ("--cache", "--depfile", "--report", "--scene", "--alignment-report", "--write-asset", "-o"):
+            output = [] if option == "-o" else ["-o", "new.h5"]
+            self.assertIn("an empty one", self.command("bundle", "asset.json", *output, option, "", status=2))
+        for option in ("-o", "--dump-state", "--from-state"):
+            self.assertIn("an empty one", self.command("run", "scene.json", option, "", status=2))
+        for value in ("nan", "NaN", "-nan", "inf", "0", "-1", "1e400"):
+            self.assertIn(f"found '{value}'", self.command("bundle", "asset.json", "-o", "new.h5", f"--training-budget={value}", status=2))
+        self.assertIn("found 'nan'", self.command("mesh", "surface.obj", "-o", "new.msh", "--cell-size", "nan", status=2))
+        self.assertIn("found 'nan'", self.command("export", "t.h5", "-o", "t.pc2", "--frame-rate", "nan", status=2))
+
+    def test_usage_names_the_command_that_was_meant(self):
+        def said(*words):
+            return subprocess.run([PRECOMPUTE, *words], capture_output=True, text=True).stderr
+        self.assertIn("did you mean bundle?", said("bundel", "asset.json"))
+        self.assertIn("-o,--output is required", said("bundle", "asset.json"))
+
+    def test_a_missing_bundle_is_said_by_the_scenes_member(self):
+        write_json(self.folder / "lost.json", {"bundle": "lost.h5"})
+        for command in (["run", "lost.json"], ["bench", "lost.json"], ["full-space", "lost.json", "-o", "t.h5"]):
+            errors = self.command(*command, status=2)
+            self.assertIn("lost.json: /bundle: expected a bundle, found no such file", errors)
+
+    def test_depfiles_hold_every_path_that_make_can_read(self):
+        odd = self.folder / "a b#c$d:e"
+        odd.mkdir()
+        for name in ("asset.json", "bar.veg"):
+            shutil.copy(self.folder / name, odd / name)
+        self.command("bundle", odd / "asset.json", "-o", "new.h5", "--depfile", "new.d")
+        (self.folder / "Makefile").write_text("new.h5:\n\ttouch new.h5\ninclude new.d\n")
+        if shutil.which("make"):
+            subprocess.run(["make", "-s", "new.h5"], cwd=self.folder, check=True)
+            self.assertEqual(subprocess.run(["make", "-q", "new.h5"], cwd=self.folder).returncode, 0)
+            later = time.time() + 10
+            os.utime(odd / "bar.veg", (later, later))
+            self.assertEqual(subprocess.run(["make", "-q", "new.h5"], cwd=self.folder).returncode, 1)
+        broken = self.folder / "a\nb"
+        odd.rename(broken)
+        self.assertIn("line ends", self.command("bundle", broken / "asset.json", "-o", "other.h5", "--depfile", "new.d", status=2))
+        self.assertFalse((self.folder / "other.h5").exists())
+
+
+if __name__ == "__main__":
+    unittest.main(verbosity=2)
