@@ -44,7 +44,6 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   summary.asset_name = reader.text_attribute("asset_name");
   summary.generator = reader.text_attribute("generator");
   summary.input_sha256 = reader.text_attribute("input_sha256");
-  summary.format_version = reader.format_version();
   summary.constrained = reader.constrained();
   for (const LedgerEntry& entry : groups)
     if (entry.included) summary.groups.push_back(entry.group);

@@ -31,7 +31,6 @@ struct RegionSummary {
 /// What a bundle says of itself: read from its attributes and table of contents alone.
 struct BundleSummary {
   std::string asset_name, generator, input_sha256;
-  std::int64_t format_version = 0;
   std::vector<std::string> groups;  ///< present, in bundle order
   bool constrained = false;         ///< root attribute of that name (int64, 0 or 1)
   std::int64_t vertices = 0, tets = 0, modes = 0, cubature_elements = 0, eigenfunctions = 0, examples = 0;

@@ -42,10 +42,11 @@ BundleReader::BundleReader(const std::filesystem::path& path, std::vector<ReadRe
 
 void BundleReader::read_header() {
   header_value("format");
-  format_version_ = std::get<std::int64_t>(header_value("format_version"));
-  if (format_version_ > bundle_schema().format_version)
-    refuse("/@format_version", fmt::format("at most {}", bundle_schema().format_version),
-           fmt::format("{}", format_version_), "a newer version of exmat wrote this bundle");
+  const auto version = std::get<std::int64_t>(header_value("format_version"));
+  if (version != bundle_schema().format_version)
+    refuse("/@format_version", fmt::format("{}", bundle_schema().format_version), fmt::format("{}", version),
+           fmt::format("a version of exmat that is {} wrote this bundle; make it again with this one",
+                       version < bundle_schema().format_version ? "older" : "newer"));
   features_ = std::get<std::vector<std::string>>(header_value("features"));
   constrained_ = std::get<std::int64_t>(header_value("constrained")) != 0;
 }
@@ -126,9 +127,6 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
     if (includes(request.groups, "regions") && file_.has_group("/regions")) add_regions(model);
   });
   visit_fields(model, *this);
-  if (model.examples)  // before version 3
-    for (ExampleData& example : model.examples->examples)
-      if (example.pose.size() == 0) example.pose = example.reduced;
   check_model(model);
   if (model.examples) std::ranges::stable_sort(model.examples->examples, {}, &ExampleData::index);
   for (RegionData& region : model.regions) std::ranges::stable_sort(region.examples.examples, {}, &ExampleData::index);
@@ -138,7 +136,7 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
 
 void BundleReader::require_group(const LedgerEntry& entry) const {
   const std::string path = "/" + entry.group;
-  if (bundle_schema().group(path).since <= format_version_ && file_.has_group(path)) return;
+  if (file_.has_group(path)) return;
   refuse(path, fmt::format("the group ({})", entry.reason), "none",
          fmt::format("precompute the bundle again, with --scene SCENE.json or with {} of the asset",
                      asset_member(entry.group)));
@@ -190,9 +188,8 @@ const AttributeSchema& BundleReader::attribute_schema(std::string_view name) con
 }
 
 AttributeValue BundleReader::read_value(const AttributeSchema& schema) {
-  const std::string& name = schema.name_in(format_version_);
-  AttributeValue value = file_.read_attribute(path_, name);
-  const std::string place = path_ + "@" + name;
+  AttributeValue value = file_.read_attribute(path_, schema.name);
+  const std::string place = path_ + "@" + schema.name;
   if (const auto fault = check_value(schema, value, sizes_)) refuse(place, fault->expected, fault->found);
   sound_.insert(place);
   return value;
@@ -203,7 +200,6 @@ const DatasetSchema& BundleReader::schema_of(std::string_view name) const {
 }
 
 bool BundleReader::is_wanted(const DatasetSchema& schema) const {
-  if (schema.since > format_version_) return false;
   if (!request_.step_only || schema.use == Use::kStep) return true;
   return request_.positions && schema.use == Use::kPositions;
 }

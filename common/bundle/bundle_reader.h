@@ -17,15 +17,13 @@
 namespace exmat {
 
 /// Reads a bundle's header when constructed, then what is asked of it. Every fault is an InputError that names the file
-/// and the dataset, or, with `problems`, one more message there. Also the visitor of the field list (fields.h). What is
-/// newer than the file keeps its default.
+/// and the dataset, or, with `problems`, one more message there. Also the visitor of the field list (fields.h).
 class BundleReader {
  public:
   BundleReader(const std::filesystem::path& path, std::vector<ReadRecord>* record = nullptr,
                std::vector<std::string>* problems = nullptr);
 
   const Hdf5File& file() const { return file_; }
-  std::int64_t format_version() const { return format_version_; }
   const std::vector<std::string>& features() const { return features_; }
   bool constrained() const { return constrained_; }
   const SymbolSizes& sizes() const { return sizes_; }
@@ -39,7 +37,7 @@ class BundleReader {
   ReducedModel read(const BundleRequest& request);
   /// Of the root.
   std::string text_attribute(const std::string& name) const;
-  /// Of another group; the member stays as it is where the file is older than the attribute.
+  /// Of another group.
   template <typename T>
   void read_attribute(std::string_view schema_path, std::string_view path, std::string_view name, T& member) {
     group(schema_path, path);
@@ -56,7 +54,6 @@ class BundleReader {
   template <typename T>
   void attribute(std::string_view name, T& member) {
     const AttributeSchema& schema = attribute_schema(name);
-    if (schema.since > format_version_) return;
     attempt([&] { from_attribute(read_value(schema), member); });
   }
 
@@ -98,7 +95,6 @@ class BundleReader {
   Hdf5File file_;
   std::vector<ReadRecord>* record_;
   std::vector<std::string>* problems_;
-  std::int64_t format_version_ = 0;
   std::vector<std::string> features_;
   bool constrained_ = false;
 

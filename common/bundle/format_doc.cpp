@@ -21,7 +21,7 @@ and little-endian), each group of a bundle the attribute `description`. Text is 
 `ascending` no element below the one before it; `increasing` each above; `symmetric` a symmetric matrix; `one_of:a|b` one of these texts;
 `may_be_empty` unlike all others, no elements are allowed.
 
-`since` is the format version that brought an entry, and the version that renamed it, if one did; a reader refuses files of a newer version.
+A reader refuses files of another format version.
 )";
 
 constexpr std::string_view kUseOfBundle = R"(
@@ -43,30 +43,22 @@ std::string constraints_text(const std::vector<Constraint>& constraints) {
   return text;
 }
 
-// "1, before 6 as `confidence`".
-std::string since_text(const AttributeSchema& attribute) {
-  if (attribute.renamed == 0) return fmt::format("{}", attribute.since);
-  return fmt::format("{}, before {} as {}", attribute.since, attribute.renamed, code(attribute.former_name));
-}
-
 std::string attribute_table(const std::vector<AttributeSchema>& attributes) {
-  std::string text =
-      "| attribute | type | dims | units | range | since | |\n| --- | --- | --- | --- | --- | --- | --- |\n";
+  std::string text = "| attribute | type | dims | units | range | |\n| --- | --- | --- | --- | --- | --- |\n";
   for (const AttributeSchema& attribute : attributes)
-    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", code(attribute.name), name_of(attribute.type),
+    text += fmt::format("| {} | {} | {} | {} | {} | {} |\n", code(attribute.name), name_of(attribute.type),
                         cell(attribute.dims_text), attribute.units, constraints_text(attribute.constraints),
-                        since_text(attribute), cell(attribute.description));
+                        cell(attribute.description));
   return text;
 }
 
 std::string dataset_table(const FileSchema& schema, const std::string& group) {
-  std::string text =
-      "| dataset | type | dims | units | range | use | since | |\n| --- | --- | --- | --- | --- | --- | --- | --- |\n";
+  std::string text = "| dataset | type | dims | units | range | use | |\n| --- | --- | --- | --- | --- | --- | --- |\n";
   for (const DatasetSchema& dataset : schema.datasets)
     if (dataset.path.substr(0, dataset.path.rfind('/')) == group)
-      text += fmt::format("| {} | {} | {} | {} | {} | {} | {} | {} |\n", code(dataset.path), name_of(dataset.type),
+      text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", code(dataset.path), name_of(dataset.type),
                           cell(dataset.dims_text), dataset.units, constraints_text(dataset.constraints),
-                          name_of(dataset.use), dataset.since, cell(dataset.description));
+                          name_of(dataset.use), cell(dataset.description));
   return text;
 }
 
@@ -81,7 +73,7 @@ std::string own_parts(const GroupSchema& group) {
   if (group.holds.empty()) return "";
   std::string groups;
   for (const std::string& held : group.holds) groups += (groups.empty() ? "" : ", ") + code(group.path + held);
-  return fmt::format("\nIt holds {}, all as above, since version {}; its sizes {} are its own.\n", groups, group.since,
+  return fmt::format("\nIt holds {}, all as above; its sizes {} are its own.\n", groups,
                      fmt::join(group.symbols, ", "));
 }
 

@@ -113,7 +113,6 @@ void parse_value(const Json& json, Entry& entry) {
   entry.dims = parse_dims(entry.dims_text);
   entry.units = json.at("units");
   entry.description = json.at("description");
-  entry.since = json.at("since");
   for (const std::string text : json.at("constraints")) entry.constraints.push_back(parse_constraint(text));
 }
 
@@ -121,10 +120,6 @@ AttributeSchema parse_attribute(const Json& json) {
   AttributeSchema attribute;
   attribute.name = json.at("name");
   parse_value(json, attribute);
-  if (json.contains("renamed")) {
-    attribute.renamed = json["renamed"].at("version");
-    attribute.former_name = json["renamed"].at("from");
-  }
   return attribute;
 }
 
@@ -133,7 +128,6 @@ GroupSchema parse_group(const Json& json) {
   group.path = json.at("path");
   group.group = json.at("group");
   group.description = json.at("description");
-  group.since = json.at("since");
   for (const Json& attribute : json.at("attributes")) group.attributes.push_back(parse_attribute(attribute));
   group.symbols = json.value("symbols", group.symbols);
   group.holds = json.value("holds", group.holds);
@@ -175,8 +169,6 @@ void expand_holds(FileSchema& schema) {
       GroupSchema group = schema.group(held);
       group.like = std::exchange(group.path, holder.path + held);
       group.group = holder.group;
-      group.since = std::max(group.since, holder.since);
-      for (AttributeSchema& attribute : group.attributes) attribute.since = std::max(attribute.since, group.since);
       groups.push_back(std::move(group));
     }
   }
@@ -188,7 +180,6 @@ void expand_holds(FileSchema& schema) {
       DatasetSchema& copy = added.emplace_back(dataset);
       copy.path = group.path + dataset.path.substr(group.like.size());
       copy.group = group.group;
-      copy.since = std::max(copy.since, group.since);
     }
   std::ranges::move(added, std::back_inserter(schema.datasets));
 }

@@ -75,20 +75,13 @@ struct AttributeSchema {
   ElementType type;
   std::vector<Extent> dims;  ///< empty: a scalar
   std::string dims_text, units, description;
-  std::int64_t since = 1;  ///< format version
   std::vector<Constraint> constraints;
-  std::int64_t renamed = 0;  ///< format version that brought its name; 0: `since`
-  std::string former_name;   ///< in files of versions before that
-
-  /// In files of a version.
-  const std::string& name_in(std::int64_t version) const { return version < renamed ? former_name : name; }
 };
 
 struct GroupSchema {
   std::string path;   ///< "/examples/{example}": one for each example; "/regions/{region}/examples", ... likewise
   std::string group;  ///< of the ledger, e.g. "examples"
   std::string description;
-  std::int64_t since = 1;
   std::vector<AttributeSchema> attributes;
   std::vector<std::string> symbols;  ///< sizes that each group of this path has of its own
   std::vector<std::string> holds;    ///< paths of groups before this one, whose like it holds
@@ -101,7 +94,6 @@ struct DatasetSchema {
   ElementType type;
   std::vector<Extent> dims;
   std::string dims_text, units, description;
-  std::int64_t since = 1;
   Use use = Use::kInspect;
   std::vector<Constraint> constraints;
 };

@@ -6,14 +6,12 @@
 #include <utility>
 
 #include "common/bundle/bundle.h"
-#include "common/bundle/file_schemas.h"
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/core/atomic_file.h"
 #include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
-#include "common/hdf5/schema.h"
 #include "common/mesh/geometry.h"
 #include "precompute/app/asset_input.h"
 #include "precompute/examples/alignment_report.h"
@@ -103,8 +101,7 @@ bool is_up_to_date(const BundleOptions& options, const AssetConfig& asset, const
   precompute::read_inputs(asset, needs, report, build);
   try {
     const OwnOutputRead own;
-    const BundleSummary summary = summarise_bundle(options.bundle);
-    return summary.input_sha256 == report.input_sha256 && summary.format_version == bundle_schema().format_version;
+    return summarise_bundle(options.bundle).input_sha256 == report.input_sha256;
   } catch (const InputError& error) {
     log::warning(fmt::format("computing the bundle again: {}", error.what()));
     return false;

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include "common/bundle/bundle.h"
+#include "common/bundle/file_schemas.h"
 #include "common/core/error.h"
+#include "common/hdf5/schema.h"
 #include "runtime/app/commands.h"
 
 namespace exmat::runtime {
@@ -30,7 +32,7 @@ void info_command(const std::filesystem::path& bundle) {
   const BundleSummary summary = summarise_bundle(bundle);
   const ReducedModel model = read_bundle(bundle);
   fmt::print("asset          {}\ngenerator      {}\nformat version {}\ninput sha256   {}\nbody           {}\n",
-             summary.asset_name, summary.generator, summary.format_version, summary.input_sha256,
+             summary.asset_name, summary.generator, bundle_schema().format_version, summary.input_sha256,
              summary.constrained ? "constrained" : "free");
   fmt::print("mesh           {} vertices, {} tets\n", summary.vertices, summary.tets);
   fmt::print("modes          {}\n", summary.modes);

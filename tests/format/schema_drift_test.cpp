@@ -49,20 +49,6 @@ TEST(BundleSchema, ListsTheGroupsOfTheLedgerInOrder) {
   EXPECT_EQ(schema, ledger);
 }
 
-// What is newer than its group's version would be missing in files that the reader takes.
-TEST(BundleSchema, HasNothingOlderThanItsGroup) {
-  for (const GroupSchema& group : bundle_schema().groups)
-    for (const AttributeSchema& attribute : group.attributes) {
-      EXPECT_GE(attribute.since, group.since) << group.path << attribute.name;
-      EXPECT_LE(attribute.since, bundle_schema().format_version) << group.path << attribute.name;
-      EXPECT_LE(attribute.renamed, bundle_schema().format_version) << group.path << attribute.name;
-      EXPECT_EQ(attribute.renamed > attribute.since, !attribute.former_name.empty()) << group.path << attribute.name;
-    }
-  for (const DatasetSchema& dataset : bundle_schema().datasets)
-    EXPECT_GE(dataset.since, bundle_schema().group(dataset.path.substr(0, dataset.path.rfind('/'))).since)
-        << dataset.path;
-}
-
 std::set<std::string> datasets_of(const Hdf5File& file, const std::string& group) {
   std::set<std::string> paths;
   for (const std::string& name : file.list(group)) {
@@ -191,8 +177,6 @@ TEST_P(FileSchemaOf, DescribesEveryEntry) {
   }
   for (const DatasetSchema& dataset : schema_.datasets) {
     EXPECT_FALSE(dataset.description.empty()) << dataset.path;
-    EXPECT_GE(dataset.since, 1) << dataset.path;
-    EXPECT_LE(dataset.since, schema_.format_version) << dataset.path;
     const bool is_index = dataset.type == ElementType::kInt32 || dataset.type == ElementType::kUint8;
     EXPECT_EQ(dataset.units.empty(), is_index) << dataset.path;
   }

@@ -196,7 +196,6 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.asset_name, "small");
   EXPECT_EQ(summary.generator, "exmat test");
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
-  EXPECT_EQ(summary.format_version, 8);
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
                                           "projection", "targets", "target_space", "target_elasticity", "fidelity",

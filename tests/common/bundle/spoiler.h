@@ -29,9 +29,6 @@ class Spoiler {
     H5Lcreate_external("/dev/null", "/x", file_, path, H5P_DEFAULT, H5P_DEFAULT);
   }
 
-  void rename_attribute(const char* object, const char* from, const char* to) {
-    H5Arename_by_name(file_, object, from, to, H5P_DEFAULT);
-  }
   void remove_attribute(const char* object, const char* name) { H5Adelete_by_name(file_, object, name, H5P_DEFAULT); }
 
   void set_attribute(const char* object, const char* name, hid_t type, const void* value,
