@@ -177,6 +177,22 @@ def command_line(root, program):
     return set(re.findall(r'add_subcommand\(\s*"([a-z]+)"', text)), set(OPTION.findall(literals.replace(",--", " --"))) | {"--help"}
 
 
+@lru_cache(maxsize=None)
+def literals(root):
+    """Texts of the sources, those that are written in pieces put together, without what stands for values."""
+    sources = "".join((root / name).read_text() for name in files_of(root) if re.match(r"(common|precompute|runtime)/.*[.](cpp|h)$", name))
+    return re.sub(r"\{[\d:.<>=+a-z]*\}", "\0", re.sub(r'"\s*"', "", sources).replace('\\"', '"'))
+
+
+def message_faults(root, text):
+    """A page's messages, in the first column of tables that begin with "message" or "symptom or message"."""
+    for table in re.finditer(r"^\| (?:symptom or )?message .*\n(?:\|.*\n)*", text, re.M):
+        for match in re.finditer(r"^\| (`[^|\n]*`)", table.group(), re.M):
+            for part in re.split(r"\.\.\.|`", match.group(1)):
+                if len(part.strip()) > 3 and part.strip() not in literals(root):
+                    yield table.start() + match.start(), f'no program prints "{part.strip()}"'
+
+
 def command_faults(root, text, code_of):
     for code in code_of.finditer(text):
         calls = list(re.finditer(r"(?<![\w./=-])(?:[\w./-]+/)?(exmat-precompute|exmat-runtime)(?![\w-])(?:[ ]+([a-z]+)(?![\w./-]))?", code.group()))
@@ -202,6 +218,6 @@ def references(root):
         outside_code = FENCE.sub(lambda m: blank(m.group()), text) if page else text
         found = [*page_faults(root, path.parent if page else None, outside_code), *path_faults(root, outside_code, names), *command_faults(root, text, CODE if page else QUOTED),
                  *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ()),
-                 *(symbol_faults(root, outside_code) if page and name != "CHANGELOG.md" else ())]
+                 *(message_faults(root, outside_code) if page else ()), *(symbol_faults(root, outside_code) if page and name != "CHANGELOG.md" else ())]
         for position, what in sorted(found):
             yield f"{name}:{text.count(chr(10), 0, position) + 1}: {what}"

@@ -64,6 +64,7 @@ PLANTED = [
     ("references", "docs/x.md", "Call `exmat_body_fly`.\n"),
     ("references", "docs/x.md", "Set `EXMAT_NO_SUCH_OPTION=1`.\n"),
     ("references", "docs/x.md", "As `FlyingBody` does, `tests/rules` shows.\n"),
+    ("references", "docs/x.md", "| message | cause |\n| --- | --- |\n| `no ... prints this` | none |\n"),
     ("columns", "docs/studies/x.md", "word " * 24 + "words\n"),
     ("columns", "README.md", "    exmat-runtime " + "word " * 24 + "\n"),
     ("references", "docs/x.md", "# X\n\n[there](#nothing)\n"),
