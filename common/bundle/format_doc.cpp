@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <sstream>
 
 #include "common/bundle/file_schemas.h"
 #include "common/hdf5/schema.h"
@@ -11,23 +12,41 @@ namespace {
 
 constexpr std::string_view kIntroduction = R"(# File formats
 
-<!-- Generated from schemas/bundle.json and schemas/trajectory.json; to renew it, run exmat_test_common with EXMAT_UPDATE_DOCS=1. -->
+<!-- Generated from schemas/bundle.json and schemas/trajectory.json; exmat_test_common writes it. -->
 
-Both files are HDF5, contiguous and little-endian, so `h5dump` and every HDF5 library read them. Arrays are row-major, indices
-0-based, numbers finite. Each dataset has the attributes `description`, `units`, `dims` and `crc32` (zlib's CRC-32 of its data, row-major
-and little-endian), each group of a bundle the attribute `description`. Text is UTF-8 of fixed length. The same model gives the same bytes.
+Both files are HDF5, contiguous and little-endian, so `h5dump` and every HDF5 library read them. Arrays are row-major,
+indices 0-based, numbers finite. Each dataset has the attributes `description`, `units`, `dims` and `crc32` (zlib's
+CRC-32 of its data, row-major and little-endian), each group of a bundle the attribute `description`. Text is UTF-8 of
+fixed length. The same model gives the same bytes.
 
-`range`: `positive` > 0; `non_negative` >= 0; `unit_interval` in [0, 1]; `poisson` in (-1, 0.5); `flag` 0 or 1; `index:n` in [0, n);
-`ascending` no element below the one before it; `increasing` each above; `symmetric` a symmetric matrix; `one_of:a|b` one of these texts;
-`may_be_empty` unlike all others, no elements are allowed.
+`range`: `positive` > 0; `non_negative` >= 0; `unit_interval` in [0, 1]; `poisson` in (-1, 0.5); `flag` 0 or 1;
+`index:n` in [0, n); `ascending` no element below the one before it; `increasing` each above; `symmetric` a symmetric
+matrix; `one_of:a|b` one of these texts; `may_be_empty` unlike all others, no elements are allowed.
 
 A reader refuses files of another format version.
 )";
 
 constexpr std::string_view kUseOfBundle = R"(
-`use` says when the run time reads a dataset of a group that its scene needs: `step`, to step; `positions`, to write positions;
-`inspect`, never. Groups that no scene needs are left out.
+`use` says when the run time reads a dataset of a group that its scene needs: `step`, to step; `positions`, to write
+positions; `inspect`, never. Groups that no scene needs are left out.
 )";
+
+constexpr std::size_t kColumns = 120;
+
+/// The text in lines of at most kColumns, broken at blanks.
+std::string wrapped(const std::string& text) {
+  std::string page;
+  std::size_t column = 0;
+  std::istringstream words(text);
+  for (std::string word; words >> word; column += word.size()) {
+    const bool is_first = page.empty();
+    const bool is_full = !is_first && column + 1 + word.size() > kColumns;
+    if (!is_first) page += is_full ? '\n' : ' ';
+    column = is_full ? 0 : column + (is_first ? 0 : 1);
+    page += word;
+  }
+  return page;
+}
 
 // Bars would end a cell.
 std::string cell(std::string text) {
@@ -73,21 +92,24 @@ std::string own_parts(const GroupSchema& group) {
   if (group.holds.empty()) return "";
   std::string groups;
   for (const std::string& held : group.holds) groups += (groups.empty() ? "" : ", ") + code(group.path + held);
-  return fmt::format("\nIt holds {}, all as above; its sizes {} are its own.\n", groups,
-                     fmt::join(group.symbols, ", "));
+  return "\n" +
+         wrapped(fmt::format("It holds {}, all as above; its sizes {} are its own.", groups,
+                             fmt::join(group.symbols, ", "))) +
+         "\n";
 }
 
 std::string group_section(const FileSchema& schema, const GroupSchema& group) {
   if (!group.like.empty()) return "";
-  std::string text = fmt::format("\n### {}\n{}.\n{}", code(group.path), group.description, own_parts(group));
+  std::string text =
+      fmt::format("\n### {}\n{}\n{}", code(group.path), wrapped(group.description + "."), own_parts(group));
   if (!group.attributes.empty()) text += "\n" + attribute_table(group.attributes);
   if (has_datasets(schema, group.path)) text += "\n" + dataset_table(schema, group.path);
   return text;
 }
 
 std::string file_section(const FileSchema& schema, const std::string& title, std::string_view remark) {
-  std::string text =
-      fmt::format("\n## {}\n{}\n\nFormat version {}.\n{}", title, schema.description, schema.format_version, remark);
+  std::string text = fmt::format("\n## {}\n{}\n\nFormat version {}.\n{}", title, wrapped(schema.description),
+                                 schema.format_version, remark);
   text += "\n| symbol | |\n| --- | --- |\n";
   for (const auto& [name, meaning] : schema.symbols) text += fmt::format("| {} | {} |\n", code(name), meaning);
   text += "\n### Root\n" + attribute_table(schema.attributes);

@@ -5,13 +5,12 @@ Usage: accuracy.py [--split] [--write] [--programs build/release/bin] [SCENE ...
 
 Everything goes to build/accuracy, where motions in full space are found again. --split also tells what each approximation adds to the error. --write
 renews docs/studies/accuracy.md from all that has been measured. Ten minutes, twice as much for the split; on a machine that does nothing else, or the
-times mean little.
+times of bundles mean little.
 """
 import argparse
 import json
 import pathlib
 import shutil
-import subprocess
 import time
 
 from other_loads import ROOT, absolute, error, frames_of, mesh_of, run
@@ -30,27 +29,32 @@ FRAMES = 100
 
 HEAD = """# The six scenes beside their full space
 
-Written by `examples/tools/accuracy.py --write` on {processor}. Mean error over the whole scene against the full space, of the position, of the free cross
-and car of the shape ([definitions](../error_metrics.md)); the cross and the car with stable neo-Hookean, since St.Venant-Kirchhoff leaves tets inverted
-in their full space. A step and a bundle are timed on this machine, the bundle with nothing cached and with its training.
+Written by `examples/tools/accuracy.py --split --write` on {processor}.
+The error is the mean over the whole scene against
+the full space: of the position, and of the free cross and car of the shape ([definitions](../error_metrics.md)). The
+cross and the car have stable neo-Hookean material here, since St.Venant-Kirchhoff leaves tets inverted in their full
+space. The seconds of a bundle include its training, with nothing cached. The time of a step depends on r and s:
+[performance](../performance.md#whole-steps-avx512).
 
-| scene | m | r | s | internal force | error | step [us] | bundle [s] |
-| --- | ---: | ---: | ---: | --- | ---: | ---: | ---: |
+| scene | m | r | s | internal force | error | bundle [s] |
+| --- | ---: | ---: | ---: | --- | ---: | ---: |
 {rows}
-Above 2 % are the cross with 20 modes or 84 elements and the teddy of local examples with 20 modes. The teddy's internal force is exact there (a
-polynomial), so it is the basis that is too small for what an arm does alone.
+The cross with 20 modes or 84 elements and the teddy of local examples with 20 modes are above 2 %. The teddy's internal
+force is exact there (a polynomial), so 20 modes are too few for an arm that moves alone.
 
 ## What each approximation adds
 
-[Errors by source](../error_metrics.md#errors-by-source) of the recommended assets. The full problem has twice the eigenfunctions and half the time step of
-the scene, so the total is not the error above: that one is against the full space with the scene's own. The alignment is not known: poses are on the rest
-example's mesh, not the object's. "Settled" is the total in the last tenth of the time.
+[Errors by source](../error_metrics.md#errors-by-source) of the recommended assets. The full problem has twice the
+eigenfunctions and half the time step of the scene, so the total is not the error above, which is against the full space
+with the scene's own settings. The part of the alignment is not known: poses are on the rest example's mesh, not the
+object's. "Settled" is the total in the last tenth of the time.
 
 | scene | {sources} | total | settled |
 | --- | {rules} |
 {split}
-Not known is the part of the eigenfunctions where the mesh has no more of them. The part says how far the motion moves with twice as many, and is no
-distance from a limit: functions finer than a few edges follow the tessellation more than the pose.
+The part of the eigenfunctions says how far the motion moves with twice as many. It is not a distance from a limit:
+functions finer than a few edges follow the tessellation more than the pose. Where the mesh has no more of them, the
+part is not known.
 
 ![The bar's error by its sources](bar-cuboid-sources.svg)
 """
@@ -82,11 +86,9 @@ def measure(name, size, programs, output):
     if not (folder / "full.h5").exists():
         run(folder, programs / "exmat-precompute", "full-space", files["scene"], "-o", "full.h5")
     run(folder, programs / "exmat-runtime", "run", files["scene"])
-    bench = json.loads(subprocess.run([programs / "exmat-runtime", "bench", files["scene"], "--json", "--progress", "none"], cwd=folder,
-                                      check=True, capture_output=True, text=True).stdout)
     away = error(frames_of(folder / "run.h5")[1:], frames_of(folder / "full.h5")[1:], mesh_of(folder / scene["bundle"]))
     result = {"m": asset["shape_space"]["eigenfunctions"], "r": asset["basis"]["size"], "s": asset["cubature"]["elements"],
-              "internal_force": asset["internal_force"], "error": away, "step_us": bench["step"]["median_us"], "bundle_s": seconds}
+              "internal_force": asset["internal_force"], "error": away, "bundle_s": seconds}
     (folder / f"result_{size}.json").write_text(json.dumps(result, indent=1) + "\n")
 
 
@@ -109,7 +111,7 @@ def percent(share):
 
 def size_row(name, size, result):
     cells = (name if size == "recommended" else "", result["m"], result["r"], result["s"], result["internal_force"], percent(result["error"]),
-             f"{result['step_us']:.1f}", f"{result['bundle_s']:.0f}" if size == "recommended" else "")
+             f"{result['bundle_s']:.0f}" if size == "recommended" else "")
     return "| " + " | ".join(str(cell) for cell in cells) + " |\n"
 
 

@@ -11,6 +11,7 @@ import argparse
 import json
 import pathlib
 import subprocess
+import textwrap
 import sys
 
 import h5py
@@ -185,14 +186,16 @@ def measure(body, programs, output):
 
 def page(tables):
     lines = ["# Loads that training has not seen", "",
-             f"Written by `examples/tools/other_loads.py --write`: error of the reduced motion (r = {MODES}, s = {ELEMENTS}, stable neo-Hookean) against the full",
-             "space, mean over 1.5 to 2 s (the cross 0.6 s), of the position, on the free cross of the shape ([definitions](../error_metrics.md)).",
-             "Columns are what the basis and the cubature of a bundle have learned from, rows what the bundle is then run with.", ""]
-    lines += [f"- {name}: {text}." for name, text in TRAININGS.items()]
-    lines += ["", "So make the bundle for the scene that it is to run (`--scene`), and make it again when the loads change: their sizes may differ by a factor of four,",
-              "their directions and vertices may not. Where loads are only known when the scene runs, declare what is known of them (`basis.loads`), take a larger",
-              "`basis.size`, and look at `/fidelity`, which says how far loads of that kind are from the full space. Where no example acts and a body",
-              "is stiff, `basis.training`: `none` is as good and takes no time. Strong pushes that may come anywhere on a soft body are beyond 30 modes of any kind."]
+             f"Written by `examples/tools/other_loads.py --write`: error of the reduced motion (r = {MODES}, s = {ELEMENTS}, stable neo-Hookean)",
+             "against the full space, mean over 1.5 to 2 s (the cross 0.6 s), of the position, on the free cross of the shape",
+             "([definitions](../error_metrics.md)). Columns are what the basis and the cubature of a bundle have learned from, rows",
+             "what the bundle is then run with.", ""]
+    lines += [line for name, text in TRAININGS.items() for line in textwrap.wrap(f"- {name}: {text}.", 120, subsequent_indent="  ")]
+    lines += ["", "Make the bundle for the scene that it is to run (`--scene`), and make it again when the loads change: their sizes may",
+              "differ by a factor of four, their directions and vertices may not. If loads are known only when the scene runs, declare",
+              "what is known of them (`basis.loads`), take a larger `basis.size`, and look at `/fidelity`, which says how far loads of",
+              "that kind are from the full space. If no example acts and the body is stiff, `basis.training`: `none` is as good and",
+              "takes no time. Strong pushes anywhere on a soft body are beyond 30 modes of any kind."]
     for body, rows in tables.items():
         lines += ["", f"## {body.capitalize()}", "", "| run with | " + " | ".join(TRAININGS) + " |", "| --- |" + " ---: |" * len(TRAININGS)]
         lines += [f"| {test} | " + " | ".join(f"{100 * e:.2g} %" for e in errors) + " |" for test, errors in rows.items()]

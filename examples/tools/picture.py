@@ -109,6 +109,12 @@ class Run:
         return f"{self.label}  t = {self.times[k]:.2f} s".strip(), actors
 
 
+    def turn_upright(self):
+        """From y up, as in a surface's .glb, to z up."""
+        for name in ("rest", "drawn", "drawn_rest", "positions"):
+            setattr(self, name, getattr(self, name)[..., [0, 2, 1]] * (1, -1, 1))
+
+
 def box_of(runs):
     """What holds all that the runs show."""
     shown = np.concatenate([r.drawn.reshape(-1, 3) for r in runs])
@@ -128,6 +134,8 @@ def panels_of(runs, low, high, ghost):
 def draw_motion(a):
     kinds = [FULL_SPACE, "reduced"] if a.full_space else [""]
     runs = [Run(path, a.times, a.frames, kind) for kind in kinds for path in a.scenes]
+    for run in runs if a.up == "y" else ():
+        run.turn_upright()
     low, high = box_of(runs)
     rows = panels_of(runs, low, high, a.ghost)
     if a.columns:
@@ -178,6 +186,7 @@ def main():
     motion.add_argument("--times", type=vector, help="instead the frames at these times [s]: T,T,...")
     motion.add_argument("--columns", type=int, help="panels in a row, instead of a row for each scene")
     motion.add_argument("--ghost", action="store_true", help="the rest shape, faint, in each panel")
+    motion.add_argument("--up", choices="yz", default="z", help="the axis that points up; y: without obstacles and forces")
     motion.add_argument("--full-space", action="store_true", help="before the scenes, the same by exmat-precompute full-space, which wrote "
                         "NAME_full.h5 beside each trajectory NAME.h5")
     movie = command("movie", draw_movie)

@@ -1,15 +1,14 @@
 #!/usr/bin/python3
-"""Run the studies of the paper's six scenes, and the two of the reduction alone, and write what came out into docs/studies.
+"""Run the studies of the paper's six scenes, and the two of the reduction alone, and write what came out into build/studies.
 
 Usage: studies [--programs build/release/bin] [--jobs N] [NAME ...]    (bar-cuboid; all where none is named)
 
-Each goes to build/studies/NAME, where an interrupted one is resumed. docs/studies gets NAME.html and README.md, a table of all
-that have run. Minutes to hours; on a machine that does nothing else, or the times mean little. Exit status 1 if a study fails.
+Each goes to build/studies/NAME, with its report.html; an interrupted one is resumed there. build/studies/tables.md has the errors and times
+of all that have run. Minutes to hours; on a machine that does nothing else, or the times mean little. Exit status 1 if a study fails.
 """
 import argparse
 import json
 import pathlib
-import shutil
 import subprocess
 import sys
 
@@ -25,13 +24,9 @@ STUDIES = {
     "reduction-cross": "reduction/cross_study.json",
 }
 
-HEAD = """# Studies
+HEAD = """# Studies of the paper's assets
 
-Written by `examples/tools/studies.py`, by `exmat-precompute study` for each scene: error against run time, against the full space
-([definitions](../error_metrics.md)). Pages to open in a browser: {pages}.
-
-[The six scenes beside their full space](accuracy.md) has the recommended assets, with what each approximation adds to their errors, and [loads that training has not seen](other_loads.md) what
-bases are worth elsewhere. Times of their steps stand in [the paper's Table 2](../paper_table.md). The table below is of the paper's assets.
+By `exmat-precompute study` for each scene: error against run time, against the full space. Pages to open in a browser: {pages}.
 """
 
 ERRORS = """
@@ -83,11 +78,11 @@ def failures(results):
     return "\n## What failed\n\n" + "\n".join(lines) + "\n" if lines else ""
 
 
-def write_page(folder, docs):
+def write_page(folder):
     results = {name: json.loads((folder / name / "results.json").read_text())
                for name in STUDIES if (folder / name / "results.json").exists()}
-    text = HEAD.format(pages=", ".join(f"[{name}]({name}.html)" for name in results)) + error_table(results)
-    (docs / "README.md").write_text(text + failures(results))
+    text = HEAD.format(pages=", ".join(f"[{name}]({name}/report.html)" for name in results)) + error_table(results)
+    (folder / "tables.md").write_text(text + failures(results))
 
 
 def main():
@@ -99,8 +94,7 @@ def main():
     unknown = set(options.names) - set(STUDIES)
     if unknown:
         parser.error(f"no study {', '.join(sorted(unknown))}; there are: {', '.join(STUDIES)}")
-    folder, docs = ROOT / "build/studies", ROOT / "docs/studies"
-    docs.mkdir(exist_ok=True)
+    folder = ROOT / "build/studies"
     failed = []
     for name in options.names or STUDIES:
         output = folder / name
@@ -110,9 +104,7 @@ def main():
                                "--jobs", str(options.jobs)])
         if done.returncode:
             failed.append(name)
-        if done.returncode < 2 and (output / "report.html").exists():
-            shutil.copy(output / "report.html", docs / f"{name}.html")
-    write_page(folder, docs)
+    write_page(folder)
     return 1 if failed else 0
 
 

@@ -9,6 +9,7 @@ import json
 import os
 import re
 import subprocess
+import textwrap
 from pathlib import Path
 
 SETS = ("avx512", "avx2", "portable")  # the fastest first; the first one that the machine has runs everything
@@ -75,6 +76,10 @@ def number(value):
     if value >= 1000:
         return f"{value:,.0f}"
     return f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def paragraph(text):
+    return textwrap.fill(text, 120, break_long_words=False, break_on_hyphens=False)
 
 
 def table(header, rows):
@@ -199,10 +204,11 @@ def over_elements(result, bodies=1000):
 
 
 def report_crowds(result):
-    return (f"Microseconds of wall clock for a step of one body, the best of {CROWD_REPETITIONS} ({result.name}), four examples, table, 1 ms; each is thrown by\n"
-            "a speed of its own, free ones turn. In parentheses how many times as long as its flops at the DGEMM rate of one thread.\n"
-            "Side by side the stiffness is a polynomial where that has fewer flops, and those are counted. Over the flops of one by itself, a sum over elements, 1,000\n"
-            f"clamped bodies take {over_elements(result)}.\n\n" + crowds(result))
+    return paragraph(
+        f"Microseconds of wall clock for a step of one body, the best of {CROWD_REPETITIONS} ({result.name}), four examples, table, 1 ms; "
+        "each is thrown by a speed of its own, free ones turn. In parentheses how many times as long as its flops at the DGEMM rate of one "
+        "thread. Side by side the stiffness is a polynomial where that has fewer flops, and those are counted. Over the flops of one by "
+        f"itself, a sum over elements, 1,000 clamped bodies take {over_elements(result)}.") + "\n\n" + crowds(result)
 
 
 def worlds(result):
@@ -222,14 +228,16 @@ def worlds(result):
 def own_contact(result):
     certificate = 1e3 * result.microseconds("world/certificate")
     closed, apart, without = (number(result.microseconds(f"world/fork/{name}")) for name in ("closed", "open", "never"))
-    return (f"Whether a body may touch itself is told in {number(certificate)} ns. A fork (r = 20) takes {without} us a step "
-            f"without self-contact, {apart} us with it while its prongs are apart, {closed} us while they press on each other.")
+    return paragraph(
+        f"The test whether a body may touch itself takes {number(certificate)} ns. A fork (r = 20) takes {without} us a step "
+        f"without self-contact, {apart} us with it while its prongs are apart, {closed} us while they press on each other.")
 
 
 def report_worlds(result):
     return "\n\n".join((
-        f"Microseconds of wall clock for a step of one body, the best of {WORLD_REPETITIONS} ({result.name}): blocks of r = 20, s = 96, 45 "
-        "vertices on the surface, without examples,\nat rest on a floor and on each other, 2 ms.",
+        paragraph(
+            f"Microseconds of wall clock for a step of one body, the best of {WORLD_REPETITIONS} ({result.name}): blocks of r = 20, s = 96, "
+            "45 vertices on the surface, without examples, at rest on a floor and on each other, 2 ms."),
         worlds(result), own_contact(result)))
 
 
@@ -237,9 +245,10 @@ def report(results, compiler):
     fastest = results[0]
     return "\n\n".join((
         machine(results, compiler),
-        f"Each number is the best of {REPETITIONS} repetitions, which were taken in random order so that a disturbance "
-        "does not hit all of one benchmark's.\nTimes of one thread are of its processor time, those of several bodies "
-        "of the wall clock.",
+        paragraph(
+            f"Each number is the best of {REPETITIONS} repetitions, which were taken in random order so that a disturbance "
+            "does not hit all of one benchmark's. Times of one thread are of its processor time, those of several bodies "
+            "of the wall clock."),
         f"### Whole steps ({fastest.name})\n\nMicroseconds of a step; in parentheses how many times as long as its "
         "flops at the DGEMM rate.",
         steps(fastest),

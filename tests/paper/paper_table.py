@@ -29,9 +29,9 @@ PAPER = {
     "teddy-local": ("08_teddy_local", "{}", (1773, 1755, 11193, 6, 30, 30), (302.8, 313.7), (33.2, 38.4)),
 }
 KINDS = ("paper", "recommended")
-BASELINE = """How many times as long the full-space method of Zhu et al. takes: t_interp / t_total. The first column of ratios is the paper's own. The
-others compare the baseline, which is that method as we wrote it (`tests/paper`), with ours on one machine, with the paper's m, r and s.
-All are medians, the baseline's over its first 50 steps."""
+BASELINE = """How many times as long the full-space method of Zhu et al. takes: t_interp / t_total. The first column of ratios is the
+paper's own. The others compare the baseline, which is that method as we wrote it (`tests/paper`), with ours on one
+machine, with the paper's m, r and s. All are medians, the baseline's over its first 50 steps."""
 
 
 class Failed(Exception):
@@ -173,11 +173,14 @@ def main():
     if a.write:
         head = f"""# The paper's Table 2
 
-Written by `tests/paper/paper_table.py --write` on {cpu()}; the paper's columns were measured on an Intel Core i5 at 2.8 GHz. t_interp is
-the interpolation of the examples (here the stages weights and target of `exmat-runtime bench`), t_total a whole step. "solve" finds
-the target by minimisation in each step, as the paper does, "table" takes it from the bundle's table, which is what a scene does
-that asks for nothing else. A ratio is the paper's time by ours (with "solve" unless it says otherwise). DOFs, tets, m, r and s are
-read from the bundles, the vertices from the mesh of the last example.
+Written by `tests/paper/paper_table.py --write` on {cpu()}. The paper's columns were measured on an Intel Core i5 at
+2.8 GHz. t_interp is the interpolation of the examples (here the stages weights and target of `exmat-runtime bench`),
+t_total a whole step. "solve" finds the target by minimisation in each step, as the paper does. "table" takes it from
+the bundle's table, the default of a scene. A ratio is the paper's time by ours (with "solve" unless it says otherwise).
+DOFs, tets, m, r and s are read from the bundles, the vertices from the mesh of the last example.
+
+Compare ratios here, not microseconds: the six scenes run one after the other beside whatever else the machine does. The
+time of a step by r and s on a quiet machine is in [performance](performance.md#whole-steps-avx512).
 
 """
         (ROOT / "docs" / "paper_table.md").write_text(head + text)

@@ -2,6 +2,7 @@
 
 What a user calls his own stands in capitals (SCENE.json, DIR/report.html, NN_name) and is no reference.
 """
+import builtins
 import re
 import subprocess
 from functools import lru_cache
@@ -24,6 +25,8 @@ QUOTED = re.compile(r"`[^`\n]+`")
 CODE = re.compile(QUOTED.pattern + r"|^ {4}.*(?:\n +[\[-].*)*|^```.*?\n(?s:.*?)^```$", re.M)  # of a page: with blocks, and lines that go on
 PLACEHOLDER = re.compile(r"(^|/|_)(NN|[A-Z]{3,}|[A-Z]+_\w+|NAME)\b|NN_name|(^|/)x\.\w+$")
 OPTION = re.compile(r"(?<![\w-])--[a-z][a-z-]*")
+# Names of ours in a page's code: of the C interface, of options and of types and tests.
+SYMBOL = re.compile(r"(?<![\w./<:*-])(exmat_[a-z]\w*[a-z0-9]|EXMAT_[A-Z]\w*[A-Z0-9]|k?[A-Z][a-z0-9]+(?:[A-Z][a-z0-9]*)+)(?![\w*.-])")
 
 
 def blank(text):
@@ -106,7 +109,7 @@ def page_faults(root, folder, text):
     for match in PAGE.finditer(text):
         name, sections, heading, step = match.groups()
         page = next((place / name for place in (root, folder) if place and (place / name).exists()), None)
-        if is_placeholder(name):
+        if is_placeholder(name) or name.startswith("build/"):
             continue
         if page is None:
             yield match.start(), f"there is no page {name}"
@@ -126,9 +129,25 @@ def path_faults(root, text, names):
             if not is_placeholder(name) and not exists(root, name):
                 yield match.start(), f"there is no {name}"
     for match in SOURCE.finditer(text):
-        if not is_placeholder(match.group(1)) and not PATH.match(match.group(1)) and not any(
-                name == match.group(1) or name.endswith("/" + match.group(1)) for name in names):
+        if is_placeholder(match.group(1)) or PATH.match(match.group(1)):
+            continue
+        found = [name for name in names if name == match.group(1) or name.endswith("/" + match.group(1))]
+        if not found:
             yield match.start(), f"there is no source {match.group(1)}"
+
+
+@lru_cache(maxsize=None)
+def symbols(root):
+    """Every word of the sources."""
+    return {word for name in files_of(root) if name.endswith(C_LIKE + HASHED[:-1] + (".cmake", ".json"))
+            for word in re.findall(r"\w+", (root / name).read_text(errors="replace"))}
+
+
+def symbol_faults(root, text):
+    for code in QUOTED.finditer(text):
+        for match in SYMBOL.finditer(code.group()):
+            if match.group(1) not in symbols(root) and not hasattr(builtins, match.group(1)):
+                yield code.start() + match.start(), f"no source has {match.group(1)}"
 
 
 def relative_faults(path, text):
@@ -158,6 +177,22 @@ def command_line(root, program):
     return set(re.findall(r'add_subcommand\(\s*"([a-z]+)"', text)), set(OPTION.findall(literals.replace(",--", " --"))) | {"--help"}
 
 
+@lru_cache(maxsize=None)
+def literals(root):
+    """Texts of the sources, those that are written in pieces put together, without what stands for values."""
+    sources = "".join((root / name).read_text() for name in files_of(root) if re.match(r"(common|precompute|runtime)/.*[.](cpp|h)$", name))
+    return re.sub(r"\{[\d:.<>=+a-z]*\}", "\0", re.sub(r'"\s*"', "", sources).replace('\\"', '"'))
+
+
+def message_faults(root, text):
+    """A page's messages, in the first column of tables that begin with "message" or "symptom or message"."""
+    for table in re.finditer(r"^\| (?:symptom or )?message .*\n(?:\|.*\n)*", text, re.M):
+        for match in re.finditer(r"^\| (`[^|\n]*`)", table.group(), re.M):
+            for part in re.split(r"\.\.\.|`", match.group(1)):
+                if len(part.strip()) > 3 and part.strip() not in literals(root):
+                    yield table.start() + match.start(), f'no program prints "{part.strip()}"'
+
+
 def command_faults(root, text, code_of):
     for code in code_of.finditer(text):
         calls = list(re.finditer(r"(?<![\w./=-])(?:[\w./-]+/)?(exmat-precompute|exmat-runtime)(?![\w-])(?:[ ]+([a-z]+)(?![\w./-]))?", code.group()))
@@ -182,6 +217,7 @@ def references(root):
         page = path.suffix == ".md"
         outside_code = FENCE.sub(lambda m: blank(m.group()), text) if page else text
         found = [*page_faults(root, path.parent if page else None, outside_code), *path_faults(root, outside_code, names), *command_faults(root, text, CODE if page else QUOTED),
-                 *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ())]
+                 *(relative_faults(path, outside_code) if page else ()), *(link_faults(path, outside_code) if page else ()),
+                 *(message_faults(root, outside_code) if page else ()), *(symbol_faults(root, outside_code) if page and name != "CHANGELOG.md" else ())]
         for position, what in sorted(found):
             yield f"{name}:{text.count(chr(10), 0, position) + 1}: {what}"

@@ -24,6 +24,7 @@ LAYERS = {
 INNER = {f"{stage}/{folder}": (stage, depth) for stage, folders in LAYERS.items() for depth, folder in enumerate(folders.split())}
 OUTER = {"runtime/include", "runtime/python"}
 SEEN_FROM = {"common": (), "runtime": ("common/",), "precompute": ("common/", "runtime/sim/", "runtime/kernels")}
+WIDEST = 120  # columns of a line of a page
 LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime/kernels", "runtime/sim")
 LEAN_INCLUDES = LEAN + ("exmat",)
 POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of these sources alone
@@ -170,6 +171,18 @@ def mirrored_tests(root):
                 yield f"tests/{folder}/{path.name}: there is no folder {folder}"
 
 
+def columns(root):
+    """Lines of pages fit beside another window: at most 120 columns, but for rows of tables, what programs print (fences)
+    and a line that is one link, one picture or one word. The changelog is a list for search, not a page."""
+    for path in sorted({*root.glob("*.md"), *(root / "docs").rglob("*.md"), *(root / "examples").rglob("*.md")}):
+        fenced = False
+        for number, line in enumerate(path.read_text().splitlines(), 1):
+            fenced ^= line.startswith("```")
+            whole = line.startswith(("|", "![")) or fenced or " " not in re.sub(r"\[[^\]]*\]\(\S*\)\S*", "", line.strip())
+            if len(line) > WIDEST and not whole and path.name != "CHANGELOG.md":
+                yield f"{path.relative_to(root)}:{number}: {len(line)} columns, more than {WIDEST}"
+
+
 def top_level(root):
     """Nothing but what the architecture names stands at the top."""
     listed = subprocess.run(["git", "-C", str(root), "ls-files"], capture_output=True, text=True)
@@ -189,7 +202,7 @@ def formatting(root):
             yield line
 
 
-RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, python_module, viewer, one_header, mirrored_tests, references, top_level,
+RULES = {rule.__name__: rule for rule in (direction, lean, hot_path, petsc, hdf5, public_headers, python_module, viewer, one_header, mirrored_tests, references, columns, top_level,
                                         formatting)}
 
 

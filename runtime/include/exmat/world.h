@@ -47,7 +47,7 @@ EXMAT_API void exmat_world_destroy(exmat_world* world) EXMAT_NOEXCEPT;
    NULL. */
 EXMAT_API exmat_world* exmat_body_world(const exmat_body* body) EXMAT_NOEXCEPT;
 
-/* All bodies back to rest at time 0, without applied forces. Obstacles of the scene go back, too. */
+/* All bodies back to rest at time 0, without applied forces. Obstacles that no host has moved begin anew, too. */
 EXMAT_API exmat_status exmat_world_reset(exmat_world* world) EXMAT_NOEXCEPT;
 
 /* Its steps times the time step [s]; negative where `world` is NULL. */

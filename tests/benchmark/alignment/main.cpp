@@ -228,8 +228,8 @@ std::string table() {
       fmt::print(stderr, "{}, {}: {} ({:.1f} s)\n", body.name, method.name, ours, timer.seconds());
     }
   text += fmt::format(
-      "\n{} cases: {} refused (of these {} wrong by more than {} over the ideal projection), {} taken with a warning "
-      "({} wrong),\nthe rest taken as good: {} wrong.\n",
+      "\n{} cases: {} refused (of these {} wrong by more than {} over the ideal projection), {} taken with a "
+      "warning\n({} wrong), the rest taken as good: {} wrong.\n",
       counts.cases, counts.refused, counts.wrong_and_refused, kWrong, counts.doubtful, counts.wrong_and_doubtful,
       counts.silent);
   return text;

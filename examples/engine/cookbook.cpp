@@ -1,0 +1,253 @@
+// The recipes of docs/engine_cookbook.md in one program, which a test compiles and runs.
+//   cookbook BUNDLE.h5    (a free body with contact, as examples/10_pile/asset_bar.json makes)
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <exmat/exmat.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+using Vector = std::array<double, 3>;
+
+Vector operator-(const Vector& a, const Vector& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+
+// recipe: model
+exmat::Model load(const std::string& bundle) {
+  exmat_settings settings = exmat::default_settings();
+  settings.time_step = 1.0 / 240;
+  settings.gravity[2] = -9.81;
+  settings.stiffness_damping = 0.005;
+  settings.use_examples = 1;
+  settings.example_stiffness = 400;
+  settings.example_damping = 10;
+  settings.use_contact = 1;
+  return exmat::Model(bundle, settings);
+}
+
+// recipe: world
+exmat_obstacle floor() {
+  exmat_obstacle plane = exmat::default_obstacle();  // through the origin, z up
+  plane.stiffness = 1e6;                             // [N/m^3]
+  plane.damping = 1e4;
+  plane.friction = 0.5;
+  return plane;
+}
+
+std::int64_t drop(exmat::World& world, const exmat::Model& model, const Vector& where) {
+  exmat::Body body(model);
+  exmat_motion motion = body.motion();
+  for (std::size_t axis = 0; axis < 3; ++axis) motion.position[axis] += where[axis];
+  body.set_motion(motion);
+  return world.add(std::move(body));
+}
+
+exmat::World make_world() {
+  exmat_contact_law law = exmat::default_contact_law();  // of bodies with each other
+  law.stiffness = 1e6;
+  law.damping = 1e4;
+  law.friction = 0.5;
+  exmat::World world(law);
+  world.add_obstacle(floor());
+  return world;
+}
+
+// recipe: sub-steps
+class Clock {
+ public:
+  explicit Clock(double time_step) : time_step_(time_step) {}
+
+  /// Steps that a frame of `seconds` needs; at most `most`, so that one slow frame does not make the next one slower.
+  int steps(double seconds, int most = 16) {
+    owed_ += seconds;
+    const int steps = std::min(most, static_cast<int>(owed_ / time_step_));
+    owed_ = steps == most ? 0 : owed_ - steps * time_step_;
+    return steps;
+  }
+
+ private:
+  double time_step_, owed_ = 0;
+};
+
+// recipe: drawing
+struct Drawn {
+  explicit Drawn(const exmat::Model& model)
+      : surface(model), triangles(surface.triangles()), xyz(3 * surface.points()) {}
+
+  void update(exmat::BodyRef body) { body.read_positions(surface, xyz); }  // then upload xyz
+  Vector point(std::int32_t k) const {
+    const auto at = 3 * static_cast<std::size_t>(k);
+    return {xyz[at], xyz[at + 1], xyz[at + 2]};
+  }
+
+  exmat::Surface surface;
+  std::vector<std::int32_t> triangles;  // [3f], constant
+  std::vector<float> xyz;               // [3k], of this frame
+};
+
+// recipe: picking
+struct Picked {
+  std::int64_t triangle = -1;
+  std::array<double, 3> shares{};  // of its corners
+  double distance = INFINITY;
+};
+
+/// The nearest triangle that a ray from `eye` along `direction` meets (Moeller and Trumbore 1997).
+std::optional<Picked> pick(const Drawn& drawn, const Vector& eye, const Vector& direction) {
+  Picked nearest;
+  for (std::size_t f = 0; f < drawn.triangles.size() / 3; ++f) {
+    const Vector a = drawn.point(drawn.triangles[3 * f]);
+    const Vector ab = drawn.point(drawn.triangles[3 * f + 1]) - a, ac = drawn.point(drawn.triangles[3 * f + 2]) - a;
+    const Vector p = cross(direction, ac), s = eye - a, q = cross(s, ab);
+    const double determinant = dot(ab, p);
+    const double u = dot(s, p) / determinant, v = dot(direction, q) / determinant, t = dot(ac, q) / determinant;
+    if (determinant == 0 || u < 0 || v < 0 || u + v > 1 || t < 0 || t >= nearest.distance) continue;
+    nearest = {static_cast<std::int64_t>(f), {1 - u - v, u, v}, t};
+  }
+  if (nearest.triangle < 0) return std::nullopt;
+  return nearest;
+}
+
+/// A spring from the picked point to the mouse, renewed before each step.
+class Hand {
+ public:
+  Hand(const Drawn& drawn, const Picked& picked)
+      : points_(exmat::Points::on_surface(drawn.surface, std::array{picked.triangle}, picked.shares)) {}
+
+  void pull(exmat::BodyRef body, const Vector& mouse) {
+    std::array<float, 3> xyz;
+    body.read_positions(points_, xyz);
+    std::array<double, 3> force;
+    for (std::size_t axis = 0; axis < 3; ++axis) force[axis] = stiffness_ * (mouse[axis] - xyz[axis]);
+    body.clear_forces();
+    body.apply_forces(points_, force);
+  }
+
+ private:
+  exmat::Points points_;
+  double stiffness_ = 30000;  // [N/m]
+};
+
+// recipe: poses
+void take_pose(exmat::BodyRef body, const exmat::Model& model, std::size_t example) {
+  std::vector<double> weights(model.examples(), 0.0);
+  weights[example] = 1;
+  body.set_example_weights(weights);
+}
+
+void forget_pose(exmat::BodyRef body) { body.set_example_weights({}); }  // weights follow the shape again
+
+// recipe: coupling
+/// A rigid ball of the host's own engine: exmat is told where it is, and says how hard it is pushed.
+struct Ball {
+  Vector position{}, velocity{};
+  double mass = 50, radius = 0.4;
+  std::int64_t id = -1;
+
+  void add_to(exmat::World& world) {
+    exmat_obstacle ball = exmat::default_obstacle();
+    ball.shape = EXMAT_SPHERE;
+    ball.radius = radius;
+    ball.damping = 1e4;
+    id = world.add_obstacle(ball);
+    move_in(world);
+  }
+
+  void move_in(exmat::World& world) const {
+    exmat_motion motion{};
+    motion.orientation[0] = 1;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      motion.position[axis] = position[axis];
+      motion.linear_velocity[axis] = velocity[axis];
+    }
+    world.move_obstacle(id, motion);
+  }
+
+  void step(const exmat::World& world, double dt) {
+    Vector force;
+    world.read_obstacle_load(id, force.data(), nullptr);  // the mean over the last call that stepped
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      velocity[axis] += dt * (force[axis] / mass - (axis == 2 ? 9.81 : 0));
+      position[axis] += dt * velocity[axis];
+    }
+  }
+};
+
+// recipe: save and restore
+struct Saved {
+  std::vector<double> numbers;
+  std::uint64_t hash;
+};
+
+Saved save(const exmat::World& world) { return {world.state(), world.hash()}; }
+
+/// Into a world of the same bodies; true if it is the same to the last bit.
+bool restore(exmat::World& world, const Saved& saved) {
+  world.set_state(saved.numbers);
+  return world.hash() == saved.hash;
+}
+
+// recipe: end
+
+int main(int argc, char** argv) {
+  if (argc != 2) return 2;
+  try {
+    const exmat::Model model = load(argv[1]);
+    exmat::World world = make_world();
+    drop(world, model, {0, 0, 0.2});
+    const std::int64_t upper = drop(world, model, {0.1, 0, 1.4});
+    Drawn drawn(model);
+    Clock clock(model.time_step());
+    const auto frames = [&](int count, auto before_each_step) {
+      for (int frame = 0; frame < count; ++frame)
+        for (int step = clock.steps(1.0 / 60); step > 0; --step) {
+          before_each_step();
+          world.step();
+        }
+      drawn.update(world.body(upper));
+    };
+
+    frames(60, [] {});
+    std::printf("dropped      the upper body at z = %.2f m\n", world.body(upper).motion().position[2]);
+    const Saved saved = save(world);
+
+    const Vector eye{3.8, 0.5, 10}, down{0, 0, -1};
+    const std::optional<Picked> picked = pick(drawn, eye, down);
+    if (!picked) throw exmat::Error(EXMAT_FAILURE, "the ray meets nothing");
+    Hand hand(drawn, *picked);
+    const Vector mouse{3.8, 0.5, 10 - picked->distance + 0.5};
+    frames(30, [&] { hand.pull(world.body(upper), mouse); });
+    const double before = picked->distance, after = pick(drawn, eye, down).value_or(*picked).distance;
+    std::printf("pulled       the picked point up by %.2f m\n", before - after);
+    world.body(upper).clear_forces();
+
+    take_pose(world.body(upper), model, 1);
+    frames(20, [] {});
+    std::vector<double> weights(model.examples());
+    world.body(upper).read_weights(weights);
+    std::printf("posed        weight of the twist %.2f\n", weights[1]);
+    forget_pose(world.body(upper));
+
+    const bool same = restore(world, saved);
+    std::printf("restored     %s\n", same ? "the same to the last bit" : "another state");
+
+    Ball ball;
+    ball.position = {2, 0.5, 2.6};
+    ball.add_to(world);
+    for (int step = 0; step < 240; ++step) {
+      ball.move_in(world);
+      world.step();
+      ball.step(world, model.time_step());
+    }
+    std::printf("coupled      the ball rests at z = %.2f m\n", ball.position[2]);
+  } catch (const exmat::Error& error) {
+    std::fprintf(stderr, "cookbook: %s\n", error.what());
+    return error.status();
+  }
+  return 0;
+}
