@@ -149,7 +149,6 @@ struct AssetConfig {
   std::string name;
   std::filesystem::path object_mesh;  ///< tets, or, where object_surface is there, that
   std::optional<std::filesystem::path> object_surface;
-  double length_unit = 1;           ///< of the numbers of all meshes [m]
   std::optional<int> cells;         ///< of the tets that enclose it; both absent: the default
   std::optional<double> cell_size;  ///< [m]
   MaterialConfig material;
@@ -185,6 +184,7 @@ struct AssetConfig {
   std::optional<std::vector<std::string>> needs;  ///< optional parts to write ("examples", "targets", "rigid",
                                                   ///< "contact", "regions", "render"); absent: all that apply
   std::uint64_t seed = 1;
+  double length_unit = 1;  ///< of the numbers of all meshes [m]
 };
 
 }  // namespace exmat
