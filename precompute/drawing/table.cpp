@@ -48,9 +48,9 @@ void add_members(const nlohmann::ordered_json& record, const std::string& path, 
   for (const auto& [member, value] : record.items()) {
     const std::string name = path + member;
     if (value.is_object()) add_members(value, name + "_", names, line);
-    if (value.is_structured()) continue;
+    if (value.is_structured() || value.is_null()) continue;
     if (std::ranges::find(names, name) == names.end()) names.push_back(name);
-    if (!value.is_null()) line[name] = value.is_string() ? value.get<std::string>() : value.dump();
+    line[name] = value.is_string() ? value.get<std::string>() : value.dump();
   }
 }
 

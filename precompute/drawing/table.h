@@ -30,8 +30,8 @@ std::vector<Table::Column> text_columns(std::initializer_list<const char*> names
 
 std::string to_html(const Table& table);
 std::string to_markdown(const Table& table);
-/// CSV (RFC 4180 with line feeds alone) of JSON objects, a line each: a column for every member of any of them, those
-/// of inner objects by their path with underscores. Null and absent members are empty, arrays are left out.
+/// CSV (RFC 4180 with line feeds alone) of JSON objects, a line each: a column for every member that any of them has a
+/// value of, those of inner objects by their path with underscores. Arrays are left out.
 std::string to_csv(const std::vector<nlohmann::ordered_json>& records);
 
 /// A page of HTML, all in itself, in the style of all reports.

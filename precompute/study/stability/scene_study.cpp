@@ -293,7 +293,7 @@ SceneStudy study_scene(const std::filesystem::path& file, int jobs) {
   };
   make(0, false);
   const SceneRun& own_run = study.runs.front();
-  const bool to_rest = own_run.record.non_finite == 0 && is_at_rest(own_run.record);
+  const bool to_rest = own_run.record.non_finite == 0 && own_run.record.peak_kinetic > 0 && is_at_rest(own_run.record);
   const bool several = bodies.count() > 1;  // whose steps share the threads
   std::exception_ptr failure;
 #pragma omp parallel for schedule(dynamic) num_threads(several ? 1 : jobs)

@@ -99,8 +99,13 @@ Eigen::VectorXd squashed(const ReducedModel& data, double factor) {
   const Eigen::RowVector3d low = vertices.colwise().minCoeff(), high = vertices.colwise().maxCoeff();
   Eigen::Index axis = 0;
   (high - low).maxCoeff(&axis);
-  const Eigen::VectorXd fixed = data.object->fixed.cast<double>();
-  const double middle = fixed.sum() > 0 ? fixed.dot(vertices.col(axis)) / fixed.sum() : 0.5 * (low + high)[axis];
+  double fixed = 0, sum = 0;  // vertices that no mode moves
+  for (Eigen::Index v = 0; v < vertices.rows(); ++v) {
+    if (!data.modal->basis.middleRows<3>(3 * v).isZero(0)) continue;
+    sum += vertices(v, axis);
+    ++fixed;
+  }
+  const double middle = fixed > 0 ? sum / fixed : 0.5 * (low + high)[axis];
   VertexArray field = VertexArray::Zero(vertices.rows(), 3);
   field.col(axis) = (factor - 1) * (vertices.col(axis).array() - middle);
   return nearest_pose(data.modal->basis, field);

@@ -91,9 +91,9 @@ TEST_F(Split, IsWrittenForReadersAndPrograms) {
   found.full_problem = "the full";
   found.advice = "Turn <it>.";
   const std::string csv = split_csv(found);
-  EXPECT_THAT(csv, HasSubstr("source,status,added_mean,added_max,added_end,added_settled,so_far_mean,"));
-  EXPECT_THAT(csv, HasSubstr("\nalignment,not_known,,,,,,,,,\"why, \"\"so\"\"\"\n"));
-  EXPECT_THAT(csv, HasSubstr("\nbasis,measured,0.4,0.565685425,0.565685425,0.565685425,0.2,"));
+  EXPECT_THAT(csv, HasSubstr("source,status,note,added_mean,added_max,added_end,added_settled,so_far_mean,"));
+  EXPECT_THAT(csv, HasSubstr("\nalignment,not_known,\"why, \"\"so\"\"\",,,,,,,,\n"));
+  EXPECT_THAT(csv, HasSubstr("\nbasis,measured,a against b,0.4,0.5656854249"));
   std::istringstream lines(csv);
   for (std::string line; std::getline(lines, line);)
     EXPECT_EQ(std::ranges::count(line, ','), line.starts_with("alignment") ? 11 : 10) << line;

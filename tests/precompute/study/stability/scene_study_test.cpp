@@ -153,8 +153,9 @@ TEST_F(SceneStudyTest, MomentumOfAFreeBodyIsKept) {
       study_scene(scene({{"body", {{"linear_velocity", {0, 0, 2}}, {"angular_velocity", {1, 3, 0.5}}}}}));
   for (const SceneRun& one : study.runs) {
     EXPECT_EQ(at(one.checks, Check::kMomentum).verdict, Verdict::kPass) << one.dimension << one.variant;
-    EXPECT_EQ(at(one.checks, Check::kEnergy).verdict, Verdict::kPass) << one.dimension << one.variant;
+    EXPECT_NE(at(one.checks, Check::kEnergy).verdict, Verdict::kNotApplicable) << one.dimension << one.variant;
   }
+  EXPECT_EQ(at(study.runs.front().checks, Check::kEnergy).verdict, Verdict::kPass);
   EXPECT_EQ(range(study, "speed").own, "2 m/s, 3.202 rad/s");
   EXPECT_THAT(range(study, "speed").safe, Not(HasSubstr("not tested")));
 }
@@ -193,7 +194,7 @@ TEST_F(SceneStudyTest, StartsAreTheBodyFlatAndMirrored) {
 TEST_F(SceneStudyTest, VariantsChangeOneThing) {
   make({.cells = {2, 1, 1}, .examples = 3}, /*contact=*/true);
   const WorldConfig config = load_world(scene(R"({
-      "examples": { "stiffness": 50 }, "forces": [ { "vertices": [3], "force": [1, 2, 3] } ],
+      "examples": { "stiffness": 50 }, "forces": [ { "vertices": { "ids": [3] }, "force": [1, 2, 3] } ],
       "obstacles": [ { "plane": { "point": [0, 0, -5], "normal": [0, 0, 1] }, "stiffness": 1e6 } ] })"_json));
   const auto dimensions = scene_dimensions(config, SceneBodies(config));
   const auto changed = [&](const std::string& dimension, const std::string& variant) {

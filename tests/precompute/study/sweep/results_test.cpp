@@ -144,7 +144,6 @@ TEST(ResultsCsv, HasALineOfAllFieldsForEachPoint) {
   EXPECT_EQ(field(1, "errors_rebound") + field(2, "errors_rebound"), "0.25") << "where there was one";
   EXPECT_EQ(field(1, "no_truth") + field(2, "no_truth"), "01");
   EXPECT_EQ(field(2, "reference_inverted_tets_most") + field(2, "reference_inverted_tets_last"), "73");
-  EXPECT_EQ(field(2, "errors_from_all_elements_mean"), "");
   EXPECT_EQ(field(1, "on_front") + field(2, "on_front") + field(3, "on_front") + field(4, "on_front"), "1100");
   EXPECT_EQ(field(4, "failure"), "went \"wrong\", badly\nindeed");
   EXPECT_EQ(field(4, "times_median_us") + field(4, "errors_position_mean"), "");
@@ -240,9 +239,9 @@ TEST(Report, IsOnePageInItself) {
   EXPECT_THAT(html, HasSubstr("Error against the number of cubature elements"));
   EXPECT_THAT(html, HasSubstr("Worst frames"));
   EXPECT_THAT(html, HasSubstr("error of shape, mean [%]"));
-  EXPECT_THAT(html, HasSubstr("shape,<br>settled [%]"));
-  EXPECT_THAT(html, HasSubstr("nearest<br>phase [%]"));
-  EXPECT_THAT(html, Not(HasSubstr("rebound<br>"))) << "nothing bounced";
+  EXPECT_THAT(html, HasSubstr("shape, settled [%]"));
+  EXPECT_THAT(html, HasSubstr("nearest phase [%]"));
+  EXPECT_THAT(html, Not(HasSubstr("rebound [%]"))) << "nothing bounced";
   EXPECT_THAT(html, Not(HasSubstr("no truth")));
   for (const char* outside : {"<script", "src=", "@import", "url("}) EXPECT_THAT(html, Not(HasSubstr(outside)));
   EXPECT_THAT(html, Not(HasSubstr("nan")));
@@ -256,8 +255,8 @@ TEST(Report, MarksWhatIsNoTruth) {
   EXPECT_THAT(html, HasSubstr("use the material stable_neo_hookean"));
   EXPECT_THAT(html, HasSubstr("<td>2 (no truth)</td>"));
   EXPECT_THAT(html, Not(HasSubstr("<td>1 (no truth)</td>")));
-  EXPECT_THAT(html, HasSubstr("<td class=\"bad\">7</td>"));
-  EXPECT_THAT(html, HasSubstr("rebound<br>"));
+  EXPECT_THAT(html, HasSubstr("<tr class=\"bad\">"));
+  EXPECT_THAT(html, HasSubstr("rebound [%]"));
   EXPECT_THAT(html, HasSubstr("<td>25.0</td>"));
 }
 
@@ -274,7 +273,7 @@ TEST(Report, HasAsManyCellsAsNames) {
       return found;
     };
     const std::string row = table.substr(table.find("<tr class"));
-    EXPECT_EQ(count(row.substr(0, row.find("</tr>")), "<td"), count(table.substr(0, table.find("</tr>")), "<th>"));
+    EXPECT_EQ(count(row.substr(0, row.find("</tr>")), "<td"), count(table.substr(0, table.find("</tr>")), "<th"));
   }
 }
 
