@@ -300,11 +300,9 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const PlannedTr
     const double least = kMoved * bounding_box_diagonal(object_.mesh.vertices);
     const double moved = runs.snapshots.size() > 0 ? runs.snapshots.cwiseAbs().maxCoeff() : 0;
     if (runs.snapshots.cols() > 0 && !(moved > least))
-      warn(
-          report_.warnings,
-          fmt::format("training: the loads move no vertex by more than {:.1g} m, so the basis is that of linear modes; "
-                      "do they act on vertices that are free to move?",
-                      moved));
+      warn(report_.warnings,
+           "training: the loads move no vertex, so the basis is that of linear modes; do they act on vertices that are "
+           "free to move?");
     if (!(moved > least)) result.reset();
     return result;
   });
