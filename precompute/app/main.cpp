@@ -45,6 +45,101 @@ void check(const CheckOptions& options) {
   fmt::print("{}: sound, {} files read\n", options.asset, report.inputs.size());
 }
 
+constexpr const char* kAssetText =
+    "asset file (JSON), or a surface (.glb, .gltf, .obj, .ply, .stl) that an asset is assumed for";
+
+void add_alignment_report(CLI::App& command, std::string& folder) {
+  command.add_option("--alignment-report", folder,
+                     "folder to write each transferred pose beside its example into (.vtk), and a page with pictures");
+}
+
+CLI::App& add_bundle(CLI::App& app, BundleOptions& options) {
+  CLI::App& command = *app.add_subcommand("bundle", "compute the offline stage and write a bundle");
+  command.add_option("ASSET", options.asset, kAssetText)->required();
+  command.add_option("-o,--output", options.bundle, "bundle to write (HDF5)")->required();
+  command.add_option("--scene", options.scene, "write only what this scene needs");
+  command.add_option("--write-asset", options.write_asset,
+                     "file to write the asset that a surface stands for into (JSON)");
+  command.add_option("--depfile", options.depfile, "file to list what was read in, for Make and Ninja");
+  command.add_option("--report", options.report,
+                     "file to write stages, times, errors, warnings and hashes into, also of a failure (JSON)");
+  command.add_option("--cache", options.cache,
+                     "folder to keep stages in, so that only what depends on a change is computed again");
+  command
+      .add_option("--training-budget", options.training_budget,
+                  "seconds after which no run of training begins; the bundle then depends on the machine's speed")
+      ->check(positive_number());
+  command.add_flag("--if-changed", options.if_changed,
+                   "do nothing where the bundle was made of the same inputs by this version");
+  add_alignment_report(command, options.alignment_report);
+  return command;
+}
+
+CLI::App& add_check(CLI::App& app, CheckOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("check", "read and check the inputs and align the examples, compute nothing else");
+  command.add_option("ASSET", options.asset, kAssetText)->required();
+  add_alignment_report(command, options.alignment_report);
+  return command;
+}
+
+CLI::App& add_mesh(CLI::App& app, MeshCommandOptions& options) {
+  CLI::App& command = *app.add_subcommand("mesh", "enclose a surface with tets, write these and what they are like");
+  command.add_option("SURFACE", options.surface, "surface (.glb, .gltf, .obj, .ply, .stl)")->required();
+  command.add_option("-o,--output", options.mesh, "mesh to write (Gmsh .msh)")->required();
+  auto* cells =
+      command.add_option("--cells", options.settings.cells, "about so many tets")->check(CLI::Range(50, 2000000));
+  command.add_option("--cell-size", options.settings.cell_size, "radius of the sphere about a tet, at most [m]")
+      ->check(positive_number())
+      ->excludes(cells);
+  return command;
+}
+
+CLI::App& add_study(CLI::App& app, StudyCommandOptions& options) {
+  CLI::App& command = *app.add_subcommand(
+      "study", "measure a scene's error against run time over sweeps of settings, by the full space");
+  auto* subject = command.add_option_group("subject", "what to measure");
+  subject->require_option(1);
+  subject->add_option("STUDY", options.study, "study file (JSON)");
+  subject->add_option(
+      "--stability", options.scene,
+      "scene file (JSON) to run with other time steps, loads, speeds, stiffnesses and starts: how far each "
+      "is safe; status 1 if the scene fails as it is");
+  command
+      .add_option(
+          "-o,--output", options.folder,
+          "folder for report.html, results.csv, results.json and what a resumed study needs; with --stability for "
+          "stability.html, .md, .csv and .json")
+      ->required();
+  command
+      .add_option("--budget-us", options.budget_us, "recommend the most accurate point of at most so many us a step")
+      ->check(positive_number());
+  command
+      .add_option(
+          "--max-error", options.max_error,
+          "recommend the fastest point of at most so many percent of error: of shape of a free body, else of position")
+      ->check(positive_number());
+  command
+      .add_option("--jobs", options.jobs,
+                  "processes that run points; times are measured by one. With --stability runs at a time")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  return command;
+}
+
+CLI::App& add_full_space(CLI::App& app, FullSpaceCommandOptions& options) {
+  CLI::App& command = *app.add_subcommand(
+      "full-space", "step a scene with all degrees of freedom of its mesh, without a basis, and write the trajectory");
+  command.add_option("SCENE", options.scene, "scene file (JSON), with its bundle")->required();
+  command.add_option("-o,--output", options.trajectory, "trajectory to write (HDF5), and an .xdmf beside it")
+      ->required();
+  const CLI::Range count_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
+  command.add_option("--steps", options.steps, "so many steps instead of the scene's")->check(count_range);
+  command.add_option("--every", options.every, "write a frame every so many steps instead of the scene's")
+      ->check(count_range);
+  return command;
+}
+
 int run(std::vector<char*> words) {
   CLI::App app{"Turns an object and its example poses into a bundle for exmat-runtime.", "exmat-precompute"};
   app.set_version_flag("--version", [] {
@@ -57,107 +152,23 @@ int run(std::vector<char*> words) {
   precompute::SolverSettings solvers{.options = take_solver_options(words)};
   add_solver_options(app, solvers);
 
-  BundleOptions options;
-  auto* bundle_command_line = app.add_subcommand("bundle", "compute the offline stage and write a bundle");
-  const char* asset_text =
-      "asset file (JSON), or a surface (.glb, .gltf, .obj, .ply, .stl) that an asset is assumed for";
-  bundle_command_line->add_option("ASSET", options.asset, asset_text)->required();
-  bundle_command_line->add_option("-o,--output", options.bundle, "bundle to write (HDF5)")->required();
-  bundle_command_line->add_option("--scene", options.scene, "write only what this scene needs");
-  bundle_command_line->add_option("--write-asset", options.write_asset,
-                                  "file to write the asset that a surface stands for into (JSON)");
-  bundle_command_line->add_option("--depfile", options.depfile, "file to list what was read in, for Make and Ninja");
-  bundle_command_line->add_option(
-      "--report", options.report,
-      "file to write stages, times, errors, warnings and hashes into, also of a failure (JSON)");
-  bundle_command_line->add_option("--cache", options.cache,
-                                  "folder to keep stages in, so that only what depends on a change is computed again");
-  bundle_command_line
-      ->add_option("--training-budget", options.training_budget,
-                   "seconds after which no run of training begins; the bundle then depends on the machine's speed")
-      ->check(positive_number());
-  bundle_command_line->add_flag("--if-changed", options.if_changed,
-                                "do nothing where the bundle was made of the same inputs by this version");
-
+  BundleOptions bundle_options;
   CheckOptions check_options;
-  auto* check_command =
-      app.add_subcommand("check", "read and check the inputs and align the examples, compute nothing else");
-  check_command->add_option("ASSET", check_options.asset, asset_text)->required();
-  const auto add_alignment_report = [](CLI::App* command, std::string& folder) {
-    command->add_option(
-        "--alignment-report", folder,
-        "folder to write each transferred pose beside its example into (.vtk), and a page with pictures");
-  };
-  add_alignment_report(bundle_command_line, options.alignment_report);
-  add_alignment_report(check_command, check_options.alignment_report);
-
   MeshCommandOptions mesh_options;
-  auto* mesh_command_line =
-      app.add_subcommand("mesh", "enclose a surface with tets, write these and what they are like");
-  mesh_command_line->add_option("SURFACE", mesh_options.surface, "surface (.glb, .gltf, .obj, .ply, .stl)")->required();
-  mesh_command_line->add_option("-o,--output", mesh_options.mesh, "mesh to write (Gmsh .msh)")->required();
-  auto* cells = mesh_command_line->add_option("--cells", mesh_options.settings.cells, "about so many tets")
-                    ->check(CLI::Range(50, 2000000));
-  mesh_command_line
-      ->add_option("--cell-size", mesh_options.settings.cell_size, "radius of the sphere about a tet, at most [m]")
-      ->check(positive_number())
-      ->excludes(cells);
-
   StudyCommandOptions study_options;
-  auto* study_command_line = app.add_subcommand(
-      "study", "measure a scene's error against run time over sweeps of settings, by the full space");
-  auto* subject = study_command_line->add_option_group("subject", "what to measure");
-  subject->require_option(1);
-  subject->add_option("STUDY", study_options.study, "study file (JSON)");
-  subject->add_option(
-      "--stability", study_options.scene,
-      "scene file (JSON) to run with other time steps, loads, speeds, stiffnesses and starts: how far each "
-      "is safe; status 1 if the scene fails as it is");
-  study_command_line
-      ->add_option(
-          "-o,--output", study_options.folder,
-          "folder for report.html, results.csv, results.json and what a resumed study needs; with --stability for "
-          "stability.html, .md, .csv and .json")
-      ->required();
-  study_command_line
-      ->add_option("--budget-us", study_options.budget_us,
-                   "recommend the most accurate point of at most so many us a step")
-      ->check(positive_number());
-  study_command_line
-      ->add_option(
-          "--max-error", study_options.max_error,
-          "recommend the fastest point of at most so many percent of error: of shape of a free body, else of position")
-      ->check(positive_number());
-  study_command_line
-      ->add_option("--jobs", study_options.jobs,
-                   "processes that run points; times are measured by one. With --stability runs at a time")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
-
   FullSpaceCommandOptions full_space_options;
-  auto* full_space_command_line = app.add_subcommand(
-      "full-space", "step a scene with all degrees of freedom of its mesh, without a basis, and write the trajectory");
-  full_space_command_line->add_option("SCENE", full_space_options.scene, "scene file (JSON), with its bundle")
-      ->required();
-  full_space_command_line
-      ->add_option("-o,--output", full_space_options.trajectory, "trajectory to write (HDF5), and an .xdmf beside it")
-      ->required();
-  const CLI::Range count_range(std::int64_t{1}, std::int64_t{1'000'000'000'000});
-  full_space_command_line->add_option("--steps", full_space_options.steps, "so many steps instead of the scene's")
-      ->check(count_range);
-  full_space_command_line
-      ->add_option("--every", full_space_options.every, "write a frame every so many steps instead of the scene's")
-      ->check(count_range);
+  const CLI::App &bundle = add_bundle(app, bundle_options), &asset_check = add_check(app, check_options),
+                 &mesh = add_mesh(app, mesh_options), &study = add_study(app, study_options),
+                 &full_space = add_full_space(app, full_space_options);
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     apply(common);
     precompute::configure_solvers(solvers);
     if (precompute::rank_count() > 1) log::info(fmt::format("{} ranks", precompute::rank_count()));
-    if (bundle_command_line->parsed()) bundle_command(options);
-    if (check_command->parsed()) check(check_options);
-    if (mesh_command_line->parsed()) mesh_command(mesh_options);
-    if (full_space_command_line->parsed()) full_space_command(full_space_options);
-    if (study_command_line->parsed())
-      study_options.scene.empty() ? study_command(study_options) : stability_command(study_options);
+    if (bundle.parsed()) bundle_command(bundle_options);
+    if (asset_check.parsed()) check(check_options);
+    if (mesh.parsed()) mesh_command(mesh_options);
+    if (full_space.parsed()) full_space_command(full_space_options);
+    if (study.parsed()) study_options.scene.empty() ? study_command(study_options) : stability_command(study_options);
   });
 }
 

@@ -139,8 +139,7 @@ BatchObject::BatchObject(std::shared_ptr<ModelObject> its_model, std::int64_t co
 BatchClass bind_batch(py::module_& module) {
   BatchClass type(module, "Batch",
                   "N bodies of one model, stepped together: arrays have N as their first dimension. They touch "
-                  "obstacles and not each "
-                  "other. Results do not depend on the number of threads.");
+                  "obstacles and not each other. Results do not depend on the number of threads.");
   type.def(py::init([](std::shared_ptr<ModelObject> model, std::int64_t count) {
              return std::make_shared<BatchObject>(std::move(model), count);
            }),

@@ -36,18 +36,8 @@ py::array_t<float> positions(BodyObject& body, const PointsObject& points, const
   return xyz;
 }
 
-/// Of the name of a region, the whole body where it is None.
-std::int64_t region_of(const BodyObject& body, const py::object& name) {
-  if (name.is_none()) return -1;
-  const auto wanted = name.cast<std::string>();
-  const Model& model = body.model->model;
-  for (std::size_t i = 0; i < model.regions(); ++i)
-    if (model.region_name(i) == wanted) return static_cast<std::int64_t>(i);
-  throw Error(EXMAT_INVALID_ARGUMENT, ("region: the model has none that is named " + wanted).c_str());
-}
-
 py::array_t<double> region_weights(BodyObject& body, const std::string& name) {
-  const auto region = static_cast<std::size_t>(region_of(body, py::str(name)));
+  const auto region = static_cast<std::size_t>(region_of(body.model->model, py::str(name)));
   py::array_t<double> weights(static_cast<py::ssize_t>(body.model->model.region_examples(region)));
   body.get().read_region_weights(region, span_of(weights));
   return weights;
@@ -65,7 +55,7 @@ void take_weights(BodyObject& body, const py::object& weights, const py::object&
   if (!weights.is_none()) numbers = weights.cast<std::vector<double>>();
   if (!weights.is_none() && numbers.empty())
     throw Error(EXMAT_INVALID_ARGUMENT, "weights: expected one for each example");
-  set_weights(body, numbers, region_of(body, region));
+  set_weights(body, numbers, region_of(body.model->model, region));
 }
 
 // ---- copies
@@ -86,15 +76,9 @@ Shared restored(const py::tuple& from) {
 
 Shared copy(BodyObject& body) { return restored(kept(body)); }
 
-}  // namespace
+// ---- the class
 
-BodyClass bind_body(py::module_& module) {
-  BodyClass type(
-      module, "Body",
-      "One body of a model: its state and the forces on it. Steps release the interpreter's lock; until they are done, "
-      "other threads are refused. copy.copy() and pickle keep the state and what was set for this body alone; the copy "
-      "is in "
-      "no world.");
+void bind_stepping(BodyClass& type) {
   type.def(py::init([](std::shared_ptr<ModelObject> model) {
              return std::make_shared<BodyObject>(ModelHold(std::move(model)));
            }),
@@ -103,10 +87,28 @@ BodyClass bind_body(py::module_& module) {
           "model", [](const BodyObject& body) { return body.model.object(); }, "The model that it is of.")
       .def("step", &step, py::arg("n") = 1,
            "Takes `n` >= 0 steps of a body that is in no world. Returns their Report. Raises NonFinite where a step "
-           "meets NaN or infinity: the body "
-           "is "
-           "then as it was before that step.")
+           "meets NaN or infinity: the body is then as it was before that step.")
       .def_property_readonly(
+          "report", [](BodyObject& body) { return body.get().report(); },
+          "Report of the last call that stepped the body, also where it raised.")
+      .def_property_readonly(
+          "time", [](const BodyObject& body) { return body.body.time(); }, "[s].")
+      .def("set_reduced", &set_reduced, py::arg("q"), py::arg("v"),
+           "As reset(), with the displacement `q` and velocity `v`, shapes (r,).")
+      .def(
+          "reset", [](BodyObject& body) { body.get().reset(); }, "Back to its start at time 0, without applied forces.")
+      .def_property(
+          "motion", [](BodyObject& body) { return body.get().motion(); },
+          [](BodyObject& body, const exmat_motion& motion) { body.get().set_motion(motion); },
+          "Motion as a whole. To be set of free bodies alone.")
+      .def_property(
+          "state", [](BodyObject& body) { return state_of(body); },
+          [](BodyObject& body, const StateObject& state) { set_state(body, state); },
+          "The whole State, a copy; a State of the same bundle and time step to be set.");
+}
+
+void bind_readings(BodyClass& type) {
+  type.def_property_readonly(
           "q",
           [](const py::object& self) {
             const auto& body = self.cast<BodyObject&>();
@@ -132,41 +134,28 @@ BodyClass bind_body(py::module_& module) {
            "Those of a region, by its name: shape (K of the region,). A copy.")
       .def("positions", &positions, py::arg("points"), py::arg("out") = py::none(),
            "World positions of k points, shape (k, 3), float32 [m]: into `out`, a contiguous array that is returned, "
-           "or a "
-           "new one.")
+           "or a new one.")
       .def_property_readonly(
-          "energies", [](BodyObject& body) { return body.get().energies(); }, "Energies of the last step.")
-      .def_property_readonly(
-          "report", [](BodyObject& body) { return body.get().report(); },
-          "Report of the last call that stepped the body, also where it raised.")
-      .def_property_readonly(
-          "time", [](const BodyObject& body) { return body.body.time(); }, "[s].")
-      .def("set_reduced", &set_reduced, py::arg("q"), py::arg("v"),
-           "As reset(), with the displacement `q` and velocity `v`, shapes (r,).")
-      .def(
-          "reset", [](BodyObject& body) { body.get().reset(); }, "Back to its start at time 0, without applied forces.")
-      .def("apply_forces", &apply_forces, py::arg("points"), py::arg("forces"),
+          "energies", [](BodyObject& body) { return body.get().energies(); }, "Energies of the last step.");
+}
+
+void bind_actions(BodyClass& type) {
+  type.def("apply_forces", &apply_forces, py::arg("points"), py::arg("forces"),
            "Adds forces of shape (k, 3) [N], world frame, on the points to those that act in every step from now on.")
       .def(
           "clear_forces", [](BodyObject& body) { body.get().clear_forces(); }, "Ends all applied forces.")
       .def(
           "restart_integrator", [](BodyObject& body) { body.get().restart_integrator(); },
-          "After an abrupt change of forces: keeps the impulse exact, at the price of one step of first order.")
-      .def_property(
-          "motion", [](BodyObject& body) { return body.get().motion(); },
-          [](BodyObject& body, const exmat_motion& motion) { body.get().set_motion(motion); },
-          "Motion as a whole. To be set of free bodies alone.")
-      .def_property(
-          "state", [](BodyObject& body) { return state_of(body); },
-          [](BodyObject& body, const StateObject& state) { set_state(body, state); },
-          "The whole State, a copy; a State of the same bundle and time step to be set.")
-      .def("set_gravity", &set_gravity, py::arg("gravity"),
+          "After an abrupt change of forces: keeps the impulse exact, at the price of one step of first order.");
+}
+
+void bind_settings(BodyClass& type) {
+  type.def("set_gravity", &set_gravity, py::arg("gravity"),
            "Gravity of this body alone, three numbers [m/s^2]; after an abrupt change restart_integrator() keeps the "
            "impulse exact. reset() keeps it.")
       .def("set_group", &set_group, py::arg("group"), py::arg("mask"),
            "Says whom it touches: bodies and obstacles of which each one's mask has a bit of the other's group. 1 and "
-           "all "
-           "bits at first.")
+           "all bits at first.")
       .def_property_readonly(
           "group",
           [](BodyObject& body) {
@@ -191,32 +180,47 @@ BodyClass bind_body(py::module_& module) {
       .def(
           "set_example_damping",
           [](BodyObject& body, double c_kappa, const py::object& region) {
-            set_factor(body, ExampleFactor::kDamping, c_kappa, region_of(body, region));
+            set_factor(body, ExampleFactor::kDamping, c_kappa, region_of(body.model->model, region));
           },
           py::arg("c_kappa"), py::arg("region") = py::none(), "c_kappa [1/s], likewise.")
       .def(
           "set_example_bias",
           [](BodyObject& body, double bias, const py::object& region) {
-            set_factor(body, ExampleFactor::kBias, bias, region_of(body, region));
+            set_factor(body, ExampleFactor::kBias, bias, region_of(body.model->model, region));
           },
           py::arg("bias"), py::arg("region") = py::none(), "Factor in [0, 1] on the weight of the rest pose, likewise.")
       .def(
           "set_example_stiffness",
           [](BodyObject& body, double kappa, const py::object& region) {
-            set_factor(body, ExampleFactor::kStiffness, kappa, region_of(body, region));
+            set_factor(body, ExampleFactor::kStiffness, kappa, region_of(body.model->model, region));
           },
           py::arg("kappa"), py::arg("region") = py::none(),
           "kappa [1/s^2] of this body alone, of the whole body or of a region by its name. reset() keeps it. The model "
-          "has "
-          "to have the example force.")
+          "has to have the example force.")
       .def("set_example_weights", &take_weights, py::arg("weights"), py::arg("region") = py::none(),
            "Weights of shape (K,), not negative and of sum 1, in place of those of the pose; the bias does not act on "
-           "them. "
-           "None: those of the pose again.")
-      .def("__copy__", &copy)
+           "them. None: those of the pose again.");
+}
+
+void bind_copies(BodyClass& type) {
+  type.def("__copy__", &copy)
       .def(
           "__deepcopy__", [](BodyObject& body, const py::dict&) { return copy(body); }, py::arg("memo"))
       .def(py::pickle(&kept, &restored));
+}
+
+}  // namespace
+
+BodyClass bind_body(py::module_& module) {
+  BodyClass type(module, "Body",
+                 "One body of a model: its state and the forces on it. Steps release the interpreter's lock; until "
+                 "they are done, other threads are refused. copy.copy() and pickle keep the state and what was set for "
+                 "this body alone; the copy is in no world.");
+  bind_stepping(type);
+  bind_readings(type);
+  bind_actions(type);
+  bind_settings(type);
+  bind_copies(type);
   return type;
 }
 

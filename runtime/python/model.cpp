@@ -90,6 +90,27 @@ std::shared_ptr<PointsObject> points_at(const std::shared_ptr<ModelObject>& mode
   return made(without_lock([&] { return Points::at(model->model, span); }), model);
 }
 
+std::shared_ptr<PointsObject> elements(const std::shared_ptr<ModelObject>& model) {
+  return made(without_lock([&] { return Points::elements(model->model); }), model);
+}
+
+std::vector<std::string> example_names(const ModelObject& model, const py::object& region) {
+  const std::int64_t id = region_of(model.model, region);
+  const std::size_t count = id < 0 ? model.examples : model.model.region_examples(static_cast<std::size_t>(id));
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) names.push_back(model.model.example_name(id, i));
+  return names;
+}
+
+py::array_t<double> example_pose(const ModelObject& model, const std::string& example, const py::object& region) {
+  const std::vector<std::string> names = example_names(model, region);
+  const auto found = std::ranges::find(names, example);
+  if (found == names.end())
+    throw Error(EXMAT_INVALID_ARGUMENT, ("example: the model has none that is named " + example).c_str());
+  const auto number = static_cast<std::size_t>(found - names.begin());
+  return array_of(model.model.example_pose(region_of(model.model, region), number), {model.modes});
+}
+
 void bind_points(py::module_& module) {
   py::class_<PointsObject, std::shared_ptr<PointsObject>>(
       module, "Points", "k material points of a model's bodies, in the order given; they never change.")
@@ -100,21 +121,39 @@ void bind_points(py::module_& module) {
       .def_static("at", &points_at, py::arg("model"), py::arg("xyz"),
                   "Points of the rest shape, `xyz` of shape (k, 3) [m]. Each moves with the tet that holds it, or with "
                   "the nearest one where none does.")
+      .def_static("elements", &elements, py::arg("model"), "Centroids of the s cubature elements.")
       .def("__len__", [](const PointsObject& points) { return points.count; })
       .def_property_readonly(
           "model", [](const PointsObject& points) { return points.model.object(); },
           "The model that the points are of.")
       .def_property_readonly(
-          "distances",
+          "distances", [](const PointsObject& points) { return array_of(points.points.distances(), {points.count}); },
+          "From each point to the object at rest, 0 inside: shape (k,) [m]. A copy, as those below.")
+      .def_property_readonly(
+          "rest",
           [](const PointsObject& points) {
-            py::array_t<double> result(static_cast<py::ssize_t>(points.count));
-            std::ranges::copy(points.points.distances(), result.mutable_data());
-            return result;
+            return array_of(points.points.rest(), {points.count, 3});
           },
-          "From each point to the object at rest, 0 inside: shape (k,) [m]. A copy.");
+          "X, the points at rest: shape (k, 3) [m].")
+      .def_property_readonly(
+          "basis",
+          [](const PointsObject& points) {
+            const std::size_t modes = points.model->modes;
+            return array_of(points.points.basis(modes), {points.count, 3, modes});
+          },
+          "U of the points, which are at R (X + U q) + t: shape (k, 3, r), float32 [kg^(-1/2)]. Neither X nor U is "
+          "kept for all_vertices().");
 }
 
 }  // namespace
+
+std::int64_t region_of(const Model& model, const py::object& name) {
+  if (name.is_none()) return -1;
+  const auto wanted = name.cast<std::string>();
+  for (std::size_t i = 0; i < model.regions(); ++i)
+    if (model.region_name(i) == wanted) return static_cast<std::int64_t>(i);
+  throw Error(EXMAT_INVALID_ARGUMENT, ("region: the model has none that is named " + wanted).c_str());
+}
 
 void bind_model(py::module_& module) {
   py::class_<ModelObject, std::shared_ptr<ModelObject>>(module, "Model", "What exmat.Model stands on.")
@@ -134,6 +173,17 @@ void bind_model(py::module_& module) {
             return regions;
           },
           "Of each region with an example force of its own, its name and its K, in the scene's order.")
+      .def("example_names", &example_names, py::arg("region") = py::none(),
+           "Names of the examples, of the whole body or of a region by its name, in the order of the weights.")
+      .def("example_pose", &example_pose, py::arg("example"), py::arg("region") = py::none(),
+           "The pose of an example by its name: q of shape (r,) [kg^(1/2) m]. A copy.")
+      .def_property_readonly(
+          "element_weights",
+          [](const ModelObject& model) {
+            const std::vector<double> weights = model.model.element_weights();
+            return array_of(weights, {weights.size()});
+          },
+          "How many tets each cubature element stands for: shape (s,). A copy.")
       .def_property_readonly(
           "time_step", [](const ModelObject& model) { return model.model.time_step(); }, "[s].")
       .def_readonly("input_sha256", &ModelObject::sha, "What the bundle was made of, 64 hexadecimal digits.");

@@ -14,4 +14,5 @@ PYBIND11_MODULE(_exmat, module) {
   WorldClass world = bind_world(module);
   BatchClass batch = bind_batch(module);
   bind_obstacles(module, body, world, batch);
+  bind_drawing(module, body, world, batch);
 }

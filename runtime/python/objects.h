@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <exmat/exmat.hpp>
@@ -216,6 +217,9 @@ void set_obstacles(const ObstacleAccess& to, const py::dict& kept);
 /// To be called after the state is set, with which obstacles stay where they are.
 void set_obstacle_motions(const ObstacleAccess& to, const py::dict& kept);
 
+/// Of the name of a region, -1, the whole body, where it is None.
+std::int64_t region_of(const Model& model, const py::object& name);
+
 /// A number that is one of `names`.
 std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names);
 inline const std::vector<const char*> kIntegrators{"bdf2", "backward_euler", "newmark"};
@@ -242,6 +246,14 @@ py::array_t<Number> target_array(const py::object& out, const std::vector<py::ss
 /// An array at `data` that nobody may write; it keeps `owner` alive.
 py::array view(const double* data, std::size_t count, const py::object& owner);
 
+/// A copy.
+template <typename Number>
+py::array_t<Number> array_of(const std::vector<Number>& numbers, const std::vector<std::size_t>& shape) {
+  py::array_t<Number> array(std::vector<py::ssize_t>(shape.begin(), shape.end()));
+  std::ranges::copy(numbers, array.mutable_data());
+  return array;
+}
+
 inline py::array_t<double> array_of(const double* numbers, std::size_t count) {
   return py::array_t<double>(static_cast<py::ssize_t>(count), numbers);
 }
@@ -267,5 +279,6 @@ BodyClass bind_body(py::module_& module);
 WorldClass bind_world(py::module_& module);
 BatchClass bind_batch(py::module_& module);
 void bind_obstacles(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch);
+void bind_drawing(py::module_& module, BodyClass& body, WorldClass& world, BatchClass& batch);
 
 }  // namespace exmat::python

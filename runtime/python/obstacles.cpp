@@ -381,12 +381,10 @@ py::tuple obstacle_load(Owner& owner, std::int64_t id) {
 constexpr const char* kAddObstacle =
     "An obstacle that its frame's `motion` places; its number, which no later one gets. Pressure per depth [N/m^3], "
     "pressure per approach velocity [N s/m^3], Coulomb's coefficient; `group` and `mask` as Body.set_group(). The "
-    "model "
-    "has to know of contact: use_contact, or a scene with obstacles.";
+    "model has to know of contact: use_contact, or a scene with obstacles.";
 constexpr const char* kObstacleLoad =
     "Contacts of all bodies with an obstacle in the last call that stepped, as a constant force and torque on it, "
-    "about "
-    "its frame's origin, shapes (3,) [N] and (3,) [N m].";
+    "about its frame's origin, shapes (3,) [N] and (3,) [N m].";
 
 }  // namespace
 

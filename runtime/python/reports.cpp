@@ -25,6 +25,10 @@ void bind_report(py::module_& module) {
       .def_readonly("residual", &exmat_report::residual,
                     "Of the equation of motion at the end of the last step [kg^(1/2) m/s^2].")
       .def_readonly("seconds", &exmat_report::seconds, "Wall clock [s].")
+      .def_readonly(
+          "lost_applied", &exmat_report::lost_applied,
+          "Share of the work of applied forces that the modes lose, of a body with a Capacity; else negative.")
+      .def_readonly("lost_contact", &exmat_report::lost_contact, "The same of contact forces.")
       .def("__repr__", [](const exmat_report& report) {
         return py::str("Report(steps={}, status={}, newton_iterations={}, residual={:.3g}, seconds={:.3g})")
             .format(report.steps, report.status, report.newton_iterations, report.residual, report.seconds);

@@ -327,11 +327,10 @@ WorldClass bind_world(py::module_& module) {
       .def_property_readonly(
           "report", [](WorldObject& world) { return world.get(), world.report; },
           "WorldReport of the last call that stepped, also where it raised.")
-      .def_property_readonly(
-          "contacts", &contacts,
-          "Vertices that touched another body, or their own, at the end of the last step, a structured array of shape "
-          "(count,): body, other (ids), vertex, position [m], normal (away from the other), force on the body [N] and "
-          "depth [m]. A copy.")
+      .def_property_readonly("contacts", &contacts,
+                             "Vertices that touched another body, or their own, at the end of the last step, a "
+                             "structured array of shape (count,): body, other (ids), vertex, position [m], normal "
+                             "(away from the other), force on the body [N] and depth [m]. A copy.")
       .def_property_readonly(
           "energies", [](WorldObject& world) { return world.get().energies(); }, "Of all bodies together.")
       .def_property_readonly(
@@ -343,10 +342,9 @@ WorldClass bind_world(py::module_& module) {
           "state", [](WorldObject& world) { return state_of(world); },
           [](WorldObject& world, const WorldStateObject& state) { set_state(world, state); },
           "The whole WorldState, a copy; likewise to be set.");
-  module.def(
-      "state_hash", &hash_of, py::arg("bodies"),
-      "Hash over the bits of the states of some bodies, in order: as a hexadecimal number of 16 digits it is the state "
-      "hash that `exmat-runtime run` prints.");
+  module.def("state_hash", &hash_of, py::arg("bodies"),
+             "Hash over the bits of the states of some bodies, in order: as a hexadecimal number of 16 digits it is "
+             "the state hash that `exmat-runtime run` prints.");
   bind_copies(module, type);
   return type;
 }

@@ -1,0 +1,137 @@
+"""Surfaces, examples, targets, energies, times and load capacity, beside what the bundle and a body's motion say."""
+import numpy as np
+import pytest
+
+import exmat
+
+
+def placed(body, rest, basis):
+    """R (X + U q) + t."""
+    rotation, shift = body.placement[:, :3], body.placement[:, 3]
+    return (rest + basis.astype("f8") @ body.q) @ rotation.T + shift
+
+
+@pytest.fixture(scope="module")
+def surface(model):
+    return exmat.Surface(model)
+
+
+@pytest.fixture
+def spinning(free_bundle):
+    body = exmat.Body(exmat.Model(free_bundle, use_contact=True))
+    body.motion = exmat.Motion(position=(1, 2, 3), angular_velocity=(1, 3, 2))
+    body.step(100)
+    return body
+
+
+def test_a_surface_is_the_closed_boundary_of_the_object(surface, model, bundle):
+    triangles, rest = surface.triangles, surface.rest
+    a, b, c = (rest[triangles[:, corner]] for corner in range(3))
+    with exmat.Bundle(bundle) as file:
+        vertices = file["object/vertices"][:]
+    sides = vertices.max(0) - vertices.min(0)
+    assert np.einsum("ij,ij->", a, np.cross(b, c)) / 6 == pytest.approx(sides.prod(), rel=1e-12)  # outward: positive
+    assert surface.kind == "object" and len(surface) == len(rest)
+    np.testing.assert_array_equal(rest, vertices[surface.vertices])
+    with pytest.raises(exmat.Error, match="render"):
+        exmat.Surface(model, "render")
+    with pytest.raises(exmat.InvalidArgument, match="kind"):
+        exmat.Surface(model, "skin")
+
+
+# Single precision of coordinates of some metres: two roundings of 2.4e-7.
+def test_points_stand_where_rest_basis_and_placement_say(spinning):
+    surface = exmat.Surface(spinning.model)
+    out = np.empty((len(surface), 3), "f4")
+    assert spinning.positions(surface, out) is out
+    np.testing.assert_allclose(out, placed(spinning, surface.rest, surface.basis), rtol=0, atol=1e-6)
+    points = exmat.Points(spinning.model, surface.vertices)
+    np.testing.assert_array_equal(out, spinning.positions(points))
+    np.testing.assert_array_equal(points.basis, surface.basis)
+    np.testing.assert_allclose(np.linalg.det(spinning.placement[:, :3]), 1, rtol=1e-12)
+
+
+def test_points_on_triangles_lie_between_their_corners(spinning):
+    surface = exmat.Surface(spinning.model)
+    triangles, shares = [0, 7, 7], [[1 / 3, 1 / 3, 1 / 3], [0.2, 0.3, 0.5], [1, 0, 0]]
+    points = surface.points(triangles, shares)
+    corners = spinning.positions(surface).astype("f8")[surface.triangles[triangles]]
+    np.testing.assert_allclose(spinning.positions(points), np.einsum("ks,ksx->kx", shares, corners), rtol=0, atol=1e-6)
+    spinning.apply_forces(points, np.ones((3, 3)))
+    for wrong in ([[1, 0, 0]], np.zeros((3, 2))):
+        with pytest.raises(exmat.InvalidArgument, match="shares"):
+            surface.points(triangles, wrong)
+
+
+def test_examples_have_the_poses_of_the_bundle(model, bundle):
+    assert model.example_names() == ["rest", "twist"]
+    with exmat.Bundle(bundle) as file:
+        np.testing.assert_array_equal(model.example_pose("twist"), file["examples/twist/pose"][:])
+    np.testing.assert_array_equal(model.example_pose("rest"), 0)
+    for call in (lambda: model.example_pose("bend"), lambda: model.example_names("arm"), lambda: exmat.Body(model).target("arm")):
+        with pytest.raises(exmat.InvalidArgument, match="none that is named"):
+            call()
+
+
+# Between two examples the target goes from one to the other: the force of the next step follows it.
+def test_the_target_is_what_the_examples_draw_to(model, body, bundle):
+    body.set_example_weights([1, 0])
+    body.step()
+    size = np.linalg.norm(model.example_pose("twist"))
+    assert np.linalg.norm(body.target()) < 1e-9 * size
+    body.set_example_weights([0, 1])
+    body.step(3000)
+    drawn = body.target()
+    still = exmat.Body(exmat.Model(bundle, example_stiffness=4e6, example_damping=4000, example_bias=0.2))
+    still.set_example_weights([0, 1])
+    still.step(3000)
+    np.testing.assert_allclose(still.target(), drawn, rtol=0, atol=1e-9 * size)  # of the weights alone
+    assert np.linalg.norm(still.q - drawn) < 0.05 * np.linalg.norm(drawn)        # a thousand times as strong: nearly there
+
+
+# St.Venant-Kirchhoff near rest: half of the displacement has a quarter of the energy.
+def test_energy_density_is_quadratic_near_rest(model, body, surface):
+    np.testing.assert_array_equal(body.energy_density(surface), 0)
+    pose = 1e-4 * model.example_pose("twist")
+    body.set_reduced(pose, 0 * pose)
+    whole = body.energy_density(surface)
+    body.set_reduced(pose / 2, 0 * pose)
+    np.testing.assert_allclose(body.energy_density(surface), whole / 4, rtol=2e-3)
+    assert whole.min() > 0
+
+
+def test_elements_lie_in_the_object_and_have_weights(model):
+    points = exmat.Points.elements(model)
+    rest = exmat.Surface(model).rest
+    assert len(points) == len(model.element_weights) == 30
+    assert (points.rest >= rest.min(0)).all() and (points.rest <= rest.max(0)).all() and (model.element_weights >= 0).all()
+
+
+def test_reports_have_the_work_that_a_capacity_says(model, body, surface):
+    capacity = exmat.Capacity(model, spread=0.3)
+    tip = surface.points([int(np.argmax(surface.rest[surface.triangles].mean(1)[:, 0]))], [[1 / 3] * 3])
+    body.step()
+    assert body.report.lost_applied < 0 and body.report.lost_contact < 0
+    body.set_capacity(capacity)
+    force = [[0, 0, 50]]
+    body.apply_forces(tip, force)
+    report = body.step()
+    lost = capacity.lost(body, tip, force)
+    assert 0 < lost < 1 and report.lost_applied == pytest.approx(lost, rel=1e-6)
+    assert report.lost_contact == capacity.contact_lost(body) == 0
+    assert capacity.time_scale > 0
+    body.set_capacity(None)
+    assert body.step().lost_applied < 0
+
+
+@pytest.mark.parametrize("make", [exmat.Body, lambda model: exmat.Batch(model, 5)], ids=["body", "batch"])
+def test_a_profile_adds_up_to_less_than_the_call(model, make):
+    stepped = make(model)
+    stepped.step(10)
+    assert not any(stepped.profile.values())
+    stepped.set_profiled(True)
+    seconds = stepped.step(200).seconds
+    profile = stepped.profile
+    assert list(profile) == ["weights", "target", "internal_force", "solve", "contact", "broad_phase", "candidates", "single_bodies", "islands"]
+    assert profile["internal_force"] > 0 and profile["solve"] > 0 and profile["islands"] == 0
+    assert 0 < profile["single_bodies"] <= seconds
