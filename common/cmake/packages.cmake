@@ -1,11 +1,26 @@
-# Debian packages of what is installed, one for each stage: cpack --config build/release/CPackConfig.cmake
+# Debian packages of what is installed, one for each stage and one of the pages, schemas and examples:
+# cpack --config build/release/CPackConfig.cmake
+include(common/cmake/man_pages.cmake)
+exmat_man_pages(exmat-runtime runtime run bench export info validate)
+if(EXMAT_BUILD_PRECOMPUTE)
+  exmat_man_pages(exmat-precompute precompute bundle check mesh study full-space)
+endif()
+if(EXMAT_BUILD_VIEWER)
+  exmat_man_pages(exmat-viewer viewer)
+endif()
+
+# With the links of the pages to each other, to schemas and to examples.
+install(DIRECTORY docs schemas examples DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/exmat-doc COMPONENT doc USE_SOURCE_PERMISSIONS
+        PATTERN CMakeLists.txt EXCLUDE PATTERN *.sed EXCLUDE PATTERN __pycache__ EXCLUDE)
+install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DATAROOTDIR}/doc/exmat-doc COMPONENT doc)
+
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME exmat)
 set(CPACK_PACKAGE_CONTACT "the exmat authors <exmat@localhost>")
 set(CPACK_PACKAGE_DESCRIPTION_SUMMARY "${exmat_DESCRIPTION}")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL runtime)
+set(CPACK_COMPONENTS_ALL runtime doc)
 if(EXMAT_BUILD_PRECOMPUTE)
   list(APPEND CPACK_COMPONENTS_ALL precompute)
   if(EXMAT_BUILD_MESHING)
@@ -25,6 +40,11 @@ set(CPACK_DEBIAN_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)  # what the binaries link is what their package depends on
 set(CPACK_DEBIAN_RUNTIME_PACKAGE_NAME exmat-runtime)
 set(CPACK_COMPONENT_RUNTIME_DESCRIPTION "Steps example-based elastic bodies in real time: program, library, headers.")
+set(CPACK_DEBIAN_DOC_PACKAGE_NAME exmat-doc)
+set(CPACK_DEBIAN_DOC_PACKAGE_SECTION doc)
+set(CPACK_DEBIAN_DOC_PACKAGE_ARCHITECTURE all)
+set(CPACK_DEBIAN_DOC_PACKAGE_SHLIBDEPS OFF)  # it would ask each of a thousand files whether it is a program
+set(CPACK_COMPONENT_DOC_DESCRIPTION "Pages, schemas and examples of exmat.")
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_NAME exmat-precompute)
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_SUGGESTS exmat-meshing)  # under the GPL, so nobody gets it unasked
 set(CPACK_DEBIAN_PRECOMPUTE_PACKAGE_RECOMMENDS libopenblas0-pthread)  # any BLAS does; the reference one is slow, the serial OpenBLAS serves one thread

@@ -3,6 +3,8 @@
 
 Usage: test_packages.py BUILD_FOLDER
 """
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -10,6 +12,7 @@ import unittest
 from pathlib import Path
 
 BUILD = Path(sys.argv.pop(1)).resolve()
+ROOT = Path(__file__).resolve().parents[3]
 PYTHON = (BUILD / "python/exmat").is_dir()
 OFFLINE = (BUILD / "bin/exmat-precompute").exists()
 VIEWER = (BUILD / "bin/exmat-viewer").exists()
@@ -41,9 +44,32 @@ class Packages(unittest.TestCase):
         return {str(path.relative_to(root)) for path in root.rglob("*") if not path.is_dir()}
 
     def test_one_for_each_stage(self):
-        built = {"exmat-runtime": True, "exmat-precompute": OFFLINE, "exmat-meshing": MESHING, "exmat-viewer": VIEWER,
+        built = {"exmat-runtime": True, "exmat-doc": True, "exmat-precompute": OFFLINE, "exmat-meshing": MESHING, "exmat-viewer": VIEWER,
                  "python3-exmat": PYTHON}
         self.assertEqual(set(self.packages), {name for name, is_built in built.items() if is_built})
+
+    def man_pages(self, program, *commands):
+        """Files of the pages of a program and of its commands."""
+        names = [program, *(f"{program}-{command}" for command in commands)] if shutil.which("help2man") else []
+        return {f"usr/share/man/man1/{name}.1.gz" for name in names}
+
+    @unittest.skipUnless(shutil.which("help2man"), "built without man pages")
+    def test_man_pages_say_what_help_says(self):
+        pages = self.unpacked("exmat-runtime") / "usr/share/man/man1"
+        self.assertEqual({f"usr/share/man/man1/{page.name}" for page in pages.iterdir()},
+                         self.man_pages("exmat-runtime", "run", "bench", "export", "info", "validate"))
+        text = output_of("man", "-l", str(pages / "exmat-runtime-run.1.gz"))
+        for option in re.findall(r"--[a-z-]+", output_of(str(BUILD / "bin/exmat-runtime"), "run", "--help")):
+            self.assertIn(option, text)
+        self.assertNotIn(str(BUILD), text)
+
+    def test_pages_schemas_and_examples_link_to_each_other(self):
+        root = self.unpacked("exmat-doc") / "usr/share/doc/exmat-doc"
+        self.assertEqual({path.name for path in (ROOT / "schemas").iterdir()}, {path.name for path in (root / "schemas").iterdir()})
+        for page in root.rglob("*.md"):
+            for target in re.findall(r"\]\(([^)#\s:]+)(?:#[^)]*)?\)", page.read_text()):
+                inside = not re.search(r"(^|/)(CONTRIBUTING.md|LICENSE|tests|runtime|precompute|common)\b", target)
+                self.assertTrue(not inside or (page.parent / target).exists(), f"{page.relative_to(root)}: {target}")
 
     def test_the_run_time_needs_neither_mpi_nor_petsc(self):
         depends = self.depends("exmat-runtime")
@@ -65,7 +91,8 @@ class Packages(unittest.TestCase):
     def test_the_offline_stage_is_its_program(self):
         self.assertIn("petsc", self.depends("exmat-precompute"))
         root = self.unpacked("exmat-precompute")
-        self.assertEqual(self.files(root), {"usr/bin/exmat-precompute", "usr/share/doc/exmat-precompute/copyright"})
+        self.assertEqual(self.files(root), {"usr/bin/exmat-precompute", "usr/share/doc/exmat-precompute/copyright",
+                                            *self.man_pages("exmat-precompute", "bundle", "check", "mesh", "study", "full-space")})
         self.assertIn("SLEPc", output_of(str(root / "usr/bin/exmat-precompute"), "--version"))
 
     @unittest.skipUnless(MESHING, "built without the mesher")
@@ -87,7 +114,7 @@ class Packages(unittest.TestCase):
         for window in ("libglfw", "libepoxy", "libGL"):
             self.assertNotIn(window, self.depends("exmat-runtime"))
         root, library = self.unpacked("exmat-viewer"), next(self.unpacked("exmat-runtime").rglob("libexmat_runtime.so.*"))
-        self.assertEqual(self.files(root), {"usr/bin/exmat-viewer", "usr/share/doc/exmat-viewer/copyright"})
+        self.assertEqual(self.files(root), {"usr/bin/exmat-viewer", "usr/share/doc/exmat-viewer/copyright", *self.man_pages("exmat-viewer")})
         found = subprocess.run([str(root / "usr/bin/exmat-viewer"), "--version"], capture_output=True, text=True, check=True,
                                env={"LD_LIBRARY_PATH": str(library.parent)}).stdout
         self.assertIn("exmat-viewer", found)
