@@ -135,8 +135,9 @@ exmat_status exmat_body_read_target(const exmat_body* body, std::int64_t region,
   return guarded(__func__, [&] {
     const std::size_t place = place_of(force, body->model());
     const ExampleState& state = body->state.examples[place];
-    const bool there = state.has_target && acts(body->scene.examples[place]);
-    const Eigen::VectorXd pull = there ? pull_of(*force, state) : Eigen::VectorXd::Zero(modes);
+    const ExampleSettings& settings = body->scene.examples[place];
+    const bool is_found = force->table ? body->state.step > 0 && !settings.elastic : state.has_target;
+    const Eigen::VectorXd pull = is_found && acts(settings) ? pull_of(*force, state) : Eigen::VectorXd::Zero(modes);
     std::copy_n(pull.data(), modes, q);
   });
 }

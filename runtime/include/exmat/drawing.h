@@ -94,7 +94,7 @@ EXMAT_API const char* exmat_model_example_name(const exmat_model* model, int64_t
 EXMAT_API exmat_status exmat_model_read_example_pose(const exmat_model* model, int64_t region, int64_t example,
                                                      double* q, int64_t modes) EXMAT_NOEXCEPT;
 /* The target of the last step as far as the modes see it: the reduced coordinates `q` [modes = r] that the linear
-   example force draws to. Of an elastic force that before the first step, and where no example force acts, 0. */
+   example force draws to. 0 before the first step, where no example force acts, and of an elastic force by a table. */
 EXMAT_API exmat_status exmat_body_read_target(const exmat_body* body, int64_t region, double* q,
                                               int64_t modes) EXMAT_NOEXCEPT;
 

@@ -53,7 +53,7 @@ def test_a_body_of_no_finite_numbers_is_as_it_was(bundle):
     assert np.array_equal(body.q, before) and body.report.steps == 0
     world = exmat.Batch(body.model, 3)
     world.set_reduced([[0] * 12, [1e200] * 12, [0] * 12], np.zeros((3, 12)))
-    with pytest.raises(exmat.NonFinite, match=r"bodies\[1\]"):
+    with pytest.raises(exmat.NonFinite, match="body 1"):
         world.step(4)
     assert world.time.tolist() == [0.004, 0, 0.004]
 
