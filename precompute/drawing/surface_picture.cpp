@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kFilled = 0.9;               // of the side
 constexpr std::size_t kMostTriangles = 5000;  // beyond these a picture is of pixels
-constexpr int kTones = 12, kSlices = 24;      // of colour, of depth
+constexpr int kSlices = 20;                   // of depth
 
 /// A triangle that faces the viewer.
 struct Facing {
@@ -24,12 +24,10 @@ struct Facing {
   double depth() const { return corners.row(2).mean(); }
 };
 
+/// Eight tones of each part, in three digits.
 std::string hex(const Eigen::Vector3d& colour) {
-  constexpr double kStep = 256.0 / kTones;
-  const auto part = [&](int i) {
-    return static_cast<int>(std::clamp(std::round(colour[i] / kStep) * kStep, 0.0, 255.0));
-  };
-  return fmt::format("#{:02x}{:02x}{:02x}", part(0), part(1), part(2));
+  const auto part = [&](int i) { return 2 * std::clamp<long>(std::lround(7 * colour[i] / 255), 0, 7); };
+  return fmt::format("#{:x}{:x}{:x}", part(0), part(1), part(2));
 }
 
 std::vector<Facing> facing(const PaintedSurface& surface, const PictureView& view) {
@@ -45,7 +43,6 @@ std::vector<Facing> facing(const PaintedSurface& surface, const PictureView& vie
     one.colour = hex((0.5 + 0.5 * turned / in_space.norm()) * surface.colours[static_cast<std::size_t>(k)]);
     found.push_back(std::move(one));
   }
-  std::ranges::stable_sort(found, {}, &Facing::depth);
   return found;
 }
 
@@ -77,10 +74,11 @@ struct Path {
 };
 
 /// Slices from the farthest on, triangles of a colour together: many fewer bytes than one by one, and hidden by their
-/// neighbours alike.
+/// neighbours alike. Within a slice they keep the surface's order, in which each begins near the one before.
 std::string slices(const std::vector<Facing>& triangles) {
   std::map<std::pair<std::size_t, std::string>, Path> paths;
-  const double low = triangles.front().depth(), size = std::max(triangles.back().depth() - low, 1e-300);
+  const auto [lowest, highest] = std::ranges::minmax(triangles, {}, &Facing::depth);
+  const double low = lowest.depth(), size = std::max(highest.depth() - low, 1e-300);
   for (const Facing& one : triangles) {
     const double share = std::clamp((one.depth() - low) / size, 0.0, 0.999);
     paths[{static_cast<std::size_t>(share * kSlices), one.colour}].add(one);
@@ -92,7 +90,8 @@ std::string slices(const std::vector<Facing>& triangles) {
 }
 
 /// Runs of pixels of one colour, of triangles from the farthest to the nearest, each over those behind it.
-std::string pixels(const std::vector<Facing>& triangles) {
+std::string pixels(std::vector<Facing> triangles) {
+  std::ranges::stable_sort(triangles, {}, &Facing::depth);
   constexpr int kSide = kPictureSide, kHalf = kSide / 2;
   std::vector<std::string> colours(static_cast<std::size_t>(kSide) * kSide);
   for (const Facing& one : triangles) {
@@ -143,9 +142,9 @@ Eigen::Vector3d PictureView::operator()(const Eigen::Vector3d& x) const {
 }
 
 std::string surface_paths(const PaintedSurface& surface, const PictureView& view) {
-  const std::vector<Facing> triangles = facing(surface, view);
+  std::vector<Facing> triangles = facing(surface, view);
   if (triangles.empty()) return "";
-  return triangles.size() > kMostTriangles ? pixels(triangles) : slices(triangles);
+  return triangles.size() > kMostTriangles ? pixels(std::move(triangles)) : slices(triangles);
 }
 
 std::string surface_svg(const PaintedSurface& surface, const PictureView& view) {

@@ -20,7 +20,8 @@ class StabilityStudyProgram : public testing::Test {
     write_bundle(build(asset).model, folder_.path("bundle.h5"));
   }
   Outcome study(const std::filesystem::path& scene) {
-    return exmat_precompute({"study", "--stability", scene, "-o", folder_.path("out"), "--log-level", "error"});
+    return exmat_precompute(
+        {"study", "--stability", scene, "-o", folder_.path("out"), "--log-level", "error", "--threads", "1"});
   }
   Json results() const { return Json::parse(read_file(folder_.path("out/stability.json"))); }
 

@@ -143,7 +143,7 @@ TEST_F(SceneStudyTest, SaysWhatItLeavesOut) {
     EXPECT_THAT(study.not_tested, Contains(HasSubstr(dimension)));
   }
   EXPECT_EQ(range(study, "time step").safe, "16 x and more");
-  EXPECT_THAT(scene_study_markdown(study), HasSubstr("| start | as the scene has it | flat, mirrored, random |"));
+  EXPECT_THAT(scene_study_markdown(study), HasSubstr("| start | as the scene has it |"));
 }
 
 // A body that spins in free flight: its momentum is asked for, and kept.
