@@ -11,7 +11,9 @@
 namespace exmat {
 namespace {
 
-constexpr std::size_t kMostCorners = 5000;  // of a face that is no fan: ears take the square of them
+// Points that are compared with ears: for each corner of the file, and in any case. Faces of corners at random take the
+// cube of their number.
+constexpr std::size_t kTestsPerCorner = 10'000, kTests = 200'000'000;
 
 constexpr double kRounding = 1e-12;  // of areas of a face of unit size
 
@@ -46,15 +48,18 @@ bool fan_serves(const std::vector<Point>& points) {
 /// The rest of a polygon while its ears are cut off.
 class EarCutter {
  public:
-  explicit EarCutter(const std::vector<Point>& points) : points_(points), rest_(points.size()) {
+  /// `tests` are those that are left, and counted down.
+  EarCutter(const std::vector<Point>& points, std::size_t& tests)
+      : points_(points), tests_(tests), rest_(points.size()) {
     std::iota(rest_.begin(), rest_.end(), std::size_t{0});
   }
 
-  /// Triangles of indices into the points.
+  /// Triangles of indices into the points; none where the tests did not do.
   std::vector<std::array<std::size_t, 3>> cut() {
     std::vector<std::array<std::size_t, 3>> triangles;
     std::size_t at = 0, refused = 0;
     while (rest_.size() > 3) {
+      if (tests_ < rest_.size()) return {};
       at %= rest_.size();
       // A face that crosses itself may have no ear: its next corner goes all the same.
       if (!is_ear(at) && ++refused <= rest_.size()) {
@@ -74,9 +79,10 @@ class EarCutter {
   std::size_t before(std::size_t at) const { return rest_[(at + rest_.size() - 1) % rest_.size()]; }
   std::size_t after(std::size_t at) const { return rest_[(at + 1) % rest_.size()]; }
 
-  bool is_ear(std::size_t at) const {
+  bool is_ear(std::size_t at) {
     const Point &a = points_[before(at)], &b = points_[rest_[at]], &c = points_[after(at)];
     if (!(area(a, b, c) > kRounding)) return false;
+    tests_ -= rest_.size();
     return std::ranges::none_of(rest_, [&](std::size_t other) {
       const Point& p = points_[other];
       if (p == a || p == b || p == c) return false;
@@ -85,6 +91,7 @@ class EarCutter {
   }
 
   const std::vector<Point>& points_;
+  std::size_t& tests_;
   std::vector<std::size_t> rest_;
 };
 
@@ -97,6 +104,8 @@ void PolygonFaces::add(const std::vector<std::int32_t>& polygon) {
 }
 
 void PolygonFaces::cut_ears(const std::vector<std::array<double, 3>>& vertices, const std::filesystem::path& file) {
+  std::size_t tests = kTests;
+  for (const auto& [first, count] : polygons_) tests += kTestsPerCorner * count;
   for (const auto& [first, count] : polygons_) {
     std::vector<std::int32_t> polygon{triangles_[first][0], triangles_[first][1]};
     for (std::size_t k = 0; k + 2 < count; ++k) polygon.push_back(triangles_[first + k][2]);
@@ -104,12 +113,13 @@ void PolygonFaces::cut_ears(const std::vector<std::array<double, 3>>& vertices, 
     for (const auto corner : polygon) corners.emplace_back(vertices[static_cast<std::size_t>(corner)].data());
     const std::vector<Point> points = flattened(corners);
     if (fan_serves(points)) continue;
-    if (count > kMostCorners)
-      throw InputError({file.string(), "faces",
-                        "faces of at most " + std::to_string(kMostCorners) + " corners where they are not convex",
-                        "one of " + std::to_string(count), "export the mesh triangulated"});
+    const auto cut = EarCutter(points, tests).cut();
+    if (cut.empty())
+      throw InputError({file.string(), "faces", "faces whose edges do not cross",
+                        "one of " + std::to_string(count) + " corners that takes too long to cut into triangles",
+                        "export the mesh triangulated"});
     std::size_t next = first;
-    for (const auto& [a, b, c] : EarCutter(points).cut()) triangles_[next++] = {polygon[a], polygon[b], polygon[c]};
+    for (const auto& [a, b, c] : cut) triangles_[next++] = {polygon[a], polygon[b], polygon[c]};
   }
 }
 
