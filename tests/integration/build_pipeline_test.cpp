@@ -8,6 +8,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/config/json_file.h"
+#include "common/core/error.h"
 #include "precompute/pipeline/depfile.h"
 #include "tests/integration/support.h"
 #include "tests/support/box_mesh.h"
