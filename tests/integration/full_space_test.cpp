@@ -118,7 +118,7 @@ TEST_F(FullSpaceProgram, RefusesWhatItCannotRun) {
   };
   write_scene(folder_, Json::object());
   EXPECT_EQ(to("bundle.h5").status, 2);
-  EXPECT_THAT(to("bundle.h5").errors, HasSubstr("bundle.h5: expected another file than the bundle"));
+  EXPECT_THAT(to("bundle.h5").errors, HasSubstr("bundle.h5: -o: expected a file that this command does not read"));
   EXPECT_EQ(read_file(folder_.path("bundle.h5")), bundle);
   EXPECT_EQ(to("full.xdmf").status, 2);
   EXPECT_THAT(to("full.xdmf").errors, HasSubstr("give it the extension .h5"));

@@ -180,7 +180,7 @@ TEST_F(Parallel, FailuresEndAllRanks) {
     EXPECT_EQ(folder_.names(), files);
   };
   refused(on_ranks(2, {"bundle", folder_ / "missing.json", "-o", folder_ / "bundle.h5"}), kBadInput, "missing.json");
-  refused(on_ranks(2, {"bundel"}), kBadInput, "A subcommand is required");
+  refused(on_ranks(2, {"bundel"}), kBadInput, "did you mean bundle?");
   refused(run(2, {"--eps-largest_reel"}), kBadInput, "--eps-largest-reel: expected an option of the solvers in use");
   // All ranks find that it does not converge.
   refused(run(2, {"--eigensolver", "gamg", "--st-ksp-max_it", "1"}), kFailure,

@@ -204,6 +204,11 @@ TEST_F(ApiTest, WrongArgumentsAreCodes) {
   EXPECT_EQ(exmat_points_create_at(model.get(), numbers.data(), 4, &no_points), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_points_create_at(model.get(), numbers.data(), 0, &no_points), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_points_create_at(model.get(), bad_numbers.data(), 6, &no_points), EXMAT_INVALID_ARGUMENT);
+  for (const double far : {1e155, -3e200, 1.7e308}) {
+    const std::array<double, 6> beyond{0, 0, 0, 0, far, 0};
+    EXPECT_EQ(exmat_points_create_at(model.get(), beyond.data(), 6, &no_points), EXMAT_INVALID_ARGUMENT);
+    EXPECT_THAT(exmat_last_error(), HasSubstr("xyz[4]"));
+  }
   EXPECT_EQ(exmat_points_distances(nullptr, numbers.data(), 2), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_points_distances(points.get(), nullptr, 2), EXMAT_INVALID_ARGUMENT);
   EXPECT_EQ(exmat_points_distances(points.get(), numbers.data(), 3), EXMAT_INVALID_ARGUMENT);

@@ -11,6 +11,7 @@
 namespace exmat::precompute {
 namespace {
 
+using testing::AllOf;
 using testing::HasSubstr;
 
 std::string refusal(const std::function<void()>& work) {
@@ -97,7 +98,10 @@ TEST(AlignmentVerdict, FollowsTheLimits) {
   PoseAlignment ambiguous = good();
   ambiguous.ambiguous = true;
   ambiguous.competing_maps = 2;
-  EXPECT_THAT(judged(ambiguous, true).message, HasSubstr("2 other poses fit as well"));
+  EXPECT_EQ(judged(ambiguous, true).verdict, AlignmentVerdict::kDoubtful) << "the least moved pose is taken";
+  EXPECT_THAT(judged(ambiguous, true).message, AllOf(HasSubstr("2 other poses fit as well"), HasSubstr("landmarks")));
+  ambiguous.residual = 0.06;
+  EXPECT_EQ(judged(ambiguous, true).verdict, AlignmentVerdict::kRefused) << "its surface is met by no more than 5 %";
   EXPECT_THAT(judged(ambiguous, true).message, HasSubstr("alignment.frame \"shared\""));
 }
 

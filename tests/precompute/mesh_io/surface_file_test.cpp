@@ -305,7 +305,8 @@ TEST(ReadSurface, KeepsNoPartsOutOfProportionToTheFile) {
   for (int name = 0; name < 20'000; ++name) text += fmt::format("g {}\nf 1 2 3\n", name);
   const SurfaceFile surface = read_surface_file(folder.write("body.obj", text));
   EXPECT_TRUE(surface.parts.empty());
-  EXPECT_THAT(surface.remarks, testing::ElementsAre(HasSubstr("20000 names of parts are too many")));
+  EXPECT_THAT(surface.remarks, testing::ElementsAre(HasSubstr("20000 names of parts are too many"),
+                                                    HasSubstr("19997 vertices of no triangle")));
 }
 
 TEST(ReadSurface, TakesColoursOfAPly) {
