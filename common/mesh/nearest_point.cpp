@@ -13,6 +13,8 @@ namespace {
 using Corners = Eigen::Matrix<double, 4, 3>;
 using Box = Eigen::AlignedBox3d;
 
+constexpr double kFarthest = 1e150;  // coordinates beyond count as this: their squares are not finite
+
 struct Nearest {
   Eigen::Vector4d weights = Eigen::Vector4d::Zero();
   double squared_distance = std::numeric_limits<double>::infinity();
@@ -64,7 +66,7 @@ struct Minimiser {
   const TetMesh& mesh;
   Eigen::Vector3d point;
   Nearest nearest{};
-  int tet = -1;
+  int tet = 0;
 
   double minimumOnVolume(const Box& box) const { return box.squaredExteriorDistance(point); }
   double minimumOnObject(int candidate) {
@@ -95,7 +97,7 @@ NearestPointSearch::Tree NearestPointSearch::tree_of(const TetMesh& mesh) {
 }
 
 NearestPoint NearestPointSearch::nearest(const Eigen::Vector3d& point) const {
-  Minimiser minimiser{mesh_, point};
+  Minimiser minimiser{mesh_, point.cwiseMax(-kFarthest).cwiseMin(kFarthest)};
   Eigen::BVMinimize(tree_, minimiser);
   return {minimiser.tet, minimiser.nearest.weights, std::sqrt(minimiser.nearest.squared_distance)};
 }

@@ -17,6 +17,8 @@ namespace {
 std::size_t example_force(const exmat_body& body, std::int64_t region) {
   const Model& model = body.model();
   const bool whole = region == -1 && model.has_whole_body_examples();
+  if (model.examples.empty())
+    throw InvalidArgument("the model has no example force: set use_examples, or let its scene have examples");
   if (!whole && model.region(region) == nullptr)
     throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
                                       model.has_whole_body_examples() ? "the whole body (-1) and " : "",

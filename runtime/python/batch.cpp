@@ -143,7 +143,7 @@ BatchClass bind_batch(py::module_& module) {
   type.def(py::init([](std::shared_ptr<ModelObject> model, std::int64_t count) {
              return std::make_shared<BatchObject>(std::move(model), count);
            }),
-           py::arg("model"), py::arg("count"), "`count` = N >= 1 bodies, each at its start.")
+           py::arg("model").none(false), py::arg("count"), "`count` = N >= 1 bodies, each at its start.")
       .def_property_readonly(
           "model", [](const BatchObject& batch) { return batch.model.object(); }, "The model that they are of.")
       .def("__len__", &count)

@@ -82,7 +82,7 @@ void bind_stepping(BodyClass& type) {
   type.def(py::init([](std::shared_ptr<ModelObject> model) {
              return std::make_shared<BodyObject>(ModelHold(std::move(model)));
            }),
-           py::arg("model"), "At rest at time 0, or as the model's scene starts it.")
+           py::arg("model").none(false), "At rest at time 0, or as the model's scene starts it.")
       .def_property_readonly(
           "model", [](const BodyObject& body) { return body.model.object(); }, "The model that it is of.")
       .def("step", &step, py::arg("n") = 1,

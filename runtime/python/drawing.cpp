@@ -7,19 +7,6 @@
 namespace exmat::python {
 namespace {
 
-struct SurfaceObject {
-  SurfaceObject(const std::shared_ptr<ModelObject>& its_model, std::int32_t kind)
-      : surface(its_model->model, kind), model(its_model) {}
-
-  Surface surface;
-  ModelHold model;
-  std::size_t count = surface.points();
-};
-
-struct CapacityObject {
-  Capacity capacity;
-};
-
 const std::vector<const char*> kSurfaces{"auto", "object", "render"};
 
 std::shared_ptr<SurfaceObject> surface_of(const std::shared_ptr<ModelObject>& model, const std::string& kind) {
@@ -97,7 +84,7 @@ void bind_profile(Class& type) {
 void bind_surface(py::module_& module) {
   py::class_<SurfaceObject, std::shared_ptr<SurfaceObject>>(
       module, "Surface", "Triangles of a model's bodies that are drawn, and their k points; they never change.")
-      .def(py::init(&surface_of), py::arg("model"), py::arg("kind") = "auto",
+      .def(py::init(&surface_of), py::arg("model").none(false), py::arg("kind") = "auto",
            "`kind`: \"object\", the boundary of the tets, \"render\", the render mesh, or \"auto\": this if the bundle "
            "has one, else that.")
       .def("__len__", [](const SurfaceObject& surface) { return surface.count; })
@@ -142,7 +129,7 @@ void bind_capacity(py::module_& module) {
              const py::gil_scoped_release unlocked;
              return std::make_unique<CapacityObject>(CapacityObject{Capacity(model->model, spread)});
            }),
-           py::arg("model"), py::arg("spread") = 0.0,
+           py::arg("model").none(false), py::arg("spread") = 0.0,
            "`spread` >= 0 [m]: a force acts on the surface within that distance of its point.")
       .def_property_readonly(
           "time_scale", [](const CapacityObject& capacity) { return capacity.capacity.time_scale(); },

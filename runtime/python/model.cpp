@@ -114,14 +114,14 @@ py::array_t<double> example_pose(const ModelObject& model, const std::string& ex
 void bind_points(py::module_& module) {
   py::class_<PointsObject, std::shared_ptr<PointsObject>>(
       module, "Points", "k material points of a model's bodies, in the order given; they never change.")
-      .def(py::init(&vertices), py::arg("model"), py::arg("ids"),
+      .def(py::init(&vertices), py::arg("model").none(false), py::arg("ids"),
            "Vertices of the object, 0-based `ids` of shape (k,), k >= 1; repeated ones are allowed.")
-      .def_static("all_vertices", &all_vertices, py::arg("model"),
+      .def_static("all_vertices", &all_vertices, py::arg("model").none(false),
                   "All n vertices of the object. They can be read, not pushed.")
-      .def_static("at", &points_at, py::arg("model"), py::arg("xyz"),
+      .def_static("at", &points_at, py::arg("model").none(false), py::arg("xyz"),
                   "Points of the rest shape, `xyz` of shape (k, 3) [m]. Each moves with the tet that holds it, or with "
                   "the nearest one where none does.")
-      .def_static("elements", &elements, py::arg("model"), "Centroids of the s cubature elements.")
+      .def_static("elements", &elements, py::arg("model").none(false), "Centroids of the s cubature elements.")
       .def("__len__", [](const PointsObject& points) { return points.count; })
       .def_property_readonly(
           "model", [](const PointsObject& points) { return points.model.object(); },

@@ -56,6 +56,20 @@ struct PointsObject {
   std::size_t count = points.size();
 };
 
+/// Its k points.
+struct SurfaceObject {
+  SurfaceObject(const std::shared_ptr<ModelObject>& its_model, std::int32_t kind)
+      : surface(its_model->model, kind), model(its_model) {}
+
+  Surface surface;
+  ModelHold model;
+  std::size_t count = surface.points();
+};
+
+struct CapacityObject {
+  Capacity capacity;
+};
+
 struct StateObject {
   std::vector<double> numbers;
   std::string sha;
@@ -266,6 +280,41 @@ auto span_of(Array& array) {
 inline std::span<const double> read_span(const Numbers& array) {
   return {array.data(), static_cast<std::size_t>(array.size())};
 }
+
+}  // namespace exmat::python
+
+namespace pybind11::detail {
+
+/// Refuses an object of __new__() alone, which holds nothing yet.
+template <typename Object>
+struct MadeCaster : type_caster_base<Object> {
+  bool load(handle source, bool convert) {
+    if (!type_caster_base<Object>::load(source, convert)) return false;
+    if (source.is_none()) return true;
+    const auto* made = reinterpret_cast<const instance*>(source.ptr());
+    if (made->simple_layout && !made->simple_holder_constructed)
+      throw type_error("expected an object that its class has made, found one of __new__() alone");
+    return true;
+  }
+};
+
+// clang-format off
+template <> struct type_caster<exmat::python::ModelObject> : MadeCaster<exmat::python::ModelObject> {};
+template <> struct type_caster<exmat::python::PointsObject> : MadeCaster<exmat::python::PointsObject> {};
+template <> struct type_caster<exmat::python::BodyObject> : MadeCaster<exmat::python::BodyObject> {};
+template <> struct type_caster<exmat::python::WorldObject> : MadeCaster<exmat::python::WorldObject> {};
+template <> struct type_caster<exmat::python::BatchObject> : MadeCaster<exmat::python::BatchObject> {};
+template <> struct type_caster<exmat::python::ShapeObject> : MadeCaster<exmat::python::ShapeObject> {};
+template <> struct type_caster<exmat::python::StateObject> : MadeCaster<exmat::python::StateObject> {};
+template <> struct type_caster<exmat::python::WorldStateObject> : MadeCaster<exmat::python::WorldStateObject> {};
+template <> struct type_caster<exmat::python::SurfaceObject> : MadeCaster<exmat::python::SurfaceObject> {};
+template <> struct type_caster<exmat::python::CapacityObject> : MadeCaster<exmat::python::CapacityObject> {};
+template <> struct type_caster<exmat_motion> : MadeCaster<exmat_motion> {};
+// clang-format on
+
+}  // namespace pybind11::detail
+
+namespace exmat::python {
 
 using BodyClass = py::class_<BodyObject, std::shared_ptr<BodyObject>>;
 using WorldClass = py::class_<WorldObject, std::shared_ptr<WorldObject>>;

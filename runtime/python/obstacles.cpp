@@ -336,7 +336,7 @@ void bind_obstacle_functions(Class& type, const char* whose) {
              const std::optional<exmat_motion>& motion, std::uint32_t group, std::uint32_t mask) {
             return add_obstacle(own_obstacles_of(owner), shape, {stiffness, damping, friction, group, mask}, motion);
           },
-          py::arg("shape"), py::kw_only(), py::arg("stiffness") = 1e6, py::arg("damping") = 0.0,
+          py::arg("shape").none(false), py::kw_only(), py::arg("stiffness") = 1e6, py::arg("damping") = 0.0,
           py::arg("friction") = 0.0, py::arg("motion") = py::none(), py::arg("group") = 1U, py::arg("mask") = ~0U,
           whose)
       .def(

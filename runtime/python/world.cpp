@@ -297,7 +297,7 @@ WorldClass bind_world(py::module_& module) {
           "Over the ids, ascending.")
       .def_property_readonly("ids", &ids, "Of all bodies, shape (N,), ascending. A copy.")
       .def_property_readonly("bodies", &bodies_of, "All bodies, in the order of their ids: a list of the Body of each.")
-      .def("add", &add_body, py::arg("body"),
+      .def("add", &add_body, py::arg("body").none(false),
            "The body is the world's from now on, as it is and where it is: its id, which no later one gets. What it "
            "overlaps pushes it out. Its functions serve as before, but for those that step it.")
       .def("remove", &remove, py::arg("id"), "Takes a body out and returns it.")

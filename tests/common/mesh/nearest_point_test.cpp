@@ -30,6 +30,22 @@ TEST(NearestPoints, OfABoxAreTheClampedPoints) {
   }
 }
 
+// However far a point is, one of the corners towards it is the nearest: squares of distances are not finite from 1e154
+// on.
+TEST(NearestPoints, OfPointsBeyondAllSquaresAreCornersOfTheBody) {
+  const auto mesh = test::box_mesh({2, 2, 2}, {1.0, 1.0, 1.0});
+  for (const double far : {1e20, 1e155, 3e200, 1e308}) {
+    VertexArray point(2, 3);
+    point << far, far, far, -far, 0.5, 0.5;
+    const auto nearest = nearest_points(mesh, point);
+    ASSERT_GE(nearest.tets.minCoeff(), 0) << far;
+    const Eigen::MatrixXd found = nearest.interpolation(mesh) * mesh.vertices;
+    EXPECT_GE(found.row(0).minCoeff(), 0.0) << far;
+    EXPECT_LE(found.row(0).maxCoeff(), 1.0) << far;
+    EXPECT_GE(nearest.weights.minCoeff(), 0) << far;
+  }
+}
+
 // Against brute force over a fine sampling of every tet of a body that is not convex.
 TEST(NearestPoints, OfANonConvexBodyBeatEverySample) {
   TetMesh mesh = test::box_mesh({4, 4, 1}, {1, 1, 0.25});

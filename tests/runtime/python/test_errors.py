@@ -51,11 +51,11 @@ def test_a_body_of_no_finite_numbers_is_as_it_was(bundle):
     with pytest.raises(exmat.NonFinite, match="NaN or infinity"):
         body.step()
     assert np.array_equal(body.q, before) and body.report.steps == 0
-    world = exmat.Batch(body.model, 3)
-    world.set_reduced([[0] * 12, [1e200] * 12, [0] * 12], np.zeros((3, 12)))
+    batch = exmat.Batch(body.model, 3)
+    batch.set_reduced([[0] * 12, [1e200] * 12, [0] * 12], np.zeros((3, 12)))
     with pytest.raises(exmat.NonFinite, match="body 1"):
-        world.step(4)
-    assert world.time.tolist() == [0.004, 0, 0.004]
+        batch.step(4)
+    assert batch.time == 0.001 and np.array_equal(batch.q[1], before)  # the step that the others have taken is the last
 
 
 def test_steps_let_other_threads_run_and_refuse_the_same_body(model):
@@ -120,3 +120,23 @@ def test_a_hundred_thousand_creations_leave_no_memory(model, body):
     gc.collect()
     # 16 bytes for each creation: a body alone has tens of kilobytes, the smallest Python object 16 bytes.
     assert resident() - before < 16 * 100_000
+
+
+@pytest.mark.parametrize("call", [
+    lambda m: exmat.Body(None), lambda m: exmat.Points(None, [0]), lambda m: exmat.Points.at(None, [[0, 0, 0]]),
+    lambda m: exmat.Points.all_vertices(None), lambda m: exmat.Points.elements(None), lambda m: exmat.Surface(None), lambda m: exmat.Capacity(None),
+    lambda m: exmat.Batch(None, 3), lambda m: exmat.World().add(None), lambda m: exmat.World().add_obstacle(None),
+    lambda m: exmat.Body(m).add_obstacle(None), lambda m: exmat.Body(m).positions(None), lambda m: exmat.Body(m).apply_forces(None, [[0, 0, 0]]),
+    lambda m: exmat.Body.__new__(exmat.Body).q, lambda m: exmat.Body.__new__(exmat.Body).step(), lambda m: exmat.World.__new__(exmat.World).step(),
+    lambda m: exmat.Batch.__new__(exmat.Batch).q, lambda m: exmat.Points.__new__(exmat.Points).distances, lambda m: exmat.Shape.__new__(exmat.Shape).kind,
+    lambda m: exmat.Model.__new__(exmat.Model).modes, lambda m: exmat.Surface.__new__(exmat.Surface).rest,
+    lambda m: exmat.World().add_obstacle(exmat.Shape.sphere(1), motion=exmat.Motion.__new__(exmat.Motion))])
+def test_none_and_objects_that_nobody_made_are_type_errors(model, call):
+    with pytest.raises(TypeError):
+        call(model)
+
+
+def test_points_beyond_all_bodies_are_refused(model):
+    for far in (1e155, 1e300):
+        with pytest.raises(exmat.InvalidArgument, match="at most 1e"):
+            exmat.Points.at(model, [[far, 0, 0]])
