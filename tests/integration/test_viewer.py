@@ -194,7 +194,7 @@ class Viewer(unittest.TestCase):
     def test_runs_say_what_the_basis_loses_of_contacts(self):
         printed = self.run_scene(self.world(), "--steps", "400")
         for body in ("low", "high"):
-            self.assertTrue(0 <= float(re.search(f"lost work, {body} +([0-9.]+) % of", printed).group(1)) <= 100)
+            self.assertTrue(0 <= float(re.search(f"lost work, {body} contact +([0-9.]+) % at", printed).group(1)) <= 100)
         scene = self.write("dropped.json", {"bundle": "free.h5", "time_step": 0.002, "gravity": [0, 0, -9.81], "steps": 100,
                                             "obstacles": [{"plane": {"point": [0, 0, -0.1], "normal": [0, 0, 1]}, "stiffness": 2e5}]})
         self.assertRegex(self.run_scene(scene), "lost work, contact +[0-9.]+ % at 0.[0-9]+ s, when it is [0-9.e+]+ N")
