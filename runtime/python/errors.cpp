@@ -19,6 +19,13 @@ const char* class_of(exmat_status status) {
   return "Failure";
 }
 
+/// Without the function of C that found the fault, which the user has not called.
+std::string text_of(const Error& error) {
+  const std::string text = error.what();
+  const std::size_t end = text.find(": ");
+  return text.starts_with("exmat_") && end != std::string::npos ? text.substr(end + 2) : text;
+}
+
 }  // namespace
 
 void bind_errors() {
@@ -27,7 +34,7 @@ void bind_errors() {
       if (thrown) std::rethrow_exception(thrown);
     } catch (const Error& error) {
       const py::object type = py::module_::import("exmat.errors").attr(class_of(error.status()));
-      PyErr_SetString(type.ptr(), error.what());
+      PyErr_SetString(type.ptr(), text_of(error).c_str());
     }
   });
 }
