@@ -67,7 +67,7 @@ class ContactKeeper final : public StepObserver {
     const World& world = bodies_.world();
     world.read_touches(touches_);
     std::ranges::sort(changed_);
-    changed_.erase(std::ranges::unique(changed_).begin(), changed_.end());
+    changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
     for (const std::size_t kind : changed_) {
       HardestContact& hardest = hardest_[kind];
       const Eigen::Matrix3d to_own =

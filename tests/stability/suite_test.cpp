@@ -85,9 +85,9 @@ TEST(Stability, SuiteReachesEveryExtreme) {
     for (const auto material :
          {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational})
       for (const bool free : {false, true})
-        for (const auto [E, nu, density] : {std::array{1e3, 0.0, 1e5}, {1e3, 0.4999, 1.0}, {1e12, 0.4999, 1.0}})
+        for (const auto& [E, nu, density] : {std::array{1e3, 0.0, 1e5}, {1e3, 0.4999, 1.0}, {1e12, 0.4999, 1.0}})
           for (const double dt : {1e-4, 1.0 / 30})
-            EXPECT_TRUE(any([&](const StabilityCase& test) {
+            EXPECT_TRUE(any([&, E = E, nu = nu, density = density](const StabilityCase& test) {
               const BodySpec& body = test.body;
               return test.integrator == integrator && body.material == material && body.free == free &&
                      body.youngs_modulus == E && body.poisson_ratio == nu && body.density == density &&

@@ -57,7 +57,7 @@ void expect_covered_from_any(std::vector<Point> points) {
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(1.1, Eigen::Vector3d(1, 2, -3).normalized()).toRotationMatrix();
   for (std::size_t k = 0; k < points.size(); ++k) {
     expect_covered(points, turn);
-    std::ranges::rotate(points, points.begin() + 1);
+    std::rotate(points.begin(), points.begin() + 1, points.end());
   }
 }
 
