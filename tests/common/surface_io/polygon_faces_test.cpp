@@ -1,6 +1,7 @@
 #include "common/surface_io/polygon_faces.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
