@@ -16,7 +16,9 @@ constexpr std::size_t kShares = 16;  // of a thread's groups: at so many times t
 
 int Crowd::add(const Model& model, const StepScene& scene) {
   auto kind = std::ranges::find(kinds_, &model, &Kind::model);
-  if (kind == kinds_.end()) kind = kinds_.insert(kind, Kind{&model, scene});
+  if (kind == kinds_.end()) kind = std::ranges::find(kinds_, nullptr, &Kind::model);
+  if (kind == kinds_.end()) kind = kinds_.emplace(kind);
+  if (kind->model == nullptr) *kind = {&model, scene};
   ++kind->bodies;
   std::size_t most = 0;
   for (const Kind& own : kinds_) most += static_cast<std::size_t>(own.bodies);
@@ -27,7 +29,12 @@ int Crowd::add(const Model& model, const StepScene& scene) {
   return found;
 }
 
-void Crowd::remove(int kind) { --kinds_[static_cast<std::size_t>(kind)].bodies; }
+void Crowd::remove(int kind) {
+  const auto index = static_cast<std::size_t>(kind);
+  if (--kinds_[index].bodies > 0) return;
+  kinds_[index] = {};  // the model may go with its last body, and another one be made in its place
+  for (Thread& thread : threads_) thread.of_kind[index].reset();
+}
 
 void Crowd::fit(int kind, const StepScene& scene) {
   StepScene& sized = kinds_[static_cast<std::size_t>(kind)].scene;
@@ -54,9 +61,10 @@ void Crowd::prepare(int threads) {
 }
 
 void Crowd::size(Thread& thread) const {
+  thread.of_kind.resize(kinds_.size());
   for (std::size_t k = 0; k < kinds_.size(); ++k) {
     const Kind& kind = kinds_[k];
-    if (kind.bodies == 0) continue;
+    if (kind.model == nullptr) continue;
     const std::size_t wanted =
         goes_in_lanes(kind) ? static_cast<std::size_t>(std::min<std::ptrdiff_t>(kind.bodies, kLanes)) : 1;
     const auto serves = [&](const LaneWorkspace& workspace) {
@@ -64,10 +72,8 @@ void Crowd::size(Thread& thread) const {
       return workspace.bodies() >= wanted && near.has_value() == touches(*kind.model, kind.scene) &&
              (!near || near->contact.obstacles.capacity() >= kind.scene.obstacles.size());
     };
-    if (k == thread.of_kind.size())
-      thread.of_kind.emplace_back(*kind.model, kind.scene, wanted);
-    else if (!serves(thread.of_kind[k]))
-      thread.of_kind[k] = LaneWorkspace(*kind.model, kind.scene, wanted);
+    std::optional<LaneWorkspace>& own = thread.of_kind[k];
+    if (!own || !serves(*own)) own.emplace(*kind.model, kind.scene, wanted);
   }
 }
 
@@ -134,7 +140,7 @@ void Crowd::step_group(const Group& group, const Group* next, Thread& thread, St
   const Clock::time_point start = profiled ? Clock::now() : Clock::time_point();
   const auto body_at = [this](int index) -> const Body& { return bodies_[static_cast<std::size_t>(index)]; };
   const Model& model = *kinds_[static_cast<std::size_t>(group.kind)].model;
-  LaneWorkspace& scratch = thread.of_kind[static_cast<std::size_t>(group.kind)];
+  LaneWorkspace& scratch = *thread.of_kind[static_cast<std::size_t>(group.kind)];
   const auto scratch_of = [&](std::size_t lane) -> Workspace& {
     Workspace* const own = body_at(group.bodies[lane]).workspace;
     return own != nullptr ? *own : scratch.body(lane);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "runtime/sim/lanes/lane_step.h"
@@ -39,7 +40,7 @@ class Crowd {
   /// Its scene has other obstacles than before.
   void fit(int kind, const StepScene& scene);
   /// That of the first thread, between steps.
-  Workspace& scratch(int kind) noexcept { return threads_.front().of_kind[static_cast<std::size_t>(kind)].body(0); }
+  Workspace& scratch(int kind) noexcept { return threads_.front().of_kind[static_cast<std::size_t>(kind)]->body(0); }
   /// Scratch for so many threads.
   void prepare(int threads);
 
@@ -54,8 +55,8 @@ class Crowd {
 
  private:
   struct Kind {
-    const Model* model = nullptr;
-    StepScene scene;  ///< that scratch is sized for: the one of most obstacles
+    const Model* model = nullptr;  ///< null: its last body was removed
+    StepScene scene;               ///< that scratch is sized for: the one of most obstacles
     int bodies = 0;
     // Of one step: how many can go side by side, how many of these were seen, and the group that is not full, or -1.
     int able = 0, seen = 0, open = -1;
@@ -72,8 +73,8 @@ class Crowd {
     std::array<int, kLanes> bodies{};  ///< in bodies_
     std::size_t count = 0;
   };
-  struct alignas(128) Thread {  // no cache line of two threads
-    std::vector<LaneWorkspace> of_kind;
+  struct alignas(128) Thread {                          // no cache line of two threads
+    std::vector<std::optional<LaneWorkspace>> of_kind;  ///< none of a kind without bodies
     Profile profile;
     double seconds = 0;
   };

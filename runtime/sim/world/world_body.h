@@ -36,8 +36,7 @@ struct WorldBody {
   Workspace workspace;
   SurfaceShape shape;
   StepReport report;
-  bool anew = true;     ///< no step has led to where it is: what it overlaps was not watched coming
-  bool asleep = false;  ///< in this step
+  bool anew = true;  ///< no step has led to where it is: what it overlaps was not watched coming
 
   // Of one step.
   std::optional<BodyStep> step;
