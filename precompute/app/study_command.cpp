@@ -88,6 +88,7 @@ void study_command(const StudyCommandOptions& options) {
 }
 
 void stability_command(const StudyCommandOptions& options) {
+  precompute::claim_scene_study(options.folder);
   const precompute::SceneStudy study = precompute::study_scene(options.scene, options.jobs);
   precompute::write_scene_study(study, options.folder);
   fmt::print("{}", precompute::scene_study_markdown(study));

@@ -102,6 +102,8 @@ class Commands(unittest.TestCase):
         self.refused("study", "results.json", "-o", ".", said=["results.json", "does not read"])
         write_json(self.folder / "study.json", study)
         self.refused("study", "study.json", "-o", ".", said=["recommended_asset.json", "does not read"])
+        shutil.copy(self.folder / "scene.json", self.folder / "stability.json")
+        self.refused("study", "--stability", "stability.json", "-o", ".", said=["stability.json", "does not read"])
 
     def test_a_failure_writes_its_report_over_no_other_file(self):
         """The asset fails before the mesh of the report's name is read."""

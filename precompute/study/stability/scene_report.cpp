@@ -3,17 +3,21 @@
 #include <system_error>
 
 #include "common/core/atomic_file.h"
+#include "common/core/command_files.h"
 #include "common/core/error.h"
 #include "common/core/markup.h"
 #include "precompute/drawing/table.h"
 #include "precompute/study/stability/scene_study.h"
 
-// What a study of a scene's stability prints and writes.
+// The study of a scene's stability as text and files.
 
 namespace exmat::precompute {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+constexpr const char *kPage = "stability.html", *kText = "stability.md", *kTable = "stability.csv",
+                     *kRecord = "stability.json";
 
 Table ranges_table(const SceneStudy& study) {
   Table table{text_columns({"dimension", "in the scene", "safe up to", "fails"}), {}};
@@ -60,8 +64,8 @@ Json to_json(const SceneStudy& study, const std::vector<Json>& runs) {
 
 constexpr const char* kLegend =
     "Each check, value / limit: finite: states that are not; bounded: largest displacement over the body's size; "
-    "solved: "
-    "share of steps above the tolerance; rest: kinetic energy at the end over its peak; energy: gain over the energies "
+    "solved: share of steps above the tolerance; rest: kinetic energy at the end over its peak; energy: gain over the "
+    "energies "
     "exchanged; momentum: relative error; return: distance from where the scene ends, over the size.";
 
 }  // namespace
@@ -78,6 +82,10 @@ std::string scene_study_markdown(const SceneStudy& study) {
   return text + "\n" + kLegend + "\n";
 }
 
+void claim_scene_study(const std::filesystem::path& folder) {
+  for (const char* name : {kPage, kText, kTable, kRecord}) claim_output(folder / name, "-o");
+}
+
 void write_scene_study(const SceneStudy& study, const std::filesystem::path& folder) {
   std::error_code error;
   std::filesystem::create_directories(folder, error);
@@ -86,12 +94,12 @@ void write_scene_study(const SceneStudy& study, const std::filesystem::path& fol
                      "<h2>Not tested</h2>\n<ul>\n";
   for (const std::string& reason : study.not_tested) body += "<li>" + escaped(reason) + "</li>\n";
   body += fmt::format("</ul>\n<h2>Runs</h2>\n<p class=\"note\">{}</p>\n{}", kLegend, to_html(runs_table(study)));
-  write_file_atomically(folder / "stability.html", html_page("Stability of " + study.scene, body));
-  write_file_atomically(folder / "stability.md", scene_study_markdown(study) + "\n" + to_markdown(runs_table(study)));
+  write_file_atomically(folder / kPage, html_page("Stability of " + study.scene, body));
+  write_file_atomically(folder / kText, scene_study_markdown(study) + "\n" + to_markdown(runs_table(study)));
   std::vector<Json> runs;
   for (const SceneRun& run : study.runs) runs.push_back(to_json(run));
-  write_file_atomically(folder / "stability.csv", to_csv(runs));
-  write_file_atomically(folder / "stability.json", to_json(study, runs).dump(1) + '\n');
+  write_file_atomically(folder / kTable, to_csv(runs));
+  write_file_atomically(folder / kRecord, to_json(study, runs).dump(1) + '\n');
 }
 
 }  // namespace exmat::precompute

@@ -50,6 +50,9 @@ SceneStudy study_scene(const std::filesystem::path& file, int jobs = 1);
 /// Headline, table "safe up to" and what was not tested.
 std::string scene_study_markdown(const SceneStudy& study);
 
+/// Claims the files that write_scene_study() will write, as outputs of the command. Throws InputError.
+void claim_scene_study(const std::filesystem::path& folder);
+
 /// Writes stability.html, .md, .csv and .json into a folder, which is made. Each appears whole or not at all. Throws
 /// WorkError.
 void write_scene_study(const SceneStudy& study, const std::filesystem::path& folder);
