@@ -304,7 +304,7 @@ void compact_vertices(TetMesh& mesh, MeshReport& report) {
 }  // namespace
 
 void require_extent(const VertexArray& vertices, const std::string& file) {
-  const double length = (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).maxCoeff();
+  const double length = longest_box_edge(vertices);
   if (length >= 1e-100 && length <= 1e100) return;
   throw InputError({file, "vertices", "a longest edge of the bounding box from 1e-100 to 1e100 m", to_text(length),
                     "scale the mesh, as object.unit or object.scale of the asset does"});

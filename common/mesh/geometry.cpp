@@ -55,6 +55,10 @@ double bounding_box_diagonal(const VertexArray& vertices) {
   return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
 }
 
+double longest_box_edge(const VertexArray& vertices) {
+  return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).maxCoeff();
+}
+
 TriangleArray surface_triangles(const TetArray& tets) {
   struct Face {
     std::array<std::int32_t, 3> corners;

@@ -24,6 +24,9 @@ Eigen::Vector3d centroid(const TetMesh& mesh);
 /// Length of the diagonal of the axis-aligned bounding box [m].
 double bounding_box_diagonal(const VertexArray& vertices);
 
+/// Its longest edge [m].
+double longest_box_edge(const VertexArray& vertices);
+
 /// n_f x 3 outward-oriented boundary triangles, in the order of their tets.
 TriangleArray surface_triangles(const TetArray& tets);
 

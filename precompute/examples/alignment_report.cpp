@@ -89,8 +89,7 @@ std::string section(const TetMesh& rest, const ReportedPose& pose) {
   std::string text = fmt::format(
       "<section class=\"{0}\">\n<h2>{1} <span>{0}</span></h2>\n<p><b>{2}.</b></p>\n"
       "<p>{3}, doubt {4:.2f}, residual {5:.1f} % of the body's size, {6:.1f} % of the volume inside out, {7:.0f} % "
-      "lost by "
-      "the eigenfunctions</p>\n<table>\n<tr>",
+      "lost by the eigenfunctions</p>\n<table>\n<tr>",
       name_of(outcome.verdict), escaped(outcome.name), escaped(what_to_change(outcome)), escaped(outcome.method),
       outcome.doubt, 100 * outcome.residual, 100 * outcome.inverted_fraction, 100 * outcome.shape_space_error);
   for (const auto& [label, painted] : columns) text += fmt::format("<th>{}</th>", label);
@@ -153,7 +152,7 @@ std::string alignment_page(const std::string& title, const TetMesh& rest, const 
 void claim_alignment_report(const AssetConfig& asset, const std::filesystem::path& folder) {
   claim_output(folder / "index.html", "--alignment-report");
   for (const ExampleConfig& example : asset.examples)
-    for (const char* ending : {".vtk", "_example.vtk", ".svg"})
+    for (const char* ending : {".vtk", "_example.vtk"})
       claim_output(folder / (file_name(example.name) + ending),
                    fmt::format("--alignment-report, example {}", example.name));
 }

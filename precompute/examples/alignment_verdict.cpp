@@ -29,10 +29,9 @@ const std::string kSameMesh = "a pose of the rest example's own mesh, which need
 constexpr double kMet = 0.05;
 
 // Examples stand alike as a rule, so the least moved pose is meant unless the asset says that frames are free.
-void judge_competitors(const PoseAlignment& alignment, AlignmentFrame frame, bool free_frame,
-                       AlignmentOutcome& outcome) {
+void judge_competitors(const PoseAlignment& alignment, bool met, bool free_frame, AlignmentOutcome& outcome) {
   if (!alignment.ambiguous) return;
-  if (frame != AlignmentFrame::kFree && alignment.residual <= kMet)
+  if (met)
     return object_to(
         outcome, AlignmentVerdict::kDoubtful,
         fmt::format("{} other pose{} as well, for the body is nearly symmetric; taken is the one nearest to "
@@ -136,7 +135,7 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
           : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
   judge_doubt(outcome, advice);
   judge_residual(outcome, advice);
-  judge_competitors(alignment, frame, free_frame, outcome);
+  judge_competitors(alignment, met, free_frame, outcome);
   judge_revolution(alignment, outcome);
   if (frame == AlignmentFrame::kAuto && !free_frame) judge_turn(alignment, outcome);
 }

@@ -11,6 +11,7 @@
 #include "common/core/error.h"
 #include "common/core/input_file.h"
 #include "common/core/log.h"
+#include "common/mesh/geometry.h"
 #include "precompute/mesh_io/surface_file.h"
 #include "precompute/meshing/cage.h"
 
@@ -29,7 +30,7 @@ double rounded(double value) {
 }
 
 double assumed_modulus(const VertexArray& vertices, const std::filesystem::path& file) {
-  const double length = (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).maxCoeff();
+  const double length = longest_box_edge(vertices);
   const double modulus = kBorneHeights * kDensity * kGravity * length;
   if (!std::isnormal(modulus) || !std::isnormal(length * length * length))
     throw InputError(

@@ -11,23 +11,17 @@ namespace {
 
 constexpr double kGravity = 9.81;  // [m/s^2]
 
-/// Of the bounding box [m].
-double longest_edge(const TetMesh& mesh) {
-  return (mesh.vertices.colwise().maxCoeff() - mesh.vertices.colwise().minCoeff()).maxCoeff();
-}
-
 }  // namespace
 
 std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
-  const double length = longest_edge(mesh);
+  const double length = longest_box_edge(mesh.vertices);
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   const double density = materials.density.dot(volumes) / volumes.sum(),
                modulus = materials.youngs_modulus.dot(volumes) / volumes.sum();
   const double strain = density * kGravity * length / modulus;
   const std::string advice =
       "are its numbers millimetres or centimetres? Then say so by object.unit of the asset, \"mm\" or \"cm\" "
-      "(--write-asset "
-      "FILE writes the asset of a surface); they are read as metres, its material as kg/m^3 and Pa";
+      "(--write-asset FILE writes the asset of a surface); they are read as metres, its material as kg/m^3 and Pa";
   if (strain > 1)
     return fmt::format(
         "the object is {:.3g} m long and too soft to bear its own weight ({:.3g} kg/m^3 x 9.81 m/s^2 x "
@@ -38,7 +32,7 @@ std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
 }
 
 void require_numbers(const TetMesh& mesh, const TetMaterials& materials, const std::string& file) {
-  const double length = longest_edge(mesh);
+  const double length = longest_box_edge(mesh.vertices);
   const auto require = [&](const char* member, const Eigen::VectorXd& values, double factor, const char* product) {
     for (const double value : {values.minCoeff(), values.maxCoeff()}) {
       if (value * factor >= 1e-60 && value * factor <= 1e60) continue;

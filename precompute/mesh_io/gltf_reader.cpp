@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "common/mesh/geometry.h"
 #include "common/surface_io/mesh_arrays.h"
 #include "common/surface_io/surface_parts.h"
 #include "precompute/mesh_io/gltf_accessor.h"
@@ -293,7 +294,7 @@ void GltfReader::add_morphs(SurfaceFile& surface) {
   // Many exporters write the rest shape as a target, with the noise of its numbers.
   constexpr double kNoise = 1e-6;
   const auto& rest = surface.mesh.vertices;
-  const double size = (rest.colwise().maxCoeff() - rest.colwise().minCoeff()).maxCoeff();
+  const double size = longest_box_edge(rest);
   std::erase_if(surface.morphs, [&](const MorphTarget& morph) {
     if ((morph.positions - rest).cwiseAbs().maxCoeff() > kNoise * size) return false;
     surface.remarks.push_back(fmt::format("the morph target \"{}\" moves no vertex and is left out", morph.name));

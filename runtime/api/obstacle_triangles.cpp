@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <cinttypes>
 
 #include "exmat/exmat.h"
@@ -14,8 +13,8 @@ namespace {
 
 /// Null where the world has none of that number.
 const Obstacle* obstacle_of(const exmat_world& world, std::int64_t id) noexcept {
-  const auto found = std::ranges::lower_bound(world.obstacles, id, {}, &exmat_world::HostedObstacle::id);
-  return found != world.obstacles.end() && found->id == id ? found->obstacle.get() : nullptr;
+  const std::ptrdiff_t place = place_of_obstacle(world, id);
+  return place >= 0 ? world.obstacles[static_cast<std::size_t>(place)].obstacle.get() : nullptr;
 }
 
 std::int64_t count_of(const Shape& shape) noexcept {

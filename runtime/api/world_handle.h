@@ -50,6 +50,9 @@ namespace exmat::runtime {
 /// A body's place among the members of its world.
 int place_of(const exmat_body& body) noexcept;
 
+/// An obstacle's place among those of its world; -1 where there is none of that number.
+std::ptrdiff_t place_of_obstacle(const exmat_world& world, std::int64_t id) noexcept;
+
 /// Scratch that steps of the body are taken in, to be used between steps.
 inline Workspace& scratch_of(exmat_body& body) noexcept { return body.world->world.scratch(place_of(body)); }
 

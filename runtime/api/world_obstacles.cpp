@@ -169,18 +169,11 @@ MotionSample sample_of(const exmat_motion& motion) {
   return sample;
 }
 
-exmat_world::HostedObstacle* find_obstacle(exmat_world& world, std::int64_t id) noexcept {
-  const auto found = std::ranges::lower_bound(world.obstacles, id, {}, &exmat_world::HostedObstacle::id);
-  return found != world.obstacles.end() && found->id == id ? &*found : nullptr;
-}
-
-exmat_world::HostedObstacle& hosted_of(exmat_world& world, std::int64_t id) {
-  exmat_world::HostedObstacle* const found = find_obstacle(world, id);
-  if (found == nullptr) throw InvalidArgument(fmt::format("id = {}: the world has no such obstacle", id));
-  return *found;
-}
-const exmat_world::HostedObstacle& hosted_of(const exmat_world& world, std::int64_t id) {
-  return hosted_of(const_cast<exmat_world&>(world), id);
+/// The world may be const.
+auto& hosted_of(auto& world, std::int64_t id) {
+  const std::ptrdiff_t place = place_of_obstacle(world, id);
+  if (place < 0) throw InvalidArgument(fmt::format("id = {}: the world has no such obstacle", id));
+  return world.obstacles[static_cast<std::size_t>(place)];
 }
 
 /// Wakes the bodies that the obstacle may touch where it is now.
@@ -255,7 +248,7 @@ std::int64_t add_obstacle(const Obstacle& made, exmat_world& world) {
   return world.next_obstacle++;
 }
 
-/// What the contacts of a body did to an obstacle of its world; nothing, where it does not meet it.
+/// The load that a body's contacts put on an obstacle of its world; 0 if it does not meet it.
 ContactLoad load_on(const exmat_body& body, std::int64_t id) noexcept {
   const auto found = std::ranges::find(body.obstacle_ids, id);
   if (found == body.obstacle_ids.end()) return {};
@@ -272,6 +265,11 @@ Shape placed_shape(const exmat_shape& shape, const exmat_obstacle& obstacle) {
 }  // namespace
 
 namespace exmat::runtime {
+
+std::ptrdiff_t place_of_obstacle(const exmat_world& world, std::int64_t id) noexcept {
+  const auto found = std::ranges::lower_bound(world.obstacles, id, {}, &exmat_world::HostedObstacle::id);
+  return found != world.obstacles.end() && found->id == id ? found - world.obstacles.begin() : -1;
+}
 
 void meet_obstacles(exmat_body& body) {
   Obstacles obstacles;
