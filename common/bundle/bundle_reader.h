@@ -37,7 +37,7 @@ class BundleReader {
   ReducedModel read(const BundleRequest& request);
   /// Of the root.
   std::string text_attribute(const std::string& name) const;
-  /// Of another group.
+  /// Reads an attribute of another group.
   template <typename T>
   void read_attribute(std::string_view schema_path, std::string_view path, std::string_view name, T& member) {
     group(schema_path, path);

@@ -189,7 +189,7 @@ int run_program(CLI::App& app, int argc, char** argv, const std::function<void()
   } catch (const std::bad_alloc&) {
     std::fputs((app.get_name() + ": not enough memory\n").c_str(), stderr);
   } catch (const std::exception& error) {
-    // Where printing fails, the library names no file.
+    // The library names no file if printing fails.
     const bool printing = std::ferror(stdout) != 0 && dynamic_cast<const WorkError*>(&error) == nullptr;
     std::fputs(
         (app.get_name() + ": " + (printing ? "cannot write to standard output: " : "") + error.what() + "\n").c_str(),

@@ -10,9 +10,8 @@ namespace exmat {
 /// pipe, a device, unreadable, empty, or an output of the running command (common/core/command_files.h).
 std::string read_whole_file(const std::filesystem::path& file, const std::string& expected);
 
-/// The same of a file that is text, or begins with text: without a byte order mark, and with '\n' for line ends that
-/// are
-/// '\r' alone. Throws InputError where the text is UTF-16.
+/// Reads a file that is text, or begins with text, likewise: without a byte order mark, and with '\n' for line ends
+/// that are '\r' alone. Throws InputError where the text is UTF-16.
 std::string read_text_file(const std::filesystem::path& file, const std::string& expected);
 
 /// The file that begins with these bytes, for messages: "an HDF5 file"; empty where it is of no known kind.

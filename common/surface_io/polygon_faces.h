@@ -19,7 +19,7 @@ class PolygonFaces {
 
   /// Faces whose first corner sees all others, as convex ones, stay fans about it. Ears are cut off the others
   /// (Meisters 1975), in the plane of their Newell normal. All corners must be rows of `vertices`. Throws InputError
-  /// where such a face has too many corners.
+  /// if that takes too long, as of thousands of edges that cross.
   void cut_ears(const std::vector<std::array<double, 3>>& vertices, const std::filesystem::path& file);
 
  private:

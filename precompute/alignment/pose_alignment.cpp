@@ -289,8 +289,8 @@ double PoseAligner::limit(const std::vector<Fit>& poses) const {
   return std::max(kCompeting * least, least + kCompetingFloor);
 }
 
-// Of the poses that fit, the one nearest to rest, as it stands where the frame is not said; with landmarks, the one
-// that fits best.
+// Landmarks take the pose that fits best. Without, the one nearest to rest is taken of those that fit, as it stands if
+// the frame is not said.
 const Fit& PoseAligner::choose(const std::vector<Fit>& poses) const {
   if (has_landmarks()) return poses.front();
   const double most = limit(poses);

@@ -28,7 +28,7 @@ class GltfAccessors {
   Eigen::VectorXd read_scalars(int accessor) const;
   /// Of a SCALAR of unsigned integers; each is below `end`.
   std::vector<std::uint32_t> read_indices(int accessor, std::size_t end) const;
-  /// Whether it has no numbers of its own.
+  /// True if it has no numbers of its own.
   bool is_zeros(int accessor) const { return at(accessor).bufferView < 0 && !at(accessor).sparse.isSparse; }
   /// Whether it has one number a row.
   bool is_scalar(int accessor) const { return at(accessor).type == TINYGLTF_TYPE_SCALAR; }

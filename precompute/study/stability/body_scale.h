@@ -33,8 +33,8 @@ Eigen::VectorXd nearest_pose(const RowMatrix& basis, const VertexArray& field);
 /// Random coordinates, the same each time, that displace a vertex by `reach` [m].
 Eigen::VectorXd random_pose(const RowMatrix& basis, double reach);
 
-/// Of a free body about its centre of mass, world [kg m^2/s]: that of the motion itself, which the state's own variable
-/// only stands for.
+/// The angular momentum of a free body about its centre of mass, world [kg m^2/s]. It is computed of the motion itself;
+/// the state's own variable only stands for it.
 Eigen::Vector3d angular_momentum(const runtime::DeformingInertia& inertia, const runtime::State& state);
 
 }  // namespace exmat::precompute

@@ -263,8 +263,7 @@ std::string points_table(const StudyResult& result) {
   return "<h2>Points</h2>\n<p class=\"note\">Bold: on the front. Settled: mean of the last tenth of the time. Nearest "
          "phase: mean, against the full space up to 5 % of the duration earlier or later; where it is much below the "
          "mean, the body moves as it should, but too early or too late. Held-out: error of the cubature's force. "
-         "Newton: "
-         "iterations a step; the last column counts steps.</p>\n" +
+         "Newton: iterations a step; the last column counts steps.</p>\n" +
          to_html(table);
 }
 
