@@ -90,10 +90,15 @@ inline bool factor_serves(const NewtonSettings& settings, double before, double 
   return rate <= settings.chord_rate && std::log(now / limit) <= -settings.chord_steps * std::log(rate);
 }
 
+/// Adds that share of the largest diagonal entry to all of the diagonal.
+inline void shift_diagonal(double share, Eigen::MatrixXd& hessian) {
+  hessian.diagonal().array() += share * hessian.diagonal().cwiseAbs().maxCoeff();
+}
+
 namespace detail {
 
 inline constexpr int kShifts = 12;
-inline constexpr double kFirstShift = 1e-6;  // times the largest diagonal entry
+inline constexpr double kFirstShift = 1e-6;  // of shift_diagonal(); ten times as much each time
 
 /// A problem that keeps its Hessian itself.
 template <class Problem>
@@ -122,11 +127,13 @@ bool factorise(Problem& problem, NewtonWorkspace& workspace, NewtonReport& repor
 template <class Problem>
 bool factorise_shifted(Problem& problem, NewtonWorkspace& workspace, NewtonReport& report) {
   if (factorise(problem, workspace, report)) return true;
-  if constexpr (kFactorises<Problem>) return false;
-  double shift = kFirstShift * workspace.hessian.diagonal().cwiseAbs().maxCoeff();
-  for (int attempt = 0; attempt < kShifts; ++attempt, shift *= 10) {
-    workspace.hessian.diagonal().array() += shift;
-    if (factorise(workspace, report)) return true;
+  double share = kFirstShift;
+  for (int attempt = 0; attempt < kShifts; ++attempt, share *= 10) {
+    if constexpr (kFactorises<Problem>)
+      problem.shift(share);
+    else
+      shift_diagonal(share, workspace.hessian);
+    if (factorise(problem, workspace, report)) return true;
   }
   return false;
 }
@@ -195,10 +202,11 @@ double solve_direction(Problem& problem, NewtonWorkspace& workspace, bool gyrosc
 ///   const MatrixXd* gyroscopic()                         optional: antisymmetric part of the Jacobian of the gradient
 ///                                                        of forces without a potential, or null where it is weak
 ///   int gyroscopic_terms(); VectorXd gyroscopic_product(x)   optional: how often a weak one is applied, its product
-///   bool factorise(); void solve(Map<VectorXd>& x)       optional: of a problem that keeps its Hessian itself, the
-///                                                        matrix handed to it is empty then; false where it is not
-///                                                        positive definite. x from the right-hand side, which
-///                                                        descends wherever that is minus the gradient
+///   bool factorise(); void shift(double share);          optional: of a problem that keeps its Hessian itself, the
+///   void solve(Map<VectorXd>& x)                         matrix handed to it is empty then; false where it is not
+///                                                        positive definite, shift() then adds that share of its
+///                                                        diagonal. x from the right-hand side, which descends
+///                                                        wherever that is minus the gradient
 ///   bool kSeeksLowest                                    optional constant: lengths are halved for as long as the
 ///                                                        potential falls, beyond the first that is low enough
 /// A hessian() of projected tangents may change what the problem keeps frozen; the gradient is then evaluated anew.

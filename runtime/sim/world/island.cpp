@@ -179,6 +179,10 @@ bool IslandProblem::factorise() noexcept {
                      [](const PotentialValue& positive) { return positive.value > 0; });
 }
 
+void IslandProblem::shift(double share) noexcept {
+  for (WorldBody* const own : bodies_) shift_diagonal(share, own->near().newton.hessian);
+}
+
 void IslandProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
   if (!is_dense_) return solve_by_gradients(x);
   std::copy(x.begin(), x.end(), workspace_.right_side.data());

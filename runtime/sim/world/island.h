@@ -49,6 +49,7 @@ class IslandProblem {
   void accept(PotentialEvaluation& evaluation) noexcept;
 
   bool factorise() noexcept;
+  void shift(double share) noexcept;  ///< the Hessians of the bodies, each by its own diagonal
   void solve(Eigen::Map<Eigen::VectorXd>& x) noexcept;
 
   int conjugate_gradients() const noexcept { return conjugate_gradients_; }  ///< iterations so far

@@ -63,6 +63,33 @@ NewtonReport minimise(Problem problem, double& at, const NewtonPolicy& policy = 
   return report;
 }
 
+/// Keeps its Hessian itself, which projected tangents leave indefinite, as those of an island may be.
+struct Indefinite : Function {
+  double kept = 0, factor = 0;
+  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {
+    return Function::evaluate(x, gradient);
+  }
+  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& second) {
+    hessian(x, Tangent::kExact, second);
+    return evaluate(x, gradient);
+  }
+  void hessian(const Eigen::VectorXd& x, Tangent /*tangent*/, Eigen::MatrixXd& /*second*/) {
+    kept = curvature_of(x[0]);
+  }
+  bool factorise() {
+    factor = kept;
+    return factor > 0;
+  }
+  void shift(double share) { kept += share; }
+  void solve(Eigen::Map<Eigen::VectorXd>& x) { x /= factor; }
+};
+
+TEST(Newton, ShiftsTheHessianThatAProblemKeepsItself) {
+  double x = 0.1;
+  EXPECT_EQ(minimise(Indefinite{two_wells()}, x).status, NewtonStatus::kConverged);
+  EXPECT_NEAR(std::abs(x), 1, 1e-6);
+}
+
 TEST(Newton, LineSearchStopsFullStepsFromDiverging) {
   double x = 2;
   EXPECT_EQ(minimise(rounded_cone(), x).status, NewtonStatus::kConverged);
