@@ -283,34 +283,30 @@ void stay(std::span<WorldBody* const> bodies, Eigen::VectorXd& x) noexcept {
   for (WorldBody* const own : bodies) stay(*own, x.segment(own->offset, own->unknowns()));
 }
 
-/// Whether bodies go so far in a step that they would be deep in each other.
-bool are_fast(std::span<WorldBody* const> bodies) noexcept {
-  return std::ranges::any_of(bodies, [](const WorldBody* own) {
-    const double speed = own->model.frame->velocity(own->state.frame).linear.norm();
-    return own->scene.time_step * speed > kFast * own->surface.bound(own->state.q).radius;
-  });
+/// True if the potential is higher at workspace.x than where the bodies stand. The bodies are at workspace.x then.
+bool is_above_start(IslandProblem& problem, std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noexcept {
+  workspace.trial = workspace.x;
+  stay(bodies, workspace.trial);
+  const PotentialValue start = problem.value(workspace.trial);
+  return problem.value(workspace.x).value > start.value + kNearRounding * start.magnitude;
 }
 
-/// From where the bodies would go without each other. Where that leads nowhere, or to a minimum that is none of theirs,
-/// as between bodies that would be deep in each other, from where they are: there the potential is the energy that they
-/// have, and no minimum below has more.
+/// Minimises from where the bodies would go without each other. If that leads nowhere, or to a minimum that lies above
+/// where they stand, as between bodies that would be deep in each other, from where they stand: there the potential is
+/// the energy that they have. A solution that is still above that is none.
 NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                           std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
   IslandProblem problem(bodies, pairs, incidences, threads, workspace);
   for (const WorldBody* const own : bodies) workspace.x.segment(own->offset, own->unknowns()) = own->near().x;
   NewtonReport total = minimise(problem, bodies, pairs, threads, workspace);
   bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated;
-  if (total.status == NewtonStatus::kConverged && are_fast(bodies)) {
-    const double end = problem.value(workspace.x).value;
-    workspace.trial = workspace.x;
-    stay(bodies, workspace.trial);
-    again = problem.value(workspace.trial).value < end;
-    problem.value(workspace.x);  // the bodies are there
-  }
+  if (total.status == NewtonStatus::kConverged) again = is_above_start(problem, bodies, workspace);
   if (again) {
     stay(bodies, workspace.x);
     for (WorldBody* const own : bodies) own->step->potential().start(own->state.q);
     add(minimise(problem, bodies, pairs, threads, workspace), total);
+    if (total.status == NewtonStatus::kConverged && is_above_start(problem, bodies, workspace))
+      total.status = NewtonStatus::kStagnated;
   }
   for (WorldBody* const own : bodies) own->near().x = workspace.x.segment(own->offset, own->unknowns());
   return total;
