@@ -245,7 +245,7 @@ exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* re
   if (result == nullptr) return null_argument(__func__, "energies");
   if (const exmat_status status = check_size(__func__, result->size, kEnergiesSizes)) return status;
   const Energies now = energies(body->model(), body->scene, body->state);
-  give(exmat_energies{0, now.kinetic, now.elastic, now.potential}, result->size, result);
+  give(exmat_energies{0, now.kinetic, now.elastic, now.potential, now.contact}, result->size, result);
   return EXMAT_OK;
 }
 

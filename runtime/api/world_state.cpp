@@ -12,11 +12,11 @@ using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 // The state of a world: how many bodies; of each its number of numbers, whether it is anew, and these; how many pairs;
-// of each its bodies, how many vertices of either touch, and nine numbers for each.
+// of each its bodies, how many vertices of either touch, its energy and account, and nine numbers for each vertex.
 
 namespace {
 
-constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 4, kContactNumbers = 9;
+constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 6, kContactNumbers = 9;
 
 std::size_t size_of(const exmat_world& world) {
   std::size_t size = kHeadNumbers;
@@ -27,8 +27,9 @@ std::size_t size_of(const exmat_world& world) {
 }
 
 void write_contacts(const HeldPair& pair, std::vector<double>& numbers) {
-  for (const auto number : {static_cast<double>(pair.first), static_cast<double>(pair.second),
-                            static_cast<double>(pair.held[0].size()), static_cast<double>(pair.held[1].size())})
+  for (const auto number :
+       {static_cast<double>(pair.first), static_cast<double>(pair.second), static_cast<double>(pair.held[0].size()),
+        static_cast<double>(pair.held[1].size()), pair.energy, pair.account})
     numbers.push_back(number);
   for (const auto& side : pair.held)
     for (const HeldBodyContact& held : side) {
@@ -77,6 +78,9 @@ std::vector<HeldPair> read_pairs(StateNumbers& reader, const exmat_world& world)
     pair.second = static_cast<int>(second);
     const std::size_t of_first = reader.count("contacts", reader.left()),
                       of_second = reader.count("contacts", reader.left());
+    pair.energy = reader.number();
+    pair.account = reader.number();
+    if (pair.energy < 0 || pair.account < 0) throw InvalidArgument("numbers: expected energies of a pair >= 0");
     pair.held[0] = read_contacts(reader, of_first, *world.members[first].body);
     pair.held[1] = read_contacts(reader, of_second, *world.members[second].body);
   }

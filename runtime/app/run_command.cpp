@@ -59,6 +59,7 @@ void print_summary(const RunSummary& summary, const LoadedWorld& loaded, const W
   print("elastic energy", fmt::format("{:.6g} J", summary.end.elastic));
   print("potential energy", fmt::format("{:.6g} J", summary.end.potential));
   if (touches) {
+    print("contact energy", fmt::format("{:.6g} J", summary.end.contact));
     print("energy at the start", fmt::format("{:.6g} J", summary.start.total()));
     print("deepest contact", fmt::format("{:.3g} m between bodies at the end", summary.deepest));
   }

@@ -40,12 +40,13 @@ void bind_energies(py::module_& module) {
       .def_readonly("kinetic", &exmat_energies::kinetic, "Of the body in the world [J].")
       .def_readonly("elastic", &exmat_energies::elastic, "[J].")
       .def_readonly("potential", &exmat_energies::potential, "Of gravity, 0 at rest [J].")
+      .def_readonly("contact", &exmat_energies::contact, "Of a world: the springs between its bodies [J].")
       .def_property_readonly(
-          "total", [](const exmat_energies& now) { return now.kinetic + now.elastic + now.potential; },
+          "total", [](const exmat_energies& now) { return now.kinetic + now.elastic + now.potential + now.contact; },
           "Their sum [J].")
       .def("__repr__", [](const exmat_energies& now) {
-        return py::str("Energies(kinetic={:.6g}, elastic={:.6g}, potential={:.6g})")
-            .format(now.kinetic, now.elastic, now.potential);
+        return py::str("Energies(kinetic={:.6g}, elastic={:.6g}, potential={:.6g}, contact={:.6g})")
+            .format(now.kinetic, now.elastic, now.potential, now.contact);
       });
 }
 

@@ -1,6 +1,8 @@
 #include "runtime/scene/state_file.h"
 
+#include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <utility>
@@ -27,7 +29,8 @@ std::string name_of_version(int version) {
 }
 
 OrderedJson to_json(const HeldPair& pair) {
-  OrderedJson json{{"first", pair.first}, {"second", pair.second}};
+  OrderedJson json{{"first", pair.first}, {"second", pair.second}, {"energy", pair.energy}};
+  if (std::isfinite(pair.account)) json["account"] = pair.account;
   for (const auto& [name, side] : {std::pair{"first_vertices", 0}, std::pair{"second_vertices", 1}}) {
     json[name] = OrderedJson::array();
     for (const HeldBodyContact& held : pair.held[static_cast<std::size_t>(side)])
@@ -87,6 +90,8 @@ class Reader {
     if (!memory.held.empty() &&
         std::pair(memory.held.back().first, memory.held.back().second) >= std::pair(pair.first, pair.second))
       refuse(place, "pairs in ascending order, each once", fmt::format("{} and {}", pair.first, pair.second));
+    pair.energy = from.value("energy", 0.0);
+    pair.account = from.value("account", std::numeric_limits<double>::infinity());
     read_side(from["first_vertices"], place + "/first_vertices", pair.first, pair.held[0]);
     read_side(from["second_vertices"], place + "/second_vertices", pair.second, pair.held[1]);
     memory.held.push_back(std::move(pair));

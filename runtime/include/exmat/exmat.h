@@ -265,6 +265,7 @@ typedef struct exmat_energies {
   double kinetic;   /* of the body in the world [J] */
   double elastic;   /* [J] */
   double potential; /* of gravity, 0 at rest [J] */
+  double contact;   /* of a world: the springs of the contacts between its bodies [J] */
 } exmat_energies;
 EXMAT_API exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* energies) EXMAT_NOEXCEPT;
 

@@ -34,7 +34,7 @@ void follow_frame(const Model& model, const StepScene& scene, State& state, Work
 
 Energies energies(const Model& model, const StepScene& scene, const State& state) noexcept {
   return {model.frame->kinetic_energy(state.v, state.frame), state.elastic_energy,
-          -scene.gravity_force.dot(state.q) + model.frame->potential_energy(scene.gravity, state.frame)};
+          -scene.gravity_force.dot(state.q) + model.frame->potential_energy(scene.gravity, state.frame), 0};
 }
 
 }  // namespace exmat::runtime

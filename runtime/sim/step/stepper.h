@@ -30,8 +30,9 @@ struct Energies {
   double kinetic = 0;    ///< of the body in the world [J]
   double elastic = 0;    ///< E(q) [J]
   double potential = 0;  ///< of gravity, 0 at rest [J]
+  double contact = 0;    ///< of a world: the springs of the contacts between its bodies [J]
 
-  double total() const { return kinetic + elastic + potential; }
+  double total() const { return kinetic + elastic + potential + contact; }
 };
 Energies energies(const Model& model, const StepScene& scene, const State& state) noexcept;
 

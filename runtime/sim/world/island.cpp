@@ -8,7 +8,6 @@
 #include "runtime/sim/step/sleep.h"
 #include "runtime/sim/step/stepper.h"
 #include "runtime/sim/world/for_all.h"
-#include "runtime/sim/world/island_momenta.h"
 
 namespace exmat::runtime {
 namespace {
@@ -16,6 +15,7 @@ namespace {
 constexpr Eigen::Index kDenseUnknowns = 160;  // a factorisation of more takes longer than conjugate gradients
 constexpr double kSolutionError = 1e-3;       // of conjugate gradients, in the norm of the preconditioner
 constexpr int kMostGradients = 400;
+constexpr double kGain = 1e-12;  // of the kinetic energy: rounding
 
 }  // namespace
 
@@ -312,34 +312,84 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
   return total;
 }
 
-double kinetic_and_total(std::span<WorldBody* const> bodies, double& total) noexcept {
-  double kinetic = 0;
-  total = 0;
+/// Kinetic, elastic and potential energy of bodies together [J].
+struct IslandEnergy {
+  double kinetic = 0, total = 0;
+};
+
+IslandEnergy energy_of(std::span<WorldBody* const> bodies) noexcept {
+  IslandEnergy sum;
   for (const WorldBody* const own : bodies) {
     const Energies energy = energies(own->model, own->scene, own->state);
-    kinetic += energy.kinetic;
-    total += energy.total();
+    sum.kinetic += energy.kinetic;
+    sum.total += energy.total();
   }
-  return kinetic;
+  return sum;
 }
 
-/// After the step of an island that did not converge: its bodies have the momenta that they have to have, if nothing
-/// else touches them, and together no more energy than `before` [J].
-void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
-                  const std::optional<IslandBegin>& begin, double before) {
-  double now = 0;
-  const double kinetic = kinetic_and_total(bodies, now);
-  if (begin) {
-    if (!take_momenta(bodies, *begin, before - (now - kinetic))) return;
+/// Energy of an island where a step begins [J].
+struct IslandStart {
+  IslandEnergy bodies;
+  double springs = 0;   ///< of all contacts between them
+  double accounts = 0;  ///< the most that these may ever give back
+};
+
+IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
+  IslandStart start{energy_of(bodies)};
+  for (PairContact* const pair : pairs) {
+    pair->begin_account(bodies[static_cast<std::size_t>(pair->body(0))]->anew ||
+                        bodies[static_cast<std::size_t>(pair->body(1))]->anew);
+    start.springs += pair->start_energy();
+    start.accounts += pair->account();
+  }
+  return start;
+}
+
+/// True if nothing but gravity and what they do to each other changes the energy of the bodies.
+bool is_isolated(std::span<WorldBody* const> bodies, const IslandBegin& begin) noexcept {
+  return begin.is_alone && std::ranges::none_of(bodies, [](const WorldBody* own) {
+           const FreeState& free = free_state(own->state);
+           return runs_examples(own->scene) || !own->scene.forces.empty() || !own->state.applied_force.isZero(0) ||
+                  !free.applied_force.isZero(0) || !free.applied_torque.isZero(0);
+         });
+}
+
+/// After a step that did not converge, or that ends with more energy than there is: the bodies have the momenta that
+/// they have to have, if nothing else touches them, and together no more energy than `allowed` [J].
+void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs, const IslandBegin& begin,
+                  double allowed) noexcept {
+  const IslandEnergy now = energy_of(bodies);
+  if (begin.is_alone) {
+    if (!take_momenta(bodies, begin, allowed - (now.total - now.kinetic))) return;
     for (PairContact* const pair : pairs)  // what they remember is of where the bodies are
       pair->evaluate(*bodies[static_cast<std::size_t>(pair->body(0))],
                      *bodies[static_cast<std::size_t>(pair->body(1))]);
     return;
   }
-  if (!(now > before) || !(kinetic > 0)) return;
-  const double share = std::max(0.0, 1 - (now - before) / kinetic);
+  if (!(now.total > allowed) || !(now.kinetic > 0)) return;
+  const double share = std::max(0.0, 1 - (now.total - allowed) / now.kinetic);
   for (WorldBody* const own : bodies)
     own->step->limit_kinetic_energy(share * own->model.frame->kinetic_energy(own->state.v, own->state.frame));
+}
+
+/// What the step has done to the accounts of the pairs. `closed`: they never gain more together than the bodies have
+/// lost, as where nothing else acts.
+void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs, const IslandStart& start,
+                  bool closed, bool converged) noexcept {
+  double sum = 0;
+  for (PairContact* const pair : pairs) {
+    const WorldBody &first = *bodies[static_cast<std::size_t>(pair->body(0))],
+                    &second = *bodies[static_cast<std::size_t>(pair->body(1))];
+    const auto changed = [](const WorldBody& body) -> Eigen::Vector3d {
+      return body.model.frame->velocity(body.state.frame).linear - body.start_velocity;
+    };
+    pair->end_account(first, second, changed(first) - changed(second), converged);
+    sum += pair->account();
+  }
+  if (!closed) return;
+  const double most = std::max(0.0, start.accounts + start.bodies.total - energy_of(bodies).total);
+  if (sum > most)
+    for (PairContact* const pair : pairs) pair->scale_account(most / sum);
 }
 
 }  // namespace
@@ -348,6 +398,7 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
                          std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
   for_all(bodies.size(), threads, [&](std::size_t i) {
     WorldBody& own = *bodies[i];
+    own.start_velocity = own.model.frame->velocity(own.state.frame).linear;
     own.step.emplace(own.model, own.scene, own.state, own.workspace);
     own.step->begin(/*touches_others=*/true);
     if (own.step->prepare()) {
@@ -357,14 +408,11 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
     }
     own.problem.emplace(own.model, own.state, own.step->potential(), own.workspace);
   });
-  const NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
+  const IslandStart start = start_accounts(bodies, pairs);
+  NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
   const bool converged = newton.status == NewtonStatus::kConverged;
-  std::optional<IslandBegin> begin;
-  double energy = 0;
-  if (!converged) {
-    begin = begin_of(bodies);
-    kinetic_and_total(bodies, energy);
-  }
+  begin_of(bodies, workspace.begin);
+  const bool isolated = is_isolated(bodies, workspace.begin);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
     Eigen::Vector3d torque = own.near().contact.torque;
@@ -381,10 +429,19 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   }
   for (WorldBody* const own : bodies) own->step->take(newton);
   const auto is_finite = [](const WorldBody* own) { return (own->step->report().status & kStepNonFinite) == 0; };
-  if (!converged && std::ranges::all_of(bodies, is_finite)) limit_energy(bodies, pairs, begin, energy);
+  if (std::ranges::all_of(bodies, is_finite)) {
+    const double allowed = start.bodies.total + (converged ? start.accounts : start.springs);
+    const bool gains = isolated && energy_of(bodies).total > allowed + kGain * start.bodies.kinetic;
+    if (!converged || gains) limit_energy(bodies, pairs, workspace.begin, allowed);
+    if (gains) newton.status = NewtonStatus::kStagnated;
+    end_accounts(bodies, pairs, start, isolated || !converged, converged && !gains);
+  } else {
+    for (PairContact* const pair : pairs) pair->abandon();
+  }
   bool rest = true;
   for (WorldBody* const own : bodies) {
     own->report = own->step->report();
+    if (newton.status == NewtonStatus::kStagnated) own->report.status |= kStepStagnated;
     rest = rests(own->model, own->scene, own->report, own->state) && rest;
   }
   if (rest)

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "runtime/sim/solver/newton.h"
+#include "runtime/sim/world/island_momenta.h"
 #include "runtime/sim/world/pair_contact.h"
 
 namespace exmat::runtime {
@@ -17,6 +18,7 @@ struct IslandWorkspace {
   std::vector<PotentialEvaluation> evaluations;  ///< of each body
   std::vector<PotentialValue> values;            ///< of each body, then of each pair
   std::vector<Eigen::VectorXd> unknowns;         ///< of each body
+  IslandBegin begin;
 
   // Linear solutions.
   Eigen::MatrixXd dense;  ///< all unknowns of a small island, lower triangle

@@ -81,19 +81,24 @@ void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin
 
 }  // namespace
 
-std::optional<IslandBegin> begin_of(std::span<WorldBody* const> bodies) {
-  IslandBegin begin{{position_of(*bodies.front()), {}}, {}};
+void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin) {
+  begin.momenta = {position_of(*bodies.front()), {}};
+  begin.bodies.resize(bodies.size());
+  begin.is_alone = false;
   FrameMomenta& sum = begin.momenta.total;
-  for (const WorldBody* const own : bodies) {
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    const WorldBody* const own = bodies[i];
     const BodyFrame& frame = *own->model.frame;
     const std::optional<FrameMomenta> momenta = frame.expected_momenta(own->workspace.frame);
-    if (!momenta || own->near().contact.candidate_count > 0) return std::nullopt;
+    if (!momenta || own->near().contact.candidate_count > 0) return;
     // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
     sum.linear += momenta->linear;
     sum.angular += momenta->angular + (position_of(*own) - begin.momenta.about).cross(momenta->linear);
-    begin.bodies.push_back({frame.motion(own->state.frame), own->state.q, own->state.elastic_energy});
+    begin.bodies[i].motion = frame.motion(own->state.frame);
+    begin.bodies[i].q = own->state.q;
+    begin.bodies[i].elastic_energy = own->state.elastic_energy;
   }
-  return begin;
+  begin.is_alone = true;
 }
 
 bool take_momenta(std::span<WorldBody* const> bodies, const IslandBegin& begin, double allowed) {

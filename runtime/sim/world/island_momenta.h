@@ -1,6 +1,5 @@
 #pragma once
 
-#include <optional>
 #include <span>
 #include <vector>
 
@@ -27,11 +26,12 @@ struct BodyBegin {
 struct IslandBegin {
   IslandMomenta momenta;  ///< as external forces alone change them in the step
   std::vector<BodyBegin> bodies;
+  bool is_alone = false;  ///< there is nothing else; else the rest is of no meaning
 };
 
-/// After start_contact() of each, before the end of the step. Nothing where something else takes part: an obstacle that
-/// is near, or a body that momenta do not move.
-std::optional<IslandBegin> begin_of(std::span<WorldBody* const> bodies);
+/// After start_contact() of each, before the end of the step. They are not alone where something else takes part: an
+/// obstacle that is near, or a body that momenta do not move.
+void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin);
 
 /// After a step of theirs that did not converge, whose motion does not add up to what they have to have: gives them
 /// their momenta by a rigid motion of all together, then takes out motion against each other until they have no more

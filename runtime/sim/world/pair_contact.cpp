@@ -1,6 +1,8 @@
 #include "runtime/sim/world/pair_contact.h"
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
 
 #include "runtime/sim/step/contact_step.h"
 
@@ -11,6 +13,10 @@ namespace {
 TouchingBody touching(const WorldBody& body) {
   return {body.contact(), *body.touching, pose_of(body.model, body.state),
           BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
+}
+
+double energy_of_spring(const ContactCandidate& candidate, double depth) {
+  return depth > 0 ? 0.5 * candidate.stiffness * depth * depth : 0;
 }
 
 /// Columns about world axes become those of the unknowns.
@@ -28,7 +34,8 @@ void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index u
 void PairContact::reset(int first, int second, const HeldPair* held) {
   bodies_ = {first, second};
   held_ = held;
-  has_first_ = false;
+  has_first_ = is_abandoned_ = false;
+  account_ = start_energy_ = 0;
   for (BodyCandidates& candidates : candidates_) candidates.all.clear();
 }
 
@@ -43,6 +50,53 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     contact.gather_own(touching(own), search, candidates_[at]);
   else
     contact.gather(touching(own), touching(other), search, candidates_[at]);
+}
+
+void PairContact::begin_account(bool starts) noexcept {
+  const auto depth_of = [](const BodyCandidate& candidate) {
+    return std::max(0.0, -candidate.normal.dot(candidate.carried));
+  };
+  double energy = 0;
+  for (const BodyCandidates& candidates : candidates_)
+    for (const BodyCandidate& candidate : candidates.all) energy += energy_of_spring(candidate, depth_of(candidate));
+  const bool is_known = held_ != nullptr && std::isfinite(held_->account);
+  account_ = is_known ? held_->account : starts || held_ != nullptr ? energy : 0;
+  start_energy_ = std::min(energy, account_);
+  if (energy <= account_) return;
+  for (BodyCandidates& candidates : candidates_)
+    for (BodyCandidate& candidate : candidates.all)
+      if (depth_of(candidate) > 0) candidate.stiffness *= account_ / energy;
+}
+
+/// What contacts lose is theirs to give back: of springs, by friction and damping, and what backward Euler takes from
+/// the motion of the two against each other, 1/2 dt F . (u_1 - u_0).
+void PairContact::end_account(const WorldBody& first, const WorldBody& second, const Eigen::Vector3d& parted,
+                              bool converged) noexcept {
+  double given = 0;
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();  // on the first
+  for (std::size_t at = 0; at < 2; ++at) {
+    const WorldBody& own = at == 0 ? first : second;
+    const WorldBody& other = at == 0 ? second : first;
+    for (const BodyCandidate& candidate : candidates_[at].all) {
+      if (!candidate.is_loaded()) continue;
+      const Eigen::Vector3d place =
+          own.placement.position + candidate.arm - other.placement.position - candidate.surface_arm;
+      given += candidate.force.dot(place - candidate.carried);
+      force += (at == 0 ? 1 : -1) * candidate.force;
+    }
+  }
+  if (converged)
+    account_ += 0.5 * first.scene.time_step * force.dot(parted) - given;
+  else
+    account_ += spring_energy() - start_energy_;
+  account_ = std::max(0.0, account_);
+}
+
+double PairContact::spring_energy() const noexcept {
+  double sum = 0;
+  for (const BodyCandidates& candidates : candidates_)
+    for (const BodyCandidate& candidate : candidates.all) sum += energy_of_spring(candidate, -candidate.gap);
+  return sum;
 }
 
 double PairContact::way_since_first(const WorldBody& first, const WorldBody& second) const noexcept {
@@ -137,6 +191,12 @@ void PairContact::read_touches(int side, const WorldBody& own, int number, int o
 }
 
 void PairContact::commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const {
+  if (is_abandoned_) {
+    held = held_ != nullptr ? *held_ : HeldPair();
+    return;
+  }
+  held.energy = std::min(spring_energy(), account_);
+  held.account = account_;
   const BodyContact contact(half_);
   contact.commit(first.pose(), second.pose(), candidates_[0], held.held[0]);
   contact.commit(second.pose(), first.pose(), candidates_[1], held.held[1]);

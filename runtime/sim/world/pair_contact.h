@@ -13,6 +13,8 @@ namespace exmat::runtime {
 struct HeldPair {
   int first = 0, second = 0;                           ///< bodies, first < second
   std::array<std::vector<HeldBodyContact>, 2> held{};  ///< the first's vertices, the second's vertices
+  double energy = 0;   ///< of the springs of all contacts at the end of the last step [J]
+  double account = 0;  ///< the most that they may hold where the next step begins [J]; not finite: what they do hold
 };
 
 /// A vertex of one body that touched the surface of another, or of its own, at the end of a step.
@@ -27,6 +29,11 @@ struct BodyTouch {
 
 /// Two bodies that may touch in a step, or a body that may touch itself: each one's vertices against the other's
 /// surface, with half of the law.
+///
+/// A pair keeps an account of its energy: what its contacts took from the bodies and have not given back. Where a step
+/// begins vertices come in and normals turn, so that springs would hold what nobody put into them: those that push are
+/// softened for the step until they hold no more than the account. What overlaps at the start is where it begins from.
+/// docs/step_in_detail.md, "Energy of contacts".
 class PairContact {
  public:
   /// Of other bodies than before.
@@ -48,6 +55,21 @@ class PairContact {
 
   /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
   void gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin);
+
+  /// After gather() of both sides: the account, by which springs are softened. `starts`: what overlaps is new and
+  /// counts.
+  void begin_account(bool starts) noexcept;
+  /// After the step, evaluated at its end: what it has done to the account; `parted` is the velocity of the first's
+  /// centre of mass against the second's, less what it was where the step began [m/s]. `converged`: the bodies go as
+  /// the forces say.
+  void end_account(const WorldBody& first, const WorldBody& second, const Eigen::Vector3d& parted,
+                   bool converged) noexcept;
+  void scale_account(double share) noexcept { account_ *= share; }
+  double account() const noexcept { return account_; }            ///< [J]
+  double start_energy() const noexcept { return start_energy_; }  ///< of the springs where the step begins [J]
+  double spring_energy() const noexcept;                          ///< at the last evaluation [J]
+  /// The step was not taken: the pair remembers what it did before.
+  void abandon() noexcept { is_abandoned_ = true; }
 
   // At the iterates of the bodies.
 
@@ -86,6 +108,8 @@ class PairContact {
   std::array<int, 2> bodies_{};
   const HeldPair* held_ = nullptr;
   ContactLaw half_;
+  double account_ = 0, start_energy_ = 0;
+  bool is_abandoned_ = false;
   bool has_first_ = false;  // evaluation; where the bodies were in it
   std::array<Placement, 2> first_{};
   std::array<Eigen::VectorXd, 2> first_q_;

@@ -417,6 +417,7 @@ Energies World::energies() const {
     sum.elastic += own.elastic;
     sum.potential += own.potential;
   }
+  for (const HeldPair& pair : held_) sum.contact += pair.energy;
   return sum;
 }
 

@@ -81,7 +81,7 @@ class World {
   /// Times the stages of steps, if set; kOther stays what it is.
   void set_profile(WorldProfile* profile) noexcept { profile_ = profile; }
 
-  /// Kinetic, elastic and potential energy of all bodies [J].
+  /// Kinetic, elastic and potential energy of all bodies, and that of the contacts between them [J].
   Energies energies() const;
 
  private:

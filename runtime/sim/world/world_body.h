@@ -41,8 +41,9 @@ struct WorldBody {
   // Of one step.
   std::optional<BodyStep> step;
   std::optional<ContactProblem> problem;
-  Placement placement;      ///< at the iterate
-  Eigen::Index offset = 0;  ///< of its unknowns in those of its island
+  Eigen::Vector3d start_velocity = Eigen::Vector3d::Zero();  ///< of the centre of mass, where the step begins [m/s]
+  Placement placement;                                       ///< at the iterate
+  Eigen::Index offset = 0;                                   ///< of its unknowns in those of its island
 
   ContactProblemWorkspace& near() noexcept { return *workspace.near; }
   const ContactProblemWorkspace& near() const noexcept { return *workspace.near; }

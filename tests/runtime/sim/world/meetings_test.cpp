@@ -1,0 +1,86 @@
+#include "tests/runtime/sim/world/meetings.h"
+
+#include <gtest/gtest.h>
+
+namespace exmat::runtime {
+namespace {
+
+using test::Meeting;
+
+constexpr double kGain = 1e-6;  // BDF2 in free flight and the residuals of Newton's method
+
+std::string name_of(const Meeting& meeting) {
+  return fmt::format("E {:g} Pa, {:g} m/s, {:g} N/m^3, {:g} s, damped {}, body {}, start {}", meeting.youngs_modulus,
+                     meeting.speed, meeting.stiffness, meeting.time_step, meeting.damped, meeting.bodies,
+                     meeting.start);
+}
+
+void expect_no_gain(const Meeting& meeting) {
+  SCOPED_TRACE(name_of(meeting));
+  const test::MeetingResult result = test::meet(test::meeting_blocks(meeting), meeting);
+  EXPECT_LE(result.peak, 1 + kGain);
+  EXPECT_EQ(result.non_finite, 0);
+  EXPECT_LE(result.drift, 1e-9);
+}
+
+// The driver exmat-meetings takes all of them.
+TEST(Meetings, NoneGainsEnergyOrEnds) {
+  for (const Meeting& meeting : test::some_meetings(60, 20261127)) expect_no_gain(meeting);
+}
+
+// Before contacts had an account these ended with up to ten million times their energy.
+TEST(Meetings, NoneOfThoseThatGainedDoes) {
+  for (const Meeting& meeting : {Meeting{1e3, 20, 1e9, 1.0 / 60, false, 1, 1},
+                                 {1e3, 2, 1e8, 1.0 / 60, false, 0, 1},
+                                 {1e4, 5, 1e9, 1.0 / 60, false, 1, 2},
+                                 {1e4, 50, 1e8, 1.0 / 60, false, 1, 1},
+                                 {1e3, 50, 1e9, 1.0 / 60, true, 1, 1}})
+    for (const double share : {1.0, 0.25}) {
+      Meeting finer = meeting;
+      finer.time_step *= share;
+      expect_no_gain(finer);
+    }
+}
+
+TEST(Meetings, GoOnFromTheirMemoryToTheLastBit) {
+  const Meeting meeting{1e4, 5, 1e9, 1.0 / 60, true, 1, 2};
+  const test::Blocks blocks = test::meeting_blocks(meeting);
+  World world = test::meeting_world(blocks, meeting);
+  for (int i = 0; i < 8; ++i) world.step(1);
+  ASSERT_EQ(world.held().size(), 1U);
+  EXPECT_GT(world.held().front().account, 0);
+  std::vector<WorldBodyStart> bodies{blocks.body({0, 0, 0}), blocks.body({0, 0, 0})};
+  for (int i = 0; i < 2; ++i) bodies[static_cast<std::size_t>(i)].state = world.state(i);
+  World other(std::move(bodies), test::law_of(meeting));
+  other.set_memory(world.held(), {false, false});
+  EXPECT_EQ(other.energies().total(), world.energies().total());
+  for (int i = 0; i < 20; ++i) {
+    world.step(1);
+    other.step(1);
+  }
+  for (int i = 0; i < 2; ++i) {
+    EXPECT_EQ(world.state(i).q, other.state(i).q);
+    EXPECT_EQ(free_state(world.state(i)).position, free_state(other.state(i)).position);
+  }
+}
+
+// Soft bodies that fall upon each other and upon the floor, where obstacles and gravity act, too.
+TEST(Meetings, APileOfSoftBodiesGainsNoEnergy) {
+  for (const double stiffness : {1e7, 1e9}) {
+    test::Blocks blocks = test::meeting_blocks({3e3, 0, stiffness, 1.0 / 60, false, 1, 0});
+    blocks.set_gravity(9.81);
+    blocks.add_floor(1e7, 0.3, 1e4);
+    std::vector<WorldBodyStart> bodies;
+    for (int i = 0; i < 5; ++i)
+      bodies.push_back(blocks.body({0.1 * (i % 2), 0.07 * (i % 3), 0.1 + 0.6 * i}, {0, 0, -2.0 - 2 * i}));
+    World world(std::move(bodies), {stiffness, stiffness / 1e3, 0.3});
+    const double start = world.energies().total(), kinetic = world.energies().kinetic;
+    for (int i = 0; i < 200; ++i) {
+      world.step(1);
+      ASSERT_LE(world.energies().total(), start + kGain * kinetic) << i << ", " << stiffness << " N/m^3";
+    }
+  }
+}
+
+}  // namespace
+}  // namespace exmat::runtime
