@@ -15,7 +15,8 @@ namespace {
 constexpr Eigen::Index kDenseUnknowns = 160;  // a factorisation of more takes longer than conjugate gradients
 constexpr double kSolutionError = 1e-3;       // of conjugate gradients, in the norm of the preconditioner
 constexpr int kMostGradients = 400;
-constexpr double kGain = 1e-12;  // of the kinetic energy: rounding
+constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
+constexpr double kGain = 1e-12;     // of the kinetic energy: rounding
 
 }  // namespace
 
@@ -283,6 +284,15 @@ void stay(std::span<WorldBody* const> bodies, Eigen::VectorXd& x) noexcept {
   for (WorldBody* const own : bodies) stay(*own, x.segment(own->offset, own->unknowns()));
 }
 
+/// True if a search may have ended at a minimum that is none of the bodies': it took long, or they go so far in the
+/// step that they would be deep in each other.
+bool is_doubtful(const NewtonReport& newton, std::span<WorldBody* const> bodies) noexcept {
+  return newton.iterations > kSureIterations || std::ranges::any_of(bodies, [](const WorldBody* own) {
+           const double way = own->scene.time_step * own->start_velocity.norm();
+           return way > kFast * own->surface.bound(own->state.q).radius;
+         });
+}
+
 /// True if the potential is higher at workspace.x than where the bodies stand. The bodies are at workspace.x then.
 bool is_above_start(IslandProblem& problem, std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noexcept {
   workspace.trial = workspace.x;
@@ -300,7 +310,8 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
   for (const WorldBody* const own : bodies) workspace.x.segment(own->offset, own->unknowns()) = own->near().x;
   NewtonReport total = minimise(problem, bodies, pairs, threads, workspace);
   bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated;
-  if (total.status == NewtonStatus::kConverged) again = is_above_start(problem, bodies, workspace);
+  if (total.status == NewtonStatus::kConverged && is_doubtful(total, bodies))
+    again = is_above_start(problem, bodies, workspace);
   if (again) {
     stay(bodies, workspace.x);
     for (WorldBody* const own : bodies) own->step->potential().start(own->state.q);
