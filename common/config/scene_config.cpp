@@ -205,7 +205,11 @@ WorldConfig world_of(SceneConfig scene) {
 
 WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   check_scene(json, file);
-  if (!json.contains("bodies")) return world_of(scene_of(json, file));
+  if (!json.contains("bodies")) {
+    WorldConfig world = world_of(scene_of(json, file));
+    world.contact.release = member_or(json, "contact", Json::object()).value("release", world.contact.release);
+    return world;
+  }
   refuse_members_of_one_body(json, file);
   WorldConfig world;
   world.file = file;
@@ -230,6 +234,7 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   world.contact.damping = contact.value("damping", world.contact.damping);
   world.contact.friction = contact.value("friction", world.contact.friction);
   world.contact.self = contact.value("self", world.contact.self);
+  world.contact.release = contact.value("release", world.contact.release);
   set_meetings(world);
   return world;
 }

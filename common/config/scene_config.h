@@ -173,6 +173,7 @@ struct BodyContactConfig {
   double damping = 0;      ///< pressure per approach velocity [N s/m^3]
   double friction = 0;     ///< Coulomb's coefficient
   bool self = false;       ///< parts of one body, too
+  double release = 1;      ///< how fast what overlaps at the start is let out, obstacles included [m/s]
 };
 
 /// Where a body stands beyond what its BodyConfig says.

@@ -13,8 +13,8 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kLayout = 2;
-constexpr std::size_t kHeadNumbers = 5, kSleepNumbers = 3, kContactNumbers = 9;
+constexpr double kLayout = 3;
+constexpr std::size_t kHeadNumbers = 5, kSleepNumbers = 3, kContactNumbers = 10;
 constexpr double kMostSteps = 9007199254740992;  // 2^53: whole numbers up to here have all their digits
 
 constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q,          &State::v, &State::q_previous,
@@ -53,6 +53,8 @@ void read_contacts(StateNumbers& reader, std::size_t count, const exmat_body& bo
     held.normal_force = reader.number();
     held.anchor = reader.vector();
     held.way_out = reader.vector();
+    held.overlap = reader.number();
+    if (held.overlap < 0) throw InvalidArgument("numbers: expected overlaps of contacts >= 0");
   }
 }
 
@@ -88,6 +90,7 @@ std::vector<double> write_state(const exmat_body& body) {
       writer.add(number);
     writer.add_all(held.anchor);
     writer.add_all(held.way_out);
+    writer.add(held.overlap);
   }
   return writer.take();
 }

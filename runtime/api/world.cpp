@@ -21,11 +21,21 @@ const exmat_world::Member* member_of(const exmat_world& world, std::int64_t id) 
   return found != world.members.end() && found->id == id ? &*found : nullptr;
 }
 
-ContactLaw contact_law_of(const exmat_contact_law& law) noexcept { return {law.stiffness, law.damping, law.friction}; }
+ContactLaw contact_law_of(const exmat_contact_law& law) noexcept {
+  return {law.stiffness, law.damping, law.friction, law.release};
+}
 
 exmat_contact_law default_law() noexcept {
   const BodyContactConfig defaults;
-  return {sizeof(exmat_contact_law), defaults.stiffness, defaults.damping, defaults.friction, defaults.self ? 1 : 0, 0};
+  return {sizeof(exmat_contact_law), defaults.stiffness, defaults.damping, defaults.friction,
+          defaults.self ? 1 : 0,     /*apart=*/0,        defaults.release};
+}
+
+/// What the caller's version knows of it, the rest of `law`.
+exmat_contact_law completed(const exmat_contact_law& given, exmat_contact_law law) noexcept {
+  std::memcpy(static_cast<void*>(&law), &given, std::min(given.size, sizeof law));
+  law.size = sizeof law;
+  return law;
 }
 
 exmat_contact_law own_law() noexcept {
@@ -38,6 +48,8 @@ void require_law(const exmat_contact_law& given) {
   const auto is_positive = [](double number) { return number > 0 && std::isfinite(number); };
   if (!is_positive(given.stiffness))
     throw InvalidArgument(fmt::format("law.stiffness = {:g}: expected a finite number above 0", given.stiffness));
+  if (!is_positive(given.release))
+    throw InvalidArgument(fmt::format("law.release = {:g}: expected a finite number above 0", given.release));
   for (const auto& [number, name] : {std::pair(given.damping, "damping"), std::pair(given.friction, "friction")})
     if (number != 0 && !is_positive(number))
       throw InvalidArgument(fmt::format("law.{} = {:g}: expected a finite number >= 0", name, number));
@@ -147,9 +159,9 @@ void check_joins(const exmat_world& world, const exmat_body& body) {
 std::unique_ptr<exmat_world> load(const WorldConfig& config) {
   LoadedWorld loaded = load_world_run(config);
   const BodyContactConfig& contact = config.contact;
-  auto world =
-      std::make_unique<exmat_world>(exmat_contact_law{sizeof(exmat_contact_law), contact.stiffness, contact.damping,
-                                                      contact.friction, contact.self ? 1 : 0, config.is_list ? 0 : 1});
+  auto world = std::make_unique<exmat_world>(exmat_contact_law{sizeof(exmat_contact_law), contact.stiffness,
+                                                               contact.damping, contact.friction, contact.self ? 1 : 0,
+                                                               config.is_list ? 0 : 1, contact.release});
   take_obstacles(loaded.obstacles, *world);
   std::vector<std::shared_ptr<const Source>> sources;
   for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
@@ -195,7 +207,7 @@ exmat_status exmat_world_create(const exmat_contact_law* law, exmat_world** worl
   if (law != nullptr)
     if (const exmat_status status = check_size(__func__, law->size, kContactLawSizes)) return status;
   return guarded(__func__, [&] {
-    const exmat_contact_law given = law != nullptr ? *law : default_law();
+    const exmat_contact_law given = law != nullptr ? completed(*law, default_law()) : default_law();
     require_law(given);
     *world = new exmat_world(given);
   });
@@ -251,7 +263,7 @@ exmat_status exmat_world_set_contact_law(exmat_world* world, const exmat_contact
   EXMAT_REQUIRE(law);
   if (const exmat_status status = check_size(__func__, law->size, kContactLawSizes)) return status;
   return guarded(__func__, [&] {
-    exmat_contact_law given = *law;
+    exmat_contact_law given = completed(*law, world->law);
     given.self = world->law.self;
     given.apart = world->law.apart;
     require_law(given);

@@ -236,6 +236,7 @@ std::int64_t add_obstacle(const Obstacle& made, exmat_world& world) {
   if (!world.members.empty() && !touch)
     throw InvalidArgument("the model knows no contact: expected settings with use_contact, or a scene with obstacles");
   world.obstacles.push_back({world.next_obstacle, std::make_shared<Obstacle>(made), true});
+  world.obstacles.back().obstacle->release = world.law.release;
   const exmat_world::HostedObstacle hosted = world.obstacles.back();
   try {
     for (const exmat_world::Member& member : world.members)

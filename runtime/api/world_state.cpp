@@ -12,11 +12,11 @@ using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 // The state of a world: how many bodies; of each its number of numbers, whether it is anew, and these; how many pairs;
-// of each its bodies, how many vertices of either touch, its energy and account, and nine numbers for each vertex.
+// of each its bodies, how many vertices of either touch, its energy and account, and ten numbers for each vertex.
 
 namespace {
 
-constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 6, kContactNumbers = 9;
+constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 6, kContactNumbers = 10;
 
 std::size_t size_of(const exmat_world& world) {
   std::size_t size = kHeadNumbers;
@@ -33,7 +33,7 @@ void write_contacts(const HeldPair& pair, std::vector<double>& numbers) {
     numbers.push_back(number);
   for (const auto& side : pair.held)
     for (const HeldBodyContact& held : side) {
-      for (const double number : {static_cast<double>(held.vertex), held.gap, held.normal_force})
+      for (const double number : {static_cast<double>(held.vertex), held.gap, held.normal_force, held.overlap})
         numbers.push_back(number);
       numbers.insert(numbers.end(), held.stretch.begin(), held.stretch.end());
       numbers.insert(numbers.end(), held.normal.begin(), held.normal.end());
@@ -62,6 +62,8 @@ std::vector<HeldBodyContact> read_contacts(StateNumbers& reader, std::size_t cou
     last = held.vertex;
     held.gap = reader.number();
     held.normal_force = reader.number();
+    held.overlap = reader.number();
+    if (held.overlap < 0) throw InvalidArgument("numbers: expected overlaps of contacts >= 0");
     held.stretch = reader.vector();
     held.normal = reader.vector();
   }

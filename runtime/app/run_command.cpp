@@ -108,6 +108,21 @@ void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
         summary.unconverged_steps, summary.steps * summary.bodies, config.bodies.front().scene.newton.tolerance));
 }
 
+void warn_of_overlap(const RunSummary& summary, const LoadedWorld& loaded, const WorldConfig& config) {
+  if (!summary.overlap) return;
+  const auto name_of = [&](int body) {
+    const std::string& name = loaded.bodies[static_cast<std::size_t>(body)].name;
+    return name.empty() ? fmt::format("body {}", body) : fmt::format("body \"{}\"", name);
+  };
+  const StartOverlap& overlap = *summary.overlap;
+  log::warning(fmt::format(
+      "{} starts {:.3g} m inside {} (its vertex {}): what overlaps at the start is let out at {:g} m/s "
+      "(contact.release)",
+      name_of(overlap.body), overlap.depth,
+      overlap.is_obstacle ? fmt::format("obstacle {} of those that it meets", overlap.other) : name_of(overlap.other),
+      overlap.vertex, config.contact.release));
+}
+
 }  // namespace
 
 void run_command(const RunCommandOptions& options) {
@@ -120,6 +135,7 @@ void run_command(const RunCommandOptions& options) {
   RunOptions run_options = options.run;
   run_options.keeps_contacts = true;
   const RunSummary summary = run(loaded, config, run_options);
+  warn_of_overlap(summary, loaded, config);
   warn_of_steps(summary, config);
   print_summary(summary, loaded, config);
   print_lost_work(summary, loaded, config, options.load_capacity);

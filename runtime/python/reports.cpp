@@ -106,6 +106,7 @@ void bind_contact_law(py::module_& module) {
       .def_readonly("stiffness", &exmat_contact_law::stiffness, "Pressure per depth [N/m^3].")
       .def_readonly("damping", &exmat_contact_law::damping, "Pressure per approach velocity [N s/m^3].")
       .def_readonly("friction", &exmat_contact_law::friction, "Coulomb's coefficient.")
+      .def_readonly("release", &exmat_contact_law::release, "How fast what overlaps at the start is let out [m/s].")
       .def_property_readonly(
           "self_contact", [](const exmat_contact_law& law) { return law.self == 1; },
           "Whether bodies touch themselves, too.")

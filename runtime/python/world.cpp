@@ -101,11 +101,12 @@ py::array_t<exmat_body_contact> contacts(WorldObject& world) {
 }
 
 void set_law(WorldObject& world, std::optional<double> stiffness, std::optional<double> damping,
-             std::optional<double> friction) {
+             std::optional<double> friction, std::optional<double> release) {
   exmat_contact_law law = world.get().contact_law();
   law.stiffness = stiffness.value_or(law.stiffness);
   law.damping = damping.value_or(law.damping);
   law.friction = friction.value_or(law.friction);
+  law.release = release.value_or(law.release);
   world.hold->world.set_contact_law(law);
 }
 
@@ -230,7 +231,7 @@ py::dict kept_world(WorldObject& world) {
     bodies.append(py::make_tuple(id, of_scene ? py::none() : body->model.object(), kept_settings(*body)));
   }
   py::dict result;
-  result["law"] = py::make_tuple(law.stiffness, law.damping, law.friction);
+  result["law"] = py::make_tuple(law.stiffness, law.damping, law.friction, law.release);
   result["next"] = world.next_id;
   result["bodies"] = bodies;
   result["obstacles"] = kept_obstacles(obstacles_of(world));
@@ -271,7 +272,7 @@ void restore_world(WorldObject& world, const py::dict& kept) {
   const auto law = kept["law"].cast<py::tuple>();
   const auto bodies = kept["bodies"].cast<py::list>();
   const auto obstacles = kept["obstacles"].cast<py::dict>();
-  set_law(world, law[0].cast<double>(), law[1].cast<double>(), law[2].cast<double>());
+  set_law(world, law[0].cast<double>(), law[1].cast<double>(), law[2].cast<double>(), law[3].cast<double>());
   restore_bodies(world, bodies);
   if (!world.bodies.empty()) skip_ids(world, kept["next"].cast<std::int64_t>(), world.bodies.begin()->second->model);
   set_obstacles(obstacles_of(world), obstacles);
@@ -319,7 +320,8 @@ WorldClass bind_world(py::module_& module) {
           "contact_law", [](WorldObject& world) { return world.get().contact_law(); },
           "How bodies touch: a ContactLaw.")
       .def("set_contact_law", &set_law, py::kw_only(), py::arg("stiffness") = py::none(),
-           py::arg("damping") = py::none(), py::arg("friction") = py::none(), "What is None stays.")
+           py::arg("damping") = py::none(), py::arg("friction") = py::none(), py::arg("release") = py::none(),
+           "What is None stays.")
       .def("step", &step_world, py::arg("n") = 1, py::arg("threads") = 0,
            "Takes `n` steps of all bodies by up to `threads` threads, 0: one for each processor; the results do not "
            "depend on their number. Returns a WorldReport. Raises NonFinite, which names the first such body: it and "

@@ -33,7 +33,8 @@ Bodies::Bodies(const LoadedWorld& loaded, const WorldConfig& config)
     : loaded_(loaded),
       config_(config),
       scenes_(scenes_at_start(loaded)),
-      world_(starts(), {config.contact.stiffness, config.contact.damping, config.contact.friction}),
+      world_(starts(),
+             {config.contact.stiffness, config.contact.damping, config.contact.friction, config.contact.release}),
       threads_(std::min(omp_get_max_threads(), world_.count())) {}
 
 std::vector<WorldBodyStart> Bodies::starts() const {

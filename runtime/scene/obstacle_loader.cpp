@@ -84,12 +84,12 @@ RigidMotion make_motion(const std::vector<KeyframeConfig>& keys) {
   return RigidMotion(frames);
 }
 
-Obstacles make_obstacles(const std::vector<ObstacleConfig>& configs) {
+Obstacles make_obstacles(const std::vector<ObstacleConfig>& configs, double release) {
   Obstacles obstacles;
   for (const ObstacleConfig& obstacle : configs)
     obstacles.push_back(Obstacle{std::visit([](const auto& shape) { return make_shape(shape); }, obstacle.shape),
                                  make_motion(obstacle.motion), obstacle.stiffness, obstacle.damping, obstacle.friction,
-                                 obstacle.meeting});
+                                 obstacle.meeting, release});
   return obstacles;
 }
 

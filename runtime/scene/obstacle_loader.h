@@ -11,8 +11,8 @@ namespace exmat::runtime {
 RigidMotion make_motion(const std::vector<KeyframeConfig>& keys);
 
 /// Reads the files of meshes and height fields. Throws InputError where one is not what it is to be: a mesh without
-/// thickness has to be closed.
-Obstacles make_obstacles(const std::vector<ObstacleConfig>& configs);
+/// thickness has to be closed. `release` [m/s], see Obstacle.
+Obstacles make_obstacles(const std::vector<ObstacleConfig>& configs, double release = kRelease);
 /// Those of them that a body meets.
 Obstacles obstacles_of(const MeetingGroup& body, const Obstacles& all);
 /// Those that the body of the scene meets.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <memory>
 #include <mutex>
+#include <span>
 
 #include "common/core/progress.h"
 #include "common/core/timer.h"
@@ -148,6 +149,26 @@ RunSummary empty_summary(const WorldConfig& config, const Bodies& bodies, bool p
   return summary;
 }
 
+/// After the first step: the deepest of what it has begun to let out, if any. `step` is what it let out [m].
+std::optional<StartOverlap> start_overlap(const World& world, double step) {
+  std::optional<StartOverlap> deepest;
+  const auto add = [&](const StartOverlap& found) {
+    if (found.depth > step && (!deepest || found.depth > deepest->depth)) deepest = found;
+  };
+  for (int body = 0; body < world.count(); ++body) {
+    const ContactState& contacts = world.state(body).contacts;
+    for (const HeldContact& held : std::span(contacts.held).first(contacts.count))
+      add({body, held.obstacle, true, world.model(body).contact->object_vertex(held.vertex), held.overlap + step});
+  }
+  for (const HeldPair& pair : world.held())
+    for (const int side : {0, 1})
+      for (const HeldBodyContact& held : pair.held[static_cast<std::size_t>(side)]) {
+        const int body = side == 0 ? pair.first : pair.second, other = side == 0 ? pair.second : pair.first;
+        add({body, other, false, world.model(body).contact->object_vertex(held.vertex), held.overlap + step});
+      }
+  return deepest;
+}
+
 }  // namespace
 
 RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOptions& options) {
@@ -178,6 +199,8 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
     bodies.require_finite();
     if (options.keeps_contacts) contacts.add_touches();
     add(report, world, seconds, summary);
+    if (summary.steps == 1 && !options.from_state)
+      summary.overlap = start_overlap(world, config.time_step * config.contact.release);
     const Timer output;
     const bool written = trajectory && summary.steps % config.every == 0;
     if (written) append(seconds / world.count());

@@ -26,6 +26,14 @@ struct StageSamples {
   std::array<Samples, kWorldStageNames.size()> of_world;  ///< on the wall clock
 };
 
+/// A vertex that begins inside an obstacle or another body, deeper than one step lets out.
+struct StartOverlap {
+  int body = 0, other = 0;  ///< numbers in the world; `other` of the obstacles that the body meets, if it is one
+  bool is_obstacle = false;
+  int vertex = 0;    ///< of the body's object
+  double depth = 0;  ///< [m]
+};
+
 /// What a run did.
 struct RunSummary {
   std::int64_t steps = 0;  ///< of each body
@@ -44,6 +52,7 @@ struct RunSummary {
   std::int64_t unconverged_islands = 0;          ///< of all steps
   double deepest = 0;                            ///< that a vertex is inside another body at the end [m]
   Energies start, end;                           ///< of all bodies
+  std::optional<StartOverlap> overlap;           ///< the deepest, where bodies overlap something at the start
   std::uint64_t state_hash = 0;                  ///< of all bodies, at the end; see Bodies::hash
   std::optional<double> largest_displacement;    ///< over the written frames [m]; only with a trajectory
   std::vector<HardestContact> hardest_contacts;  ///< of each kind; only if asked for

@@ -33,12 +33,14 @@ OrderedJson to_json(const HeldPair& pair) {
   if (std::isfinite(pair.account)) json["account"] = pair.account;
   for (const auto& [name, side] : {std::pair{"first_vertices", 0}, std::pair{"second_vertices", 1}}) {
     json[name] = OrderedJson::array();
-    for (const HeldBodyContact& held : pair.held[static_cast<std::size_t>(side)])
+    for (const HeldBodyContact& held : pair.held[static_cast<std::size_t>(side)]) {
       json[name].push_back({{"vertex", held.vertex},
                             {"gap", held.gap},
                             {"normal_force", held.normal_force},
                             {"stretch", array_of(held.stretch)},
                             {"side", array_of(held.normal)}});
+      if (held.overlap > 0) json[name].back()["overlap"] = held.overlap;
+    }
   }
   return json;
 }
@@ -131,7 +133,7 @@ class Reader {
         refuse(fmt::format("{}/{}/vertex", place, i), fmt::format("vertices below {} in ascending order", vertices),
                fmt::format("{}", vertex));
       held.push_back({static_cast<int>(vertex), entry["gap"], entry["normal_force"], vector_of(entry["stretch"]),
-                      vector_of(entry["side"])});
+                      vector_of(entry["side"]), entry.value("overlap", 0.0)});
     }
   }
 

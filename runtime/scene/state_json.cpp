@@ -78,6 +78,7 @@ class BodyReader {
     for (const Json& entry : from) {
       HeldContact held{entry["vertex"], entry["obstacle"], entry["normal_force"], vector_of(entry["anchor"])};
       if (entry.contains("way_out")) held.way_out = vector_of(entry["way_out"]);
+      held.overlap = entry.value("overlap", 0.0);
       const std::string place = fmt::format("/contacts/{}", contacts.count);
       const Eigen::Index vertices = loaded_.model->contact->vertices();
       if (held.vertex >= vertices) refuse(place, fmt::format("a vertex below {}", vertices), entry["vertex"].dump());
@@ -119,6 +120,7 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
                                 {"normal_force", held.normal_force},
                                 {"anchor", array_of(held.anchor)}});
     if (!held.way_out.isZero(0)) body["contacts"].back()["way_out"] = array_of(held.way_out);
+    if (held.overlap > 0) body["contacts"].back()["overlap"] = held.overlap;
   }
   return body;
 }

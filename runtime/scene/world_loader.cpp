@@ -38,7 +38,7 @@ std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, cons
 LoadedWorld load_world_run(const WorldConfig& config) {
   LoadedWorld world;
   world.kinds.reserve(config.bodies.size());
-  world.obstacles = make_obstacles(config.bodies.front().scene.obstacles);
+  world.obstacles = make_obstacles(config.bodies.front().scene.obstacles, config.contact.release);
   for (const BodiesConfig& bodies : config.bodies) {
     LoadedKind& kind = world.kinds.emplace_back(LoadedKind{load_run(bodies.scene, &world.obstacles), nullptr});
     const LoadedScene& loaded = kind.loaded;

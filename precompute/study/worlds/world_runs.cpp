@@ -143,7 +143,8 @@ WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>&
 }
 
 WorldRun run_full_space_world(const WorldConfig& config, const std::vector<double>& times) {
-  FullSpaceWorld world({config.contact.stiffness, config.contact.damping, config.contact.friction});
+  FullSpaceWorld world(
+      {config.contact.stiffness, config.contact.damping, config.contact.friction, config.contact.release});
   std::vector<std::unique_ptr<const FullKind>> kinds;
   WorldRun result;
   for (const BodiesConfig& bodies : config.bodies) {

@@ -23,6 +23,7 @@ typedef struct exmat_contact_law {
   double friction;  /* Coulomb's coefficient, >= 0; 0 */
   int32_t self;     /* 1: a body also touches itself; 0. Takes time for each body's model when it is added */
   int32_t apart;    /* 1: bodies touch neither each other nor themselves, obstacles alone; 0 */
+  double release;   /* how fast what overlaps at the start is let out, obstacles included, > 0 [m/s]; 1 */
 } exmat_contact_law;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_contact_law). */
@@ -53,7 +54,8 @@ EXMAT_API exmat_status exmat_world_reset(exmat_world* world) EXMAT_NOEXCEPT;
 /* Its steps times the time step [s]; negative where `world` is NULL. */
 EXMAT_API double exmat_world_time(const exmat_world* world) EXMAT_NOEXCEPT;
 
-/* Changes stiffness, damping and friction; `self` and `apart` stay. */
+/* Changes stiffness, damping, friction and release, the latter between bodies and of obstacles added later; `self` and
+   `apart` stay. */
 EXMAT_API exmat_status exmat_world_set_contact_law(exmat_world* world, const exmat_contact_law* law) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_contact_law(const exmat_world* world, exmat_contact_law* law) EXMAT_NOEXCEPT;
 

@@ -11,9 +11,9 @@
 namespace exmat::runtime {
 namespace {
 
-// A vertex that comes in is found within some steps of its way, or this share of the surface's radius. What is deeper
+// A vertex that comes in is found within kEntrySteps of its way, or this share of the surface's radius. What is deeper
 // and was not inside before has not come in: surfaces that fold, or cross themselves, do not tell inside from outside.
-constexpr double kEntrySteps = 2, kEntryShare = 0.01;
+constexpr double kEntryShare = 0.01;
 
 constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
 constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
@@ -175,6 +175,9 @@ struct Gathering {
     }
     const Eigen::Vector3d place = at.offset - arm_b;
     freeze_contact(law, surface, place, place + time_step * apart, a.set.area(vertex), time_step, candidate);
+    const double depth = -surface.distance;
+    const double inside = was_inside ? before->overlap : anew ? depth : 0;
+    candidate.release_overlap(depth, inside, time_step * law.release);
     if (!was_inside) return;
     candidate.friction_force = law.friction * before->normal_force;
     take_stretch(*before, b.pose.rotation, candidate);
@@ -442,15 +445,17 @@ void BodyContact::commit(const BodyPose& a, const BodyPose& b, const BodyCandida
                          std::vector<HeldBodyContact>& held) const {
   held.clear();
   for (const BodyCandidate& candidate : candidates.all) {
-    if (candidate.gap >= 0 && candidate.normal_force <= 0) continue;
+    if (!(candidate.gap < 0) && !(candidate.normal_force > 0)) continue;
     HeldBodyContact& contact = held.emplace_back();
     contact.vertex = candidate.vertex;
     contact.gap = std::min(0.0, candidate.gap);
     contact.normal_force = candidate.normal_force;
     contact.normal = b.rotation.transpose() * candidate.normal;
+    contact.overlap = std::clamp(-candidate.gap, 0.0, candidate.overlap);
     const Eigen::Vector3d place = place_of(a, b, candidate);
     if (candidate.normal_force > 0)
       contact.stretch = b.rotation.transpose() * held_stretch(law_.friction, place, candidate);
+    if (!contact.stretch.allFinite()) contact.stretch.setZero();
   }
 }
 

@@ -17,6 +17,7 @@ struct HeldBodyContact {
   double normal_force = 0;                            ///< likewise [N]
   Eigen::Vector3d stretch = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the other body [m]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< of the side that it came in by, frame of the other body
+  double overlap = 0;                                 ///< that is not released yet [m]
 };
 
 /// A vertex of one body that may touch the surface of another in this step. Its law is that of contact_law.h with the

@@ -228,6 +228,10 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, cons
   }
   freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
   if (workspace.are_all_planes) workspace.planes.end(workspace.candidate_count);
+  // Side by side nothing is known of overlaps.
+  const auto candidates = std::span(workspace.candidates).first(workspace.candidate_count);
+  if (std::ranges::any_of(candidates, [](const ContactCandidate& candidate) { return candidate.overlap > 0; }))
+    workspace.are_all_planes = false;
 }
 
 /// With v in workspace.x; empties the batch.

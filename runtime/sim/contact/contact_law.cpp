@@ -37,7 +37,7 @@ Eigen::Vector3d slip_of(const ContactCandidate& candidate, const Eigen::Vector3d
 
 /// d - tau v_n.
 double damped_depth(const ContactCandidate& candidate, double gap, const Eigen::Vector3d& point) {
-  return -gap - candidate.damping * candidate.normal.dot(point - candidate.carried);
+  return -gap - candidate.overlap - candidate.damping * candidate.normal.dot(point - candidate.carried);
 }
 
 /// Returns what it adds to (1 + tau) W, as evaluate_friction().
@@ -80,6 +80,7 @@ void freeze_contact(const ContactLaw& law, const SurfacePoint& surface, const Ei
   candidate.damping = touches ? law.damping / (law.stiffness * time_step) : 0;
   candidate.spring_share = 1 / (1 + candidate.damping);
   candidate.friction_force = 0;
+  candidate.overlap = candidate.released = 0;
 }
 
 double ContactState::longest_way_out() const noexcept {
@@ -105,8 +106,13 @@ void freeze_contact(const PlacedObstacle& placed, const HeldContact* held, const
       held != nullptr ? Eigen::Vector3d(placed.pose.rotation * held->way_out) : Eigen::Vector3d::Zero();
   candidate.passage = find_passage(placed, way, surface, way_out);
   if (candidate.passage.kind == Passage::Kind::kThrough) surface = candidate.passage.side.nearest(way.carried);
-  freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction}, surface, way.carried, motion.predicted,
-                 area, time_step, candidate);
+  freeze_contact({obstacle.stiffness, obstacle.damping, obstacle.friction, obstacle.release}, surface, way.carried,
+                 motion.predicted, area, time_step, candidate);
+  // A vertex that nobody has seen come in was put there.
+  const double gone = (motion.predicted - way.carried).norm();
+  const double depth = -surface.distance;
+  const double before = held != nullptr ? held->overlap : depth > kEntrySteps * gone ? depth : 0;
+  candidate.release_overlap(depth, before, time_step * obstacle.release);
   if (held == nullptr) return;
   candidate.anchor = placed.pose.to_world(held->anchor);
   candidate.friction_force = obstacle.friction * held->normal_force;
@@ -196,11 +202,13 @@ Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point,
 void hold_contact(const PlacedObstacle& placed, const Eigen::Vector3d& point, const ContactCandidate& candidate,
                   ContactState& state) noexcept {
   const bool is_beyond = candidate.by_plane && candidate.gap < 0;
-  if (candidate.normal_force <= 0 && !is_beyond) return;
+  const double overlap = std::clamp(-candidate.gap, 0.0, candidate.overlap);
+  if (candidate.normal_force <= 0 && !is_beyond && overlap <= 0) return;
   HeldContact& held = state.held[state.count++];
   held.vertex = candidate.vertex;
   held.obstacle = candidate.obstacle;
   held.normal_force = candidate.normal_force;
+  held.overlap = overlap;
   held.anchor = placed.pose.to_frame(point - held_stretch(placed.obstacle->friction, point, candidate));
   held.way_out.setZero();
   if (is_beyond) held.way_out = placed.pose.rotation.transpose() * (-candidate.gap * candidate.passage.side.normal);

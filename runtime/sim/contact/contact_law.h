@@ -21,17 +21,21 @@ namespace exmat::runtime {
 //             stiffness kappa, capped by Coulomb's law: f1(l) = 2 l / e - (l / e)^2 up to e = 2 mu lambda / kappa,
 //             then 1 (the mollifier of Li et al. 2020 on a displacement). The anchor sticks to the obstacle and is
 //             dragged along where it slides (Cundall and Strack 1979), so that nothing creeps below the cone.
+// Depths are those beyond the overlap of the vertex: what it was inside where it began, less what has been released of
+// that since, so that nothing that starts inside is thrown out.
 // lambda is the normal force at the end of the last step, or at the last refresh_friction(). Both forces are minus the
 // gradient of a potential of the positions x at the end of the step, whatever the integrator.
 
 inline constexpr int kFrictionRounds = 3;      ///< solutions of one step for the normal forces of friction
 inline constexpr double kSameFriction = 0.05;  ///< relative change of friction that needs no further one
+inline constexpr double kEntrySteps = 2;       ///< of its way: a vertex that is deeper has not come in
 
 /// Of a pair of surfaces, per area.
 struct ContactLaw {
-  double stiffness = 0;  ///< pressure per depth, > 0 [N/m^3]
-  double damping = 0;    ///< pressure per approach velocity, >= 0 [N s/m^3]
-  double friction = 0;   ///< Coulomb's coefficient, >= 0
+  double stiffness = 0;       ///< pressure per depth, > 0 [N/m^3]
+  double damping = 0;         ///< pressure per approach velocity, >= 0 [N s/m^3]
+  double friction = 0;        ///< Coulomb's coefficient, >= 0
+  double release = kRelease;  ///< how fast what overlaps at the start is let out, > 0 [m/s]
 };
 
 /// What a touching vertex remembers from step to step.
@@ -41,6 +45,7 @@ struct HeldContact {
   Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the obstacle [m]
   /// To the surface that it came in by, where that is not the nearest; else 0. Frame of the obstacle [m].
   Eigen::Vector3d way_out = Eigen::Vector3d::Zero();
+  double overlap = 0;  ///< that is not released yet [m]
 };
 
 /// The contacts of a State: the first `count` of `held`, in order of vertex and obstacle.
@@ -65,6 +70,8 @@ struct ContactCandidate {
   double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
   double spring_share = 1;                            ///< 1 / (1 + gamma)
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
+  double overlap = 0;                                 ///< of the depth, that pushes nothing yet [m]
+  double released = 0;                                ///< of it where the step begins [m]
   Passage passage;                                    ///< of obstacles
 
   /// How far its vertex may go from where it was at the first evaluation without being touched [m]; negative: it has to
@@ -81,6 +88,12 @@ struct ContactCandidate {
   Eigen::Vector3d slip = Eigen::Vector3d::Zero();       ///< y, tangential [m]
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of the normal force, where there is one
 
+  /// Of a vertex that is `depth` inside [m], `before` of it without a push so far [m]: releases `most` [m].
+  void release_overlap(double depth, double before, double most) noexcept {
+    before = std::clamp(before, 0.0, std::max(0.0, depth));
+    overlap = std::max(0.0, before - most);
+    released = before - overlap;
+  }
   bool is_loaded() const noexcept { return normal_force > 0 || friction_force > 0; }
   /// How fast the normal force grows [N/m]; 0 where there is none.
   double normal_stiffness() const noexcept { return normal_force > 0 ? stiffness * (1 + damping) : 0; }

@@ -66,6 +66,8 @@ double deepest(const Shape& shape) noexcept;
 /// The shortest way that may lead through it: 0 where it is not known, as of meshes [m].
 double shortest_passage(const Shape& shape) noexcept;
 
+inline constexpr double kRelease = 1;  ///< [m/s] of overlaps at the start, where nothing else is said
+
 /// What a body may touch. Per area of the body's surface, so that results do not depend on its tessellation.
 struct Obstacle {
   Shape shape;
@@ -74,6 +76,7 @@ struct Obstacle {
   double damping = 0;    ///< pressure per approach velocity, >= 0 [N s/m^3]
   double friction = 0;   ///< Coulomb's coefficient, >= 0
   MeetingGroup meeting{};
+  double release = kRelease;  ///< how fast a body that overlaps it at the start is let out, > 0 [m/s]
 };
 
 /// An obstacle that any number of bodies may touch. Whoever made it may change it between steps.

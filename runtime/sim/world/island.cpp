@@ -348,8 +348,7 @@ struct IslandStart {
 IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
   IslandStart start{energy_of(bodies)};
   for (PairContact* const pair : pairs) {
-    pair->begin_account(bodies[static_cast<std::size_t>(pair->body(0))]->anew ||
-                        bodies[static_cast<std::size_t>(pair->body(1))]->anew);
+    pair->begin_account();
     start.springs += pair->start_energy();
     start.accounts += pair->account();
   }

@@ -41,7 +41,7 @@ void PairContact::reset(int first, int second, const HeldPair* held) {
 
 void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin) {
   static const std::vector<HeldBodyContact> none;
-  half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction};
+  half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction, law.release};
   const auto at = static_cast<std::size_t>(side);
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);
@@ -52,15 +52,19 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     contact.gather(touching(own), touching(other), search, candidates_[at]);
 }
 
-void PairContact::begin_account(bool starts) noexcept {
+void PairContact::begin_account() noexcept {
   const auto depth_of = [](const BodyCandidate& candidate) {
-    return std::max(0.0, -candidate.normal.dot(candidate.carried));
+    return -candidate.normal.dot(candidate.carried) - candidate.overlap;
   };
-  double energy = 0;
+  double energy = 0, released = 0;
   for (const BodyCandidates& candidates : candidates_)
-    for (const BodyCandidate& candidate : candidates.all) energy += energy_of_spring(candidate, depth_of(candidate));
-  const bool is_known = held_ != nullptr && std::isfinite(held_->account);
-  account_ = is_known ? held_->account : starts || held_ != nullptr ? energy : 0;
+    for (const BodyCandidate& candidate : candidates.all) {
+      const double depth = depth_of(candidate), own = energy_of_spring(candidate, depth);
+      energy += own;
+      released += own - energy_of_spring(candidate, depth - candidate.released);
+    }
+  const bool is_known = held_ == nullptr || std::isfinite(held_->account);
+  account_ = !is_known ? energy : released + (held_ != nullptr ? held_->account : 0);
   start_energy_ = std::min(energy, account_);
   if (energy <= account_) return;
   for (BodyCandidates& candidates : candidates_)
@@ -89,13 +93,14 @@ void PairContact::end_account(const WorldBody& first, const WorldBody& second, c
     account_ += 0.5 * first.scene.time_step * force.dot(parted) - given;
   else
     account_ += spring_energy() - start_energy_;
-  account_ = std::max(0.0, account_);
+  account_ = std::isfinite(account_) ? std::max(0.0, account_) : 0;
 }
 
 double PairContact::spring_energy() const noexcept {
   double sum = 0;
   for (const BodyCandidates& candidates : candidates_)
-    for (const BodyCandidate& candidate : candidates.all) sum += energy_of_spring(candidate, -candidate.gap);
+    for (const BodyCandidate& candidate : candidates.all)
+      sum += energy_of_spring(candidate, -candidate.gap - candidate.overlap);
   return sum;
 }
 

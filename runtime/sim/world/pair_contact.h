@@ -32,8 +32,8 @@ struct BodyTouch {
 ///
 /// A pair keeps an account of its energy: what its contacts took from the bodies and have not given back. Where a step
 /// begins vertices come in and normals turn, so that springs would hold what nobody put into them: those that push are
-/// softened for the step until they hold no more than the account. What overlaps at the start is where it begins from.
-/// docs/step_in_detail.md, "Energy of contacts".
+/// softened for the step until they hold no more than the account. What overlaps at the start adds what is released of
+/// it. docs/step_in_detail.md, "Energy of contacts".
 class PairContact {
  public:
   /// Of other bodies than before.
@@ -56,9 +56,8 @@ class PairContact {
   /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
   void gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin);
 
-  /// After gather() of both sides: the account, by which springs are softened. `starts`: what overlaps is new and
-  /// counts.
-  void begin_account(bool starts) noexcept;
+  /// After gather() of both sides: the account, by which springs are softened. Releasing overlaps adds to it.
+  void begin_account() noexcept;
   /// After the step, evaluated at its end: what it has done to the account; `parted` is the velocity of the first's
   /// centre of mass against the second's, less what it was where the step began [m/s]. `converged`: the bodies go as
   /// the forces say.

@@ -1,0 +1,76 @@
+#include <gtest/gtest.h>
+
+#include "tests/runtime/sim/world/touching_blocks.h"
+
+namespace exmat::runtime {
+namespace {
+
+using test::Blocks;
+
+constexpr double kDeep = 0.08;  // [m] of blocks of 0.2 m
+
+double speed_of(const Blocks& blocks, const World& world, int body) {
+  return free_state(world.state(body)).linear_momentum.norm() / blocks.mass();
+}
+
+/// Fastest centre in a second, or what is faster than the release lets be.
+double fastest_of(const Blocks& blocks, World& world) {
+  double fastest = 0;
+  for (int i = 0; i < static_cast<int>(std::lround(1 / blocks.scene.time_step)); ++i) {
+    world.step(1);
+    for (int body = 0; body < world.count(); ++body) {
+      fastest = std::max(fastest, speed_of(blocks, world, body));
+      EXPECT_EQ(world.report(body).status & kStepNonFinite, 0U);
+    }
+  }
+  return fastest;
+}
+
+// A spring over the depth would throw it at 30 m/s and more.
+TEST(Release, ABodyThatBeginsInTheFloorIsLetOutSlowly) {
+  for (const double time_step : {1e-3, 1.0 / 60})
+    for (const double gravity : {0.0, 9.81})
+      for (const bool sphere : {false, true}) {
+        SCOPED_TRACE(testing::Message() << time_step << " s, " << gravity << " m/s^2, sphere " << sphere);
+        Blocks blocks(time_step);
+        blocks.set_gravity(gravity);
+        if (sphere)
+          blocks.scene.obstacles.push_back(Obstacle{Sphere{{0.2, 0.1, -10}, 10}, RigidMotion(), 1e8, 1e4, 0.3});
+        else
+          blocks.add_floor(1e8, 0.3, 1e4);
+        World world({blocks.body({0, 0, -kDeep})}, {1e7, 0, 0});
+        EXPECT_LE(fastest_of(blocks, world), 2 * kRelease);
+        EXPECT_GE(blocks.centre(world.state(0))[2], 0.1 - 0.01) << "it is out";
+      }
+}
+
+TEST(Release, BodiesThatBeginInEachOtherPartSlowly) {
+  for (const double time_step : {1e-3, 1.0 / 60})
+    for (const double friction : {0.0, 0.5}) {
+      SCOPED_TRACE(testing::Message() << time_step << " s, friction " << friction);
+      const Blocks blocks(time_step);
+      World world({blocks.body({0, 0, 0}), blocks.body({0.4 - kDeep, 0.01, 0.02})}, {1e8, 0, friction});
+      EXPECT_LE(fastest_of(blocks, world), kRelease);
+      EXPECT_TRUE(world.held().empty());
+      EXPECT_GE((blocks.centre(world.state(0)) - blocks.centre(world.state(1))).norm(), 0.4);
+    }
+}
+
+TEST(Release, GoesOnFromItsMemoryToTheLastBit) {
+  Blocks blocks(1e-3);
+  blocks.add_floor(1e8, 0.3, 0);
+  World world({blocks.body({0, 0, -0.03}), blocks.body({0.4 - kDeep, 0.01, 0.02})}, {1e8, 0, 0.3});
+  for (int i = 0; i < 15; ++i) world.step(1);
+  std::vector<WorldBodyStart> bodies{blocks.body({0, 0, 0}), blocks.body({0, 0, 0})};
+  for (int i = 0; i < 2; ++i) bodies[static_cast<std::size_t>(i)].state = world.state(i);
+  World other(std::move(bodies), {1e8, 0, 0.3});
+  other.set_memory(world.held(), {false, false});
+  for (int i = 0; i < 30; ++i) {
+    world.step(1);
+    other.step(1);
+  }
+  for (int i = 0; i < 2; ++i) EXPECT_EQ(world.state(i).q, other.state(i).q);
+}
+
+}  // namespace
+}  // namespace exmat::runtime
