@@ -119,6 +119,8 @@ class BodyFrame {
   /// After a step: every velocity, q's v included, becomes `share` of what it is and that of a rigid motion beside it.
   virtual void add_motion(double /*share*/, const FrameVelocity& /*added*/, FrameWorkspace& /*workspace*/,
                           Eigen::VectorXd& /*v*/, FrameState& /*state*/) const noexcept {}
+  /// After the solution of a step: whether all is finite that commit() is to take.
+  virtual bool is_finite(const FrameWorkspace& /*workspace*/) const noexcept { return true; }
   /// After a step, about the centre of mass, world [kg m^2]; 0 where the body is not moved by its momenta.
   virtual Eigen::Matrix3d inertia(const FrameWorkspace& /*workspace*/, const FrameState& /*state*/) const noexcept {
     return Eigen::Matrix3d::Zero();

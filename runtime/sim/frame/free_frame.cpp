@@ -171,6 +171,13 @@ void FreeFrame::add_motion(double share, const FrameVelocity& added, FrameWorksp
   body.momentum = v + moments.deformation().lazyProduct(body.spin);
 }
 
+bool FreeFrame::is_finite(const FrameWorkspace& workspace) const noexcept {
+  const FreeMotionWorkspace& free = own(workspace);
+  return free.moved.position.allFinite() && free.moved.linear_momentum.allFinite() &&
+         free.moved.angular_momentum.allFinite() && free.solution.spin.allFinite() &&
+         free.solution.rotation.allFinite();
+}
+
 Eigen::Matrix3d FreeFrame::inertia(const FrameWorkspace& workspace, const FrameState& state) const noexcept {
   const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix();
   return rotation * own(workspace).moments.inertia * rotation.transpose();

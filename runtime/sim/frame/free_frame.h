@@ -43,6 +43,7 @@ class FreeFrame final : public BodyFrame {
                                        Eigen::VectorXd& v, FrameState& state) const noexcept override;
   void add_motion(double share, const FrameVelocity& added, FrameWorkspace& workspace, Eigen::VectorXd& v,
                   FrameState& state) const noexcept override;
+  bool is_finite(const FrameWorkspace& workspace) const noexcept override;
   Eigen::Matrix3d inertia(const FrameWorkspace& workspace, const FrameState& state) const noexcept override;
 
   void begin(const FrameStep& step, FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept override;

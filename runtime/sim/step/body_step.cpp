@@ -213,7 +213,9 @@ const StepReport& BodyStep::take(const NewtonReport& newton) noexcept {
   add_newton_report(newton, report_);
   Workspace& workspace = workspace_;
   workspace.v = workspace.form.velocity_factor * (workspace.q - workspace.form.velocity_centre);
-  if (!are_finite(workspace.q) || !are_finite(workspace.v)) report_.status |= kStepNonFinite;
+  const bool finite = are_finite(workspace.q) && are_finite(workspace.v) && model_.frame->is_finite(workspace.frame) &&
+                      (!near_ || workspace.near->contact.force.allFinite());
+  if (!finite) report_.status |= kStepNonFinite;
   if (report_.status & kStepNonFinite) return report_;
   if (near_) {
     report_.contacts = workspace.near->contact.touching;

@@ -83,7 +83,7 @@ TEST_F(ApiWorldTest, AWorldOfASceneAndOneOfItsHostAreThatOfARunBitForBit) {
                 "grid": {"counts": [1, 2, 2], "spacing": [0.1, 0.15, 0.22]}}]})");
   const WorldConfig config = load_world(scene);
   const runtime::RunSummary expected = run(runtime::load_world_run(config), config);
-  ASSERT_GT(expected.most_pairs, 2);
+  ASSERT_GT(expected.most_pairs, 1);
 
   World of_scene = World::from_scene(scene);
   ASSERT_THAT(of_scene.ids(), ::testing::ElementsAre(0, 1, 2, 3));

@@ -82,5 +82,31 @@ TEST(Meetings, APileOfSoftBodiesGainsNoEnergy) {
   }
 }
 
+// Whatever they are given, a step is finite or says that it is not.
+TEST(Meetings, WhatOverflowsIsReported) {
+  for (const double speed : {1e10, 1e150, 1e306, 1e308})
+    for (const double stiffness : {5e-324, 1e7, 1e300}) {
+      SCOPED_TRACE(testing::Message() << speed << " m/s, " << stiffness << " N/m^3");
+      const test::Blocks blocks(1e-3);
+      World world({blocks.body({0, 0, 0}, {speed, 0, 0}), blocks.body({0.45, 0.02, 0}), blocks.body({0, 0.15, 0.05})},
+                  {stiffness, 0, 0.5});
+      for (int i = 0; i < 3; ++i) {
+        world.step(1);
+        for (int body = 0; body < world.count(); ++body) {
+          if ((world.report(body).status & kStepNonFinite) != 0) continue;
+          const FreeState& there = free_state(world.state(body));
+          EXPECT_TRUE(world.state(body).q.allFinite() && world.state(body).v.allFinite()) << body;
+          EXPECT_TRUE(there.position.allFinite() && there.angular_momentum.allFinite()) << body;
+        }
+        for (const HeldPair& pair : world.held()) {
+          EXPECT_TRUE(std::isfinite(pair.energy) && std::isfinite(pair.account));
+          for (const auto& side : pair.held)
+            for (const HeldBodyContact& contact : side)
+              EXPECT_TRUE(contact.stretch.allFinite() && contact.normal.allFinite() && std::isfinite(contact.gap));
+        }
+      }
+    }
+}
+
 }  // namespace
 }  // namespace exmat::runtime
