@@ -84,6 +84,9 @@ TEST_F(ApiWorldTest, AWorldOfASceneAndOneOfItsHostAreThatOfARunBitForBit) {
   const WorldConfig config = load_world(scene);
   const runtime::RunSummary expected = run(runtime::load_world_run(config), config);
   ASSERT_GT(expected.most_pairs, 1);
+  ASSERT_TRUE(expected.overlap) << "blocks of 0.2 m begin 0.15 m apart";
+  EXPECT_FALSE(expected.overlap->is_obstacle);
+  EXPECT_NEAR(expected.overlap->depth, 0.05, 1e-6);
 
   World of_scene = World::from_scene(scene);
   ASSERT_THAT(of_scene.ids(), ::testing::ElementsAre(0, 1, 2, 3));
