@@ -9,6 +9,7 @@
 #include "common/bundle/table_checks.h"
 #include "common/core/error.h"
 #include "common/hdf5/value_checks.h"
+#include "common/mesh/elements.h"
 
 namespace exmat {
 namespace {
@@ -235,6 +236,12 @@ void BundleReader::check_model(const ReducedModel& model) {
   attempt([&] { check_fixed_vertices(model); });
   if (model.targets) check_targets("/targets", *model.targets);
   if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
+  if (model.object && model.cubature)
+    attempt([&] { check_elements(*model.object, "/cubature", model.cubature->elements); });
+  if (model.object && model.target_space)
+    attempt([&] { check_elements(*model.object, "/target_space", model.target_space->elements); });
+  if (model.object && model.target_elasticity)
+    attempt([&] { check_elements(*model.object, "/target_elasticity", model.target_elasticity->elements); });
   for (const RegionData& region : model.regions) {
     const std::string path = "/regions/" + region.name;
     attempt([&] { check_example_indices(path + "/examples", region.examples); });
@@ -290,6 +297,19 @@ void BundleReader::check_target_knots(const std::string& folder, const TargetTab
   if (!is_sound(path) || !is_sound(folder + "/exponents")) return;
   if (const auto fault = check_knots(targets.knots, targets.exponents.cols()))
     refuse(path, fault->expected, fault->found);
+}
+
+// Where both the mesh and the elements have been read.
+void BundleReader::check_elements(const ObjectData& object, const std::string& group,
+                                  const IndexVector& elements) const {
+  for (const std::string& path : {group + "/elements", std::string("/object/vertices"), std::string("/object/tets"),
+                                  std::string("/object/youngs_modulus"), std::string("/object/poisson_ratio")})
+    if (!is_sound(path)) return;
+  const bool linear = object.materials.formulation == Formulation::kLinear;
+  const Eigen::Index count = linear ? object.mesh.tet_count() : elements_of(object.mesh, object.materials).count();
+  if (elements.maxCoeff() >= count)
+    refuse(group + "/elements", fmt::format("numbers of the {} elements of /object, from 0 on", count),
+           std::to_string(elements.maxCoeff()));
 }
 
 void BundleReader::check_barycentric(const RowMatrix& rows) const {

@@ -35,6 +35,8 @@ template <typename Object, typename Visitor>
 void visit_object(Object& object, Visitor& visit) {
   enter(kTopPlace, "/object", visit);
   visit.attribute("material", object.materials.model);
+  visit.attribute("formulation", object.materials.formulation);
+  visit.attribute("variance_factor", object.materials.variance_factor);
   visit.dataset("vertices", object.mesh.vertices);
   visit.dataset("tets", object.mesh.tets);
   visit.dataset("surface", object.surface);
@@ -111,6 +113,7 @@ void visit_cubature(Cubature& cubature, Visitor& visit) {
   visit.dataset("gradient", cubature.gradient);
   visit.dataset("youngs_modulus", cubature.youngs_modulus);
   visit.dataset("poisson_ratio", cubature.poisson_ratio);
+  visit.dataset("variance", cubature.variance);
   visit.dataset("heldout_poses", cubature.heldout_poses);
 }
 

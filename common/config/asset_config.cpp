@@ -56,6 +56,7 @@ class AssetReader {
     asset.material.youngs_modulus = optional_member<double>(material, "youngs_modulus");
     asset.material.poisson_ratio = optional_member<double>(material, "poisson_ratio");
     asset.material.density = optional_member<double>(material, "density");
+    asset.formulation = choice_or(json, "formulation", asset.formulation);
     const Json parts = member_or(json, "materials", Json::array());
     for (std::size_t i = 0; i < parts.size(); ++i) {
       const Json& part = parts[i];

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/elastic/material_model.h"
+#include "common/mesh/tet_mesh.h"
 #include "common/model/choices.h"
 
 namespace exmat {
@@ -153,7 +154,8 @@ struct AssetConfig {
   std::optional<double> cell_size;  ///< [m]
   MaterialConfig material;
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
-  std::optional<VertexSelection> fixed;                ///< absent: a free body
+  Formulation formulation = Formulation::kLinear;
+  std::optional<VertexSelection> fixed;  ///< absent: a free body
   DropConfig object_drop;
   std::optional<std::filesystem::path> render_mesh;  ///< surface that is drawn in the object's place
   std::vector<ExampleConfig> examples;

@@ -14,7 +14,7 @@ namespace exmat {
 // The contract between the two stages: what precompute builds, the bundle holds and the run time steps.
 // Symbols: n vertices, n_t tets, n_f surface triangles, m eigenfunctions, K examples, r modes, s cubature elements.
 
-/// Group /object: the rest mesh as given, in the world frame.
+/// Group /object: the rest mesh as given, in the world frame, and its material.
 struct ObjectData {
   TetMesh mesh;
   TriangleArray surface;   ///< n_f x 3, outward
@@ -72,12 +72,13 @@ struct ModalData {
 
 /// Group /cubature.
 struct CubatureData {
-  IndexVector elements;            ///< s, distinct tets of the object, ascending
+  IndexVector elements;            ///< s, distinct elements of the object (Elements), ascending
   Eigen::VectorXd weights;         ///< s, >= 0
   Eigen::VectorXd volumes;         ///< s [m^3]
   RowMatrix gradient;              ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
   Eigen::VectorXd youngs_modulus;  ///< s [Pa]
   Eigen::VectorXd poisson_ratio;   ///< s
+  RowMatrix variance;              ///< r x r, the constant part of the stiffness, of all elements; none: zero
   RowMatrix heldout_poses;         ///< N x r reduced poses that the held-out errors are measured on
   ForceMethod internal_force = ForceMethod::kCubature;  ///< what `auto` takes, one of the two others
   std::string internal_force_reason;                    ///< why
@@ -120,7 +121,7 @@ struct TargetSpaceData {
   double element_error = 0;        ///< largest found of what the elements lose of it
   RowMatrix poses;                 ///< K x d, the examples
   RowMatrix pull;                  ///< r x d, U^T P Y, Y [3n x d] the displacements
-  IndexVector elements;            ///< s, distinct tets of the object
+  IndexVector elements;            ///< s, distinct elements of the object
   Eigen::VectorXd weights;         ///< s, >= 0
   Eigen::VectorXd volumes;         ///< s [m^3]
   RowMatrix gradient;              ///< 9s x d (dataset s 9 d): row 3a + b of element j is dF_ab/dy
@@ -133,8 +134,8 @@ struct TargetSpaceData {
 /// /target_space. docs/method.md, "Force".
 struct TargetElasticityData {
   double heldout_error = 0;        ///< relative, of the force by these elements, as in CubatureData
-  IndexVector elements;            ///< s, distinct tets of the object, ascending
-  Eigen::VectorXd weights;         ///< s, >= 0; of a region times the tet's share in it
+  IndexVector elements;            ///< s, distinct elements of the object, ascending
+  Eigen::VectorXd weights;         ///< s, >= 0; of a region times the element's share in it
   Eigen::VectorXd volumes;         ///< s [m^3]
   RowMatrix gradient;              ///< 9s x r (dataset s 9 r): B_j, row 3a + b of element j is dF_ab/dq
   RowMatrix target_gradient;       ///< 9s x d (dataset s 9 d): G_j, likewise dF*_ab/dy

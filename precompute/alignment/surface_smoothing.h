@@ -1,7 +1,7 @@
 #pragma once
 
+#include "common/mesh/assembly.h"
 #include "common/mesh/tet_mesh.h"
-#include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
 

@@ -160,7 +160,8 @@ void pass_members(Archive& archive, TetMesh& value) {
 
 template <typename Archive>
 void pass_members(Archive& archive, TetMaterials& value) {
-  pass_all(archive, value.density, value.youngs_modulus, value.poisson_ratio, value.model);
+  pass_all(archive, value.density, value.youngs_modulus, value.poisson_ratio, value.model, value.formulation,
+           value.variance_factor);
 }
 
 template <typename Archive, typename First, typename Second>

@@ -18,7 +18,7 @@ namespace {
 constexpr double kEnergyWeight = 3;
 constexpr Eigen::Index kHeldoutPoses = 50;
 constexpr Eigen::Index kStiffnessPoses = 10;
-constexpr int kPasses = 4;                          // over meshes that offer a part of their tets in each
+constexpr int kPasses = 4;                          // over meshes that offer a part of their elements in each
 constexpr Eigen::Index kCandidatesPerElement = 16;  // in each of these passes: more lower no held-out error
 
 // The body in coordinates y = L^T q in which its stiffness at rest is the identity, L L^T = U^T K U: the norm of forces
@@ -39,7 +39,7 @@ class UnitBody {
   ElementSamples samples_;
 };
 
-// Sum of all tets' responses at the poses, and each tet's mean share of the energy.
+// Sum of all elements' responses at the poses, and each one's mean share of the energy.
 struct Totals {
   Responses responses;
   Eigen::VectorXd element_energies;
@@ -91,7 +91,7 @@ class TrainingRows {
   Eigen::ArrayXd force_scale_, energy_scale_;
 };
 
-// A systematic sample of tets over the order of their energies, `kept` always in it. Ascending.
+// A systematic sample of elements over the order of their energies, `kept` always in it. Ascending.
 std::vector<Eigen::Index> choose_candidates(const Eigen::VectorXd& energies, const std::vector<Eigen::Index>& kept,
                                             Eigen::Index limit, std::uint64_t seed) {
   std::vector<Eigen::Index> order(static_cast<std::size_t>(energies.size()));
@@ -129,18 +129,18 @@ SelectionProblem build_problem(const ElementSamples& samples, const PoseLanes& p
   return problem;
 }
 
-std::vector<Eigen::Index> to_tets(const std::vector<Eigen::Index>& candidates,
-                                  const std::vector<Eigen::Index>& members) {
-  std::vector<Eigen::Index> tets;
-  for (const Eigen::Index member : members) tets.push_back(candidates[static_cast<std::size_t>(member)]);
-  return tets;
+std::vector<Eigen::Index> elements_of_members(const std::vector<Eigen::Index>& candidates,
+                                              const std::vector<Eigen::Index>& members) {
+  std::vector<Eigen::Index> elements;
+  for (const Eigen::Index member : members) elements.push_back(candidates[static_cast<std::size_t>(member)]);
+  return elements;
 }
 
 std::vector<Eigen::Index> to_members(const std::vector<Eigen::Index>& candidates,
-                                     const std::vector<Eigen::Index>& tets) {
+                                     const std::vector<Eigen::Index>& elements) {
   std::vector<Eigen::Index> members;
-  for (const Eigen::Index tet : tets)
-    members.push_back(std::lower_bound(candidates.begin(), candidates.end(), tet) - candidates.begin());
+  for (const Eigen::Index element : elements)
+    members.push_back(std::lower_bound(candidates.begin(), candidates.end(), element) - candidates.begin());
   return members;
 }
 
@@ -149,8 +149,8 @@ struct Choice {
   Eigen::VectorXd weights;
 };
 
-Choice every_element(Eigen::Index tets) {
-  Choice choice{std::vector<Eigen::Index>(static_cast<std::size_t>(tets)), Eigen::VectorXd::Ones(tets)};
+Choice every_element(Eigen::Index count) {
+  Choice choice{std::vector<Eigen::Index>(static_cast<std::size_t>(count)), Eigen::VectorXd::Ones(count)};
   std::iota(choice.elements.begin(), choice.elements.end(), 0);
   return choice;
 }
@@ -256,36 +256,24 @@ Choice choose(const ElementSamples& samples, const CubatureOptions& options, con
                                               options.seed + 1000 + static_cast<unsigned>(pass));
     const auto problem = build_problem(samples, poses, rows, totals.responses, candidates);
     const StopRule tolerance_met{std::max<std::size_t>(1, r / 4), [&](const Selection& selection) {
-                                   return heldout->force_error(to_tets(candidates, selection.members),
+                                   return heldout->force_error(elements_of_members(candidates, selection.members),
                                                                selection.weights) <= *options.tolerance;
                                  }};
     const std::size_t count = target * static_cast<std::size_t>(pass + 1) / static_cast<std::size_t>(passes);
     const auto selection =
         select(problem, options, count, to_members(candidates, choice.elements), open_ended ? &tolerance_met : nullptr);
-    choice = {to_tets(candidates, selection.members), selection.weights};
+    choice = {elements_of_members(candidates, selection.members), selection.weights};
     progress.advance();
     if (open_ended && heldout->force_error(choice.elements, choice.weights) <= *options.tolerance) break;
   }
   return choice;
 }
 
-void set_elements(const ElementSamples& samples, const TetMaterials& materials, const Choice& choice,
-                  CubatureData& data) {
-  const auto s = static_cast<Eigen::Index>(choice.elements.size());
-  data.elements.resize(s);
+CubatureData data_of(const ElementSamples& samples, const Choice& choice) {
+  CubatureData data = samples.data_of(choice.elements);
   data.weights = choice.weights;
-  data.volumes.resize(s);
-  data.gradient.resize(9 * s, samples.modes());
-  data.youngs_modulus.resize(s);
-  data.poisson_ratio.resize(s);
-  for (Eigen::Index j = 0; j < s; ++j) {
-    const Eigen::Index tet = choice.elements[static_cast<std::size_t>(j)];
-    data.elements[j] = static_cast<std::int32_t>(tet);
-    data.volumes[j] = samples.volume(tet);
-    data.gradient.middleRows(9 * j, 9) = samples.gradient(tet);
-    data.youngs_modulus[j] = materials.youngs_modulus[tet];
-    data.poisson_ratio[j] = materials.poisson_ratio[tet];
-  }
+  data.variance = samples.variance();
+  return data;
 }
 
 Choice choice_of(const CubatureData& data) { return {{data.elements.begin(), data.elements.end()}, data.weights}; }
@@ -306,9 +294,10 @@ struct HeldoutMeter {
   }
 };
 
-void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
-  if (options.elements && *options.elements > tets)
-    throw InputError({"", "/cubature/elements", "at most the number of tets, " + std::to_string(tets),
+void require_sound_options(const CubatureOptions& options, Eigen::Index elements) {
+  if (options.elements && *options.elements > elements)
+    throw InputError({"", "/cubature/elements",
+                      "at most the number of elements of the mesh, " + std::to_string(elements),
                       std::to_string(*options.elements), ""});
   if (options.tolerance && options.method == CubatureMethod::kNnHtp)
     throw InputError({"", "/cubature/tolerance", "cubature.elements with method nn_htp, which needs a fixed number",
@@ -322,17 +311,15 @@ void require_sound_options(const CubatureOptions& options, Eigen::Index tets) {
 
 CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis) {
   const ElementSamples samples(mesh, materials, basis);
-  CubatureData data;
+  CubatureData data = data_of(samples, every_element(samples.count()));
   data.method = CubatureMethod::kAllElements;
-  set_elements(samples, materials, every_element(samples.count()), data);
   return data;
 }
 
 CubatureData with_basis(const CubatureData& other, const TetMesh& mesh, const TetMaterials& materials,
                         const RowMatrix& basis) {
-  CubatureData data;
+  CubatureData data = data_of(ElementSamples(mesh, materials, basis), choice_of(other));
   data.method = other.method;
-  set_elements(ElementSamples(mesh, materials, basis), materials, choice_of(other), data);
   return data;
 }
 
@@ -345,17 +332,16 @@ CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& material
 
 CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                             const CubatureOptions& options) {
-  require_sound_options(options, mesh.tet_count());
-  const UnitBody body(mesh, materials, source);
   const ElementSamples samples(mesh, materials, source.basis);
+  require_sound_options(options, samples.count());
+  const UnitBody body(mesh, materials, source);
   const RowMatrix training_poses = draw_poses(source, options.training_poses, options.seed);
   const ErrorMeter training(body, training_poses);
   std::optional<HeldoutMeter> heldout;
   if (options.measured || options.tolerance) heldout.emplace(body, source, options);
   const Choice choice = choose(body.samples(), options, training, heldout ? &heldout->meter : nullptr);
-  CubatureData data;
+  CubatureData data = data_of(samples, choice);
   data.method = options.method;
-  set_elements(samples, materials, choice, data);
   data.training_error = training.force_error(choice.elements, choice.weights);
   if (heldout) heldout->measure(samples, choice, data);
   if (options.tolerance && data.heldout_error > *options.tolerance)

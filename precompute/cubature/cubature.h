@@ -13,11 +13,12 @@ struct CubatureOptions {
   CubatureMethod method = CubatureMethod::kGreedySwap;  ///< all elements have neither of these
   int training_poses = 200;
   std::uint64_t seed = 1;
-  /// Most entries of the training matrix [(r + 1) poses x candidates], 8 bytes each: where all tets would be more, each
-  /// of four passes chooses from as many as fit, a systematic sample over the order of their energies, beside those
-  /// that it has.
+  /// Most entries of the training matrix [(r + 1) poses x candidates], 8 bytes each: where all elements would be more,
+  /// each of four passes chooses from as many as fit, a systematic sample over the order of their energies, beside
+  /// those that it has.
   std::int64_t training_entries = 50'000'000;
-  bool measured = true;  ///< on held-out poses, which takes as long as the rest where tets are many; else errors of 0
+  bool measured =
+      true;  ///< on held-out poses, which takes as long as the rest where elements are many; else errors of 0
 };
 
 /// What the stage cache keeps of it.
@@ -37,7 +38,7 @@ CubatureErrors cubature_errors(const TetMesh& mesh, const TetMaterials& material
                                const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
                                const RowMatrix& poses);
 
-/// All tets with the weight 1, no errors measured.
+/// All elements with the weight 1, no errors measured.
 CubatureData all_elements(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis);
 
 /// The elements and weights of `other` for another basis, no errors measured.

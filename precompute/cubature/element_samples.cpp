@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "common/mesh/geometry.h"
 #include "runtime/sim/elasticity/element_potential.h"
 
 namespace exmat::precompute {
@@ -13,7 +12,7 @@ using runtime::ElementArrays;
 using runtime::ElementLaw;
 using runtime::kLanes;
 
-constexpr Eigen::Index kAtOnce = 64;       // tets whose B the second-level cache holds
+constexpr Eigen::Index kAtOnce = 64;       // elements whose B the second-level cache holds
 constexpr Eigen::Index kPartialSums = 64;  // whatever the number of threads: sums do not depend on it
 
 ElementLaw law_of(MaterialModel model, const double* mu, const double* lambda) {
@@ -46,35 +45,61 @@ Eigen::VectorXd Responses::energies() const {
 }
 
 ElementSamples::ElementSamples(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis)
-    : mesh_(mesh), materials_(materials), basis_(basis), volumes_(tet_volumes(mesh)) {}
+    : mesh_(mesh), materials_(materials), basis_(basis), elements_(elements_of(mesh, materials)) {}
 
-LameParameters ElementSamples::lame(Eigen::Index tet) const {
-  return lame_parameters(materials_.youngs_modulus[tet], materials_.poisson_ratio[tet]);
-}
-
-RowMatrix ElementSamples::gradient(Eigen::Index tet) const {
+RowMatrix ElementSamples::gradient(Eigen::Index element) const {
   RowMatrix B(9, modes());
-  write_gradient(tet, modes(), B.data());
+  write_gradient(element, modes(), B.data());
   return B;
 }
 
-// Rows `stride` apart.
-void ElementSamples::write_gradient(Eigen::Index tet, Eigen::Index stride, double* numbers) const {
-  const auto shape = shape_gradients(tet_positions(mesh_, tet));
-  Eigen::Map<RowMatrix, 0, Eigen::OuterStride<>> B(numbers, 9, modes(), Eigen::OuterStride<>(stride));
-  B.setZero();
-  for (int corner = 0; corner < 4; ++corner)
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) B.row(3 * a + b) += shape(corner, b) * basis_.row(3 * mesh_.tets(tet, corner) + a);
+CubatureData ElementSamples::data_of(const std::vector<Eigen::Index>& elements) const {
+  const auto s = std::ssize(elements);
+  CubatureData data;
+  data.elements.resize(s);
+  data.gradient.resize(9 * s, modes());
+  for (Eigen::Index j = 0; j < s; ++j) {
+    const Eigen::Index element = elements[static_cast<std::size_t>(j)];
+    data.elements[j] = static_cast<std::int32_t>(element);
+    data.gradient.middleRows<9>(9 * j) = gradient(element);
+  }
+  data.volumes = elements_.volumes(elements);
+  data.youngs_modulus = elements_.youngs_modulus(elements);
+  data.poisson_ratio = elements_.poisson_ratio(elements);
+  return data;
 }
 
-void ElementSamples::respond(Eigen::Index tet, const PoseLanes& poses, Responses& responses) const {
+RowMatrix ElementSamples::variance() const {
+  const SparseMatrix S = variance_matrix(mesh_, materials_, elements_);
+  RowMatrix sum = RowMatrix::Zero(modes(), modes());
+  for (Eigen::Index row = 0; row < S.outerSize(); ++row) {
+    RowMatrix image = RowMatrix::Zero(3, modes());
+    for (SparseMatrix::InnerIterator entry(S, row); entry; ++entry)
+      image += entry.value() * basis_.middleRows<3>(3 * entry.col());
+    sum += basis_.middleRows<3>(3 * row).transpose() * image;
+  }
+  return 0.5 * (sum + sum.transpose());  // without the rounding of a product that is symmetric
+}
+
+// Rows `stride` apart.
+void ElementSamples::write_gradient(Eigen::Index element, Eigen::Index stride, double* numbers) const {
+  const auto vertices = elements_.vertices_of(element);
+  const auto shape = elements_.gradients_of(element);
+  Eigen::Map<RowMatrix, 0, Eigen::OuterStride<>> B(numbers, 9, modes(), Eigen::OuterStride<>(stride));
+  B.setZero();
+  for (std::size_t j = 0; j < vertices.size(); ++j)
+    for (int a = 0; a < 3; ++a)
+      for (int b = 0; b < 3; ++b)
+        B.row(3 * a + b) += shape(static_cast<Eigen::Index>(j), b) * basis_.row(3 * vertices[j] + a);
+}
+
+void ElementSamples::respond(Eigen::Index element, const PoseLanes& poses, Responses& responses) const {
   const Eigen::Index r = modes(), stride = runtime::padded(r);
   thread_local AlignedArray B;
   if (B.size() != 9 * stride) B = AlignedArray(9 * stride);
-  write_gradient(tet, stride, B.data());
-  const auto parameters = lame(tet);
-  const double mu = volumes_[tet] * parameters.mu, lambda = volumes_[tet] * parameters.lambda;
+  write_gradient(element, stride, B.data());
+  const auto parameters = lame(element);
+  const double mu = volume(element) * parameters.mu, lambda = volume(element) * parameters.lambda;
   const ElementArrays arrays{1, r, stride, nullptr, B.data(), nullptr, 1};
   const ElementLaw law = law_of(materials_.model, &mu, &lambda);
   for (Eigen::Index g = 0; g < poses.groups(); ++g) {
@@ -84,7 +109,7 @@ void ElementSamples::respond(Eigen::Index tet, const PoseLanes& poses, Responses
 }
 
 // Of kLanes poses, in the layout of the kernels.
-void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights, Part part,
+void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights, Part part,
                                    const PoseLanes& poses, std::vector<AlignedArray>& sums) const {
   const Eigen::Index r = modes(), stride = runtime::padded(r);
   AlignedArray B(kAtOnce * 9 * stride), mu(kAtOnce), lambda(kAtOnce), force(r * kLanes),
@@ -93,11 +118,11 @@ void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const 
   for (Eigen::Index first = part.begin; first < part.end; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, part.end - first);
     for (Eigen::Index e = 0; e < count; ++e) {
-      const Eigen::Index tet = tets[static_cast<std::size_t>(first + e)];
-      const auto parameters = lame(tet);
-      write_gradient(tet, stride, B.data() + e * 9 * stride);
-      mu[e] = weights[first + e] * volumes_[tet] * parameters.mu;
-      lambda[e] = weights[first + e] * volumes_[tet] * parameters.lambda;
+      const Eigen::Index element = elements[static_cast<std::size_t>(first + e)];
+      const auto parameters = lame(element);
+      write_gradient(element, stride, B.data() + e * 9 * stride);
+      mu[e] = weights[first + e] * volume(element) * parameters.mu;
+      lambda[e] = weights[first + e] * volume(element) * parameters.lambda;
     }
     const ElementArrays arrays{runtime::padded(count) / kLanes, r, stride, nullptr, B.data(), nullptr, count};
     const ElementLaw law = law_of(materials_.model, mu.data(), lambda.data());
@@ -109,15 +134,15 @@ void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& tets, const 
   }
 }
 
-std::vector<Eigen::MatrixXd> ElementSamples::stiffness(const std::vector<Eigen::Index>& tets,
+std::vector<Eigen::MatrixXd> ElementSamples::stiffness(const std::vector<Eigen::Index>& elements,
                                                        const Eigen::VectorXd& weights, const PoseLanes& poses) const {
   const Eigen::Index r = modes();
   using Sums = std::vector<AlignedArray>;
   const Sums zeros(static_cast<std::size_t>(poses.groups()), AlignedArray(runtime::lane_triangle(r)));
-  const std::vector<Part> parts = parts_of(std::ssize(tets));
+  const std::vector<Part> parts = parts_of(std::ssize(elements));
   std::vector<Sums> partial(parts.size(), zeros);
 #pragma omp parallel for schedule(dynamic)
-  for (std::size_t i = 0; i < parts.size(); ++i) add_stiffness(tets, weights, parts[i], poses, partial[i]);
+  for (std::size_t i = 0; i < parts.size(); ++i) add_stiffness(elements, weights, parts[i], poses, partial[i]);
   std::vector<Eigen::MatrixXd> stiffness(static_cast<std::size_t>(poses.count()), Eigen::MatrixXd::Zero(r, r));
   for (const Sums& sums : partial)
     for (Eigen::Index p = 0; p < poses.count(); ++p)

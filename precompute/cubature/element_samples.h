@@ -3,13 +3,14 @@
 #include <vector>
 
 #include "common/core/arrays.h"
-#include "common/elastic/material.h"
-#include "common/mesh/tet_mesh.h"
+#include "common/mesh/assembly.h"
+#include "common/mesh/elements.h"
+#include "common/model/reduced_model.h"
 #include "runtime/kernels/aligned_array.h"
 
 namespace exmat::precompute {
 
-/// What is summed by itself where tets are many: the same parts, and so the same sum, for every number of threads.
+/// What is summed by itself where elements are many: the same parts, and so the same sum, for every number of threads.
 struct Part {
   Eigen::Index begin = 0, end = 0;
 };
@@ -30,8 +31,9 @@ class PoseLanes {
   runtime::AlignedArray numbers_;
 };
 
-/// Reduced forces [r] and energies of one tet or a sum of tets at N poses, as the kernels leave them: for each group of
-/// kLanes poses r rows of forces and one of energies, a pose in each column. Columns after the last pose are zeros.
+/// Reduced forces [r] and energies of one element or a sum of elements at N poses, as the kernels leave them: for each
+/// group of kLanes poses r rows of forces and one of energies, a pose in each column. Columns after the last pose are
+/// zeros.
 class Responses {
  public:
   Responses(Eigen::Index modes, const PoseLanes& poses)
@@ -57,37 +59,44 @@ class Responses {
   runtime::AlignedArray numbers_;
 };
 
-/// Reduced elasticity of single tets: what cubature chooses from, and the sum over all of them.
+/// Reduced elasticity of single elements: what cubature chooses from, and the sum over all of them.
 class ElementSamples {
  public:
-  /// `basis` is U, 3n x r. All three must outlive this.
+  /// `basis` is U, 3n x r. It and the mesh must outlive this.
   ElementSamples(const TetMesh& mesh, const TetMaterials& materials, const RowMatrix& basis);
 
-  Eigen::Index count() const { return mesh_.tet_count(); }
+  const Elements& elements() const { return elements_; }
+  Eigen::Index count() const { return elements_.count(); }
   Eigen::Index modes() const { return basis_.cols(); }
-  double volume(Eigen::Index tet) const { return volumes_[tet]; }
+  double volume(Eigen::Index element) const { return elements_.volumes[element]; }
+  LameParameters lame(Eigen::Index element) const { return elements_.lame(element); }
 
   /// [9 x r] B_j = dF/dq, row 3a + b.
-  RowMatrix gradient(Eigen::Index tet) const;
+  RowMatrix gradient(Eigen::Index element) const;
 
-  /// Of one tet, times its volume; `responses` has the size that the poses ask for.
-  void respond(Eigen::Index tet, const PoseLanes& poses, Responses& responses) const;
+  /// Elements, volumes, gradients and parameters of some of them; weights are the caller's to set.
+  CubatureData data_of(const std::vector<Eigen::Index>& elements) const;
 
-  /// [r x r] at each of the poses: the sum of the reduced stiffnesses of tets, times weights [s] and volumes. The same
-  /// for every number of threads.
-  std::vector<Eigen::MatrixXd> stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights,
+  /// [r x r] U^T (S x I) U, the constant part of the stiffness; zero of linear elements.
+  RowMatrix variance() const;
+
+  /// Of one element, times its volume; `responses` has the size that the poses ask for.
+  void respond(Eigen::Index element, const PoseLanes& poses, Responses& responses) const;
+
+  /// [r x r] at each of the poses: the sum of the reduced stiffnesses of elements, times weights [s] and volumes,
+  /// without the constant part. The same for every number of threads.
+  std::vector<Eigen::MatrixXd> stiffness(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights,
                                          const PoseLanes& poses) const;
 
  private:
-  LameParameters lame(Eigen::Index tet) const;
-  void write_gradient(Eigen::Index tet, Eigen::Index stride, double* numbers) const;
-  void add_stiffness(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights, Part part,
+  void write_gradient(Eigen::Index element, Eigen::Index stride, double* numbers) const;
+  void add_stiffness(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights, Part part,
                      const PoseLanes& poses, std::vector<runtime::AlignedArray>& sums) const;
 
   const TetMesh& mesh_;
   const TetMaterials& materials_;
   const RowMatrix& basis_;
-  Eigen::VectorXd volumes_;
+  Elements elements_;
 };
 
 }  // namespace exmat::precompute

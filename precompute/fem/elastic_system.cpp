@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
+#include <utility>
 
 #include "common/core/error.h"
 
@@ -13,10 +14,10 @@ namespace {
 constexpr double kClampRank = 1e-6;
 
 // [3n x 6] translations and rotations about `centre`.
-Eigen::MatrixXd raw_rigid_motions(const TetMesh& mesh, const Eigen::Vector3d& centre) {
-  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3 * mesh.vertex_count(), 6);
-  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
-    const Eigen::Vector3d x = mesh.vertices.row(v).transpose() - centre;
+Eigen::MatrixXd raw_rigid_motions(const VertexArray& nodes, const Eigen::Vector3d& centre) {
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(3 * nodes.rows(), 6);
+  for (Eigen::Index v = 0; v < nodes.rows(); ++v) {
+    const Eigen::Vector3d x = nodes.row(v).transpose() - centre;
     for (int axis = 0; axis < 3; ++axis) {
       motions(3 * v + axis, axis) = 1;
       motions.block<3, 1>(3 * v, 3 + axis) = Eigen::Vector3d::Unit(axis).cross(x);
@@ -26,10 +27,10 @@ Eigen::MatrixXd raw_rigid_motions(const TetMesh& mesh, const Eigen::Vector3d& ce
 }
 
 // Whatever the rest of the body is like: a clamp may be small beside it.
-void require_clamped(const TetMesh& mesh, const FlagVector& fixed) {
+void require_clamped(const VertexArray& nodes, const FlagVector& fixed) {
   Eigen::MatrixX3d points(fixed.cast<Eigen::Index>().sum(), 3);
-  for (Eigen::Index v = 0, row = 0; v < mesh.vertex_count(); ++v)
-    if (fixed[v] != 0) points.row(row++) = mesh.vertices.row(v);
+  for (Eigen::Index v = 0, row = 0; v < nodes.rows(); ++v)
+    if (fixed[v] != 0) points.row(row++) = nodes.row(v);
   points.rowwise() -= points.colwise().mean().eval();
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(points.transpose() * points);
   const auto& squares = svd.singularValues();
@@ -49,20 +50,20 @@ Eigen::MatrixXd ElasticSystem::extend(const Eigen::MatrixXd& free_rows) const {
   return fields;
 }
 
-MassProperties mass_properties(const TetMesh& mesh, const SparseMatrix& mass) {
+MassProperties mass_properties(const VertexArray& nodes, const SparseMatrix& mass) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(mass.rows());
   const Eigen::VectorXd row_sums = mass * ones;
   MassProperties properties;
-  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v) {
+  for (Eigen::Index v = 0; v < nodes.rows(); ++v) {
     properties.mass += row_sums[3 * v];
-    properties.centre += row_sums[3 * v] * mesh.vertices.row(v).transpose();
+    properties.centre += row_sums[3 * v] * nodes.row(v).transpose();
   }
   properties.centre /= properties.mass;
   return properties;
 }
 
-Eigen::MatrixXd rigid_motions(const TetMesh& mesh, const SparseMatrix& mass) {
-  Eigen::MatrixXd motions = raw_rigid_motions(mesh, mass_properties(mesh, mass).centre);
+Eigen::MatrixXd rigid_motions(const VertexArray& nodes, const SparseMatrix& mass) {
+  Eigen::MatrixXd motions = raw_rigid_motions(nodes, mass_properties(nodes, mass).centre);
   for (int pass = 0; pass < 2; ++pass) {
     const Eigen::MatrixXd gram = motions.transpose() * (mass * motions);
     gram.llt().matrixU().solveInPlace<Eigen::OnTheRight>(motions);
@@ -71,26 +72,32 @@ Eigen::MatrixXd rigid_motions(const TetMesh& mesh, const SparseMatrix& mass) {
 }
 
 ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed) {
+  return eliminate_fixed(mesh.vertices, expand_to_vectors(scalar_mass(mesh, materials.density)),
+                         elastic_stiffness(mesh, materials), fixed);
+}
+
+ElasticSystem eliminate_fixed(const VertexArray& nodes, SparseMatrix mass, SparseMatrix stiffness,
+                              const FlagVector& fixed) {
   ElasticSystem system;
-  system.full_mass = expand_to_vectors(scalar_mass(mesh, materials.density));
-  system.full_stiffness = elastic_stiffness(mesh, materials);
-  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v)
+  system.full_mass = std::move(mass);
+  system.full_stiffness = std::move(stiffness);
+  for (Eigen::Index v = 0; v < nodes.rows(); ++v)
     for (int axis = 0; fixed[v] == 0 && axis < 3; ++axis)
       system.free_dofs.push_back(static_cast<std::int32_t>(3 * v + axis));
   const auto size = static_cast<Eigen::Index>(system.free_dofs.size());
   if (size == system.full_mass.rows()) {
     system.mass = system.full_mass;
     system.stiffness = system.full_stiffness;
-    system.null_space = system.rigid = rigid_motions(mesh, system.full_mass);
+    system.null_space = system.rigid = rigid_motions(nodes, system.full_mass);
     return system;
   }
   if (size == 0)
     throw InputError({"", "/object/fixed", "a vertex that is free to move", "all of them fixed", "fix fewer"});
-  require_clamped(mesh, fixed);
+  require_clamped(nodes, fixed);
   system.mass = submatrix(system.full_mass, system.free_dofs);
   system.stiffness = submatrix(system.full_stiffness, system.free_dofs);
   system.null_space.resize(size, 0);
-  system.rigid = system.restrict(rigid_motions(mesh, system.full_mass));
+  system.rigid = system.restrict(rigid_motions(nodes, system.full_mass));
   return system;
 }
 

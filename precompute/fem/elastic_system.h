@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/core/arrays.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 
 namespace exmat::precompute {
 
@@ -30,14 +30,18 @@ struct ElasticSystem {
 /// vertices are all there are, or leave the body a rigid motion: they must be at least three and not lie on one line.
 ElasticSystem build_elastic_system(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed);
 
-/// [3n x 6] translations along and rotations about the axes through the centre of mass, M-orthonormal.
-Eigen::MatrixXd rigid_motions(const TetMesh& mesh, const SparseMatrix& mass);
+/// The same of any mass and stiffness [3n x 3n] of `nodes` [n x 3].
+ElasticSystem eliminate_fixed(const VertexArray& nodes, SparseMatrix mass, SparseMatrix stiffness,
+                              const FlagVector& fixed);
 
-/// Total mass [kg] and centre of mass [m] of the [3n x 3n] mass matrix of a mesh.
+/// [3n x 6] translations along and rotations about the axes through the centre of mass, M-orthonormal.
+Eigen::MatrixXd rigid_motions(const VertexArray& nodes, const SparseMatrix& mass);
+
+/// Total mass [kg] and centre of mass [m] of the [3n x 3n] mass matrix of nodes.
 struct MassProperties {
   double mass = 0;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
 };
-MassProperties mass_properties(const TetMesh& mesh, const SparseMatrix& mass);
+MassProperties mass_properties(const VertexArray& nodes, const SparseMatrix& mass);
 
 }  // namespace exmat::precompute

@@ -2,8 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "common/mesh/assembly.h"
 #include "common/mesh/tet_mesh.h"
-#include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
 

@@ -36,16 +36,16 @@ ExamplePoses known_example_poses(const ReducedModel& model, const std::string& r
 /// Example forces without a modal basis, of which those of docs/step_in_detail.md, "Target", are the Galerkin
 /// projection: with the m eigenfunctions Phi of the shape space, T u = Lambda Phi^T (M_s/V) u / V^(1/3), and the filter
 /// P u = M Phi Phi^T (M_s/V) u, U^T P U = T^+ T, and of a region D''^T P D''. f free degrees of freedom, K examples.
-/// All tets take part in the energies of the target.
+/// All elements take part in the energies of the target.
 class FullSpaceExamples {
  public:
-  /// Of `poses` no more than the view is kept. Tets that an example turns inside out are left out of the energies of
-  /// the examples where these start from the examples.
+  /// Of `poses` no more than the view is kept. Elements that an example turns inside out are left out of the energies
+  /// of the examples where these start from the examples.
   FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                     EnergyReference reference);
 
   Eigen::Index count() const { return weights_.examples(); }
-  Eigen::Index left_out_tets() const { return left_out_; }
+  Eigen::Index left_out_elements() const { return left_out_; }
 
   /// [n_t] shares of the tets in an elastic force; none of the whole body, where all have 1.
   const std::optional<Eigen::VectorXd>& tet_shares() const { return tet_shares_; }
@@ -62,7 +62,8 @@ class FullSpaceExamples {
   const Eigen::MatrixXd& pose_basis() const { return coordinates_.basis; }
   Eigen::VectorXd pose(Eigen::Index k) const { return coordinates_.poses.col(k); }
 
-  /// Minimises the energies of the examples over the tets, in coordinates y [d]: the displacement is [f x d] fields y.
+  /// Minimises the energies of the examples over the elements, in coordinates y [d]: the displacement is [f x d] fields
+  /// y.
   const runtime::TargetSolver& target() const { return target_; }
   const Eigen::MatrixXd& target_fields() const { return target_fields_; }
 

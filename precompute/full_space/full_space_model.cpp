@@ -14,9 +14,9 @@ VertexArray as_rows(const Eigen::VectorXd& field) { return field.reshaped<Eigen:
 void add_examples(const ReducedModel& model, const FullSpaceOptions& options, FullSpaceModel& full) {
   const auto add = [&](const ExamplePoses& poses, EnergyReference reference, const std::string& owner) {
     const auto& added = full.examples.emplace_back(model, full.system, poses, reference);
-    if (const Eigen::Index left_out = added.left_out_tets(); left_out > 0)
+    if (const Eigen::Index left_out = added.left_out_elements(); left_out > 0)
       log::warning(owner + ": the energies of the target leave out " + std::to_string(left_out) + " of " +
-                   std::to_string(model.object->mesh.tet_count()) + " tets, which an example turns inside out");
+                   std::to_string(full.elasticity.elements()) + " elements, which an example turns inside out");
   };
   const bool known = !options.coordinates.empty();
   if (options.whole_body)

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/elastic/material.h"
+#include "common/mesh/elements.h"
 #include "common/mesh/tet_mesh.h"
 #include "runtime/sim/elasticity/element_potential.h"
 
@@ -13,26 +14,28 @@ namespace exmat::precompute {
 /// Lower triangle of a symmetric [f x f] matrix, by columns.
 using LowerTriangle = Eigen::SparseMatrix<double>;
 
-/// Elastic energy of a mesh by all of its tets, its force and stiffness. The displacements u [f] are those of the free
-/// degrees of freedom, the others are 0. Linear elements: F is constant in each tet. Bonet and Wood 2008, sections 9.3
-/// and 9.4.
+/// Elastic energy of a mesh by all of its elements, its force and stiffness. The displacements u [f] are those of the
+/// free degrees of freedom, the others are 0. Bonet and Wood 2008, sections 9.3 and 9.4; see Elements.
 class MeshElasticity {
  public:
   MeshElasticity() = default;
-  /// `free_dofs` of the 3n ascend.
+  /// `free_dofs` of the 3n ascend, three of each free vertex.
   MeshElasticity(const TetMesh& mesh, const TetMaterials& materials, const std::vector<std::int32_t>& free_dofs);
 
   Eigen::Index size() const { return size_; }
-  Eigen::Index tet_count() const { return static_cast<Eigen::Index>(gradients_.size()); }
+  Eigen::Index elements() const { return elements_.count(); }
 
   /// Zeros where a stiffness or a mass matrix of the mesh has entries.
   const LowerTriangle& pattern() const { return pattern_; }
 
-  /// The shape of no energy that displacements start from, instead of that of the mesh: [n x 3]. Tets that it turns
-  /// inside out are left out of all sums; returns their number.
+  /// The shape of no energy that displacements start from, instead of that of the mesh: [n x 3]. Energies are
+  /// V det F* Psi(F F*^-1) of each element, F* its deformation gradient there; without the variance term, which a
+  /// rotation of a bent shape would change. Elements that it turns inside out are left out of all sums; returns their
+  /// number.
   Eigen::Index set_undeformed(const VertexArray& positions);
 
-  /// Counts each tet by its share [n_t] >= 0 in all sums, for good; 0 leaves it out.
+  /// Counts each tet by its share [n_t] >= 0 in the sums over elements, for good; 0 leaves it out. Before
+  /// set_undeformed().
   void set_shares(const Eigen::VectorXd& shares);
 
   /// [J].
@@ -49,27 +52,31 @@ class MeshElasticity {
   Eigen::VectorXd values_of(const Eigen::SparseMatrix<double, Eigen::RowMajor>& matrix) const;
 
  private:
-  using Gradients = Eigen::Matrix<double, 4, 3>;
-  using Corners = Eigen::Matrix<std::int32_t, 12, 1>;
-  using Slots = Eigen::Matrix<std::int32_t, 12, 12>;
-
   void build_pattern();
-  Eigen::Matrix3d displacement_gradient(Eigen::Index tet, const Eigen::VectorXd& u) const;
-  void add_force(Eigen::Index tet, const Eigen::Matrix3d& stress, Eigen::VectorXd& force) const;
-  void add_stiffness(Eigen::Index tet, const Matrix9& tangent, double* values) const;
+  void build_variance();
+  Eigen::Matrix3d displacement_gradient(Eigen::Index element, const Eigen::VectorXd& u) const;
+  void add_force(Eigen::Index element, const Eigen::Matrix3d& stress, Eigen::VectorXd& force) const;
+  void add_stiffness(Eigen::Index element, const Matrix9& tangent, double* values) const;
+  double add_variance(const Eigen::VectorXd& u, Eigen::VectorXd* force) const;
   template <typename Work>
-  void for_each_tet(const Eigen::VectorXd& u, Work&& work) const;
+  void for_each_element(const Eigen::VectorXd& u, Work&& work) const;
 
   Eigen::Index size_ = 0;
-  MaterialModel material_ = MaterialModel::kStVenantKirchhoff;
-  TetArray tets_;
-  Eigen::VectorXd shares_;  // none: all 1
-  std::vector<LameParameters> lame_;
-  std::vector<Gradients> gradients_;  // of the shape functions
-  Eigen::VectorXd volumes_;           // times the share; 0 where a tet is left out
-  std::vector<Corners> dofs_;         // of each tet; -1 where fixed
-  std::vector<Slots> slots_;          // places of a tet's stiffness among the values; -1 where there is none
+  TetMesh mesh_;
+  TetMaterials materials_;
+  Elements elements_;
+  std::vector<std::int32_t> unknowns_;       // of each vertex, its first; -1 where fixed
+  decltype(Elements::gradients) gradients_;  // of the elements, from the undeformed shape on
+  Eigen::VectorXd rest_volumes_;             // of the elements, times the share
+  Eigen::VectorXd volumes_;                  // of the undeformed shape; 0 where an element is left out
+  // Of each element the places among the values of the blocks of its pairs of vertices i, j that are free, that of i
+  // not before that of j, row by row in the element's order: the first entry of the first column.
+  std::vector<std::size_t> starts_;
+  std::vector<std::int32_t> slots_;
   LowerTriangle pattern_;
+  Eigen::SparseMatrix<double, Eigen::RowMajor> variance_;  // f/3 x f/3
+  Eigen::VectorXd variance_values_;                        // on pattern_
+  bool has_variance_ = false;
 };
 
 }  // namespace exmat::precompute

@@ -45,7 +45,9 @@ TetMaterials object_materials(const AssetConfig& asset, const TetMesh& file_mesh
   TetMaterials materials{base(asset.material.density, "density", &TetMaterials::density),
                          base(asset.material.youngs_modulus, "youngs_modulus", &TetMaterials::youngs_modulus),
                          base(asset.material.poisson_ratio, "poisson_ratio", &TetMaterials::poisson_ratio),
-                         asset.material.model};
+                         asset.material.model,
+                         asset.formulation,
+                         asset.formulation == Formulation::kSmoothed ? kVarianceFactor : 0};
   for (const MaterialRegionConfig& region : asset.material_regions) {
     const auto tets = select_tets(file_mesh, sets, region.tets, asset.file.string());
     if (const auto* file = std::get_if<FileSelection>(&region.tets)) files.push_back(file->file);

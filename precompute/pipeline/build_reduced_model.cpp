@@ -16,6 +16,7 @@
 #include "precompute/examples/alignment_report.h"
 #include "precompute/examples/example_finish.h"
 #include "precompute/fem/elastic_system.h"
+#include "precompute/fem/mesh_stiffness.h"
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/inputs/object_size.h"
 #include "precompute/modes/linear_modes.h"
@@ -99,6 +100,7 @@ class Pipeline {
     return timed_stage(stage, report_, work);
   }
 
+  void choose_variance();
   ObjectData object_data() const;
   void require_modes(const ElasticSystem& system) const;
   void leave_out(const std::string& group, const std::string& reason);
@@ -130,6 +132,22 @@ class Pipeline {
 
 ObjectData Pipeline::object_data() const {
   return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials};
+}
+
+// Smoothed elements as stiff as quadratic tets of the same mesh.
+void Pipeline::choose_variance() {
+  TetMaterials& materials = object_.materials;
+  if (materials.formulation != Formulation::kSmoothed) return;
+  const auto found = timed("stiffness of the mesh", [&] {
+    return cache_.get(
+        "stiffness of the mesh", [&] { return mesh_stiffness(object_.mesh, materials, object_.fixed, asset_.name); },
+        object_.mesh, materials, object_.fixed);
+  });
+  if (!found) return log::info(fmt::format("elements: smoothed, beta {}, not compared", materials.variance_factor));
+  materials.variance_factor = found->variance_factor;
+  log::info(fmt::format("elements: smoothed, beta {:.3f}: {}", materials.variance_factor, to_string(*found)));
+  if (found->worst > kTooStiff)
+    warn(report_.warnings, fmt::format("{}: {}; a finer mesh is softer", asset_.name, to_string(*found)));
 }
 
 // One more than is asked for must be there, to see that none was missed.
@@ -180,9 +198,8 @@ TargetSpace Pipeline::target_space(const ElasticSystem& system, const PoseFitter
     if (options.table) log::info(space.table_message);
     if (space.left_out > 0)
       warn(report_.warnings,
-           fmt::format("{}the energies of targets leave out {} of {} tets, which a pose turns inside out",
-                       region.empty() ? "" : fmt::format("region {}: ", region), space.left_out,
-                       object_.mesh.tet_count()));
+           fmt::format("{}the energies of targets leave out {} of {} elements, which a pose turns inside out",
+                       region.empty() ? "" : fmt::format("region {}: ", region), space.left_out, space.element_count));
     return space;
   });
 }
@@ -359,6 +376,7 @@ void Pipeline::read() {
 
 ReducedModel Pipeline::run() {
   read();
+  choose_variance();
   ReducedModel model;
   model.render = std::move(render_);
   model.asset_name = asset_.name;
@@ -458,6 +476,17 @@ auto with_file_named(const AssetConfig& asset, Work work) {
   }
 }
 
+// How the mesh compares with quadratic tets, said and, where it is too stiff, warned of.
+void say_stiffness(const AssetConfig& asset, const ObjectInput& object, std::vector<std::string>& warnings) {
+  const auto found = mesh_stiffness(object.mesh, object.materials, object.fixed, asset.name);
+  if (!found) return;
+  const std::string text = fmt::format("{}: {}", asset.name, to_string(*found));
+  if (found->worst <= kTooStiff) return log::info(text);
+  warn(warnings, object.materials.formulation == Formulation::kLinear
+                     ? text + "; object.formulation \"smoothed\" or a finer mesh is softer"
+                     : text + "; a finer mesh is softer");
+}
+
 }  // namespace
 
 ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
@@ -482,6 +511,7 @@ std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::
   const auto object = read_object(asset, report.inputs);
   warn_of_size(object, asset.object_mesh.string(), report.warnings);
   if (asset.render_mesh) read_render_mesh(asset, object, report.inputs, report.warnings);
+  with_file_named(asset, [&] { say_stiffness(asset, object, report.warnings); });
   if (asset.examples.empty()) return {};
   const auto input = read_examples(asset, object, report.inputs);
   StageCache no_cache;

@@ -19,8 +19,8 @@ using Strain = Eigen::Matrix<double, 6, 1>;  // a symmetric 3 x 3 matrix; its do
 
 constexpr Eigen::Index kStrainSize = 6;
 constexpr Eigen::Index kBatchBytes = Eigen::Index{64} << 20;
-// Tets of one batch: enough for the products, few enough to report progress.
-constexpr Eigen::Index kMostBatchTets = 256;
+// Elements of one batch: enough for the products, few enough to report progress.
+constexpr Eigen::Index kMostBatchElements = 256;
 // Pairs of modes of one block of the products, the unit of work of a thread.
 constexpr Eigen::Index kBlock = 96;
 
@@ -29,8 +29,8 @@ Eigen::Index pair_count(Eigen::Index size) { return size * (size + 1) / 2; }
 // Place of a pair in the lower triangle by rows, i >= j or not.
 Eigen::Index pair_index(Eigen::Index i, Eigen::Index j) { return i >= j ? pair_count(i) + j : pair_count(j) + i; }
 
-// Multiplies strains by the square root of V times the elasticity, so that the energy of a tet is half a squared norm:
-// V (mu |dev E|^2 + (3 lambda + 2 mu) / 6 tr(E)^2).
+// Multiplies strains by the square root of V times the elasticity, so that the energy of an element is half a squared
+// norm: V (mu |dev E|^2 + (3 lambda + 2 mu) / 6 tr(E)^2).
 struct StrainScale {
   double deviatoric = 0, spherical = 0;
 
@@ -46,13 +46,13 @@ struct StrainScale {
   }
 };
 
-// Scaled strains of some tets, six rows each: e(q) = sum_i l_i q_i + 1/2 sum_ij m_ij q_i q_j.
+// Scaled strains of some elements, six rows each: e(q) = sum_i l_i q_i + 1/2 sum_ij m_ij q_i q_j.
 struct StrainBatch {
   Eigen::MatrixXd linear;     // 6 B x r, l_i
   Eigen::MatrixXd quadratic;  // 6 B x R, m_ij
 };
 
-void fill_tet(const RowMatrix& B, const StrainScale& scale, Eigen::Index row, StrainBatch& batch) {
+void fill_element(const RowMatrix& B, const StrainScale& scale, Eigen::Index row, StrainBatch& batch) {
   std::vector<Eigen::Matrix3d> gradients(static_cast<std::size_t>(B.cols()));
   for (Eigen::Index i = 0; i < B.cols(); ++i) {
     Eigen::Matrix3d& G = gradients[static_cast<std::size_t>(i)];
@@ -64,7 +64,7 @@ void fill_tet(const RowMatrix& B, const StrainScale& scale, Eigen::Index row, St
   }
 }
 
-// Sums over tets before symmetrisation: l_i . l_j, m_ij . l_k, m_ij . m_kl.
+// Sums over elements before symmetrisation: l_i . l_j, m_ij . l_k, m_ij . m_kl.
 class StrainProducts {
  public:
   explicit StrainProducts(Eigen::Index modes) : pairs_(pair_count(modes)) {
@@ -147,9 +147,9 @@ void require_polynomial_modes(Eigen::Index modes) {
        "use \"cubature\", or a smaller basis.size"});
 }
 
-double polynomial_flops(Eigen::Index modes, Eigen::Index tets) {
+double polynomial_flops(Eigen::Index modes, Eigen::Index elements) {
   const auto r = static_cast<double>(modes), R = static_cast<double>(pair_count(modes));
-  return kStrainSize * static_cast<double>(tets) * R * (R + 2 * r);
+  return kStrainSize * static_cast<double>(elements) * R * (R + 2 * r);
 }
 
 std::int64_t polynomial_bytes(Eigen::Index modes) {
@@ -162,25 +162,25 @@ PolynomialData reduced_polynomial(const TetMesh& mesh, const TetMaterials& mater
   require_polynomial_modes(modes);
   const ElementSamples elements(mesh, materials, basis);
   const Eigen::Index fit = kBatchBytes / (kStrainSize * (modes + pairs) * static_cast<Eigen::Index>(sizeof(double)));
-  const Eigen::Index batch_tets = std::clamp(fit, Eigen::Index{1}, std::min(kMostBatchTets, elements.count()));
+  const Eigen::Index batch_elements = std::clamp(fit, Eigen::Index{1}, std::min(kMostBatchElements, elements.count()));
   StrainBatch batch;
   StrainProducts products(modes);
   Progress progress("polynomial", elements.count());
-  for (Eigen::Index first = 0; first < elements.count(); first += batch_tets) {
-    const Eigen::Index count = std::min(batch_tets, elements.count() - first);
+  for (Eigen::Index first = 0; first < elements.count(); first += batch_elements) {
+    const Eigen::Index count = std::min(batch_elements, elements.count() - first);
     batch.linear.resize(kStrainSize * count, modes);
     batch.quadratic.resize(kStrainSize * count, pairs);
 #pragma omp parallel for
     for (Eigen::Index t = 0; t < count; ++t) {
-      const Eigen::Index tet = first + t;
-      const auto lame = lame_parameters(materials.youngs_modulus[tet], materials.poisson_ratio[tet]);
-      fill_tet(elements.gradient(tet), StrainScale(elements.volume(tet), lame), kStrainSize * t, batch);
+      const Eigen::Index element = first + t;
+      fill_element(elements.gradient(element), StrainScale(elements.volume(element), elements.lame(element)),
+                   kStrainSize * t, batch);
     }
     products.add(batch);
     progress.advance(count);
   }
   PolynomialData& data = products.sums;
-  data.stiffness = RowMatrix(data.stiffness.selfadjointView<Eigen::Lower>());
+  data.stiffness = RowMatrix(data.stiffness.selfadjointView<Eigen::Lower>()) + elements.variance();
   symmetrise_cubic(data.cubic);
   symmetrise_quartic(modes, data.quartic);
   return std::move(data);

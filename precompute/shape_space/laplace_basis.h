@@ -2,9 +2,9 @@
 
 #include <string>
 
+#include "common/mesh/assembly.h"
 #include "common/mesh/tet_mesh.h"
 #include "common/model/reduced_model.h"
-#include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
 

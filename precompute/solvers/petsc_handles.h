@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/core/error.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 
 namespace exmat::precompute {
 

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "common/core/error.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 
 namespace exmat::precompute {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/solvers/elimination.h"
 
 namespace exmat::precompute {

@@ -6,7 +6,7 @@
 #include <Eigen/Core>
 
 #include "common/core/arrays.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 
 namespace exmat::precompute {
 

@@ -6,9 +6,8 @@
 #include <string>
 
 #include "common/core/error.h"
-#include "common/mesh/geometry.h"
 #include "precompute/cubature/element_samples.h"
-#include "precompute/targets/tet_forces.h"
+#include "precompute/targets/element_forces.h"
 
 namespace exmat::precompute {
 namespace {
@@ -24,26 +23,19 @@ bool inverts(const RowMatrix& gradient, const Eigen::MatrixXd& poses) {
   });
 }
 
-void require_some(const std::vector<Eigen::Index>& tets) {
-  if (!tets.empty()) return;
+void require_some(const std::vector<Eigen::Index>& elements) {
+  if (!elements.empty()) return;
   throw InputError({"", "/examples", "poses that leave some tets of the object upright",
                     "poses that turn each of them inside out", "use milder poses"});
 }
 
-// Of these tets, each `weight` times.
+// Of these elements, each `weight` times.
 void build_solver(const ObjectData& object, const ElementSamples& samples, const PoseCoordinates& coordinates,
-                  EnergyReference reference, const std::vector<Eigen::Index>& tets, double weight,
+                  EnergyReference reference, const std::vector<Eigen::Index>& elements, double weight,
                   runtime::TargetSolver& solver) {
-  const auto count = std::ssize(tets);
-  CubatureData elements;
-  elements.gradient.resize(9 * count, samples.modes());
-  for (Eigen::Index j = 0; j < count; ++j)
-    elements.gradient.middleRows<9>(9 * j) = samples.gradient(tets[static_cast<std::size_t>(j)]);
-  elements.weights = Eigen::VectorXd::Constant(count, weight);
-  elements.volumes = tet_volumes(object.mesh)(tets);
-  elements.youngs_modulus = object.materials.youngs_modulus(tets);
-  elements.poisson_ratio = object.materials.poisson_ratio(tets);
-  const auto complaint = solver.build(object.materials.model, elements, examples_at(coordinates.poses),
+  CubatureData data = samples.data_of(elements);
+  data.weights = Eigen::VectorXd::Constant(std::ssize(elements), weight);
+  const auto complaint = solver.build(object.materials.model, data, examples_at(coordinates.poses),
                                       RowMatrix::Identity(samples.modes(), samples.modes()), reference);
   if (complaint) throw InputError(*complaint);
 }
@@ -84,25 +76,25 @@ MeshTarget mesh_target(const ObjectData& object, const ElasticSystem& system, co
   const RowMatrix basis = system.extend(coordinates.basis);
   const ElementSamples samples(object.mesh, object.materials, basis);
   MeshTarget target;
-  for (Eigen::Index t = 0; t < samples.count(); ++t)
-    if (reference != EnergyReference::kExample || !inverts(samples.gradient(t), coordinates.poses))
-      target.tets.push_back(t);
-  target.left_out = samples.count() - std::ssize(target.tets);
-  require_some(target.tets);
-  build_solver(object, samples, coordinates, reference, target.tets, 1, target.solver);
+  for (Eigen::Index e = 0; e < samples.count(); ++e)
+    if (reference != EnergyReference::kExample || !inverts(samples.gradient(e), coordinates.poses))
+      target.elements.push_back(e);
+  target.left_out = samples.count() - std::ssize(target.elements);
+  require_some(target.elements);
+  build_solver(object, samples, coordinates, reference, target.elements, 1, target.solver);
   return target;
 }
 
 MeshTarget sampled_target(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
                           EnergyReference reference, Eigen::Index most) {
   MeshTarget target;
-  target.all = std::make_shared<TetForces>(object, system, coordinates, reference);
-  target.tets = target.all->tets();
-  target.left_out = object.mesh.tet_count() - std::ssize(target.tets);
-  require_some(target.tets);
-  const Eigen::Index all = std::ssize(target.tets), count = std::min(most, all);
+  target.all = std::make_shared<ElementForces>(object, system, coordinates, reference);
+  target.elements = target.all->members();
+  target.left_out = target.all->elements().count() - std::ssize(target.elements);
+  require_some(target.elements);
+  const Eigen::Index all = std::ssize(target.elements), count = std::min(most, all);
   std::vector<Eigen::Index> sample;
-  for (Eigen::Index i = 0; i < count; ++i) sample.push_back(target.tets[static_cast<std::size_t>(i * all / count)]);
+  for (Eigen::Index i = 0; i < count; ++i) sample.push_back(target.elements[static_cast<std::size_t>(i * all / count)]);
   const RowMatrix basis = system.extend(coordinates.basis);
   build_solver(object, ElementSamples(object.mesh, object.materials, basis), coordinates, reference, sample,
                static_cast<double>(all) / static_cast<double>(count), target.solver);

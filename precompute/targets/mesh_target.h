@@ -29,22 +29,22 @@ PoseCoordinates pose_range(const SparseMatrix& mass, const Eigen::MatrixXd& fiel
 /// [3m x K] changes of descriptor from the object's own to the examples, entry 3i + axis.
 Eigen::MatrixXd descriptor_changes(const RowMatrix& rest_descriptor, const ExampleSet& set);
 
-class TetForces;
+class ElementForces;
 
-/// The energies of targets over the tets of a mesh.
+/// The energies of targets over the elements of a mesh.
 struct MeshTarget {
-  runtime::TargetSolver solver;    ///< in coordinates of unit stiffness at rest, `solver.basis()` [d x d] away from y
-  std::vector<Eigen::Index> tets;  ///< that take part, ascending
-  Eigen::Index left_out = 0;       ///< tets that an example turns inside out, where the energies start from examples
-  std::shared_ptr<const TetForces> all;  ///< where the solver has a sample of the tets alone: the forces of all
+  runtime::TargetSolver solver;  ///< in coordinates of unit stiffness at rest, `solver.basis()` [d x d] away from y
+  std::vector<Eigen::Index> elements;  ///< that take part, ascending
+  Eigen::Index left_out = 0;  ///< elements that an example turns inside out, where the energies start from examples
+  std::shared_ptr<const ElementForces> all;  ///< where the solver has a sample of the elements alone: the forces of all
 };
 
-/// Throws InputError where no tet is left.
+/// Throws InputError where no element is left.
 MeshTarget mesh_target(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
                        EnergyReference reference);
 
-/// A solver of a systematic sample of at most `most` tets, each for as many as it stands for, and the forces of all.
-/// `object` must outlive it.
+/// A solver of a systematic sample of at most `most` elements, each for as many as it stands for, and the forces of
+/// all. `object` must outlive it.
 MeshTarget sampled_target(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
                           EnergyReference reference, Eigen::Index most);
 

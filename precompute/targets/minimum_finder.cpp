@@ -35,7 +35,7 @@ void MinimumFinder::descend(const RowMatrix& weights, std::vector<Candidate>& ca
     at.row(i) = weights.row(candidates[static_cast<std::size_t>(i)].row);
     y.col(i) = candidates[static_cast<std::size_t>(i)].y;
   }
-  const std::vector<TetForces::Answer> answers = all_->polish(target_, at, y);
+  const std::vector<ElementForces::Answer> answers = all_->polish(target_, at, y);
   for (std::size_t i = 0; i < candidates.size(); ++i) {
     candidates[i].y = y.col(static_cast<Eigen::Index>(i));
     candidates[i].found = answers[i].converged || answers[i].residual <= enough;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "common/core/arrays.h"
-#include "precompute/targets/tet_forces.h"
+#include "precompute/targets/element_forces.h"
 #include "runtime/sim/examples/target.h"
 
 namespace exmat::precompute {
@@ -20,7 +20,7 @@ class MinimumFinder {
 
   /// Answers nearer to each other than `same_distance` in y are one minimum. Where the target is that of some tets,
   /// `all` makes them the minima of all.
-  MinimumFinder(const runtime::TargetSolver& target, double same_distance, const TetForces* all = nullptr)
+  MinimumFinder(const runtime::TargetSolver& target, double same_distance, const ElementForces* all = nullptr)
       : target_(target), same_distance_(same_distance), all_(all) {}
 
   /// Starts are near minima of all tets: the target of some would lead away from them.
@@ -53,7 +53,7 @@ class MinimumFinder {
 
   const runtime::TargetSolver& target_;
   double same_distance_;
-  const TetForces* all_;
+  const ElementForces* all_;
   bool near_ = false;
   Correction correction_;
   int solves_ = 0;

@@ -78,25 +78,32 @@ Eigen::VectorXd scales_of(const Eigen::VectorXd& values) {
   return values.unaryExpr([least](double value) { return value > 0 || least > 0 ? 1 / std::max(value, least) : 0; });
 }
 
+std::vector<Eigen::Index> with_a_share(const Eigen::VectorXd& shares) {
+  std::vector<Eigen::Index> members;
+  for (Eigen::Index e = 0; e < shares.size(); ++e)
+    if (shares[e] > 0) members.push_back(e);
+  return members;
+}
+
 class ForceSamples {
  public:
   ForceSamples(const TargetElasticityInput& input, const Eigen::LLT<Eigen::MatrixXd>& stiffness, Pairs pairs)
       : input_(input),
         body_(input.mesh, input.materials, input.basis),
         target_(input.mesh, input.materials, input.displacements),
+        shares_(mean_over_elements(input.mesh, body_.elements(), input.shares)),
+        members_(with_a_share(shares_)),
         stiffness_(stiffness),
         pairs_(std::move(pairs)) {
-    for (Eigen::Index t = 0; t < body_.count(); ++t)
-      if (input.shares[t] > 0) tets_.push_back(t);
     total_ = sum();
     force_scales_ = scales_of(total_.forces.colwise().norm().transpose());
     energy_scales_ = kEnergyWeight * scales_of(total_.energies);
   }
 
-  const std::vector<Eigen::Index>& tets() const { return tets_; }  // that have a share
+  const std::vector<Eigen::Index>& members() const { return members_; }  // that have a share
 
-  /// Of one tet with its share.
-  Response response(Eigen::Index tet) const;
+  /// Of one element with its share.
+  Response response(Eigen::Index element) const;
 
   /// Rows of the selection problem.
   Eigen::VectorXd rows(const Response& response) const {
@@ -107,10 +114,10 @@ class ForceSamples {
   }
   Eigen::VectorXd target_rows() const { return rows(total_); }
 
-  double error(const std::vector<Eigen::Index>& tets, const Eigen::VectorXd& weights) const {
+  double error(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights) const {
     Eigen::MatrixXd difference = -total_.forces;
-    for (std::size_t k = 0; k < tets.size(); ++k)
-      difference += weights[static_cast<Eigen::Index>(k)] * response(tets[k]).forces;
+    for (std::size_t k = 0; k < elements.size(); ++k)
+      difference += weights[static_cast<Eigen::Index>(k)] * response(elements[k]).forces;
     return (difference * force_scales_.asDiagonal()).norm() / std::sqrt(static_cast<double>(pairs_.count()));
   }
 
@@ -119,18 +126,18 @@ class ForceSamples {
 
   const TargetElasticityInput& input_;
   ElementSamples body_, target_;
+  Eigen::VectorXd shares_;  // e
+  std::vector<Eigen::Index> members_;
   const Eigen::LLT<Eigen::MatrixXd>& stiffness_;
   Pairs pairs_;
-  std::vector<Eigen::Index> tets_;
   Response total_;
   Eigen::VectorXd force_scales_, energy_scales_;
 };
 
-Response ForceSamples::response(Eigen::Index tet) const {
-  const RowMatrix B = body_.gradient(tet);
-  const Eigen::MatrixXd of_body = B * pairs_.poses, of_target = target_.gradient(tet) * pairs_.targets;
-  const LameParameters lame =
-      lame_parameters(input_.materials.youngs_modulus[tet], input_.materials.poisson_ratio[tet]);
+Response ForceSamples::response(Eigen::Index element) const {
+  const RowMatrix B = body_.gradient(element);
+  const Eigen::MatrixXd of_body = B * pairs_.poses, of_target = target_.gradient(element) * pairs_.targets;
+  const LameParameters lame = body_.lame(element);
   Eigen::MatrixXd stresses = Eigen::MatrixXd::Zero(9, pairs_.count());
   Response result{{}, Eigen::VectorXd::Zero(pairs_.count())};
   with_material(input_.materials.model, [&](auto material) {
@@ -138,7 +145,7 @@ Response ForceSamples::response(Eigen::Index tet) const {
       const Eigen::Matrix3d H = Eigen::Map<const RowMatrix3>(of_body.col(i).data());
       const Eigen::Matrix3d H_target = Eigen::Map<const RowMatrix3>(of_target.col(i).data());
       const Eigen::Matrix3d target = Eigen::Matrix3d::Identity() + H_target;
-      const double volume = input_.shares[tet] * body_.volume(tet) * target.determinant();
+      const double volume = shares_[element] * body_.volume(element) * target.determinant();
       if (!(volume > 0)) continue;
       const Eigen::Matrix3d inverse = target.inverse(), relative = (H - H_target) * inverse;
       result.energies[i] = volume * material.energy(relative, lame);
@@ -151,14 +158,14 @@ Response ForceSamples::response(Eigen::Index tet) const {
 }
 
 Response ForceSamples::sum() const {
-  const Eigen::Index count = std::ssize(tets_), blocks = (count + kSumBlock - 1) / kSumBlock;
+  const Eigen::Index count = std::ssize(members_), blocks = (count + kSumBlock - 1) / kSumBlock;
   const Response nothing{Eigen::MatrixXd::Zero(body_.modes(), pairs_.count()), Eigen::VectorXd::Zero(pairs_.count())};
   std::vector<Response> partial(static_cast<std::size_t>(blocks), nothing);
 #pragma omp parallel for schedule(dynamic)
   for (Eigen::Index block = 0; block < blocks; ++block) {
     Response& own = partial[static_cast<std::size_t>(block)];
     for (Eigen::Index i = block * kSumBlock; i < std::min(count, (block + 1) * kSumBlock); ++i) {
-      const Response more = response(tets_[static_cast<std::size_t>(i)]);
+      const Response more = response(members_[static_cast<std::size_t>(i)]);
       own.forces += more.forces;
       own.energies += more.energies;
     }
@@ -172,37 +179,28 @@ Response ForceSamples::sum() const {
 }
 
 // All, or a systematic sample in their order.
-std::vector<Eigen::Index> candidates_of(const std::vector<Eigen::Index>& tets, Eigen::Index most) {
-  const Eigen::Index all = std::ssize(tets);
-  if (all <= most) return tets;
+std::vector<Eigen::Index> candidates_of(const std::vector<Eigen::Index>& members, Eigen::Index most) {
+  const Eigen::Index all = std::ssize(members);
+  if (all <= most) return members;
   std::vector<Eigen::Index> chosen;
-  for (Eigen::Index i = 0; i < most; ++i) chosen.push_back(tets[static_cast<std::size_t>(i * all / most)]);
+  for (Eigen::Index i = 0; i < most; ++i) chosen.push_back(members[static_cast<std::size_t>(i * all / most)]);
   return chosen;
 }
 
-TargetElasticityData data_of(const TargetElasticityInput& input, const std::vector<Eigen::Index>& tets,
+TargetElasticityData data_of(const TargetElasticityInput& input, const std::vector<Eigen::Index>& members,
                              const Eigen::VectorXd& weights) {
   const ElementSamples body(input.mesh, input.materials, input.basis);
   const ElementSamples target(input.mesh, input.materials, input.displacements);
-  const auto s = std::ssize(tets);
+  const Eigen::VectorXd shares = mean_over_elements(input.mesh, body.elements(), input.shares);
+  const CubatureData of_body = body.data_of(members);
   TargetElasticityData data;
-  data.elements.resize(s);
-  data.weights.resize(s);
-  data.volumes.resize(s);
-  data.gradient.resize(9 * s, body.modes());
-  data.target_gradient.resize(9 * s, target.modes());
-  data.youngs_modulus.resize(s);
-  data.poisson_ratio.resize(s);
-  for (Eigen::Index j = 0; j < s; ++j) {
-    const Eigen::Index tet = tets[static_cast<std::size_t>(j)];
-    data.elements[j] = static_cast<std::int32_t>(tet);
-    data.weights[j] = weights[j] * input.shares[tet];
-    data.volumes[j] = body.volume(tet);
-    data.gradient.middleRows<9>(9 * j) = body.gradient(tet);
-    data.target_gradient.middleRows<9>(9 * j) = target.gradient(tet);
-    data.youngs_modulus[j] = input.materials.youngs_modulus[tet];
-    data.poisson_ratio[j] = input.materials.poisson_ratio[tet];
-  }
+  data.elements = of_body.elements;
+  data.weights = weights.cwiseProduct(shares(members));
+  data.volumes = of_body.volumes;
+  data.gradient = of_body.gradient;
+  data.target_gradient = target.data_of(members).gradient;
+  data.youngs_modulus = of_body.youngs_modulus;
+  data.poisson_ratio = of_body.poisson_ratio;
   data.control_points = input.targets.table ? input.targets.table->control_points
                                             : RowMatrix(input.targets.coordinates.poses.transpose());
   return data;
@@ -217,10 +215,9 @@ ForceSamples heldout_samples(const TargetElasticityInput& input, const PoseSourc
 }  // namespace
 
 TargetElasticityData all_target_elements(const TargetElasticityInput& input) {
-  std::vector<Eigen::Index> tets;
-  for (Eigen::Index t = 0; t < input.mesh.tet_count(); ++t)
-    if (input.shares[t] > 0) tets.push_back(t);
-  return data_of(input, tets, Eigen::VectorXd::Ones(std::ssize(tets)));
+  const Elements elements = elements_of(input.mesh, input.materials);
+  const std::vector<Eigen::Index> members = with_a_share(mean_over_elements(input.mesh, elements, input.shares));
+  return data_of(input, members, Eigen::VectorXd::Ones(std::ssize(members)));
 }
 
 TargetElasticityData target_elasticity(const TargetElasticityInput& input, const PoseSource& source,
@@ -231,15 +228,15 @@ TargetElasticityData target_elasticity(const TargetElasticityInput& input, const
                               pair_up(input, draw_poses(source, options.training_poses, options.seed), options.seed));
   const ForceSamples heldout = heldout_samples(input, source, options, stiffness);
   SelectionProblem problem{{}, training.target_rows()};
-  const std::vector<Eigen::Index> tets =
-      candidates_of(training.tets(), std::max<Eigen::Index>(1, options.training_entries / problem.target.size()));
-  problem.columns.resize(problem.target.size(), std::ssize(tets));
+  const std::vector<Eigen::Index> candidates =
+      candidates_of(training.members(), std::max<Eigen::Index>(1, options.training_entries / problem.target.size()));
+  problem.columns.resize(problem.target.size(), std::ssize(candidates));
 #pragma omp parallel for schedule(dynamic, 16)
-  for (std::size_t i = 0; i < tets.size(); ++i)
-    problem.columns.col(static_cast<Eigen::Index>(i)) = training.rows(training.response(tets[i]));
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    problem.columns.col(static_cast<Eigen::Index>(i)) = training.rows(training.response(candidates[i]));
   const auto members = [&](const Selection& selection) {
     std::vector<Eigen::Index> chosen;
-    for (const Eigen::Index member : selection.members) chosen.push_back(tets[static_cast<std::size_t>(member)]);
+    for (const Eigen::Index member : selection.members) chosen.push_back(candidates[static_cast<std::size_t>(member)]);
     return chosen;
   };
   const Eigen::Index modes = input.basis.cols();
@@ -248,8 +245,9 @@ TargetElasticityData target_elasticity(const TargetElasticityInput& input, const
                           [&](const Selection& selection) {
                             return heldout.error(members(selection), selection.weights) <= *options.tolerance;
                           }};
-  const Selection selection = select_greedy_swap(problem, static_cast<std::size_t>(std::min(most, std::ssize(tets))),
-                                                 {}, options.tolerance ? &accurate : nullptr);
+  const Selection selection =
+      select_greedy_swap(problem, static_cast<std::size_t>(std::min(most, std::ssize(candidates))), {},
+                         options.tolerance ? &accurate : nullptr);
   TargetElasticityData data = data_of(input, members(selection), selection.weights);
   data.heldout_error = heldout.error(members(selection), selection.weights);
   return data;
@@ -259,15 +257,15 @@ double target_elasticity_error(const TargetElasticityInput& input, const PoseSou
                                const CubatureOptions& options, const IndexVector& elements,
                                const Eigen::VectorXd& weights) {
   const Eigen::LLT<Eigen::MatrixXd> stiffness(source.rest_stiffness);
-  std::vector<Eigen::Index> tets;
+  const ForceSamples heldout = heldout_samples(input, source, options, stiffness);
+  std::vector<Eigen::Index> members;
   std::vector<double> kept;
   for (Eigen::Index j = 0; j < elements.size(); ++j) {
-    if (input.shares[elements[j]] == 0) continue;
-    tets.push_back(elements[j]);
+    if (!std::ranges::binary_search(heldout.members(), elements[j])) continue;
+    members.push_back(elements[j]);
     kept.push_back(weights[j]);
   }
-  return heldout_samples(input, source, options, stiffness)
-      .error(tets, Eigen::Map<const Eigen::VectorXd>(kept.data(), std::ssize(kept)));
+  return heldout.error(members, Eigen::Map<const Eigen::VectorXd>(kept.data(), std::ssize(kept)));
 }
 
 }  // namespace exmat::precompute

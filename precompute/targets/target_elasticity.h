@@ -21,7 +21,7 @@ struct TargetElasticityInput {
   Eigen::MatrixXd target_reduced;  ///< r x d, U^T M Y
 };
 
-/// By all tets that have a share, with the weight 1; no error measured.
+/// By all elements that have a share, with the weight 1; no error measured.
 TargetElasticityData all_target_elements(const TargetElasticityInput& input);
 
 /// Elements and weights chosen so that the force is right at pairs of a pose and a target, by greedy selection with
@@ -31,7 +31,7 @@ TargetElasticityData all_target_elements(const TargetElasticityInput& input);
 TargetElasticityData target_elasticity(const TargetElasticityInput& input, const PoseSource& source,
                                        const CubatureOptions& options);
 
-/// The held-out error of that many tets and their weights, as TargetElasticityData has it; weights without shares.
+/// The held-out error of that many elements and their weights, as TargetElasticityData has it; weights without shares.
 double target_elasticity_error(const TargetElasticityInput& input, const PoseSource& source,
                                const CubatureOptions& options, const IndexVector& elements,
                                const Eigen::VectorXd& weights);

@@ -7,21 +7,20 @@
 #include <random>
 
 #include "common/elastic/materials.h"
-#include "common/mesh/geometry.h"
 #include "common/model/needs.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/cubature/selection.h"
+#include "precompute/targets/element_forces.h"
 #include "precompute/targets/example_stress.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
-#include "precompute/targets/tet_forces.h"
 
 namespace exmat::precompute {
 namespace {
 
 constexpr double kNoise = 0.1;                  // of the largest example: how far from targets forces are sampled, too
 constexpr Eigen::Index kMostRows = 2000;        // of the selection problem
-constexpr Eigen::Index kMostCandidates = 6000;  // tets that it chooses from
+constexpr Eigen::Index kMostCandidates = 6000;  // elements that it chooses from
 constexpr Eigen::Index kElementsPerDimension = 12, kLeastElements = 24;  // most of them: 12 d, at least 24
 constexpr double kNothing = 1e-6;  // of the largest force: one that says nothing of the elements
 
@@ -47,10 +46,10 @@ class ElementChooser {
   RowMatrix weights(int per_dimension) const;
   std::vector<Sample> force_samples() const;
   std::vector<Eigen::Index> candidates() const;
-  Eigen::MatrixXd forces(Eigen::Index tet, const std::vector<Sample>& samples) const;
+  Eigen::MatrixXd forces(Eigen::Index element, const std::vector<Sample>& samples) const;
   Eigen::MatrixXd sum_of_forces(const std::vector<Sample>& samples) const;
-  SelectionProblem problem(const std::vector<Eigen::Index>& tets, const std::vector<Sample>& samples) const;
-  CubatureData cubature(const std::vector<Eigen::Index>& tets, const Selection& selection) const;
+  SelectionProblem problem(const std::vector<Eigen::Index>& elements, const std::vector<Sample>& samples) const;
+  CubatureData cubature(const std::vector<Eigen::Index>& elements, const Selection& selection) const;
   double error(const CubatureData& cubature) const;
 
   const ObjectData& object_;
@@ -101,20 +100,19 @@ std::vector<Sample> ElementChooser::force_samples() const {
 
 // All that take part, or a systematic sample of them in their order.
 std::vector<Eigen::Index> ElementChooser::candidates() const {
-  const auto all = std::ssize(target_.tets);
-  if (all <= kMostCandidates) return target_.tets;
+  const auto all = std::ssize(target_.elements);
+  if (all <= kMostCandidates) return target_.elements;
   std::vector<Eigen::Index> chosen;
   for (Eigen::Index i = 0; i < kMostCandidates; ++i)
-    chosen.push_back(target_.tets[static_cast<std::size_t>(i * all / kMostCandidates)]);
+    chosen.push_back(target_.elements[static_cast<std::size_t>(i * all / kMostCandidates)]);
   return chosen;
 }
 
-// [d x N] of one tet, in unit coordinates, times its volume.
-Eigen::MatrixXd ElementChooser::forces(Eigen::Index tet, const std::vector<Sample>& samples) const {
-  const RowMatrix B = samples_.gradient(tet);
+// [d x N] of one element, in unit coordinates, times its volume.
+Eigen::MatrixXd ElementChooser::forces(Eigen::Index element, const std::vector<Sample>& samples) const {
+  const RowMatrix B = samples_.gradient(element);
   const RowMatrix poses = B * coordinates_.poses;
-  const LameParameters lame =
-      lame_parameters(object_.materials.youngs_modulus[tet], object_.materials.poisson_ratio[tet]);
+  const LameParameters lame = samples_.lame(element);
   Eigen::MatrixXd stresses(9, std::ssize(samples));
   with_material(object_.materials.model, [&](auto material) {
     for (Eigen::Index i = 0; i < stresses.cols(); ++i) {
@@ -123,13 +121,13 @@ Eigen::MatrixXd ElementChooser::forces(Eigen::Index tet, const std::vector<Sampl
       const Eigen::Matrix3d P =
           example_stress(material, options_.energy_reference, Eigen::Map<const RowMatrix3>(H.data()),
                          Eigen::Map<const RowMatrix3>(H_example.data()), lame);
-      stresses.col(i) = samples_.volume(tet) * P.reshaped<Eigen::RowMajor>();
+      stresses.col(i) = samples_.volume(element) * P.reshaped<Eigen::RowMajor>();
     }
   });
   return target_.solver.basis().transpose() * (B.transpose() * stresses);
 }
 
-// [d x N] of all tets.
+// [d x N] of all elements.
 Eigen::MatrixXd ElementChooser::sum_of_forces(const std::vector<Sample>& samples) const {
   const Eigen::Index d = target_.solver.dimension(), count = std::ssize(samples);
   if (target_.all) {
@@ -143,14 +141,14 @@ Eigen::MatrixXd ElementChooser::sum_of_forces(const std::vector<Sample>& samples
     return target_.solver.basis().transpose() * target_.all->forces(weights, at);
   }
   constexpr Eigen::Index kBlock = 256;  // sums do not depend on the number of threads
-  const Eigen::Index blocks = (std::ssize(target_.tets) + kBlock - 1) / kBlock;
+  const Eigen::Index blocks = (std::ssize(target_.elements) + kBlock - 1) / kBlock;
   std::vector<Eigen::MatrixXd> partial(static_cast<std::size_t>(blocks));
 #pragma omp parallel for schedule(dynamic)
   for (Eigen::Index block = 0; block < blocks; ++block) {
     Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(d, count);
-    const Eigen::Index end = std::min<Eigen::Index>(std::ssize(target_.tets), (block + 1) * kBlock);
+    const Eigen::Index end = std::min<Eigen::Index>(std::ssize(target_.elements), (block + 1) * kBlock);
     for (Eigen::Index i = block * kBlock; i < end; ++i)
-      sum += forces(target_.tets[static_cast<std::size_t>(i)], samples);
+      sum += forces(target_.elements[static_cast<std::size_t>(i)], samples);
     partial[static_cast<std::size_t>(block)] = std::move(sum);
   }
   Eigen::MatrixXd total = Eigen::MatrixXd::Zero(d, count);
@@ -158,7 +156,7 @@ Eigen::MatrixXd ElementChooser::sum_of_forces(const std::vector<Sample>& samples
   return total;
 }
 
-SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
+SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& elements,
                                          const std::vector<Sample>& samples) const {
   const Eigen::Index count = std::ssize(samples);
   const Eigen::MatrixXd total = sum_of_forces(samples);
@@ -167,34 +165,22 @@ SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& tets,
       (norms.array() > kNothing * norms.maxCoeff()).select(norms.cwiseInverse(), Eigen::VectorXd::Zero(count));
   SelectionProblem problem;
   problem.target = (total * scales.asDiagonal()).reshaped();
-  problem.columns.resize(problem.target.size(), std::ssize(tets));
+  problem.columns.resize(problem.target.size(), std::ssize(elements));
 #pragma omp parallel for schedule(dynamic, 16)
-  for (std::size_t i = 0; i < tets.size(); ++i)
-    problem.columns.col(static_cast<Eigen::Index>(i)) = (forces(tets[i], samples) * scales.asDiagonal()).reshaped();
+  for (std::size_t i = 0; i < elements.size(); ++i)
+    problem.columns.col(static_cast<Eigen::Index>(i)) = (forces(elements[i], samples) * scales.asDiagonal()).reshaped();
   return problem;
 }
 
-CubatureData ElementChooser::cubature(const std::vector<Eigen::Index>& tets, const Selection& selection) const {
-  CubatureData data;
-  const auto s = static_cast<Eigen::Index>(selection.members.size());
-  data.elements.resize(s);
+CubatureData ElementChooser::cubature(const std::vector<Eigen::Index>& elements, const Selection& selection) const {
+  std::vector<Eigen::Index> chosen;
+  for (const Eigen::Index member : selection.members) chosen.push_back(elements[static_cast<std::size_t>(member)]);
+  CubatureData data = samples_.data_of(chosen);
   data.weights = selection.weights;
-  data.volumes.resize(s);
-  data.gradient.resize(9 * s, coordinates_.poses.rows());
-  data.youngs_modulus.resize(s);
-  data.poisson_ratio.resize(s);
-  for (Eigen::Index j = 0; j < s; ++j) {
-    const Eigen::Index tet = tets[static_cast<std::size_t>(selection.members[static_cast<std::size_t>(j)])];
-    data.elements[j] = static_cast<std::int32_t>(tet);
-    data.volumes[j] = samples_.volume(tet);
-    data.gradient.middleRows<9>(9 * j) = samples_.gradient(tet);
-    data.youngs_modulus[j] = object_.materials.youngs_modulus[tet];
-    data.poisson_ratio[j] = object_.materials.poisson_ratio[tet];
-  }
   return data;
 }
 
-// Largest distance of the elements' targets from those of all tets, over the largest example.
+// Largest distance of the elements' targets from those of all elements, over the largest example.
 double ElementChooser::error(const CubatureData& cubature) const {
   const Eigen::Index d = coordinates_.poses.rows();
   runtime::TargetSolver solver;
@@ -224,15 +210,15 @@ CubatureData ElementChooser::choose() {
   MinimumFinder finder(target_.solver, std::numeric_limits<double>::max(), target_.all.get());
   exact_ = finder.find(held_out_, from_blend(target_.solver), "targets that elements are checked by");
   const std::vector<Sample> samples = force_samples();
-  const std::vector<Eigen::Index> tets = candidates();
-  const SelectionProblem all = problem(tets, samples);
+  const std::vector<Eigen::Index> elements = candidates();
+  const SelectionProblem all = problem(elements, samples);
   const Eigen::Index d = coordinates_.poses.rows();
   const auto most = static_cast<std::size_t>(
-      std::min<Eigen::Index>(std::ssize(tets), std::max(kLeastElements, kElementsPerDimension * d)));
+      std::min<Eigen::Index>(std::ssize(elements), std::max(kLeastElements, kElementsPerDimension * d)));
   const StopRule accurate{static_cast<std::size_t>(std::max<Eigen::Index>(1, d / 2)), [&](const Selection& selection) {
-                            return error(cubature(tets, selection)) <= options_.tolerance;
+                            return error(cubature(elements, selection)) <= options_.tolerance;
                           }};
-  CubatureData chosen = cubature(tets, select_greedy_swap(all, most, {}, &accurate));
+  CubatureData chosen = cubature(elements, select_greedy_swap(all, most, {}, &accurate));
   chosen.heldout_error = error(chosen);
   return chosen;
 }

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/core/log.h"
+#include "common/mesh/elements.h"
 #include "common/model/needs.h"
 #include "precompute/targets/minimum_finder.h"
 #include "precompute/targets/simplex_points.h"
@@ -100,6 +101,7 @@ class SpaceBuilder {
         system_(system),
         range_(range),
         options_(options),
+        element_count_(elements_of(object.mesh, object.materials).count()),
         whole_(target_in(range)),
         count_(range.poses.cols()),
         examples_(whole_.solver.dimension(), count_) {
@@ -127,6 +129,7 @@ class SpaceBuilder {
   const ElasticSystem& system_;
   const PoseCoordinates& range_;
   const TargetSpaceOptions& options_;
+  Eigen::Index element_count_;
   MeshTarget whole_;
   Eigen::Index count_;
   Eigen::MatrixXd examples_;  // d' x K, in unit coordinates of the range
@@ -137,7 +140,7 @@ class SpaceBuilder {
 };
 
 MeshTarget SpaceBuilder::target_in(const PoseCoordinates& coordinates) const {
-  if (object_.mesh.tet_count() <= options_.most_tets)
+  if (element_count_ <= options_.most_elements)
     return mesh_target(object_, system_, coordinates, options_.energy_reference);
   return sampled_target(object_, system_, coordinates, options_.energy_reference, options_.sample);
 }
@@ -198,6 +201,7 @@ TargetSpace SpaceBuilder::build() {
     if (space.error <= kShare * options_.tolerance) break;
   }
   space.left_out = whole_.left_out;
+  space.element_count = element_count_;
   log::info(fmt::format("targets: {} displacements hold them, error {:.1e}", columns_.cols(), space.error));
   space.elements = target_elements(object_, system_, space.coordinates, small_,
                                    {options_.energy_reference, options_.element_tolerance, options_.seed});

@@ -16,9 +16,9 @@ struct TargetSpaceOptions {
   double element_tolerance = 1e-3;  ///< of what the elements lose of them, beside that
   bool table = true;                ///< make one, where 2 <= K <= kMostTableExamples
   std::uint64_t seed = 1;           ///< of the poses that the elements are chosen by
-  /// That energies are summed over at every step. Targets of more begin with a sample of their tets, and a table of
+  /// That energies are summed over at every step. Targets of more begin with a sample of their elements, and a table of
   /// them with the elements.
-  Eigen::Index most_tets = 20'000;
+  Eigen::Index most_elements = 20'000;
   Eigen::Index sample = 8192;
 };
 
@@ -26,7 +26,7 @@ struct TargetSpaceOptions {
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpaceOptions& value) {
   pass_all(archive, value.energy_reference, value.tolerance, value.element_tolerance, value.table, value.seed,
-           value.most_tets, value.sample);
+           value.most_elements, value.sample);
 }
 
 /// The targets of a set of examples, minimised over all tets of the mesh in all poses that descriptors stand for:
@@ -35,7 +35,8 @@ struct TargetSpace {
   PoseCoordinates coordinates;           ///< few displacements that hold all targets, and the examples in them
   CubatureData elements;                 ///< that stand for all tets in the energies of targets, in these coordinates
   double error = 0;                      ///< largest found of what the coordinates lose of a target
-  std::int64_t left_out = 0;             ///< tets that an example turns inside out
+  std::int64_t left_out = 0;             ///< elements that an example turns inside out
+  std::int64_t element_count = 0;        ///< of the mesh
   std::optional<TargetTableData> table;  ///< control points [P c x d]
   EnergyReference energy_reference = EnergyReference::kExample;
   std::string table_message;  ///< what was made, or why nothing was
@@ -44,8 +45,8 @@ struct TargetSpace {
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpace& value) {
-  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.table, value.energy_reference,
-           value.table_message);
+  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.element_count, value.table,
+           value.energy_reference, value.table_message);
 }
 
 /// `range` holds all poses, from pose_range(). Targets are solved there at weights all over the simplex; their

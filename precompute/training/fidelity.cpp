@@ -4,8 +4,8 @@
 #include <cmath>
 #include <fmt/format.h>
 
+#include "common/mesh/assembly.h"
 #include "common/mesh/geometry.h"
-#include "precompute/fem/assembly.h"
 
 namespace exmat::precompute {
 namespace {

@@ -59,7 +59,7 @@ TrainingChains draw_training(const TrainingInput& input, TrainingLoads loads, co
   const ObjectData& object = *input.model.object;
   const TrainingBody body = training_body(input);
   const double soft = compliance(input);
-  const MassProperties mass = mass_properties(object.mesh, input.system.full_mass);
+  const MassProperties mass = mass_properties(object.mesh.vertices, input.system.full_mass);
   if (loads.any_gravity && !body.free)
     loads.gravity *= std::min(1.0, kMostSag * body.size / (loads.gravity.norm() * mass.mass * soft));
   const SegmentBody drawn{object.mesh.vertices, mass.centre.transpose(), free_surface(object), body.size,

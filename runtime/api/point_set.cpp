@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/bundle/bundle.h"
+#include "common/mesh/elements.h"
 #include "common/mesh/geometry.h"
 #include "common/mesh/nearest_point.h"
 #include "runtime/api/failures.h"
@@ -67,14 +68,21 @@ PointSet read_elements(const Source& source) {
   const ReducedModel data = read_bundle(source.bundle, {.groups = groups});
   require_same_bundle(source, data);
   const TetMesh& mesh = data.object->mesh;
+  const Elements all = elements_of(mesh, data.object->materials);
   const IndexVector& elements = data.cubature->elements;
-  IndexMatrix corners(elements.size(), 4);
-  VertexArray rest(elements.size(), 3);
+  // A ring is at its vertex, a tet at its centroid.
+  const Eigen::Index k = all.smoothed() ? 1 : 4;
+  IndexMatrix corners(elements.size(), k);
+  VertexArray rest = VertexArray::Zero(elements.size(), 3);
   for (Eigen::Index j = 0; j < elements.size(); ++j) {
-    corners.row(j) = mesh.tets.row(elements[j]);
-    rest.row(j) = tet_positions(mesh, elements[j]).colwise().mean();
+    if (all.smoothed())
+      corners(j, 0) = all.centres[elements[j]];
+    else
+      corners.row(j) = mesh.tets.row(elements[j]);
+    for (Eigen::Index c = 0; c < k; ++c) rest.row(j) += mesh.vertices.row(corners(j, c)) / static_cast<double>(k);
   }
-  return embedded_points(data.modal->basis, rest, corners, RowMatrix::Constant(elements.size(), 4, 0.25));
+  return embedded_points(data.modal->basis, rest, corners,
+                         RowMatrix::Constant(elements.size(), k, 1 / static_cast<double>(k)));
 }
 
 PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids) {

@@ -6,21 +6,10 @@
 #include <cmath>
 #include <vector>
 
-#include "common/elastic/material.h"
-#include "common/mesh/geometry.h"
+#include "common/mesh/assembly.h"
 
 namespace exmat::runtime {
 namespace {
-
-using Sparse = Eigen::SparseMatrix<double>;
-using Triplets = std::vector<Eigen::Triplet<double>>;
-
-/// Block of two corners of a tet: V (lambda a b^T + mu b a^T + mu (a . b) I), a and b the gradients of their shape
-/// functions.
-Eigen::Matrix3d stiffness_block(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const LameParameters& lame) {
-  return lame.lambda * a * b.transpose() + lame.mu * b * a.transpose() +
-         lame.mu * a.dot(b) * Eigen::Matrix3d::Identity();
-}
 
 /// [unknowns x 6] translations and turns about the origin.
 Eigen::MatrixXd rigid_motions(const VertexArray& vertices) {
@@ -52,8 +41,11 @@ LoadCapacity::LoadCapacity(const ReducedModel& model, double spread)
       reduced_basis_.block(place_[static_cast<std::size_t>(i)], 0, 3, basis.cols()) = basis.middleRows<3>(3 * i);
   if (free) reduced_basis_.rightCols<6>() = rigid_motions(vertices_);
 
-  Sparse mass(count, count), stiffness(count, count);
-  assemble(model, mass, stiffness);
+  std::vector<std::int32_t> unknowns;
+  for (std::int32_t i = 0; i < 3 * vertices_.rows(); ++i)
+    if (place_[static_cast<std::size_t>(i / 3)] >= 0) unknowns.push_back(i);
+  const SparseMatrix mass = submatrix(expand_to_vectors(scalar_mass(object.mesh, object.materials.density)), unknowns),
+                     stiffness = submatrix(elastic_stiffness(object.mesh, object.materials), unknowns);
   const auto modes = reduced_basis_.leftCols(basis.cols());
   const Eigen::MatrixXd reduced_stiffness = modes.transpose() * (stiffness * modes);
   const double lowest = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(reduced_stiffness, Eigen::EigenvaluesOnly)
@@ -61,35 +53,10 @@ LoadCapacity::LoadCapacity(const ReducedModel& model, double spread)
                             .minCoeff();
   const double square = std::max(lowest, 1e-12 * reduced_stiffness.trace());
   time_scale_ = 1 / std::sqrt(square);
-  const Sparse all = mass + stiffness / square;
+  const Eigen::SparseMatrix<double> all = mass + stiffness / square;
   full_.compute(all);
   reduced_.compute(reduced_basis_.transpose() * (all * reduced_basis_));
   weigh_surface(object);
-}
-
-void LoadCapacity::assemble(const ReducedModel& model, Sparse& mass, Sparse& stiffness) const {
-  const ObjectData& object = *model.object;
-  const Eigen::VectorXd volumes = tet_volumes(object.mesh);
-  Triplets of_mass, of_stiffness;
-  for (Eigen::Index t = 0; t < object.mesh.tet_count(); ++t) {
-    const auto gradients = shape_gradients(tet_positions(object.mesh, t));
-    const LameParameters lame = lame_parameters(object.materials.youngs_modulus[t], object.materials.poisson_ratio[t]);
-    for (int a = 0; a < 4; ++a)
-      for (int b = 0; b < 4; ++b) {
-        const Eigen::Index row = place_[static_cast<std::size_t>(object.mesh.tets(t, a))];
-        const Eigen::Index column = place_[static_cast<std::size_t>(object.mesh.tets(t, b))];
-        if (row < 0 || column < 0) continue;
-        const double share = object.materials.density[t] * volumes[t] * (a == b ? 0.1 : 0.05);
-        const Eigen::Matrix3d block =
-            volumes[t] * stiffness_block(gradients.row(a).transpose(), gradients.row(b).transpose(), lame);
-        for (int i = 0; i < 3; ++i) {
-          of_mass.emplace_back(row + i, column + i, share);
-          for (int j = 0; j < 3; ++j) of_stiffness.emplace_back(row + i, column + j, block(i, j));
-        }
-      }
-  }
-  mass.setFromTriplets(of_mass.begin(), of_mass.end());
-  stiffness.setFromTriplets(of_stiffness.begin(), of_stiffness.end());
 }
 
 void LoadCapacity::weigh_surface(const ObjectData& object) {

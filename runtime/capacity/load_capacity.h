@@ -32,8 +32,6 @@ class LoadCapacity {
 
  private:
   Eigen::Index unknowns() const { return reduced_basis_.rows(); }
-  void assemble(const ReducedModel& model, Eigen::SparseMatrix<double>& mass,
-                Eigen::SparseMatrix<double>& stiffness) const;
   void weigh_surface(const ObjectData& object);
 
   double spread_, time_scale_ = 0;

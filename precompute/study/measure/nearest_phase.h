@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/study/measure/frames.h"
 
 namespace exmat::precompute {

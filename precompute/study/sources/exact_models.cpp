@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "common/core/error.h"
-#include "common/mesh/geometry.h"
 #include "precompute/cubature/cubature.h"
 #include "precompute/cubature/element_samples.h"
 #include "precompute/examples/example_stage.h"
@@ -91,23 +90,18 @@ RowMatrix pull_of(const ReducedModel& model, const ElasticSystem& system, const 
 
 TargetSpaceData exact_space(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
                             EnergyReference reference) {
-  const std::vector<Eigen::Index> tets = mesh_target(object, system, coordinates, reference).tets;
   const RowMatrix basis = system.extend(coordinates.basis);
   const ElementSamples samples(object.mesh, object.materials, basis);
-  const auto count = std::ssize(tets);
+  CubatureData elements = samples.data_of(mesh_target(object, system, coordinates, reference).elements);
   TargetSpaceData data;
   data.energy_reference = reference;
   data.poses = coordinates.poses.transpose();
-  data.elements.resize(count);
-  data.gradient.resize(9 * count, basis.cols());
-  for (Eigen::Index i = 0; i < count; ++i) {
-    data.elements[i] = static_cast<std::int32_t>(tets[static_cast<std::size_t>(i)]);
-    data.gradient.middleRows<9>(9 * i) = samples.gradient(tets[static_cast<std::size_t>(i)]);
-  }
-  data.weights = Eigen::VectorXd::Ones(count);
-  data.volumes = tet_volumes(object.mesh)(tets);
-  data.youngs_modulus = object.materials.youngs_modulus(tets);
-  data.poisson_ratio = object.materials.poisson_ratio(tets);
+  data.weights = Eigen::VectorXd::Ones(elements.elements.size());
+  data.elements = std::move(elements.elements);
+  data.volumes = std::move(elements.volumes);
+  data.gradient = std::move(elements.gradient);
+  data.youngs_modulus = std::move(elements.youngs_modulus);
+  data.poisson_ratio = std::move(elements.poisson_ratio);
   return data;
 }
 

@@ -13,7 +13,7 @@
 #include "common/core/atomic_file.h"
 #include "common/core/error.h"
 #include "common/core/version.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/inputs/inputs.h"
 #include "precompute/study/measure/error_json.h"
 #include "precompute/study/sweep/pareto.h"

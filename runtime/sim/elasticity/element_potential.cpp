@@ -83,7 +83,7 @@ ElementPotential::ElementPotential(const RowMatrix& gradient)
 ElementPotential::Workspace ElementPotential::make_workspace() const {
   const Eigen::Index stride = padded(modes_);
   return {AlignedArray(stride * kLanes), AlignedArray(lane_triangle(modes_) / kLanes),
-          AlignedArray(panels() * kTangentNumbers * kLanes), Eigen::VectorXd::Zero(modes_)};
+          AlignedArray(panels() * kTangentNumbers * kLanes), AlignedArray(stride), Eigen::VectorXd::Zero(modes_)};
 }
 
 ElementArrays ElementPotential::arrays() const noexcept {

@@ -27,6 +27,7 @@ class ElementPotential {
   /// Sized once by make_workspace(); any ElementPotential of the same s and r may share it.
   struct Workspace {
     AlignedArray force, stiffness, tangents;
+    AlignedArray constant;         ///< padded(r), of a ConstantStiffness beside the elements
     Eigen::VectorXd unused_force;  ///< r
   };
 

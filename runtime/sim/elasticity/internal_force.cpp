@@ -12,7 +12,7 @@ InternalForce::Workspace InternalForce::make_workspace() const {
 }
 
 double InternalForce::energy(const Eigen::VectorXd& q, Workspace& workspace) const noexcept {
-  return polynomial_ ? polynomial_->energy(q, workspace.polynomial) : cubature_.energy(q);
+  return polynomial_ ? polynomial_->energy(q, workspace.polynomial) : cubature_.energy(q, workspace.cubature);
 }
 
 double InternalForce::force(const Eigen::VectorXd& q, Workspace& workspace, Eigen::VectorXd& force) const noexcept {

@@ -24,8 +24,9 @@ WeightedLame::WeightedLame(const Eigen::VectorXd& weighted_volumes, const std::v
 }
 
 ReducedElasticity::ReducedElasticity(MaterialModel material, const RowMatrix& gradient,
-                                     const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame)
-    : kind_(law_kind(material)), potential_(gradient), lame_(weighted_volumes, lame) {
+                                     const Eigen::VectorXd& weighted_volumes, const std::vector<LameParameters>& lame,
+                                     const RowMatrix& variance)
+    : kind_(law_kind(material)), potential_(gradient), lame_(weighted_volumes, lame), variance_(variance) {
   if (material == MaterialModel::kStVenantKirchhoff && modes() <= kMostPolynomialModes &&
       StiffnessPolynomial::flops(modes()) < kMostFlops * potential_.stiffness_flops())
     polynomial_ = std::make_shared<LazyStiffnessPolynomial>();
@@ -33,7 +34,7 @@ ReducedElasticity::ReducedElasticity(MaterialModel material, const RowMatrix& gr
 
 ReducedElasticity::ReducedElasticity(MaterialModel material, const CubatureData& cubature)
     : ReducedElasticity(material, cubature.gradient, cubature.weights.cwiseProduct(cubature.volumes),
-                        cubature_lame(cubature)) {}
+                        cubature_lame(cubature), cubature.variance) {}
 
 void ReducedElasticity::prepare_lanes() const {
   if (!polynomial_) return;
@@ -44,14 +45,16 @@ void ReducedElasticity::prepare_lanes() const {
   });
 }
 
-void ReducedElasticity::lanes_force_and_stiffness(const double* q, Precision precision, double* energy, double* force,
-                                                  double* stiffness) const noexcept {
-  if (!polynomial_) {
+void ReducedElasticity::lanes_force_and_stiffness(const double* q, Precision precision, double* scratch, double* energy,
+                                                  double* force, double* stiffness) const noexcept {
+  if (polynomial_) {
+    potential_.lanes_force(law(), q, energy, force);
+    polynomial_->made->evaluate_lanes(q, precision, stiffness);
+  } else {
     potential_.lanes_force_and_stiffness(law(), q, precision, energy, force, stiffness);
-    return;
   }
-  potential_.lanes_force(law(), q, energy, force);
-  polynomial_->made->evaluate_lanes(q, precision, stiffness);
+  variance_.add_lanes_force(q, scratch, energy, force);
+  variance_.add_lanes_stiffness(stiffness);
 }
 
 double ReducedElasticity::lanes_stiffness_flops() const noexcept {

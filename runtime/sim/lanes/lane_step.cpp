@@ -154,7 +154,8 @@ class LaneStep {
              (begins_with_predictor && are_clearly_apart(energy_[lane] + inertia[lane], at_start[lane], energy_[lane]));
     };
     LaneNumbers energy = LaneNumbers::Zero();
-    if (any([&](std::size_t l) { return !is_decided(l); })) elements_.lanes_energy(trial_.data(), energy.data());
+    if (any([&](std::size_t l) { return !is_decided(l); }))
+      elements_.lanes_energy(trial_.data(), workspace_.elastic_scratch_.data(), energy.data());
     workspace_.predictor_was_lower_ = true;
     each([&](std::size_t l, Eigen::Index lane) {
       if (is_one_iterate(lane)) return;
@@ -176,8 +177,8 @@ class LaneStep {
 
   void evaluate_stiffness(LaneNumbers& energy) noexcept {
     fetch_next();
-    elements_.lanes_force_and_stiffness(q_.data(), bodies_.front().scene->precision, energy.data(), internal_.data(),
-                                        workspace_.stiffness_.data());
+    elements_.lanes_force_and_stiffness(q_.data(), bodies_.front().scene->precision, workspace_.elastic_scratch_.data(),
+                                        energy.data(), internal_.data(), workspace_.stiffness_.data());
   }
 
   /// Of lanes whose numbers are finite; the others are left to step().
@@ -433,7 +434,7 @@ class LaneStep {
     {
       const StageTimer timer(profile(), Stage::kInternalForce, flops(force_flops()));
       fetch_next();
-      elements_.lanes_force(trial_.data(), there_.energy.data(), internal_.data());
+      elements_.lanes_force(trial_.data(), workspace_.elastic_scratch_.data(), there_.energy.data(), internal_.data());
       assemble(trial_, trial_gradient_);
     }
     slope_there_ = dot(trial_gradient_, direction_);

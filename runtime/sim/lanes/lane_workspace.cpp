@@ -21,7 +21,7 @@ LaneWorkspace::LaneWorkspace(const Model& model, const StepScene& scene, std::si
   const Eigen::Index modes = model.modes();
   forms_ = LaneForms(modes);
   for (AlignedArray* vectors : {&q_, &previous_, &trial_, &gradient_, &trial_gradient_, &internal_, &direction_,
-                                &linear_, &frozen_, &next_frozen_, &offset_})
+                                &linear_, &frozen_, &next_frozen_, &offset_, &elastic_scratch_})
     *vectors = AlignedArray(modes * kLanes);
   for (AlignedArray* matrices : {&quadratic_, &stiffness_, &factor_, &new_factor_})
     *matrices = AlignedArray(lane_triangle(modes));

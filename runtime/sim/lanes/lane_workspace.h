@@ -37,7 +37,7 @@ class LaneWorkspace {
   std::vector<Workspace> bodies_;
   LaneForms forms_;
   AlignedArray q_, previous_, trial_, gradient_, trial_gradient_, internal_, direction_, linear_, frozen_, next_frozen_,
-      offset_;                                                // r x kLanes
+      offset_, elastic_scratch_;                              // r x kLanes
   AlignedArray quadratic_, stiffness_, factor_, new_factor_;  // lane_triangle(r)
   std::vector<LaneExamples> examples_;                        // one for each of the model's
   LaneFrames frames_;

@@ -29,7 +29,7 @@ struct ExampleParts {
 };
 
 /// The elements of a space of targets, as those of a cubature.
-CubatureData elements_of(const TargetSpaceData& space) {
+CubatureData cubature_of(const TargetSpaceData& space) {
   CubatureData elements;
   elements.weights = space.weights;
   elements.volumes = space.volumes;
@@ -54,7 +54,7 @@ std::optional<Complaint> add_solver(const RestModel& rest, const ExampleParts& p
   for (std::size_t k = 0; k < poses.size(); ++k)
     poses[k].pose = space.poses.row(static_cast<Eigen::Index>(k)).transpose();
   const Eigen::Index d = space.poses.cols();
-  auto complaint = solver.build(rest.material, elements_of(space), poses, RowMatrix::Identity(d, d), reference);
+  auto complaint = solver.build(rest.material, cubature_of(space), poses, RowMatrix::Identity(d, d), reference);
   examples.target_pull = space.pull * solver.basis();
   return complaint;
 }

@@ -102,7 +102,7 @@ TEST(Bundle, ForSteppingReadsOnlyWhatStepsNeed) {
   const auto model = read_bundle(folder / "a.h5", request_for(kLeastNeeds, true, true, false), &record);
   EXPECT_THAT(datasets_of(record),
               ElementsAre("/modal/gravity_load", "/cubature/weights", "/cubature/volumes", "/cubature/gradient",
-                          "/cubature/youngs_modulus", "/cubature/poisson_ratio"));
+                          "/cubature/youngs_modulus", "/cubature/poisson_ratio", "/cubature/variance"));
   EXPECT_EQ(record[0].bytes, 3u * 2u * 8u);
   EXPECT_FALSE(model.examples || model.shape_space || model.polynomial || model.projection || model.targets ||
                model.rigid || model.contact || model.render);
@@ -119,7 +119,7 @@ TEST(Bundle, ForPositionsReadsMeshAndBasisToo) {
   EXPECT_THAT(datasets_of(record),
               ElementsAre("/object/vertices", "/object/tets", "/object/density", "/modal/basis", "/modal/gravity_load",
                           "/cubature/weights", "/cubature/volumes", "/cubature/gradient", "/cubature/youngs_modulus",
-                          "/cubature/poisson_ratio"));
+                          "/cubature/poisson_ratio", "/cubature/variance"));
 }
 
 TEST(Bundle, ForARenderMeshReadsWhatItMovesWith) {

@@ -93,6 +93,8 @@ CubatureData small_cubature() {
   cubature.gradient = numbers(9 * kElements, kModes, -2);
   cubature.youngs_modulus = numbers(kElements, 1, 1e5);
   cubature.poisson_ratio = numbers(kElements, 1, 0.3);
+  const RowMatrix factor = numbers(kModes, kModes, 1);
+  cubature.variance = factor * factor.transpose();
   cubature.heldout_poses = numbers(4, kModes, -0.75);
   cubature.internal_force = ForceMethod::kPolynomial;
   cubature.internal_force_reason = "faster";

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "common/core/error.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "tests/support/box_mesh.h"
 
 namespace exmat::precompute {

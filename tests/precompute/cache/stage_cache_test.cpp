@@ -6,8 +6,8 @@
 
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/mesh/assembly.h"
 #include "precompute/examples/example_alignment.h"
-#include "precompute/fem/assembly.h"
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::precompute {

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <gtest/gtest.h>
 
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"
 

@@ -5,9 +5,9 @@
 #include <limits>
 #include <random>
 
+#include "common/mesh/assembly.h"
 #include "common/mesh/geometry.h"
 #include "precompute/alignment/surface_tree.h"
-#include "precompute/fem/assembly.h"
 #include "tests/support/posed_bodies.h"
 
 namespace exmat::precompute {

@@ -117,6 +117,24 @@ TEST_P(ElasticForceOf, AllTetsIsThatOfTheMesh) {
   }
 }
 
+TEST_P(ElasticForceOf, AllRingsIsThatOfTheMesh) {
+  materials_.formulation = Formulation::kSmoothed;
+  materials_.variance_factor = 0.2;
+  Eigen::VectorXd shares = ones();
+  shares.head(20).setZero();
+  shares.segment(20, 30).setConstant(0.25);
+  const Eigen::VectorXd q = draw_poses(source_, 1, 5).row(0),
+                        y = space_.coordinates.poses * Eigen::Vector3d(0.2, 0.5, 0.3);
+  for (const Eigen::VectorXd& own : {ones(), shares}) {
+    const auto data = all_target_elements(input(own));
+    EXPECT_LE(data.elements.size(), elements_of(mesh_, materials_).count());
+    const auto [force, energy] = exact(q, y, own);
+    const auto found = reduced(data, q, y);
+    EXPECT_NEAR(found.second, energy, 1e-11 * energy);
+    EXPECT_LE((found.first - force).norm(), 1e-11 * force.norm());
+  }
+}
+
 // About as far off at pairs of its own as it says: drawn in the same way, but at full distance from the target.
 TEST_P(ElasticForceOf, ChosenTetsIsNearThatOfTheMesh) {
   const auto data = target_elasticity(input(ones()), source_, {.elements = 40, .training_poses = 120});

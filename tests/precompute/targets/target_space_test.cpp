@@ -6,7 +6,7 @@
 #include <omp.h>
 #include <random>
 
-#include "precompute/targets/tet_forces.h"
+#include "precompute/targets/element_forces.h"
 #include "runtime/sim/examples/target_table.h"
 #include "runtime/sim/step/model.h"
 #include "tests/precompute/full_space/full_space_bar.h"
@@ -65,7 +65,7 @@ class Body {
   TargetSpace build_by_sample(double tolerance, Eigen::Index sample) const {
     return build_target_space(
         *bar_.model.object, system_, range_,
-        {.energy_reference = reference_, .tolerance = tolerance, .most_tets = 0, .sample = sample});
+        {.energy_reference = reference_, .tolerance = tolerance, .most_elements = 0, .sample = sample});
   }
 
   /// The displacement [f] of the target, and of the largest example.
@@ -133,9 +133,9 @@ TEST_P(TargetSpaceOf, TableOfASampleIsNearTheTargetsOfTheWholeMesh) {
 
 // By the vertices against the kernels' sum over tets. A tet's numbers are summed in another order: rounding.
 TEST_P(TargetSpaceOf, ForcesOfTetsAreTheDerivativeOfTheirEnergies) {
-  const TetForces forces(*body_.bar_.model.object, body_.system_, body_.range_, body_.reference_);
+  const ElementForces forces(*body_.bar_.model.object, body_.system_, body_.range_, body_.reference_);
   const runtime::TargetSolver& solver = body_.whole_.solver;
-  EXPECT_EQ(forces.tets(), body_.whole_.tets);
+  EXPECT_EQ(forces.members(), body_.whole_.elements);
   auto workspace = solver.make_workspace();
   for (const Eigen::VectorXd& w : random_weights(GetParam().examples, 5)) {
     Eigen::VectorXd y(solver.dimension()), expected(solver.dimension());
@@ -236,7 +236,7 @@ TEST(TargetSpace, LeavesOutTetsThatAPoseTurnsInsideOut) {
   body.range_.poses.col(1) *= 1000;
   const MeshTarget target = mesh_target(*body.bar_.model.object, body.system_, body.range_, EnergyReference::kExample);
   ASSERT_GT(target.left_out, 0);
-  EXPECT_EQ(target.left_out + std::ssize(target.tets), body.bar_.model.object->mesh.tet_count());
+  EXPECT_EQ(target.left_out + std::ssize(target.elements), body.bar_.model.object->mesh.tet_count());
   const Eigen::VectorXd pose = body.system_.extend(body.range_.basis * body.range_.poses.col(1));
   const TetMesh& mesh = body.bar_.model.object->mesh;
   const auto volume = [&](Eigen::Index t) {

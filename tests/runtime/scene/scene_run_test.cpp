@@ -102,7 +102,8 @@ std::set<std::string> datasets(const LoadedScene& loaded) {
 }
 
 const std::set<std::string> kStepDatasets{"/modal/gravity_load",      "/cubature/weights",       "/cubature/volumes",
-                                          "/cubature/youngs_modulus", "/cubature/poisson_ratio", "/cubature/gradient"};
+                                          "/cubature/youngs_modulus", "/cubature/poisson_ratio", "/cubature/gradient",
+                                          "/cubature/variance"};
 
 TEST_F(SceneRunTest, ReadsNoMoreThanSteppingNeeds) {
   const LoadedScene loaded = load_run(scene(""));

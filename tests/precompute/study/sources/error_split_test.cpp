@@ -6,7 +6,7 @@
 #include <gtest/gtest.h>
 #include <sstream>
 
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/study/sources/split_text.h"
 #include "tests/support/box_mesh.h"
 

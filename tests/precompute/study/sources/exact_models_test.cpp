@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/bundle/bundle.h"
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 #include "precompute/study/measure/error_metrics.h"
 #include "precompute/study/measure/runs.h"
 #include "tests/precompute/full_space/full_space_bar.h"

@@ -47,14 +47,14 @@ TEST_F(ReducedElasticityTest, ForceIsTheProjectedForceOfTheFullSpace) {
 TEST_F(ReducedElasticityTest, ForceIsTheDerivativeOfTheEnergy) {
   const Eigen::VectorXd q = pose(1, 0.3);
   Eigen::VectorXd force(bar_.modes());
-  EXPECT_EQ(elasticity_.force(q, workspace_, force), elasticity_.energy(q));
+  EXPECT_EQ(elasticity_.force(q, workspace_, force), elasticity_.energy(q, workspace_));
   for (Eigen::Index i = 0; i < q.size(); ++i) {
     // The energy is a quartic polynomial, whose five-point difference is exact but for rounding.
     const double h = 0.02 * q.norm();
     const auto at = [&](double offset) {
       Eigen::VectorXd moved = q;
       moved[i] += offset * h;
-      return elasticity_.energy(moved);
+      return elasticity_.energy(moved, workspace_);
     };
     const double difference = (at(-2) - 8 * at(-1) + 8 * at(1) - at(2)) / (12 * h);
     EXPECT_NEAR(force[i], difference, 1e-10 * force.norm()) << i;

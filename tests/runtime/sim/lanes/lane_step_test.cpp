@@ -218,7 +218,8 @@ TEST(LaneStep, ABodyThatNeedsMoreStepsByItself) {
   Crowd lanes = make_crowd(bar, *model, kind, 6);
   for (StepScene& scene : lanes.scenes) scene.time_step = 0.02;
   lanes.states[2].q = pose(bar, 3, 7);
-  lanes.states[2].elastic_energy = model->internal_force.cubature().energy(lanes.states[2].q);
+  auto elasticity = model->internal_force.make_workspace();
+  lanes.states[2].elastic_energy = model->internal_force.energy(lanes.states[2].q, elasticity);
   lanes.states[4].v.setConstant(std::numeric_limits<double>::infinity());
   Crowd each = lanes;
   LaneWorkspace workspace(*model, lanes.scenes.front());

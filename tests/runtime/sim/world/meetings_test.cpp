@@ -1,5 +1,6 @@
 #include "tests/runtime/sim/world/meetings.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 namespace exmat::runtime {

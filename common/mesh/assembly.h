@@ -1,10 +1,12 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <cstdint>
+#include <vector>
 
 #include "common/mesh/tet_mesh.h"
 
-namespace exmat::precompute {
+namespace exmat {
 
 /// Compressed rows, both triangles of a symmetric matrix stored, column indices ascending.
 using SparseMatrix = Eigen::SparseMatrix<double, Eigen::RowMajor>;
@@ -27,4 +29,4 @@ SparseMatrix expand_to_vectors(const SparseMatrix& scalar);
 /// [k x k] rows and columns `kept` (ascending) of a square matrix.
 SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<std::int32_t>& kept);
 
-}  // namespace exmat::precompute
+}  // namespace exmat

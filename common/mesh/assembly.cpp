@@ -1,47 +1,42 @@
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 
 #include <algorithm>
-#include <numeric>
 #include <vector>
 
 #include "common/elastic/material.h"
+#include "common/mesh/elements.h"
 #include "common/mesh/geometry.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
-// The tets around each vertex, one vertex after another.
-struct VertexTets {
-  std::vector<std::int32_t> starts, tets;
-};
-
-VertexTets tets_around(const TetMesh& mesh) {
-  VertexTets around{std::vector<std::int32_t>(static_cast<std::size_t>(mesh.vertex_count()) + 1), {}};
-  for (const auto vertex : mesh.tets.reshaped()) ++around.starts[static_cast<std::size_t>(vertex) + 1];
-  std::partial_sum(around.starts.begin(), around.starts.end(), around.starts.begin());
-  around.tets.resize(static_cast<std::size_t>(mesh.tets.size()));
-  std::vector<std::int32_t> next(around.starts);
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
-    for (const auto vertex : mesh.tets.row(t))
-      around.tets[static_cast<std::size_t>(next[static_cast<std::size_t>(vertex)]++)] = static_cast<std::int32_t>(t);
-  return around;
-}
-
-// [n x n] zeros where vertices share a tet.
-SparseMatrix vertex_pattern(const TetMesh& mesh) {
-  const VertexTets around = tets_around(mesh);
+// [n x n] zeros where vertices are in one of the lists.
+SparseMatrix vertex_pattern(Eigen::Index vertices, const IndexLists& lists) {
+  std::vector<std::vector<std::int32_t>> around(static_cast<std::size_t>(vertices));
+  for (std::size_t list = 0; list < lists.size(); ++list)
+    for (const std::int32_t vertex : lists[list])
+      around[static_cast<std::size_t>(vertex)].push_back(static_cast<std::int32_t>(list));
   std::vector<int> starts{0}, columns, row;
-  for (std::size_t v = 0; v + 1 < around.starts.size(); ++v) {
+  for (const std::vector<std::int32_t>& own : around) {
     row.clear();
-    for (auto k = around.starts[v]; k < around.starts[v + 1]; ++k)
-      for (const auto vertex : mesh.tets.row(around.tets[static_cast<std::size_t>(k)])) row.push_back(vertex);
+    for (const std::int32_t list : own)
+      row.insert(row.end(), lists[static_cast<std::size_t>(list)].begin(), lists[static_cast<std::size_t>(list)].end());
     std::sort(row.begin(), row.end());
     columns.insert(columns.end(), row.begin(), std::unique(row.begin(), row.end()));
     starts.push_back(static_cast<int>(columns.size()));
   }
   const std::vector<double> zeros(columns.size());
-  return Eigen::Map<const SparseMatrix>(mesh.vertex_count(), mesh.vertex_count(), std::ssize(columns), starts.data(),
-                                        columns.data(), zeros.data());
+  return Eigen::Map<const SparseMatrix>(vertices, vertices, std::ssize(columns), starts.data(), columns.data(),
+                                        zeros.data());
+}
+
+IndexLists corners_of(const TetMesh& mesh) {
+  IndexLists corners;
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+    for (const auto vertex : mesh.tets.row(t)) corners.indices.push_back(vertex);
+    corners.close();
+  }
+  return corners;
 }
 
 // Where (row, column) is among the stored entries.
@@ -54,7 +49,7 @@ Eigen::Index position(const SparseMatrix& matrix, Eigen::Index row, int column) 
 // Sums element(t), a [4 x 4] matrix of each tet, into an n x n matrix.
 template <typename ElementMatrix>
 SparseMatrix assemble_scalar(const TetMesh& mesh, const ElementMatrix& element) {
-  SparseMatrix matrix = vertex_pattern(mesh);
+  SparseMatrix matrix = vertex_pattern(mesh.vertex_count(), corners_of(mesh));
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
     const Eigen::Matrix4d local = element(t);
     for (int i = 0; i < 4; ++i)
@@ -81,17 +76,10 @@ SparseMatrix block_pattern(const SparseMatrix& scalar) {
   return blocks;
 }
 
-// 12 x 12: lambda g_i g_j^T + mu g_j g_i^T + mu (g_i . g_j) I for each pair of corners, times the volume.
-Eigen::Matrix<double, 12, 12> element_stiffness(const Eigen::Matrix<double, 4, 3>& gradients, double volume,
-                                                const LameParameters& lame) {
-  Eigen::Matrix<double, 12, 12> local;
-  for (int i = 0; i < 4; ++i)
-    for (int j = 0; j < 4; ++j) {
-      const Eigen::Vector3d gi = gradients.row(i), gj = gradients.row(j);
-      local.block<3, 3>(3 * i, 3 * j) = volume * (lame.lambda * gi * gj.transpose() + lame.mu * gj * gi.transpose() +
-                                                  lame.mu * gi.dot(gj) * Eigen::Matrix3d::Identity());
-    }
-  return local;
+// lambda g_i g_j^T + mu g_j g_i^T + mu (g_i . g_j) I.
+Eigen::Matrix3d stiffness_block(const Eigen::Vector3d& gi, const Eigen::Vector3d& gj, const LameParameters& lame) {
+  return lame.lambda * gi * gj.transpose() + lame.mu * gj * gi.transpose() +
+         lame.mu * gi.dot(gj) * Eigen::Matrix3d::Identity();
 }
 
 }  // namespace
@@ -113,23 +101,29 @@ SparseMatrix laplacian_stiffness(const TetMesh& mesh) {
 }
 
 SparseMatrix elastic_stiffness(const TetMesh& mesh, const TetMaterials& materials) {
-  const Eigen::VectorXd volumes = tet_volumes(mesh);
-  const SparseMatrix scalar = vertex_pattern(mesh);
+  const Elements elements = elements_of(mesh, materials);
+  const SparseMatrix scalar = vertex_pattern(mesh.vertex_count(), elements.vertices);
   SparseMatrix matrix = block_pattern(scalar);
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    const auto lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
-    const auto local = element_stiffness(shape_gradients(tet_positions(mesh, t)), volumes[t], lame);
-    for (int i = 0; i < 4; ++i) {
-      const Eigen::Index row = mesh.tets(t, i), start = scalar.outerIndexPtr()[row],
-                         stride = 3 * (scalar.outerIndexPtr()[row + 1] - start);
-      for (int j = 0; j < 4; ++j) {
-        const Eigen::Index entry = position(scalar, row, mesh.tets(t, j));
-        for (int a = 0; a < 3; ++a)
-          Eigen::Map<Eigen::RowVector3d>(matrix.valuePtr() + 9 * start + 3 * (entry - start) + a * stride) +=
-              local.block<1, 3>(3 * i + a, 3 * j);
-      }
-    }
+  const auto add = [&](Eigen::Index row, int column, const Eigen::Matrix3d& block) {
+    const Eigen::Index start = scalar.outerIndexPtr()[row], stride = 3 * (scalar.outerIndexPtr()[row + 1] - start);
+    const Eigen::Index entry = position(scalar, row, column);
+    for (int a = 0; a < 3; ++a)
+      Eigen::Map<Eigen::RowVector3d>(matrix.valuePtr() + 9 * start + 3 * (entry - start) + a * stride) += block.row(a);
+  };
+  for (Eigen::Index e = 0; e < elements.count(); ++e) {
+    const LameParameters lame = elements.lame(e);
+    const auto vertices = elements.vertices_of(e);
+    const auto gradients = elements.gradients_of(e);
+    for (std::size_t i = 0; i < vertices.size(); ++i)
+      for (std::size_t j = 0; j < vertices.size(); ++j)
+        add(vertices[i], vertices[j],
+            elements.volumes[e] * stiffness_block(gradients.row(static_cast<Eigen::Index>(i)).transpose(),
+                                                  gradients.row(static_cast<Eigen::Index>(j)).transpose(), lame));
   }
+  const SparseMatrix variance = variance_matrix(mesh, materials, elements);
+  for (Eigen::Index row = 0; row < variance.outerSize(); ++row)
+    for (SparseMatrix::InnerIterator entry(variance, row); entry; ++entry)
+      add(row, static_cast<int>(entry.col()), entry.value() * Eigen::Matrix3d::Identity());
   return matrix;
 }
 
@@ -164,4 +158,4 @@ SparseMatrix submatrix(const SparseMatrix& matrix, const std::vector<std::int32_
   return sub;
 }
 
-}  // namespace exmat::precompute
+}  // namespace exmat

@@ -1,9 +1,10 @@
-#include "precompute/targets/tet_forces.h"
+#include "precompute/targets/element_forces.h"
 
 #include <Eigen/LU>
 #include <gtest/gtest.h>
 #include <omp.h>
 
+#include "precompute/full_space/mesh_elasticity.h"
 #include "tests/support/box_mesh.h"
 #include "tests/support/random.h"
 #include "tests/support/synthetic_model.h"
@@ -23,9 +24,9 @@ struct Case {
 
 void PrintTo(const Case& c, std::ostream* out) { *out << name_of(c.reference) << " " << name_of(c.material); }
 
-class TetForcesOf : public ::testing::TestWithParam<Case> {
+class ElementForcesOf : public ::testing::TestWithParam<Case> {
  protected:
-  TetForcesOf() {
+  ElementForcesOf() {
     object_.mesh = test::box_mesh({9, 7, 6}, {1.0, 0.8, 0.6});
     const Eigen::Index tets = object_.mesh.tet_count();
     const Eigen::ArrayXd uneven = 1 + 0.5 * test::random_vector(tets, 7).array();
@@ -81,16 +82,16 @@ class TetForcesOf : public ::testing::TestWithParam<Case> {
   PoseCoordinates coordinates_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Cases, TetForcesOf,
+INSTANTIATE_TEST_SUITE_P(Cases, ElementForcesOf,
                          ::testing::Values(Case{}, Case{EnergyReference::kRest},
                                            Case{EnergyReference::kExample, MaterialModel::kStableNeoHookean},
                                            Case{EnergyReference::kRest, MaterialModel::kCorotational}));
 
 // By central differences along a random direction. Weights of zero are among them, alone and in all of a group.
-TEST_P(TetForcesOf, AreTheDerivativesOfTheEnergies) {
+TEST_P(ElementForcesOf, AreTheDerivativesOfTheEnergies) {
   constexpr double kStep = 1e-5;
-  const TetForces forces(object_, system_, coordinates_, GetParam().reference);
-  ASSERT_EQ(std::ssize(forces.tets()), object_.mesh.tet_count());
+  const ElementForces forces(object_, system_, coordinates_, GetParam().reference);
+  ASSERT_EQ(std::ssize(forces.members()), object_.mesh.tet_count());
   RowMatrix weights = test::random_matrix(kSums, 3, 5).cwiseAbs();
   weights.bottomRows(3).col(1).setZero();
   weights(0, 2) = 0;
@@ -103,9 +104,40 @@ TEST_P(TetForcesOf, AreTheDerivativesOfTheEnergies) {
   }
 }
 
+// Of rings, against the elasticity of the mesh.
+TEST_P(ElementForcesOf, OfRingsAreTheDerivativesOfTheEnergies) {
+  constexpr double kStep = 1e-5;
+  object_.materials.youngs_modulus.setConstant(1e4);
+  object_.materials.formulation = Formulation::kSmoothed;
+  object_.materials.variance_factor = 0.2;
+  const ElementForces forces(object_, system_, coordinates_, GetParam().reference);
+  ASSERT_EQ(std::ssize(forces.members()), object_.mesh.vertex_count());
+  MeshElasticity elasticity(object_.mesh, object_.materials, system_.free_dofs);
+  const RowMatrix weights = test::random_matrix(kSums, 3, 5).cwiseAbs();
+  const Eigen::MatrixXd p = 0.3 * test::random_matrix(kCoordinates, kSums, 9), found = forces.forces(weights, p);
+  const auto energy = [&](const Eigen::VectorXd& w, const Eigen::VectorXd& at) {
+    double sum = 0;
+    for (Eigen::Index k = 0; k < w.size(); ++k) {
+      const Eigen::VectorXd example = coordinates_.basis * coordinates_.poses.col(k), u = system_.extend(example);
+      const bool is_rest = GetParam().reference == EnergyReference::kRest;
+      const VertexArray from =
+          object_.mesh.vertices + (is_rest ? 0 : 1) * VertexArray(u.reshaped<Eigen::RowMajor>(u.size() / 3, 3));
+      EXPECT_EQ(elasticity.set_undeformed(from), 0);
+      sum += w[k] * elasticity.energy(coordinates_.basis * at - example);
+    }
+    return sum;
+  };
+  for (int n = 0; n < kSums; ++n) {
+    const Eigen::VectorXd direction = test::random_vector(kCoordinates, 20U + static_cast<unsigned>(n)),
+                          w = weights.row(n).transpose();
+    const double difference = energy(w, p.col(n) + kStep * direction) - energy(w, p.col(n) - kStep * direction);
+    EXPECT_NEAR(found.col(n).dot(direction), difference / (2 * kStep), 1e-6 * found.col(n).norm()) << n;
+  }
+}
+
 // Rotations are iterated until all lanes of a register have theirs, so that others make a difference of rounding.
-TEST_P(TetForcesOf, AreTheSameForEveryNumberOfThreadsAndBesideOthers) {
-  const TetForces forces(object_, system_, coordinates_, GetParam().reference);
+TEST_P(ElementForcesOf, AreTheSameForEveryNumberOfThreadsAndBesideOthers) {
+  const ElementForces forces(object_, system_, coordinates_, GetParam().reference);
   const RowMatrix weights = test::random_matrix(kSums, 3, 5).cwiseAbs();
   const Eigen::MatrixXd p = 0.3 * test::random_matrix(kCoordinates, kSums, 9);
   const int threads = omp_get_max_threads();
@@ -120,7 +152,7 @@ TEST_P(TetForcesOf, AreTheSameForEveryNumberOfThreadsAndBesideOthers) {
 }
 
 // From the minimum of a few tets: no force is left, and that of the others matters.
-TEST_P(TetForcesOf, VanishWhereTheDescentsEnd) {
+TEST_P(ElementForcesOf, VanishWhereTheDescentsEnd) {
   const MeshTarget target = sampled_target(object_, system_, coordinates_, GetParam().reference, 40);
   RowMatrix weights = test::random_matrix(kSums, 3, 6).cwiseAbs();
   for (auto row : weights.rowwise()) row /= row.sum();
@@ -136,7 +168,7 @@ TEST_P(TetForcesOf, VanishWhereTheDescentsEnd) {
   }
   const RowMatrix& Z = target.solver.basis();
   const Eigen::MatrixXd before = Z.transpose() * target.all->forces(weights, Z * y);
-  for (const TetForces::Answer& answer : target.all->polish(target.solver, weights, y))
+  for (const ElementForces::Answer& answer : target.all->polish(target.solver, weights, y))
     EXPECT_TRUE(answer.converged) << answer.residual;
   const Eigen::MatrixXd after = Z.transpose() * target.all->forces(weights, Z * y);
   EXPECT_LE(after.colwise().norm().maxCoeff(), 1e-8 * scale);

@@ -1,5 +1,5 @@
 // Assembled matrices against sums over the tets.
-#include "precompute/fem/assembly.h"
+#include "common/mesh/assembly.h"
 
 #include <cmath>
 #include <gtest/gtest.h>
@@ -8,7 +8,7 @@
 #include "common/mesh/geometry.h"
 #include "tests/support/box_mesh.h"
 
-namespace exmat::precompute {
+namespace exmat {
 namespace {
 
 using test::box_mesh;
@@ -89,4 +89,4 @@ TEST(Assembly, SubmatrixAndExpansionKeepTheEntries) {
 }
 
 }  // namespace
-}  // namespace exmat::precompute
+}  // namespace exmat

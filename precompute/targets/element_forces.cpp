@@ -1,11 +1,10 @@
-#include "precompute/targets/tet_forces.h"
+#include "precompute/targets/element_forces.h"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <utility>
 
-#include "common/mesh/geometry.h"
 #include "runtime/sim/elasticity/element_potential.h"
 
 namespace exmat::precompute {
@@ -20,15 +19,16 @@ using ConstLanes = Eigen::Map<const Eigen::Array<double, kLanes, 1>, Eigen::Alig
 constexpr double kTolerance = 1e-9;  // of the largest example
 constexpr int kMostSteps = 40;
 constexpr int kMostHalvings = 5;
-constexpr Eigen::Index kTogether = 1024;  // tets whose numbers stay in the caches
-constexpr Eigen::Index kEdges = 9;        // numbers of the three edges of a tet from its first corner
+constexpr Eigen::Index kTogether = 1024;  // elements whose numbers stay in the caches
+constexpr Eigen::Index kEntries = 9;      // of a displacement gradient, H_ab at 3a + b
 
-// H = sum of (u_c - u_0) (x) grad N_c.
-template <typename Tet>
-Eigen::Matrix3d displacement_gradient(const Eigen::VectorXd& u, const Tet& tet, const Eigen::Matrix3d& shape) {
-  Eigen::Matrix3d edges;
-  for (int c = 0; c < 3; ++c) edges.col(c) = u.segment<3>(3 * tet[c + 1]) - u.segment<3>(3 * tet[0]);
-  return edges * shape.transpose();
+Eigen::Matrix3d displacement_gradient(const Eigen::VectorXd& u, const Elements& elements, Eigen::Index element) {
+  const auto vertices = elements.vertices_of(element);
+  const auto gradients = elements.gradients_of(element);
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (std::size_t j = 0; j < vertices.size(); ++j)
+    H += u.segment<3>(3 * vertices[j]) * gradients.row(static_cast<Eigen::Index>(j));
+  return H;
 }
 
 // Its inverse, or of none where it is not positive definite: stiffness at rest is the identity.
@@ -57,7 +57,7 @@ class Descent {
   bool open() const { return open_; }
   Eigen::VectorXd trial() const { return taken_ < 0 ? y_ : y_ + step_; }
   const Eigen::VectorXd& y() const { return y_; }
-  TetForces::Answer answer() const { return {residual_ <= enough_, residual_}; }
+  ElementForces::Answer answer() const { return {residual_ <= enough_, residual_}; }
 
   /// The gradient at the trial.
   void take(const Eigen::VectorXd& gradient) {
@@ -89,7 +89,7 @@ class Descent {
 }  // namespace
 
 // Sums at N weights, a number of each in each lane, kLanes of them in a group.
-struct TetForces::Batch {
+struct ElementForces::Batch {
   Eigen::Index groups = 0, rows = 0;  ///< rows: of the vertices of a part
   AlignedArray weights{};             ///< groups x K x kLanes
   AlignedArray displacements{};       ///< groups x rows x kLanes
@@ -100,92 +100,85 @@ struct TetForces::Batch {
   }
 };
 
-TetForces::TetForces(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
-                     EnergyReference reference)
-    : object_(object), reference_(reference), fields_(system.extend(coordinates.basis)) {
-  const TetMesh& mesh = object.mesh;
+ElementForces::ElementForces(const ObjectData& object, const ElasticSystem& system, const PoseCoordinates& coordinates,
+                             EnergyReference reference)
+    : object_(object),
+      reference_(reference),
+      elements_(elements_of(object.mesh, object.materials)),
+      fields_(system.extend(coordinates.basis)) {
   for (const auto& pose : coordinates.poses.colwise()) examples_.emplace_back(fields_ * pose);
-  const auto shape_of = [&](Eigen::Index t) -> Eigen::Matrix3d {
-    return shape_gradients(tet_positions(mesh, t)).bottomRows<3>().transpose();
-  };
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    const Eigen::Matrix3d shape = shape_of(t);
+  for (Eigen::Index e = 0; e < elements_.count(); ++e) {
     const auto upright = [&](const Eigen::VectorXd& u) {
-      return (Eigen::Matrix3d::Identity() + displacement_gradient(u, mesh.tets.row(t), shape)).determinant() > 0;
+      return (Eigen::Matrix3d::Identity() + displacement_gradient(u, elements_, e)).determinant() > 0;
     };
-    if (reference != EnergyReference::kExample || std::ranges::all_of(examples_, upright)) tets_.push_back(t);
+    if (reference != EnergyReference::kExample || std::ranges::all_of(examples_, upright)) members_.push_back(e);
   }
-  parts_ = tet_parts(mesh, tets_, kTogether);
-  const Eigen::VectorXd volumes = tet_volumes(mesh);
-  for (const TetPart& part : parts_) {
-    std::vector<Tet>& numbers = numbers_.emplace_back();
-    for (const Eigen::Index t : part.tets) {
-      const LameParameters lame =
-          lame_parameters(object.materials.youngs_modulus[t], object.materials.poisson_ratio[t]);
-      numbers.push_back({shape_of(t), {volumes[t] * lame.mu, volumes[t] * lame.lambda}});
-    }
-  }
+  parts_ = element_parts(object.mesh.vertices, elements_, members_, kTogether);
 }
 
-// Of the tets of a part, by the material's lanes: one tet is all of the body, the three edges are its modes.
-void TetForces::add_forces(std::size_t index, Batch& batch) const {
-  constexpr Eigen::Index kStride = runtime::padded(kEdges);
-  alignas(runtime::kAlignment) double gradient[9 * kStride] = {}, edges[kEdges * kLanes], corners[kEdges * kLanes],
-                                                   energies[kLanes];
-  double rest[kEdges];
+// Of the elements of a part, by the material's lanes: one element is all of the body, the entries of its displacement
+// gradient from the example's are its modes.
+void ElementForces::add_forces(std::size_t index, Batch& batch) const {
+  constexpr Eigen::Index kStride = runtime::padded(kEntries);
+  alignas(runtime::kAlignment) double gradient[9 * kStride] = {}, entries[kEntries * kLanes],
+                                                   stresses[kEntries * kLanes], energies[kLanes];
+  using Lane = Eigen::Array<double, kLanes, 1>;
   LameParameters lame;
   const runtime::ElementArrays arrays{
-      .panels = 1, .modes = kEdges, .stride = kStride, .by_element = gradient, .count = 1};
+      .panels = 1, .modes = kEntries, .stride = kStride, .by_element = gradient, .count = 1};
   const runtime::ElementLaw law{
       .kind = runtime::law_kind(object_.materials.model), .mu = &lame.mu, .lambda = &lame.lambda};
-  const TetPart& part = parts_[index];
-  for (std::size_t i = 0; i < part.tets.size(); ++i) {
-    const auto tet = object_.mesh.tets.row(part.tets[i]);
-    const auto places = part.corners.col(static_cast<Eigen::Index>(i));
-    const Tet& own = numbers_[index][i];
+  const ElementPart& part = parts_[index];
+  for (std::size_t i = 0; i < part.elements.size(); ++i) {
+    const Eigen::Index element = part.elements[i];
+    const auto places = part.places[i];
+    const auto shape = elements_.gradients_of(element);
+    const LameParameters own = elements_.lame(element);
+    const double volume = elements_.volumes[element];
     for (std::size_t k = 0; k < examples_.size(); ++k) {
-      // Gradients from the example's shape on: (u - u_k) by edges, times the inverse of its deformation gradient.
-      Eigen::Matrix3d from_edges = own.shape.transpose();
-      lame = own.lame;
+      const Eigen::Matrix3d H = displacement_gradient(examples_[k], elements_, element);
+      // Gradients from the example's shape on: those at rest times the inverse of its deformation gradient.
+      Eigen::Matrix3d from_rest = Eigen::Matrix3d::Identity();
+      double scale = volume;
       if (reference_ == EnergyReference::kExample) {
-        const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + displacement_gradient(examples_[k], tet, own.shape);
-        const double determinant = F.determinant();
-        from_edges *= F.inverse();
-        lame = {determinant * lame.mu, determinant * lame.lambda};
+        const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + H;
+        scale *= F.determinant();
+        from_rest = F.inverse();
       }
+      lame = {scale * own.mu, scale * own.lambda};
       for (int a = 0; a < 3; ++a)
         for (int b = 0; b < 3; ++b)
-          for (int c = 0; c < 3; ++c) gradient[(3 * a + b) * kStride + 3 * c + a] = from_edges(c, b);
-      const double* example = examples_[k].data();
-      for (int c = 0; c < 3; ++c)
-        for (int axis = 0; axis < 3; ++axis)
-          rest[3 * c + axis] = example[3 * tet[c + 1] + axis] - example[3 * tet[0] + axis];
+          for (int c = 0; c < 3; ++c) gradient[(3 * a + b) * kStride + 3 * a + c] = from_rest(c, b);
       for (Eigen::Index group = 0; group < batch.groups; ++group) {
         const ConstLanes weights(batch.weight(group, k, examples_.size()));
         if ((weights == 0).all()) continue;
         const double* displacements = batch.displacements.data() + group * batch.rows * kLanes;
         double* forces = batch.forces.data() + group * batch.rows * kLanes;
-        for (int c = 0; c < 3; ++c)
-          for (int axis = 0; axis < 3; ++axis)
-            Lanes(edges + (3 * c + axis) * kLanes) = ConstLanes(displacements + (3 * places[c + 1] + axis) * kLanes) -
-                                                     ConstLanes(displacements + (3 * places[0] + axis) * kLanes) -
-                                                     rest[3 * c + axis];
-        runtime::kernels().lanes_force(arrays, law, edges, energies, corners);
-        for (int axis = 0; axis < 3; ++axis) {
-          Eigen::Array<double, kLanes, 1> sum = Eigen::Array<double, kLanes, 1>::Zero();
-          for (int c = 0; c < 3; ++c) {
-            const Eigen::Array<double, kLanes, 1> force = weights * ConstLanes(corners + (3 * c + axis) * kLanes);
-            Lanes(forces + (3 * places[c + 1] + axis) * kLanes) += force;
-            sum += force;
+        for (int a = 0; a < 3; ++a) {
+          Lane sums[3] = {Lane::Constant(-H(a, 0)), Lane::Constant(-H(a, 1)), Lane::Constant(-H(a, 2))};
+          for (std::size_t j = 0; j < places.size(); ++j) {
+            const ConstLanes u(displacements + (3 * places[j] + a) * kLanes);
+            for (int c = 0; c < 3; ++c) sums[c] += shape(static_cast<Eigen::Index>(j), c) * u;
           }
-          Lanes(forces + (3 * places[0] + axis) * kLanes) -= sum;
+          for (int c = 0; c < 3; ++c) Lanes(entries + (3 * a + c) * kLanes) = sums[c];
+        }
+        runtime::kernels().lanes_force(arrays, law, entries, energies, stresses);
+        for (int a = 0; a < 3; ++a) {
+          const Lane rows[3] = {weights * ConstLanes(stresses + 3 * a * kLanes),
+                                weights * ConstLanes(stresses + (3 * a + 1) * kLanes),
+                                weights * ConstLanes(stresses + (3 * a + 2) * kLanes)};
+          for (std::size_t j = 0; j < places.size(); ++j) {
+            Lanes force(forces + (3 * places[j] + a) * kLanes);
+            for (int c = 0; c < 3; ++c) force += shape(static_cast<Eigen::Index>(j), c) * rows[c];
+          }
         }
       }
     }
   }
 }
 
-Eigen::MatrixXd TetForces::forces_of_part(std::size_t index, const RowMatrix& weights, const Eigen::MatrixXd& p) const {
+Eigen::MatrixXd ElementForces::forces_of_part(std::size_t index, const RowMatrix& weights,
+                                              const Eigen::MatrixXd& p) const {
   const std::vector<std::int32_t>& vertices = parts_[index].vertices;
   const Eigen::Index d = p.rows(), count = p.cols(), rows = 3 * std::ssize(vertices);
   RowMatrix by_rows(rows, d);
@@ -218,7 +211,7 @@ Eigen::MatrixXd TetForces::forces_of_part(std::size_t index, const RowMatrix& we
   return sums;
 }
 
-Eigen::MatrixXd TetForces::forces(const RowMatrix& weights, const Eigen::MatrixXd& p) const {
+Eigen::MatrixXd ElementForces::forces(const RowMatrix& weights, const Eigen::MatrixXd& p) const {
   std::vector<Eigen::MatrixXd> of_parts(parts_.size());
 #pragma omp parallel for schedule(dynamic)
   for (std::size_t index = 0; index < parts_.size(); ++index) of_parts[index] = forces_of_part(index, weights, p);
@@ -227,8 +220,8 @@ Eigen::MatrixXd TetForces::forces(const RowMatrix& weights, const Eigen::MatrixX
   return sum;
 }
 
-std::vector<TetForces::Answer> TetForces::polish(const runtime::TargetSolver& solver, const RowMatrix& weights,
-                                                 Eigen::MatrixXd& y) const {
+std::vector<ElementForces::Answer> ElementForces::polish(const runtime::TargetSolver& solver, const RowMatrix& weights,
+                                                         Eigen::MatrixXd& y) const {
   const RowMatrix& Z = solver.basis();
   double largest = 0;
   for (Eigen::Index k = 0; k < weights.cols(); ++k) largest = std::max(largest, solver.example(k).norm());
