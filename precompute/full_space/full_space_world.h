@@ -44,7 +44,7 @@ struct FullSpaceWorldReport {
 class FullSpaceWorld {
  public:
   explicit FullSpaceWorld(const runtime::ContactLaw& law)
-      : half_{0.5 * law.stiffness, 0.5 * law.damping, law.friction} {}
+      : half_{0.5 * law.stiffness, 0.5 * law.damping, law.friction, law.release} {}
 
   /// All with the same time step, in a scene of its own each.
   void add(const ReducedModel& data, const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState state);

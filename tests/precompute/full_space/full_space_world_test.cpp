@@ -117,7 +117,8 @@ TEST_P(FullSpaceCollision, IsThatOfRungeAndKuttaToTheOrderOfTheStep) {
   flown << starts[0].x + kTime * starts[0].v, starts[1].x + kTime * starts[1].v;
   const auto collide = [&](double time_step) {
     const FullSpaceScene scene = scene_of(time_step);
-    FullSpaceWorld world = bar.world(scene, {kStiffness, 0, 0}, GetParam());
+    // A corner of the oblique one begins in the other, and the reference lets nothing out slowly.
+    FullSpaceWorld world = bar.world(scene, {.stiffness = kStiffness, .release = 1e9}, GetParam());
     int contacts = 0;
     run(world, static_cast<int>(std::lround(kTime / time_step)), &contacts);
     EXPECT_GT(contacts, 0);
