@@ -1,10 +1,11 @@
-#include "precompute/fem/mesh_stiffness.h"
+#include "precompute/modes/mesh_stiffness.h"
 
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
 #include <vector>
 
+#include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/mesh/elements.h"
 #include "common/mesh/geometry.h"
@@ -106,10 +107,12 @@ std::optional<MeshStiffness> mesh_stiffness(const TetMesh& mesh, const TetMateri
   if (mesh.tet_count() > kMostComparedTets || unknowns < 9) return std::nullopt;
   try {
     return compare(mesh, materials, fixed, name);
-  } catch (const WorkError& error) {  // what is wrong with the mesh, the stages that need it say
+  } catch (const WorkError& error) {  // what is wrong with the mesh or its clamp, the stages that need them say
     log::debug(name + ": not compared with quadratic tets: " + error.what());
-    return std::nullopt;
+  } catch (const InputError& error) {
+    log::debug(name + ": not compared with quadratic tets: " + error.what());
   }
+  return std::nullopt;
 }
 
 std::string to_string(const MeshStiffness& stiffness) {

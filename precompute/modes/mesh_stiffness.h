@@ -28,7 +28,7 @@ void pass_members(Archive& archive, MeshStiffness& value) {
 inline constexpr Eigen::Index kMostComparedTets = 12'000;
 
 /// With beta fitted where the elements are smoothed. None where the mesh has too many tets or too few, or where one of
-/// the systems cannot be solved; `name` is for messages. Throws as build_elastic_system().
+/// the systems cannot be solved; `name` is for messages.
 std::optional<MeshStiffness> mesh_stiffness(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed,
                                             const std::string& name);
 
