@@ -236,12 +236,7 @@ void BundleReader::check_model(const ReducedModel& model) {
   attempt([&] { check_fixed_vertices(model); });
   if (model.targets) check_targets("/targets", *model.targets);
   if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
-  if (model.object && model.cubature)
-    attempt([&] { check_elements(*model.object, "/cubature", model.cubature->elements); });
-  if (model.object && model.target_space)
-    attempt([&] { check_elements(*model.object, "/target_space", model.target_space->elements); });
-  if (model.object && model.target_elasticity)
-    attempt([&] { check_elements(*model.object, "/target_elasticity", model.target_elasticity->elements); });
+  check_elements(model);
   for (const RegionData& region : model.regions) {
     const std::string path = "/regions/" + region.name;
     attempt([&] { check_example_indices(path + "/examples", region.examples); });
@@ -299,17 +294,28 @@ void BundleReader::check_target_knots(const std::string& folder, const TargetTab
     refuse(path, fault->expected, fault->found);
 }
 
-// Where both the mesh and the elements have been read.
-void BundleReader::check_elements(const ObjectData& object, const std::string& group,
-                                  const IndexVector& elements) const {
-  for (const std::string& path : {group + "/elements", std::string("/object/vertices"), std::string("/object/tets"),
-                                  std::string("/object/youngs_modulus"), std::string("/object/poisson_ratio")})
+// Nothing is checked where the mesh has not been read.
+void BundleReader::check_elements(const ReducedModel& model) {
+  for (const char* path :
+       {"/object@formulation", "/object/vertices", "/object/tets", "/object/youngs_modulus", "/object/poisson_ratio"})
     if (!is_sound(path)) return;
+  const ObjectData& object = *model.object;
   const bool linear = object.materials.formulation == Formulation::kLinear;
   const Eigen::Index count = linear ? object.mesh.tet_count() : elements_of(object.mesh, object.materials).count();
-  if (elements.maxCoeff() >= count)
-    refuse(group + "/elements", fmt::format("numbers of the {} elements of /object, from 0 on", count),
-           std::to_string(elements.maxCoeff()));
+  const auto check = [&](const std::string& path, const IndexVector& elements) {
+    attempt([&] {
+      if (is_sound(path) && elements.maxCoeff() >= count)
+        refuse(path, fmt::format("numbers of the {} elements of /object, from 0 on", count),
+               std::to_string(elements.maxCoeff()));
+    });
+  };
+  const auto check_targets = [&](const std::string& group, const auto& owner) {
+    if (owner.target_space) check(group + "/target_space/elements", owner.target_space->elements);
+    if (owner.target_elasticity) check(group + "/target_elasticity/elements", owner.target_elasticity->elements);
+  };
+  if (model.cubature) check("/cubature/elements", model.cubature->elements);
+  check_targets("", model);
+  for (const RegionData& region : model.regions) check_targets("/regions/" + region.name, region);
 }
 
 void BundleReader::check_barycentric(const RowMatrix& rows) const {

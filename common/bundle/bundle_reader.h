@@ -87,7 +87,7 @@ class BundleReader {
   void check_targets(const std::string& folder, const TargetTableData& targets);
   void check_exponents(const std::string& folder, const TargetTableData& targets) const;
   void check_target_knots(const std::string& folder, const TargetTableData& targets) const;
-  void check_elements(const ObjectData& object, const std::string& group, const IndexVector& elements) const;
+  void check_elements(const ReducedModel& model);
   void check_barycentric(const RowMatrix& rows) const;
   bool is_sound(const std::string& place) const { return sound_.contains(place); }
   [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,

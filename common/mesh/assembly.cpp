@@ -12,15 +12,14 @@ namespace {
 
 // [n x n] zeros where vertices are in one of the lists.
 SparseMatrix vertex_pattern(Eigen::Index vertices, const IndexLists& lists) {
-  std::vector<std::vector<std::int32_t>> around(static_cast<std::size_t>(vertices));
-  for (std::size_t list = 0; list < lists.size(); ++list)
-    for (const std::int32_t vertex : lists[list])
-      around[static_cast<std::size_t>(vertex)].push_back(static_cast<std::int32_t>(list));
+  const IndexLists around = lists_around(static_cast<std::int32_t>(vertices), lists);
   std::vector<int> starts{0}, columns, row;
-  for (const std::vector<std::int32_t>& own : around) {
+  for (std::size_t vertex = 0; vertex < around.size(); ++vertex) {
     row.clear();
-    for (const std::int32_t list : own)
-      row.insert(row.end(), lists[static_cast<std::size_t>(list)].begin(), lists[static_cast<std::size_t>(list)].end());
+    for (const std::int32_t list : around[vertex]) {
+      const auto own = lists[static_cast<std::size_t>(list)];
+      row.insert(row.end(), own.begin(), own.end());
+    }
     std::sort(row.begin(), row.end());
     columns.insert(columns.end(), row.begin(), std::unique(row.begin(), row.end()));
     starts.push_back(static_cast<int>(columns.size()));
@@ -28,15 +27,6 @@ SparseMatrix vertex_pattern(Eigen::Index vertices, const IndexLists& lists) {
   const std::vector<double> zeros(columns.size());
   return Eigen::Map<const SparseMatrix>(vertices, vertices, std::ssize(columns), starts.data(), columns.data(),
                                         zeros.data());
-}
-
-IndexLists corners_of(const TetMesh& mesh) {
-  IndexLists corners;
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    for (const auto vertex : mesh.tets.row(t)) corners.indices.push_back(vertex);
-    corners.close();
-  }
-  return corners;
 }
 
 // Where (row, column) is among the stored entries.

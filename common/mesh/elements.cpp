@@ -15,10 +15,9 @@ Gradients gradients_of_tet(const TetMesh& mesh, Eigen::Index tet) { return shape
 
 Elements linear_elements(const TetMesh& mesh, const TetMaterials& materials) {
   Elements elements;
+  elements.vertices = corners_of(mesh);
   elements.gradients.resize(4 * mesh.tet_count(), 3);
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
-    for (const auto vertex : mesh.tets.row(t)) elements.vertices.indices.push_back(vertex);
-    elements.vertices.close();
     elements.tets.indices.push_back(static_cast<std::int32_t>(t));
     elements.tets.close();
     elements.gradients.middleRows<4>(4 * t) = gradients_of_tet(mesh, t);
@@ -46,7 +45,7 @@ std::vector<std::vector<std::int32_t>> by_material(std::span<const std::int32_t>
 }
 
 Elements smoothed_elements(const TetMesh& mesh, const TetMaterials& materials) {
-  const IndexLists around = tets_around_vertices(mesh);
+  const IndexLists around = lists_around(static_cast<std::int32_t>(mesh.vertex_count()), corners_of(mesh));
   const Eigen::VectorXd tet_volume = tet_volumes(mesh);
   Elements elements;
   std::vector<double> volumes;
@@ -95,15 +94,25 @@ Elements smoothed_elements(const TetMesh& mesh, const TetMaterials& materials) {
 
 }  // namespace
 
-IndexLists tets_around_vertices(const TetMesh& mesh) {
-  IndexLists around{std::vector<std::int32_t>(static_cast<std::size_t>(mesh.vertex_count()) + 1), {}};
-  for (const auto vertex : mesh.tets.reshaped()) ++around.starts[static_cast<std::size_t>(vertex) + 1];
+IndexLists corners_of(const TetMesh& mesh) {
+  IndexLists corners;
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+    for (const auto vertex : mesh.tets.row(t)) corners.indices.push_back(vertex);
+    corners.close();
+  }
+  return corners;
+}
+
+IndexLists lists_around(std::int32_t count, const IndexLists& lists) {
+  IndexLists around{std::vector<std::int32_t>(static_cast<std::size_t>(count) + 1), {}};
+  for (const std::int32_t index : lists.indices) ++around.starts[static_cast<std::size_t>(index) + 1];
   std::partial_sum(around.starts.begin(), around.starts.end(), around.starts.begin());
-  around.indices.resize(static_cast<std::size_t>(mesh.tets.size()));
+  around.indices.resize(lists.indices.size());
   std::vector<std::int32_t> next(around.starts);
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
-    for (const auto vertex : mesh.tets.row(t))
-      around.indices[static_cast<std::size_t>(next[static_cast<std::size_t>(vertex)]++)] = static_cast<std::int32_t>(t);
+  for (std::size_t list = 0; list < lists.size(); ++list)
+    for (const std::int32_t index : lists[list])
+      around.indices[static_cast<std::size_t>(next[static_cast<std::size_t>(index)]++)] =
+          static_cast<std::int32_t>(list);
   return around;
 }
 
@@ -136,7 +145,7 @@ Eigen::SparseMatrix<double, Eigen::RowMajor> variance_matrix(const TetMesh& mesh
   for (Eigen::Index e = 0; e < elements.count(); ++e) {
     const auto vertices = elements.vertices_of(e);
     const auto mean = elements.gradients_of(e);
-    // Of each tet the difference from the mean, so that affine displacements have none but for rounding.
+    // Each tet counts by its difference from the mean, so that affine displacements have none but for rounding.
     Eigen::MatrixXd ring = Eigen::MatrixXd::Zero(std::ssize(vertices), std::ssize(vertices));
     for (const std::int32_t t : elements.tets_of(e)) {
       Eigen::MatrixX3d difference = -mean;

@@ -24,11 +24,14 @@ struct IndexLists {
   void close() { starts.push_back(static_cast<std::int32_t>(indices.size())); }
 };
 
-/// The tets around each vertex of a mesh, ascending.
-IndexLists tets_around_vertices(const TetMesh& mesh);
+/// The four vertices of each tet of a mesh, in its order.
+IndexLists corners_of(const TetMesh& mesh);
 
-/// What the elastic energy of a mesh is a sum over: e elements in each of which the displacement gradient
-/// H_e = sum_j u_j b_ej^T is constant, and a constant matrix beside them.
+/// The lists around each of the indices 0 to `count` - 1, ascending: those that have it.
+IndexLists lists_around(std::int32_t count, const IndexLists& lists);
+
+/// Elements are what the elastic energy of a mesh is a sum over: in each of the e elements the displacement gradient
+/// H_e = sum_j u_j b_ej^T is constant, and there is a constant matrix beside them.
 ///     W(u) = sum_e V_e Psi(I + H_e) + 1/2 u^T (S x I) u
 /// Linear: an element is a tet, b_ej the gradients of its shape functions; S is zero. Smoothed: an element is the ring
 /// of tets around a vertex (one for each material there), of each tet a quarter of its volume; b_ej are the means of
@@ -58,6 +61,15 @@ struct Elements {
     return vertices[static_cast<std::size_t>(element)];
   }
   std::span<const std::int32_t> tets_of(Eigen::Index element) const { return tets[static_cast<std::size_t>(element)]; }
+  /// H_e of a field u [3n].
+  template <typename Field>
+  Eigen::Matrix3d displacement_gradient(Eigen::Index element, const Field& u) const {
+    const auto own = gradients_of(element);
+    Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+    Eigen::Index j = 0;
+    for (const std::int32_t vertex : vertices_of(element)) H += u.template segment<3>(3 * vertex) * own.row(j++);
+    return H;
+  }
 };
 
 /// By the formulation of the materials.

@@ -14,7 +14,7 @@ struct TetMesh {
   Eigen::Index tet_count() const { return tets.rows(); }
 };
 
-/// How strains follow from the displacements of vertices: see Elements.
+/// The formulation says how strains follow from the displacements of vertices, see Elements.
 enum class Formulation { kLinear, kSmoothed };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Formulation>{"linear", "smoothed"};

@@ -10,7 +10,8 @@
 
 namespace exmat::precompute {
 
-/// What is summed by itself where elements are many: the same parts, and so the same sum, for every number of threads.
+/// A part is summed by itself where elements are many: the same parts, and so the same sum, for every number of
+/// threads.
 struct Part {
   Eigen::Index begin = 0, end = 0;
 };
@@ -74,13 +75,13 @@ class ElementSamples {
   /// [9 x r] B_j = dF/dq, row 3a + b.
   RowMatrix gradient(Eigen::Index element) const;
 
-  /// Elements, volumes, gradients and parameters of some of them; weights are the caller's to set.
+  /// Collects elements, volumes, gradients and parameters of some; weights are the caller's to set.
   CubatureData data_of(const std::vector<Eigen::Index>& elements) const;
 
   /// [r x r] U^T (S x I) U, the constant part of the stiffness; zero of linear elements.
   RowMatrix variance() const;
 
-  /// Of one element, times its volume; `responses` has the size that the poses ask for.
+  /// Sets `responses`, which have the size that the poses ask for, to those of one element, times its volume.
   void respond(Eigen::Index element, const PoseLanes& poses, Responses& responses) const;
 
   /// [r x r] at each of the poses: the sum of the reduced stiffnesses of elements, times weights [s] and volumes,

@@ -44,6 +44,12 @@ void require_clamped(const VertexArray& nodes, const FlagVector& fixed) {
 
 Eigen::MatrixXd ElasticSystem::restrict(const Eigen::MatrixXd& fields) const { return fields(free_dofs, Eigen::all); }
 
+Eigen::MatrixXd ElasticSystem::unit_weights() const {
+  Eigen::MatrixXd axes = Eigen::MatrixXd::Zero(full_mass.rows(), 3);
+  for (int axis = 0; axis < 3; ++axis) axes(Eigen::seqN(axis, axes.rows() / 3, 3), axis).setOnes();
+  return full_mass * axes;
+}
+
 Eigen::MatrixXd ElasticSystem::extend(const Eigen::MatrixXd& free_rows) const {
   Eigen::MatrixXd fields = Eigen::MatrixXd::Zero(full_mass.rows(), free_rows.cols());
   fields(free_dofs, Eigen::all) = free_rows;

@@ -22,6 +22,8 @@ struct ElasticSystem {
   bool constrained() const { return null_space.cols() == 0; }
   /// [f x k] free rows of [3n x k] fields.
   Eigen::MatrixXd restrict(const Eigen::MatrixXd& fields) const;
+  /// [3n x 3] forces of a unit acceleration along each axis [kg].
+  Eigen::MatrixXd unit_weights() const;
   /// [3n x k] fields with zeros on the clamped rows, of [f x k].
   Eigen::MatrixXd extend(const Eigen::MatrixXd& free_rows) const;
 };

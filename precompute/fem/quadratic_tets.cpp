@@ -41,7 +41,7 @@ Nodes nodes_of(const TetMesh& mesh, const std::vector<Edge>& edges, Eigen::Index
   return nodes;
 }
 
-// Of the shape functions L (2 L - 1) of vertices and 4 L_i L_j of edges, at barycentric coordinates L.
+// Gradients of the shape functions L (2 L - 1) of vertices and 4 L_i L_j of edges, at barycentric coordinates L.
 Gradients gradients_at(const Eigen::Matrix<double, 4, 3>& linear, const Eigen::Vector4d& L) {
   Gradients gradients;
   for (int i = 0; i < 4; ++i) gradients.row(i) = (4 * L[i] - 1) * linear.row(i);

@@ -39,7 +39,7 @@ ExamplePoses known_example_poses(const ReducedModel& model, const std::string& r
 /// All elements take part in the energies of the target.
 class FullSpaceExamples {
  public:
-  /// Of `poses` no more than the view is kept. Elements that an example turns inside out are left out of the energies
+  /// Keeps no more of `poses` than the view. Elements that an example turns inside out are left out of the energies
   /// of the examples where these start from the examples.
   FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                     EnergyReference reference);

@@ -44,9 +44,7 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpace
   full.system = build_elastic_system(object.mesh, object.materials, object.fixed);
   full.elasticity = MeshElasticity(object.mesh, object.materials, full.system.free_dofs);
   full.mass_values = full.elasticity.values_of(full.system.mass);
-  Eigen::MatrixXd axes = Eigen::MatrixXd::Zero(full.system.full_mass.rows(), 3);
-  for (int axis = 0; axis < 3; ++axis) axes(Eigen::seqN(axis, axes.rows() / 3, 3), axis).setOnes();
-  full.gravity_load = full.system.restrict(full.system.full_mass * axes);
+  full.gravity_load = full.system.restrict(full.system.unit_weights());
   if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
   if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
   add_examples(model, options, full);

@@ -43,8 +43,7 @@ struct FullSpaceWorldReport {
 /// the step. No body touches itself.
 class FullSpaceWorld {
  public:
-  explicit FullSpaceWorld(const runtime::ContactLaw& law)
-      : half_{0.5 * law.stiffness, 0.5 * law.damping, law.friction, law.release} {}
+  explicit FullSpaceWorld(const runtime::ContactLaw& law) : half_(law.half()) {}
 
   /// All with the same time step, in a scene of its own each.
   void add(const ReducedModel& data, const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState state);

@@ -78,13 +78,10 @@ void MeshElasticity::build_variance() {
 Eigen::Index MeshElasticity::set_undeformed(const VertexArray& positions) {
   has_variance_ = false;
   Eigen::Index left_out = 0;
+  const Eigen::VectorXd moved = (positions - mesh_.vertices).reshaped<Eigen::RowMajor>();
   for (Eigen::Index e = 0; e < elements_.count(); ++e) {
-    const auto vertices = elements_.vertices_of(e);
     const auto shape = elements_.gradients_of(e);
-    Eigen::Matrix3d F = Eigen::Matrix3d::Identity();
-    for (std::size_t j = 0; j < vertices.size(); ++j)
-      F += (positions.row(vertices[j]) - mesh_.vertices.row(vertices[j])).transpose() *
-           shape.row(static_cast<Eigen::Index>(j));
+    const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + elements_.displacement_gradient(e, moved);
     const double determinant = F.determinant();
     volumes_[e] = std::max(0.0, rest_volumes_[e] * determinant);
     if (determinant > 0)

@@ -27,12 +27,8 @@ RowMatrix second_derivatives(Material material, const Elements& elements, const 
     const auto vertices = elements.vertices_of(e);
     const auto shape = elements.gradients_of(e);
     const LameParameters lame = elements.lame(e);
-    for (Eigen::Index mode = 0; mode < fields.cols(); ++mode) {
-      Eigen::Matrix3d& gradient = H[static_cast<std::size_t>(mode)];
-      gradient.setZero();
-      for (std::size_t j = 0; j < vertices.size(); ++j)
-        gradient += fields.col(mode).segment<3>(3 * vertices[j]) * shape.row(static_cast<Eigen::Index>(j));
-    }
+    for (Eigen::Index mode = 0; mode < fields.cols(); ++mode)
+      H[static_cast<std::size_t>(mode)] = elements.displacement_gradient(e, fields.col(mode));
     for (std::size_t p = 0; p < pairs.size(); ++p) {
       const Eigen::Matrix3d stress =
           elements.volumes[e] * material.rest_second_derivative(H[static_cast<std::size_t>(pairs[p].first)],

@@ -34,9 +34,7 @@ Response response_of(const ElasticSystem& system, Eigen::Index count, const std:
   Eigenpairs pairs = smallest_eigenpairs(system.stiffness, system.mass, solver, count);
   Response response{std::move(pairs.values), std::move(pairs.vectors), {}};
   if (!system.constrained()) return response;
-  Eigen::MatrixXd axes = Eigen::MatrixXd::Zero(system.full_mass.rows(), 3);
-  for (int axis = 0; axis < 3; ++axis) axes(Eigen::seqN(axis, axes.rows() / 3, 3), axis).setOnes();
-  const Eigen::MatrixXd weight = system.restrict(system.full_mass * axes);
+  const Eigen::MatrixXd weight = system.restrict(system.unit_weights());
   response.sags = weight.cwiseProduct(solver.solve(weight)).colwise().sum().transpose();
   return response;
 }
@@ -47,9 +45,10 @@ Eigen::VectorXd ratios(const Response& response, const Response& reference) {
 
 double mean(const Eigen::VectorXd& ratios) { return std::exp(ratios.array().log().mean()); }
 
-// d log(mean) / d log(beta): the share of the variance term in the stiffness of the modes.
-double slope(const ElasticSystem& system, const SparseMatrix& variance, const Response& response) {
-  const Eigen::MatrixXd pull = submatrix(expand_to_vectors(variance), system.free_dofs) * response.modes;
+// Mean over the modes of the share of `matrix` in their stiffness: d log(mean) / d log(beta) if it is that of the
+// variance term.
+double mean_share(const SparseMatrix& matrix, const Response& response) {
+  const Eigen::MatrixXd pull = matrix * response.modes;
   return (response.modes.cwiseProduct(pull).colwise().sum().transpose().array() / response.eigenvalues.array()).mean();
 }
 
@@ -78,16 +77,18 @@ MeshStiffness compare(const TetMesh& mesh, TetMaterials materials, const FlagVec
   const Response reference =
       response_of(quadratic_tets(mesh, materials, fixed).system, count, name + ": quadratic tets");
   Response response = response_of(own, count, name + ": elements");
-  if (materials.formulation == Formulation::kSmoothed)
+  if (materials.formulation == Formulation::kSmoothed) {
+    const SparseMatrix unit =
+        submatrix(expand_to_vectors(variance_matrix(mesh, materials, elements_of(mesh, materials))), own.free_dofs) /
+        materials.variance_factor;
     for (int fit = 0; fit < kFits && std::abs(mean(ratios(response, reference)) - 1) > kFitted; ++fit) {
-      const SparseMatrix variance = variance_matrix(mesh, materials, elements_of(mesh, materials));
-      const double change = -std::log(mean(ratios(response, reference))) / slope(own, variance, response);
-      const double next =
-          std::clamp(materials.variance_factor * std::exp(std::clamp(change, -1.0, 1.0)), kLeastFactor, kMostFactor);
-      if (next == materials.variance_factor) break;
-      materials.variance_factor = next;
+      const double beta = materials.variance_factor;
+      const double change = -std::log(mean(ratios(response, reference))) / (beta * mean_share(unit, response));
+      materials.variance_factor = std::clamp(beta * std::exp(std::clamp(change, -1.0, 1.0)), kLeastFactor, kMostFactor);
+      if (materials.variance_factor == beta) break;
       response = response_of(build_elastic_system(mesh, materials, fixed), count, name + ": elements");
     }
+  }
   MeshStiffness found;
   const Eigen::VectorXd of_modes = ratios(response, reference);
   found.vibration = mean(of_modes);

@@ -27,15 +27,15 @@ void pass_members(Archive& archive, MeshStiffness& value) {
 /// Meshes of more tets are not compared: quadratic ones have eight times their unknowns.
 inline constexpr Eigen::Index kMostComparedTets = 12'000;
 
-/// With beta fitted where the elements are smoothed. None where the mesh has too many tets or too few, or where one of
-/// the systems cannot be solved; `name` is for messages.
+/// Compares a mesh with quadratic tets, with beta fitted where its elements are smoothed. None where the mesh has too
+/// many tets or too few, or where one of the systems cannot be solved; `name` is for messages.
 std::optional<MeshStiffness> mesh_stiffness(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed,
                                             const std::string& name);
 
 /// "1.08 times as stiff as its material, 1.5 times at worst; ...", a sentence for logs and reports.
 std::string to_string(const MeshStiffness& stiffness);
 
-/// Above it a mesh is worth a warning.
+/// A mesh that is stiffer at worst is worth a warning.
 inline constexpr double kTooStiff = 1.15;
 
 }  // namespace exmat::precompute

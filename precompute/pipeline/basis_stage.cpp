@@ -23,9 +23,7 @@ constexpr int kSizes[] = {6, 10, 15, 20, 30, 42, 60, 85, 120};  // that basis.to
 ModalData modal_data(const ElasticSystem& system, const LinearModes& modes, RowMatrix basis) {
   ModalData modal;
   modal.frequencies = modes.eigenvalues.cwiseSqrt() / (2 * std::numbers::pi);
-  Eigen::MatrixXd directions = Eigen::MatrixXd::Zero(basis.rows(), 3);
-  for (int axis = 0; axis < 3; ++axis) directions(Eigen::seqN(axis, basis.rows() / 3, 3), axis).setOnes();
-  modal.gravity_load = (system.full_mass * directions).transpose() * basis;
+  modal.gravity_load = system.unit_weights().transpose() * basis;
   modal.basis = std::move(basis);
   return modal;
 }

@@ -9,6 +9,7 @@
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "common/core/version.h"
+#include "common/mesh/elements.h"
 #include "common/mesh/geometry.h"
 #include "precompute/cache/stage_cache.h"
 #include "precompute/contact/contact_vertices.h"
@@ -134,7 +135,16 @@ ObjectData Pipeline::object_data() const {
   return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials};
 }
 
-// Smoothed elements as stiff as quadratic tets of the same mesh.
+// Tells how the mesh compares with quadratic tets, in a warning where it is too stiff.
+void say_stiffness(const std::string& name, Formulation formulation, const MeshStiffness& found,
+                   std::vector<std::string>& warnings) {
+  const std::string text = fmt::format("{}: {}", name, to_string(found));
+  if (found.worst <= kTooStiff) return log::info(text);
+  warn(warnings, fmt::format("{}; {}a finer mesh is softer", text,
+                             formulation == Formulation::kLinear ? "object.formulation \"smoothed\" or " : ""));
+}
+
+// Makes smoothed elements as stiff as quadratic tets of the same mesh.
 void Pipeline::choose_variance() {
   TetMaterials& materials = object_.materials;
   if (materials.formulation != Formulation::kSmoothed) return;
@@ -145,9 +155,8 @@ void Pipeline::choose_variance() {
   });
   if (!found) return log::info(fmt::format("elements: smoothed, beta {}, not compared", materials.variance_factor));
   materials.variance_factor = found->variance_factor;
-  log::info(fmt::format("elements: smoothed, beta {:.3f}: {}", materials.variance_factor, to_string(*found)));
-  if (found->worst > kTooStiff)
-    warn(report_.warnings, fmt::format("{}: {}; a finer mesh is softer", asset_.name, to_string(*found)));
+  log::info(fmt::format("elements: smoothed, beta {:.3f}", materials.variance_factor));
+  say_stiffness(asset_.name, materials.formulation, *found, report_.warnings);
 }
 
 // One more than is asked for must be there, to see that none was missed.
@@ -199,7 +208,8 @@ TargetSpace Pipeline::target_space(const ElasticSystem& system, const PoseFitter
     if (space.left_out > 0)
       warn(report_.warnings,
            fmt::format("{}the energies of targets leave out {} of {} elements, which a pose turns inside out",
-                       region.empty() ? "" : fmt::format("region {}: ", region), space.left_out, space.element_count));
+                       region.empty() ? "" : fmt::format("region {}: ", region), space.left_out,
+                       elements_of(object_.mesh, object_.materials).count()));
     return space;
   });
 }
@@ -476,17 +486,6 @@ auto with_file_named(const AssetConfig& asset, Work work) {
   }
 }
 
-// How the mesh compares with quadratic tets, said and, where it is too stiff, warned of.
-void say_stiffness(const AssetConfig& asset, const ObjectInput& object, std::vector<std::string>& warnings) {
-  const auto found = mesh_stiffness(object.mesh, object.materials, object.fixed, asset.name);
-  if (!found) return;
-  const std::string text = fmt::format("{}: {}", asset.name, to_string(*found));
-  if (found->worst <= kTooStiff) return log::info(text);
-  warn(warnings, object.materials.formulation == Formulation::kLinear
-                     ? text + "; object.formulation \"smoothed\" or a finer mesh is softer"
-                     : text + "; a finer mesh is softer");
-}
-
 }  // namespace
 
 ReducedModel build_reduced_model(const AssetConfig& asset, const Needs& needs, BuildReport& report,
@@ -511,7 +510,8 @@ std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::
   const auto object = read_object(asset, report.inputs);
   warn_of_size(object, asset.object_mesh.string(), report.warnings);
   if (asset.render_mesh) read_render_mesh(asset, object, report.inputs, report.warnings);
-  with_file_named(asset, [&] { say_stiffness(asset, object, report.warnings); });
+  if (const auto found = mesh_stiffness(object.mesh, object.materials, object.fixed, asset.name))
+    say_stiffness(asset.name, object.materials.formulation, *found, report.warnings);
   if (asset.examples.empty()) return {};
   const auto input = read_examples(asset, object, report.inputs);
   StageCache no_cache;

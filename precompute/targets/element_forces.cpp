@@ -22,15 +22,6 @@ constexpr int kMostHalvings = 5;
 constexpr Eigen::Index kTogether = 1024;  // elements whose numbers stay in the caches
 constexpr Eigen::Index kEntries = 9;      // of a displacement gradient, H_ab at 3a + b
 
-Eigen::Matrix3d displacement_gradient(const Eigen::VectorXd& u, const Elements& elements, Eigen::Index element) {
-  const auto vertices = elements.vertices_of(element);
-  const auto gradients = elements.gradients_of(element);
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  for (std::size_t j = 0; j < vertices.size(); ++j)
-    H += u.segment<3>(3 * vertices[j]) * gradients.row(static_cast<Eigen::Index>(j));
-  return H;
-}
-
 // Its inverse, or of none where it is not positive definite: stiffness at rest is the identity.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& hessian) {
   const Eigen::Index d = hessian.rows();
@@ -109,7 +100,7 @@ ElementForces::ElementForces(const ObjectData& object, const ElasticSystem& syst
   for (const auto& pose : coordinates.poses.colwise()) examples_.emplace_back(fields_ * pose);
   for (Eigen::Index e = 0; e < elements_.count(); ++e) {
     const auto upright = [&](const Eigen::VectorXd& u) {
-      return (Eigen::Matrix3d::Identity() + displacement_gradient(u, elements_, e)).determinant() > 0;
+      return (Eigen::Matrix3d::Identity() + elements_.displacement_gradient(e, u)).determinant() > 0;
     };
     if (reference != EnergyReference::kExample || std::ranges::all_of(examples_, upright)) members_.push_back(e);
   }
@@ -136,7 +127,7 @@ void ElementForces::add_forces(std::size_t index, Batch& batch) const {
     const LameParameters own = elements_.lame(element);
     const double volume = elements_.volumes[element];
     for (std::size_t k = 0; k < examples_.size(); ++k) {
-      const Eigen::Matrix3d H = displacement_gradient(examples_[k], elements_, element);
+      const Eigen::Matrix3d H = elements_.displacement_gradient(element, examples_[k]);
       // Gradients from the example's shape on: those at rest times the inverse of its deformation gradient.
       Eigen::Matrix3d from_rest = Eigen::Matrix3d::Identity();
       double scale = volume;

@@ -201,7 +201,6 @@ TargetSpace SpaceBuilder::build() {
     if (space.error <= kShare * options_.tolerance) break;
   }
   space.left_out = whole_.left_out;
-  space.element_count = element_count_;
   log::info(fmt::format("targets: {} displacements hold them, error {:.1e}", columns_.cols(), space.error));
   space.elements = target_elements(object_, system_, space.coordinates, small_,
                                    {options_.energy_reference, options_.element_tolerance, options_.seed});

@@ -29,14 +29,13 @@ void pass_members(Archive& archive, TargetSpaceOptions& value) {
            value.most_elements, value.sample);
 }
 
-/// The targets of a set of examples, minimised over all tets of the mesh in all poses that descriptors stand for:
+/// The targets of a set of examples, minimised over all elements of the mesh in all poses that descriptors stand for:
 /// independent of any modal basis. docs/method.md, "Table of targets".
 struct TargetSpace {
   PoseCoordinates coordinates;           ///< few displacements that hold all targets, and the examples in them
-  CubatureData elements;                 ///< that stand for all tets in the energies of targets, in these coordinates
+  CubatureData elements;                 ///< that stand for all in the energies of targets, in these coordinates
   double error = 0;                      ///< largest found of what the coordinates lose of a target
   std::int64_t left_out = 0;             ///< elements that an example turns inside out
-  std::int64_t element_count = 0;        ///< of the mesh
   std::optional<TargetTableData> table;  ///< control points [P c x d]
   EnergyReference energy_reference = EnergyReference::kExample;
   std::string table_message;  ///< what was made, or why nothing was
@@ -45,8 +44,8 @@ struct TargetSpace {
 /// What the stage cache keeps of it.
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpace& value) {
-  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.element_count, value.table,
-           value.energy_reference, value.table_message);
+  pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.table, value.energy_reference,
+           value.table_message);
 }
 
 /// `range` holds all poses, from pose_range(). Targets are solved there at weights all over the simplex; their

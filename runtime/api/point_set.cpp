@@ -68,15 +68,16 @@ PointSet read_elements(const Source& source) {
   const ReducedModel data = read_bundle(source.bundle, {.groups = groups});
   require_same_bundle(source, data);
   const TetMesh& mesh = data.object->mesh;
-  const Elements all = elements_of(mesh, data.object->materials);
+  const bool rings = data.object->materials.formulation == Formulation::kSmoothed;
+  const IndexVector centres = rings ? elements_of(mesh, data.object->materials).centres : IndexVector();
   const IndexVector& elements = data.cubature->elements;
   // A ring is at its vertex, a tet at its centroid.
-  const Eigen::Index k = all.smoothed() ? 1 : 4;
+  const Eigen::Index k = rings ? 1 : 4;
   IndexMatrix corners(elements.size(), k);
   VertexArray rest = VertexArray::Zero(elements.size(), 3);
   for (Eigen::Index j = 0; j < elements.size(); ++j) {
-    if (all.smoothed())
-      corners(j, 0) = all.centres[elements[j]];
+    if (rings)
+      corners(j, 0) = centres[elements[j]];
     else
       corners.row(j) = mesh.tets.row(elements[j]);
     for (Eigen::Index c = 0; c < k; ++c) rest.row(j) += mesh.vertices.row(corners(j, c)) / static_cast<double>(k);

@@ -32,7 +32,7 @@ struct PointSet {
 PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids);
 PointSet read_all_vertices(const Source& source);
 PointSet read_points_at(const Source& source, const VertexArray& points);
-/// The centroids of the cubature elements.
+/// The cubature elements: the centroids of tets, the vertices of rings.
 PointSet read_elements(const Source& source);
 
 /// Throws InputError where `data` is not of the bundle that was loaded.

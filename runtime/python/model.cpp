@@ -183,7 +183,7 @@ void bind_model(py::module_& module) {
             const std::vector<double> weights = model.model.element_weights();
             return array_of(weights, {weights.size()});
           },
-          "How many tets each cubature element stands for: shape (s,). A copy.")
+          "How many elements of the object each cubature element stands for: shape (s,). A copy.")
       .def_property_readonly(
           "time_step", [](const ModelObject& model) { return model.model.time_step(); }, "[s].")
       .def_readonly("input_sha256", &ModelObject::sha, "What the bundle was made of, 64 hexadecimal digits.");

@@ -59,7 +59,8 @@ EXMAT_API exmat_status exmat_points_create_on_surface(const exmat_surface* surfa
                                                       const double* shares, int64_t count,
                                                       exmat_points** points) EXMAT_NOEXCEPT;
 
-/* The centroids of the s cubature elements, and how many tets each stands for: `weights` [count = s], or NULL. */
+/* The places of the s cubature elements, of tets their centroids and of rings their vertices, and how many each stands
+   for: `weights` [count = s], or NULL. */
 EXMAT_API int64_t exmat_model_elements(const exmat_model* model) EXMAT_NOEXCEPT; /* s */
 EXMAT_API exmat_status exmat_model_read_element_weights(const exmat_model* model, double* weights,
                                                         int64_t count) EXMAT_NOEXCEPT;

@@ -227,11 +227,12 @@ void ContactSet::freeze(const BodyPose& pose, const BodyVelocity& velocity, cons
     if (batch.full()) freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
   }
   freeze_batch(pose, velocity, expected, time_step, state, next, batch, workspace);
-  if (workspace.are_all_planes) workspace.planes.end(workspace.candidate_count);
+  if (!workspace.are_all_planes) return;
+  workspace.planes.end(workspace.candidate_count);
   // Side by side nothing is known of overlaps.
   const auto candidates = std::span(workspace.candidates).first(workspace.candidate_count);
-  if (std::ranges::any_of(candidates, [](const ContactCandidate& candidate) { return candidate.overlap > 0; }))
-    workspace.are_all_planes = false;
+  workspace.are_all_planes =
+      std::ranges::none_of(candidates, [](const ContactCandidate& candidate) { return candidate.overlap > 0; });
 }
 
 /// With v in workspace.x; empties the batch.

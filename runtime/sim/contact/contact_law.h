@@ -36,6 +36,9 @@ struct ContactLaw {
   double damping = 0;         ///< pressure per approach velocity, >= 0 [N s/m^3]
   double friction = 0;        ///< Coulomb's coefficient, >= 0
   double release = kRelease;  ///< how fast what overlaps at the start is let out, > 0 [m/s]
+
+  /// The law of each of two surfaces whose vertices meet the other one.
+  ContactLaw half() const noexcept { return {0.5 * stiffness, 0.5 * damping, friction, release}; }
 };
 
 /// What a touching vertex remembers from step to step.

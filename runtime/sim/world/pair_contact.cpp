@@ -41,7 +41,7 @@ void PairContact::reset(int first, int second, const HeldPair* held) {
 
 void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin) {
   static const std::vector<HeldBodyContact> none;
-  half_ = {0.5 * law.stiffness, 0.5 * law.damping, law.friction, law.release};
+  half_ = law.half();
   const auto at = static_cast<std::size_t>(side);
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);

@@ -77,6 +77,19 @@ class ElementForcesOf : public ::testing::TestWithParam<Case> {
     return sum;
   }
 
+  /// By central differences along random directions.
+  template <typename Energy>
+  static void expect_derivatives(const ElementForces& forces, const RowMatrix& weights, const Energy& energy) {
+    constexpr double kStep = 1e-5;
+    const Eigen::MatrixXd p = 0.3 * test::random_matrix(kCoordinates, kSums, 9), found = forces.forces(weights, p);
+    for (int n = 0; n < kSums; ++n) {
+      const Eigen::VectorXd direction = test::random_vector(kCoordinates, 20U + static_cast<unsigned>(n)),
+                            w = weights.row(n).transpose();
+      const double difference = energy(w, p.col(n) + kStep * direction) - energy(w, p.col(n) - kStep * direction);
+      EXPECT_NEAR(found.col(n).dot(direction), difference / (2 * kStep), 1e-6 * found.col(n).norm()) << n;
+    }
+  }
+
   ObjectData object_;
   ElasticSystem system_;
   PoseCoordinates coordinates_;
@@ -87,26 +100,18 @@ INSTANTIATE_TEST_SUITE_P(Cases, ElementForcesOf,
                                            Case{EnergyReference::kExample, MaterialModel::kStableNeoHookean},
                                            Case{EnergyReference::kRest, MaterialModel::kCorotational}));
 
-// By central differences along a random direction. Weights of zero are among them, alone and in all of a group.
+// Weights of zero are among them, alone and in all of a group.
 TEST_P(ElementForcesOf, AreTheDerivativesOfTheEnergies) {
-  constexpr double kStep = 1e-5;
   const ElementForces forces(object_, system_, coordinates_, GetParam().reference);
   ASSERT_EQ(std::ssize(forces.members()), object_.mesh.tet_count());
   RowMatrix weights = test::random_matrix(kSums, 3, 5).cwiseAbs();
   weights.bottomRows(3).col(1).setZero();
   weights(0, 2) = 0;
-  const Eigen::MatrixXd p = 0.3 * test::random_matrix(kCoordinates, kSums, 9), found = forces.forces(weights, p);
-  for (int n = 0; n < kSums; ++n) {
-    const Eigen::VectorXd direction = test::random_vector(kCoordinates, 20U + static_cast<unsigned>(n)),
-                          w = weights.row(n).transpose();
-    const double difference = energy(w, p.col(n) + kStep * direction) - energy(w, p.col(n) - kStep * direction);
-    EXPECT_NEAR(found.col(n).dot(direction), difference / (2 * kStep), 1e-6 * found.col(n).norm()) << n;
-  }
+  expect_derivatives(forces, weights, [&](const Eigen::VectorXd& w, const Eigen::VectorXd& p) { return energy(w, p); });
 }
 
 // Of rings, against the elasticity of the mesh.
 TEST_P(ElementForcesOf, OfRingsAreTheDerivativesOfTheEnergies) {
-  constexpr double kStep = 1e-5;
   object_.materials.youngs_modulus.setConstant(1e4);
   object_.materials.formulation = Formulation::kSmoothed;
   object_.materials.variance_factor = 0.2;
@@ -114,7 +119,6 @@ TEST_P(ElementForcesOf, OfRingsAreTheDerivativesOfTheEnergies) {
   ASSERT_EQ(std::ssize(forces.members()), object_.mesh.vertex_count());
   MeshElasticity elasticity(object_.mesh, object_.materials, system_.free_dofs);
   const RowMatrix weights = test::random_matrix(kSums, 3, 5).cwiseAbs();
-  const Eigen::MatrixXd p = 0.3 * test::random_matrix(kCoordinates, kSums, 9), found = forces.forces(weights, p);
   const auto energy = [&](const Eigen::VectorXd& w, const Eigen::VectorXd& at) {
     double sum = 0;
     for (Eigen::Index k = 0; k < w.size(); ++k) {
@@ -127,12 +131,7 @@ TEST_P(ElementForcesOf, OfRingsAreTheDerivativesOfTheEnergies) {
     }
     return sum;
   };
-  for (int n = 0; n < kSums; ++n) {
-    const Eigen::VectorXd direction = test::random_vector(kCoordinates, 20U + static_cast<unsigned>(n)),
-                          w = weights.row(n).transpose();
-    const double difference = energy(w, p.col(n) + kStep * direction) - energy(w, p.col(n) - kStep * direction);
-    EXPECT_NEAR(found.col(n).dot(direction), difference / (2 * kStep), 1e-6 * found.col(n).norm()) << n;
-  }
+  expect_derivatives(forces, weights, energy);
 }
 
 // Rotations are iterated until all lanes of a register have theirs, so that others make a difference of rounding.
