@@ -40,13 +40,6 @@ function(exmat_library name)
   target_link_libraries(${name} PUBLIC Eigen3::Eigen)
 endfunction()
 
-# exmat_precompile(NAME HEADER...): of a library or program whose sources nearly all include these. No source needs it.
-function(exmat_precompile name)
-  if(EXMAT_PRECOMPILED_HEADERS)
-    target_precompile_headers(${name} PRIVATE ${ARGN})
-  endif()
-endfunction()
-
 # exmat_header_library(NAME HEADER PACKAGE): a target for headers that come without a CMake or pkg-config file.
 function(exmat_header_library name header package)
   string(TOUPPER ${name}_INCLUDE_DIR variable)

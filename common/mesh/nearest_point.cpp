@@ -10,7 +10,7 @@
 namespace exmat {
 namespace {
 
-using Corners = Eigen::Matrix<double, 4, 3>;
+using CornerPoints = Eigen::Matrix<double, 4, 3>;
 using Box = Eigen::AlignedBox3d;
 
 constexpr double kFarthest = 1e150;  // coordinates beyond count as this: their squares are not finite
@@ -21,14 +21,15 @@ struct Nearest {
 };
 
 // Takes the point with these weights if it is in the simplex and nearer than what is held.
-void offer(const Corners& corners, const Eigen::Vector3d& point, const Eigen::Vector4d& weights, Nearest& nearest) {
+void offer(const CornerPoints& corners, const Eigen::Vector3d& point, const Eigen::Vector4d& weights,
+           Nearest& nearest) {
   if (weights.minCoeff() < 0) return;
   const double squared = (corners.transpose() * weights - point).squaredNorm();
   if (squared < nearest.squared_distance) nearest = {weights, squared};
 }
 
 // Projection of the point onto the affine hull of the corners in `subset` (bits); not offered where it falls outside.
-void offer_face(const Corners& corners, const Eigen::Vector3d& point, unsigned subset, Nearest& nearest) {
+void offer_face(const CornerPoints& corners, const Eigen::Vector3d& point, unsigned subset, Nearest& nearest) {
   Eigen::Matrix<double, 3, Eigen::Dynamic, 0, 3, 3> edges(3, 0);
   int members[4];
   int count = 0;
@@ -50,7 +51,7 @@ void offer_face(const Corners& corners, const Eigen::Vector3d& point, unsigned s
 
 // The nearest point of a simplex is the nearest of the projections onto its faces of every dimension that fall inside
 // them.
-Nearest nearest_in_tet(const Corners& corners, const Eigen::Vector3d& point) {
+Nearest nearest_in_tet(const CornerPoints& corners, const Eigen::Vector3d& point) {
   const Eigen::Matrix3d edges = (corners.bottomRows<3>().rowwise() - corners.row(0)).transpose();
   const Eigen::Vector3d local = edges.inverse() * (point - corners.row(0).transpose());
   Nearest nearest;
@@ -90,7 +91,7 @@ NearestPointSearch::Tree NearestPointSearch::tree_of(const TetMesh& mesh) {
   std::vector<Box> boxes(ids.size());
   for (std::size_t t = 0; t < ids.size(); ++t) {
     ids[t] = static_cast<int>(t);
-    const Corners corners = tet_positions(mesh, static_cast<Eigen::Index>(t));
+    const CornerPoints corners = tet_positions(mesh, static_cast<Eigen::Index>(t));
     boxes[t] = Box(corners.colwise().minCoeff().transpose(), corners.colwise().maxCoeff().transpose());
   }
   return {ids.begin(), ids.end(), boxes.begin(), boxes.end()};

@@ -18,10 +18,10 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 80, kCountBytes = 4, kTriangleBytes = 50;
 
-using Point = std::array<double, 3>;
+using Corner = std::array<double, 3>;
 
 struct PointHash {
-  std::size_t operator()(const Point& point) const {
+  std::size_t operator()(const Corner& point) const {
     std::uint64_t hash = 0;
     for (const double x : point) hash = (std::rotl(hash, 23) ^ std::bit_cast<std::uint64_t>(x)) * 0x9e3779b97f4a7c15U;
     return static_cast<std::size_t>(hash ^ (hash >> 32));
@@ -54,12 +54,12 @@ class StlReader {
   void read_solid();
   void read_facet();
   void expect(std::string_view word);
-  void add_triangle(const std::array<Point, 3>& corners);
+  void add_triangle(const std::array<Corner, 3>& corners);
 
   std::string_view bytes_;
   ValueCursor cursor_;
-  std::unordered_map<Point, std::int32_t, PointHash> indices_;
-  std::vector<Point> vertices_;
+  std::unordered_map<Corner, std::int32_t, PointHash> indices_;
+  std::vector<Corner> vertices_;
   std::vector<std::array<std::int32_t, 3>> triangles_;
   SurfaceParts parts_;
 };
@@ -80,8 +80,8 @@ void StlReader::read_binary() {
   cursor_.check_count(count, "triangles", kTriangleBytes);
   for (std::uint32_t t = 0; t < count; ++t) {
     cursor_.read_bytes(3 * sizeof(float), "a normal");
-    std::array<Point, 3> corners{};
-    for (Point& corner : corners)
+    std::array<Corner, 3> corners{};
+    for (Corner& corner : corners)
       for (double& x : corner) x = cursor_.read_real_of({NumberType::Kind::kReal, sizeof(float)}, "a coordinate");
     cursor_.read_bytes(2, "the attribute of a triangle");
     add_triangle(corners);
@@ -120,8 +120,8 @@ void StlReader::read_facet() {
     if (const auto word = cursor_.read_word(); word.empty()) cursor_.fail("a normal", cursor_.describe(word));
   expect("outer");
   expect("loop");
-  std::array<Point, 3> corners{};
-  for (Point& corner : corners) {
+  std::array<Corner, 3> corners{};
+  for (Corner& corner : corners) {
     expect("vertex");
     for (double& x : corner) x = cursor_.read_real("a coordinate");
   }
@@ -134,10 +134,10 @@ void StlReader::expect(std::string_view word) {
   if (const auto found = cursor_.read_word(); lower(found) != word) cursor_.fail(quote(word), cursor_.describe(found));
 }
 
-void StlReader::add_triangle(const std::array<Point, 3>& corners) {
+void StlReader::add_triangle(const std::array<Corner, 3>& corners) {
   auto& triangle = triangles_.emplace_back();
   for (std::size_t k = 0; k < 3; ++k) {
-    Point corner = corners[k];
+    Corner corner = corners[k];
     for (double& x : corner) x += 0.0;  // no negative zero
     const auto [vertex, is_new] = indices_.try_emplace(corner, static_cast<std::int32_t>(vertices_.size()));
     if (is_new) vertices_.push_back(corner);

@@ -7,7 +7,7 @@
 namespace exmat {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\n\v\f";
+constexpr std::string_view kWhiteSpace = " \t\r\n\v\f";
 constexpr std::string_view kSeparators = " \t\r\n\v\f,";
 
 // from_chars knows no plus sign.
@@ -29,7 +29,7 @@ std::optional<Number> parse_whole(std::string_view field) {
 }  // namespace
 
 std::string_view Fields::next() {
-  const std::string_view between = separators_ == Separators::kBlanks ? kBlanks : kSeparators;
+  const std::string_view between = separators_ == Separators::kBlanks ? kWhiteSpace : kSeparators;
   const std::size_t begin = std::min(rest_.find_first_not_of(between), rest_.size());
   rest_.remove_prefix(begin);
   const std::size_t length = std::min(rest_.find_first_of(between), rest_.size());
@@ -52,9 +52,9 @@ std::string advice_for_number(std::string_view field) {
 }
 
 std::string_view trimmed(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(kBlanks);
+  const std::size_t begin = text.find_first_not_of(kWhiteSpace);
   if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(kBlanks) - begin + 1);
+  return text.substr(begin, text.find_last_not_of(kWhiteSpace) - begin + 1);
 }
 
 std::string quote(std::string_view text) {

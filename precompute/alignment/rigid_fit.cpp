@@ -23,10 +23,6 @@ constexpr double kWorthIterating = 0.7, kWorthwhileGap = 0.01;
 // An axis this near to one of space is named by its letter [rad].
 constexpr double kNearAxis = 0.05;
 
-double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-  return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle();
-}
-
 }  // namespace
 
 BodySurface body_surface(const LaplaceBasis& basis, const TetArray& tets) {

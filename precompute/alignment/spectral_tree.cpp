@@ -10,8 +10,8 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGap = 0.08;           // relative, within a cluster
-constexpr Eigen::Index kSamples = 300;  // vertices of each shape
+constexpr double kGap = 0.08;                // relative, within a cluster
+constexpr Eigen::Index kShapeSamples = 300;  // vertices of each shape
 constexpr std::size_t kBeam = 48;
 constexpr Eigen::Index kLargestCluster = 3;
 
@@ -27,7 +27,7 @@ double two_way_score(const Eigen::MatrixXf& squared) {
 }
 
 Eigen::MatrixXf embedding(const AlignedShape& shape, Eigen::Index count) {
-  const auto samples = farthest_points(shape.basis.vertices, kSamples);
+  const auto samples = farthest_points(shape.basis.vertices, kShapeSamples);
   const Eigen::MatrixXd functions = shape.basis.eigenfunctions.leftCols(count)(samples, Eigen::all);
   return (functions * shape.basis.eigenvalues.head(count).cwiseSqrt().cwiseInverse().asDiagonal()).cast<float>();
 }

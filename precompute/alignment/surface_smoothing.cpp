@@ -14,7 +14,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kFlat = 10 * std::numbers::pi / 180;       // angle of an edge within a flat [rad]
+constexpr double kFlatAngle = 10 * std::numbers::pi / 180;  // angle of an edge within a flat [rad]
 constexpr double kNearRight = 10 * std::numbers::pi / 180;  // difference from a right angle [rad]
 constexpr double kRightAngles = 0.9;                        // of the length of edges that are not flat
 constexpr double kStaircase = 0.15;                         // of it, inward
@@ -48,7 +48,7 @@ double staircase_share(const VertexArray& vertices, const TriangleArray& triangl
     if (edge.triangles[1] < 0) continue;
     const Eigen::Vector3d a = samples.normals.row(edge.triangles[0]), b = samples.normals.row(edge.triangles[1]);
     const double angle = std::acos(std::clamp(a.dot(b), -1.0, 1.0));
-    if (angle < kFlat) continue;
+    if (angle < kFlatAngle) continue;
     const double length = (vertices.row(ends[0]) - vertices.row(ends[1])).norm();
     bent += length;
     if (std::abs(angle - std::numbers::pi / 2) > kNearRight) continue;

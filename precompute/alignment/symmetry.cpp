@@ -14,27 +14,23 @@ namespace {
 
 constexpr double kEqualMoments = 0.1;  // relative difference of moments that may belong to a symmetric body
 constexpr int kTurns = 8;              // tried about an axis of equal moments: multiples of 45 degrees
-constexpr int kSettlingRounds = 10;
-constexpr Eigen::Index kSettlingSamples = 150;
+constexpr int kSelfFitRounds = 10;
+constexpr Eigen::Index kSelfFitSamples = 150;
 constexpr double kSameRotation = 0.25;                            // [rad]
 constexpr double kRevolutionAngle = 20 * std::numbers::pi / 180;  // no prism of fewer than 18 sides admits it
-
-double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-  return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle();
-}
 
 // A body's surface laid upon itself.
 class SelfFit {
  public:
   explicit SelfFit(const AlignedShape& shape) : surface_(shape.mesh.vertices, shape.surface) {
     const auto& centres = surface_.samples().centres;
-    samples_ = centres(farthest_points(centres, kSettlingSamples), Eigen::all);
+    samples_ = centres(farthest_points(centres, kSelfFitSamples), Eigen::all);
   }
 
   // The rotation that iterated closest points reach from a first guess; a reflection from one.
   Eigen::Matrix3d settle(Eigen::Matrix3d rotation) const {
     const double sign = rotation.determinant() < 0 ? -1 : 1;
-    for (int round = 0; round < kSettlingRounds; ++round)
+    for (int round = 0; round < kSelfFitRounds; ++round)
       rotation = sign * procrustes_rotation(sign * nearest(samples_ * rotation.transpose()).transpose() * samples_);
     return rotation;
   }
@@ -134,6 +130,10 @@ Symmetry rest_symmetry(const AlignedShape& shape, double tolerance) {
   }
   symmetry.rotations.assign(found.begin() + 1, found.end());
   return symmetry;
+}
+
+double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return Eigen::AngleAxisd(Eigen::Matrix3d(a.transpose() * b)).angle();
 }
 
 }  // namespace exmat::precompute

@@ -22,6 +22,9 @@ Symmetry rest_symmetry(const AlignedShape& shape, double tolerance = 0.02);
 /// Columns: principal axes of the second moments of mass, right-handed, moments ascending.
 Eigen::Matrix3d principal_axes(const LaplaceBasis& basis);
 
+/// Angle of the turn from one rotation to the other, 0 to pi [rad].
+double angle_between(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b);
+
 /// The 24 rotations of a cube.
 std::vector<Eigen::Matrix3d> cube_rotations();
 

@@ -17,12 +17,12 @@ constexpr double kResidualRefusal = 0.15;
 // Rotations of a whole pose that its frame, taken to be the object's, makes unlikely and incredible [rad].
 constexpr double kTurnWarning = 50 * std::numbers::pi / 180, kTurnRefusal = 80 * std::numbers::pi / 180;
 // A distance of landmarks, over the body's size, that is to blame for a doubt.
-constexpr double kMissedLandmarks = 0.1;
+constexpr double kSeriouslyMissed = 0.1;
 // A displacement, over the body's size, that says nothing was found.
-constexpr double kNoPose = 0.03;
+constexpr double kNoDisplacement = 0.03;
 
 const std::string kLandmarks = "alignment.landmarks (8 vertices that do not lie in a plane)";
-const std::string kSameMesh = "a pose of the rest example's own mesh, which needs no alignment";
+const std::string kSameMeshAdvice = "a pose of the rest example's own mesh, which needs no alignment";
 
 // A surface that is met this well is that of the rest example's body: what is left to doubt is which of its poses it
 // is.
@@ -37,16 +37,16 @@ void judge_competitors(const PoseAlignment& alignment, bool met, bool free_frame
         fmt::format("{} other pose{} as well, for the body is nearly symmetric; taken is the one nearest to "
                     "the rest example as it stands. If it is another one, give {}, or {}",
                     alignment.competing_maps, alignment.competing_maps == 1 ? " fits" : "s fit", kLandmarks,
-                    kSameMesh));
+                    kSameMeshAdvice));
   const std::string others = alignment.competing_maps == 1
                                  ? "another pose fits as well"
                                  : fmt::format("{} other poses fit as well", alignment.competing_maps);
   object_to(outcome, AlignmentVerdict::kRefused,
             free_frame ? fmt::format("{}, for the body is symmetric and the example's frame unknown; give {}, or "
                                      "alignment.frame \"shared\" if it stands as the object does, or {}",
-                                     others, kLandmarks, kSameMesh)
+                                     others, kLandmarks, kSameMeshAdvice)
                        : fmt::format("{} and {} no farther from rest; give {}, or {}", others,
-                                     alignment.competing_maps == 1 ? "is" : "are", kLandmarks, kSameMesh));
+                                     alignment.competing_maps == 1 ? "is" : "are", kLandmarks, kSameMeshAdvice));
 }
 
 // A pose that lacks a part of the body, or has one more: what is left is crushed into it, or drawn over it.
@@ -64,8 +64,8 @@ void judge_parts(const PoseAlignment& alignment, AlignmentOutcome& outcome) {
 
 void judge_revolution(const PoseAlignment& alignment, AlignmentOutcome& outcome) {
   if (!alignment.hides_twist) return;
-  const std::string advice = fmt::format("give alignment.map, or {}", kSameMesh);
-  if (alignment.displacement < kNoPose)
+  const std::string advice = fmt::format("give alignment.map, or {}", kSameMeshAdvice);
+  if (alignment.displacement < kNoDisplacement)
     object_to(
         outcome, AlignmentVerdict::kRefused,
         "the rest example is a body of revolution and the pose looks like it: a twist leaves no trace; " + advice);
@@ -126,13 +126,13 @@ void judge_pose(const PoseAlignment& alignment, AlignmentFrame frame, bool free_
     object_to(outcome, met ? AlignmentVerdict::kDoubtful : AlignmentVerdict::kRefused,
               fmt::format("the mirror image of the rest example fits: its surface is {:.1f} % from the pose's (of the "
                           "body's size), the rest example's own {:.1f} %; mirror the example back, or give {}",
-                          100 * alignment.mirror_residual, 100 * alignment.residual, kSameMesh));
+                          100 * alignment.mirror_residual, 100 * alignment.residual, kSameMeshAdvice));
   judge_parts(alignment, outcome);
   const std::string advice =
-      alignment.missed_landmarks > kMissedLandmarks
+      alignment.missed_landmarks > kSeriouslyMissed
           ? fmt::format("the landmarks are {:.0f} % of the body's size from where they belong: do they correspond?",
                         100 * alignment.missed_landmarks)
-          : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMesh);
+          : fmt::format("is it the rest example's body? If so, give {}, or {}", kLandmarks, kSameMeshAdvice);
   judge_doubt(outcome, advice);
   judge_residual(outcome, advice);
   judge_competitors(alignment, met, free_frame, outcome);

@@ -12,7 +12,7 @@ using Field = Eigen::Map<const VertexArray>;
 
 Field as_field(const Eigen::VectorXd& vector) { return {vector.data(), vector.size() / 3, 3}; }
 
-Eigen::VectorXd flat(const VertexArray& field) { return field.reshaped<Eigen::RowMajor>(); }
+Eigen::VectorXd flattened(const VertexArray& field) { return field.reshaped<Eigen::RowMajor>(); }
 
 // sum_i a_i x b_i.
 Eigen::Vector3d sum_of_crosses(const VertexArray& a, const VertexArray& b) {
@@ -51,27 +51,29 @@ FittedFrame::Placement FittedFrame::place(const Eigen::VectorXd& displacement) c
   return placement;
 }
 
-Eigen::VectorXd FittedFrame::deformation(const Placement& placement) const { return flat(placement.positions - rest_); }
+Eigen::VectorXd FittedFrame::deformation(const Placement& placement) const {
+  return flattened(placement.positions - rest_);
+}
 
 Eigen::VectorXd FittedFrame::rate(const Placement& placement, const Eigen::VectorXd& direction) const {
   const Eigen::RowVector3d mean = weights_.transpose() * as_field(direction);
   const VertexArray local = (as_field(direction).rowwise() - mean) * placement.rotation;
   const Eigen::Vector3d spin = placement.spin * sum_of_crosses(mass_rest_, local);
-  return flat(local - cross_rows(spin, placement.positions));
+  return flattened(local - cross_rows(spin, placement.positions));
 }
 
 Eigen::VectorXd FittedFrame::force(const Placement& placement, const Eigen::VectorXd& g) const {
   const Eigen::Vector3d turn = placement.spin.transpose() * sum_of_crosses(placement.positions, as_field(g));
   const VertexArray world = (as_field(g) - cross_rows(turn, mass_rest_)) * placement.rotation.transpose();
-  return flat(world - weights_ * world.colwise().sum());
+  return flattened(world - weights_ * world.colwise().sum());
 }
 
 Eigen::VectorXd FittedFrame::to_world(const Placement& placement, const Eigen::VectorXd& field) {
-  return flat(as_field(field) * placement.rotation.transpose());
+  return flattened(as_field(field) * placement.rotation.transpose());
 }
 
 Eigen::VectorXd FittedFrame::to_frame(const Placement& placement, const Eigen::VectorXd& field) {
-  return flat(as_field(field) * placement.rotation);
+  return flattened(as_field(field) * placement.rotation);
 }
 
 }  // namespace exmat::precompute

@@ -11,7 +11,7 @@
 namespace exmat::precompute {
 namespace {
 
-std::string place_of(int accessor) { return fmt::format("/accessors/{}", accessor); }
+std::string place_of_accessor(int accessor) { return fmt::format("/accessors/{}", accessor); }
 
 // 0 where it is none of glTF.
 std::size_t bytes_of(int component_type) {
@@ -117,7 +117,7 @@ GltfAccessors::Rows GltfAccessors::rows_of(int view, std::size_t offset, std::si
 
 RowMatrix GltfAccessors::read(int accessor, bool normalized) const {
   const tinygltf::Accessor& source = at(accessor);
-  const std::string place = place_of(accessor);
+  const std::string place = place_of_accessor(accessor);
   const int components = tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(source.type));
   Rows rows;  // an accessor without a view is zeros, but for its sparse rows
   if (source.bufferView >= 0)
@@ -156,27 +156,28 @@ void GltfAccessors::read_sparse(const tinygltf::Accessor& accessor, bool normali
 
 VertexArray GltfAccessors::read_positions(int accessor) const {
   const tinygltf::Accessor& source = at(accessor);
-  if (source.type != TINYGLTF_TYPE_VEC3) fail(place_of(accessor) + "/type", "VEC3, of positions", "another type");
+  if (source.type != TINYGLTF_TYPE_VEC3)
+    fail(place_of_accessor(accessor) + "/type", "VEC3, of positions", "another type");
   if (source.componentType == TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT)
-    fail(place_of(accessor) + "/componentType", "reals or integers of at most 16 bits", "of 32 bits");
+    fail(place_of_accessor(accessor) + "/componentType", "reals or integers of at most 16 bits", "of 32 bits");
   return read(accessor, source.normalized);
 }
 
 VertexArray GltfAccessors::read_colours(int accessor) const {
   const tinygltf::Accessor& source = at(accessor);
   if (source.type != TINYGLTF_TYPE_VEC3 && source.type != TINYGLTF_TYPE_VEC4)
-    fail(place_of(accessor) + "/type", "VEC3 or VEC4, of colours", "another type");
+    fail(place_of_accessor(accessor) + "/type", "VEC3 or VEC4, of colours", "another type");
   return read(accessor, true).leftCols(3).cwiseMax(0).cwiseMin(1);
 }
 
 Eigen::VectorXd GltfAccessors::read_scalars(int accessor) const {
-  if (!is_scalar(accessor)) fail(place_of(accessor) + "/type", "SCALAR", "another type");
+  if (!is_scalar(accessor)) fail(place_of_accessor(accessor) + "/type", "SCALAR", "another type");
   return read(accessor, at(accessor).normalized).col(0);
 }
 
 std::vector<std::uint32_t> GltfAccessors::read_indices(int accessor, std::size_t end) const {
   const tinygltf::Accessor& source = at(accessor);
-  const std::string place = place_of(accessor);
+  const std::string place = place_of_accessor(accessor);
   if (!is_scalar(accessor) || !is_index_type(source.componentType))
     fail(place, "SCALAR of unsigned integers, of corners", "another type");
   if (source.sparse.isSparse) fail(place, "corners that are not sparse", "sparse ones");

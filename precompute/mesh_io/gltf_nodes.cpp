@@ -8,7 +8,7 @@
 namespace exmat::precompute {
 namespace {
 
-std::string place_of(int node) { return fmt::format("/nodes/{}", node); }
+std::string place_of_node(int node) { return fmt::format("/nodes/{}", node); }
 
 Eigen::Affine3d transform_of(const std::string& file, const tinygltf::Node& node, const std::string& place) {
   Eigen::Affine3d transform = Eigen::Affine3d::Identity();
@@ -75,7 +75,7 @@ class Walk {
       fail_in_gltf(file_, place, "nodes that are trees", fmt::format("node {} twice", node),
                    "a node may be no child of itself or of two");
     seen_[index] = 1;
-    steps_.push_back({node, parent * transform_of(file_, model_.nodes[index], place_of(node))});
+    steps_.push_back({node, parent * transform_of(file_, model_.nodes[index], place_of_node(node))});
   }
 
   void step() {
@@ -89,7 +89,7 @@ class Walk {
     steps_.push_back({current.node, {}});
     const auto& children = model_.nodes[static_cast<std::size_t>(current.node)].children;
     for (auto child = children.rbegin(); child != children.rend(); ++child)
-      push(*child, place_of(current.node) + "/children", *current.to_scene);
+      push(*child, place_of_node(current.node) + "/children", *current.to_scene);
   }
 
   const std::string& file_;

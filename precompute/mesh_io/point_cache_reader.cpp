@@ -13,17 +13,17 @@ namespace {
 constexpr std::string_view kMagic("POINTCACHE2\0", 12);
 constexpr std::size_t kPointBytes = 3 * sizeof(float);
 
-struct Header {
+struct CacheHeader {
   std::int32_t vertices = 0, frames = 0;
 };
 
-Header read_header(ValueCursor& cursor) {
+CacheHeader read_header(ValueCursor& cursor) {
   if (const auto magic = cursor.read_bytes(kMagic.size(), "the first bytes of a point cache, 'POINTCACHE2'");
       magic != kMagic)
     cursor.fail("the first bytes of a point cache, 'POINTCACHE2'", quote(magic), "is this a .pc2 file?");
   if (const auto version = cursor.read_int("the version"); version != 1)
     cursor.fail("version 1", std::to_string(version));
-  Header header;
+  CacheHeader header;
   header.vertices = cursor.read_int("the number of vertices");
   if (header.vertices < 1) cursor.fail("at least 1 vertex", std::to_string(header.vertices));
   cursor.read_bytes(2 * sizeof(float), "the first frame and the sample rate");
@@ -38,7 +38,7 @@ VertexArray read_point_cache_frame(const std::filesystem::path& file, std::int64
   const std::string bytes = read_whole_file(file, "a point cache (.pc2)");
   ValueCursor cursor(file.string(), bytes, ValueCursor::Layout::kAnywhere);
   cursor.set_binary(std::endian::native != std::endian::little);
-  const Header header = read_header(cursor);
+  const CacheHeader header = read_header(cursor);
   if (header.vertices != vertices)
     throw InputError({file.string(), "", fmt::format("{} vertices, as the surface has", vertices),
                       std::to_string(header.vertices),

@@ -22,7 +22,7 @@ constexpr Eigen::Index kBatchBytes = Eigen::Index{64} << 20;
 // Elements of one batch: enough for the products, few enough to report progress.
 constexpr Eigen::Index kMostBatchElements = 256;
 // Pairs of modes of one block of the products, the unit of work of a thread.
-constexpr Eigen::Index kBlock = 96;
+constexpr Eigen::Index kPairBlock = 96;
 
 Eigen::Index pair_count(Eigen::Index size) { return size * (size + 1) / 2; }
 
@@ -71,8 +71,8 @@ class StrainProducts {
     sums.stiffness.setZero(modes, modes);
     sums.cubic.setZero(pairs_, modes);
     sums.quartic.setZero(pair_count(pairs_));
-    for (Eigen::Index row = 0; row < pairs_; row += kBlock)
-      for (Eigen::Index col = 0; col <= row; col += kBlock) blocks_.emplace_back(row, col);
+    for (Eigen::Index row = 0; row < pairs_; row += kPairBlock)
+      for (Eigen::Index col = 0; col <= row; col += kPairBlock) blocks_.emplace_back(row, col);
   }
 
   // Every sum is that of one thread, in the order of the batches.
@@ -90,7 +90,7 @@ class StrainProducts {
   PolynomialData sums;
 
  private:
-  Eigen::Index block_size(Eigen::Index first) const { return std::min(kBlock, pairs_ - first); }
+  Eigen::Index block_size(Eigen::Index first) const { return std::min(kPairBlock, pairs_ - first); }
 
   void add_cubic(const StrainBatch& batch, Eigen::Index row) {
     const Eigen::Index size = block_size(row);

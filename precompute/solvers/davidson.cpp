@@ -17,7 +17,7 @@ namespace {
 // Of |K^-1 (K x - lambda M x)| in the norm of M, where |x| is 1.
 constexpr double kTolerable = 1e-6;  // where rounding stops it; refinement in long double has the rest
 constexpr int kPatience = 4;         // steps that bring the worst pair no nearer by half
-constexpr int kMostSteps = 300;
+constexpr int kMostExpansions = 300;
 constexpr double kIndependent = 1e-13;  // of eigenvalues of a Gram matrix of unit diagonal
 // Pairs beside those that are wanted, a share and a number, make these converge sooner, and cost little: reading the
 // factors takes most of the time.
@@ -115,7 +115,7 @@ Eigen::MatrixXd Davidson::solve() {
   Progress progress("eigenpairs", count_);
   extend(start());
   double nearest = std::numeric_limits<double>::infinity();
-  for (int step = 0, waited = 0; step < kMostSteps; ++step) {
+  for (int step = 0, waited = 0; step < kMostExpansions; ++step) {
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> ritz(projected_.topLeftCorner(size_, size_));
     const Eigen::Index pairs = std::min(pairs_, size_);
     RowMatrix vectors = RowMatrix::Zero(space_.rows(), pairs);
@@ -141,7 +141,7 @@ Eigen::MatrixXd Davidson::solve() {
     extend(steps(Eigen::all, open));
   }
   throw WorkError("eigensolver: " + std::to_string(count_) + " eigenpairs do not converge in " +
-                  std::to_string(kMostSteps) + " steps; use --eigensolver direct");
+                  std::to_string(kMostExpansions) + " steps; use --eigensolver direct");
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 constexpr double kTolerance = 1e-12;
 // Steps of conjugate gradients: a good body takes 3 to 6. Where the first solution takes more than the first of these,
 // factors in double are cheaper.
-constexpr int kWorthwhile = 40, kMostSteps = 200;
+constexpr int kWorthwhile = 40, kMostIterations = 200;
 // Of |B - K X| / |B|, of the first solution. What a null vector that is not R's would leave is a thousand times as
 // much.
 constexpr double kSolved = 1e-6;
@@ -98,7 +98,7 @@ MixedSolver::Outcome MixedSolver::iterate(RowMatrix residual, int most) const {
 }
 
 RowMatrix MixedSolver::solve(RowMatrix right_hand_sides) const {
-  Outcome outcome = iterate(std::move(right_hand_sides), kMostSteps);
+  Outcome outcome = iterate(std::move(right_hand_sides), kMostIterations);
   if (!outcome.converged)
     throw WorkError("conjugate gradients with factors in single precision do not converge in " +
                     std::to_string(outcome.steps) + " steps; use --eigensolver direct");

@@ -22,7 +22,7 @@ constexpr double kNoise = 0.1;                  // of the largest example: how f
 constexpr Eigen::Index kMostRows = 2000;        // of the selection problem
 constexpr Eigen::Index kMostCandidates = 6000;  // elements that it chooses from
 constexpr Eigen::Index kElementsPerDimension = 12, kLeastElements = 24;  // most of them: 12 d, at least 24
-constexpr double kNothing = 1e-6;  // of the largest force: one that says nothing of the elements
+constexpr double kNoForce = 1e-6;  // of the largest force: one that says nothing of the elements
 
 // A force of one example's energy.
 struct Sample {
@@ -162,7 +162,7 @@ SelectionProblem ElementChooser::problem(const std::vector<Eigen::Index>& elemen
   const Eigen::MatrixXd total = sum_of_forces(samples);
   const Eigen::VectorXd norms = total.colwise().norm();
   const Eigen::VectorXd scales =
-      (norms.array() > kNothing * norms.maxCoeff()).select(norms.cwiseInverse(), Eigen::VectorXd::Zero(count));
+      (norms.array() > kNoForce * norms.maxCoeff()).select(norms.cwiseInverse(), Eigen::VectorXd::Zero(count));
   SelectionProblem problem;
   problem.target = (total * scales.asDiagonal()).reshaped();
   problem.columns.resize(problem.target.size(), std::ssize(elements));

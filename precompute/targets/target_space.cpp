@@ -21,11 +21,11 @@ namespace {
 
 using runtime::TargetSolver;
 
-constexpr double kShare = 0.1;     // of the tolerance that the space may take
-constexpr int kRounds = 4;         // in which weights whose targets the space misses are added
-constexpr double kNothing = 1e-9;  // of the largest example: a direction of poses that is rounding
-constexpr double kSame = 0.1;      // of the tolerance: answers nearer to each other are one minimum
-constexpr int kTableChecks = 8;    // targets of all tets on every edge of the simplex, that a table is checked by
+constexpr double kShare = 0.1;         // of the tolerance that the space may take
+constexpr int kRounds = 4;             // in which weights whose targets the space misses are added
+constexpr double kNoDirection = 1e-9;  // of the largest example: a direction of poses that is rounding
+constexpr double kSame = 0.1;          // of the tolerance: answers nearer to each other are one minimum
+constexpr int kTableChecks = 8;        // targets of all tets on every edge of the simplex, that a table is checked by
 
 // One, two or three examples at equal shares, then all of them.
 RowMatrix equal_shares(Eigen::Index examples) {
@@ -193,7 +193,7 @@ TargetSpace SpaceBuilder::build() {
   TargetSpace space;
   space.energy_reference = options_.energy_reference;
   for (int round = 0; round < kRounds; ++round) {
-    columns_ = principal_space(examples_, samples_, 0.5 * distance, kNothing * scale_);
+    columns_ = principal_space(examples_, samples_, 0.5 * distance, kNoDirection * scale_);
     space.coordinates = coordinates();
     small_ = target_in(space.coordinates);
     if (scale_ == 0 || count_ < 2) break;

@@ -8,7 +8,7 @@
 #include "tests/support/box_mesh.h"
 
 namespace exmat::test {
-namespace {
+namespace command_line_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -273,5 +273,5 @@ TEST_F(CommandLine, ADamagedBundleIsRefusedByNameOfTheDataset) {
   expect_refused(run(write_scene(folder_)), kBadInput, {bundle_, "/cubature/weights"});
 }
 
-}  // namespace
+}  // namespace command_line_test
 }  // namespace exmat::test

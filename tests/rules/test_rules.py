@@ -182,15 +182,20 @@ class Naming(unittest.TestCase):
     def test_holds_in_the_project(self):
         self.assertEqual(naming.violations(ROOT, BUILD), [])
 
-    def planted(self, files):
-        """Violations of a project of these sources."""
+    def planted(self, files, unity=False):
+        """Violations of a project of these sources, each a unit, or one of all."""
         with tempfile.TemporaryDirectory() as folder:
             root = Path(folder).resolve()
             shutil.copy(ROOT / ".clang-tidy", root)
             for name, text in files.items():
                 (root / name).parent.mkdir(parents=True, exist_ok=True)
                 (root / name).write_text(text)
-            commands = [{"file": str(root / name), "command": f"c++ -std=c++20 -I{root} -Winvalid-pch -include {root}/cmake_pch.hxx -o x.o -c {root / name}"} for name in files if name.endswith(".cpp")]
+            units = [root / name for name in files if name.endswith(".cpp")]
+            if unity:
+                (root / "Unity").mkdir()
+                (root / "Unity/unity.cxx").write_text("".join(f'#include "{unit}"\n' for unit in units))
+                units = [root / "Unity/unity.cxx"]
+            commands = [{"file": str(unit), "command": f"c++ -std=c++20 -I{root} -o x.o -c {unit}"} for unit in units]
             (root / "compile_commands.json").write_text(json.dumps(commands))
             return "\n".join(naming.violations(root, root))
 
@@ -199,10 +204,8 @@ class Naming(unittest.TestCase):
         for name in ("bad_type", "Function", "limit"):
             self.assertIn(name, found)
 
-    def test_reads_apart_what_does_not_compile_together(self):
-        clash = "static int help() { return 1; }\n"
-        self.assertEqual(self.planted({"common/a.cpp": clash, "common/b.cpp": clash}), "")
-        self.assertIn("limit", self.planted({"common/a.cpp": clash, "common/b.cpp": clash + self.BAD}))
+    def test_reads_the_sources_of_a_unity_build(self):
+        self.assertIn("limit", self.planted({"common/core/x.h": self.BAD, "common/x.cpp": '#include "common/core/x.h"\n'}, unity=True))
 
     def test_reports_what_does_not_compile(self):
         self.assertIn("error", self.planted({"common/a.cpp": "int f( {\n"}))
@@ -231,7 +234,7 @@ class RuntimeAlone(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             blind = dict(os.environ, PKG_CONFIG_PATH="/nowhere")
             options = ["-DEXMAT_BUILD_PRECOMPUTE=OFF", "-DEXMAT_BUILD_TESTS=OFF", "-DCMAKE_DISABLE_FIND_PACKAGE_MPI=ON",
-                       self.cached("CMAKE_BUILD_TYPE"), self.cached("EXMAT_SANITIZE"), self.cached("EXMAT_PRECOMPILED_HEADERS"), self.cached("CMAKE_CXX_COMPILER")]
+                       self.cached("CMAKE_BUILD_TYPE"), self.cached("EXMAT_SANITIZE"), self.cached("CMAKE_UNITY_BUILD"), self.cached("CMAKE_CXX_COMPILER")]
             subprocess.run(["cmake", "-S", str(ROOT), "-B", folder, "-GNinja", *options], check=True, env=blind, capture_output=True)
             alone = self.commands(Path(folder))
         self.assertGreater(len([line for line in alone if " -c " in line]), 50)

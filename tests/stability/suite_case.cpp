@@ -11,7 +11,7 @@ constexpr std::array kIntegrators{Integrator::kBdf2, Integrator::kBackwardEuler,
 constexpr std::array kMaterials{MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean,
                                 MaterialModel::kCorotational};
 constexpr double kGravity = 9.81;
-constexpr double kSixtieth = 1.0 / 60, kThirtieth = 1.0 / 30;
+constexpr double kFrame = 1.0 / 60, kThirtieth = 1.0 / 30;
 const Eigen::Vector3d kDown(0, 0, -1), kInward(-1, 0, 0);
 
 using Cases = std::vector<StabilityCase>;
@@ -349,7 +349,7 @@ void add_product(Cases& cases) {
   for (const double E : {1e3, 1e6, 1e9, 1e12})
     for (const double nu : {0.0, 0.3, 0.45, 0.499, 0.4999})
       for (const double density : {1.0, 1e3, 1e5})
-        for (const double time_step : {1e-4, 1e-3, kSixtieth, kThirtieth})
+        for (const double time_step : {1e-4, 1e-3, kFrame, kThirtieth})
           add_let_go({.youngs_modulus = E, .poisson_ratio = nu, .density = density}, time_step, cases);
 }
 
@@ -401,8 +401,8 @@ std::vector<StabilityCase> long_stability_suite() {
   for (StabilityCase& test : short_stability_suite())
     if (test.group != "stiffness" && test.group != "examples on the ground" && test.group != "bodies")
       cases.push_back(std::move(test));
-  add_examples_on_ground({1e-4, 1e-3, kSixtieth, kThirtieth}, {1e4, 1e6, 1e8, 1e10}, {1e3, 1e6, 1e10}, cases);
-  add_worlds({1e-4, 1e-3, kSixtieth, kThirtieth}, {1e4, 1e6, 1e8, 1e10}, /*all_integrators=*/true, cases);
+  add_examples_on_ground({1e-4, 1e-3, kFrame, kThirtieth}, {1e4, 1e6, 1e8, 1e10}, {1e3, 1e6, 1e10}, cases);
+  add_worlds({1e-4, 1e-3, kFrame, kThirtieth}, {1e4, 1e6, 1e8, 1e10}, /*all_integrators=*/true, cases);
   return cases;
 }
 

@@ -12,10 +12,10 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kRestTime = 20;     // over the rate of the slowest mode
-constexpr double kClearance = 0.02;  // between bodies, and between them and the ground [m]
-constexpr double kGroundMass = 200;  // of a body on the area that it lies on [kg/m^2]
-constexpr int kShortest = 120;       // steps
+constexpr double kWorldRestTime = 20;     // over the rate of the slowest mode
+constexpr double kWorldClearance = 0.02;  // between bodies, and between them and the ground [m]
+constexpr double kGroundMass = 200;       // of a body on the area that it lies on [kg/m^2]
+constexpr int kShortest = 120;            // steps
 
 class WorldRun {
  public:
@@ -27,7 +27,7 @@ class WorldRun {
       swing();
     }
     if (test.ground == Ground::kPlane)
-      scene_.obstacles.push_back(runtime::Obstacle{runtime::Plane{{0, 0, -kClearance}, Eigen::Vector3d::UnitZ()},
+      scene_.obstacles.push_back(runtime::Obstacle{runtime::Plane{{0, 0, -kWorldClearance}, Eigen::Vector3d::UnitZ()},
                                                    runtime::RigidMotion(), test.contact_stiffness, damping(),
                                                    test.friction});
     kind_ = kind_of(body, scene_);
@@ -108,7 +108,7 @@ void WorldRun::place(const StudyBody* carried) {
   const Eigen::VectorXd rest = Eigen::VectorXd::Zero(body_.model->modes());
   const Eigen::Vector3d down(0, 0, -test_.velocity), along(0.5 * test_.velocity, 0, 0);
   const Eigen::Quaterniond across(Eigen::AngleAxisd(0.5 * std::numbers::pi, Eigen::Vector3d::UnitZ()));
-  const double height = lengths()[2] + kClearance;
+  const double height = lengths()[2] + kWorldClearance;
   switch (test_.company) {
     case Company::kNone:
       break;
@@ -117,7 +117,7 @@ void WorldRun::place(const StudyBody* carried) {
         add_body(kind_, {{0, 0, i * height}, i == 1 ? across : Eigen::Quaterniond::Identity(), down, {0, 0, 0}}, rest);
       break;
     case Company::kPair: {
-      const Eigen::Vector3d aside(lengths()[0] + kClearance, 0.3 * lengths()[1], 0.2 * lengths()[2]);
+      const Eigen::Vector3d aside(lengths()[0] + kWorldClearance, 0.3 * lengths()[1], 0.2 * lengths()[2]);
       add_body(kind_, {{0, 0, 0}, Eigen::Quaterniond::Identity(), along, {0, 0, 0}}, rest);
       add_body(kind_, {aside, Eigen::Quaterniond::Identity(), -along, {0, 0, 0}}, rest);
       break;
@@ -143,7 +143,7 @@ void WorldRun::plan_steps() {
         width * width / lengths()[0] * std::sqrt(test_.contact_stiffness / body_.reduced.rigid->mass);
     rate = std::min(rate, 0.7 * rocking);
   }
-  const double needed = 2 * kLoadSteps + std::max<double>(kShortest, kRestTime / (rate * test_.time_step));
+  const double needed = 2 * kLoadSteps + std::max<double>(kShortest, kWorldRestTime / (rate * test_.time_step));
   if (needed > most_steps_) return;
   steps_ = static_cast<std::int64_t>(std::ceil(needed));
   expects_rest_ = (test_.company == Company::kPile && scene_.examples.empty()) ||
@@ -155,7 +155,7 @@ double WorldRun::linear_displacement(const runtime::World& world) const {
   const runtime::Energies energies = world.energies();
   double energy = energies.elastic + energies.kinetic;
   const double mass = body_.reduced.rigid ? body_.reduced.rigid->mass : 0;
-  energy += world.count() * mass * test_.gravity * world.count() * (lengths()[2] + kClearance);
+  energy += world.count() * mass * test_.gravity * world.count() * (lengths()[2] + kWorldClearance);
   if (test_.company == Company::kCarried) {
     const double speed = 0.5 * std::numbers::pi * body_.size / (kLoadSteps * test_.time_step);
     energy += 2 * mass * speed * speed;  // of the body, thrown at twice the speed of the fastest point

@@ -18,7 +18,7 @@ void add(RelativeError& sum, const RelativeError& part) {
   sum.settled += part.settled;
 }
 
-std::string percent(double share) { return fmt::format("{:.2g} %", 100 * share); }
+std::string rough_percent(double share) { return fmt::format("{:.2g} %", 100 * share); }
 
 std::string what_to_turn(ErrorSource source, const PointKnobs& knobs) {
   switch (source) {
@@ -95,15 +95,15 @@ std::string advice_on(const ErrorSplit& split, const PointKnobs& knobs) {
   const ErrorPart* largest = known.front();
   const bool all_known =
       std::ranges::none_of(split.parts, [](const ErrorPart& part) { return part.status == PartStatus::kNotKnown; });
-  const std::string name(name_of(largest->source));
+  const std::string name(exmat::name_of(largest->source));
   std::string text = split.total.mean <= kGood
                          ? fmt::format("Near the full problem ({}); the most of it is {} of {}: to come nearer, {}",
-                                       percent(split.total.mean), percent(largest->added->mean), name,
+                                       rough_percent(split.total.mean), rough_percent(largest->added->mean), name,
                                        what_to_turn(largest->source, knobs))
-                         : fmt::format("The most of the error of {} is {} of {}: {}", percent(split.total.mean),
-                                       percent(largest->added->mean), name, what_to_turn(largest->source, knobs));
+                         : fmt::format("The most of the error of {} is {} of {}: {}", rough_percent(split.total.mean),
+                                       rough_percent(largest->added->mean), name, what_to_turn(largest->source, knobs));
   if (known.size() > 1 && known[1]->added->mean >= kAlsoLarge * largest->added->mean)
-    text += fmt::format("; next is {} with {}", name_of(known[1]->source), percent(known[1]->added->mean));
+    text += fmt::format("; next is {} with {}", exmat::name_of(known[1]->source), rough_percent(known[1]->added->mean));
   return text + (all_known ? "." : "; what is not known below is not among it.");
 }
 

@@ -20,10 +20,10 @@ std::string spaced(std::string_view name) {
   return text;
 }
 
-std::string source_name(const ErrorPart& part) { return spaced(name_of(part.source)); }
+std::string source_name(const ErrorPart& part) { return spaced(exmat::name_of(part.source)); }
 
 std::vector<std::string> row_of(const ErrorPart& part) {
-  const std::string remark = spaced(name_of(part.status));
+  const std::string remark = spaced(exmat::name_of(part.status));
   std::vector<std::string> cells{source_name(part), part.added ? percent(part.added->mean) : remark,
                                  part.added ? percent(part.added->settled) : remark};
   cells.push_back(part.so_far ? percent(part.so_far->mean) : "");
@@ -68,7 +68,7 @@ std::string split_svg(const ErrorSplit& split, const std::string& headline) {
   StackedBar mean{"mean", {}, 100 * split.total.mean, "total"},
       settled{"settled", {}, 100 * split.total.settled, "total"};
   for (const ErrorPart& part : split.parts) {
-    picture.parts.push_back({source_name(part), part.added ? "" : spaced(name_of(part.status))});
+    picture.parts.push_back({source_name(part), part.added ? "" : spaced(exmat::name_of(part.status))});
     mean.values.push_back(part.added ? 100 * part.added->mean : 0);
     settled.values.push_back(part.added ? 100 * part.added->settled : 0);
   }
@@ -108,8 +108,8 @@ Ordered to_json(const ErrorSplit& split) {
   Ordered json{{"point", split.point}, {"failure", split.failure}, {"full_problem", split.full_problem}};
   json["parts"] = Ordered::array();
   for (const ErrorPart& part : split.parts)
-    json["parts"].push_back({{"source", name_of(part.source)},
-                             {"status", name_of(part.status)},
+    json["parts"].push_back({{"source", exmat::name_of(part.source)},
+                             {"status", exmat::name_of(part.status)},
                              {"note", part.note},
                              {"added", to_json(part.added)},
                              {"so_far", to_json(part.so_far)}});

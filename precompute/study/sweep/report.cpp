@@ -17,7 +17,7 @@
 namespace exmat::precompute {
 namespace {
 
-std::string microseconds(double seconds) {
+std::string microsecond_text(double seconds) {
   const double value = 1e6 * seconds;
   return fmt::format("{:.{}f}", value, value < 10 ? 2 : value < 1000 ? 1 : 0);
 }
@@ -28,7 +28,7 @@ bool all_elements(const PointResult& point) { return point.settings.internal_for
 
 std::string label_of(std::size_t index, const PointResult& point) {
   return fmt::format("{}: {}: {} %, {} us", index + 1, describe(point.settings), percent(point.errors.headline().mean),
-                     point.times ? microseconds(point.times->median) : "-");
+                     point.times ? microsecond_text(point.times->median) : "-");
 }
 
 std::string error_label(const StudyResult& result) { return fmt::format("error of {}, mean [%]", result.headline()); }
@@ -234,7 +234,7 @@ Table::Row point_row(const StudyResult& result, std::size_t i) {
   cells.push_back(all_elements(point) ? "-" : percent(point.heldout_error));
   const StepTimes times = point.times.value_or(StepTimes());
   for (const double seconds : {times.median, times.p95, times.interpolation})
-    cells.push_back(point.times ? microseconds(seconds) : "-");
+    cells.push_back(point.times ? microsecond_text(seconds) : "-");
   cells.push_back(fmt::format("{:.1f}", point.precompute_seconds));
   cells.push_back(fmt::format("{:.2f}", point.newton_iterations));
   cells.push_back(std::to_string(point.unconverged_steps));
@@ -352,7 +352,7 @@ std::string recommendation_text(const StudyResult& result) {
   const auto named = [&](std::size_t i) {
     const PointResult& point = result.points[i];
     return fmt::format("point {} ({}): {} %, {} us a step", i + 1, describe(point.settings),
-                       percent(point.errors.headline().mean), microseconds(point.times->median));
+                       percent(point.errors.headline().mean), microsecond_text(point.times->median));
   };
   if (result.recommended) return fmt::format("{}: {}", budget_text(result.budget), named(*result.recommended));
   if (result.nearest)

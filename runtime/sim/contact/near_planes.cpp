@@ -6,11 +6,11 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kSearchedMargins = 2;   // beyond what a step needs: some steps of what it moves by,
-constexpr double kSearchedShare = 2e-3;  // and of the body's size: many steps of one that hardly moves
-constexpr int kWorthwhile = 3;           // steps that a search has to serve
-constexpr int kWithout = 16;             // steps without, after one that did not
-constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();  // of where a vertex is
+constexpr double kPlaneMargins = 2;   // beyond what a step needs: some steps of what it moves by,
+constexpr double kPlaneShare = 2e-3;  // and of the body's size: many steps of one that hardly moves
+constexpr int kPlaneWorthwhile = 3;   // steps that a search has to serve
+constexpr int kPlaneWithout = 16;     // steps without, after one that did not
+constexpr double kPlaneRounding = 16 * std::numeric_limits<double>::epsilon();  // of where a vertex is
 
 bool is_same(const Plane& a, const Plane& b) { return a.normal == b.normal && a.point == b.point; }
 
@@ -33,7 +33,7 @@ bool NearPlanes::knows(std::span<const PlacedObstacle> obstacles, const Pose& po
   const Eigen::Vector3d moved = pose.placement.position - placement_.position;
   const Eigen::Matrix3d turned = (pose.placement.rotation - placement_.rotation).transpose();
   const double farthest = pose.reach + pose.movement.of(pose.q);
-  const double deformed = pose.movement.of(pose.q - q_) + kRounding * (pose.placement.position.norm() + farthest);
+  const double deformed = pose.movement.of(pose.q - q_) + kPlaneRounding * (pose.placement.position.norm() + farthest);
   double longest = 0;
   for (std::size_t i = 0; i < obstacles_; ++i) {
     const Plane& plane = *obstacles[i].plane;
@@ -47,7 +47,7 @@ bool NearPlanes::knows(std::span<const PlacedObstacle> obstacles, const Pose& po
 }
 
 bool NearPlanes::is_worthwhile() noexcept {
-  if (radius_ >= 0 && served_ < kWorthwhile) without_ = kWithout;
+  if (radius_ >= 0 && served_ < kPlaneWorthwhile) without_ = kPlaneWithout;
   radius_ = -1;
   if (without_ == 0) return true;
   --without_;
@@ -58,7 +58,7 @@ void NearPlanes::begin(std::span<const PlacedObstacle> obstacles, const Pose& po
   for (std::size_t i = 0; i < obstacles_; ++i) planes_[i] = *obstacles[i].plane;
   placement_ = pose.placement;
   q_ = pose.q;
-  radius_ = (1 + kSearchedMargins) * margin + kSearchedShare * pose.reach;
+  radius_ = (1 + kPlaneMargins) * margin + kPlaneShare * pose.reach;
   count_ = 0;
   served_ = 0;
 }

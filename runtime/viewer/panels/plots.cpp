@@ -8,7 +8,7 @@
 namespace exmat::viewer {
 namespace {
 
-constexpr float kWidth = 252, kMargin = 12, kPlotHeight = 58;
+constexpr float kPlotWidth = 252, kPlotMargin = 12, kPlotHeight = 58;
 
 /// Lines over the last while, zero marked.
 void plot(const Style& style, const Series& series, float least, float most) {
@@ -177,9 +177,9 @@ void draw_plots(const Style& style, const Snapshot& snapshot, const History& his
                 const std::vector<std::shared_ptr<const BodyShape>>& shapes, double frame_seconds) {
   const float s = style.scale;
   const ImVec2 display = ImGui::GetIO().DisplaySize;
-  ImGui::SetNextWindowPos({display.x - (kWidth + kMargin) * s, kMargin * s});
-  ImGui::SetNextWindowSize({kWidth * s, 0});
-  ImGui::SetNextWindowSizeConstraints({kWidth * s, 0}, {kWidth * s, display.y - 2 * kMargin * s});
+  ImGui::SetNextWindowPos({display.x - (kPlotWidth + kPlotMargin) * s, kPlotMargin * s});
+  ImGui::SetNextWindowSize({kPlotWidth * s, 0});
+  ImGui::SetNextWindowSizeConstraints({kPlotWidth * s, 0}, {kPlotWidth * s, display.y - 2 * kPlotMargin * s});
   ImGui::Begin("##plots", nullptr,
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_NoSavedSettings);

@@ -9,7 +9,7 @@
 #include "tests/support/box_mesh.h"
 
 namespace exmat {
-namespace {
+namespace st_venant_kirchhoff_test {
 
 using Material = StVenantKirchhoff;
 
@@ -127,5 +127,5 @@ TEST(ProjectPositiveSemidefinite, ClampsNegativeEigenvaluesOnly) {
   EXPECT_LE((after.eigenvalues() - before.eigenvalues().cwiseMax(0.0)).norm(), 1e-12 * before.eigenvalues().norm());
 }
 
-}  // namespace
+}  // namespace st_venant_kirchhoff_test
 }  // namespace exmat

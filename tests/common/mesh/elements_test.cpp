@@ -11,7 +11,7 @@
 #include "tests/support/random.h"
 
 namespace exmat {
-namespace {
+namespace elements_test {
 
 constexpr double kRounding = 1e-12;  // sums of some dozens of terms
 
@@ -137,5 +137,5 @@ TEST_F(SmoothedElements, AreTetsWhereTheFormulationIsLinear) {
     EXPECT_EQ(all.gradients_of(e), (shape_gradients(tet_positions(mesh_, e))));
 }
 
-}  // namespace
+}  // namespace elements_test
 }  // namespace exmat

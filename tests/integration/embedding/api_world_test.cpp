@@ -10,7 +10,7 @@
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::test {
-namespace {
+namespace api_world_test {
 
 using ::testing::HasSubstr;
 
@@ -313,5 +313,5 @@ TEST_F(ApiWorldTest, ABodyThatBreaksIsNamedAndTheOthersGoOn) {
   EXPECT_NEAR(world.body(0).time(), world.body(1).time() + kTimeStep, 1e-12);
 }
 
-}  // namespace
+}  // namespace api_world_test
 }  // namespace exmat::test

@@ -11,7 +11,7 @@
 #include "tests/support/posed_bodies.h"
 
 namespace exmat::precompute {
-namespace {
+namespace registration_test {
 
 constexpr double kLength = 4, kEdge = 0.2, kAngle = 0.8;
 
@@ -95,5 +95,5 @@ TEST_F(RelaxedBoxes, OfALargerBodyIsAsLarge) {
   EXPECT_LT(bar.relaxed_error(), 0.05);
 }
 
-}  // namespace
+}  // namespace registration_test
 }  // namespace exmat::precompute

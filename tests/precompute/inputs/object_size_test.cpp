@@ -13,7 +13,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 std::string remark(double length, double modulus, double density = 1000) {
-  const TetMesh mesh = test::box_mesh({4, 1, 1}, {length, length / 4, length / 4});
+  const TetMesh mesh = exmat::test::box_mesh({4, 1, 1}, {length, length / 4, length / 4});
   TetMaterials materials;
   materials.density = Eigen::VectorXd::Constant(mesh.tet_count(), density);
   materials.youngs_modulus = Eigen::VectorXd::Constant(mesh.tet_count(), modulus);
@@ -42,7 +42,7 @@ TEST(ObjectSize, TheReasonIsNamed) {
 
 // Whatever is beyond would end in a solver, without a word of the number that it came from.
 TEST(RequireNumbers, NamesNumbersThatDoublePrecisionCannotHold) {
-  const TetMesh mesh = test::box_mesh({4, 1, 1}, {2, 0.5, 0.5});
+  const TetMesh mesh = exmat::test::box_mesh({4, 1, 1}, {2, 0.5, 0.5});
   const auto refusal = [&](double density, double modulus) -> std::string {
     TetMaterials materials;
     materials.density = Eigen::VectorXd::Constant(mesh.tet_count(), density);

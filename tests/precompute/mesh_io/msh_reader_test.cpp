@@ -10,7 +10,7 @@
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
-namespace {
+namespace msh_reader_test {
 
 using test::ByteWriter;
 using test::complaint_of;
@@ -341,5 +341,5 @@ TEST_F(ReadMsh, RefusesABinarySecondOrderMesh) {
   EXPECT_EQ(complaint.expected, "tetrahedra of first order (element type 4)");
 }
 
-}  // namespace
+}  // namespace msh_reader_test
 }  // namespace exmat::precompute

@@ -7,7 +7,7 @@
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
-namespace {
+namespace stl_reader_test {
 
 using test::complaint_of;
 using test::edited;
@@ -104,5 +104,5 @@ TEST(ReadStl, RefusesBinaryFilesOfAnotherSizeOrWithoutNumbers) {
   EXPECT_EQ(refused("binary").expected, "a header of 80 bytes");
 }
 
-}  // namespace
+}  // namespace stl_reader_test
 }  // namespace exmat::precompute

@@ -16,7 +16,7 @@
 #include "tests/support/box_mesh.h"
 
 namespace exmat::precompute {
-namespace {
+namespace surface_file_test {
 
 SurfaceMesh read_surface(const std::filesystem::path& file) { return read_surface_file(file).mesh; }
 
@@ -428,5 +428,5 @@ TEST(ReadSurface, NamesTheKnownExtensions) {
   EXPECT_EQ(complaint.found, "'.fbx'");
 }
 
-}  // namespace
+}  // namespace surface_file_test
 }  // namespace exmat::precompute

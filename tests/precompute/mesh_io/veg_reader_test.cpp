@@ -8,7 +8,7 @@
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
-namespace {
+namespace veg_reader_test {
 
 using test::complaint_of;
 using test::edited;
@@ -242,5 +242,5 @@ constexpr std::array kMalformed{
 INSTANTIATE_TEST_SUITE_P(Malformed, RefusesVeg, testing::ValuesIn(kMalformed),
                          [](const auto& param) { return std::string(param.param.name); });
 
-}  // namespace
+}  // namespace veg_reader_test
 }  // namespace exmat::precompute

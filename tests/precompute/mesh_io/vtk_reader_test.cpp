@@ -9,7 +9,7 @@
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
-namespace {
+namespace vtk_reader_test {
 
 using test::complaint_of;
 using test::edited;
@@ -255,5 +255,5 @@ constexpr std::array kMalformed{
 INSTANTIATE_TEST_SUITE_P(Malformed, RefusesVtk, testing::ValuesIn(kMalformed),
                          [](const auto& param) { return std::string(param.param.name); });
 
-}  // namespace
+}  // namespace vtk_reader_test
 }  // namespace exmat::precompute

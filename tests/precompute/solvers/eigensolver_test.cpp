@@ -10,7 +10,7 @@
 #include "tests/support/box_mesh.h"
 
 namespace exmat::precompute {
-namespace {
+namespace eigensolver_test {
 
 // Both have residuals below 1e-9, and eigenvalues have the error of the residual squared.
 constexpr double kTolerance = 1e-8;
@@ -94,5 +94,5 @@ INSTANTIATE_TEST_SUITE_P(, Eigensolvers,
                          testing::Values(Eigensolver::kMixed, Eigensolver::kGamg, Eigensolver::kLobpcg));
 INSTANTIATE_TEST_SUITE_P(, MultigridSolvers, testing::Values(Eigensolver::kGamg, Eigensolver::kLobpcg));
 
-}  // namespace
+}  // namespace eigensolver_test
 }  // namespace exmat::precompute

@@ -17,7 +17,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::precompute {
-namespace {
+namespace mixed_solver_test {
 
 ElasticSystem system_of(const TetMesh& mesh, bool clamped) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(mesh.tet_count());
@@ -145,5 +145,5 @@ TEST_F(SolverChoice, AutoGoesByTheMeshAndTheMemory) {
   EXPECT_NE(log_.find("multigrid and LOBPCG in their place"), std::string::npos) << log_;
 }
 
-}  // namespace
+}  // namespace mixed_solver_test
 }  // namespace exmat::precompute

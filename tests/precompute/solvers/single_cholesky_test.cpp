@@ -13,7 +13,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::precompute {
-namespace {
+namespace single_cholesky_test {
 
 // Condition number times the rounding of single precision.
 constexpr double kTolerance = 2e-5;
@@ -146,5 +146,5 @@ TEST(NestedDissection, FillsLittle) {
   EXPECT_LT(2 * entries(plate, true), entries(plate, false));
 }
 
-}  // namespace
+}  // namespace single_cholesky_test
 }  // namespace exmat::precompute

@@ -8,7 +8,7 @@
 // Against Eigen's products, of enough rows for several threads and of few.
 
 namespace exmat::precompute {
-namespace {
+namespace tall_test {
 
 constexpr double kTolerance = 1e-13;
 
@@ -73,5 +73,5 @@ TEST_P(Tall, AreTheSameForEveryNumberOfThreads) {
   EXPECT_EQ(one, three);
 }
 
-}  // namespace
+}  // namespace tall_test
 }  // namespace exmat::precompute

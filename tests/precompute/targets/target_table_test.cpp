@@ -16,7 +16,7 @@
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::precompute {
-namespace {
+namespace target_table_test {
 
 using runtime::TargetSolver;
 using runtime::TargetTable;
@@ -427,5 +427,5 @@ TEST(TargetTableRefusal, OfTooFewAndTooManyExamples) {
   }
 }
 
-}  // namespace
+}  // namespace target_table_test
 }  // namespace exmat::precompute

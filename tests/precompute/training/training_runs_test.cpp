@@ -7,7 +7,7 @@
 #include "tests/precompute/full_space/full_space_bar.h"
 
 namespace exmat::precompute {
-namespace {
+namespace training_runs_test {
 
 struct Body {
   test::Bar bar = test::make_bar({.cells = {3, 1, 1}, .linear_modes = 3});
@@ -80,5 +80,5 @@ TEST(TrainingRuns, BeginNoneAfterTheBudget) {
   EXPECT_EQ(runs.snapshots.cols(), 0);
 }
 
-}  // namespace
+}  // namespace training_runs_test
 }  // namespace exmat::precompute

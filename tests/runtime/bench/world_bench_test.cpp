@@ -10,7 +10,7 @@
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::runtime {
-namespace {
+namespace world_bench_test {
 
 constexpr double kRounding = 1e-12;
 
@@ -78,5 +78,5 @@ TEST_F(WorldBenchTest, ANonFiniteStepIsAFailure) {
   EXPECT_THROW(bench(loaded, config, {.seconds = 0.01}), WorkError);
 }
 
-}  // namespace
+}  // namespace world_bench_test
 }  // namespace exmat::runtime

@@ -15,7 +15,7 @@
 // The kernels of kLanes bodies side by side, of every instruction set, against Eigen and against one body at a time.
 
 namespace exmat::runtime {
-namespace {
+namespace lanes_test {
 
 using Shape = std::pair<int, int>;  // r, s
 
@@ -199,5 +199,5 @@ TEST_P(LanesTest, OneMatrixServesAllLanes) {
   }
 }
 
-}  // namespace
+}  // namespace lanes_test
 }  // namespace exmat::runtime

@@ -10,7 +10,7 @@
 // The rotation of one body against its formulas, written out with matrices (docs/step_in_detail.md, "Free bodies").
 
 namespace exmat::runtime {
-namespace {
+namespace rotation_kernels_test {
 
 constexpr double kRounding = 1e-13;  // of sums of at most 50 terms, over their norms
 constexpr int kFirst[6] = {0, 1, 2, 1, 0, 0}, kSecond[6] = {0, 1, 2, 2, 2, 1};
@@ -140,5 +140,5 @@ TEST_P(RotationKernels, StiffnessAndItsProductAreThoseOfTheMatrices) {
 
 INSTANTIATE_TEST_SUITE_P(Modes, RotationKernels, testing::Values(1, 2, 3, 7, 8, 9, 12, 17, 20, 30, 42));
 
-}  // namespace
+}  // namespace rotation_kernels_test
 }  // namespace exmat::runtime

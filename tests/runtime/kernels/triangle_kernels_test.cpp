@@ -15,7 +15,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
-namespace {
+namespace triangle_kernels_test {
 
 constexpr double kRounding = 1e-13;  // of the square of the way to the triangle's corner
 
@@ -296,5 +296,5 @@ TEST(TriangleKernels, LeavesThatAreNotFarAreKept) {
   for (const int count : by_each) EXPECT_GT(count, 500);
 }
 
-}  // namespace
+}  // namespace triangle_kernels_test
 }  // namespace exmat::runtime

@@ -10,7 +10,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
-namespace {
+namespace near_planes_test {
 
 using test::random_matrix;
 using test::random_vector;
@@ -153,5 +153,5 @@ TEST(MovementBound, TellsTheMostThatWeightsMayHave) {
   }
 }
 
-}  // namespace
+}  // namespace near_planes_test
 }  // namespace exmat::runtime

@@ -13,7 +13,7 @@
 // Against the sum over elements of one body at a time, with every instruction set.
 
 namespace exmat::runtime {
-namespace {
+namespace stiffness_polynomial_test {
 
 constexpr double kRounding = 1e-13;
 
@@ -108,5 +108,5 @@ TEST(StiffnessPolynomial, ServesWhereItTakesLess) {
   EXPECT_EQ(flops(MaterialModel::kStableNeoHookean, 20, 23), 1);
 }
 
-}  // namespace
+}  // namespace stiffness_polynomial_test
 }  // namespace exmat::runtime

@@ -9,7 +9,7 @@
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::runtime {
-namespace {
+namespace target_elasticity_test {
 
 constexpr Eigen::Index kElements = 11, kModes = 7, kCoordinates = 4;  // more than a panel, and not a multiple
 
@@ -161,5 +161,5 @@ TEST(TargetElasticity, OfAUniformStretchIsThatOfTheClosedForm) {
   EXPECT_NEAR(elasticity.energy((a - 1) * Eigen::VectorXd::Unit(9, 0), workspace), 0, 1e-13 * expected);
 }
 
-}  // namespace
+}  // namespace target_elasticity_test
 }  // namespace exmat::runtime

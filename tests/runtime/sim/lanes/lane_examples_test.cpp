@@ -10,7 +10,7 @@
 // Weights and targets of bodies side by side, of every instruction set, against those of each body and definitions.
 
 namespace exmat::runtime {
-namespace {
+namespace lane_examples_test {
 
 constexpr Eigen::Index kModes = 7;
 
@@ -109,5 +109,5 @@ TEST(LaneExamples, BernsteinPolynomialsAreThoseOfEachBody) {
   }
 }
 
-}  // namespace
+}  // namespace lane_examples_test
 }  // namespace exmat::runtime

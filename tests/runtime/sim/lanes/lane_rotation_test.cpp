@@ -11,7 +11,7 @@
 // The rotation of free bodies side by side against that of each by itself.
 
 namespace exmat::runtime {
-namespace {
+namespace lane_rotation_test {
 
 constexpr double kTimeStep = 0.002, kRate = 1.5 / kTimeStep;
 
@@ -134,5 +134,5 @@ TEST(LaneRotation, LeavesFastTurnsToOthersAndIdleBodiesTheirSpin) {
   EXPECT_EQ(own.solution.spin, bodies.each[2].solution.spin);
 }
 
-}  // namespace
+}  // namespace lane_rotation_test
 }  // namespace exmat::runtime

@@ -10,7 +10,7 @@
 #include "tests/support/surfaces.h"
 
 namespace exmat::runtime {
-namespace {
+namespace mesh_step_test {
 
 using test::mesh_of_box;
 using test::ThrownBlock;
@@ -108,5 +108,5 @@ TEST(MeshStep, AllocatesNothing) {
   EXPECT_GT(touching, 0);
 }
 
-}  // namespace
+}  // namespace mesh_step_test
 }  // namespace exmat::runtime

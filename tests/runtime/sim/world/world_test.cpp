@@ -6,7 +6,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
-namespace {
+namespace world_test {
 
 using test::Blocks;
 
@@ -205,5 +205,5 @@ TEST(World, ThreadsAndTheWayOfSolvingDoNotChangeTheResult) {
   for (std::size_t i = 0; i < one.size(); ++i) EXPECT_EQ(one[i], two[i]);
 }
 
-}  // namespace
+}  // namespace world_test
 }  // namespace exmat::runtime

@@ -8,7 +8,7 @@
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::viewer {
-namespace {
+namespace simulation_test {
 
 constexpr const char* kScene = R"({"bundle": "bar.h5", "gravity": [0, 0, -1], "damping": {"mass": 1, "stiffness": 0.01},
   "examples": {"stiffness": 50, "damping": 1}, "instances": 2})";
@@ -184,5 +184,5 @@ TEST_F(Simulations, RunByAClockOrInRealTime) {
   EXPECT_EQ(simulation.steps(), 0);
 }
 
-}  // namespace
+}  // namespace simulation_test
 }  // namespace exmat::viewer

@@ -7,7 +7,7 @@
 #include "tests/support/temporary_folder.h"
 
 namespace exmat::viewer {
-namespace {
+namespace world_simulation_test {
 
 constexpr const char* kScene = R"({
   "time_step": 0.002, "gravity": [0, 0, -9.81], "damping": {"mass": 0.5, "stiffness": 0.002},
@@ -141,5 +141,5 @@ TEST_F(WorldSimulations, AreAlone) {
   EXPECT_ANY_THROW(scene.with_bundle(folder_ / "sub/block.h5"));
 }
 
-}  // namespace
+}  // namespace world_simulation_test
 }  // namespace exmat::viewer

@@ -6,7 +6,7 @@
 #include "exmat/exmat.hpp"
 
 namespace exmat::viewer {
-namespace {
+namespace picking_test {
 
 const std::vector<double> kTetrahedron{0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1};
 const std::vector<std::int32_t> kFaces{0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3};
@@ -81,5 +81,5 @@ TEST(Picking, FindsObstaclesWhereTheyStand) {
   EXPECT_FALSE(obstacle_hit(ray, obstacle, {}, motion));
 }
 
-}  // namespace
+}  // namespace picking_test
 }  // namespace exmat::viewer
