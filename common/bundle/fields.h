@@ -37,6 +37,9 @@ void visit_object(Object& object, Visitor& visit) {
   visit.attribute("material", object.materials.model);
   visit.attribute("formulation", object.materials.formulation);
   visit.attribute("variance_factor", object.materials.variance_factor);
+  visit.attribute("stiffness_ratio", object.stiffness_ratio);
+  visit.attribute("worst_stiffness", object.worst_stiffness);
+  visit.attribute("thin_share", object.thin_share);
   visit.dataset("vertices", object.mesh.vertices);
   visit.dataset("tets", object.mesh.tets);
   visit.dataset("surface", object.surface);

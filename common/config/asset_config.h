@@ -154,7 +154,7 @@ struct AssetConfig {
   std::optional<double> cell_size;  ///< [m]
   MaterialConfig material;
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
-  Formulation formulation = Formulation::kLinear;
+  Formulation formulation = Formulation::kSmoothed;
   std::optional<VertexSelection> fixed;  ///< absent: a free body
   DropConfig object_drop;
   std::optional<std::filesystem::path> render_mesh;  ///< surface that is drawn in the object's place

@@ -17,9 +17,12 @@ namespace exmat {
 /// Group /object: the rest mesh as given, in the world frame, and its material.
 struct ObjectData {
   TetMesh mesh;
-  TriangleArray surface;   ///< n_f x 3, outward
-  FlagVector fixed;        ///< n, 1 where the vertex is clamped
-  TetMaterials materials;  ///< n_t each
+  TriangleArray surface;       ///< n_f x 3, outward
+  FlagVector fixed;            ///< n, 1 where the vertex is clamped
+  TetMaterials materials;      ///< n_t each
+  double stiffness_ratio = 0;  ///< of the elements over quadratic tets on the same mesh; 0 where not compared
+  double worst_stiffness = 0;  ///< largest of its parts
+  double thin_share = 0;       ///< of the volume: where the mesh is one tet thick
 };
 
 /// Group /shape_space: Laplace-Beltrami eigenpairs of the object at centroid 0 and volume 1, the constant one dropped.

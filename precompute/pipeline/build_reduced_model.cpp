@@ -101,7 +101,7 @@ class Pipeline {
     return timed_stage(stage, report_, work);
   }
 
-  void choose_variance();
+  void compare_with_quadratic_tets();
   ObjectData object_data() const;
   void require_modes(const ElasticSystem& system) const;
   void leave_out(const std::string& group, const std::string& reason);
@@ -127,12 +127,19 @@ class Pipeline {
   const BuildOptions& options_;
   StageCache cache_;
   ObjectInput object_;
+  std::optional<MeshStiffness> stiffness_;
   std::optional<ExampleInput> examples_;
   std::optional<RenderData> render_;
 };
 
 ObjectData Pipeline::object_data() const {
-  return {object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials};
+  ObjectData data{object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials};
+  if (stiffness_) {
+    data.stiffness_ratio = stiffness_->vibration;
+    data.worst_stiffness = stiffness_->worst;
+    data.thin_share = stiffness_->thin;
+  }
+  return data;
 }
 
 // Tells how the mesh compares with quadratic tets, in a warning where it is too stiff.
@@ -144,19 +151,20 @@ void say_stiffness(const std::string& name, Formulation formulation, const MeshS
                              formulation == Formulation::kLinear ? "object.formulation \"smoothed\" or " : ""));
 }
 
-// Makes smoothed elements as stiff as quadratic tets of the same mesh.
-void Pipeline::choose_variance() {
+// Says how stiff the mesh is, and makes smoothed elements as stiff as quadratic tets on it.
+void Pipeline::compare_with_quadratic_tets() {
   TetMaterials& materials = object_.materials;
-  if (materials.formulation != Formulation::kSmoothed) return;
-  const auto found = timed("stiffness of the mesh", [&] {
+  stiffness_ = timed("stiffness of the mesh", [&] {
     return cache_.get(
         "stiffness of the mesh", [&] { return mesh_stiffness(object_.mesh, materials, object_.fixed, asset_.name); },
         object_.mesh, materials, object_.fixed);
   });
-  if (!found) return log::info(fmt::format("elements: smoothed, beta {}, not compared", materials.variance_factor));
-  materials.variance_factor = found->variance_factor;
-  log::info(fmt::format("elements: smoothed, beta {:.3f}", materials.variance_factor));
-  say_stiffness(asset_.name, materials.formulation, *found, report_.warnings);
+  if (stiffness_) materials.variance_factor = stiffness_->variance_factor;
+  if (materials.formulation == Formulation::kSmoothed)
+    log::info(fmt::format("elements: smoothed, beta {:.3f}", materials.variance_factor));
+  if (stiffness_) return say_stiffness(asset_.name, materials.formulation, *stiffness_, report_.warnings);
+  log::info(fmt::format("{}: the mesh is not compared with quadratic tets: that takes at most {} tets", asset_.name,
+                        kMostComparedTets));
 }
 
 // One more than is asked for must be there, to see that none was missed.
@@ -386,7 +394,7 @@ void Pipeline::read() {
 
 ReducedModel Pipeline::run() {
   read();
-  choose_variance();
+  compare_with_quadratic_tets();
   ReducedModel model;
   model.render = std::move(render_);
   model.asset_name = asset_.name;

@@ -99,6 +99,11 @@ void add_model(const ReducedModel& model, Json& json) {
                    {"modes", model.modal->basis.cols()},
                    {"cubature_elements", model.cubature->elements.size()},
                    {"eigenfunctions", model.shape_space ? model.shape_space->eigenvalues.size() : 0}};
+  if (model.object->stiffness_ratio > 0)
+    json["mesh_stiffness"] = {{"formulation", name_of(model.object->materials.formulation)},
+                              {"ratio", model.object->stiffness_ratio},
+                              {"worst", model.object->worst_stiffness},
+                              {"thin_share", model.object->thin_share}};
   json["examples"] = examples_of(model);
   json["cubature"] = {{"method", name_of(model.cubature->method)},
                       {"internal_force", name_of(model.cubature->internal_force)},

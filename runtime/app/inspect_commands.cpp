@@ -38,6 +38,10 @@ void info_command(const std::filesystem::path& bundle) {
   fmt::print("modes          {}\n", summary.modes);
   fmt::print("cubature       {} elements\n", summary.cubature_elements);
   if (model.object) fmt::print("material       {}\n", name_of(model.object->materials.model));
+  if (model.object && model.object->stiffness_ratio > 0)
+    fmt::print("elements       {}, {:.2f} times as stiff as the material, {:.2f} at worst; {:.0f} % one tet thick\n",
+               name_of(model.object->materials.formulation), model.object->stiffness_ratio,
+               model.object->worst_stiffness, 100 * model.object->thin_share);
   if (model.modal && model.modal->frequencies.size() > 0)
     fmt::print("frequencies    {:.4g} to {:.4g} Hz ({} linear modes)\n", model.modal->frequencies.minCoeff(),
                model.modal->frequencies.maxCoeff(), model.modal->frequencies.size());

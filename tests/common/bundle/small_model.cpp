@@ -31,6 +31,9 @@ ObjectData small_object(bool constrained) {
   object.materials.youngs_modulus = numbers(kTets, 1, 1e5);
   object.materials.poisson_ratio = numbers(kTets, 1, 0.3);
   object.materials.model = MaterialModel::kCorotational;
+  object.stiffness_ratio = 1.25;
+  object.worst_stiffness = 1.5;
+  object.thin_share = 0.125;
   return object;
 }
 
