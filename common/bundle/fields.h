@@ -78,6 +78,10 @@ void visit_example(const FieldPlace& place, Example& example, Visitor& visit) {
   visit.attribute("surface_iterations", example.surface_iterations);
   visit.attribute("shape_space_error", example.shape_space_error);
   visit.attribute("basis_error", example.basis_error);
+  visit.attribute("best_error", example.best_error);
+  visit.attribute("settled_error", example.settled_error);
+  visit.attribute("settled_distance", example.settled_distance);
+  visit.attribute("settled_vertex", example.settled_vertex);
   visit.dataset("descriptor", example.descriptor);
   visit.dataset("reduced", example.reduced);
   visit.dataset("pose", example.pose);
@@ -143,6 +147,8 @@ void visit_targets(const FieldPlace& place, Targets& targets, Visitor& visit) {
   visit.attribute("error", targets.error);
   visit.attribute("energy_reference", targets.energy_reference);
   visit.attribute("is_pull", targets.is_pull);
+  visit.attribute("compensated_stiffness", targets.compensated_stiffness);
+  visit.attribute("compensated_gravity", targets.compensated_gravity);
   visit.dataset("exponents", targets.exponents);
   visit.dataset("control_points", targets.control_points);
   visit.dataset("knots", targets.knots);

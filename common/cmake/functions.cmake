@@ -2,7 +2,8 @@
 add_library(exmat_flags INTERFACE)
 target_compile_options(exmat_flags INTERFACE
   $<$<CXX_COMPILER_ID:GNU,Clang,AppleClang>:-Wall;-Wextra;-Wpedantic;-Wshadow;-Wconversion;-Wno-sign-conversion>
-  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>)  # false alarms of GCC 12 on string concatenation (bug 105329)
+  # False alarms of GCC 12: on string concatenation (bug 105329), and of a unity build on sources as if they were headers.
+  $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-subobject-linkage>)
 if(EXMAT_SANITIZE)
   target_compile_options(exmat_flags INTERFACE -fsanitize=${EXMAT_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   target_link_options(exmat_flags INTERFACE -fsanitize=${EXMAT_SANITIZE})
@@ -11,11 +12,26 @@ if(EXMAT_SANITIZE)
   endif()
 endif()
 
+# exmat_unity(NAME): in a unity build (CMAKE_UNITY_BUILD) the sources of a folder are one unit, so that local names have to
+# differ within a folder alone.
+function(exmat_unity name)
+  get_target_property(sources ${name} SOURCES)
+  foreach(source IN LISTS sources)
+    cmake_path(ABSOLUTE_PATH source BASE_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR})
+    cmake_path(GET source PARENT_PATH folder)
+    cmake_path(RELATIVE_PATH folder BASE_DIRECTORY ${exmat_SOURCE_DIR})
+    string(MAKE_C_IDENTIFIER ${folder} group)
+    set_source_files_properties(${source} PROPERTIES UNITY_GROUP ${group})
+  endforeach()
+  set_target_properties(${name} PROPERTIES UNITY_BUILD_MODE GROUP)
+endfunction()
+
 # exmat_target(NAME): what all targets have in common. Without the extensions of GNU products are not contracted.
 function(exmat_target name)
   target_compile_features(${name} PRIVATE cxx_std_20)
   set_target_properties(${name} PROPERTIES CXX_EXTENSIONS OFF)
   target_link_libraries(${name} PRIVATE $<BUILD_INTERFACE:exmat_flags>)
+  exmat_unity(${name})
   if(exmat_IS_TOP_LEVEL OR NOT CMAKE_RUNTIME_OUTPUT_DIRECTORY)
     set_target_properties(${name} PROPERTIES RUNTIME_OUTPUT_DIRECTORY ${exmat_BINARY_DIR}/bin)
   endif()

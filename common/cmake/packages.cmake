@@ -3,7 +3,7 @@
 include(common/cmake/man_pages.cmake)
 exmat_man_pages(exmat-runtime runtime run bench export info validate)
 if(EXMAT_BUILD_PRECOMPUTE)
-  exmat_man_pages(exmat-precompute precompute bundle check mesh study full-space)
+  exmat_man_pages(exmat-precompute precompute new bundle check mesh study full-space)
 endif()
 if(EXMAT_BUILD_VIEWER)
   exmat_man_pages(exmat-viewer viewer)

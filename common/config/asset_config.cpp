@@ -119,6 +119,7 @@ class AssetReader {
   static void read_shape_space(const Json& json, AssetConfig& asset) {
     const Json shape_space = member_or(json, "shape_space", Json::object());
     asset.eigenfunctions = shape_space.value("eigenfunctions", asset.eigenfunctions);
+    asset.pose_tolerance = optional_member<double>(shape_space, "tolerance");
     asset.weighting = choice_or(shape_space, "weighting", asset.weighting);
   }
 

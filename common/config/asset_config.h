@@ -161,7 +161,8 @@ struct AssetConfig {
   std::vector<ExampleConfig> examples;
   std::vector<RegionConfig> regions;
 
-  int eigenfunctions = 20;  ///< m
+  int eigenfunctions = 20;               ///< m, with a tolerance the least
+  std::optional<double> pose_tolerance;  ///< share of a pose that eigenfunctions may lose; more are taken
   Weighting weighting = Weighting::kEigenvalue;
   AlignmentConfig alignment;
 

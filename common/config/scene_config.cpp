@@ -25,6 +25,11 @@ ExampleForceConfig read_example_force(const Json& json, const std::filesystem::p
   config.target = choice_or(json, "target", config.target);
   config.target_iterations = json.value("target_iterations", config.target_iterations);
   config.energy_reference = choice_or(json, "energy_reference", config.energy_reference);
+  config.compensate = json.value("compensate", config.compensate);
+  if (config.compensate && (config.law == ExampleForceLaw::kElastic || config.target == TargetSource::kSolve))
+    throw InputError({file.string(), place + "/compensate", "a linear force with a table of targets",
+                      config.law == ExampleForceLaw::kElastic ? "an elastic force" : "targets that are solved for",
+                      "leave force and target out"});
   return config;
 }
 

@@ -50,6 +50,7 @@ struct ExampleForceConfig {
   TargetSource target = TargetSource::kAuto;
   int target_iterations = 4;  ///< most Newton iterations of `solve` in one step; the next step carries on
   EnergyReference energy_reference = EnergyReference::kExample;
+  bool compensate = false;  ///< the bundle's targets make up for elasticity and gravity, of the whole body's examples
   std::optional<Eigen::VectorXd> weights{};  ///< [K] in place of those of the shape
   ExampleKeysConfig keys{};
 };

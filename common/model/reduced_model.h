@@ -52,9 +52,13 @@ struct ExampleData {
   std::int64_t surface_iterations = 0;           ///< that this pose took
   double shape_space_error = 0;  ///< share of its displacement that the m functions lose, relative M-norm
   double basis_error = 0;        ///< share of its transferred displacement that U loses, relative M-norm
-  RowMatrix descriptor;          ///< m x 3
-  Eigen::VectorXd reduced;       ///< r, T^+ (e_k - e_0)
-  Eigen::VectorXd pose;          ///< r, p_k: the same with the fixed vertices of a clamped body put back
+  double best_error = 0;         ///< of the body settled under an example force of any strength, relative M-norm
+  double settled_error = 0;      ///< of the body settled under the scene's, where the bundle is of one; else best_error
+  double settled_distance = 0;   ///< largest of a vertex then [m]
+  std::int64_t settled_vertex = 0;  ///< which
+  RowMatrix descriptor;             ///< m x 3
+  Eigen::VectorXd reduced;          ///< r, T^+ (e_k - e_0)
+  Eigen::VectorXd pose;             ///< r, p_k: the same with the fixed vertices of a clamped body put back
 };
 
 /// Group /examples and the weights problem min 1/2 w^T G w - (h0 + hq q)^T w on the simplex. docs/step_in_detail.md,
@@ -115,6 +119,9 @@ struct TargetTableData {
   /// Control points are of the pull g(w) = U^T P p*(w), p* minimised over all tets and P the filter of the example
   /// force; before format 7 of p*(w) minimised in the modal basis.
   bool is_pull = false;
+  /// The body settles in its examples' poses where kappa [1/s^2] and gravity [m/s^2] are these; 0: not looked after.
+  double compensated_stiffness = 0;
+  Eigen::Vector3d compensated_gravity = Eigen::Vector3d::Zero();
 };
 
 /// Group /target_space: the same targets to be solved for, in d displacements of their own that hold them all.

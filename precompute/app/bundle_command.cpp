@@ -43,10 +43,12 @@ void print_ledger(const std::vector<LedgerEntry>& ledger) {
 }
 
 void print_examples(const std::string& title, const ExampleSet& set) {
-  fmt::print("\n{:<20}{:<18}{:>8}{:>16}{:>14}\n", title, "method", "doubt", "lost by m [%]", "by basis [%]");
+  fmt::print("\n{:<20}{:<18}{:>8}{:>16}{:>14}{:>14}{:>14}\n", title, "method", "doubt", "lost by m [%]", "by basis [%]",
+             "at best [%]", "settled [%]");
   for (const auto& example : set.examples)
-    fmt::print("{:<20}{:<18}{:>8.3f}{:>16.2f}{:>14.2f}\n", example.name, example.method, example.doubt,
-               100 * example.shape_space_error, 100 * example.basis_error);
+    fmt::print("{:<20}{:<18}{:>8.3f}{:>16.2f}{:>14.2f}{:>14.2f}{:>14.2f}\n", example.name, example.method,
+               example.doubt, 100 * example.shape_space_error, 100 * example.basis_error, 100 * example.best_error,
+               100 * example.settled_error);
   for (const auto& example : set.examples)
     if (example.surface_iterations > 0)
       fmt::print("{}: its surface is missed by {:.3g} % of the diagonal (RMS), {:.3g} % at most\n", example.name,

@@ -10,6 +10,7 @@
 #include "precompute/app/bundle_command.h"
 #include "precompute/app/full_space_command.h"
 #include "precompute/app/mesh_command.h"
+#include "precompute/app/new_command.h"
 #include "precompute/app/solver_options.h"
 #include "precompute/app/study_command.h"
 #include "precompute/examples/alignment_report.h"
@@ -95,6 +96,15 @@ CLI::App& add_mesh(CLI::App& app, MeshCommandOptions& options) {
   return command;
 }
 
+CLI::App& add_new(CLI::App& app, NewCommandOptions& options) {
+  CLI::App& command =
+      *app.add_subcommand("new", "write an asset and a scene to begin with for a surface and its poses");
+  command.add_option("SURFACE", options.surface, "surface with its poses as morph targets (.glb, .gltf), or without")
+      ->required();
+  command.add_option("-o,--output", options.folder, "folder to write into; absent: one of the surface's name");
+  return command;
+}
+
 CLI::App& add_study(CLI::App& app, StudyCommandOptions& options) {
   CLI::App& command = *app.add_subcommand(
       "study", "measure a scene's error against run time over sweeps of settings, by the full space");
@@ -155,11 +165,12 @@ int run(std::vector<char*> words) {
   BundleOptions bundle_options;
   CheckOptions check_options;
   MeshCommandOptions mesh_options;
+  NewCommandOptions new_options;
   StudyCommandOptions study_options;
   FullSpaceCommandOptions full_space_options;
   const CLI::App &bundle = add_bundle(app, bundle_options), &asset_check = add_check(app, check_options),
-                 &mesh = add_mesh(app, mesh_options), &study = add_study(app, study_options),
-                 &full_space = add_full_space(app, full_space_options);
+                 &mesh = add_mesh(app, mesh_options), &begin = add_new(app, new_options),
+                 &study = add_study(app, study_options), &full_space = add_full_space(app, full_space_options);
   return run_program(app, static_cast<int>(words.size()), words.data(), [&] {
     apply(common);
     precompute::configure_solvers(solvers);
@@ -167,6 +178,7 @@ int run(std::vector<char*> words) {
     if (bundle.parsed()) bundle_command(bundle_options);
     if (asset_check.parsed()) check(check_options);
     if (mesh.parsed()) mesh_command(mesh_options);
+    if (begin.parsed()) new_command(new_options);
     if (full_space.parsed()) full_space_command(full_space_options);
     if (study.parsed()) study_options.scene.empty() ? study_command(study_options) : stability_command(study_options);
   });

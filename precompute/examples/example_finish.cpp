@@ -3,48 +3,19 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <optional>
 #include <utility>
 
 #include "common/core/log.h"
+#include "precompute/examples/function_counter.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/region_poses.h"
 #include "precompute/shape_space/region_window.h"
-#include "precompute/solvers/eigenpairs.h"
 
 namespace exmat::precompute {
 namespace {
 
 // A share of an example's displacement lost to truncation that is worth a warning.
 constexpr double kTruncationWarning = 0.25;
-// Functions of the object looked through for how many would carry a pose.
-constexpr Eigen::Index kMostFunctions = 100;
-
-// The least number of the object's functions, no cluster cut, that loses at most the share worth a warning of a
-// displacement [3n]; 0 where kMostFunctions do not do.
-class FunctionCounter {
- public:
-  FunctionCounter(const TetMesh& mesh, const std::string& name) : mesh_(mesh), name_(name) {}
-
-  Eigen::Index needed(const Eigen::VectorXd& field) {
-    if (!basis_) basis_ = laplace_basis(mesh_, std::min(kMostFunctions, mesh_.vertex_count() - 2), name_);
-    const VertexArray displacement = field.reshaped<Eigen::RowMajor>(field.size() / 3, 3);
-    const double whole = (displacement.transpose() * (basis_->mass * displacement)).trace();
-    const Eigen::VectorXd shares = coefficients(*basis_, displacement).rowwise().squaredNorm() / whole;
-    double carried = 0;
-    for (Eigen::Index count = 1; count < shares.size(); ++count) {
-      carried += shares[count - 1];
-      if (1 - carried <= kTruncationWarning * kTruncationWarning && !splits_cluster(basis_->eigenvalues, count))
-        return count;
-    }
-    return 0;
-  }
-
- private:
-  const TetMesh& mesh_;
-  const std::string& name_;
-  std::optional<LaplaceBasis> basis_;
-};
 
 // [3m x (K-1)] changes of descriptor from the rest pose to the others.
 Eigen::MatrixXd changes_from_rest(const ExampleSet& set) {
@@ -58,21 +29,22 @@ std::string advice_on_loss(const ExampleData& example, Eigen::Index functions, E
                        100 * kTruncationWarning);
   if (needed > 0 && example.method == "coupled")
     return "coupled bases do, not the functions: give more landmarks or regions, or take alignment.method \"auto\"";
-  return fmt::format("the first {} do not carry it", kMostFunctions);
+  return fmt::format("the first {} do not carry it", kMostEigenfunctions);
 }
 
-void log_group(const ExampleGroup& group, const AssetConfig& asset, FunctionCounter& counter, const ExampleSet& set,
+void log_group(const ExampleGroup& group, FunctionCounter& counter, const ExampleSet& set,
                std::vector<std::string>& warnings) {
   const std::string where = group.region.empty() ? "" : fmt::format(" in region {}", group.region);
   for (Eigen::Index k = 0; k < group.fields.cols(); ++k) {
     const ExampleData& example = set.examples[static_cast<std::size_t>(k + 1)];
     log::info(fmt::format(
         "example {}{}: the {} eigenfunctions lose {:.1f} % of its displacement, the basis {:.1f} % of the rest",
-        example.name, where, asset.eigenfunctions, 100 * example.shape_space_error, 100 * example.basis_error));
+        example.name, where, example.descriptor.rows(), 100 * example.shape_space_error, 100 * example.basis_error));
     if (example.shape_space_error <= kTruncationWarning) continue;
     warn(warnings, fmt::format("example {}{}: {} eigenfunctions lose {:.0f} % of its displacement; {}", example.name,
-                               where, asset.eigenfunctions, 100 * example.shape_space_error,
-                               advice_on_loss(example, asset.eigenfunctions, counter.needed(group.fields.col(k)))));
+                               where, example.descriptor.rows(), 100 * example.shape_space_error,
+                               advice_on_loss(example, example.descriptor.rows(),
+                                              counter.needed(group.fields.col(k), kTruncationWarning))));
   }
 }
 
@@ -120,6 +92,23 @@ Eigen::MatrixXd PoseFitter::fields() const {
     fields.rightCols(more.cols()) = more;
   }
   return fields;
+}
+
+PoseFitter::PoseFields PoseFitter::pose_fields(Eigen::Index index, Eigen::Index k) const {
+  const auto group = static_cast<std::size_t>(index);
+  const Eigen::VectorXd clamped = system_.extend(fields_[group].col(k - 1));
+  const ExampleGroup& examples = stage_.groups[group];
+  if (!examples.region.empty()) return {examples.fields.col(k - 1), seen(index, clamped), seen(index, clamped)};
+  Eigen::MatrixXd given = examples.fields.col(k - 1);
+  hold_fixed_mean(object_.fixed, given);
+  return {given,
+          carried_fields(stage_.object, stage_.weights, object_.fixed, changes_from_rest(examples.examples).col(k - 1)),
+          clamped};
+}
+
+RowMatrix PoseFitter::seen(Eigen::Index group, const RowMatrix& displacements) const {
+  const auto& view = stage_.groups[static_cast<std::size_t>(group)].view;
+  return view ? RowMatrix(view->see(displacements)) : displacements;
 }
 
 PoseCoordinates PoseFitter::range(Eigen::Index index) const {
@@ -199,7 +188,7 @@ void PoseFitter::log_losses(const ReducedModel& model, std::vector<std::string>&
   FunctionCounter counter(model.object->mesh, asset_.name);
   auto region = model.regions.begin();
   for (const ExampleGroup& group : stage_.groups)
-    log_group(group, asset_, counter, group.region.empty() ? *model.examples : (region++)->examples, warnings);
+    log_group(group, counter, group.region.empty() ? *model.examples : (region++)->examples, warnings);
 }
 
 }  // namespace exmat::precompute

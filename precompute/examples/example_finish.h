@@ -41,6 +41,16 @@ class PoseFitter {
   /// basis.
   void put(const std::vector<TargetSpace>& targets, ReducedModel& model) const;
 
+  /// A pose of a group, k > 0, as its stages leave it: displacements [3n] of the object, as a region sees them.
+  struct PoseFields {
+    Eigen::VectorXd given;    ///< as it came, about the mean of the fixed vertices
+    Eigen::VectorXd carried;  ///< what the m functions hold of it
+    Eigen::VectorXd clamped;  ///< and with the fixed vertices put back
+  };
+  PoseFields pose_fields(Eigen::Index group, Eigen::Index k) const;
+  /// What a group sees of the displacements [3n x k].
+  RowMatrix seen(Eigen::Index group, const RowMatrix& displacements) const;
+
   /// Logs what of each example of a model is lost, and records what is worth a warning.
   void log_losses(const ReducedModel& model, std::vector<std::string>& warnings) const;
 

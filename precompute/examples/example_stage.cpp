@@ -10,6 +10,7 @@
 #include "common/core/log.h"
 #include "common/mesh/geometry.h"
 #include "precompute/examples/example_alignment.h"
+#include "precompute/examples/function_counter.h"
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/solvers/eigenpairs.h"
@@ -22,6 +23,8 @@ constexpr Eigen::Index kExtraEigenfunctions = 4;
 // A displacement, over the object's size, that is none: numbers written with few digits have as much. Two
 // tessellations of one body have more.
 constexpr double kNoPose = 1e-4, kNoRegisteredPose = 0.01;
+// What a pose moves fixed vertices by, over the object's size, that is worth a warning.
+constexpr double kMovedClamp = 0.005;
 // A turn that is worth words [rad].
 constexpr double kTurned = 0.02;
 
@@ -50,8 +53,11 @@ class ShapeStageBuilder {
   void add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred,
                 ExampleGroup& group) const;
   ExampleData example_data(const AlignmentOutcome& outcome, double scale, const ExampleGroup& group) const;
+  void warn_of_clamp(const std::string& name, const VertexArray& displacement);
   void report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred);
   void add_groups(const AlignedRest& rest);
+  void add_poses(const AlignedRest& rest, const std::vector<AlignedPose>& poses);
+  Eigen::Index functions_needed(const std::vector<AlignedPose>& poses) const;
   PoseFrame region_frame(const AlignedRest& rest, const RegionView& view) const;
   Eigen::VectorXd share_of_region(const AlignedRest& rest, const RegionInput& input) const;
   void cut(const RegionView& view, const Eigen::VectorXd& share, TransferredPose& pose) const;
@@ -62,13 +68,14 @@ class ShapeStageBuilder {
   const ExampleInput& input_;
   StageCache& cache_;
   std::vector<std::string>& warnings_;
-  double rest_scale_ = 1;  // from the rest example's unit of length to the object's
+  Eigen::Index functions_ = asset_.eigenfunctions;  // m
+  double rest_scale_ = 1;                           // from the rest example's unit of length to the object's
   ShapeStage stage_;
 };
 
 // Leaves the first m functions in the stage and returns the eigenvalues of a few more.
 Eigen::VectorXd ShapeStageBuilder::object_basis() {
-  const Eigen::Index m = asset_.eigenfunctions;
+  const Eigen::Index m = functions_;
   const Eigen::Index available = object_.mesh.vertex_count() - 2;
   if (m >= available)
     throw InputError({"", "/shape_space/eigenfunctions",
@@ -84,7 +91,7 @@ Eigen::VectorXd ShapeStageBuilder::object_basis() {
 }
 
 void ShapeStageBuilder::set_shape_data(const Eigen::VectorXd& eigenvalues) {
-  const Eigen::Index m = asset_.eigenfunctions;
+  const Eigen::Index m = functions_;
   const LaplaceBasis& object = stage_.object;
   stage_.weights = descriptor_weights(object, asset_.weighting);
   stage_.rest_coefficients = coefficients(object, object.vertices);
@@ -143,12 +150,31 @@ TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const Align
 void ShapeStageBuilder::report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred) {
   if (!pose.scale.note.empty()) log::info(fmt::format("example {}: {}", name, pose.scale.note));
   if (!pose.scale.warning.empty()) warn(warnings_, fmt::format("example {}: {}", name, pose.scale.warning));
+  warn_of_clamp(name, transferred.displacement);
   const double share = transferred.displacement.norm() / stage_.object.vertices.norm();
   if (pose.outcome.method == "same_connectivity" || share > kNoRegisteredPose) return;
   warn(warnings_,
        fmt::format("example {}: it differs by {:.2g} % of the body's size from {}, no more than two meshes of "
                    "one body do; leave it out, or pose the rest example's own mesh",
                    name, 100 * share, rest_pose_text(transferred.rotation)));
+}
+
+// `displacement` is that of the normalised object.
+void ShapeStageBuilder::warn_of_clamp(const std::string& name, const VertexArray& displacement) {
+  if (!object_.fixed.any()) return;
+  Eigen::MatrixXd field = displacement.reshaped<Eigen::RowMajor>();
+  hold_fixed_mean(object_.fixed, field);
+  const Eigen::VectorXd distances = field.reshaped<Eigen::RowMajor>(displacement.rows(), 3).rowwise().norm();
+  const Eigen::VectorXd moved = object_.fixed.cast<double>().cwiseProduct(distances);
+  Eigen::Index vertex = 0;
+  const double farthest = std::cbrt(stage_.object.volume) * moved.maxCoeff(&vertex);
+  const double size = bounding_box_diagonal(object_.mesh.vertices);
+  if (farthest <= kMovedClamp * size) return;
+  warn(warnings_,
+       fmt::format("example {}: the pose moves fixed vertices by up to {:.3g} m ({:.1f} % of the body's size, "
+                   "vertex {}), where the body cannot follow; leave them at rest in the pose, or out of "
+                   "object.fixed",
+                   name, farthest, 100 * farthest / size, vertex));
 }
 
 void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred,
@@ -210,13 +236,30 @@ void ShapeStageBuilder::add_examples() {
   rest_scale_ = std::cbrt(stage_.object.volume / rest.basis.volume);
   const std::string remark = remark_on_rest_scale(rest.basis.volume, stage_.object.volume);
   if (!remark.empty()) warn(warnings_, fmt::format("rest example {}: {}", rest.outcome.name, remark));
-  stage_.alignments.push_back(rest.outcome);
+  std::vector<AlignedPose> poses;
+  for (const PoseInput& input : input_.poses) poses.push_back(aligner.align_pose(rest, input));
+  add_poses(rest, poses);
+  if (const Eigen::Index needed = functions_needed(poses); needed > functions_) {
+    functions_ = needed;
+    set_shape_data(object_basis());
+    add_poses(rest, poses);
+  }
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    report(input_.poses[i].name, poses[i],
+           transfer(rest, poses[i], {rest.free_poses, fit_weights(), object_.fixed.any()}));
+}
+
+// The groups of the stage, by its m functions.
+void ShapeStageBuilder::add_poses(const AlignedRest& rest, const std::vector<AlignedPose>& poses) {
+  stage_.groups.clear();
+  stage_.poses.clear();
+  stage_.alignments.assign(1, rest.outcome);
   add_groups(rest);
   const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
-  for (const PoseInput& input : input_.poses) {
-    const AlignedPose pose = aligner.align_pose(rest, input);
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    const PoseInput& input = input_.poses[p];
+    const AlignedPose& pose = poses[p];
     const TransferredPose whole = transfer(rest, pose, frame);
-    report(input.name, pose, whole);
     stage_.poses.push_back({whole.rotation, rest_scale_ / pose.scale.unit, carried_displacement(whole)});
     stage_.alignments.push_back(pose.outcome);
     stage_.alignments.back().shape_space_error = whole.shape_space_error;
@@ -230,6 +273,24 @@ void ShapeStageBuilder::add_examples() {
       add_pose(input, pose, local, group);
     }
   }
+}
+
+// How many functions lose no more of any pose than the asset tolerates. Those that coupled bases carry are left out:
+// they are known by the functions that were coupled.
+Eigen::Index ShapeStageBuilder::functions_needed(const std::vector<AlignedPose>& poses) const {
+  const auto is_carried = [](const AlignedPose& pose) { return pose.carried.has_value(); };
+  if (!asset_.pose_tolerance || std::ranges::any_of(poses, is_carried)) return functions_;
+  FunctionCounter counter(object_.mesh, asset_.name);
+  const Eigen::Index most = std::min(kMostEigenfunctions, object_.mesh.vertex_count() - 2 - kExtraEigenfunctions);
+  Eigen::Index needed = functions_;
+  for (const ExampleGroup& group : stage_.groups)
+    for (const auto& field : group.fields.colwise()) {
+      const Eigen::Index count = counter.needed(field, *asset_.pose_tolerance);
+      needed = std::max(needed, count > 0 ? std::min(count, most) : most);
+    }
+  log::info(fmt::format("eigenfunctions: {}, so that each loses at most {:.1f} % of a pose, where {} do", needed,
+                        100 * *asset_.pose_tolerance, most));
+  return needed;
 }
 
 VertexArray ShapeStageBuilder::carried_displacement(const TransferredPose& pose) const {

@@ -19,6 +19,9 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
                         "no given weights: the full-space reference takes those of the shape", "some", ""});
   };
   if (config.examples) require_no_weights("/examples", *config.examples);
+  if (config.examples && config.examples->compensate)
+    throw InputError({file, "/examples/compensate", "false: targets of the full-space reference are not compensated",
+                      "true", "compare with a bundle made without it"});
   for (std::size_t i = 0; i < config.regions.size(); ++i)
     require_no_weights("/regions/" + std::to_string(i), config.regions[i].force);
   if (!config.body.motion.empty())

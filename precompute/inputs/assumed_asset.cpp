@@ -86,7 +86,7 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                     {"youngs_modulus", assumed_modulus(file.mesh.vertices, surface)},
                     {"poisson_ratio", 0.4},
                     {"density", kDensity}}}}},
-                {"shape_space", {{"eigenfunctions", 20}}},
+                {"shape_space", {{"tolerance", 0.02}}},
                 {"basis", {{"size", 30}}},
                 {"cubature", {{"elements", 60}}},
                 {"seed", 1}};

@@ -9,7 +9,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kGravity = 9.81;  // [m/s^2]
+constexpr double kUsualGravity = 9.81;  // [m/s^2]
 
 }  // namespace
 
@@ -18,7 +18,7 @@ std::string remark_on_size(const TetMesh& mesh, const TetMaterials& materials) {
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   const double density = materials.density.dot(volumes) / volumes.sum(),
                modulus = materials.youngs_modulus.dot(volumes) / volumes.sum();
-  const double strain = density * kGravity * length / modulus;
+  const double strain = density * kUsualGravity * length / modulus;
   const std::string advice =
       "are its numbers millimetres or centimetres? Then say so by object.unit of the asset, \"mm\" or \"cm\" "
       "(--write-asset FILE writes the asset of a surface); they are read as metres, its material as kg/m^3 and Pa";

@@ -10,7 +10,7 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr std::string_view kMagic("POINTCACHE2\0", 12);
+constexpr std::string_view kCacheMagic("POINTCACHE2\0", 12);
 constexpr std::size_t kPointBytes = 3 * sizeof(float);
 
 struct CacheHeader {
@@ -18,8 +18,8 @@ struct CacheHeader {
 };
 
 CacheHeader read_header(ValueCursor& cursor) {
-  if (const auto magic = cursor.read_bytes(kMagic.size(), "the first bytes of a point cache, 'POINTCACHE2'");
-      magic != kMagic)
+  if (const auto magic = cursor.read_bytes(kCacheMagic.size(), "the first bytes of a point cache, 'POINTCACHE2'");
+      magic != kCacheMagic)
     cursor.fail("the first bytes of a point cache, 'POINTCACHE2'", quote(magic), "is this a .pc2 file?");
   if (const auto version = cursor.read_int("the version"); version != 1)
     cursor.fail("version 1", std::to_string(version));

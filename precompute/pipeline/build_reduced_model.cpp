@@ -24,6 +24,7 @@
 #include "precompute/pipeline/basis_stage.h"
 #include "precompute/pipeline/cubature_stage.h"
 #include "precompute/pipeline/modal_training.h"
+#include "precompute/pipeline/settled_poses.h"
 #include "precompute/pipeline/target_elasticity_stage.h"
 #include "precompute/polynomial/internal_force.h"
 #include "precompute/polynomial/reduced_polynomial.h"
@@ -109,7 +110,7 @@ class Pipeline {
   std::vector<TargetSpace> target_spaces(const ElasticSystem& system, const PoseFitter& fitter);
   std::optional<PlannedTraining> plan(const TrainingInput& input, const SemidefiniteSolver& solver, ReducedModel& body);
   std::optional<Motions> train(const BodyStages& stages, const PlannedTraining& planned, const ReducedModel& body);
-  std::string training_text() const;
+  std::string loads_text() const;
   void require_vertices(const TrainingLoads& loads) const;
   void add_internal_force(ReducedModel& model);
   std::vector<bool> elastic_groups(const PoseFitter& fitter) const;
@@ -119,6 +120,7 @@ class Pipeline {
             asset_.seed};
   }
   void add_contact(ReducedModel& model);
+  void settle_examples(const BodyStages& stages, ReducedModel& model);
   void add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice, ReducedModel& model);
 
   const AssetConfig& asset_;
@@ -251,13 +253,13 @@ void Pipeline::add_target_elasticity(const BodyStages& stages, const PoseSource&
   put_target_elasticity(stages, choose, model);
 }
 
-// A scene is an input where its loads are trained on.
-std::string Pipeline::training_text() const {
-  const bool of_scene = asset_.training.from == Training::kAuto || asset_.training.from == Training::kScene;
-  if (!of_scene || options_.scene == nullptr) return "";
+// The scene's loads are an input: bodies are trained on them and settled under them.
+std::string Pipeline::loads_text() const {
+  if (options_.scene == nullptr) return "";
   TrainingBody body{.free = !object_.fixed.any(), .size = 1, .angular_frequency = 1, .groups = {""}};
   for (const RegionConfig& region : asset_.regions) body.groups.push_back(region.name);
-  return text_of(scene_loads(*options_.scene, body));
+  const bool compensate = options_.scene->examples && options_.scene->examples->compensate;
+  return text_of(scene_loads(*options_.scene, body)) + (compensate ? "compensated\n" : "");
 }
 
 void Pipeline::require_vertices(const TrainingLoads& loads) const {
@@ -373,6 +375,26 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
                         found.heldout_runs, 100 * found.modal_error, found.advice));
 }
 
+void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
+  std::optional<SettlingLoad> load;
+  if (options_.scene != nullptr) {
+    TrainingBody body{.free = !stages.system.constrained(), .size = 1, .angular_frequency = 1};
+    for (Eigen::Index group = 0; group < stages.fitter->groups(); ++group)
+      body.groups.push_back(stages.fitter->region(group));
+    const TrainingLoads loads = scene_loads(*options_.scene, body);
+    load = {options_.scene->file.string(), loads.examples, loads.gravity,
+            options_.scene->examples && options_.scene->examples->compensate};
+  }
+  const auto found = timed("settled poses", [&] { return precompute::settle_examples(stages, load, model); });
+  for (const SettledPose& pose : found) {
+    const std::string text = fmt::format("example {}", to_string(pose, model));
+    if (pose.settles && pose.error() <= kFarFromPose)
+      log::info(text);
+    else
+      warn(report_.warnings, text);
+  }
+}
+
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
 
 void Pipeline::read() {
@@ -389,7 +411,7 @@ void Pipeline::read() {
 
   if (includes(report_.ledger, "render"))
     render_ = timed("render mesh", [&] { return read_render_mesh(asset_, object_, report_.inputs, report_.warnings); });
-  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_) + training_text());
+  report_.input_sha256 = hash_inputs(report_.inputs, generator() + "\n" + text_of(needs_) + loads_text());
 }
 
 ReducedModel Pipeline::run() {
@@ -479,6 +501,7 @@ ReducedModel Pipeline::run() {
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
   add_contact(model);
   if (motions) add_fidelity(stages, *motions, choice, model);
+  if (fitter) settle_examples(stages, model);
   return model;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/mesh/elements.h"
 #include "common/mesh/geometry.h"
 #include "precompute/contact/contact_vertices.h"
 #include "precompute/cubature/cubature.h"
@@ -82,7 +83,7 @@ ManyModes many_modes(const BodyStages& stages, const ReducedModel& body, const E
   const Eigen::MatrixXd basis = modal_basis(input, static_cast<int>(std::min(kModes, most)));
   put_basis(stages, basis, model);
   CubatureOptions options;
-  options.elements = static_cast<int>(std::min(kElements, object.mesh.tet_count()));
+  options.elements = static_cast<int>(std::min(kElements, elements_of(object.mesh, object.materials).count()));
   options.training_poses = kPoses;
   options.seed = seed;
   options.measured = false;

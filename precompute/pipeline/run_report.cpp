@@ -73,7 +73,11 @@ void add_examples(const std::string& region, const ExampleSet& set, Json& exampl
                         {"inverted_fraction", example.inverted_fraction},
                         {"competing_maps", example.competing_maps},
                         {"shape_space_error", example.shape_space_error},
-                        {"basis_error", example.basis_error}});
+                        {"basis_error", example.basis_error},
+                        {"best_error", example.best_error},
+                        {"settled_error", example.settled_error},
+                        {"settled_distance", example.settled_distance},
+                        {"settled_vertex", example.settled_vertex}});
 }
 
 Json examples_of(const ReducedModel& model) {

@@ -22,7 +22,7 @@ namespace {
 constexpr double kIterationTolerance = 1e-12;
 // Of the right-hand side as given: what is left of one along the null space is rounding.
 constexpr double kRounding = 1e-14;
-constexpr PetscInt kMostIterations = 2000;
+constexpr PetscInt kMostKrylovIterations = 2000;
 // Share of the mean of the diagonal that the matrix which multigrid is made for is shifted by, where K has null
 // vectors.
 constexpr double kShift = 1e-6;
@@ -240,8 +240,9 @@ void SolverShare::set_up_multigrid(const SparseMatrix& whole, const Eigen::Matri
   check_petsc(KSPSetOperators(iteration.get(), matrix.get(), made_for), "linear solver");
   check_petsc(KSPSetType(iteration.get(), KSPCG), "linear solver");
   check_petsc(KSPSetNormType(iteration.get(), KSP_NORM_UNPRECONDITIONED), "linear solver");
-  check_petsc(KSPSetTolerances(iteration.get(), kIterationTolerance, PETSC_DEFAULT, PETSC_DEFAULT, kMostIterations),
-              "linear solver");
+  check_petsc(
+      KSPSetTolerances(iteration.get(), kIterationTolerance, PETSC_DEFAULT, PETSC_DEFAULT, kMostKrylovIterations),
+      "linear solver");
   check_petsc(KSPGetPC(iteration.get(), &multigrid), "multigrid");
   check_petsc(PCSetType(multigrid, PCGAMG), "multigrid");
   check_petsc(KSPSetOptionsPrefix(iteration.get(), "st_"), "linear solver");

@@ -26,7 +26,7 @@ constexpr double kSubtree = 1.0 / 32;  // of all work: larger subtrees are not o
 constexpr double kLittleWork = 1e7;    // operations: threads that wait for each other cost more
 constexpr float kZero = 0, kOne = 1, kMinusOne = -1;
 
-std::size_t at(Index i) { return static_cast<std::size_t>(i); }
+std::size_t index_of(Index i) { return static_cast<std::size_t>(i); }
 
 // Lower L in place of the lower triangle of A [n x n], rows `stride` apart. False where A is not positive definite.
 bool factorise_diagonal(float* a, int n, int stride) {
@@ -145,13 +145,13 @@ SingleCholesky::SingleCholesky(std::shared_ptr<const Elimination> plan, int bloc
     size += block_ * block_ * node.columns * (node.columns + std::ssize(node.rows));
   }
   factors_.reset(new float[static_cast<std::size_t>(size)]);
-  for (std::size_t v = 0; v < original_.size(); ++v) original_[at(plan_->place[v])] = static_cast<Index>(v);
+  for (std::size_t v = 0; v < original_.size(); ++v) original_[index_of(plan_->place[v])] = static_cast<Index>(v);
   for (std::size_t i = 0; i < plan_->nodes.size(); ++i) {
     const Node& node = plan_->nodes[i];
     const double columns = node.columns, height = columns + static_cast<double>(node.rows.size());
     Subtree subtree{i, columns * height * height, columns * height};
     for (const Index child : node.children) {
-      Subtree& below = subtrees_[at(child)];
+      Subtree& below = subtrees_[index_of(child)];
       below.has_parent = true;
       subtree.first = std::min(subtree.first, below.first);
       subtree.operations += below.operations;
@@ -180,7 +180,7 @@ void SingleCholesky::visit(Order order, double Subtree::*size, int threads, cons
     if (order == Order::kParentsFirst) work(i, true);
     for (const Index child : plan_->nodes[i].children) {
 #pragma omp task firstprivate(child)
-      visit_tree(at(child));
+      visit_tree(index_of(child));
     }
 #pragma omp taskwait
     if (order == Order::kChildrenFirst) work(i, true);
@@ -206,12 +206,12 @@ void SingleCholesky::assemble(std::size_t index, const SparseMatrix& matrix, con
   std::fill_n(front, height * block_ * node.columns, 0.0F);
   for (Index c = 0; c < node.columns; ++c)
     for (Index axis = 0; axis < block_; ++axis) {
-      const Eigen::Index row = block_ * static_cast<Eigen::Index>(original_[at(node.begin + c)]) + axis;
+      const Eigen::Index row = block_ * static_cast<Eigen::Index>(original_[index_of(node.begin + c)]) + axis;
       float* column = front + (block_ * c + axis) * height;
       for (SparseMatrix::InnerIterator entry(matrix, row); entry; ++entry) {
         const auto other = static_cast<std::size_t>(entry.col() / block_);
         if (plan_->place[other] < node.begin) continue;
-        column[block_ * scratch.position[at(plan_->place[other])] + entry.col() % block_] =
+        column[block_ * scratch.position[index_of(plan_->place[other])] + entry.col() % block_] =
             static_cast<float>(entry.value() * scale_[row] * scale_[entry.col()]);
       }
       column[block_ * c + axis] = 1;
@@ -223,8 +223,9 @@ bool SingleCholesky::eliminate(std::size_t index, const SparseMatrix& matrix, bo
                                std::vector<std::vector<float>>& updates) const {
   const Node& node = plan_->nodes[index];
   std::vector<Index>& position = scratch.position;
-  for (Index c = 0; c < node.columns; ++c) position[at(node.begin + c)] = c;
-  for (std::size_t i = 0; i < node.rows.size(); ++i) position[at(node.rows[i])] = node.columns + static_cast<Index>(i);
+  for (Index c = 0; c < node.columns; ++c) position[index_of(node.begin + c)] = c;
+  for (std::size_t i = 0; i < node.rows.size(); ++i)
+    position[index_of(node.rows[i])] = node.columns + static_cast<Index>(i);
   assemble(index, matrix, scratch);
   const int columns = block_ * node.columns, below = block_ * static_cast<int>(node.rows.size()),
             height = columns + below;
@@ -232,16 +233,16 @@ bool SingleCholesky::eliminate(std::size_t index, const SparseMatrix& matrix, bo
   std::vector<float>& rest = updates[index];
   rest.assign(static_cast<std::size_t>(below) * static_cast<std::size_t>(below), 0.0F);
   for (const Index child : node.children) {
-    const std::vector<Index>& rows = plan_->nodes[at(child)].rows;
-    std::vector<float>& update_of_child = updates[at(child)];
+    const std::vector<Index>& rows = plan_->nodes[index_of(child)].rows;
+    std::vector<float>& update_of_child = updates[index_of(child)];
     const auto size = static_cast<std::ptrdiff_t>(block_) * std::ssize(rows);
     const auto add = [&](std::size_t j) {
       for (Index axis = 0; axis < block_; ++axis) {
-        const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(block_) * position[at(rows[j])] + axis;
+        const std::ptrdiff_t column = static_cast<std::ptrdiff_t>(block_) * position[index_of(rows[j])] + axis;
         float* into = column < columns ? front + column * height : rest.data() + (column - columns) * below - columns;
         const float* from = update_of_child.data() + (block_ * static_cast<std::ptrdiff_t>(j) + axis) * size;
         for (std::size_t i = j; i < rows.size(); ++i) {
-          const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(block_) * position[at(rows[i])];
+          const std::ptrdiff_t row = static_cast<std::ptrdiff_t>(block_) * position[index_of(rows[i])];
           for (std::ptrdiff_t a = 0; a < block_; ++a)
             into[row + a] += from[block_ * static_cast<std::ptrdiff_t>(i) + a];
         }
@@ -325,8 +326,8 @@ void SingleCholesky::solve_down(std::size_t index, bool shared, Eigen::MatrixXf&
   rest.resize(k, below);
   const float* beta = &kZero;
   const auto take_from = [&](Index child) {
-    const std::vector<Index>& rows = plan_->nodes[at(child)].rows;
-    const Eigen::MatrixXf update = std::move(updates[at(child)]);
+    const std::vector<Index>& rows = plan_->nodes[index_of(child)].rows;
+    const Eigen::MatrixXf update = std::move(updates[index_of(child)]);
     std::size_t j = 0;
     for (; j < rows.size() && rows[j] < node.begin + node.columns; ++j)
       x.middleCols(static_cast<Eigen::Index>(block_) * rows[j], block_) -=

@@ -15,8 +15,8 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 // How long a rank that failed waits for the others before it ends them all.
-constexpr std::chrono::seconds kPatience{10};
-constexpr std::chrono::milliseconds kNap{1};
+constexpr std::chrono::seconds kTeamPatience{10};
+constexpr std::chrono::milliseconds kTeamNap{1};
 constexpr int kLeader = 0, kRowsTag = 1, kMatrixTag = 2;
 
 std::int64_t& last_share_id() {
@@ -42,8 +42,8 @@ int first_failed(const std::string& failure) {
     MPI_Wait(&request, MPI_STATUS_IGNORE);
     return first;
   }
-  const auto deadline = Clock::now() + kPatience;
-  for (int done = 0; done == 0; std::this_thread::sleep_for(kNap)) {
+  const auto deadline = Clock::now() + kTeamPatience;
+  for (int done = 0; done == 0; std::this_thread::sleep_for(kTeamNap)) {
     MPI_Test(&request, &done, MPI_STATUS_IGNORE);
     if (done == 0 && Clock::now() > deadline) end_all(failure);
   }

@@ -8,8 +8,8 @@
 namespace exmat::precompute {
 namespace {
 
-constexpr double kResidual = 0.1;       // of the distance of answers that are one minimum
-constexpr Eigen::Index kTogether = 64;  // weights whose minima of all tets are found side by side
+constexpr double kResidual = 0.1;             // of the distance of answers that are one minimum
+constexpr Eigen::Index kSolvedTogether = 64;  // weights whose minima of all tets are found side by side
 
 }  // namespace
 
@@ -80,8 +80,8 @@ std::vector<MinimumFinder::Minimum> MinimumFinder::lowest(
 RowMatrix MinimumFinder::find(const RowMatrix& weights, const Starts& starts, const std::string& stage) {
   RowMatrix found(weights.rows(), target_.dimension());
   Progress progress(stage, weights.rows());
-  for (Eigen::Index begin = 0; begin < weights.rows(); begin += kTogether) {
-    const RowMatrix some = weights.middleRows(begin, std::min(kTogether, weights.rows() - begin));
+  for (Eigen::Index begin = 0; begin < weights.rows(); begin += kSolvedTogether) {
+    const RowMatrix some = weights.middleRows(begin, std::min(kSolvedTogether, weights.rows() - begin));
     std::vector<std::vector<Eigen::VectorXd>> from;
     for (Eigen::Index i = 0; i < some.rows(); ++i) from.push_back(starts(some.row(i).transpose(), begin + i));
     const std::vector<Minimum> minima = lowest(some, from);

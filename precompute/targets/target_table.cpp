@@ -23,12 +23,12 @@ using runtime::TargetSolver;
 using runtime::TargetTable;
 
 constexpr int kDegreeStep = 2;
-constexpr int kDegreesPerGrid = 2;       // degrees that are fitted to the same nodes
-constexpr double kOversampling = 1.25;   // degree of the nodes over that of the polynomial
-constexpr int kChecksPerDimension = 64;  // weights on every edge; twice as many on every face
-constexpr Eigen::Index kEveryStart = 4;  // every fourth weight is solved from every start
-constexpr double kMargin = 0.7;          // of the tolerance: more may turn up between the checks
-constexpr double kSame = 0.1;            // of the tolerance: answers nearer to each other are one minimum
+constexpr int kDegreesPerGrid = 2;        // degrees that are fitted to the same nodes
+constexpr double kOversampling = 1.25;    // degree of the nodes over that of the polynomial
+constexpr int kChecksPerDimension = 64;   // weights on every edge; twice as many on every face
+constexpr Eigen::Index kTableStarts = 4;  // every fourth weight is solved from every start
+constexpr double kMargin = 0.7;           // of the tolerance: more may turn up between the checks
+constexpr double kSameTarget = 0.1;       // of the tolerance: answers nearer to each other are one minimum
 
 int most_degree(const TargetTableOptions& options, Eigen::Index examples) {
   if (options.most_degree > 0) return std::min(options.most_degree, BernsteinBasis::kMostDegree);
@@ -73,7 +73,7 @@ TableBuilder::TableBuilder(const TargetSolver& target, const Eigen::MatrixXd& po
       report_(report),
       examples_(poses.cols()),
       error_(target, examples_),
-      finder_(target, kSame * options.tolerance * error_.scale(), options.all) {
+      finder_(target, kSameTarget * options.tolerance * error_.scale(), options.all) {
   if (options.correction) finder_.correct_by(options.correction);
 }
 
@@ -81,7 +81,7 @@ TableBuilder::TableBuilder(const TargetSolver& target, const Eigen::MatrixXd& po
 TargetSamples TableBuilder::solve_checks() {
   const RowMatrix weights = spread_points(examples_, kChecksPerDimension);
   const auto starts = [&](const Eigen::VectorXd& w, Eigen::Index row) -> std::vector<Eigen::VectorXd> {
-    if (row % kEveryStart == 0) return blend_and_examples(target_, w);
+    if (row % kTableStarts == 0) return blend_and_examples(target_, w);
     return {blend(target_, w)};
   };
   return {weights, finder_.find(weights, starts, "targets to check the table by")};
@@ -92,7 +92,7 @@ TargetSamples TableBuilder::solve_nodes(int degree) {
   const auto starts = [&](const Eigen::VectorXd& w, Eigen::Index row) {
     std::vector<Eigen::VectorXd> from;
     if (former_) from.emplace_back(error_.decode(*former_, w.transpose()).row(0).transpose());
-    if (!former_ || row % kEveryStart == 0) from.push_back(blend(target_, w));
+    if (!former_ || row % kTableStarts == 0) from.push_back(blend(target_, w));
     return from;
   };
   return {weights, finder_.find(weights, starts, "targets of the table")};
@@ -214,6 +214,20 @@ std::optional<TargetTableData> build_target_table(const TargetSolver& target, co
   auto data = TableBuilder(target, poses, options, report).run();
   report.seconds = timer.seconds();
   return data;
+}
+
+void shift_targets(const Eigen::MatrixXd& shifts, TargetTableData& table) {
+  const Eigen::Index points = table.exponents.rows(), pieces = table.knots.size() - 1;
+  for (Eigen::Index row = 0; row < pieces * points; ++row) {
+    Eigen::VectorXd weights =
+        table.exponents.row(row % points).cast<double>().transpose() / static_cast<double>(table.degree);
+    if (pieces > 1) {  // of two examples, from one knot to the next
+      const Eigen::Index piece = row / points;
+      weights[1] = table.knots[piece] + weights[1] * (table.knots[piece + 1] - table.knots[piece]);
+      weights[0] = 1 - weights[1];
+    }
+    table.control_points.row(row) += (shifts * weights).transpose();
+  }
 }
 
 }  // namespace exmat::precompute

@@ -1,6 +1,5 @@
 #include "precompute/training/reduced_runs.h"
 
-#include <memory>
 #include <utility>
 
 #include "common/core/error.h"
@@ -13,31 +12,11 @@ namespace {
 
 using runtime::StepScene;
 
-// The forces of all segments are elastic, or none's.
-std::unique_ptr<const runtime::Model> prepare(const ReducedModel& data, EnergyReference reference,
-                                              const std::vector<runtime::ExampleSettings>& examples) {
-  runtime::ModelOptions options;
-  options.examples = data.examples.has_value();
-  options.target_table = data.targets.has_value();
-  options.energy_reference = reference;
-  auto own = examples.begin();
-  const auto is_elastic = [&] { return own != examples.end() && (own++)->elastic; };
-  if (options.examples) options.elastic = is_elastic();
-  options.polynomial = data.polynomial && data.cubature->internal_force == ForceMethod::kPolynomial;
-  for (const RegionData& region : data.regions)
-    options.regions.push_back(
-        {region.name, region.targets.has_value(), is_elastic(),
-         region.target_space ? region.target_space->energy_reference : EnergyReference::kExample});
-  auto [model, complaint] = runtime::build_model(data, options);
-  if (!model) throw InputError(complaint);
-  return std::move(model);
-}
-
 class ReducedRunner {
  public:
   ReducedRunner(const ReducedModel& data, EnergyReference reference,
                 const std::vector<runtime::ExampleSettings>& examples, const TrainingRunOptions& options)
-      : data_(data), model_(prepare(data, reference, examples)), options_(options) {}
+      : data_(data), model_(stepped_model(data, reference, examples)), options_(options) {}
 
   template <typename Advance>
   ChainFrames run(const Chain& chain, Advance advance) const;
@@ -110,6 +89,25 @@ ChainFrames ReducedRunner::run(const Chain& chain, Advance advance) const {
 }
 
 }  // namespace
+
+std::unique_ptr<const runtime::Model> stepped_model(const ReducedModel& data, EnergyReference reference,
+                                                    const std::vector<runtime::ExampleSettings>& examples) {
+  runtime::ModelOptions options;
+  options.examples = data.examples.has_value();
+  options.target_table = data.targets.has_value();
+  options.energy_reference = reference;
+  auto own = examples.begin();
+  const auto is_elastic = [&] { return own != examples.end() && (own++)->elastic; };
+  if (options.examples) options.elastic = is_elastic();
+  options.polynomial = data.polynomial && data.cubature->internal_force == ForceMethod::kPolynomial;
+  for (const RegionData& region : data.regions)
+    options.regions.push_back(
+        {region.name, region.targets.has_value(), is_elastic(),
+         region.target_space ? region.target_space->energy_reference : EnergyReference::kExample});
+  auto [model, complaint] = runtime::build_model(data, options);
+  if (!model) throw InputError(complaint);
+  return std::move(model);
+}
 
 std::vector<ChainFrames> run_reduced_chains(const ReducedModel& model, EnergyReference reference,
                                             const std::vector<Chain>& chains, const TrainingRunOptions& options) {

@@ -1,10 +1,13 @@
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "common/model/reduced_model.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/training/training_runs.h"
+#include "runtime/sim/step/model.h"
+#include "runtime/sim/step/scene.h"
 
 namespace exmat::precompute {
 
@@ -16,6 +19,10 @@ struct ChainFrames {
   std::int64_t steps = 0;
   bool finite = true;  ///< else the run ends where it was not
 };
+
+/// The run time's body of a model whose example forces are to be these, of its groups in order. Throws InputError.
+std::unique_ptr<const runtime::Model> stepped_model(const ReducedModel& data, EnergyReference reference,
+                                                    const std::vector<runtime::ExampleSettings>& examples);
 
 /// Runs each chain with a reduced body; `reference` is that of all targets.
 std::vector<ChainFrames> run_reduced_chains(const ReducedModel& model, EnergyReference reference,

@@ -19,14 +19,14 @@ const ExampleModel* example_force(const Model& model, std::int64_t region) {
   return model.has_whole_body_examples() ? &model.examples.front() : nullptr;
 }
 
-std::size_t place_of(const ExampleModel* force, const Model& model) {
+std::size_t force_place(const ExampleModel* force, const Model& model) {
   return static_cast<std::size_t>(force - model.examples.data());
 }
 
 const NamedPose* named_pose(const exmat_model& model, std::int64_t region, std::int64_t example) {
   const ExampleModel* force = example_force(model.model(), region);
   if (force == nullptr) return nullptr;
-  const auto& poses = model.source->loaded.poses[place_of(force, model.model())];
+  const auto& poses = model.source->loaded.poses[force_place(force, model.model())];
   return example >= 0 && example < std::ssize(poses) ? &poses[static_cast<std::size_t>(example)] : nullptr;
 }
 
@@ -133,7 +133,7 @@ exmat_status exmat_body_read_target(const exmat_body* body, std::int64_t region,
     return fail(EXMAT_INVALID_ARGUMENT, "%s: region = %" PRId64 ": the model has no such example force", __func__,
                 region);
   return guarded(__func__, [&] {
-    const std::size_t place = place_of(force, body->model());
+    const std::size_t place = force_place(force, body->model());
     const ExampleState& state = body->state.examples[place];
     const ExampleSettings& settings = body->scene.examples[place];
     const bool is_found = force->table ? body->state.step > 0 && !settings.elastic : state.has_target;

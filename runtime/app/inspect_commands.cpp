@@ -19,11 +19,12 @@ void print_groups(const ReducedModel& model, const BundleSummary& summary) {
 }
 
 void print_examples(const ExampleSet& set) {
-  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12}\n", "example", "mapped by", "residual", "doubt",
-             "shape error", "basis error");
+  fmt::print("\n{:<20} {:<20} {:>10} {:>12} {:>14} {:>12} {:>14}\n", "example", "mapped by", "residual", "doubt",
+             "shape error", "basis error", "settled error");
   for (const ExampleData& example : set.examples)
-    fmt::print("{:<20} {:<20} {:>10.3g} {:>12.3g} {:>14.3g} {:>12.3g}\n", example.name, example.method,
-               example.alignment_residual, example.doubt, example.shape_space_error, example.basis_error);
+    fmt::print("{:<20} {:<20} {:>10.3g} {:>12.3g} {:>14.3g} {:>12.3g} {:>14.3g}\n", example.name, example.method,
+               example.alignment_residual, example.doubt, example.shape_space_error, example.basis_error,
+               example.settled_error);
 }
 
 }  // namespace

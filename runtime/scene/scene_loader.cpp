@@ -7,6 +7,7 @@
 
 #include "common/config/config.h"
 #include "common/core/error.h"
+#include "common/core/log.h"
 #include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/sim/lanes/lane_step.h"
@@ -170,6 +171,22 @@ std::vector<std::vector<NamedPose>> named_poses(const LoadedScene& loaded) {
   return all;
 }
 
+// Targets that make up for one stiffness and gravity are wrong with others.
+void check_compensation(const SceneConfig& config, const ReducedModel& data) {
+  if (!config.examples || !data.targets) return;
+  const double stiffness = data.targets->compensated_stiffness;
+  if (config.examples->compensate && stiffness == 0)
+    throw InputError({config.file.string(), "/examples/compensate", "a bundle that was made for this scene",
+                      config.bundle.string() + ", whose targets are not compensated",
+                      "make it again: exmat-precompute bundle ASSET --scene " + config.file.string()});
+  const Eigen::Vector3d& gravity = data.targets->compensated_gravity;
+  if (stiffness == 0 || (config.examples->stiffness == stiffness && config.gravity == gravity)) return;
+  log::warning(
+      fmt::format("{}: its targets are compensated for a stiffness of {:g} 1/s^2 and gravity of ({:g}, {:g}, {:g}) "
+                  "m/s^2; with those of the scene the body settles beside its poses",
+                  config.bundle.string(), stiffness, gravity[0], gravity[1], gravity[2]));
+}
+
 std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedModel& data) {
   ModelOptions options;
   options.examples = config.examples.has_value();
@@ -238,6 +255,7 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   const bool positions = config.trajectory || config.meets_bodies || (moves && !config.forces.empty());
   const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
+  check_compensation(config, loaded.data);
   loaded.model = prepare(config, loaded.data);
   loaded.keys = make_keys(config, *loaded.model);
   loaded.scene = step_scene(config, obstacles, loaded);

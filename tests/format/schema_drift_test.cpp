@@ -35,7 +35,10 @@ TEST(BundleSchema, IsCaughtWithoutAnEntryThatIsBound) {
               ElementsAre("/modal/basis is bound to a member but not in the schema",
                           "/object@formulation is bound to a member but not in the schema",
                           "/object@material is bound to a member but not in the schema",
-                          "/object@variance_factor is bound to a member but not in the schema"));
+                          "/object@stiffness_ratio is bound to a member but not in the schema",
+                          "/object@thin_share is bound to a member but not in the schema",
+                          "/object@variance_factor is bound to a member but not in the schema",
+                          "/object@worst_stiffness is bound to a member but not in the schema"));
 }
 
 TEST(BundleSchema, IsCaughtWithAnotherType) {

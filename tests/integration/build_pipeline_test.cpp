@@ -159,12 +159,15 @@ TEST_F(BuildPipeline, TheReportSaysWhatCameOut) {
   EXPECT_EQ(found["bundle"]["sha256"], sha256(bundle_));
   ASSERT_EQ(found["inputs"].size(), 4U);
   for (const Json& input : found["inputs"]) EXPECT_EQ(input["sha256"], sha256(input["file"])) << input;
-  ASSERT_EQ(found["warnings"].size(), 2U) << outcome.errors;
+  ASSERT_EQ(found["warnings"].size(), 3U) << outcome.errors;
   EXPECT_THAT(found["warnings"][0], HasSubstr("re-oriented 1 inverted tets"));
+  EXPECT_THAT(found["warnings"][2], HasSubstr("example twist: settled at best"));
   for (const std::string warning : found["warnings"]) EXPECT_THAT(outcome.errors, HasSubstr("[warning] " + warning));
   ASSERT_EQ(found["examples"].size(), 2U);
   EXPECT_EQ(found["examples"][1]["name"], "twist");
   EXPECT_EQ(found["examples"][1]["basis_error"], model.examples->examples[1].basis_error);
+  EXPECT_EQ(found["examples"][1]["settled_error"], model.examples->examples[1].settled_error);
+  EXPECT_EQ(found["mesh_stiffness"]["ratio"], model.object->stiffness_ratio);
   EXPECT_EQ(found["cubature"]["heldout_error"], model.cubature->heldout_error);
   EXPECT_EQ(found["targets"][0]["error"], model.targets->error);
   EXPECT_EQ(found["sizes"]["tets"], 96);
@@ -255,10 +258,15 @@ TEST_F(BuildPipeline, TheCacheServesWhatDidNotChange) {
     return stages;
   };
   using Stages = std::set<std::string>;
-  const Stages all{"eigenfunctions", "eigenfunctions of the rest example",
-                   "linear modes",   "modal derivatives",
-                   "cubature",       "polynomial",
-                   "targets",        "training"};
+  const Stages all{"eigenfunctions",
+                   "eigenfunctions of the rest example",
+                   "linear modes",
+                   "modal derivatives",
+                   "cubature",
+                   "polynomial",
+                   "targets",
+                   "training",
+                   "stiffness of the mesh"};
   EXPECT_EQ(computed(changed("{}")), all);
   EXPECT_EQ(computed(changed("{}")), Stages{});
   EXPECT_EQ(computed(changed(R"({ "cubature": { "elements": 7 } })")), Stages{"cubature"});
@@ -328,7 +336,7 @@ TEST_P(BundlePackage, ComputesWhatChangedAndNothingElse) {
   EXPECT_EQ(read_file(build_ / "where.txt"), plain.string());
   EXPECT_TRUE(read_bundle(build_ / "bar.h5").examples);
   EXPECT_FALSE(read_bundle(plain).examples);
-  EXPECT_EQ(Json::parse(read_file(build_ / "bar.report.json"))["cache"].size(), 6U)
+  EXPECT_EQ(Json::parse(read_file(build_ / "bar.report.json"))["cache"].size(), 7U)
       << "the working folder is the binary folder";
   EXPECT_EQ(build(), 0);
   touch("twist.msh");

@@ -39,6 +39,7 @@ TEST(InvertedPose, GivesABundleThatRuns) {
   for (const char* force : {"cubature", "polynomial"}) {
     const auto asset = write_bar(folder, {.cells = {8, 3, 3}, .example_cells = {8, 3, 3}, .twist = 4.5},
                                  {{"internal_force", force},
+                                  {"object", {{"formulation", "linear"}}},  // an element is a tet
                                   {"shape_space", {{"eigenfunctions", 10}}},
                                   {"basis", {{"size", 16}, {"linear_modes", 10}}},
                                   {"cubature", {{"elements", 40}}}});

@@ -10,7 +10,7 @@
 #include "tests/integration/support.h"
 
 namespace exmat::test {
-namespace {
+namespace leaving_out_test {
 
 using ::testing::AllOf;
 using ::testing::Contains;
@@ -186,5 +186,5 @@ TEST_F(LeavingOut, AMissingGroupIsNamed) {
   EXPECT_THAT(refusal([&] { read_bundle(bundle_, request); }), AllOf(HasSubstr("bundle.h5"), HasSubstr("/rigid")));
 }
 
-}  // namespace
+}  // namespace leaving_out_test
 }  // namespace exmat::test

@@ -23,7 +23,9 @@ class MaterialFiles : public testing::Test {
  protected:
   /// The clamped bar in little, 4 m long, stiff and light beyond x = 2.
   ReducedModel built(const Json& object) {
-    return through_bundle(build(write_small_bar(folder_, {{"object", object}})).model, folder_.path("bundle.h5"));
+    Json of_tets = object;
+    of_tets["formulation"] = "linear";
+    return through_bundle(build(write_small_bar(folder_, {{"object", of_tets}})).model, folder_.path("bundle.h5"));
   }
 
   TemporaryFolder folder_;

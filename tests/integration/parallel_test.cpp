@@ -13,7 +13,7 @@
 #include "tests/integration/support.h"
 
 namespace exmat::test {
-namespace {
+namespace parallel_test {
 
 using ::testing::HasSubstr;
 
@@ -200,5 +200,5 @@ TEST_F(Parallel, TheDeathOfARankEndsTheOthers) {
   EXPECT_EQ(folder_.names(), files);
 }
 
-}  // namespace
+}  // namespace parallel_test
 }  // namespace exmat::test

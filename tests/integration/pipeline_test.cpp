@@ -112,7 +112,8 @@ class Pipeline : public testing::Test {
 // elements. The other methods are printed for comparison.
 TEST_F(Pipeline, CubatureFollowsAllElementsThroughALargeDeflection) {
   constexpr double kLimit = 0.01;
-  const ReducedModel model = build_bar();
+  const Json of_tets = {{"formulation", "linear"}};
+  const ReducedModel model = build_bar({{"object", of_tets}});
   Json members = R"({ "time_step": 0.001, "steps": 1000, "gravity": [0, 0, -1],
                       "forces": [ { "force": [0, 60, -150], "end": 0.6 } ] })"_json;
   members["forces"][0]["vertices"]["ids"] = end_vertices(model.object->mesh.vertices);
@@ -125,7 +126,7 @@ TEST_F(Pipeline, CubatureFollowsAllElementsThroughALargeDeflection) {
   EXPECT_GE(deflection, 0.3 * bar_.lengths[0]);
 
   for (const std::string method : {"greedy_swap", "greedy", "nn_htp"}) {
-    const ReducedModel built = build_bar({{"cubature", {{"method", method}}}});
+    const ReducedModel built = build_bar({{"object", of_tets}, {"cubature", {{"method", method}}}});
     ASSERT_EQ(built.modal->basis, model.modal->basis);
     const double error = (run_scene(scene) - reference).norm() / reference.norm();
     fmt::print("{}: s = {}, trajectory error {:.2f} %, held-out force error {:.2f} %\n", method,
@@ -224,7 +225,8 @@ TEST_F(Pipeline, CubatureTakesItsSizeOrItsTolerance) {
   const ReducedModel fixed_size = build_bar({{"cubature", {{"elements", 45}, {"training_poses", 60}}}});
   EXPECT_EQ(fixed_size.cubature->elements.size(), 45);
   const ReducedModel by_tolerance =
-      build_bar({{"cubature", {{"elements", nullptr}, {"tolerance", 0.06}, {"training_poses", 60}}}});
+      build_bar({{"object", {{"formulation", "linear"}}},
+                 {"cubature", {{"elements", nullptr}, {"tolerance", 0.06}, {"training_poses", 60}}}});
   const CubatureData& cubature = *by_tolerance.cubature;
   fmt::print("tolerance 0.06: s = {}, held-out error {:.3f}\n", cubature.elements.size(), cubature.heldout_error);
   EXPECT_LE(cubature.heldout_error, 0.06);

@@ -10,7 +10,7 @@
 #include "tests/integration/support.h"
 
 namespace exmat::test {
-namespace {
+namespace render_test {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -161,5 +161,5 @@ TEST_F(RenderMesh, WhatIsNoTrajectoryIsNotExported) {
   expect_cache(folder_ / "a.pc2", "/vertices", 1);
 }
 
-}  // namespace
+}  // namespace render_test
 }  // namespace exmat::test

@@ -9,7 +9,7 @@
 #include "tests/support/box_mesh.h"
 
 namespace exmat::test {
-namespace {
+namespace sources_test {
 
 using namespace nlohmann::literals;
 using ::testing::HasSubstr;
@@ -313,5 +313,5 @@ TEST_F(Sources, AreRefusedBeforeAnythingIsRun) {
   refused({{"exact_examples", "other.json"}}, "expected the object of the study's asset");
 }
 
-}  // namespace
+}  // namespace sources_test
 }  // namespace exmat::test

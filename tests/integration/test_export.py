@@ -345,6 +345,14 @@ class Export(unittest.TestCase):
             with h5py.File(damaged, "r+") as f:
                 f[dataset][row, 0] += 1
             self.assertIn("checksum", self.refused("damaged.h5", "-o", "a.glb"))
+        # Times that do not increase, or are no numbers, in every format.
+        for times in ((0, np.nan), (2, 1)):
+            damaged.write_bytes((self.folder / "free_run.h5").read_bytes())
+            with h5py.File(damaged, "r+") as f:
+                f["time"][1:3] = times
+            for target in ("a.glb", "a.usda", "a.pc2"):
+                self.assertIn("/time", self.refused("damaged.h5", "-o", target))
+        damaged.write_bytes((self.folder / "free_run.h5").read_bytes())
         with h5py.File(damaged, "r+") as f:
             del f["reduced"]
         self.assertIn("export it as .usda or .pc2", self.refused("damaged.h5", "-o", "a.glb"))

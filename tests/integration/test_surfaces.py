@@ -146,6 +146,36 @@ class Surfaces(unittest.TestCase):
             self.assertLess(fixed[:, 0].max(), 0.3 + 0.5)  # within a cell of the mark
             self.assertEqual(a["render"].attrs["outside"], 0)
 
+    def test_what_new_writes_becomes_a_motion_by_the_commands_that_it_prints(self):
+        printed = self.run_program("new", "tube.glb")
+        self.assertEqual({path.name for path in (self.folder / "tube").iterdir()}, {"asset.json", "scene.json"})
+        commands = [line.split() for line in printed.splitlines() if line.startswith("  exmat-")]
+        self.assertEqual([command[:2] for command in commands],
+                         [["exmat-precompute", "bundle"], ["exmat-runtime", "run"], ["exmat-runtime", "export"]])
+        for command in commands:
+            self.run_program(*command[1:], program=PROGRAMS / command[0])
+        self.assertTrue((self.folder / "tube/tube_run.glb").exists())
+        with h5py.File(self.folder / "tube/tube.h5") as bundle, h5py.File(self.folder / "tube/tube_run.h5") as run:
+            # The body is as near to each pose as it can be, under gravity and by a force that is not strong, when it has had the weight.
+            times, frames, rest = run["time"][:], run["vertices"][:], bundle["object/vertices"][:]
+            basis = bundle["modal/basis"][:]
+            for k, name in enumerate(("bend", "twist")):
+                example = bundle["examples"][name]
+                self.assertAlmostEqual(example.attrs["settled_error"], example.attrs["best_error"], delta=0.02)
+                held = frames[np.abs(times - (2 * k + 1.5)).argmin()] - rest
+                pose = np.tensordot(basis, example["pose"][:], 1)
+                self.assertLess(np.linalg.norm(held - pose), 0.15 * np.linalg.norm(pose), name)
+        refused = self.run_program("new", "tube.glb", status=2)
+        self.assertIn("tube/asset.json: expected no such file yet", refused)
+        self.run_program("new", "tube.glb", "-o", "other/place")
+        self.assertEqual(json.loads((self.folder / "other/place/asset.json").read_text())["object"]["surface"], "../../tube.glb")
+        # A free body lands on a floor at the height of its lowest point.
+        write_glb(self.folder / "loose.glb", self.points, self.triangles)
+        self.run_program("new", "loose.glb")
+        scene = json.loads((self.folder / "loose/scene.json").read_text())
+        self.assertAlmostEqual(scene["obstacles"][0]["plane"]["point"][1], self.points[:, 1].min(), places=6)
+        self.assertIn("a surface: .glb", self.run_program("new", "tube/asset.json", status=2))
+
     def test_targets_as_exporters_write_them(self):
         """The rest shape as a target, names that no bundle can hold, vertices of no triangle."""
         posed = bent(self.points, 90)

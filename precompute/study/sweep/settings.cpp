@@ -131,6 +131,7 @@ std::vector<PointSettings> expand(const StudyConfig& study, const AssetConfig& a
 
 AssetConfig with_settings(AssetConfig asset, const PointSettings& settings) {
   asset.eigenfunctions = settings.eigenfunctions;
+  asset.pose_tolerance.reset();
   asset.basis_size = settings.basis_size;
   asset.linear_modes = settings.linear_modes;
   asset.training.from = from_name<Training>(settings.training).value();

@@ -12,9 +12,9 @@ namespace exmat::runtime {
 namespace {
 
 constexpr int kLeafFaces = 4;
-constexpr double kNoDistance = 1e-12;  // of the size: below it normals of the surface say which way is out
-constexpr int kMostCells = 16;         // along the longest axis
-constexpr double kRounded = 1e-6;      // of a distance in single precision, and more
+constexpr double kNoMeshDistance = 1e-12;  // of the size: below it normals of the surface say which way is out
+constexpr int kMostCells = 16;             // along the longest axis
+constexpr double kMeshRounded = 1e-6;      // of a distance in single precision, and more
 
 int corner_of(double u, double v) { return u > 0 ? 0 : v > 0 ? 1 : 2; }
 
@@ -106,7 +106,7 @@ void RigidMesh::sample_cells() {
   if (!(cell_ > 0)) return;
   cells_low_ = all.low.array() - cell_;
   for (int axis = 0; axis < 3; ++axis)
-    cell_counts_[axis] = 2 + static_cast<int>(std::ceil((all.high[axis] - all.low[axis]) / cell_ - kRounded));
+    cell_counts_[axis] = 2 + static_cast<int>(std::ceil((all.high[axis] - all.low[axis]) / cell_ - kMeshRounded));
   cell_distances_.resize(static_cast<std::size_t>(cell_counts_.cast<std::int64_t>().prod()));
   double deepest = deepest_;
 #pragma omp parallel for schedule(dynamic, 1) reduction(max : deepest)
@@ -184,7 +184,7 @@ SurfacePoint RigidMesh::nearest(const Eigen::Vector3d& point, NearestHint& hint)
   }
   const Found best = search<Search::kTwoNearest>(point, std::numeric_limits<double>::infinity());
   if (best.face < 0) return {best.second, Eigen::Vector3d::UnitZ(), point};  // not a number
-  hint = {best.face, (1 - kRounded) * std::sqrt(best.second), point};
+  hint = {best.face, (1 - kMeshRounded) * std::sqrt(best.second), point};
   return surface_of(point, best);
 }
 
@@ -199,7 +199,7 @@ SurfacePoint RigidMesh::surface_of(const Eigen::Vector3d& point, const Found& fo
   const double side = away.dot(out) >= 0 ? 1 : -1;
   const double distance = std::sqrt(found.on.squared_distance);
   SurfacePoint surface{side * distance, out, found.on.point};
-  if (inner < 3 && distance > kNoDistance * size_)
+  if (inner < 3 && distance > kNoMeshDistance * size_)
     surface.normal = side / distance * away;
   else if (out.squaredNorm() > 0)
     surface.normal = out.normalized();
@@ -225,7 +225,7 @@ bool RigidMesh::may_be_within(const Eigen::Vector3d& point, double radius) const
                               static_cast<std::size_t>(cell_counts_[1]) * static_cast<std::size_t>(cell[2]));
       const double middle = cell_distances_[index];
       const double way = cell_ * (cells - cell.cast<double>() - Eigen::Vector3d::Constant(0.5)).norm();
-      const double rounding = kRounded * (std::abs(middle) + cell_);
+      const double rounding = kMeshRounded * (std::abs(middle) + cell_);
       if (middle - way - rounding > radius) return false;
       if (middle + way + rounding <= radius) return true;
     }

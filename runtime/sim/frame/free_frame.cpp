@@ -9,15 +9,15 @@
 namespace exmat::runtime {
 namespace {
 
-FreeState& own(FrameState& state) { return *std::get_if<FreeState>(&state); }
-const FreeState& own(const FrameState& state) { return *std::get_if<FreeState>(&state); }
-FreeMotionWorkspace& own(FrameWorkspace& workspace) { return *std::get_if<FreeMotionWorkspace>(&workspace); }
-const FreeMotionWorkspace& own(const FrameWorkspace& workspace) {
+FreeState& own_free(FrameState& state) { return *std::get_if<FreeState>(&state); }
+const FreeState& own_free(const FrameState& state) { return *std::get_if<FreeState>(&state); }
+FreeMotionWorkspace& own_free(FrameWorkspace& workspace) { return *std::get_if<FreeMotionWorkspace>(&workspace); }
+const FreeMotionWorkspace& own_free(const FrameWorkspace& workspace) {
   return *std::get_if<FreeMotionWorkspace>(&workspace);
 }
 
 template <typename Body, typename Visitor>
-void visit(Body& body, Visitor& visitor) {
+void visit_numbers(Body& body, Visitor& visitor) {
   visitor(body.position, body.orientation.coeffs(), body.linear_momentum, body.angular_momentum, body.spin,
           body.applied_force, body.applied_torque, body.momentum, body.momentum_previous);
 }
@@ -40,8 +40,8 @@ void FreeFrame::follow(const WorldLoads& /*loads*/, double /*time*/, const Eigen
 
 bool FreeFrame::set_motion(const FrameMotion& motion, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                            FrameWorkspace& workspace, FrameState& state) const noexcept {
-  FreeState& body = own(state);
-  DeformingInertia::Moments& moments = own(workspace).moments;
+  FreeState& body = own_free(state);
+  DeformingInertia::Moments& moments = own_free(workspace).moments;
   inertia_.moments(q, moments);
   body.position = motion.position;
   body.orientation = motion.orientation.normalized();
@@ -54,37 +54,37 @@ bool FreeFrame::set_motion(const FrameMotion& motion, const Eigen::VectorXd& q, 
 }
 
 Placement FreeFrame::placement(const FrameState& state) const noexcept {
-  const FreeState& body = own(state);
+  const FreeState& body = own_free(state);
   return {origin(), origin() + body.position, body.orientation.toRotationMatrix()};
 }
 
 FrameVelocity FreeFrame::velocity(const FrameState& state) const noexcept {
-  const FreeState& body = own(state);
+  const FreeState& body = own_free(state);
   return {body.linear_momentum / body.mass, body.orientation.toRotationMatrix() * body.spin};
 }
 
 FrameMotion FreeFrame::motion(const FrameState& state) const noexcept {
-  const FreeState& body = own(state);
+  const FreeState& body = own_free(state);
   return {body.position, body.orientation, body.linear_momentum / body.mass, body.orientation * body.spin};
 }
 
 std::optional<FrameMomenta> FreeFrame::momenta(const FrameState& state) const noexcept {
-  return FrameMomenta{own(state).linear_momentum, own(state).angular_momentum};
+  return FrameMomenta{own_free(state).linear_momentum, own_free(state).angular_momentum};
 }
 
-double FreeFrame::turn_rate(const FrameState& state) const noexcept { return own(state).spin.norm(); }
+double FreeFrame::turn_rate(const FrameState& state) const noexcept { return own_free(state).spin.norm(); }
 
 const Eigen::VectorXd& FreeFrame::momentum(const Eigen::VectorXd& /*v*/, const FrameState& state) const noexcept {
-  return own(state).momentum;
+  return own_free(state).momentum;
 }
 
 const Eigen::VectorXd& FreeFrame::former_momentum(const Eigen::VectorXd& /*v_previous*/,
                                                   const FrameState& state) const noexcept {
-  return own(state).momentum_previous;
+  return own_free(state).momentum_previous;
 }
 
 double FreeFrame::kinetic_energy(const Eigen::VectorXd& v, const FrameState& state) const noexcept {
-  const FreeState& body = own(state);
+  const FreeState& body = own_free(state);
   // w . l = w . (J w + h) and (pi - v) . v = w . h.
   const Eigen::Vector3d l = body.orientation.conjugate() * body.angular_momentum;
   double energy = 0.5 * v.squaredNorm();
@@ -94,11 +94,11 @@ double FreeFrame::kinetic_energy(const Eigen::VectorXd& v, const FrameState& sta
 }
 
 double FreeFrame::potential_energy(const Eigen::Vector3d& gravity, const FrameState& state) const noexcept {
-  return -(own(state).mass * gravity.dot(own(state).position));
+  return -(own_free(state).mass * gravity.dot(own_free(state).position));
 }
 
 BodyFrame::Coordinates FreeFrame::coordinates(const FrameState& state) const noexcept {
-  const FreeState& body = own(state);
+  const FreeState& body = own_free(state);
   Coordinates coordinates(13);
   coordinates << body.position, body.orientation.coeffs(), body.linear_momentum, body.angular_momentum;
   return coordinates;
@@ -106,23 +106,23 @@ BodyFrame::Coordinates FreeFrame::coordinates(const FrameState& state) const noe
 
 std::vector<double> FreeFrame::numbers(const FrameState& state) const {
   NumberWriter writer;
-  visit(own(state), writer);
+  visit_numbers(own_free(state), writer);
   return writer.numbers;
 }
 
 void FreeFrame::set_numbers(std::span<const double> numbers, FrameState& state) const noexcept {
   NumberReader reader{numbers};
-  visit(own(state), reader);
+  visit_numbers(own_free(state), reader);
 }
 
 void FreeFrame::apply(const Eigen::Vector3d& force, const Eigen::Vector3d& torque, FrameState& state) const noexcept {
-  own(state).applied_force += force;
-  own(state).applied_torque += torque;
+  own_free(state).applied_force += force;
+  own_free(state).applied_torque += torque;
 }
 
 void FreeFrame::clear_forces(FrameState& state) const noexcept {
-  own(state).applied_force.setZero();
-  own(state).applied_torque.setZero();
+  own_free(state).applied_force.setZero();
+  own_free(state).applied_torque.setZero();
 }
 
 /// With momenta and the velocity v given, the energy is p^2 / 2m + l^T J^-1 l / 2, the rigid part, and a part that is
@@ -130,8 +130,8 @@ void FreeFrame::clear_forces(FrameState& state) const noexcept {
 Eigen::Vector3d FreeFrame::limit_kinetic_energy(double allowed, const Eigen::Vector3d& impulse,
                                                 FrameWorkspace& workspace, Eigen::VectorXd& v,
                                                 FrameState& state) const noexcept {
-  const FreeMotionWorkspace& free = own(workspace);
-  FreeState& body = own(state);
+  const FreeMotionWorkspace& free = own_free(workspace);
+  FreeState& body = own_free(state);
   const double mass = body.mass;
   const Eigen::Vector3d before = body.linear_momentum;
   const Eigen::Matrix3d to_body = body.orientation.toRotationMatrix().transpose();
@@ -162,8 +162,8 @@ Eigen::Vector3d FreeFrame::limit_kinetic_energy(double allowed, const Eigen::Vec
 
 void FreeFrame::add_motion(double share, const FrameVelocity& added, FrameWorkspace& workspace, Eigen::VectorXd& v,
                            FrameState& state) const noexcept {
-  const DeformingInertia::Moments& moments = own(workspace).moments;
-  FreeState& body = own(state);
+  const DeformingInertia::Moments& moments = own_free(workspace).moments;
+  FreeState& body = own_free(state);
   v *= share;
   body.linear_momentum = share * body.linear_momentum + body.mass * added.linear;
   body.angular_momentum = share * body.angular_momentum + inertia(workspace, state) * added.angular;
@@ -172,19 +172,19 @@ void FreeFrame::add_motion(double share, const FrameVelocity& added, FrameWorksp
 }
 
 bool FreeFrame::is_finite(const FrameWorkspace& workspace) const noexcept {
-  const FreeMotionWorkspace& free = own(workspace);
+  const FreeMotionWorkspace& free = own_free(workspace);
   return free.moved.position.allFinite() && free.moved.linear_momentum.allFinite() &&
          free.moved.angular_momentum.allFinite() && free.solution.spin.allFinite() &&
          free.solution.rotation.allFinite();
 }
 
 Eigen::Matrix3d FreeFrame::inertia(const FrameWorkspace& workspace, const FrameState& state) const noexcept {
-  const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix();
-  return rotation * own(workspace).moments.inertia * rotation.transpose();
+  const Eigen::Matrix3d rotation = own_free(state).orientation.toRotationMatrix();
+  return rotation * own_free(workspace).moments.inertia * rotation.transpose();
 }
 
 std::optional<FrameMomenta> FreeFrame::expected_momenta(const FrameWorkspace& workspace) const noexcept {
-  const FreeState& body = own(workspace).moved;
+  const FreeState& body = own_free(workspace).moved;
   return FrameMomenta{body.linear_momentum, body.angular_momentum};
 }
 
@@ -201,8 +201,8 @@ void FreeFrame::begin(const FrameStep& step, FrameWorkspace& /*workspace*/,
 /// them, away from obstacles.
 void FreeFrame::move(const FrameStep& step, bool near, bool dissipative, const FrameState& state,
                      FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept {
-  const FreeState& start = own(state);
-  FreeState& body = own(workspace).moved;
+  const FreeState& start = own_free(state);
+  FreeState& body = own_free(workspace).moved;
   body.mass = start.mass;
   body.position = start.position;
   body.orientation = start.orientation;
@@ -225,14 +225,14 @@ void FreeFrame::move(const FrameStep& step, bool near, bool dissipative, const F
   body.position += dt / mass * (body.linear_momentum + share * dt * force);
   body.linear_momentum += dt * force;
   body.angular_momentum += dt * torque;
-  begin_rotation(body, dt, dissipative, own(workspace));
+  begin_rotation(body, dt, dissipative, own_free(workspace));
 }
 
 void FreeFrame::add_start_force(const FrameStep& step, const FrameState& state, FrameWorkspace& workspace,
                                 Eigen::VectorXd& force) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
+  FreeMotionWorkspace& free = own_free(workspace);
   free.velocity = step.v;
-  free.solution.spin = own(state).spin;
+  free.solution.spin = own_free(state).spin;
   inertia_.moments(step.q, free.moments);
   rotation_force(inertia_, 0, free);
   force += free.force;
@@ -240,53 +240,53 @@ void FreeFrame::add_start_force(const FrameStep& step, const FrameState& state, 
 
 bool FreeFrame::update_force(const Eigen::VectorXd& q, double velocity_factor, const Eigen::VectorXd& velocity_centre,
                              FrameWorkspace& workspace) const noexcept {
-  return update_rotation(inertia_, velocity_factor, q, velocity_centre, own(workspace));
+  return update_rotation(inertia_, velocity_factor, q, velocity_centre, own_free(workspace));
 }
 
 const Eigen::VectorXd* FreeFrame::force(const FrameWorkspace& workspace) const noexcept {
-  return &own(workspace).force;
+  return &own_free(workspace).force;
 }
 
 void FreeFrame::add_stiffness(double velocity_factor, FrameWorkspace& workspace,
                               Eigen::MatrixXd& hessian) const noexcept {
-  add_rotation_stiffness(inertia_, velocity_factor, own(workspace), hessian);
+  add_rotation_stiffness(inertia_, velocity_factor, own_free(workspace), hessian);
 }
 
 double FreeFrame::gyroscopic_ratio(double velocity_factor, const FrameWorkspace& workspace) const noexcept {
-  return 2 * own(workspace).solution.spin.norm() / velocity_factor;
+  return 2 * own_free(workspace).solution.spin.norm() / velocity_factor;
 }
 
 const Eigen::MatrixXd* FreeFrame::gyroscopic(double velocity_factor, FrameWorkspace& workspace) const noexcept {
-  set_gyroscopic(inertia_, velocity_factor, own(workspace));
-  return &own(workspace).gyroscopic;
+  set_gyroscopic(inertia_, velocity_factor, own_free(workspace));
+  return &own_free(workspace).gyroscopic;
 }
 
 const Eigen::VectorXd* FreeFrame::gyroscopic_product(double velocity_factor, const Eigen::VectorXd& x,
                                                      FrameWorkspace& workspace) const noexcept {
-  runtime::gyroscopic_product(inertia_, velocity_factor, x, own(workspace));
-  return &own(workspace).product;
+  runtime::gyroscopic_product(inertia_, velocity_factor, x, own_free(workspace));
+  return &own_free(workspace).product;
 }
 
 bool FreeFrame::fall_back(const FrameStep& step, FrameWorkspace& workspace) const noexcept {
-  turn_rigidly(inertia_, step.q, step.v, step.time_step, own(workspace));
+  turn_rigidly(inertia_, step.q, step.v, step.time_step, own_free(workspace));
   return true;
 }
 
 void FreeFrame::commit(const WorldLoads& /*loads*/, double rate, const Eigen::VectorXd& /*q*/, const Eigen::VectorXd& v,
                        Eigen::VectorXd& a, FrameWorkspace& workspace, FrameState& state) const noexcept {
-  commit_free_motion(rate, v, own(workspace), a, own(state));
+  commit_free_motion(rate, v, own_free(workspace), a, own_free(state));
 }
 
 // ---- Near obstacles -------------------------------------------------------------------------------------------------
 
 void FreeFrame::begin_contact(const FrameState& state, const Eigen::VectorXd& q, double time_step,
                               FrameWorkspace& workspace, Eigen::VectorXd& x) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
+  FreeMotionWorkspace& free = own_free(workspace);
   free.spin_is_given = true;
   x.segment<3>(3) = free.solution.rotation;
   inertia_.moments(q, free.moments);
   free.unknowns.time_step = time_step;
-  free.unknowns.start_rotation = own(state).orientation.toRotationMatrix();
+  free.unknowns.start_rotation = own_free(state).orientation.toRotationMatrix();
   free.unknowns.start_inertia = free.moments.inertia;
   free.unknowns.expected_turn = free.solution.rotation;
   free.unknowns.frozen_turn.setZero();
@@ -294,7 +294,7 @@ void FreeFrame::begin_contact(const FrameState& state, const Eigen::VectorXd& q,
 }
 
 Placement FreeFrame::place(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
+  FreeMotionWorkspace& free = own_free(workspace);
   const Eigen::Vector3d turn = x.segment<3>(3);
   free.solution.rotation = turn;
   free.solution.spin = turn / free.unknowns.time_step;
@@ -302,7 +302,7 @@ Placement FreeFrame::place(const Eigen::VectorXd& x, FrameWorkspace& workspace) 
 }
 
 double FreeFrame::rigid_potential(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept {
-  const RigidUnknowns& unknowns = own(workspace).unknowns;
+  const RigidUnknowns& unknowns = own_free(workspace).unknowns;
   const double dt = unknowns.time_step;
   const Eigen::Vector3d d = x.head<3>(), t = x.segment<3>(3);
   const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (dt * dt);
@@ -312,7 +312,7 @@ double FreeFrame::rigid_potential(const Eigen::VectorXd& x, FrameWorkspace& work
 
 void FreeFrame::rigid_gradient(const Eigen::VectorXd& x, const FrameMomenta& contact, FrameWorkspace& workspace,
                                Eigen::VectorXd& gradient) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
+  FreeMotionWorkspace& free = own_free(workspace);
   RigidUnknowns& unknowns = free.unknowns;
   const double dt = unknowns.time_step, mass = inertia_.mass();
   const Eigen::Vector3d d = x.head<3>(), t = x.segment<3>(3);
@@ -329,7 +329,7 @@ void FreeFrame::rigid_gradient(const Eigen::VectorXd& x, const FrameMomenta& con
 }
 
 double FreeFrame::accept_rigid(FrameWorkspace& workspace) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
+  FreeMotionWorkspace& free = own_free(workspace);
   RigidUnknowns& unknowns = free.unknowns;
   const double change = (unknowns.next_frozen_turn - unknowns.frozen_turn).dot(free.solution.rotation);
   unknowns.frozen_turn = unknowns.next_frozen_turn;
@@ -344,7 +344,7 @@ Eigen::Matrix3d FreeFrame::turn_to_world(const Eigen::VectorXd& x, const Placeme
 void FreeFrame::add_rigid_hessian(const Eigen::VectorXd& x, const Placement& placement,
                                   Eigen::MatrixXd& contact_stiffness, FrameWorkspace& workspace,
                                   Eigen::MatrixXd& hessian) const noexcept {
-  const FreeMotionWorkspace& free = own(workspace);
+  const FreeMotionWorkspace& free = own_free(workspace);
   const double dt = free.unknowns.time_step;
   const Eigen::Matrix3d to_world = turn_to_world(x, placement);
   Eigen::MatrixXd& K = contact_stiffness;
@@ -369,10 +369,10 @@ double FreeFrame::residual_of(const Eigen::Vector3d& force) const noexcept {
 
 void FreeFrame::end_contact(const Eigen::VectorXd& x, bool converged, const Eigen::Vector3d& torque,
                             const FrameState& state, FrameWorkspace& workspace, Eigen::Vector3d& force) const noexcept {
-  FreeMotionWorkspace& free = own(workspace);
+  FreeMotionWorkspace& free = own_free(workspace);
   FreeState& body = free.moved;
   const double dt = free.unknowns.time_step;
-  const Eigen::Matrix3d rotation = own(state).orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
+  const Eigen::Matrix3d rotation = own_free(state).orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
   const Eigen::Vector3d deformation = free.moments.deformation().transpose() * free.velocity;
   if (converged) {
     body.position += dt * dt / body.mass * force;  // d, but for the residual: the centre goes as its momentum says

@@ -1,9 +1,8 @@
 #include "runtime/viewer/app/window.h"
 
-#include <epoxy/gl.h>
-// After epoxy, which brings the functions of OpenGL.
 #include <GLFW/glfw3.h>
 #include <algorithm>
+#include <epoxy/gl.h>
 #include <fmt/format.h>
 
 #include "common/core/error.h"

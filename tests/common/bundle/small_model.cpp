@@ -64,6 +64,10 @@ ExampleData small_example(const std::string& name, std::int64_t index) {
   example.doubt = 0.25;
   example.shape_space_error = 0.125;
   example.basis_error = 0.0625;
+  example.best_error = 0.07;
+  example.settled_error = 0.08;
+  example.settled_distance = 0.0125;
+  example.settled_vertex = 3;
   example.descriptor = numbers(kEigenfunctions, 3, static_cast<double>(index));
   example.reduced = numbers(kModes, 1, static_cast<double>(index));
   example.pose = 2 * example.reduced;
@@ -122,6 +126,8 @@ TargetTableData small_targets() {
   targets.exponents.resize(6, kExamples);
   targets.exponents << 2, 0, 0, 1, 1, 0, 1, 0, 1, 0, 2, 0, 0, 1, 1, 0, 0, 2;
   targets.control_points = numbers(6, kModes, 3);
+  targets.compensated_stiffness = 400;
+  targets.compensated_gravity = {0.5, -9.5, 0.25};
   return targets;
 }
 

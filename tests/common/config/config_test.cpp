@@ -30,6 +30,8 @@ TEST(LoadAsset, FillsInDefaults) {
                asset.needs || asset.render_mesh || asset.contact_vertices || asset.contact_count);
   EXPECT_TRUE(asset.examples.empty());
   EXPECT_EQ(asset.eigenfunctions, 20);
+  EXPECT_FALSE(asset.pose_tolerance);
+  EXPECT_EQ(asset.formulation, Formulation::kSmoothed);
   EXPECT_EQ(asset.basis_size, 30);
   EXPECT_EQ(asset.cubature_method, CubatureMethod::kGreedySwap);
   EXPECT_EQ(asset.target_tolerance, 1e-4);
@@ -57,7 +59,7 @@ TEST(LoadAsset, ReadsEveryMember) {
                "material": {"model": "stvk", "youngs_modulus": 6.0e6, "poisson_ratio": 0.4, "density": 1000},
                "fixed": {"box": {"min": [0, -1, 0], "max": [1, 1, 0.01]}},
                "materials": [{"tets": {"set": "wheel 1"}, "density": 7}], "render_mesh": "draw/car.obj"},
-    "shape_space": {"eigenfunctions": 6, "weighting": "none"},
+    "shape_space": {"eigenfunctions": 6, "tolerance": 0.05, "weighting": "none"},
     "examples": [{"name": "rest", "mesh": "../ex0.veg", "rest": true},
                  {"name": "bend", "mesh": "sub/./ex1.veg", "drop": ["unreferenced_vertices"]}],
     "alignment": {"method": "coupled", "frame": "free", "landmarks": "marks.txt", "accept": true,
@@ -83,6 +85,7 @@ TEST(LoadAsset, ReadsEveryMember) {
   EXPECT_EQ(std::get<SetSelection>(asset.material_regions.at(0).tets).name, "wheel 1");
   EXPECT_EQ(asset.render_mesh, folder / "draw/car.obj");
   EXPECT_EQ(asset.eigenfunctions, 6);
+  EXPECT_EQ(asset.pose_tolerance, 0.05);
   EXPECT_EQ(asset.weighting, Weighting::kNone);
   ASSERT_EQ(asset.examples.size(), 2u);
   EXPECT_TRUE(asset.examples[0].rest);
@@ -183,7 +186,7 @@ TEST(LoadScene, ReadsEveryMember) {
     "damping": {"mass": 0.02, "stiffness": 0.003}, "newton": {"max_iterations": 5, "tolerance": 1e-8},
     "sleep": {"energy": 1e-5, "time": 0.25}, "precision": "mixed",
     "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "target": "table", "target_iterations": 7,
-                 "force": "linear", "energy_reference": "rest"},
+                 "force": "linear", "energy_reference": "rest", "compensate": true},
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
                {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]}],
     "output": {"trajectory": "run.h5", "every": 2, "render": true}})");
@@ -203,6 +206,7 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.examples->bias, 0.6);
   EXPECT_EQ(scene.examples->target, TargetSource::kTable);
   EXPECT_EQ(scene.examples->target_iterations, 7);
+  EXPECT_TRUE(scene.examples->compensate);
   EXPECT_EQ(scene.examples->energy_reference, EnergyReference::kRest);
   EXPECT_EQ(scene.internal_force, ForceMethod::kPolynomial);
   EXPECT_EQ(scene.instances, 1000);

@@ -92,7 +92,7 @@ class Packages(unittest.TestCase):
         self.assertIn("petsc", self.depends("exmat-precompute"))
         root = self.unpacked("exmat-precompute")
         self.assertEqual(self.files(root), {"usr/bin/exmat-precompute", "usr/share/doc/exmat-precompute/copyright",
-                                            *self.man_pages("exmat-precompute", "bundle", "check", "mesh", "study", "full-space")})
+                                            *self.man_pages("exmat-precompute", "new", "bundle", "check", "mesh", "study", "full-space")})
         self.assertIn("SLEPc", output_of(str(root / "usr/bin/exmat-precompute"), "--version"))
 
     @unittest.skipUnless(MESHING, "built without the mesher")

@@ -8,7 +8,7 @@
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
-namespace {
+namespace medit_reader_test {
 
 using test::complaint_of;
 using test::edited;
@@ -124,5 +124,5 @@ constexpr std::array kMalformed{
 INSTANTIATE_TEST_SUITE_P(Malformed, RefusesMedit, testing::ValuesIn(kMalformed),
                          [](const auto& param) { return std::string(param.param.name); });
 
-}  // namespace
+}  // namespace medit_reader_test
 }  // namespace exmat::precompute

@@ -9,7 +9,7 @@
 #include "tests/precompute/mesh_io/mesh_samples.h"
 
 namespace exmat::precompute {
-namespace {
+namespace tetgen_reader_test {
 
 using test::complaint_of;
 using test::edited;
@@ -154,5 +154,5 @@ TEST_F(ReadTetgen, NamesTheFileThatIsMissing) {
   EXPECT_EQ(complaint.found, "no such file");
 }
 
-}  // namespace
+}  // namespace tetgen_reader_test
 }  // namespace exmat::precompute

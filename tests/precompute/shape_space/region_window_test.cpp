@@ -10,7 +10,7 @@
 #include "tests/support/refined_mesh.h"
 
 namespace exmat::precompute {
-namespace {
+namespace region_window_test {
 
 constexpr double kRounding = 1e-12;
 
@@ -119,5 +119,5 @@ TEST(RegionWindow, OfATetIsItsMean) {
   EXPECT_GT(shares.maxCoeff(), 0.9);
 }
 
-}  // namespace
+}  // namespace region_window_test
 }  // namespace exmat::precompute

@@ -12,7 +12,7 @@
 // Against energies as the definitions have them, of a mesh of several parts.
 
 namespace exmat::precompute {
-namespace {
+namespace element_forces_test {
 
 constexpr Eigen::Index kCoordinates = 5;
 constexpr int kSums = 11;  // no multiple of the lanes of a register
@@ -174,5 +174,5 @@ TEST_P(ElementForcesOf, VanishWhereTheDescentsEnd) {
   EXPECT_GE(before.colwise().norm().maxCoeff(), 1e-4 * scale);
 }
 
-}  // namespace
+}  // namespace element_forces_test
 }  // namespace exmat::precompute

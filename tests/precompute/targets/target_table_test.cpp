@@ -427,5 +427,38 @@ TEST(TargetTableRefusal, OfTooFewAndTooManyExamples) {
   }
 }
 
+// One polynomial of three examples, and pieces of two.
+TEST(ShiftedTargets, AreFartherByALinearFunctionOfTheWeights) {
+  std::mt19937 generator(3);
+  std::normal_distribution<double> normal;
+  for (const int examples : {2, 3}) {
+    TargetTableData data;
+    data.degree = 4;
+    data.exponents.resize(examples == 2 ? 5 : 15, examples);
+    Eigen::Index row = 0;
+    for (int a = 4; a >= 0; --a)
+      for (int b = 4 - a; b >= (examples == 2 ? 4 - a : 0); --b, ++row) {
+        data.exponents(row, 0) = a;
+        data.exponents(row, 1) = b;
+        if (examples == 3) data.exponents(row, 2) = 4 - a - b;
+      }
+    if (examples == 2) data.knots = Eigen::Vector4d(0, 0.2, 0.7, 1);
+    const Eigen::Index modes = 5, pieces = data.knots.size() - 1;
+    data.control_points =
+        RowMatrix::NullaryExpr(pieces * data.exponents.rows(), modes, [&] { return normal(generator); });
+    const Eigen::MatrixXd shifts = Eigen::MatrixXd::NullaryExpr(modes, examples, [&] { return normal(generator); });
+    TargetTableData shifted = data;
+    shift_targets(shifts, shifted);
+    const TargetTable before(data), after(shifted);
+    auto workspace = before.make_workspace();
+    Eigen::VectorXd at(modes), there(modes);
+    for (const Eigen::VectorXd& w : random_weights(examples, 20)) {
+      before.evaluate(w, workspace, at);
+      after.evaluate(w, workspace, there);
+      EXPECT_LE((there - at - shifts * w).norm(), 1e-14 * (at.norm() + there.norm() + 1));
+    }
+  }
+}
+
 }  // namespace target_table_test
 }  // namespace exmat::precompute

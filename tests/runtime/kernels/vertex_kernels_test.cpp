@@ -9,7 +9,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
-namespace {
+namespace vertex_kernels_test {
 
 constexpr double kRounding = 1e-14;  // of sums of at most 50 terms, over their norms
 
@@ -88,5 +88,5 @@ TEST_P(VertexKernels, SquaresAreTheProductWithTheTranspose) {
 
 INSTANTIATE_TEST_SUITE_P(Modes, VertexKernels, testing::Values(1, 7, 8, 20, 30, 42));
 
-}  // namespace
+}  // namespace vertex_kernels_test
 }  // namespace exmat::runtime

@@ -9,7 +9,7 @@
 #include "tests/runtime/sim/world/touching_blocks.h"
 
 namespace exmat::runtime {
-namespace {
+namespace body_contact_test {
 
 using test::Blocks;
 
@@ -325,5 +325,5 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidateOfABodyWithItself) {
   EXPECT_GT(served, kSteps / 2);
 }
 
-}  // namespace
+}  // namespace body_contact_test
 }  // namespace exmat::runtime

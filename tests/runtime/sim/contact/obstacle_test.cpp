@@ -8,7 +8,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
-namespace {
+namespace obstacle_test {
 
 using test::random_vector;
 
@@ -149,5 +149,5 @@ TEST(Obstacle, IsPlacedByItsMotion) {
             1e-14);
 }
 
-}  // namespace
+}  // namespace obstacle_test
 }  // namespace exmat::runtime

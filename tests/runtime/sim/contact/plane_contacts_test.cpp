@@ -15,7 +15,7 @@
 // Against the law of one vertex at a time, with every instruction set.
 
 namespace exmat::runtime {
-namespace {
+namespace plane_contacts_test {
 
 constexpr double kRounding = 1e-13;  // of numbers of size one: some sums of a few terms
 constexpr Eigen::Index kModes = 5;
@@ -246,5 +246,5 @@ TEST(PlaneContacts, WhatIsTooFarAwayIsNotLookedAt) {
   }
 }
 
-}  // namespace
+}  // namespace plane_contacts_test
 }  // namespace exmat::runtime

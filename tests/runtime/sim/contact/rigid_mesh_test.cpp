@@ -12,7 +12,7 @@
 #include "tests/support/surfaces.h"
 
 namespace exmat::runtime {
-namespace {
+namespace rigid_mesh_test {
 
 using test::random_vector;
 
@@ -186,5 +186,5 @@ TEST(RigidMesh, QueriesDoNotAllocate) {
   EXPECT_EQ(allocations.count(), 0u);
 }
 
-}  // namespace
+}  // namespace rigid_mesh_test
 }  // namespace exmat::runtime

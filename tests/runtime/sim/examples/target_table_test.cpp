@@ -9,7 +9,7 @@
 #include "tests/support/random.h"
 
 namespace exmat::runtime {
-namespace {
+namespace target_table_test {
 
 constexpr Eigen::Index kModes = 13;
 
@@ -327,5 +327,5 @@ TEST_P(PiecesTest, DoNotAllocate) {
   EXPECT_EQ(allocations, 0U);
 }
 
-}  // namespace
+}  // namespace target_table_test
 }  // namespace exmat::runtime

@@ -12,7 +12,7 @@
 #include "tests/support/synthetic_model.h"
 
 namespace exmat::runtime {
-namespace {
+namespace free_flight_test {
 
 using test::Bar;
 
@@ -406,5 +406,5 @@ TEST(FreeFlight, StrongExampleForcesKeepTheMomenta) {
   }
 }
 
-}  // namespace
+}  // namespace free_flight_test
 }  // namespace exmat::runtime

@@ -15,6 +15,8 @@
 
 namespace exmat::runtime::test {
 
+using namespace exmat::test;  // so that test:: is one
+
 /// Half of a sphere about the z axis, from its equator to its pole, as a meridian of triangles turned about the axis.
 struct HalfSphereOptions {
   double radius = 1;

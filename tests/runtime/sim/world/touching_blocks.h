@@ -10,6 +10,8 @@
 
 namespace exmat::runtime::test {
 
+using namespace exmat::test;  // so that test:: is one
+
 /// Free or clamped blocks of one model, in a world.
 struct Blocks {
   explicit Blocks(double time_step, const exmat::test::BarOptions& options = free_block(), bool meets_itself = false)

@@ -1,0 +1,236 @@
+#include "precompute/pipeline/settled_poses.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <fmt/format.h>
+#include <memory>
+#include <numbers>
+
+#include "common/core/error.h"
+#include "common/mesh/geometry.h"
+#include "precompute/fem/rigid_moments.h"
+#include "precompute/targets/target_table.h"
+#include "precompute/training/reduced_runs.h"
+#include "runtime/sim/step/stepper.h"
+
+namespace exmat::precompute {
+namespace {
+
+using runtime::ExampleSettings;
+
+constexpr double kPeriods = 1e4;         // of the lowest mode in one step: no inertia is left, but for its square
+constexpr double kTolerance = 1e-10;     // of Newton's method, since weak modes resist little of what strong ones do
+constexpr int kMostSteps = 50;           // each minimises the potential
+constexpr double kSettledChange = 1e-9;  // of q in a step
+constexpr double kStrongest = 1e6;       // times the stiffness of the highest mode, or the body's own
+constexpr double kNextStrength = 10;     // from one strength that is tried to the next
+constexpr double kGood = 0.05;           // an error that needs no advice
+
+using Coordinates = std::optional<Eigen::VectorXd>;  // q [r]; nothing where the body does not settle
+
+// The whole body's, or those of a region.
+template <typename Model>
+auto& examples_of(Model& model, const std::string& region) {
+  return region.empty() ? *model.examples : std::ranges::find(model.regions, region, &RegionData::name)->examples;
+}
+
+class PoseSettler {
+ public:
+  PoseSettler(const BodyStages& stages, const ReducedModel& model, const std::optional<SettlingLoad>& load);
+
+  SettledPose settle(Eigen::Index group, Eigen::Index k) const;
+  const std::optional<TargetTableData>& targets() const { return model_.targets; }
+
+ private:
+  void compensate();
+  std::vector<double> strengths(Eigen::Index group) const;
+  Coordinates settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                      const Eigen::Vector3d& gravity) const;
+  bool is_elastic(Eigen::Index group) const { return load_.examples[static_cast<std::size_t>(group)].elastic; }
+  Eigen::VectorXd field(Eigen::Index group, const Eigen::VectorXd& q) const {
+    return stages_.fitter->seen(group, model_.modal->basis * q);
+  }
+  double norm(const Eigen::VectorXd& field) const { return std::sqrt(field.dot(stages_.system.full_mass * field)); }
+  double error(Eigen::Index group, Eigen::Index k, const Coordinates& q) const;
+
+  const BodyStages& stages_;
+  ReducedModel model_;
+  SettlingLoad load_;
+  std::shared_ptr<const runtime::Model> plain_;   // its targets are those of the examples
+  std::shared_ptr<const runtime::Model> loaded_;  // compensated, if asked for
+};
+
+PoseSettler::PoseSettler(const BodyStages& stages, const ReducedModel& model, const std::optional<SettlingLoad>& load)
+    : stages_(stages), model_(model), load_(load.value_or(SettlingLoad{})) {
+  if (!model_.rigid && !stages.system.constrained())
+    model_.rigid = rigid_moments(stages.object.mesh, stages.object.materials.density, model.modal->basis);
+  load_.examples.resize(static_cast<std::size_t>(stages.fitter->groups()));
+  plain_ = loaded_ = stepped_model(model_, reference_of(stages_), load_.examples);
+  if (load_.compensate) compensate();
+}
+
+// Of the forces that are tried: from that of the lowest mode to one that leaves nothing to elasticity.
+std::vector<double> PoseSettler::strengths(Eigen::Index group) const {
+  const Eigen::VectorXd& modes = stages_.modes.eigenvalues;
+  const double most = kStrongest * (is_elastic(group) ? 1 : modes.tail(1)[0]);
+  std::vector<double> all;
+  for (double strength = is_elastic(group) ? 1 : modes[0]; strength <= most; strength *= kNextStrength)
+    all.push_back(strength);
+  return all;
+}
+
+// The forces of other groups are left out.
+Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                                 const Eigen::Vector3d& gravity) const {
+  runtime::StepScene scene;
+  scene.integrator = Integrator::kBackwardEuler;
+  scene.time_step = kPeriods * 2 * std::numbers::pi / std::sqrt(stages_.modes.eigenvalues[0]);
+  scene.newton.tolerance = kTolerance;
+  if (stages_.system.constrained()) scene.gravity = gravity;
+  scene.gravity_force = runtime::gravity_force(model, scene.gravity);
+  scene.examples.resize(load_.examples.size());
+  ExampleSettings& own = scene.examples[static_cast<std::size_t>(group)];
+  own.stiffness = stiffness;
+  own.elastic = is_elastic(group);
+  own.given_weights = Eigen::VectorXd::Unit(std::ssize(examples_of(model_, stages_.fitter->region(group)).examples), k);
+  runtime::State state = runtime::make_state(model);
+  runtime::Workspace workspace(model, scene);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Eigen::VectorXd before = state.q;
+    if ((runtime::step(model, scene, state, workspace).status & runtime::kStepNonFinite) != 0) return std::nullopt;
+    if ((state.q - before).norm() <= kSettledChange * state.q.norm()) return state.q;
+    state.v.setZero();
+    state.begins_anew = true;
+  }
+  return std::nullopt;
+}
+
+double PoseSettler::error(Eigen::Index group, Eigen::Index k, const Coordinates& q) const {
+  if (!q) return 1;
+  const Eigen::VectorXd given = stages_.fitter->pose_fields(group, k).given;
+  return norm(field(group, *q) - given) / norm(given);
+}
+
+SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
+  const PoseFitter& fitter = *stages_.fitter;
+  const PoseFitter::PoseFields pose = fitter.pose_fields(group, k);
+  const double size = norm(pose.given);
+  const Eigen::VectorXd in_basis =
+      field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * pose.given));
+  SettledPose found{.region = fitter.region(group),
+                    .example = examples_of(model_, fitter.region(group)).examples[static_cast<std::size_t>(k)].name};
+  found.basis = norm(pose.given - in_basis) / size;
+  found.clamp = norm(pose.carried - pose.clamped) / size;
+  found.compensable = found.region.empty() && model_.targets && !is_elastic(group);
+
+  Coordinates best;
+  for (const double strength : strengths(group)) {
+    Coordinates q = settled(*plain_, group, k, strength, Eigen::Vector3d::Zero());
+    if (q && (!best || error(group, k, q) < error(group, k, best))) best = std::move(q);
+  }
+  Coordinates q = best;
+  found.best = error(group, k, best);
+  const double stiffness = load_.examples[static_cast<std::size_t>(group)].stiffness;
+  if (stiffness > 0) {
+    q = settled(*loaded_, group, k, stiffness, load_.gravity);
+    found.loaded = error(group, k, q);
+  }
+  found.settles = best && q;
+  if (!found.settles) return found;
+  found.eigenfunctions = norm(in_basis - field(group, *best)) / size;
+  found.force = norm(field(group, *q) - field(group, *best)) / size;
+  if (found.force > std::max(found.basis, found.eigenfunctions))
+    found.stronger = error(group, k, settled(*loaded_, group, k, kNextStrength * stiffness, load_.gravity));
+  const Eigen::VectorXd off = field(group, *q) - pose.given;
+  const Eigen::VectorXd distances = off.reshaped<Eigen::RowMajor>(off.size() / 3, 3).rowwise().norm();
+  found.distance = distances.maxCoeff(&found.vertex);
+  return found;
+}
+
+// By the force of one strength that holds all poses best under gravity.
+void PoseSettler::compensate() {
+  const auto refuse = [&](const std::string& expected, const std::string& found, const std::string& advice) {
+    throw InputError({load_.file, "/examples/compensate", expected, found, advice});
+  };
+  if (!model_.targets)
+    refuse("a table of targets, of 2 to 4 examples of the whole body", "none",
+           "leave compensate out, or have the asset make a table: targets.tolerance");
+  const Eigen::Index count = std::ssize(model_.examples->examples);
+  double chosen = 0, least = 0;
+  for (const double strength : strengths(0)) {
+    double worst = 0;
+    for (Eigen::Index k = 1; k < count; ++k)
+      worst = std::max(worst, error(0, k, settled(*plain_, 0, k, strength, load_.gravity)));
+    if (chosen > 0 && worst >= least) continue;
+    chosen = strength;
+    least = worst;
+  }
+  const runtime::ExampleModel& force = plain_->examples.front();
+  const double stiffness = load_.examples.front().stiffness;
+  runtime::TargetTable::Workspace workspace = force.table->make_workspace();
+  Eigen::MatrixXd shifts(plain_->modes(), count);
+  Eigen::VectorXd pull(plain_->modes());
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const Coordinates q = settled(*plain_, 0, k, chosen, load_.gravity);
+    if (!q)
+      refuse("examples that the body settles in", model_.examples->examples[static_cast<std::size_t>(k)].name,
+             "leave compensate out");
+    force.table->evaluate(Eigen::VectorXd::Unit(count, k), workspace, pull);
+    shifts.col(k) = (chosen / stiffness - 1) * (pull - force.filter.matrix() * *q);
+  }
+  shift_targets(shifts, *model_.targets);
+  model_.targets->compensated_stiffness = stiffness;
+  model_.targets->compensated_gravity = load_.gravity;
+  loaded_ = stepped_model(model_, reference_of(stages_), load_.examples);
+}
+
+std::string advice_on(const SettledPose& pose) {
+  if (pose.error() <= kGood) return "";
+  if (pose.stronger)
+    return fmt::format("; ten times examples.stiffness would leave {:.1f} %{}", 100 * *pose.stronger,
+                       pose.compensable ? ", examples.compensate about what is best" : "");
+  if (pose.eigenfunctions > pose.basis)
+    return "; more shape_space.eigenfunctions, or a shape_space.tolerance, would hold more of the pose";
+  if (2 * pose.clamp > pose.basis)
+    return "; the pose moves fixed vertices: leave these at rest in it, or out of object.fixed";
+  return "; a larger basis.size would hold more of the pose";
+}
+
+}  // namespace
+
+std::vector<SettledPose> settle_examples(const BodyStages& stages, const std::optional<SettlingLoad>& load,
+                                         ReducedModel& model) {
+  const PoseSettler settler(stages, model, load);
+  model.targets = settler.targets();
+  std::vector<SettledPose> all;
+  for (Eigen::Index group = 0; group < stages.fitter->groups(); ++group) {
+    auto& examples = examples_of(model, stages.fitter->region(group)).examples;
+    for (Eigen::Index k = 1; k < std::ssize(examples); ++k) {
+      const SettledPose& found = all.emplace_back(settler.settle(group, k));
+      ExampleData& example = examples[static_cast<std::size_t>(k)];
+      example.best_error = found.best;
+      example.settled_error = found.error();
+      example.settled_distance = found.distance;
+      example.settled_vertex = found.vertex;
+    }
+  }
+  return all;
+}
+
+std::string to_string(const SettledPose& pose, const ReducedModel& model) {
+  const std::string name =
+      pose.region.empty() ? pose.example : fmt::format("{} in region {}", pose.example, pose.region);
+  if (!pose.settles) return fmt::format("{}: the body does not settle with this example", name);
+  const VertexArray& vertices = model.object->mesh.vertices;
+  const Eigen::RowVector3d at = vertices.row(pose.vertex);
+  return fmt::format(
+      "{}: settled {}{:.1f} % of its displacement from the pose, {:.3g} m ({:.1f} % of the size) at ({:.3g}, {:.3g}, "
+      "{:.3g}){}; by the basis {:.1f} (clamp {:.1f}), eigenfunctions {:.1f}, force {:.1f} %{}",
+      name, pose.loaded ? "" : "at best ", 100 * pose.error(), pose.distance,
+      100 * pose.distance / bounding_box_diagonal(vertices), at[0], at[1], at[2],
+      pose.loaded ? fmt::format(", at best {:.1f} %", 100 * pose.best) : "", 100 * pose.basis, 100 * pose.clamp,
+      100 * pose.eigenfunctions, 100 * pose.force, advice_on(pose));
+}
+
+}  // namespace exmat::precompute
