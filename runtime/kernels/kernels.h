@@ -194,6 +194,50 @@ struct alignas(kAlignment) PlaneContactPanel {
 inline constexpr std::ptrdiff_t kPlaneSums = 9;
 inline constexpr std::ptrdiff_t kPlaneFactors = 3 * kLanes;
 
+// All vertices of a mesh. Fields hold four numbers for each of the n vertices that move: x, y, z and 0.
+inline constexpr std::ptrdiff_t kMeshLanes = 16;  ///< elements of a panel, of the floats of a wide register
+
+/// Elements of common/mesh/elements.h, and two symmetric scalar matrices [n x n] on one pattern.
+struct MeshArrays {
+  std::ptrdiff_t vertices = 0;               ///< n
+  std::ptrdiff_t panels = 0;                 ///< of kMeshLanes elements; those that pad have no corners
+  const int* starts = nullptr;               ///< panels x kMeshLanes + 1, into `corners`
+  const int* corners = nullptr;              ///< vertices of each element that move
+  const double* gradients = nullptr;         ///< three of each corner [1/m]
+  const float* rounded_gradients = nullptr;  ///< the same
+  /// panels x kMeshLanes, V beta mu of smoothed elements: the variance term is that of the tets less this of the rings.
+  const double* variance = nullptr;
+  const int* rows = nullptr;        ///< n, in an order in which rows of one length are together
+  const int* row_starts = nullptr;  ///< n + 1, in that order, into `columns`
+  const int* columns = nullptr;
+  const double* mass = nullptr;             ///< [kg]
+  const double* variance_matrix = nullptr;  ///< sum over the tets of V beta mu grad N_i . grad N_j [N/m]
+};
+
+/// What a step's potential is made of besides the law: fields x, a = q - q_a and w = q - q_v, see StepForm.
+struct MeshInertia {
+  const double *displacement = nullptr, *offset = nullptr, *rate = nullptr;
+  double acceleration_factor = 0;  ///< c_a
+  double mass_damping = 0;         ///< alpha c_v
+  double stiffness_damping = 0;    ///< beta c_v
+};
+/// Inertia 1/2 c_a a M a, damping 1/2 c_v w D w, elastic energy [J].
+inline constexpr std::ptrdiff_t kMeshSums = 3;
+
+/// L L^T of a scalar matrix [n x n], L below its diagonal by rows and by columns.
+struct MeshFactor {
+  std::ptrdiff_t size = 0;
+  const int *row_starts = nullptr, *columns = nullptr, *column_starts = nullptr, *rows = nullptr;
+  const float *by_row = nullptr, *by_column = nullptr, *inverse_diagonal = nullptr;
+};
+
+/// m scalar functions of the vertices: n x stride, rows padded with zeros to kMeshLanes. Coefficients: 3 x stride.
+template <class Number>
+struct MeshFilter {
+  std::ptrdiff_t vertices = 0, stride = 0;
+  const Number* functions = nullptr;
+};
+
 struct Kernels {
   const char* name;
 
@@ -358,6 +402,28 @@ struct Kernels {
   void (*choose_weights)(const WeightCandidates&, const double* load, double* weights);
   /// values: all polynomials at weights [K], in order; scratch: lane_bernstein_scratch(D, K).
   void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
+
+  // Of a whole mesh, see above; the law is that of a material, without shifts, times the volumes.
+
+  /// inertia = c_a M a, force = c_v (alpha M + beta V) w + V x, V the variance matrix; sums [kMeshSums] of these terms.
+  void (*mesh_inertia)(const MeshArrays&, const MeshInertia&, double* inertia, double* force, double* sums);
+  /// Adds those of the elements to force and sums. frozen: padded elements x 45 in panels of kLanes, their tangents
+  /// that damping has; not read where there is no such damping.
+  void (*mesh_force)(const MeshArrays&, const ElementLaw&, const MeshInertia&, const double* frozen, double* force,
+                     double* sums);
+  /// The same, and tangents: panels x 45 x kMeshLanes, those at x and beta c_v times the frozen ones. `freeze`: sets
+  /// the frozen ones to those at x first.
+  void (*mesh_force_and_tangents)(const MeshArrays&, const ElementLaw&, const MeshInertia&, bool freeze, double* frozen,
+                                  float* tangents, double* force, double* sums);
+  /// product = matrix x + sum over the elements of B^T T B x; the matrix on the pattern of the mass.
+  void (*mesh_product)(const MeshArrays&, const float* matrix, const float* tangents, const float* x, float* product);
+  /// x = (L L^T)^-1 right.
+  void (*mesh_solve)(const MeshFactor&, const float* right, float* x);
+  /// coefficients = functions^T field; field += factor functions coefficients.
+  void (*mesh_coefficients)(const MeshFilter<double>&, const double* field, double* coefficients);
+  void (*mesh_rounded_coefficients)(const MeshFilter<float>&, const float* field, float* coefficients);
+  void (*mesh_add_functions)(const MeshFilter<double>&, double factor, const double* coefficients, double* field);
+  void (*mesh_add_rounded_functions)(const MeshFilter<float>&, float factor, const float* coefficients, float* field);
 };
 
 enum class InstructionSet { kPortable, kAvx2, kAvx512 };

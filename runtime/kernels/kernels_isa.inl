@@ -420,6 +420,7 @@ void positions(const float* rest, const float* basis, Index blocks, Index modes,
 #include "runtime/kernels/lanes_polynomial_isa.inl"
 #include "runtime/kernels/lanes_rotation_isa.inl"
 #include "runtime/kernels/lanes_vectors_isa.inl"
+#include "runtime/kernels/mesh_isa.inl"
 #include "runtime/kernels/planes_isa.inl"
 #include "runtime/kernels/rotation_isa.inl"
 #include "runtime/kernels/triangles_isa.inl"
@@ -479,6 +480,15 @@ const Kernels EXMAT_SIMD_KERNELS{EXMAT_SIMD_NAME,
                                  lanes_gyroscopic_product,
                                  lanes_weights,
                                  choose_weights,
-                                 lanes_bernstein};
+                                 lanes_bernstein,
+                                 mesh_inertia,
+                                 mesh_force,
+                                 mesh_force_and_tangents,
+                                 mesh_product,
+                                 mesh_solve,
+                                 mesh_coefficients,
+                                 mesh_rounded_coefficients,
+                                 mesh_add_functions,
+                                 mesh_add_rounded_functions};
 
 }  // namespace exmat::runtime

@@ -1,0 +1,306 @@
+// Elements of a whole mesh, for kernels_isa.inl, which includes this file. A vertex is a register of four numbers, so
+// gathers and scatters need no shuffles but where four elements change into lanes of a law.
+
+using Quad = double __attribute__((vector_size(4 * sizeof(double))));
+using FloatQuad = float __attribute__((vector_size(4 * sizeof(float))));
+using StoredQuad = Quad __attribute__((may_alias, aligned(alignof(double))));
+using StoredFloatQuad = FloatQuad __attribute__((may_alias, aligned(alignof(float))));
+
+inline Quad load_quad(const double* p) { return *reinterpret_cast<const StoredQuad*>(p); }
+inline void store_quad(double* p, Quad v) { *reinterpret_cast<StoredQuad*>(p) = v; }
+inline FloatQuad load_quad(const float* p) { return *reinterpret_cast<const StoredFloatQuad*>(p); }
+inline void store_quad(float* p, FloatQuad v) { *reinterpret_cast<StoredFloatQuad*>(p) = v; }
+
+template <class Number>
+using QuadOf = decltype(load_quad(static_cast<const Number*>(nullptr)));
+
+template <class Four>
+inline void transpose(Four* rows) {
+  const Four a = __builtin_shufflevector(rows[0], rows[1], 0, 4, 2, 6),
+             b = __builtin_shufflevector(rows[0], rows[1], 1, 5, 3, 7),
+             c = __builtin_shufflevector(rows[2], rows[3], 0, 4, 2, 6),
+             d = __builtin_shufflevector(rows[2], rows[3], 1, 5, 3, 7);
+  rows[0] = __builtin_shufflevector(a, c, 0, 1, 4, 5);
+  rows[1] = __builtin_shufflevector(b, d, 0, 1, 4, 5);
+  rows[2] = __builtin_shufflevector(a, c, 2, 3, 6, 7);
+  rows[3] = __builtin_shufflevector(b, d, 2, 3, 6, 7);
+}
+
+inline const double* gradients_of(const MeshArrays& mesh, double) { return mesh.gradients; }
+inline const float* gradients_of(const MeshArrays& mesh, float) { return mesh.rounded_gradients; }
+
+/// H [9 x lanes] of the elements from `first` on, of a field of vertices.
+template <Index lanes, class Number>
+inline void gather_gradients(const MeshArrays& mesh, Index first, const Number* field, Number* H) {
+  const Number* gradients = gradients_of(mesh, Number{});
+  for (Index group = 0; group < lanes; group += 4) {
+    QuadOf<Number> columns[3][4];
+#pragma GCC unroll 4
+    for (Index i = 0; i < 4; ++i) {
+      QuadOf<Number> x{}, y{}, z{};
+      const Index element = first + group + i, end = mesh.starts[element + 1];
+      for (Index k = mesh.starts[element]; k < end; ++k) {
+        const QuadOf<Number> u = load_quad(field + 4 * mesh.corners[k]);
+        x += u * gradients[3 * k];
+        y += u * gradients[3 * k + 1];
+        z += u * gradients[3 * k + 2];
+      }
+      columns[0][i] = x;
+      columns[1][i] = y;
+      columns[2][i] = z;
+    }
+#pragma GCC unroll 3
+    for (Index b = 0; b < 3; ++b) {
+      transpose(columns[b]);
+#pragma GCC unroll 3
+      for (Index a = 0; a < 3; ++a) store_quad(H + (3 * a + b) * lanes + group, columns[b][a]);
+    }
+  }
+}
+
+/// forces += P b of the elements from `first` on, of stresses [9 x lanes].
+template <Index lanes, class Number>
+inline void scatter_stresses(const MeshArrays& mesh, Index first, const Number* P, Number* forces) {
+  const Number* gradients = gradients_of(mesh, Number{});
+  for (Index group = 0; group < lanes; group += 4) {
+    QuadOf<Number> columns[3][4];
+#pragma GCC unroll 3
+    for (Index b = 0; b < 3; ++b) {
+#pragma GCC unroll 3
+      for (Index a = 0; a < 3; ++a) columns[b][a] = load_quad(P + (3 * a + b) * lanes + group);
+      columns[b][3] = QuadOf<Number>{};
+      transpose(columns[b]);
+    }
+#pragma GCC unroll 4
+    for (Index i = 0; i < 4; ++i) {
+      const Index element = first + group + i, end = mesh.starts[element + 1];
+      for (Index k = mesh.starts[element]; k < end; ++k) {
+        Number* force = forces + 4 * mesh.corners[k];
+        store_quad(force, load_quad(force) + columns[0][i] * gradients[3 * k] + columns[1][i] * gradients[3 * k + 1] +
+                              columns[2][i] * gradients[3 * k + 2]);
+      }
+    }
+  }
+}
+
+/// image [9] = T x, T the upper triangle by rows of a symmetric 9 x 9, its numbers `stride` apart.
+template <class Lanes, class Number>
+inline void tangent_product(const Number* tangent, Index stride, const Lanes* x, Lanes* image) {
+  for (Index i = 0; i < 9; ++i) image[i] = Lanes{};
+  Index entry = 0;
+#pragma GCC unroll 9
+  for (Index i = 0; i < 9; ++i) {
+    image[i] += load(tangent + entry++ * stride) * x[i];
+#pragma GCC unroll 9
+    for (Index j = i + 1; j < 9; ++j, ++entry) {
+      const Lanes value = load(tangent + entry * stride);
+      image[i] += value * x[j];
+      image[j] += value * x[i];
+    }
+  }
+}
+
+void mesh_inertia(const MeshArrays& mesh, const MeshInertia& terms, double* inertia_force, double* force,
+                  double* sums) {
+  Quad inertia{}, damping{}, spread{};
+  for (Index i = 0; i < mesh.vertices; ++i) {
+    const Index row = mesh.rows[i], end = mesh.row_starts[i + 1];
+    Quad Ma{}, Mw{}, Lx{}, Lw{};
+    for (Index k = mesh.row_starts[i]; k < end; ++k) {
+      const Index column = 4 * mesh.columns[k];
+      const double mass = mesh.mass[k], variance = mesh.variance_matrix[k];
+      const Quad w = load_quad(terms.rate + column);
+      Ma += load_quad(terms.offset + column) * mass;
+      Mw += w * mass;
+      Lx += load_quad(terms.displacement + column) * variance;
+      Lw += w * variance;
+    }
+    Ma *= terms.acceleration_factor;
+    const Quad damped = Mw * terms.mass_damping + Lw * terms.stiffness_damping;
+    store_quad(inertia_force + 4 * row, Ma);
+    store_quad(force + 4 * row, damped + Lx);
+    inertia += Ma * load_quad(terms.offset + 4 * row);
+    damping += damped * load_quad(terms.rate + 4 * row);
+    spread += Lx * load_quad(terms.displacement + 4 * row);
+  }
+  const auto add_up = [](Quad v) { return (v[0] + v[1]) + v[2]; };
+  sums[0] = 0.5 * add_up(inertia);
+  sums[1] = 0.5 * add_up(damping);
+  sums[2] = 0.5 * add_up(spread);
+}
+
+/// As mesh_force() and mesh_force_and_tangents().
+template <Want want, class Law>
+inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const MeshInertia& terms, bool freeze,
+                          double* frozen, float* tangents, double* force, double* sums) {
+  alignas(kAlignment) double H[9 * kLanes], rates[9 * kLanes], P[9 * kLanes], tangent[kTangentNumbers * kLanes];
+  const bool damped = terms.stiffness_damping > 0;
+  Vec elastic = zero(), damping = zero();
+  for (Index first = 0; first < mesh.panels * kMeshLanes; first += kLanes) {
+    double* const own_frozen = damped ? frozen + first * kTangentNumbers : nullptr;
+    gather_gradients<kLanes>(mesh, first, terms.displacement, H);
+    if (damped) gather_gradients<kLanes>(mesh, first, terms.rate, rates);
+    for (Index lane = 0; lane < kLanes; lane += kWidth) {
+      Vec h[9], p[9];
+      for (Index i = 0; i < 9; ++i) h[i] = load(H + i * kLanes + lane);
+      elastic += evaluate_law<want, Law>(law, first + lane, h, p, tangent + lane);
+      const Vec variance = load(mesh.variance + first + lane);
+      elastic -= 0.5 * variance * dot(h, h, 9);
+      for (Index i = 0; i < 9; ++i) p[i] -= variance * h[i];
+      if constexpr (want == Want::kStiffness) {
+        for (Index i = 0; i < 9; ++i) add_to(tangent + triangle_entry<9>(i, i) * kLanes + lane, -variance);
+        if (damped && freeze)
+          for (Index k = 0; k < kTangentNumbers; ++k)
+            store(own_frozen + k * kLanes + lane, load(tangent + k * kLanes + lane));
+      }
+      if (damped) {
+        Vec w[9], image[9];
+        for (Index i = 0; i < 9; ++i) w[i] = load(rates + i * kLanes + lane);
+        tangent_product(own_frozen + lane, kLanes, w, image);
+        for (Index i = 0; i < 9; ++i) {
+          image[i] *= terms.stiffness_damping;
+          p[i] += image[i];
+        }
+        damping += dot(w, image, 9);
+      }
+      for (Index i = 0; i < 9; ++i) store(P + i * kLanes + lane, p[i]);
+    }
+    scatter_stresses<kLanes>(mesh, first, P, force);
+    if constexpr (want == Want::kStiffness) {
+      float* const rounded = tangents + first / kMeshLanes * kTangentNumbers * kMeshLanes + first % kMeshLanes;
+      for (Index k = 0; k < kTangentNumbers; ++k)
+        for (Index lane = 0; lane < kLanes; ++lane) {
+          double value = tangent[k * kLanes + lane];
+          if (damped) value += terms.stiffness_damping * own_frozen[k * kLanes + lane];
+          rounded[k * kMeshLanes + lane] = static_cast<float>(value);
+        }
+    }
+  }
+  sums[1] += 0.5 * sum(damping);
+  sums[2] += sum(elastic);
+}
+
+void mesh_force(const MeshArrays& mesh, const ElementLaw& law, const MeshInertia& terms, const double* frozen,
+                double* force, double* sums) {
+  with_law(law, [&]<class Law>() {
+    evaluate_mesh<Want::kForce, Law>(mesh, law, terms, false, const_cast<double*>(frozen), nullptr, force, sums);
+  });
+}
+
+void mesh_force_and_tangents(const MeshArrays& mesh, const ElementLaw& law, const MeshInertia& terms, bool freeze,
+                             double* frozen, float* tangents, double* force, double* sums) {
+  with_law(law, [&]<class Law>() {
+    evaluate_mesh<Want::kStiffness, Law>(mesh, law, terms, freeze, frozen, tangents, force, sums);
+  });
+}
+
+void mesh_product(const MeshArrays& mesh, const float* matrix, const float* tangents, const float* x, float* product) {
+  constexpr Index kFloats = 2 * kWidth;
+  for (Index i = 0; i < mesh.vertices; ++i) {
+    FloatQuad even{}, odd{};
+    const Index end = mesh.row_starts[i + 1];
+    Index k = mesh.row_starts[i];
+    for (; k + 1 < end; k += 2) {
+      even += load_quad(x + 4 * mesh.columns[k]) * matrix[k];
+      odd += load_quad(x + 4 * mesh.columns[k + 1]) * matrix[k + 1];
+    }
+    if (k < end) even += load_quad(x + 4 * mesh.columns[k]) * matrix[k];
+    store_quad(product + 4 * mesh.rows[i], even + odd);
+  }
+  alignas(kAlignment) float H[9 * kMeshLanes];
+  for (Index panel = 0; panel < mesh.panels; ++panel) {
+    gather_gradients<kMeshLanes>(mesh, panel * kMeshLanes, x, H);
+    for (Index lane = 0; lane < kMeshLanes; lane += kFloats) {
+      FloatVec h[9], image[9];
+      for (Index i = 0; i < 9; ++i) h[i] = load(H + i * kMeshLanes + lane);
+      tangent_product(tangents + panel * kTangentNumbers * kMeshLanes + lane, kMeshLanes, h, image);
+      for (Index i = 0; i < 9; ++i) store(H + i * kMeshLanes + lane, image[i]);
+    }
+    scatter_stresses<kMeshLanes>(mesh, panel * kMeshLanes, H, product);
+  }
+}
+
+/// value - sum of numbers times the places at `indices`.
+inline FloatQuad less_products(FloatQuad value, const float* numbers, const int* indices, Index count, const float* x) {
+  FloatQuad other{};
+  Index k = 0;
+  for (; k + 1 < count; k += 2) {
+    other -= load_quad(x + 4 * indices[k]) * numbers[k];
+    value -= load_quad(x + 4 * indices[k + 1]) * numbers[k + 1];
+  }
+  if (k < count) other -= load_quad(x + 4 * indices[k]) * numbers[k];
+  return value + other;
+}
+
+void mesh_solve(const MeshFactor& factor, const float* right, float* x) {
+  for (Index i = 0; i < factor.size; ++i) {
+    const Index start = factor.row_starts[i];
+    store_quad(x + 4 * i, less_products(load_quad(right + 4 * i), factor.by_row + start, factor.columns + start,
+                                        factor.row_starts[i + 1] - start, x) *
+                              factor.inverse_diagonal[i]);
+  }
+  for (Index i = factor.size - 1; i >= 0; --i) {
+    const Index start = factor.column_starts[i];
+    store_quad(x + 4 * i, less_products(load_quad(x + 4 * i), factor.by_column + start, factor.rows + start,
+                                        factor.column_starts[i + 1] - start, x) *
+                              factor.inverse_diagonal[i]);
+  }
+}
+
+template <class Lanes, Index vectors, class Number>
+inline void filter_strip(const MeshFilter<Number>& filter, const Number* field, Index first, Number* coefficients) {
+  constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
+  Lanes sums[3][vectors] = {};
+  const Number* row = filter.functions + first;
+  for (Index i = 0; i < filter.vertices; ++i, row += filter.stride, field += 4)
+#pragma GCC unroll 2
+    for (Index v = 0; v < vectors; ++v) {
+      const Lanes value = load(row + v * kNumbers);
+#pragma GCC unroll 3
+      for (Index a = 0; a < 3; ++a) sums[a][v] += value * field[a];
+    }
+  for (Index a = 0; a < 3; ++a)
+    for (Index v = 0; v < vectors; ++v) store(coefficients + a * filter.stride + first + v * kNumbers, sums[a][v]);
+}
+
+template <class Lanes, class Number>
+inline void coefficients_of(const MeshFilter<Number>& filter, const Number* field, Number* coefficients) {
+  constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
+  Index first = 0;
+  for (; first + 2 * kNumbers <= filter.stride; first += 2 * kNumbers)
+    filter_strip<Lanes, 2>(filter, field, first, coefficients);
+  if (first < filter.stride) filter_strip<Lanes, 1>(filter, field, first, coefficients);
+}
+
+template <class Lanes, class Number>
+inline void add_functions(const MeshFilter<Number>& filter, Number factor, const Number* coefficients, Number* field) {
+  constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
+  const Number* row = filter.functions;
+  for (Index i = 0; i < filter.vertices; ++i, row += filter.stride, field += 4) {
+    Lanes sums[3] = {};
+    for (Index k = 0; k < filter.stride; k += kNumbers) {
+      const Lanes value = load(row + k);
+#pragma GCC unroll 3
+      for (Index a = 0; a < 3; ++a) sums[a] += value * load(coefficients + a * filter.stride + k);
+    }
+    for (Index a = 0; a < 3; ++a) {
+      Number total = 0;
+      for (Index lane = 0; lane < kNumbers; ++lane) total += sums[a][lane];
+      field[a] += factor * total;
+    }
+  }
+}
+
+void mesh_coefficients(const MeshFilter<double>& filter, const double* field, double* coefficients) {
+  coefficients_of<Vec>(filter, field, coefficients);
+}
+void mesh_rounded_coefficients(const MeshFilter<float>& filter, const float* field, float* coefficients) {
+  coefficients_of<FloatVec>(filter, field, coefficients);
+}
+void mesh_add_functions(const MeshFilter<double>& filter, double factor, const double* coefficients, double* field) {
+  add_functions<Vec>(filter, factor, coefficients, field);
+}
+void mesh_add_rounded_functions(const MeshFilter<float>& filter, float factor, const float* coefficients,
+                                float* field) {
+  add_functions<FloatVec>(filter, factor, coefficients, field);
+}

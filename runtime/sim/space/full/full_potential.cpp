@@ -1,0 +1,111 @@
+#include "runtime/sim/space/full/full_potential.h"
+
+namespace exmat::runtime {
+namespace {
+
+using Field = Eigen::Map<Eigen::VectorXd>;
+
+}  // namespace
+
+FullPotentialWorkspace::FullPotentialWorkspace(const FullSpace& space)
+    : start(Eigen::VectorXd::Zero(space.field_size())),
+      offset(start),
+      rate(start),
+      external(start),
+      unused(start),
+      x(space.field_size()),
+      a(x),
+      w(x),
+      inertia(x),
+      force(x),
+      frozen(space.padded_elements() * kTangentNumbers),
+      tangents(space.padded_elements() * kTangentNumbers),
+      coefficients(3 * space.filter().stride),
+      target(coefficients),
+      rate_coefficients(coefficients) {}
+
+void FullPotential::begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept {
+  FullPotentialWorkspace& work = workspace_;
+  space_.to_field(form_.acceleration_centre, work.offset);
+  space_.to_field(form_.velocity_centre, work.rate);
+  if (filters()) kernels().mesh_coefficients(space_.filter(), work.rate.data(), work.rate_coefficients.data());
+  space_.to_field(q, work.start);
+  space_.to_field(external, work.external);
+  work.offset = work.start - work.offset;
+  work.rate = work.start - work.rate;
+  external_norm_ = work.external.norm();
+  reach_ = space_.extent() + work.start.lpNorm<Eigen::Infinity>();
+}
+
+MeshInertia FullPotential::terms() const noexcept {
+  return {workspace_.x.data(),
+          workspace_.a.data(),
+          workspace_.w.data(),
+          form_.acceleration_factor,
+          scene_.mass_damping * form_.velocity_factor,
+          scene_.stiffness_damping * form_.velocity_factor};
+}
+
+double FullPotential::undamped_at_start(double elastic_energy) noexcept {
+  const Eigen::Index size = space_.field_size();
+  Field(workspace_.a.data(), size) = workspace_.offset;
+  std::array<double, kMeshSums> sums{};
+  kernels().mesh_inertia(space_.arrays(), terms(), workspace_.inertia.data(), workspace_.force.data(), sums.data());
+  return sums[0] + elastic_energy;
+}
+
+void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangents, bool freeze) noexcept {
+  const Eigen::Index size = space_.field_size();
+  FullPotentialWorkspace& work = workspace_;
+  Field(work.x.data(), size) = work.start + d;
+  Field(work.a.data(), size) = work.offset + d;
+  Field(work.w.data(), size) = work.rate + d;
+  const MeshArrays mesh = space_.arrays();
+  const ElementLaw law = space_.law();
+  const MeshInertia own = terms();
+  const Kernels& run = kernels();
+  run.mesh_inertia(mesh, own, work.inertia.data(), work.force.data(), sums_.data());
+  if (tangents == Tangents::kExact) {
+    run.mesh_force_and_tangents(mesh, law, own, freeze, work.frozen.data(), work.tangents.data(), work.force.data(),
+                                sums_.data());
+  } else {
+    if (tangents == Tangents::kProjected)
+      space_.projected_tangents(work.x.data(), own.stiffness_damping, freeze, work.frozen.data(), work.tangents.data());
+    run.mesh_force(mesh, law, own, work.frozen.data(), work.force.data(), sums_.data());
+  }
+  work_ = work.external.dot(d);
+}
+
+void FullPotential::set_coefficients() noexcept {
+  kernels().mesh_coefficients(space_.filter(), workspace_.x.data(), workspace_.coefficients.data());
+}
+
+PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) noexcept {
+  const Eigen::Index size = space_.field_size();
+  FullPotentialWorkspace& work = workspace_;
+  const Field inertia(work.inertia.data(), size), force(work.force.data(), size);
+  PotentialEvaluation evaluation;
+  evaluation.force_scale = external_norm_ + inertia.norm() + force.norm();
+  PotentialValue& total = evaluation.potential;
+  total.value = sums_[0] + sums_[1] + sums_[2];
+  total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>();
+  total.value -= work_;
+  gradient = inertia + force - work.external;
+  if (!filters()) return evaluation;
+
+  set_coefficients();
+  const double kappa = filter_stiffness(), damping = filter_damping();
+  double energy = 0;
+  for (Eigen::Index i = 0; i < work.coefficients.size(); ++i) {
+    const double from_target = work.coefficients[i] - work.target[i];
+    const double rate = work.coefficients[i] - work.rate_coefficients[i];
+    energy += 0.5 * (kappa * from_target * from_target + damping * rate * rate);
+    work.coefficients[i] = kappa * from_target + damping * rate;
+  }
+  kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), gradient.data());
+  total.value += energy;
+  total.magnitude += energy;
+  return evaluation;
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,308 @@
+#include "runtime/sim/space/full/full_space.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/OrderingMethods>
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <set>
+#include <tuple>
+#include <utility>
+
+#include "common/elastic/materials.h"
+#include "common/mesh/geometry.h"
+#include "runtime/sim/elasticity/element_potential.h"
+
+namespace exmat::runtime {
+namespace {
+
+// Of the scalar Laplacian that stands for the stiffness: mu and lambda of the material count so much. Anything between
+// half and 1.4 times as much needs about as many iterations.
+constexpr double kShearShare = 1.42, kVolumeShare = 0.5;
+
+// Elements or rows whose loops are of one length stand side by side, within stretches that stay in a cache.
+constexpr Eigen::Index kStretch = 256;
+
+template <typename Length>
+std::vector<std::int32_t> by_length(Eigen::Index count, const Length& length) {
+  std::vector<std::int32_t> order(static_cast<std::size_t>(count));
+  std::iota(order.begin(), order.end(), 0);
+  for (Eigen::Index begin = 0; begin < count; begin += kStretch)
+    std::stable_sort(order.begin() + begin, order.begin() + std::min(count, begin + kStretch),
+                     [&](std::int32_t a, std::int32_t b) { return length(a) < length(b); });
+  return order;
+}
+
+using Gradients = Eigen::Matrix<double, 4, 3>;
+
+}  // namespace
+
+FullSpace::FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed,
+                     const RowMatrix& filter)
+    : model_(materials.model), clamped_(fixed.any()) {
+  order_vertices(mesh, fixed);
+  add_matrices(mesh, materials);
+  add_elements(elements_of(mesh, materials), materials);
+  add_filter(filter);
+}
+
+void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed) {
+  std::vector<std::int32_t> moving(static_cast<std::size_t>(mesh.vertex_count()), -1);
+  std::int32_t count = 0;
+  for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v)
+    if (fixed[v] == 0) moving[static_cast<std::size_t>(v)] = count++;
+  std::vector<Eigen::Triplet<double>> entries;
+  double length = 0, edges = 0;
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        const std::int32_t a = mesh.tets(t, i), b = mesh.tets(t, j);
+        if (i < j) {
+          length += (mesh.vertices.row(a) - mesh.vertices.row(b)).norm();
+          ++edges;
+        }
+        if (fixed[a] == 0 && fixed[b] == 0)
+          entries.emplace_back(moving[static_cast<std::size_t>(a)], moving[static_cast<std::size_t>(b)], 1.0);
+      }
+  edge_ = length / edges;
+  extent_ = mesh.vertices.cwiseAbs().maxCoeff();
+  Eigen::SparseMatrix<double> pattern(count, count);
+  pattern.setFromTriplets(entries.begin(), entries.end());
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> order;
+  Eigen::AMDOrdering<int>()(pattern, order);
+  vertex_of_.assign(order.indices().data(), order.indices().data() + count);
+  std::vector<std::int32_t> place(static_cast<std::size_t>(count));
+  for (std::int32_t k = 0; k < count; ++k) place[static_cast<std::size_t>(vertex_of_[static_cast<std::size_t>(k)])] = k;
+  place_of_ = moving;
+  for (std::int32_t& at : place_of_)
+    if (at >= 0) at = place[static_cast<std::size_t>(at)];
+}
+
+void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials) {
+  const Eigen::Index n = vertices();
+  std::vector<std::set<std::int32_t>> neighbours(static_cast<std::size_t>(n));
+  const auto for_pairs = [&](Eigen::Index t, auto&& work) {
+    for (int i = 0; i < 4; ++i)
+      for (int j = 0; j < 4; ++j) {
+        const std::int32_t row = place_of_[static_cast<std::size_t>(mesh.tets(t, i))],
+                           column = place_of_[static_cast<std::size_t>(mesh.tets(t, j))];
+        if (row >= 0 && column >= 0) work(static_cast<std::size_t>(row), column, i, j);
+      }
+  };
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    for_pairs(t, [&](std::size_t row, std::int32_t column, int, int) { neighbours[row].insert(column); });
+  rows_ = by_length(n, [&](std::int32_t row) { return neighbours[static_cast<std::size_t>(row)].size(); });
+  std::vector<std::int32_t> start_of(static_cast<std::size_t>(n));
+  for (const std::int32_t row : rows_) {
+    const auto& own = neighbours[static_cast<std::size_t>(row)];
+    start_of[static_cast<std::size_t>(row)] = row_starts_.back();
+    columns_.insert(columns_.end(), own.begin(), own.end());
+    row_starts_.push_back(static_cast<std::int32_t>(columns_.size()));
+  }
+  mass_.assign(columns_.size(), 0);
+  variance_matrix_ = laplacian_ = mass_;
+  gravity_load_.setZero(size(), 3);
+  const Eigen::VectorXd volumes = tet_volumes(mesh);
+  const double beta = materials.formulation == Formulation::kSmoothed ? materials.variance_factor : 0;
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
+    const Gradients gradients = shape_gradients(tet_positions(mesh, t));
+    const LameParameters lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
+    const double mass = materials.density[t] * volumes[t];
+    for_pairs(t, [&](std::size_t row, std::int32_t column, int i, int j) {
+      const auto begin = columns_.begin() + start_of[row];
+      const auto k = static_cast<std::size_t>(
+          std::lower_bound(begin, begin + static_cast<std::ptrdiff_t>(neighbours[row].size()), column) -
+          columns_.begin());
+      const double laplacian = volumes[t] * gradients.row(i).dot(gradients.row(j));
+      mass_[k] += mass * (i == j ? 0.1 : 0.05);
+      variance_matrix_[k] += beta * lame.mu * laplacian;
+      laplacian_[k] += (kShearShare * lame.mu + kVolumeShare * lame.lambda) * laplacian;
+    });
+    for (int i = 0; i < 4; ++i)
+      if (const std::int32_t place = place_of_[static_cast<std::size_t>(mesh.tets(t, i))]; place >= 0)
+        gravity_load_.middleRows<3>(3 * vertex_of_[static_cast<std::size_t>(place)]).diagonal().array() += mass / 4;
+  }
+}
+
+void FullSpace::add_elements(const Elements& elements, const TetMaterials& materials) {
+  std::vector<std::int32_t> order(static_cast<std::size_t>(elements.count()));
+  std::iota(order.begin(), order.end(), 0);
+  const auto first_place = [&](std::int32_t element) {
+    std::int32_t least = static_cast<std::int32_t>(vertices());
+    for (const std::int32_t vertex : elements.vertices_of(element))
+      if (const std::int32_t place = place_of_[static_cast<std::size_t>(vertex)]; place >= 0)
+        least = std::min(least, place);
+    return least;
+  };
+  std::ranges::stable_sort(order, {}, first_place);
+  const auto moving = [&](std::int32_t element) {
+    return std::ranges::count_if(elements.vertices_of(element),
+                                 [&](std::int32_t vertex) { return place_of_[static_cast<std::size_t>(vertex)] >= 0; });
+  };
+  const std::vector<std::int32_t> within =
+      by_length(elements.count(), [&](std::int32_t i) { return moving(order[static_cast<std::size_t>(i)]); });
+  const Eigen::Index padded_count = (elements.count() + kMeshLanes - 1) / kMeshLanes * kMeshLanes;
+  mu_ = lambda_ = variance_ = AlignedArray(padded_count);
+  for (Eigen::Index at = 0; at < elements.count(); ++at) {
+    const std::int32_t element = order[static_cast<std::size_t>(within[static_cast<std::size_t>(at)])];
+    const auto gradients = elements.gradients_of(element);
+    Eigen::Index row = 0;
+    for (const std::int32_t vertex : elements.vertices_of(element)) {
+      const std::int32_t place = place_of_[static_cast<std::size_t>(vertex)];
+      if (place >= 0) {
+        corners_.push_back(place);
+        for (int c = 0; c < 3; ++c) gradients_.push_back(gradients(row, c));
+      }
+      ++row;
+    }
+    starts_.push_back(static_cast<std::int32_t>(corners_.size()));
+    const LameParameters lame = elements.lame(element);
+    mu_[at] = elements.volumes[element] * lame.mu;
+    lambda_[at] = elements.volumes[element] * lame.lambda;
+    variance_[at] = elements.smoothed() ? materials.variance_factor * mu_[at] : 0;
+  }
+  starts_.resize(static_cast<std::size_t>(padded_count) + 1, starts_.back());
+  rounded_gradients_.assign(gradients_.begin(), gradients_.end());
+}
+
+void FullSpace::add_filter(const RowMatrix& filter) {
+  functions_ = filter.cols();
+  stride_ = (functions_ + kMeshLanes - 1) / kMeshLanes * kMeshLanes;
+  filter_ = AlignedArray(vertices() * stride_);
+  for (Eigen::Index v = 0; functions_ > 0 && v < filter.rows(); ++v)
+    if (const std::int32_t place = place_of_[static_cast<std::size_t>(v)]; place >= 0)
+      for (Eigen::Index k = 0; k < functions_; ++k) filter_[place * stride_ + k] = filter(v, k);
+  rounded_filter_ = AlignedFloats(vertices() * stride_);
+  std::copy_n(filter_.data(), vertices() * stride_, rounded_filter_.data());
+}
+
+FullSpace::Scalar FullSpace::scalar_matrix(const std::vector<double>& values) const {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (std::size_t i = 0; i < rows_.size(); ++i)
+    for (auto k = static_cast<std::size_t>(row_starts_[i]); k < static_cast<std::size_t>(row_starts_[i + 1]); ++k)
+      entries.emplace_back(rows_[i], columns_[k], values[k]);
+  Scalar matrix(vertices(), vertices());
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
+void FullSpace::to_field(const Eigen::VectorXd& x, Eigen::VectorXd& field) const noexcept {
+  for (std::size_t k = 0; k < vertex_of_.size(); ++k) {
+    const auto place = static_cast<Eigen::Index>(4 * k);
+    field.segment<3>(place) = x.segment<3>(3 * vertex_of_[k]);
+    field[place + 3] = 0;
+  }
+}
+
+Eigen::VectorXd FullSpace::to_field(const Eigen::VectorXd& x) const {
+  Eigen::VectorXd field(field_size());
+  to_field(x, field);
+  return field;
+}
+
+void FullSpace::from_field(const Eigen::VectorXd& field, Eigen::VectorXd& x) const noexcept {
+  for (std::size_t k = 0; k < vertex_of_.size(); ++k)
+    x.segment<3>(3 * vertex_of_[k]) = field.segment<3>(static_cast<Eigen::Index>(4 * k));
+}
+
+MeshArrays FullSpace::arrays() const noexcept {
+  MeshArrays mesh;
+  mesh.vertices = vertices();
+  mesh.panels = padded_elements() / kMeshLanes;
+  mesh.starts = starts_.data();
+  mesh.corners = corners_.data();
+  mesh.gradients = gradients_.data();
+  mesh.rounded_gradients = rounded_gradients_.data();
+  mesh.variance = variance_.data();
+  mesh.rows = rows_.data();
+  mesh.row_starts = row_starts_.data();
+  mesh.columns = columns_.data();
+  mesh.mass = mass_.data();
+  mesh.variance_matrix = variance_matrix_.data();
+  return mesh;
+}
+
+ElementLaw FullSpace::law() const noexcept {
+  ElementLaw law;
+  law.kind = law_kind(model_);
+  law.mu = mu_.data();
+  law.lambda = lambda_.data();
+  return law;
+}
+
+void FullSpace::projected_tangents(const double* field, double stiffness_damping, bool freeze, double* frozen,
+                                   float* tangents) const noexcept {
+  with_material(model_, [&](auto material) {
+    for (Eigen::Index e = 0; e < padded_elements(); ++e) {
+      Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+      for (auto k = static_cast<std::size_t>(starts_[static_cast<std::size_t>(e)]);
+           k < static_cast<std::size_t>(starts_[static_cast<std::size_t>(e) + 1]); ++k)
+        H += Eigen::Map<const Eigen::Vector3d>(field + 4 * corners_[k]) *
+             Eigen::Map<const Eigen::RowVector3d>(&gradients_[3 * k]);
+      Matrix9 D = projected_tangent<decltype(material)>(H, {mu_[e], lambda_[e]});
+      D.diagonal().array() -= variance_[e];
+      double* const own_frozen = frozen + e / kLanes * kLanes * kTangentNumbers + e % kLanes;
+      float* const own = tangents + e / kMeshLanes * kMeshLanes * kTangentNumbers + e % kMeshLanes;
+      for (Eigen::Index i = 0, entry = 0; i < 9; ++i)
+        for (Eigen::Index j = i; j < 9; ++j, ++entry) {
+          double value = D(i, j);
+          if (stiffness_damping > 0) {
+            if (freeze) own_frozen[entry * kLanes] = value;
+            value += stiffness_damping * own_frozen[entry * kLanes];
+          }
+          own[entry * kMeshLanes] = static_cast<float>(value);
+        }
+    }
+  });
+}
+
+FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor,
+                                       double filter_stiffness)
+    : size_(space.vertices()), stride_(space.filter().stride) {
+  const Eigen::SparseMatrix<double> matrix =
+      mass_factor * space.mass() + stiffness_factor * space.preconditioning_stiffness();
+  const Eigen::SimplicialLLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> factor(matrix);
+  const Eigen::SparseMatrix<double> L = factor.matrixL();
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> rows = L;
+  const auto take = [](const auto& matrix_of, std::vector<std::int32_t>& starts, std::vector<std::int32_t>& indices,
+                       std::vector<float>& values) {
+    starts.push_back(0);
+    for (Eigen::Index outer = 0; outer < matrix_of.outerSize(); ++outer) {
+      for (typename std::decay_t<decltype(matrix_of)>::InnerIterator entry(matrix_of, outer); entry; ++entry)
+        if (entry.index() != outer) {
+          indices.push_back(static_cast<std::int32_t>(entry.index()));
+          values.push_back(static_cast<float>(entry.value()));
+        }
+      starts.push_back(static_cast<std::int32_t>(indices.size()));
+    }
+  };
+  take(rows, row_starts_, columns_, by_row_);
+  take(L, column_starts_, rows_, by_column_);
+  for (Eigen::Index i = 0; i < size_; ++i) inverse_diagonal_.push_back(static_cast<float>(1 / L.coeff(i, i)));
+
+  // Woodbury: S^-1 - Z (1/k + W^T Z)^-1 Z^T with Z = S^-1 W, as the square of Z times a root of the inverse.
+  functions_ = AlignedFloats(filter_stiffness > 0 ? size_ * stride_ : 0);
+  if (filter_stiffness <= 0 || stride_ == 0) return;
+  const Eigen::Map<const RowMatrix> W(space.filter().functions, size_, stride_);
+  const Eigen::MatrixXd Z = factor.solve(Eigen::MatrixXd(W));
+  Eigen::MatrixXd small = W.transpose() * Z;
+  small.diagonal().array() += 1 / filter_stiffness;
+  const Eigen::MatrixXd root =
+      small.llt().matrixU().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(stride_, stride_)));
+  Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(functions_.data(), size_, stride_) =
+      (Z * root).cast<float>();
+}
+
+void FullPreconditioner::solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
+                               AlignedFloats& coefficients) const noexcept {
+  run.mesh_solve({size_, row_starts_.data(), columns_.data(), column_starts_.data(), rows_.data(), by_row_.data(),
+                  by_column_.data(), inverse_diagonal_.data()},
+                 right.data(), x.data());
+  if (functions_.size() == 0) return;
+  const MeshFilter<float> filter{size_, stride_, functions_.data()};
+  run.mesh_rounded_coefficients(filter, right.data(), coefficients.data());
+  run.mesh_add_rounded_functions(filter, -1, coefficients.data(), x.data());
+}
+
+}  // namespace exmat::runtime

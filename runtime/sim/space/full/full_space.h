@@ -1,0 +1,115 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/SparseCore>
+#include <cstdint>
+#include <vector>
+
+#include "common/core/arrays.h"
+#include "common/mesh/elements.h"
+#include "runtime/kernels/aligned_array.h"
+#include "runtime/kernels/kernels.h"
+
+namespace exmat::runtime {
+
+/// Floats at kAlignment, zero at first.
+class AlignedFloats {
+ public:
+  AlignedFloats() = default;
+  explicit AlignedFloats(Eigen::Index size) : numbers_((size + 1) / 2), size_(size) {}
+
+  float* data() { return reinterpret_cast<float*>(numbers_.data()); }
+  const float* data() const { return reinterpret_cast<const float*>(numbers_.data()); }
+  Eigen::Index size() const { return size_; }
+  Eigen::Map<Eigen::VectorXf> vector() { return {data(), size_}; }
+  Eigen::Map<const Eigen::VectorXf> vector() const { return {data(), size_}; }
+
+ private:
+  AlignedArray numbers_;
+  Eigen::Index size_ = 0;
+};
+
+/// The space of all displacements of a mesh whose fixed vertices stay, and what a step sums over in it. Immutable.
+/// n vertices that move, f = 3n unknowns in the order of the vertices, as in runtime::State. Fields are what the
+/// kernels take: four numbers a vertex, the vertices in an order of elimination that keeps sparse factors sparse.
+class FullSpace {
+ public:
+  FullSpace() = default;
+  /// `filter` [vertices of the mesh x m], none or W of the shape filter P = W W^T (x) I3 of a linear example force.
+  FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed, const RowMatrix& filter = {});
+
+  Eigen::Index size() const { return 3 * vertices(); }              ///< f
+  Eigen::Index vertices() const { return std::ssize(vertex_of_); }  ///< n
+  Eigen::Index field_size() const { return 4 * vertices(); }        ///< of a field
+  Eigen::Index functions() const { return functions_; }             ///< m
+  bool is_clamped() const { return clamped_; }                      ///< whether a vertex is fixed
+  double edge() const { return edge_; }                             ///< mean length of the edges [m]
+  double extent() const { return extent_; }                         ///< largest coordinate at rest [m]
+  const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
+
+  Eigen::VectorXd to_field(const Eigen::VectorXd& x) const;
+  void to_field(const Eigen::VectorXd& x, Eigen::VectorXd& field) const noexcept;
+  void from_field(const Eigen::VectorXd& field, Eigen::VectorXd& x) const noexcept;
+
+  /// Scalar matrices [n x n] in the order of fields: mass [kg], and Laplacians of the tets, times the variance factor
+  /// and mu [N/m], and times the stiffness that the preconditioner takes for theirs [N/m].
+  using Scalar = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+  Scalar mass() const { return scalar_matrix(mass_); }
+  Scalar preconditioning_stiffness() const { return scalar_matrix(laplacian_); }
+  Eigen::Index entries() const { return std::ssize(columns_); }
+  double mass_value(Eigen::Index k) const { return mass_[static_cast<std::size_t>(k)]; }
+  double variance_value(Eigen::Index k) const { return variance_matrix_[static_cast<std::size_t>(k)]; }
+
+  MeshArrays arrays() const noexcept;
+  ElementLaw law() const noexcept;
+  MeshFilter<double> filter() const noexcept { return {vertices(), stride_, filter_.data()}; }
+  MeshFilter<float> rounded_filter() const noexcept { return {vertices(), stride_, rounded_filter_.data()}; }
+  Eigen::Index padded_elements() const { return std::ssize(starts_) - 1; }
+
+  /// [panels x 45 x kMeshLanes] tangents at x as those of Kernels::mesh_force_and_tangents(), their negative
+  /// eigenvalues set to zero before the variance is taken off.
+  void projected_tangents(const double* field, double stiffness_damping, bool freeze, double* frozen,
+                          float* tangents) const noexcept;
+
+ private:
+  void order_vertices(const TetMesh& mesh, const FlagVector& fixed);
+  void add_matrices(const TetMesh& mesh, const TetMaterials& materials);
+  void add_elements(const Elements& elements, const TetMaterials& materials);
+  void add_filter(const RowMatrix& filter);
+  Scalar scalar_matrix(const std::vector<double>& values) const;
+
+  MaterialModel model_ = MaterialModel::kStVenantKirchhoff;
+  bool clamped_ = false;
+  double edge_ = 0, extent_ = 0;
+  std::vector<std::int32_t> vertex_of_;  ///< of each place in a field, among those that move
+  std::vector<std::int32_t> place_of_;   ///< of each vertex of the mesh, -1 where it is fixed
+  Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load_;
+  std::vector<std::int32_t> starts_{0}, corners_;
+  std::vector<double> gradients_;
+  std::vector<float> rounded_gradients_;
+  AlignedArray mu_, lambda_, variance_;  ///< times the volumes
+  std::vector<std::int32_t> rows_, row_starts_{0}, columns_;
+  std::vector<double> mass_, variance_matrix_, laplacian_;
+  Eigen::Index functions_ = 0, stride_ = 0;
+  AlignedArray filter_;
+  AlignedFloats rounded_filter_;
+};
+
+/// (M (c_a + alpha c_v) + (1 + beta c_v) L + k W W^T)^-1, factored once for these numbers, in single precision.
+class FullPreconditioner {
+ public:
+  FullPreconditioner() = default;
+  FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor, double filter_stiffness);
+
+  /// x = (S (x) I3)^-1 right, fields; coefficients: 3 x stride of the filter.
+  void solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
+             AlignedFloats& coefficients) const noexcept;
+
+ private:
+  Eigen::Index size_ = 0, stride_ = 0;
+  std::vector<std::int32_t> row_starts_, columns_, column_starts_, rows_;
+  std::vector<float> by_row_, by_column_, inverse_diagonal_;
+  AlignedFloats functions_;  ///< what the filter takes off, as a square
+};
+
+}  // namespace exmat::runtime

@@ -1,0 +1,340 @@
+#include "runtime/sim/space/full/full_step.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <gtest/gtest.h>
+#include <numbers>
+#include <omp.h>
+#include <string>
+
+#include "common/mesh/assembly.h"
+#include "tests/runtime/sim/space/full/full_bar.h"
+#include "tests/support/allocation_counter.h"
+
+namespace exmat::runtime {
+namespace {
+
+/// Steps for a time; every one has to converge.
+State run(const FullSpace& space, const StepScene& scene, State state, double time, const FullAccuracy& accuracy = {}) {
+  FullWorkspace workspace(space, scene, accuracy);
+  const auto steps = static_cast<int>(std::lround(time / scene.time_step));
+  for (int i = 0; i < steps; ++i) EXPECT_EQ(step(space, scene, state, workspace).status, 0U) << "step " << i;
+  return state;
+}
+
+State at_rest(const FullSpace& space, const StepScene& scene) {
+  FullWorkspace workspace(space, scene);
+  return make_state(space, workspace);
+}
+
+/// Displacement in the first mode of bending, of so many metres at the end, and its angular frequency.
+struct Mode {
+  Eigen::VectorXd shape;
+  double angular_frequency = 0;
+};
+Mode first_mode(const FullBar& bar, double size) {
+  std::vector<std::int32_t> free;
+  for (Eigen::Index v = 0; v < bar.mesh.vertex_count(); ++v)
+    for (int c = 0; c < 3 && bar.fixed[v] == 0; ++c) free.push_back(static_cast<std::int32_t>(3 * v + c));
+  const Eigen::MatrixXd K = submatrix(elastic_stiffness(bar.mesh, bar.materials), free);
+  const Eigen::MatrixXd M = submatrix(expand_to_vectors(scalar_mass(bar.mesh, bar.materials.density)), free);
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> solver(K, M);
+  const Eigen::VectorXd shape = solver.eigenvectors().col(0);
+  return {size / shape.cwiseAbs().maxCoeff() * shape, std::sqrt(solver.eigenvalues()[0])};
+}
+
+// A load that comes and goes smoothly, so that nothing fast moves, bends the bar by a third of its length. Halving the
+// step has to divide the error by 4 and by 2.
+TEST(FullStepTest, ConvergesInTheOrderOfItsIntegrator) {
+  for (const Integrator integrator : {Integrator::kBdf2, Integrator::kBackwardEuler}) {
+    const FullBar bar({.cells = {4, 1, 1}});
+    const double period = 2 * std::numbers::pi / first_mode(bar, 1).angular_frequency;
+    const Eigen::VectorXd force = bar.end_force({0, 1.5, 3});
+    const auto end = [&](int steps) {
+      StepScene scene = full_scene(1.5 * period / steps);
+      scene.integrator = integrator;
+      FullWorkspace workspace(bar.space, scene);
+      State state = make_state(bar.space, workspace);
+      for (int i = 1; i <= steps; ++i) {
+        state.applied_force = force * (1 - std::cos(2 * std::numbers::pi * i / steps));
+        EXPECT_EQ(step(bar.space, scene, state, workspace).status, 0U);
+      }
+      return state.q;
+    };
+    const bool second = integrator == Integrator::kBdf2;
+    const int steps = second ? 160 : 640;
+    const Eigen::VectorXd coarse = end(steps), middle = end(2 * steps), fine = end(4 * steps);
+    EXPECT_GE(fine.cwiseAbs().maxCoeff(), 0.02);
+    EXPECT_NEAR((coarse - middle).norm() / (middle - fine).norm(), second ? 4 : 2, second ? 0.2 : 0.1);
+  }
+}
+
+// BDF2 is slow by (omega h)^2 / 3 = 8e-5 of the frequency at 400 steps a period, and an amplitude of 1e-6 m is linear.
+TEST(FullStepTest, SwingsAtTheFrequencyOfTheEigenproblem) {
+  for (const Formulation formulation : kFormulations) {
+    const FullBar bar({.formulation = formulation, .two_parts = true});
+    const Mode mode = first_mode(bar, 1e-6);
+    StepScene scene = full_scene(2 * std::numbers::pi / mode.angular_frequency / 400);
+    FullWorkspace workspace(bar.space, scene);
+    State state = make_state(bar.space, mode.shape, Eigen::VectorXd::Zero(bar.space.size()), workspace);
+    std::vector<double> crossings;
+    for (int i = 0; i < 1200; ++i) {
+      const double before = state.q.dot(mode.shape);
+      ASSERT_EQ(step(bar.space, scene, state, workspace).status, 0U);
+      const double after = state.q.dot(mode.shape);
+      if (before > 0 && after <= 0) crossings.push_back(state.time - scene.time_step * after / (after - before));
+    }
+    ASSERT_EQ(crossings.size(), 3U);
+    const double found = 2 * std::numbers::pi * 2 / (crossings[2] - crossings[0]);
+    EXPECT_NEAR(found / mode.angular_frequency, 1 - 8.2e-5, 2e-5);
+  }
+}
+
+StepScene loaded(const FullBar& bar, double time_step, double tolerance = 1e-9) {
+  StepScene scene = full_scene(time_step, tolerance);
+  scene.gravity = {0, 0, -3};
+  scene.mass_damping = 0.5;
+  scene.stiffness_damping = 0.01;
+  scene.forces.push_back({.force = bar.end_force({0, 1.5, 1}), .start = 0.1, .end = 0.3});
+  return scene;
+}
+
+// The gradient is in double precision: the tolerance is met whatever the precision of the directions.
+TEST(FullStepTest, MeetsATightTolerance) {
+  for (const MaterialModel model : kModels)
+    for (const Formulation formulation : kFormulations) {
+      const FullBar bar({.model = model, .formulation = formulation, .two_parts = true});
+      const StepScene scene = loaded(bar, 0.004, 1e-10);
+      const State state = run(bar.space, scene, at_rest(bar.space, scene), 0.4);
+      EXPECT_GE(state.q.cwiseAbs().maxCoeff(), 0.05);
+    }
+}
+
+// In equilibrium steps of any length leave the body where it is.
+TEST(FullStepTest, SagDoesNotDependOnTheStep) {
+  for (const double poisson_ratio : {0.3, 0.49}) {
+    const FullBar bar({.poisson_ratio = poisson_ratio});
+    Eigen::VectorXd sag;
+    for (const double time_step : {1.0 / 30, 0.004}) {
+      StepScene scene = full_scene(time_step);
+      scene.gravity = {0, 0, -3};
+      scene.mass_damping = 4;
+      const State state = run(bar.space, scene, at_rest(bar.space, scene), 8);
+      if (sag.size() == 0) sag = state.q;
+      EXPECT_LE((state.q - sag).norm(), 1e-6 * sag.norm());
+    }
+    StepScene fine = full_scene(1e-4);
+    fine.gravity = {0, 0, -3};
+    State state = at_rest(bar.space, fine);
+    state.q = state.q_previous = sag;
+    state = run(bar.space, fine, state, 0.02);
+    EXPECT_LE((state.q - sag).norm(), 1e-6 * sag.norm());
+  }
+}
+
+// Integrators that damp what they cannot resolve never add energy, whatever the length of the step.
+TEST(FullStepTest, UndampedMotionStaysBounded) {
+  for (const double time_step : {0.004, 1.0 / 60})
+    for (const bool real_time : {false, true}) {
+      const FullBar bar({.cells = {4, 1, 1}});
+      StepScene scene = full_scene(time_step, 1e-6);
+      if (real_time) scene.newton = kRealTimeNewton;
+      FullWorkspace workspace(bar.space, scene, real_time ? kRealTime : FullAccuracy{});
+      State state = at_rest(bar.space, scene);
+      state.v = state.v_previous = 2 * first_mode(bar, 1).shape;
+      const double before = energies(bar.space, scene, state, workspace).total();
+      const auto steps = static_cast<int>(20 / time_step);
+      double largest = 0;
+      for (int i = 0; i < steps; ++i) {
+        ASSERT_EQ(step(bar.space, scene, state, workspace).status & kStepNonFinite, 0U);
+        if (i % 10 == 0) largest = std::max(largest, energies(bar.space, scene, state, workspace).total());
+      }
+      EXPECT_LE(largest, 1.01 * before) << time_step << " " << real_time;
+    }
+}
+
+// The load bends the bar by about a fifth of its length; a hundred times as much turns elements inside out.
+TEST(FullStepTest, ComesBackFromAHundredTimesTheLoad) {
+  for (const MaterialModel model : {MaterialModel::kStableNeoHookean, MaterialModel::kCorotational})
+    for (const bool real_time : {false, true}) {
+      const FullBar bar({.model = model});
+      StepScene scene = full_scene(0.004, 1e-6);
+      if (real_time) scene.newton = kRealTimeNewton;
+      scene.mass_damping = 4;
+      scene.stiffness_damping = 0.01;
+      scene.forces.push_back({.force = bar.end_force({-100, 100, 50}), .start = 0.1, .end = 0.2});
+      FullWorkspace workspace(bar.space, scene, real_time ? kRealTime : FullAccuracy{});
+      State state = make_state(bar.space, workspace);
+      double largest = 0;
+      for (int i = 0; i < 1500; ++i) {
+        ASSERT_EQ(step(bar.space, scene, state, workspace).status & kStepNonFinite, 0U);
+        largest = std::max(largest, state.q.cwiseAbs().maxCoeff());
+      }
+      EXPECT_GE(largest, 0.9);
+      EXPECT_LE(state.q.cwiseAbs().maxCoeff(), 1e-3);
+    }
+}
+
+// From a shape of inverted elements, in steps so long that the tangents are not positive definite.
+TEST(FullStepTest, RecoversFromRandomAndMirroredShapes) {
+  for (const MaterialModel model : {MaterialModel::kStableNeoHookean, MaterialModel::kCorotational})
+    for (const bool mirrored : {false, true}) {
+      const FullBar bar({.model = model});
+      StepScene scene = full_scene(1.0 / 30, 1e-6);
+      scene.mass_damping = 4;
+      FullWorkspace workspace(bar.space, scene);
+      Eigen::VectorXd u = 0.3 * test::random_vector(bar.space.size(), 9);
+      for (Eigen::Index v = 0, row = 0; mirrored && v < bar.mesh.vertex_count(); ++v) {
+        if (bar.fixed[v] != 0) continue;
+        u.segment<3>(row) = Eigen::Vector3d(-2 * bar.mesh.vertices(v, 0), 0, 0);
+        row += 3;
+      }
+      State state = make_state(bar.space, u, Eigen::VectorXd::Zero(u.size()), workspace);
+      int projections = 0;
+      for (int i = 0; i < 300; ++i) {
+        const FullReport report = step(bar.space, scene, state, workspace);
+        ASSERT_EQ(report.status & kStepNonFinite, 0U);
+        projections += report.projections;
+      }
+      EXPECT_GT(projections, 0);
+      EXPECT_LE(state.q.cwiseAbs().maxCoeff(), 1e-3) << static_cast<int>(model) << " " << mirrored;
+    }
+}
+
+// Few iterations are enough for half a percent of the displacement; that is far more than rounding.
+TEST(FullStepTest, RealTimeAccuracyIsWithinHalfAPercent) {
+  for (const MaterialModel model : kModels) {
+    const FullBar bar({.model = model});
+    const StepScene tight = loaded(bar, 0.004);
+    StepScene quick = tight;
+    quick.newton = kRealTimeNewton;
+    FullWorkspace tight_workspace(bar.space, tight), quick_workspace(bar.space, quick, kRealTime);
+    State expected = at_rest(bar.space, tight), state = expected;
+    double error = 0, size = 0;
+    int iterations = 0;
+    for (int i = 0; i < 150; ++i) {
+      ASSERT_EQ(step(bar.space, tight, expected, tight_workspace).status, 0U);
+      const FullReport report = step(bar.space, quick, state, quick_workspace);
+      ASSERT_EQ(report.status, 0U);
+      iterations += report.cg_iterations;
+      error = std::max(error, (state.q - expected.q).norm());
+      size = std::max(size, expected.q.norm());
+    }
+    EXPECT_LE(error, 0.005 * size);
+    EXPECT_LE(iterations, 4 * 150);
+  }
+}
+
+// A linear example force pulls towards its target; with much stiffness the body is there as far as the filter sees.
+TEST(FullStepTest, ExampleForcePullsTowardsItsTarget) {
+  const FullBar bar({.functions = 3});
+  StepScene scene = full_scene(0.004);
+  scene.mass_damping = 20;
+  scene.examples.push_back({.stiffness = 1e6, .damping = 1});
+  FullWorkspace workspace(bar.space, scene);
+  State state = make_state(bar.space, workspace);
+  const Eigen::MatrixXd target = 0.1 * test::random_matrix(3, 3, 8);
+  for (int i = 0; i < 500; ++i) {
+    FullStep one(bar.space, scene, state, workspace);
+    one.begin();
+    one.set_target(target);
+    one.solve();
+    ASSERT_EQ(one.finish().status, 0U);
+  }
+  Eigen::VectorXd coefficients(3 * bar.space.filter().stride);
+  kernels().mesh_coefficients(bar.space.filter(), bar.space.to_field(state.q).data(), coefficients.data());
+  const auto found = coefficients.reshaped(bar.space.filter().stride, 3).topRows(3);
+  EXPECT_LE((found - target).norm(), 0.01 * target.norm());
+}
+
+TEST(FullStepTest, FreeBodyWithoutDampingKeepsItsMomenta) {
+  const FullBar bar({.free = true});
+  const StepScene scene = full_scene(0.004, 1e-10);
+  State state = at_rest(bar.space, scene);
+  const Eigen::VectorXd kick = test::random_vector(bar.space.size(), 3);
+  const SparseMatrix mass = expand_to_vectors(scalar_mass(bar.mesh, bar.materials.density));
+  state.v = state.v_previous = kick;
+  const auto momentum = [&] {
+    return Eigen::Vector3d((mass * state.v).reshaped(3, state.v.size() / 3).rowwise().sum());
+  };
+  const Eigen::Vector3d before = momentum();
+  state = run(bar.space, scene, state, 0.4);
+  EXPECT_LE((momentum() - before).norm(), 1e-9 * (mass * kick).norm());
+}
+
+// What a workspace holds must not matter: only the state goes on.
+TEST(FullStepTest, SameBitsFromACopyOfTheStateAndWithAnyNumberOfThreads) {
+  for (const bool real_time : {false, true}) {
+    const FullBar bar;
+    StepScene scene = loaded(bar, 0.004, 1e-6);
+    if (real_time) scene.newton = kRealTimeNewton;
+    const FullAccuracy accuracy = real_time ? kRealTime : FullAccuracy{};
+    FullWorkspace workspace(bar.space, scene, accuracy);
+    State whole = make_state(bar.space, workspace);
+    State part = whole;
+    const int threads = omp_get_max_threads();
+    omp_set_num_threads(1);
+    for (int i = 0; i < 60; ++i) step(bar.space, scene, whole, workspace);
+    omp_set_num_threads(4);
+    for (int i = 0; i < 60; ++i) {
+      FullWorkspace fresh(bar.space, scene, accuracy);
+      step(bar.space, scene, part, fresh);
+    }
+    omp_set_num_threads(threads);
+    EXPECT_EQ(whole.q, part.q);
+    EXPECT_EQ(whole.v, part.v);
+    EXPECT_EQ(whole.elastic_energy, part.elastic_energy);
+  }
+}
+
+TEST(FullStepTest, NoStepAllocates) {
+  if (!test::AllocationCounter::works()) GTEST_SKIP() << "a sanitizer owns malloc";
+  const FullBar bar({.functions = 5});
+  for (const bool real_time : {false, true}) {
+    StepScene scene = loaded(bar, 1.0 / 30);
+    scene.examples.push_back({.stiffness = 100, .damping = 1});
+    if (real_time) scene.newton = kRealTimeNewton;
+    FullWorkspace workspace(bar.space, scene, real_time ? kRealTime : FullAccuracy{});
+    const Eigen::VectorXd u = 0.3 * test::random_vector(bar.space.size(), 9);  // projections and line searches too
+    State state = make_state(bar.space, u, 0 * u, workspace);
+    int projections = 0;
+    const test::AllocationCounter counter;
+    for (int i = 0; i < 100; ++i) projections += step(bar.space, scene, state, workspace).projections;
+    EXPECT_EQ(counter.count(), 0U);
+    EXPECT_GT(projections, 0);
+  }
+}
+
+TEST(FullStepTest, StateStaysWhereANumberIsNotFinite) {
+  const FullBar bar;
+  const StepScene scene = full_scene(0.004);
+  FullWorkspace workspace(bar.space, scene);
+  State state = make_state(bar.space, workspace);
+  state.applied_force[4] = std::nan("");
+  EXPECT_EQ(step(bar.space, scene, state, workspace).status, kStepNonFinite);
+  EXPECT_EQ(state.step, 0);
+  EXPECT_TRUE(state.q.isZero(0));
+}
+
+TEST(FullStepTest, SaysWhatItCannotStep) {
+  const FullBar bar, free({.free = true});
+  StepScene scene = full_scene(0.004);
+  EXPECT_EQ(unsupported(bar.space, scene), nullptr);
+  EXPECT_EQ(unsupported(free.space, scene), nullptr);
+  scene.mass_damping = 1;
+  EXPECT_EQ(unsupported(bar.space, scene), nullptr);
+  EXPECT_NE(unsupported(free.space, scene), nullptr);
+  StepScene newmark = scene;
+  newmark.integrator = Integrator::kNewmark;
+  EXPECT_NE(unsupported(bar.space, newmark), nullptr);
+  StepScene examples = scene;
+  examples.examples.push_back({.stiffness = 1});
+  EXPECT_NE(unsupported(bar.space, examples), nullptr);
+  const FullBar filtered({.functions = 2});
+  EXPECT_EQ(unsupported(filtered.space, examples), nullptr);
+  examples.examples.front().elastic = true;
+  EXPECT_NE(unsupported(filtered.space, examples), nullptr);
+}
+
+}  // namespace
+}  // namespace exmat::runtime
