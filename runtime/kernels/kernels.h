@@ -224,7 +224,9 @@ struct MeshInertia {
 /// Inertia 1/2 c_a a M a, damping 1/2 c_v w D w, elastic energy [J].
 inline constexpr std::ptrdiff_t kMeshSums = 3;
 
-/// L L^T of a scalar matrix [n x n], L below its diagonal by rows and by columns.
+inline constexpr std::ptrdiff_t kFactorMultiple = 4;
+/// L L^T of a scalar matrix [n x n], L below its diagonal by rows and by columns, each padded with zeros to a multiple
+/// of kFactorMultiple.
 struct MeshFactor {
   std::ptrdiff_t size = 0;
   const int *row_starts = nullptr, *columns = nullptr, *column_starts = nullptr, *rows = nullptr;

@@ -220,16 +220,13 @@ void mesh_product(const MeshArrays& mesh, const float* matrix, const float* tang
   }
 }
 
-/// value - sum of numbers times the places at `indices`.
+/// value - sum of numbers times the places at `indices`; kFactorMultiple of them at a time.
 inline FloatQuad less_products(FloatQuad value, const float* numbers, const int* indices, Index count, const float* x) {
-  FloatQuad other{};
-  Index k = 0;
-  for (; k + 1 < count; k += 2) {
-    other -= load_quad(x + 4 * indices[k]) * numbers[k];
-    value -= load_quad(x + 4 * indices[k + 1]) * numbers[k + 1];
-  }
-  if (k < count) other -= load_quad(x + 4 * indices[k]) * numbers[k];
-  return value + other;
+  FloatQuad sums[kFactorMultiple] = {value};
+  for (Index k = 0; k < count; k += kFactorMultiple)
+#pragma GCC unroll 4
+    for (Index i = 0; i < kFactorMultiple; ++i) sums[i] -= load_quad(x + 4 * indices[k + i]) * numbers[k + i];
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
 void mesh_solve(const MeshFactor& factor, const float* right, float* x) {
@@ -275,6 +272,7 @@ inline void coefficients_of(const MeshFilter<Number>& filter, const Number* fiel
 template <class Lanes, class Number>
 inline void add_functions(const MeshFilter<Number>& filter, Number factor, const Number* coefficients, Number* field) {
   constexpr Index kNumbers = sizeof(Lanes) / sizeof(Number);
+  alignas(kAlignment) Number lanes[kNumbers < 4 ? 4 : kNumbers] = {};
   const Number* row = filter.functions;
   for (Index i = 0; i < filter.vertices; ++i, row += filter.stride, field += 4) {
     Lanes sums[3] = {};
@@ -283,11 +281,15 @@ inline void add_functions(const MeshFilter<Number>& filter, Number factor, const
 #pragma GCC unroll 3
       for (Index a = 0; a < 3; ++a) sums[a] += value * load(coefficients + a * filter.stride + k);
     }
+    QuadOf<Number> totals[4] = {};
+#pragma GCC unroll 3
     for (Index a = 0; a < 3; ++a) {
-      Number total = 0;
-      for (Index lane = 0; lane < kNumbers; ++lane) total += sums[a][lane];
-      field[a] += factor * total;
+      store(lanes, sums[a]);
+      totals[a] = load_quad(lanes);
+      for (Index lane = 4; lane < kNumbers; lane += 4) totals[a] += load_quad(lanes + lane);
     }
+    transpose(totals);
+    store_quad(field, load_quad(field) + factor * ((totals[0] + totals[1]) + (totals[2] + totals[3])));
   }
 }
 

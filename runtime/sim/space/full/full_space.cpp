@@ -274,6 +274,10 @@ FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_facto
           indices.push_back(static_cast<std::int32_t>(entry.index()));
           values.push_back(static_cast<float>(entry.value()));
         }
+      while ((std::ssize(indices) - starts.back()) % kFactorMultiple != 0) {
+        indices.push_back(0);
+        values.push_back(0);
+      }
       starts.push_back(static_cast<std::int32_t>(indices.size()));
     }
   };

@@ -101,18 +101,17 @@ void FullStep::begin() noexcept {
 
 void FullStep::choose_first_iterate() noexcept {
   Eigen::VectorXd& d = workspace_.d;
-  const bool checked = workspace_.accuracy.unchecked_move == 0;
   space_.to_field(state_.v, d);
-  if (!checked) {
+  if (!is_checked()) {
     space_.to_field(state_.v_previous, workspace_.trial);
     d = 1.5 * d - 0.5 * workspace_.trial;
   }
   d *= scene_.time_step;
-  predicted_ = checked || (!anew_ && largest_move(d) <= kMostPredicted * space_.edge());
-  const double at_start = checked ? potential_.undamped_at_start(state_.elastic_energy) : 0;
+  predicted_ = is_checked() || (!anew_ && largest_move(d) <= kMostPredicted * space_.edge());
+  const double at_start = is_checked() ? potential_.undamped_at_start(state_.elastic_energy) : 0;
   if (!predicted_) d.setZero();
   potential_.evaluate_elements(d, FullPotential::Tangents::kExact, true);
-  if (!checked || potential_.undamped() <= at_start || d.isZero(0)) return;
+  if (!is_checked() || potential_.undamped() <= at_start || d.isZero(0)) return;
   ++report_.line_search_evaluations;
   predicted_ = false;
   d.setZero();
@@ -177,7 +176,7 @@ void FullStep::project() noexcept {
 }
 
 bool FullStep::is_short() const noexcept {
-  return workspace_.accuracy.unchecked_move > 0 && predicted_ && at_first_iterate_ &&
+  return !is_checked() && predicted_ && at_first_iterate_ &&
          largest_move(workspace_.direction) <= workspace_.accuracy.unchecked_move * space_.edge();
 }
 
@@ -211,11 +210,14 @@ NewtonStatus FullStep::minimise() noexcept {
   NewtonReport newton;
   newton.residual = report_.residual = work.gradient.norm();
   unchecked_from_ = std::numeric_limits<double>::infinity();
+  // A coarse tolerance would leave the body beside its equilibrium for good.
+  const NewtonSettings at_least_one{scene_.newton.max_iterations, 0};
   for (;;) {
     newton.residual = report_.residual;
     newton.iterations = report_.newton_iterations;
-    if (const auto reason = reason_to_end(newton, scene_.newton, here_, unchecked_from_)) return *reason;
-    const double left = scene_.newton.tolerance * here_.force_scale / report_.residual;
+    const NewtonSettings& settings = is_checked() || !at_first_iterate_ ? scene_.newton : at_least_one;
+    if (const auto reason = reason_to_end(newton, settings, here_, unchecked_from_)) return *reason;
+    const double left = settings.tolerance * here_.force_scale / report_.residual;
     if (find_direction(std::max(work.accuracy.tolerance, kForcing * left)) == Outcome::kIndefinite) {
       project();
       report_.residual = work.gradient.norm();

@@ -91,6 +91,7 @@ class FullStep {
   NewtonStatus minimise() noexcept;
   Outcome find_direction(double tolerance) noexcept;
   void project() noexcept;
+  bool is_checked() const noexcept { return workspace_.accuracy.unchecked_move == 0; }
   bool is_short() const noexcept;
   bool move() noexcept;
 

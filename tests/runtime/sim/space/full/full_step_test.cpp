@@ -225,6 +225,20 @@ TEST(FullStepTest, RealTimeAccuracyIsWithinHalfAPercent) {
   }
 }
 
+// The body comes to rest where all forces balance, though a residual of a percent of the forces would do for a step:
+// it would tremble by 1e-6 of its sag.
+TEST(FullStepTest, RealTimeAccuracySettlesInTheEquilibrium) {
+  const FullBar bar;
+  StepScene scene = full_scene(0.004);
+  scene.gravity = {0, 0, -3};
+  scene.mass_damping = 4;
+  const State expected = run(bar.space, scene, at_rest(bar.space, scene), 8);
+  scene.newton = kRealTimeNewton;
+  State state = run(bar.space, scene, at_rest(bar.space, scene), 16, kRealTime);
+  EXPECT_LE((state.q - expected.q).norm(), 1e-6 * expected.q.norm());
+  EXPECT_LE(scene.time_step * state.v.norm(), 1e-9 * expected.q.norm());
+}
+
 // A linear example force pulls towards its target; with much stiffness the body is there as far as the filter sees.
 TEST(FullStepTest, ExampleForcePullsTowardsItsTarget) {
   const FullBar bar({.functions = 3});
