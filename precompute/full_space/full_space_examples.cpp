@@ -157,6 +157,11 @@ Eigen::VectorXd FullSpaceExamples::filter(const Eigen::VectorXd& u) const {
   return force(synthesis_, coefficients(analysis_, u));
 }
 
+std::optional<Eigen::MatrixXd> FullSpaceExamples::root() const {
+  if (view_ || !symmetric_) return std::nullopt;
+  return Eigen::MatrixXd(std::sqrt(synthesis_.norm() / analysis_.norm()) * analysis_);
+}
+
 Eigen::VectorXd FullSpaceExamples::transposed_filter(const Eigen::VectorXd& u) const {
   return force(analysis_, coefficients(synthesis_, u));
 }

@@ -57,6 +57,8 @@ class FullSpaceExamples {
   Eigen::VectorXd filter(const Eigen::VectorXd& u) const;
   Eigen::VectorXd transposed_filter(const Eigen::VectorXd& u) const;
   bool symmetric() const { return symmetric_; }
+  /// [free vertices x m] W, P = W W^T (x) I3; none of a region, or where P is not symmetric.
+  std::optional<Eigen::MatrixXd> root() const;
 
   /// [f x d] mass-orthonormal basis of the poses that descriptors stand for, and [d] the examples in it.
   const Eigen::MatrixXd& pose_basis() const { return coordinates_.basis; }

@@ -34,6 +34,17 @@ void add_examples(const ReducedModel& model, const FullSpaceOptions& options, Fu
     add(poses[i], options.regions[i].energy_reference, model.asset_name + ", region " + names[i]);
 }
 
+void add_space(const ObjectData& object, FullSpaceModel& full) {
+  RowMatrix filter;
+  if (full.examples.size() == 1 && full.examples.front().root()) {
+    full.space_root = *full.examples.front().root();
+    filter.setZero(full.rest.rows(), full.space_root.cols());
+    for (Eigen::Index i = 0; i < full.space_root.rows(); ++i)
+      filter.row(full.system.free_dofs[static_cast<std::size_t>(3 * i)] / 3) = full.space_root.row(i);
+  }
+  full.space = runtime::FullSpace(object.mesh, object.materials, object.fixed, filter);
+}
+
 }  // namespace
 
 FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpaceOptions& options) {
@@ -48,6 +59,7 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpace
   if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
   if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
   add_examples(model, options, full);
+  add_space(object, full);
   return full;
 }
 

@@ -13,6 +13,7 @@
 #include "precompute/full_space/mesh_elasticity.h"
 #include "precompute/full_space/target_method.h"
 #include "precompute/full_space/vertex_contacts.h"
+#include "runtime/sim/space/full/full_space.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
 
@@ -31,6 +32,11 @@ struct FullSpaceModel {
   std::vector<FullSpaceExamples> examples;  ///< of the whole body, if they are asked for, then of regions
   /// In place of the targets of `examples`, one for each of them; or none.
   std::vector<std::shared_ptr<const TargetMethod>> target_methods;
+
+  /// The same elements for MatrixFreeStepper, with the filter of the whole body's example force, if there is one and it
+  /// is symmetric, and W of it [free vertices x m].
+  runtime::FullSpace space;
+  Eigen::MatrixXd space_root;
 
   Eigen::Index size() const { return elasticity.size(); }
 };

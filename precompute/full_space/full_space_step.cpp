@@ -4,11 +4,11 @@
 #include <utility>
 
 #include "common/core/timer.h"
+#include "precompute/full_space/target_update.h"
 
 namespace exmat::precompute {
 namespace {
 
-using runtime::ExampleState;
 using runtime::NewtonReport;
 using runtime::NewtonStatus;
 
@@ -112,58 +112,15 @@ void FullSpaceStep::update_targets(const Eigen::VectorXd& q) {
     if (!acts(group)) continue;
     if (!deformation) deformation.emplace(model_, q);
     const FullSpaceExamples& examples = model_.examples[group];
-    examples_[group] = next_target(group, deformation->u());
+    examples_[group] = next_target(model_, group, scene_.examples[group], state_.examples[group], deformation->u(),
+                                   workspace_.examples[group].target, report_);
     ExampleTerm& term = terms_.examples.emplace_back();
     term.examples = &examples;
     term.settings = &scene_.examples[group];
-    const bool of_method = !model_.target_methods.empty();
-    term.target = (of_method ? examples.pose_basis() : examples.target_fields()) * examples_[group].target;
+    term.target = target_displacement(model_, group, examples_[group]);
     if (runtime::elastic_factor(scene_.examples[group]) > 0) term.elasticity = undeformed(group, term.target);
   }
   report_.target_seconds += timer.seconds();
-}
-
-ExampleState FullSpaceStep::next_target(std::size_t group, const Eigen::VectorXd& u) {
-  const ExampleState& former = state_.examples[group];
-  ExampleState next = former;
-  next.weights = model_.examples[group].weights(u);
-  runtime::apply_example_bias(scene_.examples[group].bias, next.weights);
-  if (!former.has_target) next.target = start_target(group, next.weights);
-  next.has_target = true;
-  next.target_converged = former.has_target && former.target_converged && next.weights == former.weights;
-  if (!next.target_converged)
-    model_.target_methods.empty() ? solve_target(group, next) : solve_by_method(*model_.target_methods[group], next);
-  if (!next.target_converged) report_.status |= runtime::kTargetNotConverged;
-  return next;
-}
-
-// The blend of the examples.
-Eigen::VectorXd FullSpaceStep::start_target(std::size_t group, const Eigen::VectorXd& weights) const {
-  const FullSpaceExamples& examples = model_.examples[group];
-  Eigen::VectorXd target = Eigen::VectorXd::Zero(examples.pose_basis().cols());
-  if (model_.target_methods.empty()) {
-    examples.target().start(weights, target);
-    return target;
-  }
-  for (Eigen::Index k = 0; k < examples.count(); ++k) target += weights[k] * examples.pose(k);
-  return target;
-}
-
-void FullSpaceStep::solve_target(std::size_t group, ExampleState& examples) {
-  const runtime::TargetSolver& solver = model_.examples[group].target();
-  auto& scratch = workspace_.examples[group].target;
-  if (!scratch) scratch.emplace(solver.make_workspace());
-  const NewtonReport solved = solver.solve(examples.weights, *scratch, examples.target);
-  report_.target_iterations += solved.iterations;
-  examples.target_converged = solved.status != NewtonStatus::kIterationLimit;
-  if (solved.status == NewtonStatus::kNonFinite) report_.status |= runtime::kStepNonFinite;
-}
-
-void FullSpaceStep::solve_by_method(const TargetMethod& method, ExampleState& examples) {
-  const TargetMethod::Solved solved = method.solve(examples.weights, examples.target);
-  report_.target_iterations += solved.iterations;
-  examples.target_converged = solved.converged;
-  if (!examples.target.allFinite()) report_.status |= runtime::kStepNonFinite;
 }
 
 // The elasticity of which the target [f] is the undeformed shape.

@@ -44,10 +44,6 @@ class FullSpaceStep {
   Eigen::VectorXd start_acceleration();
   bool acts(std::size_t group) const;
   void update_targets(const Eigen::VectorXd& q);
-  runtime::ExampleState next_target(std::size_t group, const Eigen::VectorXd& u);
-  Eigen::VectorXd start_target(std::size_t group, const Eigen::VectorXd& weights) const;
-  void solve_target(std::size_t group, runtime::ExampleState& examples);
-  void solve_by_method(const TargetMethod& method, runtime::ExampleState& examples);
   const MeshElasticity* undeformed(std::size_t group, const Eigen::VectorXd& target);
   void choose_first_iterate();
   void commit();

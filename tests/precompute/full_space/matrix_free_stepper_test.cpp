@@ -1,0 +1,194 @@
+#include "precompute/full_space/matrix_free_stepper.h"
+
+#include <gtest/gtest.h>
+
+#include "precompute/mesh_io/mesh_file.h"
+#include "runtime/sim/space/full/full_potential.h"
+#include "tests/precompute/full_space/full_space_bar.h"
+#include "tests/support/random.h"
+
+namespace exmat::precompute {
+namespace {
+
+/// The bar of examples/01_twisted_bar: 340 vertices, 1,042 tets, 4 m long.
+FullSpaceModel bar_of_the_examples(MaterialModel model, Formulation formulation) {
+  ReducedModel reduced;
+  ObjectData& object = reduced.object.emplace();
+  object.mesh = read_mesh(EXMAT_SOURCE_DIR "/examples/01_twisted_bar/bar.msh").mesh;
+  const Eigen::Index tets = object.mesh.tet_count();
+  object.materials.density = Eigen::VectorXd::Constant(tets, 1000);
+  object.materials.youngs_modulus = Eigen::VectorXd::Constant(tets, 1e6);
+  object.materials.poisson_ratio = Eigen::VectorXd::Constant(tets, 0.4);
+  object.materials.model = model;
+  object.materials.formulation = formulation;
+  object.materials.variance_factor = formulation == Formulation::kSmoothed ? kVarianceFactor : 0;
+  object.fixed = FlagVector::Zero(object.mesh.vertex_count());
+  for (Eigen::Index v = 0; v < object.fixed.size(); ++v) object.fixed[v] = object.mesh.vertices(v, 0) < 0.01;
+  return build_full_space_model(reduced);
+}
+
+/// Pushed at the end from 0.04 to 0.2 s, under gravity, damped.
+FullSpaceScene pushed(const FullSpaceModel& model, double tolerance) {
+  FullSpaceScene scene;
+  scene.time_step = 0.004;
+  scene.gravity = {0, 0, -1};
+  scene.mass_damping = 0.2;
+  scene.stiffness_damping = 0.01;
+  scene.newton = {50, tolerance};
+  VertexForceConfig& force = scene.forces.emplace_back();
+  for (Eigen::Index v = 0; v < model.rest.rows(); ++v)
+    if (model.rest(v, 0) > model.rest.col(0).maxCoeff() - 1e-3) force.vertices.push_back(v);
+  force.force = Eigen::Vector3d(0, 60, 40);
+  force.start = 0.04;
+  force.end = 0.2;
+  return scene;
+}
+
+struct Compared {
+  double largest = 0, error = 0;  ///< of displacements, |q|
+  void add(const Eigen::VectorXd& q, const Eigen::VectorXd& expected) {
+    largest = std::max(largest, expected.norm());
+    error = std::max(error, (q - expected).norm());
+  }
+};
+
+// Both meet a residual of 1e-9 of the forces; the error of a displacement is that times how much softer the body is
+// than its stiffest part.
+TEST(MatrixFreeStepperTest, IsTheReferenceOnTheBarOfTheExamples) {
+  for (const MaterialModel material :
+       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational})
+    for (const Formulation formulation : {Formulation::kSmoothed, Formulation::kLinear}) {
+      if (formulation == Formulation::kLinear && material != MaterialModel::kStVenantKirchhoff) continue;
+      const FullSpaceModel model = bar_of_the_examples(material, formulation);
+      const FullSpaceScene scene = pushed(model, 1e-9);
+      FullSpaceState expected = at_rest(model), state = expected;
+      FullSpaceWorkspace workspace(model);
+      MatrixFreeStepper stepper(model);
+      ASSERT_TRUE(stepper.set(scene));
+      Compared compared;
+      for (int i = 0; i < 100; ++i) {
+        ASSERT_EQ(step(model, scene, expected, workspace).status, 0U);
+        ASSERT_EQ(stepper.step(state).status, 0U);
+        compared.add(state.q, expected.q);
+        ASSERT_NEAR(state.elastic_energy, expected.elastic_energy, 1e-6 * expected.elastic_energy);
+      }
+      EXPECT_GE(compared.largest, 0.9);
+      EXPECT_LE(compared.error, 1e-6 * compared.largest);
+      EXPECT_LE((state.v - expected.v).norm(), 1e-5 * expected.v.norm());
+    }
+}
+
+TEST(MatrixFreeStepperTest, FewIterationsAreWithinHalfAPercentOfTheReference) {
+  const FullSpaceModel model = bar_of_the_examples(MaterialModel::kStVenantKirchhoff, Formulation::kSmoothed);
+  const FullSpaceScene scene = pushed(model, 1e-8);
+  runtime::StepScene quick;
+  quick.time_step = scene.time_step;
+  quick.gravity = scene.gravity;
+  quick.mass_damping = scene.mass_damping;
+  quick.stiffness_damping = scene.stiffness_damping;
+  quick.newton = runtime::kRealTimeNewton;
+  Eigen::VectorXd force = Eigen::VectorXd::Zero(3 * model.rest.rows());
+  for (const std::int64_t vertex : scene.forces.front().vertices)
+    force.segment<3>(3 * vertex) = scene.forces.front().force;
+  quick.forces.push_back({.force = model.system.restrict(force), .start = 0.04, .end = 0.2});
+  runtime::FullWorkspace quick_workspace(model.space, quick, runtime::kRealTime);
+  FullSpaceWorkspace workspace(model);
+  FullSpaceState expected = at_rest(model), state = expected;
+  Compared compared;
+  int iterations = 0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(step(model, scene, expected, workspace).status, 0U);
+    const runtime::FullReport report = runtime::step(model.space, quick, state, quick_workspace);
+    ASSERT_EQ(report.status, 0U);
+    iterations += report.cg_iterations;
+    compared.add(state.q, expected.q);
+  }
+  EXPECT_GE(compared.largest, 0.9);
+  EXPECT_LE(compared.error, 0.005 * compared.largest);
+  EXPECT_LE(iterations, 4 * 100);
+}
+
+TEST(MatrixFreeStepperTest, IsTheReferenceUnderAnExampleForce) {
+  const test::BarOptions options{.eigenfunctions = 8, .examples = 3};
+  const test::Bar bar = complete_bar(options);
+  const FullSpaceModel model = build_full_space_model(bar.model, targets_of(options));
+  FullSpaceScene scene;
+  scene.time_step = 0.002;
+  scene.gravity = {0, 1, -1};
+  scene.stiffness_damping = 0.005;
+  scene.newton = {50, 1e-9};
+  scene.examples.push_back({.stiffness = 300, .damping = 2, .bias = 0.4});
+  FullSpaceState expected = at_rest(model), state = expected;
+  FullSpaceWorkspace workspace(model);
+  MatrixFreeStepper stepper(model);
+  ASSERT_TRUE(stepper.set(scene));
+  Compared compared;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(step(model, scene, expected, workspace).status, 0U);
+    ASSERT_EQ(stepper.step(state).status, 0U);
+    compared.add(state.q, expected.q);
+  }
+  EXPECT_LE(compared.error, 1e-6 * compared.largest);
+  EXPECT_LE((state.examples[0].weights - expected.examples[0].weights).norm(), 1e-6);
+  EXPECT_LE((state.examples[0].target - expected.examples[0].target).norm(), 1e-6 * expected.examples[0].target.norm());
+
+  // Without the force the body is elsewhere.
+  FullSpaceState other = at_rest(model);
+  scene.examples.clear();
+  ASSERT_TRUE(stepper.set(scene));
+  for (int i = 0; i < 100; ++i) ASSERT_EQ(stepper.step(other).status, 0U);
+  EXPECT_GE((other.q - expected.q).norm(), 0.05 * compared.largest);
+}
+
+TEST(MatrixFreeStepperTest, ElementsHaveTheEnergyOfTheReference) {
+  for (const MaterialModel material : {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean}) {
+    const FullSpaceModel model = bar_of_the_examples(material, Formulation::kSmoothed);
+    const Eigen::VectorXd u = 0.02 * test::random_vector(model.size(), 4);
+    const runtime::StepScene scene;
+    const runtime::StepForm form{0, 0, u, u};
+    runtime::FullPotentialWorkspace workspace(model.space);
+    runtime::FullPotential potential(model.space, scene, form, workspace);
+    potential.begin(u, 0 * u);
+    Eigen::VectorXd gradient(model.space.field_size()), force(model.size()), expected;
+    potential.evaluate(Eigen::VectorXd::Zero(gradient.size()), gradient);
+    model.space.from_field(gradient, force);
+    const double energy = model.elasticity.force(u, expected);
+    EXPECT_NEAR(potential.elastic_energy(), energy, 1e-12 * energy);
+    EXPECT_LE((force - expected).norm(), 1e-12 * expected.norm());
+  }
+}
+
+TEST(MatrixFreeStepperTest, RefusesWhatItCannotStep) {
+  const test::BarOptions options{.cells = {3, 1, 1}, .eigenfunctions = 6, .examples = 2};
+  const test::Bar bar = complete_bar(options);
+  const FullSpaceModel model = build_full_space_model(bar.model, targets_of(options));
+  MatrixFreeStepper stepper(model);
+  FullSpaceScene scene;
+  scene.examples.push_back({.stiffness = 300});
+  EXPECT_TRUE(stepper.set(scene));
+  scene.examples.front().elastic = true;
+  EXPECT_FALSE(stepper.set(scene));
+  scene.examples.clear();
+  scene.integrator = Integrator::kNewmark;
+  EXPECT_FALSE(stepper.set(scene));
+  scene.integrator = Integrator::kBdf2;
+  scene.obstacles = {runtime::Obstacle{runtime::Plane{{0, -1, 0}, {0, 1, 0}}, {}, 1e6, 1e3, 0.4}};
+  EXPECT_FALSE(stepper.set(scene));
+
+  test::BarOptions uneven = options;
+  uneven.density_gradient = 2;
+  const test::Bar uneven_bar = complete_bar(uneven);
+  const FullSpaceModel uneven_model = build_full_space_model(uneven_bar.model, targets_of(uneven));
+  MatrixFreeStepper uneven_stepper(uneven_model);
+  FullSpaceScene examples;
+  examples.examples.push_back({.stiffness = 300});
+  EXPECT_FALSE(uneven_stepper.set(examples));
+
+  const test::Bar free = test::make_bar({.cells = {3, 1, 1}, .free = true});
+  const FullSpaceModel free_model = build_full_space_model(free.model);
+  MatrixFreeStepper free_stepper(free_model);
+  EXPECT_FALSE(free_stepper.set({}));
+}
+
+}  // namespace
+}  // namespace exmat::precompute
