@@ -30,6 +30,9 @@ int main(int argc, char** argv) {
   benchmarks::register_sizes();
   benchmarks::register_crowds();
   benchmarks::register_worlds();
+#ifdef EXMAT_SOURCE_DIR
+  benchmarks::register_full_space();
+#endif
   ::benchmark::RunSpecifiedBenchmarks();
   ::benchmark::Shutdown();
   return 0;
