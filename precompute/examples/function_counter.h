@@ -18,8 +18,8 @@ class FunctionCounter {
   /// Both are kept by reference; `name` is for messages.
   FunctionCounter(const TetMesh& mesh, const std::string& name) : mesh_(mesh), name_(name) {}
 
-  /// The least number that loses at most the share of a displacement [3n], relative M-norm, and cuts no cluster; 0 where
-  /// kMostEigenfunctions do not do.
+  /// The least number that loses at most the share of a displacement [3n], relative M-norm, and cuts no cluster; 0
+  /// where kMostEigenfunctions do not do.
   Eigen::Index needed(const Eigen::VectorXd& field, double share);
 
  private:

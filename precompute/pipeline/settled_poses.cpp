@@ -118,8 +118,9 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   const double size = norm(pose.given);
   const Eigen::VectorXd in_basis =
       field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * pose.given));
-  SettledPose found{.region = fitter.region(group),
-                    .example = examples_of(model_, fitter.region(group)).examples[static_cast<std::size_t>(k)].name};
+  SettledPose found;
+  found.region = fitter.region(group);
+  found.example = examples_of(model_, found.region).examples[static_cast<std::size_t>(k)].name;
   found.basis = norm(pose.given - in_basis) / size;
   found.clamp = norm(pose.carried - pose.clamped) / size;
   found.compensable = found.region.empty() && model_.targets && !is_elastic(group);

@@ -47,8 +47,8 @@ struct TargetTableReport {
 std::optional<TargetTableData> build_target_table(const runtime::TargetSolver& target, const Eigen::MatrixXd& poses,
                                                   const TargetTableOptions& options, TargetTableReport& report);
 
-/// Adds a linear function of the weights to the targets of a table: sum_k w_k times column k of `shifts` [r x K]. Exact,
-/// since Bernstein polynomials of any degree hold linear functions.
+/// Adds a linear function of the weights to the targets of a table: sum_k w_k times column k of `shifts` [r x K].
+/// Exact, since Bernstein polynomials of any degree hold linear functions.
 void shift_targets(const Eigen::MatrixXd& shifts, TargetTableData& table);
 
 }  // namespace exmat::precompute

@@ -237,7 +237,7 @@ class RuntimeAlone(unittest.TestCase):
                        self.cached("CMAKE_BUILD_TYPE"), self.cached("EXMAT_SANITIZE"), self.cached("CMAKE_UNITY_BUILD"), self.cached("CMAKE_CXX_COMPILER")]
             subprocess.run(["cmake", "-S", str(ROOT), "-B", folder, "-GNinja", *options], check=True, env=blind, capture_output=True)
             alone = self.commands(Path(folder))
-        self.assertGreater(len([line for line in alone if " -c " in line]), 50)
+        self.assertGreater(len([line for line in alone if " -c " in line]), 20)
         self.assertTrue(any("exmat-runtime" in line and " -o bin/exmat-runtime" in line for line in alone))
         self.assertEqual(alone - self.commands(BUILD), set())
         foreign = [line for line in alone if re.search(r"petsc|slepc|openmpi|precompute", line)]

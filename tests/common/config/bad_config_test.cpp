@@ -332,7 +332,8 @@ const BadConfig kBadScenes[] = {
     {"CompensatedElasticForce", scene(R"("examples": {"stiffness": 1, "force": "elastic", "compensate": true})"),
      "a.json: /examples/compensate: expected a linear force with a table of targets, found an elastic force"},
     {"CompensatedSolvedTargets", scene(R"("examples": {"stiffness": 1, "target": "solve", "compensate": true})"),
-     "a.json: /examples/compensate: expected a linear force with a table of targets, found targets that are solved for"},
+     "a.json: /examples/compensate: expected a linear force with a table of targets, found targets that are solved "
+     "for"},
     {"NoTargetIterations", scene(R"("examples": {"stiffness": 1, "target_iterations": 0})"),
      "a.json: /examples/target_iterations: expected an integer >= 1 and <= 1000, found 0"},
     {"UnknownForce", scene(R"("examples": {"stiffness": 1, "force": "plastic"})"),

@@ -42,12 +42,16 @@ Eigen::Vector3d displacement(const Solid& body, const Eigen::VectorXd& load) {
     for (int iteration = 0;; ++iteration) {
       elasticity.force_and_stiffness(u, runtime::Tangent::kExact, force, stiffness);
       if ((force - outer).norm() <= 1e-8 * outer.norm()) break;
-      if (iteration == 50) {
+      if (iteration == 100) {
         ADD_FAILURE() << "no equilibrium at step " << step;
         return Eigen::Vector3d::Zero();
       }
       const Eigen::SimplicialLDLT<LowerTriangle> factors(stiffness);
-      const Eigen::VectorXd step = factors.solve(outer - force);
+      Eigen::VectorXd step = factors.solve(outer - force);
+      if (!(step.dot(outer - force) > 0)) {
+        elasticity.force_and_stiffness(u, runtime::Tangent::kPositiveSemidefinite, force, stiffness);
+        step = Eigen::SimplicialLDLT<LowerTriangle>(stiffness).solve(outer - force);
+      }
       const double start = elasticity.energy(u) - outer.dot(u), rounding = 1e-12 * (std::abs(start) + outer.norm());
       double length = 1;
       while (length > 1e-3 &&
