@@ -43,6 +43,7 @@ class PoseSettler {
   const std::optional<TargetTableData>& targets() const { return model_.targets; }
 
  private:
+  std::optional<Eigen::MatrixXd> shifts(double strength) const;
   void compensate();
   std::vector<double> strengths(Eigen::Index group) const;
   Coordinates settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
@@ -149,38 +150,51 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   return found;
 }
 
-// By the force of one strength that holds all poses best under gravity.
-void PoseSettler::compensate() {
-  const auto refuse = [&](const std::string& expected, const std::string& found, const std::string& advice) {
-    throw InputError({load_.file, "/examples/compensate", expected, found, advice});
-  };
-  if (!model_.targets)
-    refuse("a table of targets, of 2 to 4 examples of the whole body", "none",
-           "leave compensate out, or have the asset make a table: targets.tolerance");
-  const Eigen::Index count = std::ssize(model_.examples->examples);
-  double chosen = 0, least = 0;
-  for (const double strength : strengths(0)) {
-    double worst = 0;
-    for (Eigen::Index k = 1; k < count; ++k)
-      worst = std::max(worst, error(0, k, settled(*plain_, 0, k, strength, load_.gravity)));
-    if (chosen > 0 && worst >= least) continue;
-    chosen = strength;
-    least = worst;
-  }
+// Shifts by which the stiffness of the load has the force of another strength where that settles; nothing where it does
+// not settle.
+std::optional<Eigen::MatrixXd> PoseSettler::shifts(double strength) const {
   const runtime::ExampleModel& force = plain_->examples.front();
-  const double stiffness = load_.examples.front().stiffness;
+  const Eigen::Index count = std::ssize(model_.examples->examples);
   runtime::TargetTable::Workspace workspace = force.table->make_workspace();
   Eigen::MatrixXd shifts(plain_->modes(), count);
   Eigen::VectorXd pull(plain_->modes());
   for (Eigen::Index k = 0; k < count; ++k) {
-    const Coordinates q = settled(*plain_, 0, k, chosen, load_.gravity);
-    if (!q)
-      refuse("examples that the body settles in", model_.examples->examples[static_cast<std::size_t>(k)].name,
-             "leave compensate out");
+    const Coordinates q = settled(*plain_, 0, k, strength, load_.gravity);
+    if (!q) return std::nullopt;
     force.table->evaluate(Eigen::VectorXd::Unit(count, k), workspace, pull);
-    shifts.col(k) = (chosen / stiffness - 1) * (pull - force.filter.matrix() * *q);
+    shifts.col(k) = (strength / load_.examples.front().stiffness - 1) * (pull - force.filter.matrix() * *q);
   }
-  shift_targets(shifts, *model_.targets);
+  return shifts;
+}
+
+// By the strength after which the body settles nearest to all poses, from rest: where a force is so weak that a pose is
+// no stable equilibrium, less is more. None where all make it worse.
+void PoseSettler::compensate() {
+  if (!model_.targets)
+    throw InputError({load_.file, "/examples/compensate", "a table of targets, of 2 to 4 examples of the whole body",
+                      "none", "leave compensate out, or have the asset make a table: targets.tolerance"});
+  const double stiffness = load_.examples.front().stiffness;
+  const auto worst = [&](const runtime::Model& model) {
+    double largest = 0;
+    for (Eigen::Index k = 1; k < std::ssize(model_.examples->examples); ++k)
+      largest = std::max(largest, error(0, k, settled(model, 0, k, stiffness, load_.gravity)));
+    return largest;
+  };
+  const TargetTableData plain = *model_.targets;
+  TargetTableData best = plain;
+  double least = worst(*plain_);
+  for (const double strength : strengths(0)) {
+    const auto by = strength > stiffness ? shifts(strength) : std::nullopt;
+    if (!by) continue;
+    *model_.targets = plain;
+    shift_targets(*by, *model_.targets);
+    const auto candidate = stepped_model(model_, reference_of(stages_), load_.examples);
+    const double found = worst(*candidate);
+    if (found >= least) continue;
+    least = found;
+    best = *model_.targets;
+  }
+  model_.targets = best;
   model_.targets->compensated_stiffness = stiffness;
   model_.targets->compensated_gravity = load_.gravity;
   loaded_ = stepped_model(model_, reference_of(stages_), load_.examples);

@@ -67,7 +67,8 @@ def teddy():
 def hug(teddy, bundle, folder):
     asset = {
         "name": "teddy",
-        "object": {"mesh": (teddy.rest, teddy.tets), "fixed": {"box": {"min": [-0.4, 0.3, 0.5], "max": [0.4, 0.5, 1.4]}},
+        "object": {"mesh": (teddy.rest, teddy.tets), "formulation": "linear",  # the depths are those of its stiffness
+                   "fixed": {"box": {"min": [-0.4, 0.3, 0.5], "max": [0.4, 0.5, 1.4]}},
                    "material": {"model": "stable_neo_hookean", "youngs_modulus": 1e5, "poisson_ratio": 0.4, "density": 300}},
         "shape_space": {"eigenfunctions": 30},
         "examples": [{"name": "rest", "mesh": (teddy.rest, teddy.tets), "rest": True}, {"name": "hug", "mesh": teddy.posed}],
