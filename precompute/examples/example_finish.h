@@ -48,7 +48,7 @@ class PoseFitter {
     Eigen::VectorXd clamped;  ///< and with the fixed vertices put back
   };
   PoseFields pose_fields(Eigen::Index group, Eigen::Index k) const;
-  /// What a group sees of the displacements [3n x k].
+  /// Displacements [3n x k] as a group sees them.
   RowMatrix seen(Eigen::Index group, const RowMatrix& displacements) const;
 
   /// Logs what of each example of a model is lost, and records what is worth a warning.

@@ -23,7 +23,7 @@ constexpr Eigen::Index kExtraEigenfunctions = 4;
 // A displacement, over the object's size, that is none: numbers written with few digits have as much. Two
 // tessellations of one body have more.
 constexpr double kNoPose = 1e-4, kNoRegisteredPose = 0.01;
-// What a pose moves fixed vertices by, over the object's size, that is worth a warning.
+// A pose that moves fixed vertices by more, over the object's size, deserves a warning.
 constexpr double kMovedClamp = 0.005;
 // A turn that is worth words [rad].
 constexpr double kTurned = 0.02;
@@ -275,8 +275,8 @@ void ShapeStageBuilder::add_poses(const AlignedRest& rest, const std::vector<Ali
   }
 }
 
-// How many functions lose no more of any pose than the asset tolerates. Those that coupled bases carry are left out:
-// they are known by the functions that were coupled.
+// Counts the functions that lose no more of any pose than the asset tolerates. Where coupled bases carry a pose, the
+// number stays: the pose is known by the functions that were coupled.
 Eigen::Index ShapeStageBuilder::functions_needed(const std::vector<AlignedPose>& poses) const {
   const auto is_carried = [](const AlignedPose& pose) { return pose.carried.has_value(); };
   if (!asset_.pose_tolerance || std::ranges::any_of(poses, is_carried)) return functions_;

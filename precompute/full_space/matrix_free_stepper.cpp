@@ -9,7 +9,7 @@
 namespace exmat::precompute {
 namespace {
 
-// Whether factors made for one serve the other.
+// Tells whether factors that were made for one scene serve the other.
 bool same_matrices(const runtime::StepScene& a, const runtime::StepScene& b) {
   const auto numbers = [](const runtime::StepScene& scene) {
     const bool acts = !scene.examples.empty();

@@ -71,7 +71,7 @@ PoseSettler::PoseSettler(const BodyStages& stages, const ReducedModel& model, co
   if (load_.compensate) compensate();
 }
 
-// Of the forces that are tried: from that of the lowest mode to one that leaves nothing to elasticity.
+// Stiffnesses that are tried, from that of the lowest mode to one that leaves nothing to elasticity.
 std::vector<double> PoseSettler::strengths(Eigen::Index group) const {
   const Eigen::VectorXd& modes = stages_.modes.eigenvalues;
   const double most = kStrongest * (is_elastic(group) ? 1 : modes.tail(1)[0]);
@@ -81,7 +81,7 @@ std::vector<double> PoseSettler::strengths(Eigen::Index group) const {
   return all;
 }
 
-// The forces of other groups are left out.
+// Settles the body with the force of one group; those of others are left out.
 Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
                                  const Eigen::Vector3d& gravity) const {
   runtime::StepScene scene;

@@ -10,7 +10,7 @@
 
 namespace exmat::precompute {
 
-/// What holds a settled body while an example has all of the weight.
+/// Forces and gravity that hold a settled body while an example has all of the weight.
 struct SettlingLoad {
   std::string file;                                   ///< whose load it is, for messages
   std::vector<runtime::ExampleSettings> examples;     ///< of the groups, in their order
@@ -18,8 +18,8 @@ struct SettlingLoad {
   bool compensate = false;                            ///< shift targets so that the body settles as it would at best
 };
 
-/// How far a settled body is from an example's pose as it was given. Errors are relative to the pose's displacement, by
-/// mass; those of a region are of what the region sees.
+/// Distance of a settled body from an example's pose as it was given. Errors are relative to the pose's displacement,
+/// by mass; those of a region are of what the region sees.
 struct SettledPose {
   std::string region, example;
   bool settles = true;           ///< else all errors are those of the rest pose

@@ -214,7 +214,7 @@ struct MeshArrays {
   const double* variance_matrix = nullptr;  ///< sum over the tets of V beta mu grad N_i . grad N_j [N/m]
 };
 
-/// What a step's potential is made of besides the law: fields x, a = q - q_a and w = q - q_v, see StepForm.
+/// Fields of a step's potential besides the law: x, a = q - q_a and w = q - q_v, see StepForm.
 struct MeshInertia {
   const double *displacement = nullptr, *offset = nullptr, *rate = nullptr;
   double acceleration_factor = 0;  ///< c_a
