@@ -60,6 +60,11 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   summary.internal_force = CubatureData{}.internal_force;
   if (includes(groups, "cubature"))
     reader.read_attribute("/cubature", "/cubature", "internal_force", summary.internal_force);
+  if (includes(groups, "fidelity")) {
+    std::string loads;
+    reader.read_attribute("/fidelity", "/fidelity", "loads", loads);
+    summary.knows_scene = loads == kLoadsOfScene;
+  }
   if (summary.has_targets) reader.read_attribute("/targets", "/targets", "energy_reference", summary.energy_reference);
   summary.render_vertices = value_of(sizes, "v");
   if (includes(groups, "regions"))

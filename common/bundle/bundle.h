@@ -39,6 +39,7 @@ struct BundleSummary {
   bool has_polynomial = false;                                   ///< /polynomial is there
   bool has_targets = false;                                      ///< /targets is there
   bool has_target_space = false;                                 ///< /target_space is there
+  bool knows_scene = false;                                      ///< its basis has learned from the loads of a scene
   std::vector<RegionSummary> regions;
   std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
 };

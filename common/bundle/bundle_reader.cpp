@@ -24,8 +24,8 @@ const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attrib
 std::string asset_member(std::string_view group) {
   if (group == "polynomial") return "\"polynomial\" as internal_force";
   if (group == "render") return "object.render_mesh";
-  const bool is_need = group == "targets" || group == "target_elasticity" || group == "rigid" || group == "contact" ||
-                       group == "regions";
+  const bool is_need = group == "targets" || group == "target_elasticity" || group == "full_space" ||
+                       group == "rigid" || group == "contact" || group == "regions";
   return fmt::format("\"{}\" among the needs", is_need ? group : "examples");
 }
 

@@ -80,6 +80,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.target_space.emplace();
   else if (group == "target_elasticity")
     model.target_elasticity.emplace();
+  else if (group == "full_space")
+    model.full_space.emplace();
   else if (group == "fidelity")
     model.fidelity.emplace();
   else if (group == "regions")

@@ -184,6 +184,15 @@ void visit_target_elasticity(const FieldPlace& place, Elasticity& elasticity, Vi
   visit.dataset("control_points", elasticity.control_points);
 }
 
+template <typename FullSpace, typename Visitor>
+void visit_full_space(FullSpace& full, Visitor& visit) {
+  enter(kTopPlace, "/full_space", visit);
+  visit.dataset("filter", full.filter);
+  visit.dataset("slopes", full.slopes);
+  visit.dataset("control_points", full.control_points);
+  visit.dataset("from_target", full.from_target);
+}
+
 template <typename Fidelity, typename Visitor>
 void visit_fidelity(Fidelity& fidelity, Visitor& visit) {
   enter(kTopPlace, "/fidelity", visit);
@@ -273,6 +282,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.targets) visit_targets(kTopPlace, *model.targets, visit);
   if (model.target_space) visit_target_space(kTopPlace, *model.target_space, visit);
   if (model.target_elasticity) visit_target_elasticity(kTopPlace, *model.target_elasticity, visit);
+  if (model.full_space) visit_full_space(*model.full_space, visit);
   if (model.fidelity) visit_fidelity(*model.fidelity, visit);
   if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);

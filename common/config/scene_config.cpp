@@ -108,6 +108,10 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   const Json newton = member_or(shared, "newton", Json::object());
   scene.newton.max_iterations = newton.value("max_iterations", scene.newton.max_iterations);
   scene.newton.tolerance = newton.value("tolerance", scene.newton.tolerance);
+  scene.space.space = choice_or(own.contains("space") ? own : shared, "space", scene.space.space);
+  scene.space.release = (own.contains("space_release") ? own : shared).value("space_release", scene.space.release);
+  scene.space.newton.max_iterations = newton.value("max_iterations", scene.space.newton.max_iterations);
+  scene.space.newton.tolerance = newton.value("tolerance", scene.space.newton.tolerance);
   const Json sleep = member_or(shared, "sleep", Json::object());
   scene.sleep.energy = sleep.value("energy", scene.sleep.energy);
   scene.sleep.time = sleep.value("time", scene.sleep.time);
@@ -260,6 +264,7 @@ Needs needs_of(const SceneConfig& scene) {
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
               .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
+              .full_space = scene.space.space != Space::kReduced,
               .contact = scene.meets_others || scene.meets_bodies || !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};

@@ -66,6 +66,13 @@ struct NewtonConfig {
   double tolerance = 1e-6;  ///< relative to |f_ext| + |f_int| + |inertia|
 };
 
+/// What the unknowns of steps are.
+struct SpaceConfig {
+  Space space = Space::kReduced;
+  double release = 0.5;           ///< [s]
+  NewtonConfig newton{20, 0.01};  ///< of steps in all vertices
+};
+
 struct SleepConfig {
   double energy = 0;  ///< a body below this kinetic energy [J]; 0: none
   double time = 0.5;  ///< for so long is left alone [s]
@@ -149,6 +156,7 @@ struct SceneConfig {
   double stiffness_damping = 0;                     ///< beta [s]
   Precision precision = Precision::kDouble;
   NewtonConfig newton;
+  SpaceConfig space;
   SleepConfig sleep;
   std::optional<ExampleForceConfig> examples;  ///< of the whole body
   std::vector<RegionForceConfig> regions;

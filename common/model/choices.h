@@ -15,6 +15,12 @@ enum class Precision { kDouble, kMixed };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Precision>{"double", "mixed"};
 
+/// The unknowns of a body: reduced coordinates, all vertices, or reduced until something acts that the modes were not
+/// made for.
+enum class Space { kReduced, kFull, kAuto };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<Space>{"reduced", "full", "auto"};
+
 /// How the internal force is computed; `auto` as the bundle says, or by measurement where the bundle is made.
 enum class ForceMethod { kAuto, kCubature, kPolynomial };
 template <>

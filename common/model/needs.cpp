@@ -26,6 +26,12 @@ LedgerEntry plan_target_elasticity(const Needs& needs, const LedgerEntry& exampl
   return {"target_elasticity", true, 0, "an elastic example force is asked for"};
 }
 
+LedgerEntry plan_full_space(const Needs& needs, const LedgerEntry& examples) {
+  if (!needs.full_space) return {"full_space", false, 0, "no steps in full space are asked for"};
+  if (!examples.included) return {"full_space", false, 0, examples.reason + "; the mesh is enough"};
+  return {"full_space", true, 0, "steps in full space are asked for"};
+}
+
 LedgerEntry plan_polynomial(const Needs& needs) {
   if (needs.internal_force == ForceMethod::kCubature)
     return {"polynomial", false, 0, "the internal force is by cubature"};
@@ -70,6 +76,7 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
       plan_targets(needs, examples, example_count),
       plan_target_space(needs, examples),
       plan_target_elasticity(needs, examples),
+      plan_full_space(needs, examples),
       {"fidelity", needs.fidelity, 0, needs.fidelity ? "runs in full space to compare with" : "nothing was trained on"},
       regions,
       {"rigid", rigid, 0, rigid_reason},

@@ -30,6 +30,7 @@ struct Needs {
   bool targets = true;                                ///< /targets, of at most kMostTableExamples examples
   bool target_space = true;                           ///< /target_space
   bool target_elasticity = false;                     ///< /target_elasticity, of an elastic example force
+  bool full_space = true;                             ///< /full_space, of a body that may step in all vertices
   bool fidelity = false;                              ///< /fidelity: of what came of training, of no use to a step
   bool contact = true;                                ///< /contact
   bool render = true;                                 ///< /render, of an asset that names a render mesh

@@ -174,6 +174,18 @@ struct RegionData {
   std::optional<TargetElasticityData> target_elasticity;
 };
 
+/// Group /full_space: what steps in all vertices take of the whole body's examples, in the coefficients W^T u. The
+/// filter of the example force is P = W W^T (x) I3; row 3i + axis of a coefficient. docs/method.md, "Force".
+struct FullSpaceData {
+  RowMatrix filter;          ///< n x m, W
+  RowMatrix slopes;          ///< K x 3m: h = h0 + slopes W^T u of the weights problem
+  RowMatrix control_points;  ///< P c x 3m, W^T of those of /targets; without a table of the examples
+  RowMatrix from_target;     ///< d x 3m, W^T Y, Y [3n x d] the displacements of /target_space
+};
+
+/// FidelityData::loads of a bundle whose basis has learned from a scene.
+inline constexpr const char* kLoadsOfScene = "the loads of the scene";
+
 /// Group /fidelity: how far the reduced body is from the full space, or one of many modes in its place, in runs that
 /// its basis has not learned from.
 /// Errors are relative, docs/error_metrics.md. Of no use to a step.
@@ -242,6 +254,7 @@ struct ReducedModel {
   std::optional<TargetTableData> targets;
   std::optional<TargetSpaceData> target_space;
   std::optional<TargetElasticityData> target_elasticity;
+  std::optional<FullSpaceData> full_space;
   std::optional<FidelityData> fidelity;
   std::vector<RegionData> regions;  ///< in index order; none: no such group
   std::optional<RigidData> rigid;

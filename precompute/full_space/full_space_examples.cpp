@@ -16,9 +16,6 @@
 namespace exmat::precompute {
 namespace {
 
-// Relative difference of P and its transpose that is rounding.
-constexpr double kSymmetric = 1e-12;
-
 using Field = Eigen::Map<const VertexArray>;
 
 // Squared angular frequency of the highest linear mode, as the pipeline's clamp has it.
@@ -99,21 +96,14 @@ FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSys
 
 void FullSpaceExamples::set_filter(const ReducedModel& model, const ExampleSet& set) {
   const LaplaceBasis object = laplace_basis_of(model);
-  analysis_ = object.mass * object.eigenfunctions;
-  synthesis_ = scalar_mass(model.object->mesh, model.object->materials.density) * object.eigenfunctions;
+  filter_ = FilterFunctions(object, model.object->mesh, model.object->materials.density);
   if (!view_) {
     std::vector<std::int32_t> free_vertices;
     for (std::size_t i = 0; i < free_dofs_.size(); i += 3) free_vertices.push_back(free_dofs_[i] / 3);
-    analysis_ = RowMatrix(analysis_(free_vertices, Eigen::all));
-    synthesis_ = RowMatrix(synthesis_(free_vertices, Eigen::all));
+    filter_.analysis = RowMatrix(filter_.analysis(free_vertices, Eigen::all));
+    filter_.synthesis = RowMatrix(filter_.synthesis(free_vertices, Eigen::all));
   }
-  const double ratio = synthesis_.norm() / analysis_.norm();
-  symmetric_ = (synthesis_ - ratio * analysis_).norm() <= kSymmetric * synthesis_.norm();
-
-  const Eigen::VectorXd weights = descriptor_weights(object, model.shape_space->weighting) / std::cbrt(object.volume);
-  RowMatrix slopes(std::ssize(set.examples), 3 * weights.size());
-  for (std::size_t k = 0; k < set.examples.size(); ++k)
-    slopes.row(static_cast<Eigen::Index>(k)) = flat(weights.asDiagonal() * set.examples[k].descriptor).transpose();
+  const RowMatrix slopes = weight_slopes(object, model.shape_space->weighting, set);
   weights_ = runtime::ExampleWeights(set.gram, set.h0, slopes);
 }
 
@@ -149,21 +139,21 @@ Eigen::VectorXd FullSpaceExamples::force(const RowMatrix& functions, const Eigen
 Eigen::VectorXd FullSpaceExamples::weights(const Eigen::VectorXd& u) const {
   runtime::ExampleWeights::Workspace workspace = weights_.make_workspace();
   Eigen::VectorXd weights(count());
-  weights_.solve(flat(coefficients(analysis_, u)), workspace, weights);
+  weights_.solve(flat(coefficients(filter_.analysis, u)), workspace, weights);
   return weights;
 }
 
 Eigen::VectorXd FullSpaceExamples::filter(const Eigen::VectorXd& u) const {
-  return force(synthesis_, coefficients(analysis_, u));
+  return force(filter_.synthesis, coefficients(filter_.analysis, u));
 }
 
 std::optional<Eigen::MatrixXd> FullSpaceExamples::root() const {
-  if (view_ || !symmetric_) return std::nullopt;
-  return Eigen::MatrixXd(std::sqrt(synthesis_.norm() / analysis_.norm()) * analysis_);
+  if (view_ || !filter_.symmetric) return std::nullopt;
+  return Eigen::MatrixXd(filter_.root_over_analysis() * filter_.analysis);
 }
 
 Eigen::VectorXd FullSpaceExamples::transposed_filter(const Eigen::VectorXd& u) const {
-  return force(analysis_, coefficients(synthesis_, u));
+  return force(filter_.analysis, coefficients(filter_.synthesis, u));
 }
 
 }  // namespace exmat::precompute

@@ -7,6 +7,7 @@
 
 #include "common/model/reduced_model.h"
 #include "precompute/fem/elastic_system.h"
+#include "precompute/shape_space/filter_functions.h"
 #include "precompute/shape_space/region_view.h"
 #include "precompute/targets/mesh_target.h"
 #include "runtime/sim/examples/example_weights.h"
@@ -56,7 +57,7 @@ class FullSpaceExamples {
   /// P u and P^T u [f]; the same where density is uniform.
   Eigen::VectorXd filter(const Eigen::VectorXd& u) const;
   Eigen::VectorXd transposed_filter(const Eigen::VectorXd& u) const;
-  bool symmetric() const { return symmetric_; }
+  bool symmetric() const { return filter_.symmetric; }
   /// [free vertices x m] W, P = W W^T (x) I3; none of a region, or where P is not symmetric.
   std::optional<Eigen::MatrixXd> root() const;
 
@@ -79,10 +80,8 @@ class FullSpaceExamples {
   std::optional<RegionView> view_;
   std::optional<Eigen::VectorXd> tet_shares_;
   std::vector<std::int32_t> free_dofs_;  // of a region
-  RowMatrix analysis_;                   // vertices x m, (M_s/V) Phi; free vertices, of a region all
-  RowMatrix synthesis_;                  // likewise, M Phi
-  bool symmetric_ = true;
-  runtime::ExampleWeights weights_;  // of Phi^T (M_s/V) u [3m]
+  FilterFunctions filter_;               // of free vertices, of a region all
+  runtime::ExampleWeights weights_;      // of Phi^T (M_s/V) u [3m]
   PoseCoordinates coordinates_;
   Eigen::MatrixXd target_fields_;
   runtime::TargetSolver target_;

@@ -42,7 +42,7 @@ void add_space(const ObjectData& object, FullSpaceModel& full) {
     for (Eigen::Index i = 0; i < full.space_root.rows(); ++i)
       filter.row(full.system.free_dofs[static_cast<std::size_t>(3 * i)] / 3) = full.space_root.row(i);
   }
-  full.space = runtime::FullSpace(object.mesh, object.materials, object.fixed, filter);
+  full.matrix_free = runtime::FullModel(runtime::FullSpace(object.mesh, object.materials, object.fixed, filter));
 }
 
 }  // namespace

@@ -13,7 +13,7 @@
 #include "precompute/full_space/mesh_elasticity.h"
 #include "precompute/full_space/target_method.h"
 #include "precompute/full_space/vertex_contacts.h"
-#include "runtime/sim/space/full/full_space.h"
+#include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
 
@@ -35,7 +35,7 @@ struct FullSpaceModel {
 
   /// The same elements for MatrixFreeStepper, with the filter of the whole body's example force, if there is one and it
   /// is symmetric, and W of it [free vertices x m].
-  runtime::FullSpace space;
+  runtime::FullModel matrix_free;
   Eigen::MatrixXd space_root;
 
   Eigen::Index size() const { return elasticity.size(); }

@@ -1,6 +1,5 @@
 #include "precompute/full_space/matrix_free_stepper.h"
 
-#include <array>
 #include <utility>
 
 #include "common/core/timer.h"
@@ -9,21 +8,11 @@
 namespace exmat::precompute {
 namespace {
 
-// Tells whether factors that were made for one scene serve the other.
-bool same_matrices(const runtime::StepScene& a, const runtime::StepScene& b) {
-  const auto numbers = [](const runtime::StepScene& scene) {
-    const bool acts = !scene.examples.empty();
-    return std::array{scene.time_step, scene.mass_damping, scene.stiffness_damping,
-                      acts ? scene.examples.front().stiffness : 0, acts ? scene.examples.front().damping : 0};
-  };
-  return a.integrator == b.integrator && numbers(a) == numbers(b);
-}
-
 runtime::ScriptedForce scripted(const FullSpaceModel& model, const VertexForceConfig& force) {
   Eigen::VectorXd all = Eigen::VectorXd::Zero(3 * model.rest.rows());
   for (const std::int64_t vertex : force.vertices) all.segment<3>(3 * vertex) += force.force;
   runtime::ScriptedForce scripted;
-  scripted.force = model.system.restrict(all);
+  scripted.on_vertices = model.system.restrict(all);
   scripted.start = force.start;
   scripted.end = force.end;
   return scripted;
@@ -38,14 +27,17 @@ bool MatrixFreeStepper::set(const FullSpaceScene& scene) {
   next.integrator = scene.integrator;
   next.mass_damping = scene.mass_damping;
   next.stiffness_damping = scene.stiffness_damping;
-  next.newton = scene.newton;
+  next.space.newton = scene.newton;
   next.gravity = scene.gravity;
   next.obstacles = scene.obstacles;
   for (const runtime::ExampleSettings& settings : scene.examples)
     if (runtime::acts(settings)) next.examples = scene.examples;
-  if (runtime::unsupported(model_.space, next) != nullptr) return false;
+  if (runtime::unsupported(model_.matrix_free, next) != nullptr) return false;
   for (const VertexForceConfig& force : scene.forces) next.forces.push_back(scripted(model_, force));
-  if (!workspace_ || !same_matrices(scene_, next)) workspace_.emplace(model_.space, next);
+  if (workspace_)
+    workspace_->fit(model_.matrix_free, next);
+  else
+    workspace_.emplace(model_.matrix_free, next);
   scene_ = std::move(next);
   return true;
 }
@@ -53,7 +45,7 @@ bool MatrixFreeStepper::set(const FullSpaceScene& scene) {
 FullSpaceReport MatrixFreeStepper::step(FullSpaceState& state) {
   const Timer timer;
   FullSpaceReport report;
-  runtime::FullStep one(model_.space, scene_, state, *workspace_);
+  runtime::FullStep one(model_.matrix_free, scene_, state, *workspace_);
   one.begin();
   std::optional<runtime::ExampleState> examples;
   if (!scene_.examples.empty()) {

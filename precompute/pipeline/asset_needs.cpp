@@ -40,6 +40,7 @@ std::string text_of(const Needs& needs) {
       "examples {}\nrigid {} {}\ntargets {}\ncontact {}\nrender {}\ninternal_force {}\nenergy_reference {}\n",
       needs.examples, needs.rigid, needs.carried, needs.targets, needs.contact, needs.render,
       name_of(needs.internal_force), name_of(needs.energy_reference));
+  if (needs.full_space) text += "full_space\n";
   if (needs.target_elasticity) text += "target_elasticity\n";
   if (!needs.regions) return text;
   for (const RegionNeeds& region : *needs.regions)
@@ -58,6 +59,7 @@ Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_
   needs.examples = named("examples");
   needs.targets = named("targets");
   needs.target_elasticity = named("target_elasticity");
+  needs.full_space = named("full_space");
   needs.rigid = needs.carried = named("rigid");
   needs.contact = named("contact");
   needs.render = named("render");

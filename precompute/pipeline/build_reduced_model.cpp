@@ -16,6 +16,7 @@
 #include "precompute/cubature/cubature.h"
 #include "precompute/examples/alignment_report.h"
 #include "precompute/examples/example_finish.h"
+#include "precompute/examples/full_space_data.h"
 #include "precompute/fem/elastic_system.h"
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/inputs/object_size.h"
@@ -121,6 +122,7 @@ class Pipeline {
   }
   void add_contact(ReducedModel& model);
   void settle_examples(const BodyStages& stages, ReducedModel& model);
+  void refuse_full_space();
   void add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice, ReducedModel& model);
 
   const AssetConfig& asset_;
@@ -395,6 +397,21 @@ void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
   }
 }
 
+void Pipeline::refuse_full_space() {
+  const std::string reason = "parts of the body have several densities";
+  if (options_.scene != nullptr && options_.scene->space.space != Space::kReduced)
+    throw InputError({options_.scene->file.string(), options_.scene->place + "/space", "\"reduced\", since " + reason,
+                      fmt::format("\"{}\"", name_of(options_.scene->space.space)),
+                      "give all parts of the asset one density, or take space \"reduced\""});
+  leave_out("full_space", reason);
+}
+
+const TargetSpace& whole_body_targets(const PoseFitter& fitter, const std::vector<TargetSpace>& targets) {
+  std::size_t group = 0;
+  while (!fitter.region(static_cast<Eigen::Index>(group)).empty()) ++group;
+  return targets[group];
+}
+
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
 
 void Pipeline::read() {
@@ -501,6 +518,10 @@ ReducedModel Pipeline::run() {
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
   add_contact(model);
   if (motions) add_fidelity(stages, *motions, choice, model);
+  if (includes(report_.ledger, "full_space")) {
+    model.full_space = full_space_data(model, system, whole_body_targets(*fitter, targets));
+    if (!model.full_space) refuse_full_space();
+  }
   if (fitter) settle_examples(stages, model);
   return model;
 }

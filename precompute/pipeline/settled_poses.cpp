@@ -9,6 +9,7 @@
 
 #include "common/core/error.h"
 #include "common/mesh/geometry.h"
+#include "precompute/examples/full_space_data.h"
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/targets/target_table.h"
 #include "precompute/training/reduced_runs.h"
@@ -40,10 +41,16 @@ class PoseSettler {
   PoseSettler(const BodyStages& stages, const ReducedModel& model, const std::optional<SettlingLoad>& load);
 
   SettledPose settle(Eigen::Index group, Eigen::Index k) const;
-  const std::optional<TargetTableData>& targets() const { return model_.targets; }
+  const ReducedModel& model() const { return model_; }
 
  private:
-  std::optional<Eigen::MatrixXd> shifts(double strength) const;
+  /// By which the stiffness of the load has the force of another strength where that settles; a column for each
+  /// example.
+  struct Shifts {
+    Eigen::MatrixXd pull;          // r x K
+    Eigen::MatrixXd coefficients;  // 3m x K, of a body that may step in full space
+  };
+  std::optional<Shifts> shifts(double strength) const;
   void compensate();
   std::vector<double> strengths(Eigen::Index group) const;
   Coordinates settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
@@ -53,7 +60,9 @@ class PoseSettler {
     return stages_.fitter->seen(group, model_.modal->basis * q);
   }
   double norm(const Eigen::VectorXd& field) const { return std::sqrt(field.dot(stages_.system.full_mass * field)); }
-  double error(Eigen::Index group, Eigen::Index k, const Coordinates& q) const;
+  double error(Eigen::Index group, const Eigen::VectorXd& given, const Coordinates& q) const {
+    return q ? norm(field(group, *q) - given) / norm(given) : 1;
+  }
 
   const BodyStages& stages_;
   ReducedModel model_;
@@ -107,12 +116,6 @@ Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group
   return std::nullopt;
 }
 
-double PoseSettler::error(Eigen::Index group, Eigen::Index k, const Coordinates& q) const {
-  if (!q) return 1;
-  const Eigen::VectorXd given = stages_.fitter->pose_fields(group, k).given;
-  return norm(field(group, *q) - given) / norm(given);
-}
-
 SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   const PoseFitter& fitter = *stages_.fitter;
   const PoseFitter::PoseFields pose = fitter.pose_fields(group, k);
@@ -129,70 +132,98 @@ SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   Coordinates best;
   for (const double strength : strengths(group)) {
     Coordinates q = settled(*plain_, group, k, strength, Eigen::Vector3d::Zero());
-    if (q && (!best || error(group, k, q) < error(group, k, best))) best = std::move(q);
+    if (q && (!best || error(group, pose.given, q) < error(group, pose.given, best))) best = std::move(q);
   }
   Coordinates q = best;
-  found.best = error(group, k, best);
+  found.best = error(group, pose.given, best);
   const double stiffness = load_.examples[static_cast<std::size_t>(group)].stiffness;
   if (stiffness > 0) {
     q = settled(*loaded_, group, k, stiffness, load_.gravity);
-    found.loaded = error(group, k, q);
+    found.loaded = error(group, pose.given, q);
   }
   found.settles = best && q;
   if (!found.settles) return found;
   found.eigenfunctions = norm(in_basis - field(group, *best)) / size;
   found.force = norm(field(group, *q) - field(group, *best)) / size;
   if (found.force > std::max(found.basis, found.eigenfunctions))
-    found.stronger = error(group, k, settled(*loaded_, group, k, kNextStrength * stiffness, load_.gravity));
+    found.stronger = error(group, pose.given, settled(*loaded_, group, k, kNextStrength * stiffness, load_.gravity));
   const Eigen::VectorXd off = field(group, *q) - pose.given;
   const Eigen::VectorXd distances = off.reshaped<Eigen::RowMajor>(off.size() / 3, 3).rowwise().norm();
   found.distance = distances.maxCoeff(&found.vertex);
   return found;
 }
 
-// Shifts by which the stiffness of the load has the force of another strength where that settles; nothing where it does
-// not settle.
-std::optional<Eigen::MatrixXd> PoseSettler::shifts(double strength) const {
+// Nothing where the body does not settle.
+std::optional<PoseSettler::Shifts> PoseSettler::shifts(double strength) const {
   const runtime::ExampleModel& force = plain_->examples.front();
   const Eigen::Index count = std::ssize(model_.examples->examples);
   runtime::TargetTable::Workspace workspace = force.table->make_workspace();
-  Eigen::MatrixXd shifts(plain_->modes(), count);
+  Shifts found{Eigen::MatrixXd(plain_->modes(), count), {}};
+  if (model_.full_space) found.coefficients.resize(model_.full_space->from_target.cols(), count);
   Eigen::VectorXd pull(plain_->modes());
+  const double share = strength / load_.examples.front().stiffness - 1;
   for (Eigen::Index k = 0; k < count; ++k) {
     const Coordinates q = settled(*plain_, 0, k, strength, load_.gravity);
     if (!q) return std::nullopt;
     force.table->evaluate(Eigen::VectorXd::Unit(count, k), workspace, pull);
-    shifts.col(k) = (strength / load_.examples.front().stiffness - 1) * (pull - force.filter.matrix() * *q);
+    found.pull.col(k) = share * (pull - force.filter.matrix() * *q);
+    if (!model_.full_space) continue;
+    TargetTableData full = *model_.targets;
+    full.control_points = model_.full_space->control_points;
+    const runtime::TargetTable table(full);
+    runtime::TargetTable::Workspace scratch = table.make_workspace();
+    Eigen::VectorXd target(found.coefficients.rows());
+    table.evaluate(Eigen::VectorXd::Unit(count, k), scratch, target);
+    found.coefficients.col(k) =
+        share *
+        (target - filter_coefficients(*model_.full_space, model_.modal->basis * *q).reshaped<Eigen::RowMajor>());
   }
-  return shifts;
+  return found;
 }
 
 // By the strength after which the body settles nearest to all poses, from rest: where a force is so weak that a pose is
 // no stable equilibrium, less is more. None where all make it worse.
 void PoseSettler::compensate() {
+  const auto refuse = [&](const char* place, const char* expected, const char* found, const char* advice) {
+    throw InputError({load_.file, place, expected, found, advice});
+  };
   if (!model_.targets)
-    throw InputError({load_.file, "/examples/compensate", "a table of targets, of 2 to 4 examples of the whole body",
-                      "none", "leave compensate out, or have the asset make a table: targets.tolerance"});
+    refuse("/examples/compensate", "a table of targets, of 2 to 4 examples of the whole body", "none",
+           "leave compensate out, or have the asset make a table: targets.tolerance");
   const double stiffness = load_.examples.front().stiffness;
+  if (!(stiffness > 0))
+    refuse("/examples/stiffness", "> 0, where targets are compensated", "0", "leave compensate out");
+  std::vector<Eigen::VectorXd> given;
+  for (Eigen::Index k = 1; k < std::ssize(model_.examples->examples); ++k)
+    given.push_back(stages_.fitter->pose_fields(0, k).given);
   const auto worst = [&](const runtime::Model& model) {
     double largest = 0;
-    for (Eigen::Index k = 1; k < std::ssize(model_.examples->examples); ++k)
-      largest = std::max(largest, error(0, k, settled(model, 0, k, stiffness, load_.gravity)));
+    for (Eigen::Index k = 1; k <= std::ssize(given); ++k)
+      largest = std::max(
+          largest, error(0, given[static_cast<std::size_t>(k - 1)], settled(model, 0, k, stiffness, load_.gravity)));
     return largest;
   };
   const TargetTableData plain = *model_.targets;
   TargetTableData best = plain;
+  std::optional<Shifts> taken;
   double least = worst(*plain_);
   for (const double strength : strengths(0)) {
-    const auto by = strength > stiffness ? shifts(strength) : std::nullopt;
+    auto by = strength > stiffness ? shifts(strength) : std::nullopt;
     if (!by) continue;
     *model_.targets = plain;
-    shift_targets(*by, *model_.targets);
+    shift_targets(by->pull, *model_.targets);
     const auto candidate = stepped_model(model_, reference_of(stages_), load_.examples);
     const double found = worst(*candidate);
     if (found >= least) continue;
     least = found;
     best = *model_.targets;
+    taken = std::move(by);
+  }
+  if (taken && model_.full_space) {
+    TargetTableData full = plain;
+    full.control_points = model_.full_space->control_points;
+    shift_targets(taken->coefficients, full);
+    model_.full_space->control_points = full.control_points;
   }
   model_.targets = best;
   model_.targets->compensated_stiffness = stiffness;
@@ -217,7 +248,8 @@ std::string advice_on(const SettledPose& pose) {
 std::vector<SettledPose> settle_examples(const BodyStages& stages, const std::optional<SettlingLoad>& load,
                                          ReducedModel& model) {
   const PoseSettler settler(stages, model, load);
-  model.targets = settler.targets();
+  model.targets = settler.model().targets;
+  model.full_space = settler.model().full_space;
   std::vector<SettledPose> all;
   for (Eigen::Index group = 0; group < stages.fitter->groups(); ++group) {
     auto& examples = examples_of(model, stages.fitter->region(group)).examples;

@@ -112,7 +112,7 @@ TrainingPlan plan_training(const TrainingConfig& config, const SceneConfig* scen
   if (of_scene && scene == nullptr)
     throw InputError({"", "/basis/training", "a scene, for its loads", "none", "name one by --scene"});
   if (of_scene) {
-    TrainingPlan plan{scene_loads(*scene, body), false, "the loads of the scene"};
+    TrainingPlan plan{scene_loads(*scene, body), false, kLoadsOfScene};
     if (!plan.loads.deforms(body.free)) return {{}, false, "nothing in the scene deforms the body"};
     return plan;
   }

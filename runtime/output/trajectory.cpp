@@ -129,28 +129,28 @@ struct BodyFrames::Datasets {
   std::optional<RowWriter> render;  // vertices of the render mesh
 };
 
-BodyFrames::BodyFrames(Hdf5File& file, std::string group, const ReducedModel& model, const BodyFrame& frame,
-                       TrajectoryInfo info)
-    : model_(model),
-      frame_(frame),
-      info_(std::move(info)),
+BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body)
+    : model_(body.model),
+      frame_(body.frame),
+      space_(body.space),
+      info_(body.info),
       group_(std::move(group)),
       tets_(group_ + "/tets"),
       vertices_(group_ + "/vertices"),
       render_triangles_(group_ + "/render/triangles"),
       render_vertices_(group_ + "/render/vertices"),
-      rest_masses_(tet_volumes(model.object->mesh).cwiseProduct(model.object->materials.density)),
-      displacements_(model.object->mesh.vertex_count(), 3),
-      velocities_(model.object->mesh.vertex_count(), 3) {
-  write_run(file, group_.empty() ? "/" : group_, model, info_);
-  write_groups(file, group_, model, info_);
-  const SymbolSizes sizes = sizes_of(model, info_);
+      rest_masses_(tet_volumes(model_.object->mesh).cwiseProduct(model_.object->materials.density)),
+      displacements_(model_.object->mesh.vertex_count(), 3),
+      velocities_(model_.object->mesh.vertex_count(), 3) {
+  write_run(file, group_.empty() ? "/" : group_, model_, info_);
+  write_groups(file, group_, model_, info_);
+  const SymbolSizes sizes = sizes_of(model_, info_);
   const auto write = [&](const char* name, const auto& array) {
     const DatasetSchema& schema = trajectory_schema().dataset(name);
     write_dataset(file, schema, group_ + schema.path, sizes.evaluate(schema.dims), array.data());
   };
-  write("/tets", model.object->mesh.tets);
-  if (model.render) write("/render/triangles", model.render->triangles);
+  write("/tets", model_.object->mesh.tets);
+  if (model_.render) write("/render/triangles", model_.render->triangles);
   datasets_ = std::make_unique<Datasets>(file, group_, sizes, info_.weights);
 }
 
@@ -175,12 +175,30 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
     datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
 }
 
-void BodyFrames::append_positions(const State& state) {
+/// World positions and velocities, and displacements in the body's frame.
+void BodyFrames::set_positions(const State& state, VertexArray& positions) {
+  const VertexArray& rest = model_.object->mesh.vertices;
+  const Placement placement = frame_.placement(state.frame);
+  if (state.full) {
+    for (Eigen::Index v = 0; v < rest.rows(); ++v) {
+      positions.row(v) = rest.row(v) + space_->displacement(v, state.full->q).transpose();
+      velocities_.row(v) = space_->displacement(v, state.full->v);
+    }
+    displacements_ = ((positions.rowwise() - placement.position.transpose()) * placement.rotation).rowwise() +
+                     placement.origin.transpose();
+    displacements_ -= rest;
+    return;
+  }
   const RowMatrix& basis = model_.modal->basis;
   displacements_.reshaped<Eigen::RowMajor>().noalias() = basis * state.q;
   velocities_.reshaped<Eigen::RowMajor>().noalias() = basis * state.v;
-  VertexArray positions = model_.object->mesh.vertices + displacements_;
-  if (frame_.moves()) to_world(frame_.placement(state.frame), frame_.velocity(state.frame), positions, velocities_);
+  positions = rest + displacements_;
+  if (frame_.moves()) to_world(placement, frame_.velocity(state.frame), positions, velocities_);
+}
+
+void BodyFrames::append_positions(const State& state) {
+  VertexArray positions(displacements_.rows(), 3);
+  set_positions(state, positions);
   append_drawn(positions, datasets_->positions);
   if (model_.render) append_render_mesh(positions);
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
@@ -231,7 +249,7 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const std:
   for (const NamedBody& body : bodies) {
     const std::string group = body.name.empty() ? "" : fill_name("/bodies/{body}", kBodyPlaceholder, body.name);
     if (!group.empty()) write_group(file_, group_schema("/bodies/{body}"), group);
-    frames_.push_back(std::make_unique<BodyFrames>(file_, group, body.model, body.frame, body.info));
+    frames_.push_back(std::make_unique<BodyFrames>(file_, group, body));
     names_.push_back(body.name.empty() ? body.model.asset_name : body.name);
   }
 }

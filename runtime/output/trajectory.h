@@ -11,6 +11,7 @@
 #include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/xdmf.h"
 #include "common/model/reduced_model.h"
+#include "runtime/sim/space/full/full_space.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -31,12 +32,20 @@ struct TrajectoryInfo {
   std::vector<WeightInfo> weights{};
 };
 
+/// A body whose frames a trajectory holds.
+struct NamedBody {
+  std::string name;           ///< of its group; empty: it is the only one, at the root
+  const ReducedModel& model;  ///< holds /object and the basis, perhaps /render
+  const BodyFrame& frame;
+  TrajectoryInfo info;
+  const FullSpace* space = nullptr;  ///< of a body that may step in full space
+};
+
 /// The frames of one body in an open file, below a group: "" for the root, or "/bodies/NAME".
 class BodyFrames {
  public:
-  /// `model` holds /object and the basis, perhaps /render, and outlives the writer, as the frame of the body does. The
-  /// file outlives it, too. Throws WorkError.
-  BodyFrames(Hdf5File& file, std::string group, const ReducedModel& model, const BodyFrame& frame, TrajectoryInfo info);
+  /// What the body refers to and the file outlive the writer. Throws WorkError.
+  BodyFrames(Hdf5File& file, std::string group, const NamedBody& body);
   ~BodyFrames();
 
   /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
@@ -57,10 +66,12 @@ class BodyFrames {
  private:
   struct Datasets;
   void append_positions(const State& state);
+  void set_positions(const State& state, VertexArray& positions);
   void append_render_mesh(const VertexArray& positions);
 
   const ReducedModel& model_;
   const BodyFrame& frame_;
+  const FullSpace* space_;
   TrajectoryInfo info_;
   std::string group_, tets_, vertices_, render_triangles_, render_vertices_;  // paths
   std::unique_ptr<Datasets> datasets_;
@@ -68,14 +79,6 @@ class BodyFrames {
   VertexArray displacements_, velocities_;  ///< n x 3
   std::vector<double> times_;
   double largest_displacement_ = 0;
-};
-
-/// A body whose frames a trajectory holds.
-struct NamedBody {
-  std::string name;  ///< of its group; empty: it is the only one, at the root
-  const ReducedModel& model;
-  const BodyFrame& frame;
-  TrajectoryInfo info;
 };
 
 /// Writes a trajectory: a group /bodies/NAME for each body, or the root of one without a name. Beside it an .xdmf of

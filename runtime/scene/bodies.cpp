@@ -26,6 +26,10 @@ bool is_bad(const World& world, int body) { return (world.report(body).status & 
 void add_to_hash(const Model& model, const State& state, FnvHash& hash) {
   hash.add_all(state.q);
   hash.add_all(state.v);
+  if (state.full) {
+    hash.add_all(state.full->q);
+    hash.add_all(state.full->v);
+  }
   hash.add_all(model.frame->coordinates(state.frame));
 }
 
@@ -52,7 +56,8 @@ std::vector<WorldBodyStart> Bodies::starts() const {
     const LoadedKind& kind = loaded_.kinds[body.kind];
     State state = start_of(kind.loaded, body.place);
     state.examples = examples[body.kind];
-    bodies.push_back({{kind.loaded.model.get(), &scenes_[body.kind], kind.surface}, std::move(state)});
+    bodies.push_back(
+        {{kind.loaded.model.get(), &scenes_[body.kind], kind.surface, kind.loaded.full.get()}, std::move(state)});
   }
   return bodies;
 }

@@ -112,6 +112,12 @@ ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConf
       positions.row(static_cast<Eigen::Index>(i)) = loaded.data.object->mesh.vertices.row(force.vertices[i]);
   }
   ScriptedForce scripted = runtime::scripted_force(*loaded.model, rows, positions, force.force);
+  if (loaded.full) {
+    scripted.on_vertices = Eigen::VectorXd::Zero(loaded.full->space.size());
+    for (const std::int64_t vertex : force.vertices)
+      if (const std::int32_t number = loaded.full->space.number(vertex); number >= 0)
+        scripted.on_vertices.segment<3>(3 * number) += force.force;
+  }
   scripted.start = force.start;
   scripted.end = force.end;
   return scripted;
@@ -133,6 +139,11 @@ StepScene step_scene(const SceneConfig& config, const Obstacles* obstacles, Load
   scene.newton = {config.newton.max_iterations, config.newton.tolerance};
   scene.precision = config.precision;
   scene.sleep = {config.sleep.energy, config.sleep.time};
+  scene.space = {config.space.space,
+                 config.space.release,
+                 /*contact=*/!loaded.summary.knows_scene || config.meets_others,
+                 /*forces=*/!loaded.summary.knows_scene,
+                 {config.space.newton.max_iterations, config.space.newton.tolerance}};
   scene.meeting = config.meeting;
   scene.obstacles = obstacles != nullptr ? obstacles_of(config.meeting, *obstacles) : make_obstacles(config);
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
@@ -148,6 +159,7 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   const Eigen::Index modes = loaded.model->modes();
   State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
   prepare_contacts(*loaded.model, loaded.scene.obstacles.size(), state);
+  if (loaded.full) prepare_full(*loaded.full, state);
   const BodyFrame& frame = *loaded.model->frame;
   FrameWorkspace workspace = frame.make_workspace();
   frame.follow(loaded.scene, state.time, state.q, state.v, workspace, state.frame);
@@ -204,6 +216,25 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   throw InputError(std::move(result.complaint));
 }
 
+std::unique_ptr<const FullModel> prepare_full_space(const SceneConfig& config, const LoadedScene& loaded) {
+  FullModelResult result = build_full_model(loaded.data, *loaded.model);
+  if (result.model) return std::move(result.model);
+  result.complaint.file = config.bundle.string();
+  throw InputError(std::move(result.complaint));
+}
+
+void check_full_space(const SceneConfig& config, const LoadedScene& loaded) {
+  const std::string space = fmt::format("\"{}\"", name_of(config.space.space));
+  const auto refuse = [&](const std::string& found, const char* advice) {
+    throw InputError(
+        {config.file.string(), config.place + "/space", "\"reduced\", where a scene has " + found, space, advice});
+  };
+  if (const char* reason = unsupported(*loaded.full, loaded.scene)) refuse(reason, "");
+  if (config.space.space == Space::kFull && config.meets_bodies)
+    refuse("bodies that may touch each other or themselves",
+           "\"auto\" steps in all vertices those that touch no other body at the time");
+}
+
 std::string describe_target(const ExampleModel& examples, const ExampleSettings& settings) {
   if (examples.table)
     return fmt::format(
@@ -252,13 +283,16 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
                               std::ssize(loaded.summary.regions), loaded.summary.render_vertices > 0);
   // A force on a body that moves needs to know where it acts.
   const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
+  const bool steps_in_full = config.space.space != Space::kReduced;
   const bool positions = config.trajectory || config.meets_bodies || (moves && !config.forces.empty());
-  const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions};
+  const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/!steps_in_full, positions};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   check_compensation(config, loaded.data);
   loaded.model = prepare(config, loaded.data);
+  if (steps_in_full) loaded.full = prepare_full_space(config, loaded);
   loaded.keys = make_keys(config, *loaded.model);
   loaded.scene = step_scene(config, obstacles, loaded);
+  if (steps_in_full) check_full_space(config, loaded);
   loaded.start = start_state(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
   loaded.poses = named_poses(loaded);
@@ -271,6 +305,7 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   loaded.data.targets.reset();
   loaded.data.target_space.reset();
   loaded.data.target_elasticity.reset();
+  loaded.data.full_space.reset();
   loaded.data.contact.reset();
   loaded.data.regions.clear();
   return loaded;
@@ -298,6 +333,13 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
                        : "precision: double, mixed is for four and more bodies side by side");
   plan.push_back(fmt::format("solve: Newton, Cholesky of {} x {}, at most {} iterations", model.modes(), model.modes(),
                              scene.newton.max_iterations));
+  if (loaded.full)
+    plan.push_back(fmt::format(
+        "full space: {} vertices, Newton, conjugate gradients with a factor of {} x {}{}",
+        loaded.full->space.vertices(), loaded.full->space.vertices(), loaded.full->space.vertices(),
+        scene.space.space == Space::kAuto
+            ? fmt::format("; until {:g} s after a load that the bundle was not made for", scene.space.release)
+            : ", in all steps"));
   if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {
     plan.push_back(
         fmt::format("damping: mass {:g} 1/s, stiffness {:g} s", scene.mass_damping, scene.stiffness_damping));

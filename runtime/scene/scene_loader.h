@@ -6,6 +6,7 @@
 
 #include "common/bundle/bundle.h"
 #include "common/config/scene_config.h"
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/scene_keys.h"
 #include "runtime/sim/step/state.h"
@@ -21,9 +22,10 @@ struct NamedPose {
 /// A scene ready to step, and how it came to be.
 struct LoadedScene {
   std::unique_ptr<const Model> model;
-  StepScene scene;  ///< settings with keys as strong as they ever are
-  SceneKeys keys;   ///< of what changes in time: to be applied to a copy of the scene before each step
-  State start;      ///< where every body begins
+  std::unique_ptr<const FullModel> full;  ///< where the scene, or a host, may have steps in full space
+  StepScene scene;                        ///< settings with keys as strong as they ever are
+  SceneKeys keys;  ///< of what changes in time: to be applied to a copy of the scene before each step
+  State start;     ///< where every body begins
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;            ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;            ///< datasets that were read, in order

@@ -32,8 +32,9 @@ std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedWorld& loaded, con
   std::vector<NamedBody> bodies;
   for (const LoadedBody& body : loaded.bodies) {
     const LoadedScene& kind = loaded.kinds[body.kind].loaded;
-    bodies.push_back(
-        {body.name, kind.data, *kind.model->frame, trajectory_info(kind, config.bodies[body.kind].scene, config)});
+    bodies.push_back({body.name, kind.data, *kind.model->frame,
+                      trajectory_info(kind, config.bodies[body.kind].scene, config),
+                      kind.full ? &kind.full->space : nullptr});
     if (!config.is_list) break;
   }
   return std::make_unique<TrajectoryWriter>(*config.trajectory, bodies);
@@ -180,8 +181,7 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
   const auto append = [&](double seconds) {
     for (std::size_t i = 0; i < trajectory->bodies(); ++i) {
       const auto body = static_cast<int>(i);
-      trajectory->append(i, world.state(body), energies(world.model(body), world.scene(body), world.state(body)),
-                         seconds);
+      trajectory->append(i, world.state(body), world.energies(body), seconds);
     }
   };
   if (trajectory) append(0);

@@ -25,6 +25,16 @@ constexpr ModeArray kModeArrays[] = {{"reduced", &State::q},
                                      {"acceleration", &State::a},
                                      {"applied_force", &State::applied_force}};
 
+// Those of a FullMotion, [f].
+struct VertexMember {
+  const char* name;
+  Eigen::VectorXd FullMotion::*member;
+};
+constexpr VertexMember kVertexArrays[] = {{"displacement", &FullMotion::q},
+                                          {"velocity", &FullMotion::v},
+                                          {"displacement_before", &FullMotion::q_previous},
+                                          {"velocity_before", &FullMotion::v_previous}};
+
 // One body of a file.
 class BodyReader {
  public:
@@ -47,6 +57,7 @@ class BodyReader {
     require_count("/examples", body_["examples"].size(), state.examples.size());
     for (std::size_t i = 0; i < state.examples.size(); ++i) read_examples(i, state.examples[i]);
     read_contacts(state.contacts);
+    read_full_space(state);
   }
 
  private:
@@ -68,6 +79,21 @@ class BodyReader {
     read_array(name + "target", from["target"], examples.target);
     examples.has_target = from["has_target"];
     examples.target_converged = from["target_converged"];
+  }
+  void read_full_space(State& state) const {
+    state.full.reset();
+    if (!body_.contains("full_space")) return;
+    if (!loaded_.full) refuse("/full_space", "no such member of a body of space \"reduced\"", "one");
+    const Json& from = body_["full_space"];
+    read_array("full_space/force", from["force"], state.vertex_force);
+    if (!from.contains("displacement")) return;
+    const bool begins_anew = state.begins_anew;
+    enter_full_space(*loaded_.full, *loaded_.model, state);
+    for (const auto& [name, member] : kVertexArrays)
+      read_array(std::string("full_space/") + name, from[name], (*state.full).*member);
+    state.full->alone = from["alone"];
+    state.full->elastic_energy = state.elastic_energy;
+    state.begins_anew = begins_anew;
   }
   void read_contacts(ContactState& contacts) const {
     const Json& from = body_["contacts"];
@@ -114,6 +140,13 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
                                 {"target", array_of(examples.target)},
                                 {"has_target", examples.has_target},
                                 {"target_converged", examples.target_converged}});
+  if (state.vertex_force.size() > 0) {
+    OrderedJson& full = body["full_space"] = {{"force", array_of(state.vertex_force)}};
+    if (state.full) {
+      full["alone"] = state.full->alone;
+      for (const auto& [name, member] : kVertexArrays) full[name] = array_of((*state.full).*member);
+    }
+  }
   for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count)) {
     body["contacts"].push_back({{"vertex", held.vertex},
                                 {"obstacle", held.obstacle},

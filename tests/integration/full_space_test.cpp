@@ -66,6 +66,59 @@ TEST_F(FullSpaceProgram, WritesTheMotionOfTheFullSpace) {
   EXPECT_THAT(read_file(folder_.path("full.xdmf")), HasSubstr("full.h5:/vertices"));
 }
 
+// Both with the pushes of the scene, which the basis has not learned: in space `full` the run is the reference, but for
+// the few iterations of a step and what a lag of the target by their ends makes of it, and in space `auto` while the
+// push acts. The reduced run is not.
+TEST_F(FullSpaceProgram, IsWhatARunInAllVerticesFinds) {
+  Json scene = kScene;
+  scene["time_step"] = 0.004;
+  scene["steps"] = 100;
+  scene["output"] = {{"every", 1}};
+  scene["forces"] = {{{"vertices", {{"ids", {30, 31}}}}, {"force", {0, 2, 1}}, {"start", 0.04}, {"end", 0.3}}};
+  make(scene);
+  ASSERT_EQ(full_space().status, 0);
+  const std::vector<float> expected = positions("full.h5");
+  const auto error = [&](const char* space) {
+    Json run = scene;
+    run["space"] = space;
+    run["output"]["trajectory"] = "run.h5";
+    write_scene(folder_, run);
+    const Outcome outcome = exmat_runtime({"run", folder_.path("scene.json")});
+    EXPECT_EQ(outcome.status, 0) << outcome.errors;
+    const std::vector<float> found = positions("run.h5");
+    const auto frames = static_cast<Eigen::Index>(101), size = static_cast<Eigen::Index>(found.size()) / frames;
+    const Eigen::Map<const Eigen::MatrixXf> a(found.data(), size, frames), b(expected.data(), size, frames);
+    return (a - b).colwise().norm().mean() / (b.colwise() - b.col(0)).colwise().norm().maxCoeff();
+  };
+  EXPECT_LE(error("full"), 0.005);
+  EXPECT_LE(error("auto"), 0.03);
+  EXPECT_GE(error("reduced"), 0.05);
+}
+
+TEST_F(FullSpaceProgram, RefusesWhatABodyInAllVerticesCannotHave) {
+  make(kScene);
+  const auto refusal = [&](const Json& members) {
+    Json scene = kScene;
+    scene["space"] = "full";
+    if (!members.empty()) scene.update(members);
+    write_scene(folder_, scene);
+    const Outcome outcome = exmat_runtime({"run", folder_.path("scene.json")});
+    EXPECT_EQ(outcome.status, 2);
+    return outcome.errors;
+  };
+  EXPECT_THAT(refusal({{"integrator", "newmark"}}),
+              HasSubstr("/space: expected \"reduced\", where a scene has Newmark's"));
+  EXPECT_THAT(refusal({{"space", "ful"}}), HasSubstr("/space"));
+  EXPECT_THAT(refusal({{"space_release", 0}}), HasSubstr("/space_release"));
+  Json lean = kScene;
+  write_scene(folder_, lean);
+  ASSERT_EQ(exmat_precompute({"bundle", folder_.path("asset.json"), "-o", folder_.path("bundle.h5"), "--scene",
+                              folder_.path("scene.json")})
+                .status,
+            0);
+  EXPECT_THAT(refusal(Json::object()), HasSubstr("/full_space: expected the group"));
+}
+
 // The tools of reduced trajectories read it, and it is near the reduced motion of the same scene.
 TEST_F(FullSpaceProgram, IsReadAsAnyTrajectory) {
   make({{"time_step", 0.01},

@@ -23,11 +23,16 @@ const Groups kPlain{"object", "modal", "cubature", "polynomial"};
 const Groups kPlainAndRigid{"object", "modal", "cubature", "polynomial", "rigid"};
 const Groups kWithExamples{"object",     "shape_space", "examples", "modal",       "cubature",
                            "polynomial", "projection",  "targets",  "target_space"};
-const Groups kAll{"object",     "shape_space", "examples",     "modal", "cubature", "polynomial",
-                  "projection", "targets",     "target_space", "rigid", "contact"};
+const Groups kAll{"object",     "shape_space", "examples",     "modal",      "cubature", "polynomial",
+                  "projection", "targets",     "target_space", "full_space", "rigid",    "contact"};
 
 Groups without_group(Groups groups, const char* group) {
   std::erase(groups, group);
+  return groups;
+}
+
+Groups and_full_space(Groups groups) {
+  groups.push_back("full_space");
   return groups;
 }
 
@@ -110,8 +115,11 @@ class LeavingOut : public testing::Test {
 };
 
 TEST_F(LeavingOut, AConstrainedBodyHoldsWhatItsSceneNeeds) {
-  expect_groups(Json::object(), std::nullopt, and_contact(kWithExamples));
+  expect_groups(Json::object(), std::nullopt, and_contact(and_full_space(kWithExamples)));
   expect_groups(Json::object(), needs_of_scene(R"({ "examples": { "stiffness": 10 } })"), kWithExamples);
+  expect_groups(Json::object(), needs_of_scene(R"({ "examples": { "stiffness": 10 }, "space": "auto" })"),
+                and_full_space(kWithExamples));
+  expect_groups(Json::object(), needs_of_scene(R"({ "space": "full" })"), kPlain);
   expect_groups(Json::object(), needs_of_scene("{}"), kPlain);
   expect_groups(Json::object(), needs_of_scene(R"({ "obstacles": [ { "sphere": { "radius": 1 } } ] })"),
                 and_contact(kPlain));
@@ -136,6 +144,8 @@ TEST_F(LeavingOut, TheAssetNamesItsNeeds) {
   expect_groups(free_, std::nullopt, without_group(kWithExamples, "targets"));
   free_["needs"] = {"examples", "targets"};
   expect_groups(free_, std::nullopt, kWithExamples);
+  free_["needs"] = {"examples", "targets", "full_space"};
+  expect_groups(free_, std::nullopt, and_full_space(kWithExamples));
   // A scene decides before the asset does.
   expect_groups(free_, needs_of_scene("{}"), kPlainAndRigid);
 }

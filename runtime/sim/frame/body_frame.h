@@ -74,6 +74,11 @@ class BodyFrame {
     return false;
   }
 
+  /// Where a body that steps in full space stands, and its momenta; q and v are of the modes nearest to it there.
+  virtual void adopt(const FrameMotion& /*motion*/, const FrameMomenta& /*momenta*/, const Eigen::VectorXd& /*q*/,
+                     const Eigen::VectorXd& /*v*/, FrameWorkspace& /*workspace*/,
+                     FrameState& /*state*/) const noexcept {}
+
   virtual Placement placement(const FrameState& /*state*/) const noexcept { return {}; }
   virtual FrameVelocity velocity(const FrameState& /*state*/) const noexcept { return {}; }
   virtual FrameMotion motion(const FrameState& /*state*/) const noexcept { return {}; }

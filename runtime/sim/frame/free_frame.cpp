@@ -53,6 +53,19 @@ bool FreeFrame::set_motion(const FrameMotion& motion, const Eigen::VectorXd& q, 
   return true;
 }
 
+void FreeFrame::adopt(const FrameMotion& motion, const FrameMomenta& momenta, const Eigen::VectorXd& q,
+                      const Eigen::VectorXd& v, FrameWorkspace& workspace, FrameState& state) const noexcept {
+  set_motion(motion, q, v, workspace, state);
+  FreeState& body = own_free(state);
+  const DeformingInertia::Moments& moments = own_free(workspace).moments;
+  body.linear_momentum = momenta.linear;
+  body.angular_momentum = momenta.angular;
+  const Eigen::Vector3d own = body.orientation.conjugate() * momenta.angular;
+  body.spin = moments.inertia.inverse() * (own - moments.deformation().transpose() * v);
+  body.momentum = v + moments.deformation().lazyProduct(body.spin);
+  body.momentum_previous = body.momentum;
+}
+
 Placement FreeFrame::placement(const FrameState& state) const noexcept {
   const FreeState& body = own_free(state);
   return {origin(), origin() + body.position, body.orientation.toRotationMatrix()};

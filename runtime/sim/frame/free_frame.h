@@ -24,6 +24,8 @@ class FreeFrame final : public BodyFrame {
               FrameWorkspace& workspace, FrameState& state) const noexcept override;
   bool set_motion(const FrameMotion& motion, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                   FrameWorkspace& workspace, FrameState& state) const noexcept override;
+  void adopt(const FrameMotion& motion, const FrameMomenta& momenta, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+             FrameWorkspace& workspace, FrameState& state) const noexcept override;
   Placement placement(const FrameState& state) const noexcept override;
   FrameVelocity velocity(const FrameState& state) const noexcept override;
   FrameMotion motion(const FrameState& state) const noexcept override;

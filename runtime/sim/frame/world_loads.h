@@ -17,6 +17,7 @@ struct ScriptedForce {
   Eigen::Vector3d total = Eigen::Vector3d::Zero();       ///< sum over the vertices [N]
   Eigen::Vector3d lever = Eigen::Vector3d::Zero();       ///< mean of the vertices' X about the centre of mass [m]
   Eigen::Matrix3Xd mean_basis{};                         ///< [3 x r] mean of their U; these three for a body that moves
+  Eigen::VectorXd on_vertices{};                         ///< [f] world [N], of a body in full space
 
   bool acts_at(double time) const noexcept { return start <= time && time < end; }
 };

@@ -3,23 +3,6 @@
 namespace exmat::runtime {
 namespace {
 
-/// p* by Newton's method from the last target, in its coordinates, into the workspace.
-void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
-                  ExampleWorkspace& workspace, StepReport& report) noexcept {
-  const TargetSolver& solver = *model.target;
-  Eigen::VectorXd& y = workspace.solved_target;
-  y = state.target;
-  if (!state.has_target) solver.start(workspace.weights, y);
-  workspace.target_converged = state.has_target && state.target_converged && workspace.weights == state.weights;
-  if (!workspace.target_converged) {
-    const NewtonReport solved = solver.solve(workspace.weights, workspace.target_solver, y, most_iterations);
-    report.target_iterations += solved.iterations;
-    workspace.target_converged = solved.status != NewtonStatus::kIterationLimit;
-    if (!workspace.target_converged) report.status |= kTargetNotConverged;
-    if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
-  }
-}
-
 /// What the force of the target is made of: its pull, or the elasticity from it.
 void find_target(const ExampleModel& model, const ExampleSettings& settings, const ExampleState& state,
                  ExampleWorkspace& workspace, StepReport& report) noexcept {
@@ -36,6 +19,22 @@ void find_target(const ExampleModel& model, const ExampleSettings& settings, con
 }
 
 }  // namespace
+
+void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
+                  ExampleWorkspace& workspace, StepReport& report) noexcept {
+  const TargetSolver& solver = *model.target;
+  Eigen::VectorXd& y = workspace.solved_target;
+  y = state.target;
+  if (!state.has_target) solver.start(workspace.weights, y);
+  workspace.target_converged = state.has_target && state.target_converged && workspace.weights == state.weights;
+  if (!workspace.target_converged) {
+    const NewtonReport solved = solver.solve(workspace.weights, workspace.target_solver, y, most_iterations);
+    report.target_iterations += solved.iterations;
+    workspace.target_converged = solved.status != NewtonStatus::kIterationLimit;
+    if (!workspace.target_converged) report.status |= kTargetNotConverged;
+    if (solved.status == NewtonStatus::kNonFinite) report.status |= kStepNonFinite;
+  }
+}
 
 void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
                       Workspace& workspace) noexcept {

@@ -13,6 +13,10 @@ namespace exmat::runtime {
 void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
                       Workspace& workspace) noexcept;
 
+/// p* of these examples by Newton's method from the last target, for the weights in the workspace: its coordinates.
+void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
+                  ExampleWorkspace& workspace, StepReport& report) noexcept;
+
 /// Weights and targets at the pose q [r], into the workspace. Targets that are solved for start from those of the
 /// state.
 void update_targets(const Model& model, const StepScene& scene, const State& state, const Eigen::VectorXd& q,

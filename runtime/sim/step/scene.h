@@ -31,6 +31,15 @@ struct SleepSettings {
   double time = 0.5;  ///< [s]
 };
 
+/// In which of its spaces a body steps, and when it leaves the full one.
+struct SpaceSettings {
+  Space space = Space::kReduced;
+  double release = 0.5;  ///< [s] that a body in space `auto` stays full after the last load that asked for it
+  bool contact = true;   ///< to touch an obstacle is such a load, as forces of the caller are
+  bool forces = true;    ///< the scene's forces are
+  NewtonSettings newton{20, 0.01};  ///< of steps in full space
+};
+
 /// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.
 struct StepScene : WorldLoads {
   double time_step = 0.001;  ///< > 0 [s]
@@ -40,6 +49,7 @@ struct StepScene : WorldLoads {
   NewtonSettings newton;
   Precision precision = Precision::kDouble;  ///< of bodies side by side, the same for all of them
   SleepSettings sleep;
+  SpaceSettings space;
   MeetingGroup meeting;
   Obstacles obstacles;                    ///< that the body meets
   std::vector<ExampleSettings> examples;  ///< one for each of the model's; none: no weights, targets, example forces

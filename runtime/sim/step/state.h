@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <variant>
 #include <vector>
 
@@ -24,20 +25,33 @@ struct SleepState {
   std::uint64_t loads = 0;       ///< hash of what acted on it in the last step
 };
 
-/// All that a body carries from step to step. r modes.
-struct State {
-  Eigen::VectorXd q, v;                    ///< [r] reduced displacement, velocity
-  Eigen::VectorXd q_previous, v_previous;  ///< [r] one step earlier (BDF2)
-  Eigen::VectorXd a;                       ///< [r] acceleration (Newmark)
-  Eigen::VectorXd applied_force;           ///< [r] generalised force of the caller, added to the scene's
+/// How the unknowns of a body move: r reduced coordinates, or in full space the f coordinates of the vertices that
+/// move.
+struct Motion {
+  Eigen::VectorXd q, v;                    ///< displacement, velocity
+  Eigen::VectorXd q_previous, v_previous;  ///< one step earlier (BDF2)
+  Eigen::VectorXd a;                       ///< acceleration (Newmark)
+  Eigen::VectorXd applied_force;           ///< of the caller, added to the scene's
   std::int64_t step = 0;                   ///< steps taken
   double time = 0;                         ///< step * time_step [s]
   double elastic_energy = 0;               ///< E(q) [J]
-  std::vector<ExampleState> examples;      ///< one for each of the model's example forces
-  ContactState contacts;                   ///< what touches; sized for its scene by prepare_contacts()
   bool begins_anew = true;                 ///< the last step was no smooth one: the first, or one near obstacles
-  SleepState sleep;                        ///< where the scene lets bodies sleep
-  FrameState frame;                        ///< of the model's frame; nothing of a clamped body
+};
+
+/// A body that steps in all vertices: q is the displacement of those that move from where they were meshed, world [m].
+struct FullMotion : Motion {
+  double alone = 0;  ///< since something acted on it that asks for this space [s]
+};
+
+/// All that a body carries from step to step. r modes. Of a body in full space the reduced coordinates are those of the
+/// modes nearest to it, and steps change them with it.
+struct State : Motion {
+  std::vector<ExampleState> examples;  ///< one for each of the model's example forces
+  ContactState contacts;               ///< what touches; sized for its scene by prepare_contacts()
+  SleepState sleep;                    ///< where the scene lets bodies sleep
+  FrameState frame;                    ///< of the model's frame; nothing of a clamped body
+  std::optional<FullMotion> full;      ///< in full space
+  Eigen::VectorXd vertex_force;        ///< [f] of the caller, world [N], of a body that may step in full space
 };
 
 /// Those of a free body.

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <span>
 
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/stepper.h"
 #include "runtime/sim/world/for_all.h"
 
@@ -103,7 +104,7 @@ void Crowd::take(const Body& body) {
   const auto index = static_cast<int>(bodies_.size());
   bodies_.push_back(body);
   Kind& kind = kinds_[static_cast<std::size_t>(body.kind)];
-  const bool in_lanes = is_in_lanes(body.kind, *body.scene);
+  const bool in_lanes = body.full == nullptr && is_in_lanes(body.kind, *body.scene);
   if (!in_lanes || kind.open < 0) {
     groups_.push_back({body.kind, in_lanes});
     if (in_lanes) kind.open = static_cast<int>(groups_.size()) - 1;
@@ -150,7 +151,9 @@ void Crowd::step_group(const Group& group, const Group* next, Thread& thread, St
     step_lanes(group, next, scratch);
   } else {
     const Body& body = body_at(group.bodies[0]);
-    *body.report = runtime::step(model, *body.scene, *body.state, scratch_of(0));
+    *body.report = body.full != nullptr ? step_in_full_space(*body.full, model, *body.scene, *body.state, scratch_of(0),
+                                                             *body.full_workspace)
+                                        : runtime::step(model, *body.scene, *body.state, scratch_of(0));
   }
   for (std::size_t l = 0; observer != nullptr && l < group.count; ++l) {
     const Body& body = body_at(group.bodies[l]);

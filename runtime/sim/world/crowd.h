@@ -6,6 +6,7 @@
 
 #include "runtime/sim/lanes/lane_step.h"
 #include "runtime/sim/solver/profile.h"
+#include "runtime/sim/space/full/full_step.h"
 
 namespace exmat::runtime {
 
@@ -32,6 +33,8 @@ class Crowd {
     State* state = nullptr;
     Workspace* workspace = nullptr;  ///< its own scratch; null: one of the crowd's
     StepReport* report = nullptr;
+    const FullModel* full = nullptr;  ///< it steps in full space
+    FullWorkspace* full_workspace = nullptr;
   };
 
   /// One more body of this model; its kind. Sizes scratch.
@@ -44,7 +47,8 @@ class Crowd {
   /// Scratch for so many threads.
   void prepare(int threads);
 
-  // One step: begin(), count() of all bodies, then take() or leave() of each in the same order, step().
+  // One step: begin(), count() of all bodies in reduced space, then take() or leave() of each in the same order, take()
+  // of those in full space, step().
 
   void begin() noexcept;
   void count(int kind, const StepScene& scene) noexcept;

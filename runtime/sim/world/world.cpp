@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/sleep.h"
 #include "runtime/sim/world/broad_phase.h"
@@ -68,6 +69,10 @@ void World::forget(int body) {
 void World::remove(int body) {
   forget(body);
   crowd_.remove(at(body).crowd_kind);
+  // The model may go with its last body, and another one be made in its place.
+  const FullModel* const full = at(body).kind.full;
+  if (full != nullptr && std::ranges::count(bodies_, full, [](const Member& own) { return own.kind.full; }) == 1)
+    std::erase_if(idle_full_, [=](const auto& idle) { return idle.first == full; });
   bodies_.erase(bodies_.begin() + body);
   const auto renumber = [=](int& number) { number -= number > body ? 1 : 0; };
   std::erase(touching_, body);
@@ -117,10 +122,64 @@ Workspace& World::scratch(int body) noexcept {
   return at(body).touching ? at(body).touching->workspace : crowd_.scratch(at(body).crowd_kind);
 }
 
+void World::prepare(int threads) {
+  crowd_.prepare(threads);
+  for (const Member& own : bodies_) {
+    if (own.kind.full != nullptr && own.kind.scene->space.space != Space::kReduced) reserve_full(own.kind);
+    if (own.full != nullptr) own.full->fit(*own.kind.full, *own.kind.scene);
+  }
+}
+
+/// Scratch for the first body of a kind that enters full space: later ones make theirs as they enter.
+void World::reserve_full(const BodyKind& kind) {
+  const auto has = [&](const Member& member) { return member.kind.full == kind.full && member.full != nullptr; };
+  if (std::ranges::any_of(idle_full_, [&](const auto& idle) { return idle.first == kind.full; }) ||
+      std::ranges::any_of(bodies_, has))
+    return;
+  idle_full_.emplace_back(kind.full,
+                          std::make_unique<FullWorkspace>(*kind.full, *kind.scene, accuracy_of(*kind.scene)));
+}
+
+void World::enter_full(Member& member) {
+  enter_full_space(*member.kind.full, *member.kind.model, *member.state);
+  if (member.full != nullptr) return;
+  const auto idle = std::ranges::find(idle_full_, member.kind.full, [](const auto& own) { return own.first; });
+  if (idle == idle_full_.end()) {
+    member.full =
+        std::make_unique<FullWorkspace>(*member.kind.full, *member.kind.scene, accuracy_of(*member.kind.scene));
+    return;
+  }
+  member.full = std::move(idle->second);
+  idle_full_.erase(idle);
+  member.full->fit(*member.kind.full, *member.kind.scene);
+}
+
+void World::leave_full(Member& member) noexcept {
+  leave_full_space(*member.state);
+  if (member.full != nullptr) idle_full_.emplace_back(member.kind.full, std::move(member.full));
+}
+
+bool World::is_in_island(int body) const noexcept {
+  return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
+}
+
+/// Which bodies step in full space; those of an island do not.
+void World::choose_spaces() {
+  for (int i = 0; i < count(); ++i) {
+    Member& own = at(i);
+    if (own.kind.full == nullptr || own.asleep) continue;
+    if (!is_in_island(i) && asks_for_full_space(*own.kind.scene, own.report, *own.state))
+      enter_full(own);
+    else if (own.state->full)
+      leave_full(own);
+  }
+}
+
 WorldReport World::step(int threads, StepObserver* observer) {
   prepare(threads);
   find_sleepers(threads);
   find_contacts(threads);
+  choose_spaces();
   step_crowd(threads, observer);
   step_islands(threads, observer);
   WorldReport report;
@@ -160,16 +219,17 @@ void World::find_contacts(int threads) {
 void World::step_crowd(int threads, StepObserver* observer) {
   const StageTimer timer(profile_, WorldStage::kSingleBodies);
   crowd_.begin();
-  for (const Member& own : bodies_) crowd_.count(own.crowd_kind, *own.kind.scene);
+  for (const Member& own : bodies_)
+    if (!own.state->full) crowd_.count(own.crowd_kind, *own.kind.scene);
   for (int i = 0; i < count(); ++i) {
     Member& own = at(i);
-    const bool in_island = !island_of_.empty() && island_of_[static_cast<std::size_t>(i)] >= 0;
-    if (!in_island && !own.asleep) {
+    if (!is_in_island(i) && !own.asleep) {
       Workspace* const scratch = own.touching ? &own.touching->workspace : nullptr;
-      crowd_.take({i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report});
+      const FullModel* const full = own.state->full ? own.kind.full : nullptr;
+      crowd_.take({i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report, full, own.full.get()});
       continue;
     }
-    crowd_.leave(own.crowd_kind, *own.kind.scene);
+    if (!own.state->full) crowd_.leave(own.crowd_kind, *own.kind.scene);
     if (own.asleep) own.report = sleep_through(*own.kind.scene, *own.state);
   }
   crowd_.step(threads, observer, profile_);
@@ -409,10 +469,15 @@ void World::remember() {
   for (const int body : touching_) touching(body).anew = false;
 }
 
+Energies World::energies(int body) const noexcept {
+  const BodyKind& kind = at(body).kind;
+  return runtime::energies(kind.full, *kind.model, *kind.scene, state(body));
+}
+
 Energies World::energies() const {
   Energies sum;
   for (const Member& body : bodies_) {
-    const Energies own = runtime::energies(*body.kind.model, *body.kind.scene, *body.state);
+    const Energies own = runtime::energies(body.kind.full, *body.kind.model, *body.kind.scene, *body.state);
     sum.kinetic += own.kinetic;
     sum.elastic += own.elastic;
     sum.potential += own.potential;

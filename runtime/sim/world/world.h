@@ -62,8 +62,11 @@ class World {
   /// Scratch that a body's steps are taken in, to be used between steps.
   Workspace& scratch(int body) noexcept;
 
+  /// That of its steps in full space; null where it is not there.
+  FullWorkspace* full_scratch(int body) noexcept { return at(body).full.get(); }
+
   /// Sizes scratch for steps by so many threads, which they else do themselves.
-  void prepare(int threads) { crowd_.prepare(threads); }
+  void prepare(int threads);
 
   /// One step of all bodies by so many threads, >= 1.
   WorldReport step(int threads, StepObserver* observer = nullptr);
@@ -81,6 +84,8 @@ class World {
   /// Times the stages of steps, if set; kOther stays what it is.
   void set_profile(WorldProfile* profile) noexcept { profile_ = profile; }
 
+  /// Of one body [J].
+  Energies energies(int body) const noexcept;
   /// Kinetic, elastic and potential energy of all bodies, and that of the contacts between them [J].
   Energies energies() const;
 
@@ -92,6 +97,7 @@ class World {
     StepReport report{};
     std::unique_ptr<WorldBody> touching{};  ///< of a body that may touch others or itself
     bool asleep = false;                    ///< in this step
+    std::unique_ptr<FullWorkspace> full{};  ///< of a body in full space
     bool is_bounded = false;                ///< its ball is that of where it is: it has slept since
   };
 
@@ -111,6 +117,11 @@ class World {
   bool is_linked(std::size_t pair) const;
   void unite();
   void collect_islands();
+  void choose_spaces();
+  void enter_full(Member& member);
+  void leave_full(Member& member) noexcept;
+  void reserve_full(const BodyKind& kind);
+  bool is_in_island(int body) const noexcept;
   void step_crowd(int threads, StepObserver* observer);
   void step_islands(int threads, StepObserver* observer);
   void remember();
@@ -128,6 +139,8 @@ class World {
   std::vector<std::unique_ptr<State>> owned_;
   std::vector<Member> bodies_;
   Crowd crowd_;
+  /// Scratch of steps in full space that no body has now, with the model that it is for; never fewer than those made.
+  std::vector<std::pair<const FullModel*, std::unique_ptr<FullWorkspace>>> idle_full_;
   ContactLaw law_;
   std::vector<HeldPair> held_, next_held_;
   WorldProfile* profile_ = nullptr;

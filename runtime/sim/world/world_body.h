@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "runtime/sim/contact/body_contact.h"
+#include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/contact_problem.h"
 
@@ -15,6 +16,7 @@ struct BodyKind {
   const Model* model = nullptr;                    ///< with contact, where there is a surface
   const StepScene* scene = nullptr;                ///< may change between steps
   std::shared_ptr<const TouchingSurface> surface;  ///< null: its bodies touch no other body and not themselves
+  const FullModel* full = nullptr;                 ///< of bodies that may step in full space
 };
 
 /// A body of a World that may touch others or itself. Its state is another's.

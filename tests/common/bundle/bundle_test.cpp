@@ -198,8 +198,8 @@ TEST(Bundle, IsSummarised) {
   EXPECT_EQ(summary.input_sha256, std::string(64, 'a'));
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
-                                          "projection", "targets", "target_space", "target_elasticity", "fidelity",
-                                          "regions", "rigid", "contact", "render"));
+                                          "projection", "targets", "target_space", "target_elasticity", "full_space",
+                                          "fidelity", "regions", "rigid", "contact", "render"));
   EXPECT_EQ(summary.render_vertices, 3);
   ASSERT_EQ(summary.regions.size(), 2U);
   EXPECT_EQ(summary.regions[0].name, "far right");

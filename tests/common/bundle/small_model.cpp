@@ -163,7 +163,7 @@ TargetElasticityData small_target_elasticity(Eigen::Index control_points) {
 
 FidelityData small_fidelity() {
   FidelityData fidelity;
-  fidelity.loads = "the loads of the scene";
+  fidelity.loads = kLoadsOfScene;
   fidelity.reference = "full_space";
   fidelity.basis = "trained";
   fidelity.advice = "none";
@@ -255,6 +255,8 @@ ReducedModel small_model(bool constrained, bool with_examples) {
     model.targets = small_targets();
     model.target_space = small_target_space(kExamples);
     model.target_elasticity = small_target_elasticity(6);
+    model.full_space = FullSpaceData{numbers(5, kEigenfunctions, 9), numbers(kExamples, 3 * kEigenfunctions, 10),
+                                     numbers(6, 3 * kEigenfunctions, 11), numbers(1, 3 * kEigenfunctions, 12)};
     model.regions = small_regions(model);
   }
   model.fidelity = small_fidelity();

@@ -173,8 +173,8 @@ const BadConfig kBadAssets[] = {
     {"TwoRestExamples", examples(R"({"name": "b", "mesh": "m", "rest": true})"),
      "a.json: /examples/1/rest: expected at most one rest example"},
     {"UnknownNeed", asset(R"("needs": ["sound"])"),
-     "a.json: /needs/0: expected \"examples\", \"targets\", \"rigid\", \"contact\", \"regions\", \"render\" or "
-     "\"target_elasticity\", found \"sound\""},
+     "a.json: /needs/0: expected \"examples\", \"targets\", \"rigid\", \"contact\", \"regions\", \"render\", "
+     "\"full_space\" or \"target_elasticity\", found \"sound\""},
     {"UnknownInternalForce", asset(R"("internal_force": "exact")"),
      "a.json: /internal_force: expected \"auto\", \"cubature\" or \"polynomial\", found \"exact\""},
     {"NoContactVertices", asset(R"("contact": {"count": 0})"), "a.json: /contact/count: expected an integer >= 1"},

@@ -34,6 +34,7 @@ std::vector<Case> cases() {
   const std::string floor = kFloor;
   static const std::string free_members =
       floor + R"(, "body": {"linear_velocity": [0.2, -1, 0], "angular_velocity": [1, 2, 3]})";
+  static const std::string full_members = free_members + R"(, "space": "full")";
   return {{"clamped",
            {.examples = 3},
            false,
@@ -44,7 +45,13 @@ std::vector<Case> cases() {
           {"carried",
            {.carried = true},
            false,
-           R"(, "body": {"motion": [{"time": 0}, {"time": 0.15, "position": [0, 0.1, 0]}]})"}};
+           R"(, "body": {"motion": [{"time": 0}, {"time": 0.15, "position": [0, 0.1, 0]}]})"},
+          {"full", {.free = true}, true, full_members.c_str()},
+          {"auto",
+           {},
+           false,
+           R"(, "space": "auto", "space_release": 0.1,
+              "forces": [{"vertices": {"ids": [60]}, "force": [0, 1, 0], "start": 0.05, "end": 0.15}])"}};
 }
 
 class StateFile : public ::testing::TestWithParam<Case> {

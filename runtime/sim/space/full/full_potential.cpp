@@ -1,34 +1,39 @@
 #include "runtime/sim/space/full/full_potential.h"
 
+#include <limits>
+
 namespace exmat::runtime {
 namespace {
 
 using Field = Eigen::Map<Eigen::VectorXd>;
 
+constexpr double kGapRounding = 4 * std::numeric_limits<double>::epsilon();  // of the place of a vertex
+
 }  // namespace
 
-FullPotentialWorkspace::FullPotentialWorkspace(const FullSpace& space)
-    : start(Eigen::VectorXd::Zero(space.field_size())),
+FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
+    : start(Eigen::VectorXd::Zero(model.space.field_size())),
       offset(start),
       rate(start),
       external(start),
       unused(start),
-      x(space.field_size()),
+      x(start.size()),
       a(x),
       w(x),
       inertia(x),
       force(x),
-      frozen(space.padded_elements() * kTangentNumbers),
-      tangents(space.padded_elements() * kTangentNumbers),
-      coefficients(3 * space.filter().stride),
+      frozen(model.space.padded_elements() * kTangentNumbers),
+      tangents(model.space.padded_elements() * kTangentNumbers),
+      coefficients(3 * model.space.filter().stride),
       target(coefficients),
-      rate_coefficients(coefficients) {}
+      rate_coefficients(coefficients) {
+  if (model.rigid) rigid = RigidWorkspace(model.space);
+}
 
 void FullPotential::begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept {
   FullPotentialWorkspace& work = workspace_;
   space_.to_field(form_.acceleration_centre, work.offset);
   space_.to_field(form_.velocity_centre, work.rate);
-  if (filters()) kernels().mesh_coefficients(space_.filter(), work.rate.data(), work.rate_coefficients.data());
   space_.to_field(q, work.start);
   space_.to_field(external, work.external);
   work.offset = work.start - work.offset;
@@ -60,6 +65,10 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   Field(work.x.data(), size) = work.start + d;
   Field(work.a.data(), size) = work.offset + d;
   Field(work.w.data(), size) = work.rate + d;
+  if (model_.rigid) {
+    if (freeze) model_.rigid->place(work.x.data(), work.rigid);
+    if (damps()) model_.rigid->remove_motion(work.rigid, work.w.data());
+  }
   const MeshArrays mesh = space_.arrays();
   const ElementLaw law = space_.law();
   const MeshInertia own = terms();
@@ -91,21 +100,34 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>();
   total.value -= work_;
   gradient = inertia + force - work.external;
-  if (!filters()) return evaluation;
+  if (filters()) add_filter_force(total, gradient);
+  if (contact_ != nullptr) add_contacts(evaluation, gradient);
+  return evaluation;
+}
 
+void FullPotential::add_filter_force(PotentialValue& total, Eigen::VectorXd& gradient) noexcept {
+  FullPotentialWorkspace& work = workspace_;
   set_coefficients();
   const double kappa = filter_stiffness(), damping = filter_damping();
+  if (damping > 0) kernels().mesh_coefficients(space_.filter(), work.w.data(), work.rate_coefficients.data());
   double energy = 0;
   for (Eigen::Index i = 0; i < work.coefficients.size(); ++i) {
     const double from_target = work.coefficients[i] - work.target[i];
-    const double rate = work.coefficients[i] - work.rate_coefficients[i];
+    const double rate = damping > 0 ? work.rate_coefficients[i] : 0;
     energy += 0.5 * (kappa * from_target * from_target + damping * rate * rate);
     work.coefficients[i] = kappa * from_target + damping * rate;
   }
   kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), gradient.data());
   total.value += energy;
   total.magnitude += energy;
-  return evaluation;
+}
+
+void FullPotential::add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept {
+  evaluation.force_scale += model_.contacts->evaluate(workspace_.x.data(), *contact_, gradient.data());
+  evaluation.potential.value += contact_->potential;
+  evaluation.potential.magnitude += contact_->potential;
+  // A gap is known to the rounding of where its vertex is: no residual comes below what that makes of its force.
+  evaluation.force_scale += kGapRounding * reach_ * contact_->stiffness / scene_.space.newton.tolerance;
 }
 
 }  // namespace exmat::runtime

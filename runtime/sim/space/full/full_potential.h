@@ -4,7 +4,7 @@
 #include <array>
 
 #include "runtime/sim/solver/line_search.h"
-#include "runtime/sim/space/full/full_space.h"
+#include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/step/integrator.h"
 #include "runtime/sim/step/scene.h"
 
@@ -13,25 +13,30 @@ namespace exmat::runtime {
 /// Scratch of a FullPotential, sized once.
 struct FullPotentialWorkspace {
   FullPotentialWorkspace() = default;
-  explicit FullPotentialWorkspace(const FullSpace& space);
+  explicit FullPotentialWorkspace(const FullModel& model);
 
   Eigen::VectorXd start, offset, rate, external;         ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
   Eigen::VectorXd unused;                                ///< a gradient that nobody asked for
   AlignedArray x, a, w, inertia, force;                  ///< fields at the last d
   AlignedArray frozen;                                   ///< tangents of damping, see Kernels::mesh_force()
   AlignedFloats tangents;                                ///< of the Hessian
-  AlignedArray coefficients, target, rate_coefficients;  ///< 3 x stride: W^T u at the last d, c*, W^T q_v
+  AlignedArray coefficients, target, rate_coefficients;  ///< 3 x stride: W^T q at the last d, c*, W^T (q - q_v)
+  RigidWorkspace rigid;                                  ///< of a free body, where freeze() was last called
 };
 
 /// What a step in full space minimises, a function of the field d = q - q_n:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + c_v/2 (q - q_v)^T D (q - q_v)
 ///     + kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2,
-/// D = alpha M + beta K, K of the iterate that freeze() was last called at. Of a clamped body; of a free one without
-/// damping and example force. Problem of search_line(). No call allocates.
+/// D = alpha M + beta K, K of the iterate that was last frozen, and with obstacles near their potential. Of a free body
+/// q - q_v is that without the rigid motion that has its momenta, as the body stands at that iterate. Problem of
+/// search_line(). No call allocates.
 class FullPotential {
  public:
-  FullPotential(const FullSpace& space, const StepScene& scene, const StepForm& form, FullPotentialWorkspace& workspace)
-      : space_(space), scene_(scene), form_(form), workspace_(workspace) {}
+  FullPotential(const FullModel& model, const StepScene& scene, const StepForm& form, FullPotentialWorkspace& workspace)
+      : model_(model), space_(model.space), scene_(scene), form_(form), workspace_(workspace) {}
+
+  /// Obstacles are near: their candidates after FullContacts::begin().
+  void set_contact(ContactWorkspace* contact) noexcept { contact_ = contact; }
 
   /// Fields at d = 0 of the form's centres; q_n [f] and f_ext [f].
   void begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept;
@@ -64,10 +69,18 @@ class FullPotential {
   }
   MeshInertia terms() const noexcept;
 
+  void add_filter_force(PotentialValue& total, Eigen::VectorXd& gradient) noexcept;
+  void add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
+  bool damps() const noexcept {
+    return scene_.mass_damping > 0 || scene_.stiffness_damping > 0 || filter_damping() > 0;
+  }
+
+  const FullModel& model_;
   const FullSpace& space_;
   const StepScene& scene_;
   const StepForm& form_;
   FullPotentialWorkspace& workspace_;
+  ContactWorkspace* contact_ = nullptr;
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;
 };

@@ -5,6 +5,7 @@
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <numeric>
 #include <set>
 #include <tuple>
@@ -35,6 +36,38 @@ std::vector<std::int32_t> by_length(Eigen::Index count, const Length& length) {
 }
 
 using Gradients = Eigen::Matrix<double, 4, 3>;
+
+// Of (L L^T)^-1, from its entries on the pattern of L alone (Takahashi, Fagan and Chen 1973).
+Eigen::VectorXd diagonal_of_inverse(const Eigen::SparseMatrix<double>& L) {
+  Eigen::SparseMatrix<double> inverse = L;
+  Eigen::VectorXd column = Eigen::VectorXd::Zero(L.rows());
+  for (Eigen::Index j = L.cols() - 1; j >= 0; --j) {
+    const Eigen::Index begin = L.outerIndexPtr()[j], end = L.outerIndexPtr()[j + 1];
+    const double pivot = L.valuePtr()[begin];
+    for (Eigen::Index k = begin + 1; k < end; ++k) column[L.innerIndexPtr()[k]] = 0;
+    // column = Z L_j below the diagonal, Z the symmetric inverse so far: both of its triangles count.
+    for (Eigen::Index k = begin + 1; k < end; ++k) {
+      const Eigen::Index row = L.innerIndexPtr()[k];
+      const double factor = L.valuePtr()[k];
+      Eigen::Index at = begin + 1;
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(inverse, row); entry; ++entry) {
+        while (at < end && L.innerIndexPtr()[at] < entry.index()) ++at;
+        if (at == end) break;
+        if (L.innerIndexPtr()[at] != entry.index()) continue;
+        column[entry.index()] += factor * entry.value();
+        if (entry.index() != row) column[row] += L.valuePtr()[at] * entry.value();
+      }
+    }
+    double sum = 1 / pivot;
+    for (Eigen::Index k = begin + 1; k < end; ++k) {
+      const double value = -column[L.innerIndexPtr()[k]] / pivot;
+      inverse.valuePtr()[k] = value;
+      sum -= L.valuePtr()[k] * value;
+    }
+    inverse.valuePtr()[begin] = sum / pivot;
+  }
+  return inverse.diagonal();
+}
 
 }  // namespace
 
@@ -109,6 +142,7 @@ void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials)
     const Gradients gradients = shape_gradients(tet_positions(mesh, t));
     const LameParameters lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
     const double mass = materials.density[t] * volumes[t];
+    wave_rate_ = std::max(wave_rate_, std::sqrt((lame.lambda + 2 * lame.mu) / materials.density[t]) / edge_);
     for_pairs(t, [&](std::size_t row, std::int32_t column, int i, int j) {
       const auto begin = columns_.begin() + start_of[row];
       const auto k = static_cast<std::size_t>(
@@ -173,6 +207,12 @@ void FullSpace::add_filter(const RowMatrix& filter) {
   for (Eigen::Index v = 0; functions_ > 0 && v < filter.rows(); ++v)
     if (const std::int32_t place = place_of_[static_cast<std::size_t>(v)]; place >= 0)
       for (Eigen::Index k = 0; k < functions_; ++k) filter_[place * stride_ + k] = filter(v, k);
+  // A translation of a free body is no deformation: W' = W - (M 1) (1^T W) / m.
+  if (!clamped_ && functions_ > 0) {
+    const Eigen::VectorXd masses = mass() * Eigen::VectorXd::Ones(vertices());
+    Eigen::Map<RowMatrix> W(filter_.data(), vertices(), stride_);
+    W -= masses / masses.sum() * W.colwise().sum().eval();
+  }
   rounded_filter_ = AlignedFloats(vertices() * stride_);
   std::copy_n(filter_.data(), vertices() * stride_, rounded_filter_.data());
 }
@@ -204,6 +244,17 @@ Eigen::VectorXd FullSpace::to_field(const Eigen::VectorXd& x) const {
 void FullSpace::from_field(const Eigen::VectorXd& field, Eigen::VectorXd& x) const noexcept {
   for (std::size_t k = 0; k < vertex_of_.size(); ++k)
     x.segment<3>(3 * vertex_of_[k]) = field.segment<3>(static_cast<Eigen::Index>(4 * k));
+}
+
+double FullSpace::kinetic_energy(const Eigen::VectorXd& v) const noexcept {
+  double sum = 0;
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+    for (auto k = static_cast<std::size_t>(row_starts_[i]); k < static_cast<std::size_t>(row_starts_[i + 1]); ++k)
+      momentum += mass_[k] * v.segment<3>(3 * number_at(columns_[k]));
+    sum += momentum.dot(v.segment<3>(3 * number_at(rows_[i])));
+  }
+  return 0.5 * sum;
 }
 
 MeshArrays FullSpace::arrays() const noexcept {
@@ -258,7 +309,7 @@ void FullSpace::projected_tangents(const double* field, double stiffness_damping
 }
 
 FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor,
-                                       double filter_stiffness)
+                                       double filter_stiffness, bool with_diagonal)
     : size_(space.vertices()), stride_(space.filter().stride) {
   const Eigen::SparseMatrix<double> matrix =
       mass_factor * space.mass() + stiffness_factor * space.preconditioning_stiffness();
@@ -285,6 +336,8 @@ FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_facto
   take(L, column_starts_, rows_, by_column_);
   for (Eigen::Index i = 0; i < size_; ++i) inverse_diagonal_.push_back(static_cast<float>(1 / L.coeff(i, i)));
 
+  if (with_diagonal) diagonal_ = diagonal_of_inverse(L);
+
   // Woodbury: S^-1 - Z (1/k + W^T Z)^-1 Z^T with Z = S^-1 W, as the square of Z times a root of the inverse.
   functions_ = AlignedFloats(filter_stiffness > 0 ? size_ * stride_ : 0);
   if (filter_stiffness <= 0 || stride_ == 0) return;
@@ -296,6 +349,7 @@ FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_facto
       small.llt().matrixU().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(stride_, stride_)));
   Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(functions_.data(), size_, stride_) =
       (Z * root).cast<float>();
+  if (with_diagonal) diagonal_ -= (Z * root).rowwise().squaredNorm();
 }
 
 void FullPreconditioner::solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,

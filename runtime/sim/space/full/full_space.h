@@ -44,8 +44,22 @@ class FullSpace {
   Eigen::Index functions() const { return functions_; }             ///< m
   bool is_clamped() const { return clamped_; }                      ///< whether a vertex is fixed
   double edge() const { return edge_; }                             ///< mean length of the edges [m]
+  double wave_rate() const { return wave_rate_; }                   ///< of the fastest waves, edges a second [1/s]
   double extent() const { return extent_; }                         ///< largest coordinate at rest [m]
   const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
+  /// Of a vertex of the mesh: its place in fields, and its number among those that move; -1 where it is fixed.
+  std::int32_t place(Eigen::Index vertex) const { return place_of_[static_cast<std::size_t>(vertex)]; }
+  std::int32_t number(Eigen::Index vertex) const {
+    return place(vertex) < 0 ? -1 : vertex_of_[static_cast<std::size_t>(place(vertex))];
+  }
+  std::int32_t number_at(Eigen::Index place) const { return vertex_of_[static_cast<std::size_t>(place)]; }
+  /// 1/2 v^T M v of velocities [f].
+  double kinetic_energy(const Eigen::VectorXd& v) const noexcept;
+  /// Where a vertex of the mesh is displaced to by q [f].
+  Eigen::Vector3d displacement(Eigen::Index vertex, const Eigen::VectorXd& q) const {
+    return number(vertex) < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(q.segment<3>(3 * number(vertex)));
+  }
+  Eigen::Index mesh_vertices() const { return std::ssize(place_of_); }
 
   Eigen::VectorXd to_field(const Eigen::VectorXd& x) const;
   void to_field(const Eigen::VectorXd& x, Eigen::VectorXd& field) const noexcept;
@@ -80,7 +94,7 @@ class FullSpace {
 
   MaterialModel model_ = MaterialModel::kStVenantKirchhoff;
   bool clamped_ = false;
-  double edge_ = 0, extent_ = 0;
+  double edge_ = 0, extent_ = 0, wave_rate_ = 0;
   std::vector<std::int32_t> vertex_of_;  ///< of each place in a field, among those that move
   std::vector<std::int32_t> place_of_;   ///< of each vertex of the mesh, -1 where it is fixed
   Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load_;
@@ -99,14 +113,20 @@ class FullSpace {
 class FullPreconditioner {
  public:
   FullPreconditioner() = default;
-  FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor, double filter_stiffness);
+  /// `with_diagonal`: also inverse_diagonal().
+  FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor, double filter_stiffness,
+                     bool with_diagonal = false);
 
   /// x = (S (x) I3)^-1 right, fields; coefficients: 3 x stride of the filter.
   void solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,
              AlignedFloats& coefficients) const noexcept;
 
+  /// [n] of S^-1 [m/N], if asked for.
+  const Eigen::VectorXd& inverse_diagonal() const { return diagonal_; }
+
  private:
   Eigen::Index size_ = 0, stride_ = 0;
+  Eigen::VectorXd diagonal_;
   std::vector<std::int32_t> row_starts_, columns_, column_starts_, rows_;
   std::vector<float> by_row_, by_column_, inverse_diagonal_;
   AlignedFloats functions_;  ///< what the filter takes off, as a square

@@ -3,30 +3,42 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace exmat::runtime {
 namespace {
 
 constexpr double kMostPredicted = 0.5;  // of an edge, that an unchecked predictor moves a vertex by
 constexpr double kSlow = 0.1;           // of the residual: tangents that leave more are evaluated again
+constexpr int kContactIterations = 60;  // of conjugate gradients near obstacles, at most
+constexpr double kLongStep = 0.008;     // [s]
+constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
 constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
 
-FullWorkspace::Linear make_linear(const FullSpace& space, const StepScene& scene, double time_scale) {
+FullWorkspace::Key key_of(const FullModel& model, const StepScene& scene) {
+  const bool acts = !scene.examples.empty();
+  return {scene.time_step,
+          scene.integrator == Integrator::kBdf2 ? 1.0 : 0.0,
+          scene.mass_damping,
+          scene.stiffness_damping,
+          acts ? scene.examples.front().stiffness : 0,
+          (acts ? scene.examples.front().damping : 0) + (model.contacts && !scene.obstacles.empty() ? 0.0 : -1.0)};
+}
+
+FullWorkspace::Linear make_linear(const FullModel& model, const StepScene& scene, double time_scale, bool touches) {
+  const FullSpace& space = model.space;
   const double c_v = 1 / time_scale;
   const double mass = c_v * c_v + scene.mass_damping * c_v, stiffness = 1 + scene.stiffness_damping * c_v;
   double filter = 0;
   if (!scene.examples.empty()) filter = scene.examples.front().stiffness + scene.examples.front().damping * c_v;
-  FullWorkspace::Linear linear{FullPreconditioner(space, mass, stiffness, filter), {}, static_cast<float>(filter)};
+  FullWorkspace::Linear linear{
+      FullPreconditioner(space, mass, stiffness, filter, touches), {}, static_cast<float>(filter)};
   for (Eigen::Index k = 0; k < space.entries(); ++k)
     linear.matrix.push_back(static_cast<float>(mass * space.mass_value(k) + stiffness * space.variance_value(k)));
   return linear;
 }
 
-double largest_move(const Eigen::VectorXd& field) {
-  return std::sqrt(field.reshaped(4, field.size() / 4).colwise().squaredNorm().maxCoeff());
-}
-
-bool jumps(const StepScene& scene, const State& state) {
+bool jumps(const StepScene& scene, const Motion& state) {
   if (state.begins_anew || scene.begins_anew) return true;
   const double midpoint = state.time + 0.5 * scene.time_step;
   return std::ranges::any_of(scene.forces, [&](const ScriptedForce& force) {
@@ -36,45 +48,79 @@ bool jumps(const StepScene& scene, const State& state) {
 
 }  // namespace
 
-const char* unsupported(const FullSpace& space, const StepScene& scene) noexcept {
+const char* unsupported(const FullModel& model, const StepScene& scene) noexcept {
   if (scene.integrator == Integrator::kNewmark) return "Newmark's integrator";
-  if (!scene.obstacles.empty()) return "obstacles";
+  if (!scene.obstacles.empty() && !model.contacts) return "obstacles, since the bundle has no /contact";
   if (scene.carrier) return "a motion that carries the body";
-  if (scene.sleep.energy > 0) return "sleep";
   if (scene.examples.size() > 1) return "more than one example force";
   const bool acts_example = std::ranges::any_of(scene.examples, acts);
   if (acts_example && scene.examples.front().elastic) return "an elastic example force";
-  if (acts_example && space.functions() == 0) return "an example force, since the space has no filter";
+  if (acts_example && model.space.functions() == 0) return "an example force, since the space has no filter";
   const bool damped = scene.mass_damping > 0 || scene.stiffness_damping > 0;
-  if (!space.is_clamped() && (damped || acts_example)) return "damping or example force of a free body";
+  if (!model.space.is_clamped() && !model.rigid && (damped || acts_example))
+    return "damping or example force of a free body whose rigid motion is not known";
   return nullptr;
 }
 
-FullWorkspace::FullWorkspace(const FullSpace& space, const StepScene& scene, const FullAccuracy& of)
+FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, const FullAccuracy& of)
     : accuracy(of),
-      first(make_linear(space, scene, scene.time_step)),
-      second(scene.integrator == Integrator::kBdf2 ? make_linear(space, scene, 2 * scene.time_step / 3) : first),
-      form{0, 0, Eigen::VectorXd::Zero(space.size()), Eigen::VectorXd::Zero(space.size())},
-      potential(space),
+      form{0, 0, Eigen::VectorXd::Zero(model.space.size()), Eigen::VectorXd::Zero(model.space.size())},
+      potential(model),
       external(form.velocity_centre),
-      d(Eigen::VectorXd::Zero(space.field_size())),
+      moved(external),
+      rate(external),
+      acceleration(external),
+      d(Eigen::VectorXd::Zero(model.space.field_size())),
       gradient(d),
       direction(d),
       trial(d),
       trial_gradient(d),
-      residual(space.field_size()),
+      residual(d.size()),
       solved(residual),
       search(residual),
       image(residual),
       sum(residual),
-      coefficients(3 * space.filter().stride) {}
+      coefficients(3 * model.space.filter().stride),
+      scaled(residual),
+      field(d) {
+  fit(model, scene);
+  if (!model.examples) return;
+  if (model.examples->table) table = model.examples->table->make_workspace();
+  coefficients_there.setZero(3 * model.space.functions());
+  target = coefficients_there;
+}
 
-FullStep::FullStep(const FullSpace& space, const StepScene& scene, State& state, FullWorkspace& workspace) noexcept
-    : space_(space),
+void FullWorkspace::fit(const FullModel& model, const StepScene& scene) {
+  const Key wanted = key_of(model, scene);
+  const bool touches = model.contacts && !scene.obstacles.empty();
+  if (touches && contact.blocks.size() < static_cast<std::size_t>(model.contacts->vertices()))
+    contact = FullContactScratch(model.contacts->vertices());
+  if (key == wanted) return;
+  first = make_linear(model, scene, scene.time_step, touches);
+  second = scene.integrator == Integrator::kBdf2 ? make_linear(model, scene, 2 * scene.time_step / 3, false) : first;
+  key = wanted;
+}
+
+double compliance(const FullModel& model, std::span<const std::int32_t> vertices, std::span<const double> shares,
+                  FullWorkspace& workspace) noexcept {
+  auto right = workspace.residual.vector(), moved = workspace.solved.vector();
+  right.setZero();
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    if (const std::int32_t place = model.space.place(vertices[i]); place >= 0)
+      right[4 * place] += static_cast<float>(shares[i]);
+  workspace.first.preconditioner.solve(kernels(), workspace.residual, workspace.solved, workspace.coefficients);
+  return static_cast<double>(right.dot(moved));
+}
+
+FullStep::FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+                   const FullContactMemory& contacts) noexcept
+    : model_(model),
+      space_(model.space),
       scene_(scene),
       state_(state),
       workspace_(workspace),
-      potential_(space, scene, workspace.form, workspace.potential) {}
+      contacts_(contacts),
+      potential_(model, scene, workspace.form, workspace.potential) {}
 
 void FullStep::gather_external_force() noexcept {
   Eigen::VectorXd& external = workspace_.external;
@@ -82,20 +128,39 @@ void FullStep::gather_external_force() noexcept {
   external.noalias() += space_.gravity_load() * scene_.gravity;
   const double midpoint = state_.time + 0.5 * scene_.time_step;
   for (const ScriptedForce& force : scene_.forces)
-    if (force.acts_at(midpoint)) external += force.force;
+    if (force.acts_at(midpoint)) external += force.on_vertices;
+}
+
+// With u and v as fields in the workspace's `trial` and `field`.
+bool FullStep::find_contacts() noexcept {
+  if (!model_.contacts || contacts_.found == nullptr) return false;
+  const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
+  return model_.contacts->begin(scene_.obstacles, end, scene_.time_step, scene_.gravity, workspace_.trial.data(),
+                                workspace_.field.data(), *contacts_.held, *contacts_.found);
 }
 
 void FullStep::begin() noexcept {
   anew_ = jumps(scene_, state_);
   gather_external_force();
+  if (model_.rigid || model_.contacts) {
+    space_.to_field(state_.q, workspace_.trial);
+    space_.to_field(state_.v, workspace_.field);
+  }
+  near_ = find_contacts();
+  potential_.set_contact(near_ ? contacts_.found : nullptr);
+  if (model_.rigid) {
+    model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
+    expected_momenta_ = model_.rigid->momenta(workspace_.field.data(), workspace_.potential.rigid);
+  }
   const StepHistory history{state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous};
-  const bool second_order = scene_.integrator == Integrator::kBdf2 && !anew_;
+  const bool second_order = scene_.integrator == Integrator::kBdf2 && !anew_ && !near_;
   if (second_order)
     bdf2_form(history, scene_.time_step, workspace_.form);
   else
     backward_euler_form(history, scene_.time_step, workspace_.form);
   linear_ = second_order ? &workspace_.second : &workspace_.first;
   potential_.begin(state_.q, workspace_.external);
+  if (model_.rigid) add_external_impulse();
   choose_first_iterate();
 }
 
@@ -118,34 +183,85 @@ void FullStep::choose_first_iterate() noexcept {
   potential_.evaluate_elements(d, FullPotential::Tangents::kExact, true);
 }
 
+// Of a vertex, beside the others of a free body.
+double FullStep::largest_move(const Eigen::VectorXd& field) const noexcept {
+  const Eigen::Map<const Eigen::Matrix4Xd> columns(field.data(), 4, field.size() / 4);
+  Eigen::Vector4d mean = Eigen::Vector4d::Zero();
+  if (model_.rigid) mean = columns.rowwise().mean();
+  return std::sqrt((columns.colwise() - mean).colwise().squaredNorm().maxCoeff());
+}
+
 void FullStep::first_iterate(Eigen::VectorXd& u) const noexcept {
   space_.from_field(workspace_.d, u);
   u += state_.q;
 }
 
+void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
+  potential_.set_coefficients();
+  const FullPotentialWorkspace& work = workspace_.potential;
+  const Eigen::Index stride = space_.filter().stride;
+  for (Eigen::Index k = 0; k < space_.functions(); ++k) {
+    Eigen::Vector3d own(work.coefficients[k], work.coefficients[stride + k], work.coefficients[2 * stride + k]);
+    if (model_.rigid) {
+      const Eigen::Vector3d rest = model_.examples->rest.row(k);
+      own = work.rigid.rotation.transpose() * (rest + own) - rest;
+    }
+    coefficients.segment<3>(3 * k) = own;
+  }
+}
+
+// solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a single
+// one.
+void FullStep::precondition() noexcept {
+  FullWorkspace& work = workspace_;
+  const Kernels& run = kernels();
+  if (!near_) return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
+  const auto blocks = std::span(work.contact.blocks).first(work.contact.block_count);
+  work.scaled.vector() = work.residual.vector();
+  for (const auto& block : blocks) {
+    auto own = work.scaled.vector().segment<3>(4 * block.place);
+    own = (block.scale * own).eval();
+  }
+  linear_->preconditioner.solve(run, work.scaled, work.solved, work.coefficients);
+  for (const auto& block : blocks) {
+    auto own = work.solved.vector().segment<3>(4 * block.place);
+    own = (block.scale * own).eval();
+  }
+}
+
+// image = A search.
+void FullStep::multiply() noexcept {
+  const Kernels& run = kernels();
+  FullWorkspace& work = workspace_;
+  run.mesh_product(space_.arrays(), linear_->matrix.data(), work.potential.tangents.data(), work.search.data(),
+                   work.image.data());
+  if (linear_->filter_stiffness > 0) {
+    const MeshFilter<float> filter = space_.rounded_filter();
+    run.mesh_rounded_coefficients(filter, work.search.data(), work.coefficients.data());
+    run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
+  }
+  if (!near_) return;
+  for (const auto& block : std::span(work.contact.blocks).first(work.contact.block_count))
+    work.image.vector().segment<3>(4 * block.place) +=
+        block.stiffness * work.search.vector().segment<3>(4 * block.place);
+}
+
 // Preconditioned conjugate gradients from 0, of the gradient over its norm: forces of a body that comes to rest would
 // be too small for single precision.
 FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
-  const Kernels& run = kernels();
   FullWorkspace& work = workspace_;
-  const MeshArrays mesh = space_.arrays();
-  const MeshFilter<float> filter = space_.rounded_filter();
   auto residual = work.residual.vector(), solved = work.solved.vector(), search = work.search.vector(),
        image = work.image.vector(), sum = work.sum.vector();
+  if (near_) model_.contacts->set_blocks(*contacts_.found, linear_->preconditioner.inverse_diagonal(), work.contact);
   const double size = work.gradient.norm();
   residual = (work.gradient * (-1 / size)).cast<float>();
-  linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
+  precondition();
   search = solved;
   sum.setZero();
   float square = residual.dot(solved);
   const float limit = static_cast<float>(tolerance * tolerance) * square;
   for (int iteration = 1;; ++iteration) {
-    run.mesh_product(mesh, linear_->matrix.data(), work.potential.tangents.data(), work.search.data(),
-                     work.image.data());
-    if (linear_->filter_stiffness > 0) {
-      run.mesh_rounded_coefficients(filter, work.search.data(), work.coefficients.data());
-      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
-    }
+    multiply();
     const float curvature = search.dot(image);
     if (!(curvature > 0)) {
       if (!projected_) return Outcome::kIndefinite;
@@ -155,9 +271,9 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
     ++report_.cg_iterations;
     const float length = square / curvature;
     sum += length * search;
-    if (iteration >= work.accuracy.iterations) break;
+    if (iteration >= (near_ ? std::max(work.accuracy.iterations, kContactIterations) : work.accuracy.iterations)) break;
     residual -= length * image;
-    linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
+    precondition();
     const float next = residual.dot(solved);
     if (!(next > limit)) break;
     search = solved + next / square * search;
@@ -173,6 +289,12 @@ void FullStep::project() noexcept {
   projected_ = tangents_are_current_ = true;
   potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kProjected, at_first_iterate_);
   here_ = potential_.gradient_there(workspace_.d, workspace_.gradient);
+}
+
+// What a direction leaves in stiff modes feeds them where nothing damps them.
+double FullStep::direction_tolerance() const noexcept {
+  const bool delicate = scene_.stiffness_damping == 0 || scene_.time_step > kLongStep;
+  return delicate ? kDelicate * workspace_.accuracy.tolerance : workspace_.accuracy.tolerance;
 }
 
 bool FullStep::is_short() const noexcept {
@@ -211,14 +333,14 @@ NewtonStatus FullStep::minimise() noexcept {
   newton.residual = report_.residual = work.gradient.norm();
   unchecked_from_ = std::numeric_limits<double>::infinity();
   // A coarse tolerance would leave the body beside its equilibrium for good.
-  const NewtonSettings at_least_one{scene_.newton.max_iterations, 0};
+  const NewtonSettings at_least_one{scene_.space.newton.max_iterations, 0};
   for (;;) {
     newton.residual = report_.residual;
     newton.iterations = report_.newton_iterations;
-    const NewtonSettings& settings = is_checked() || !at_first_iterate_ ? scene_.newton : at_least_one;
+    const NewtonSettings& settings = is_checked() || !at_first_iterate_ ? scene_.space.newton : at_least_one;
     if (const auto reason = reason_to_end(newton, settings, here_, unchecked_from_)) return *reason;
     const double left = settings.tolerance * here_.force_scale / report_.residual;
-    if (find_direction(std::max(work.accuracy.tolerance, kForcing * left)) == Outcome::kIndefinite) {
+    if (find_direction(std::max(direction_tolerance(), kForcing * left)) == Outcome::kIndefinite) {
       project();
       report_.residual = work.gradient.norm();
       continue;
@@ -233,7 +355,7 @@ NewtonStatus FullStep::minimise() noexcept {
     if (moved) {
       ++report_.newton_iterations;
       report_.residual = work.gradient.norm();
-      if (report_.residual <= kSlow * before || report_.residual <= scene_.newton.tolerance * here_.force_scale)
+      if (report_.residual <= kSlow * before || report_.residual <= scene_.space.newton.tolerance * here_.force_scale)
         continue;
     } else if (tangents_are_current_) {
       potential_.evaluate_elements(work.d, FullPotential::Tangents::kNone, false);
@@ -246,67 +368,141 @@ NewtonStatus FullStep::minimise() noexcept {
   }
 }
 
-void FullStep::solve() noexcept { status_ = minimise(); }
+// Friction follows the normal forces of the solution.
+NewtonStatus FullStep::minimise_with_friction() noexcept {
+  for (int round = 1;; ++round) {
+    const NewtonStatus status = minimise();
+    FrictionChange friction;
+    for (const std::size_t number : std::span(contacts_.found->loaded).first(contacts_.found->loaded_count)) {
+      ContactCandidate& candidate = contacts_.found->candidates[number];
+      friction.refresh(scene_.obstacles[static_cast<std::size_t>(candidate.obstacle)]->friction, candidate);
+    }
+    if (status == NewtonStatus::kNonFinite || round == kFrictionRounds || friction.relative() <= kSameFriction)
+      return status;
+    tangents_are_current_ = false;
+  }
+}
+
+void FullStep::solve() noexcept { status_ = near_ ? minimise_with_friction() : minimise(); }
+
+// Half of what the external force does to the momenta in a step, where place() was called: once at its beginning, once
+// at its end.
+void FullStep::add_external_impulse() noexcept {
+  const RigidWorkspace& rigid = workspace_.potential.rigid;
+  const FrameMomenta impulse = model_.rigid->sums(workspace_.potential.external.data(), rigid);
+  expected_momenta_.linear += 0.5 * scene_.time_step * impulse.linear;
+  expected_momenta_.angular += 0.5 * scene_.time_step * impulse.angular;
+}
+
+// Momenta are those of the start and of the forces of the solution: damping and example force have none, and the turn
+// of the step is not the integrator's to take away.
+void FullStep::correct_momenta() noexcept {
+  FullWorkspace& work = workspace_;
+  RigidWorkspace& rigid = work.potential.rigid;
+  const double dt = scene_.time_step;
+  space_.to_field(state_.q, work.trial);
+  space_.to_field(state_.v, work.field);
+  model_.rigid->place(work.trial.data(), rigid);
+  add_external_impulse();
+  FrameMomenta lacking = expected_momenta_;
+  if (near_) {
+    lacking.linear += dt * contacts_.found->force;
+    lacking.angular += dt * (contacts_.found->torque - rigid.centre.cross(contacts_.found->force));
+  }
+  const FrameMomenta own = model_.rigid->momenta(work.field.data(), rigid);
+  lacking.linear -= own.linear;
+  lacking.angular -= own.angular;
+  RigidPart::add_motion(model_.rigid->motion(lacking, rigid), rigid, work.field.data());
+  space_.from_field(work.field, state_.v);
+}
+
+// A solution that did not converge may hold contact forces that throw the body.
+void FullStep::limit_energy(double allowed) noexcept {
+  const Energies now = energies(model_, scene_, state_, workspace_);
+  const double limit = std::max(0.0, allowed - now.elastic - now.potential);
+  if (now.kinetic > limit) state_.v *= std::sqrt(limit / now.kinetic);
+}
 
 const FullReport& FullStep::finish() noexcept {
   if (status_ == NewtonStatus::kIterationLimit) report_.status |= kStepIterationLimit;
   if (status_ == NewtonStatus::kStagnated) report_.status |= kStepStagnated;
-  if (status_ == NewtonStatus::kNonFinite || !workspace_.d.allFinite()) {
+  if (status_ == NewtonStatus::kNonFinite || !workspace_.d.allFinite() || !std::isfinite(potential_.elastic_energy())) {
     report_.status |= kStepNonFinite;
     return report_;
   }
+  const bool unbalanced = near_ && status_ != NewtonStatus::kConverged;
+  double energy = 0;
+  Eigen::VectorXd& d = workspace_.moved;
+  space_.from_field(workspace_.d, d);
+  // In q - q_v the digits of d are kept.
   const StepForm& form = workspace_.form;
+  workspace_.rate = form.velocity_factor * (d + (state_.q - form.velocity_centre));
+  workspace_.acceleration = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
+  const double elastic = potential_.elastic_energy();
+  if (unbalanced) energy = energies(model_, scene_, state_, workspace_).total();
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
-  // In q - q_v the digits of d are kept.
-  Eigen::VectorXd& d = workspace_.external;
-  space_.from_field(workspace_.d, d);
-  state_.v = form.velocity_factor * (d + (state_.q - form.velocity_centre));
-  state_.a = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
+  state_.v = workspace_.rate;
+  state_.a = workspace_.acceleration;
   state_.q += d;
-  state_.elastic_energy = potential_.elastic_energy();
+  state_.elastic_energy = elastic;
+  if (near_) {
+    report_.contacts = contacts_.found->touching;
+    report_.contact_force = contacts_.found->force;
+  }
+  if (unbalanced)
+    limit_energy(energy);
+  else if (model_.rigid)
+    correct_momenta();
+  if (near_) {
+    space_.to_field(state_.q, workspace_.trial);
+    model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
+  } else if (contacts_.held != nullptr) {
+    contacts_.held->count = 0;
+  }
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
-  state_.begins_anew = false;
+  state_.begins_anew = near_;
   return report_;
 }
 
-FullReport step(const FullSpace& space, const StepScene& scene, State& state, FullWorkspace& workspace) noexcept {
-  FullStep one(space, scene, state, workspace);
+FullReport step(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+                const FullContactMemory& contacts) noexcept {
+  FullStep one(model, scene, state, workspace, contacts);
   one.begin();
   one.solve();
   return one.finish();
 }
 
-State make_state(const FullSpace& space, const Eigen::VectorXd& u, const Eigen::VectorXd& v, FullWorkspace& workspace) {
+State make_state(const FullModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& v, FullWorkspace& workspace) {
   State state;
   state.q = state.q_previous = u;
   state.v = state.v_previous = v;
-  state.a = state.applied_force = Eigen::VectorXd::Zero(space.size());
-  energies(space, {}, state, workspace);
+  state.a = state.applied_force = Eigen::VectorXd::Zero(model.space.size());
+  energies(model, {}, state, workspace);
   return state;
 }
 
-State make_state(const FullSpace& space, FullWorkspace& workspace) {
-  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(space.size());
-  return make_state(space, rest, rest, workspace);
+State make_state(const FullModel& model, FullWorkspace& workspace) {
+  const Eigen::VectorXd rest = Eigen::VectorXd::Zero(model.space.size());
+  return make_state(model, rest, rest, workspace);
 }
 
-Energies energies(const FullSpace& space, const StepScene& scene, State& state, FullWorkspace& workspace) noexcept {
+Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept {
   // Elasticity at q, and the inertia of c_a = 1 and q_a = q - v.
   StepForm& form = workspace.form;
   form.velocity_factor = form.acceleration_factor = 1;
   form.velocity_centre = state.q;
   form.acceleration_centre = state.q - state.v;
   const StepScene bare;
-  FullPotential potential(space, bare, form, workspace.potential);
+  FullPotential potential(model, bare, form, workspace.potential);
   workspace.external.setZero();
   potential.begin(state.q, workspace.external);
   workspace.d.setZero();
   potential.evaluate_elements(workspace.d, FullPotential::Tangents::kNone, false);
   state.elastic_energy = potential.elastic_energy();
   const double kinetic = potential.undamped() - potential.elastic_energy();
-  return {kinetic, state.elastic_energy, -(space.gravity_load() * scene.gravity).dot(state.q)};
+  return {kinetic, state.elastic_energy, -(model.space.gravity_load() * scene.gravity).dot(state.q)};
 }
 
 }  // namespace exmat::runtime

@@ -2,11 +2,13 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "runtime/sim/solver/newton.h"
+#include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/space/full/full_potential.h"
-#include "runtime/sim/space/full/full_space.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/state.h"
 #include "runtime/sim/step/step_report.h"
@@ -22,18 +24,24 @@ struct FullAccuracy {
   /// by more than this share of an edge; 0: never. Saves a third of a step of few iterations.
   double unchecked_move = 0;
 };
-/// A step of 4 ms within 0.5 % of the displacement.
-inline constexpr FullAccuracy kRealTime{0.1, 4, 0.03};
-inline constexpr NewtonSettings kRealTimeNewton{20, 0.01};
+/// A step of 4 ms within 0.5 % of the displacement, with SpaceSettings::newton.
+inline constexpr FullAccuracy kRealTime{0.1, 40, 0.03};
 
-/// Why steps of this space cannot have this scene; null where they can. Steps look at nothing else of the scene than
-/// time step, integrator, damping, limits of Newton's method, gravity, forces, and one example force.
-const char* unsupported(const FullSpace& space, const StepScene& scene) noexcept;
+/// That, unless the scene asks for a smaller residual than it leaves.
+inline FullAccuracy accuracy_of(const StepScene& scene) noexcept {
+  return scene.space.newton.tolerance < SpaceSettings{}.newton.tolerance ? FullAccuracy{} : kRealTime;
+}
+
+/// Why steps in full space cannot have this scene; null where they can.
+const char* unsupported(const FullModel& model, const StepScene& scene) noexcept;
 
 /// Scratch of the steps of one body, of a scene's time step, damping and example force: factors for these, and the
 /// target of the next step.
 struct FullWorkspace {
-  FullWorkspace(const FullSpace& space, const StepScene& scene, const FullAccuracy& accuracy = {});
+  FullWorkspace(const FullModel& model, const StepScene& scene, const FullAccuracy& accuracy = {});
+
+  /// Makes factors again where they do not serve the scene.
+  void fit(const FullModel& model, const StepScene& scene);
 
   /// What a step form makes constant.
   struct Linear {
@@ -41,40 +49,71 @@ struct FullWorkspace {
     std::vector<float> matrix;  ///< M (c_a + alpha c_v) + (1 + beta c_v) V, see Kernels::mesh_product()
     float filter_stiffness = 0;
   };
+  /// Numbers of a scene that factors are made of.
+  using Key = std::array<double, 6>;
+
   FullAccuracy accuracy;
   Linear first, second;  ///< of backward Euler, of BDF2
+  Key key{};
   StepForm form;
   FullPotentialWorkspace potential;
-  Eigen::VectorXd external;                                          ///< f
+  Eigen::VectorXd external, moved, rate, acceleration;               ///< f
   Eigen::VectorXd d, gradient, direction, trial, trial_gradient;     ///< fields
   AlignedFloats residual, solved, search, image, sum, coefficients;  ///< of conjugate gradients
+  AlignedFloats scaled;                                              ///< residual that the preconditioner takes
+  FullContactScratch contact;
+  Eigen::VectorXd field;  ///< a field
+  TargetTable::Workspace table;
+  Eigen::VectorXd coefficients_there, target;  ///< 3m, of an example force
 };
+
+/// How far the mean of vertices of the mesh moves in a step by a force of 1 N that these shares of it act with on them,
+/// by the preconditioner [m/N]. Vertices and shares [k] each.
+double compliance(const FullModel& model, std::span<const std::int32_t> vertices, std::span<const double> shares,
+                  FullWorkspace& workspace) noexcept;
 
 struct FullReport : StepReport {
   int cg_iterations = 0;
 };
 
+/// What a step in full space reads and changes beside its motion; null where there is none.
+struct FullContactMemory {
+  ContactState* held = nullptr;
+  ContactWorkspace* found = nullptr;  ///< scratch, which then holds the contacts of the step
+};
+
 /// One step of a body in full space from its beginning to its end: begin(), set_target() where there is an example
-/// force, solve(), finish(). M u'' + D u' + f_int(u) = f_ext + f_example by the integrators of runtime::step(), damping
-/// frozen at the first iterate. Newton's method with the tangents of the first iterate for as long as they serve, in
-/// single precision, its directions by conjugate gradients preconditioned by one constant sparse factor. No call
-/// allocates.
+/// force, solve(), finish(). M u'' + D u' + f_int(u) = f_ext + f_example + f_contact by the integrators of
+/// runtime::step(), damping frozen at the first iterate. Newton's method with the tangents of the first iterate for as
+/// long as they serve, in single precision, its directions by conjugate gradients preconditioned by one constant sparse
+/// factor. A free body moves in the world; after each step its velocities get the rigid motion that its momenta lack of
+/// those that forces have made. No call allocates.
 class FullStep {
  public:
-  FullStep(const FullSpace& space, const StepScene& scene, State& state, FullWorkspace& workspace) noexcept;
+  FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+           const FullContactMemory& contacts = {}) noexcept;
 
-  /// The first iterate: the predictor q_n + dt v_n or q_n, whichever has the lower potential; where ends of directions
-  /// are taken unchecked, the predictor unless it moves a vertex by half an edge or the step has no smooth past.
+  /// Obstacles near, and the first iterate: the predictor q_n + dt v_n or q_n, whichever has the lower potential; where
+  /// ends of directions are taken unchecked, the predictor unless it moves a vertex by half an edge or the step has no
+  /// smooth past.
   void begin() noexcept;
 
   /// Displacement [f] at the first iterate, of which weights and target are made.
   void first_iterate(Eigen::VectorXd& u) const noexcept;
-  /// c* = W^T u* [m x 3].
+  /// W^T u [3m] there, of a free body that of its deformation.
+  void first_coefficients(Eigen::VectorXd& coefficients) noexcept;
+  /// c*(k, a), of a free body that of its deformation.
   template <typename Coefficients>
   void set_target(const Coefficients& target) noexcept {
-    for (int a = 0; a < 3; ++a)
-      for (Eigen::Index k = 0; k < target.rows(); ++k)
-        workspace_.potential.target[a * space_.filter().stride + k] = target(k, a);
+    const Eigen::Matrix3d& turn = workspace_.potential.rigid.rotation;
+    for (Eigen::Index k = 0; k < space_.functions(); ++k) {
+      Eigen::Vector3d own(target(k, 0), target(k, 1), target(k, 2));
+      if (model_.rigid) {
+        const Eigen::Vector3d rest = model_.examples->rest.row(k);
+        own = turn * (rest + own) - rest;
+      }
+      for (int a = 0; a < 3; ++a) workspace_.potential.target[a * space_.filter().stride + k] = own[a];
+    }
   }
 
   void solve() noexcept;
@@ -83,40 +122,60 @@ class FullStep {
   /// energies().
   const FullReport& finish() noexcept;
 
+  bool is_near() const noexcept { return near_; }
+
  private:
   enum class Outcome { kFound, kIndefinite };
+  static constexpr double kStiffStep = 10;  ///< edges that waves go
 
+  bool find_contacts() noexcept;
   void gather_external_force() noexcept;
   void choose_first_iterate() noexcept;
   NewtonStatus minimise() noexcept;
+  NewtonStatus minimise_with_friction() noexcept;
+  void precondition() noexcept;
+  void multiply() noexcept;
   Outcome find_direction(double tolerance) noexcept;
   void project() noexcept;
-  bool is_checked() const noexcept { return workspace_.accuracy.unchecked_move == 0; }
+  /// Near obstacles, where the caller asks for it, and where waves go so far in a step that the predictor leads away
+  /// from the solution: what an unchecked direction leaves then would grow.
+  bool is_checked() const noexcept {
+    return near_ || workspace_.accuracy.unchecked_move == 0 || space_.wave_rate() * scene_.time_step > kStiffStep;
+  }
+  double direction_tolerance() const noexcept;
   bool is_short() const noexcept;
+  double largest_move(const Eigen::VectorXd& field) const noexcept;
   bool move() noexcept;
+  void add_external_impulse() noexcept;
+  void correct_momenta() noexcept;
+  void limit_energy(double allowed) noexcept;
 
+  const FullModel& model_;
   const FullSpace& space_;
   const StepScene& scene_;
-  State& state_;
+  Motion& state_;
   FullWorkspace& workspace_;
+  FullContactMemory contacts_;
   const FullWorkspace::Linear* linear_ = nullptr;
   FullPotential potential_;
   FullReport report_;
   PotentialEvaluation here_;
   NewtonStatus status_ = NewtonStatus::kConverged;
-  bool anew_ = false, predicted_ = false, at_first_iterate_ = true;
+  FrameMomenta expected_momenta_;  ///< that external forces make of those of the start
+  bool anew_ = false, near_ = false, predicted_ = false, at_first_iterate_ = true;
   bool tangents_are_current_ = true, projected_ = false;
   double unchecked_from_ = 0;  ///< residual before a step that no line search checked; 0: a line search did
 };
 
 /// begin(), solve(), finish() of a body without example force.
-FullReport step(const FullSpace& space, const StepScene& scene, State& state, FullWorkspace& workspace) noexcept;
+FullReport step(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+                const FullContactMemory& contacts = {}) noexcept;
 
 /// At rest, or with displacement and velocity [f], at time 0.
-State make_state(const FullSpace& space, FullWorkspace& workspace);
-State make_state(const FullSpace& space, const Eigen::VectorXd& u, const Eigen::VectorXd& v, FullWorkspace& workspace);
+State make_state(const FullModel& model, FullWorkspace& workspace);
+State make_state(const FullModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& v, FullWorkspace& workspace);
 
 /// As runtime::energies(); sets the state's elastic energy.
-Energies energies(const FullSpace& space, const StepScene& scene, State& state, FullWorkspace& workspace) noexcept;
+Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept;
 
 }  // namespace exmat::runtime

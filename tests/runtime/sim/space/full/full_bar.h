@@ -23,8 +23,11 @@ struct FullBar {
   TetMesh mesh;
   TetMaterials materials;
   FlagVector fixed;
-  FullSpace space;
+  FullModel model;
+  const FullSpace& space = model.space;
 
+  FullBar(const FullBar&) = delete;
+  FullBar& operator=(const FullBar&) = delete;
   explicit FullBar(const FullBarOptions& options = {}) : mesh(test::box_mesh(options.cells, {1, 0.25, 0.25})) {
     const Eigen::Index tets = mesh.tet_count();
     materials.density = Eigen::VectorXd::Constant(tets, 1000);
@@ -43,7 +46,7 @@ struct FullBar {
     for (Eigen::Index v = 0; !options.free && v < mesh.vertex_count(); ++v) fixed[v] = mesh.vertices(v, 0) < 1e-9;
     RowMatrix filter;
     if (options.functions > 0) filter = 0.3 * test::random_matrix(mesh.vertex_count(), options.functions, 5);
-    space = FullSpace(mesh, materials, fixed, filter);
+    model = FullModel(FullSpace(mesh, materials, fixed, filter));
   }
 
   /// [f] the same force [N] on each vertex of the end.
@@ -67,7 +70,7 @@ inline constexpr Formulation kFormulations[] = {Formulation::kLinear, Formulatio
 inline StepScene full_scene(double time_step, double tolerance = 1e-9) {
   StepScene scene;
   scene.time_step = time_step;
-  scene.newton = {50, tolerance};
+  scene.space.newton = {50, tolerance};
   return scene;
 }
 

@@ -23,7 +23,7 @@ struct Potential {
   Eigen::VectorXd d, direction;  ///< fields
 
   Potential(const FullBarOptions& options, double size)
-      : bar(options), workspace(bar.space), potential(bar.space, scene, form, workspace) {
+      : bar(options), workspace(bar.model), potential(bar.model, scene, form, workspace) {
     const Eigen::Index f = bar.space.size();
     form = {300, 9e4, 0.9 * size * test::random_vector(f, 1), 0.8 * size * test::random_vector(f, 2)};
     scene.mass_damping = 0.5;

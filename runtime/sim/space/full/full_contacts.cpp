@@ -1,0 +1,109 @@
+#include "runtime/sim/space/full/full_contacts.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <span>
+
+namespace exmat::runtime {
+
+FullContacts::FullContacts(const ContactSet& set, const FullSpace& space, const Eigen::Vector3d& origin)
+    : rest_(set.rest().rowwise() + origin.transpose()), areas_(set.vertices()) {
+  for (int v = 0; v < set.vertices(); ++v) {
+    areas_[v] = set.area(v);
+    places_.push_back(space.place(set.object_vertex(v)));
+  }
+}
+
+bool FullContacts::begin(const Obstacles& obstacles, double end_time, double time_step, const Eigen::Vector3d& gravity,
+                         const double* u, const double* v, const ContactState& held,
+                         ContactWorkspace& contact) const noexcept {
+  contact.candidate_count = contact.loaded_count = 0;
+  contact.are_all_planes = false;
+  contact.set_zero(contact.generalised.size());
+  contact.obstacles.resize(obstacles.size());  // within what it was sized for
+  double square = 0;
+  for (int vertex = 0; vertex < std::ssize(places_); ++vertex) square = std::max(square, at(vertex, v).squaredNorm());
+  const double way = time_step * std::sqrt(square);
+  const double margin = kContactMarginSteps * way + time_step * time_step * gravity.norm() + held.longest_way_out();
+  for (std::size_t i = 0; i < obstacles.size(); ++i) {
+    PlacedObstacle& placed = contact.obstacles[i] = PlacedObstacle(*obstacles[i], end_time, time_step);
+    if (!placed.obstacle->motion.moves()) continue;
+    const double limit = kSweep * shortest_passage(placed.obstacle->shape);
+    for (int vertex = 0; vertex < std::ssize(places_) && !placed.sweeps; ++vertex)
+      placed.sweeps = placed.sweep(point(vertex, u), 0) > limit;
+  }
+  std::size_t next = 0;
+  for (int vertex = 0; vertex < std::ssize(places_); ++vertex) {
+    const Eigen::Vector3d here = point(vertex, u);
+    for (std::size_t i = 0; i < obstacles.size(); ++i) {
+      if (!contact.obstacles[i].may_meet(here, 0, margin)) continue;
+      ContactCandidate& candidate = contact.candidates[contact.candidate_count++];
+      candidate.vertex = vertex;
+      candidate.obstacle = static_cast<int>(i);
+      const Eigen::Vector3d ahead = time_step * at(vertex, v);
+      const Eigen::Vector3d predicted = here + ahead;
+      freeze_contact(contact.obstacles[i], find_held(held, next, candidate),
+                     {here, predicted, predicted + ahead + time_step * time_step * gravity}, areas_[vertex], time_step,
+                     candidate);
+    }
+  }
+  return contact.candidate_count > 0;
+}
+
+double FullContacts::evaluate(const double* u, ContactWorkspace& contact, double* gradient) const noexcept {
+  contact.set_zero(contact.generalised.size());
+  double square = 0;
+  contact.loaded_count = 0;
+  for (std::size_t i = 0; i < contact.candidate_count; ++i) {
+    ContactCandidate& candidate = contact.candidates[i];
+    const Eigen::Vector3d here = point(candidate.vertex, u);
+    candidate.arm = here;
+    const double potential =
+        evaluate_contact(contact.obstacles[static_cast<std::size_t>(candidate.obstacle)], here, candidate);
+    if (candidate.normal_force > 0) {
+      ++contact.touching;
+      contact.stiffness += candidate.normal_stiffness();
+    }
+    if (!candidate.is_loaded()) continue;
+    contact.loaded[contact.loaded_count++] = i;
+    contact.potential += potential;
+    contact.force += candidate.force;
+    contact.torque += here.cross(candidate.force);
+    square += candidate.force.squaredNorm();
+    Eigen::Map<Eigen::Vector3d>(gradient + 4 * places_[static_cast<std::size_t>(candidate.vertex)]) -= candidate.force;
+  }
+  return std::sqrt(square);
+}
+
+void FullContacts::set_blocks(const ContactWorkspace& contact, const Eigen::VectorXd& inverse_diagonal,
+                              FullContactScratch& scratch) const noexcept {
+  scratch.block_count = 0;
+  for (const std::size_t number : std::span(contact.loaded).first(contact.loaded_count)) {
+    const ContactCandidate& candidate = contact.candidates[number];
+    const StiffnessFactors factors(candidate);
+    const Eigen::Matrix3f stiffness = (factors.used().lazyProduct(factors.used().transpose())).cast<float>();
+    const Eigen::Index place = places_[static_cast<std::size_t>(candidate.vertex)];
+    // Candidates come in the order of their vertices.
+    if (scratch.block_count > 0 && scratch.blocks[scratch.block_count - 1].place == place)
+      scratch.blocks[scratch.block_count - 1].stiffness += stiffness;
+    else
+      scratch.blocks[scratch.block_count++] = {place, stiffness, {}};
+  }
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  for (auto& block : std::span(scratch.blocks).first(scratch.block_count)) {
+    solver.computeDirect(block.stiffness);
+    const Eigen::Array3f shares =
+        1 + static_cast<float>(inverse_diagonal[block.place]) * solver.eigenvalues().array().max(0);
+    block.scale = solver.eigenvectors() * shares.rsqrt().matrix().asDiagonal() * solver.eigenvectors().transpose();
+  }
+}
+
+void FullContacts::commit(const double* u, const ContactWorkspace& contact, ContactState& held) const noexcept {
+  held.count = 0;
+  for (const ContactCandidate& candidate : std::span(contact.candidates).first(contact.candidate_count))
+    hold_contact(contact.obstacles[static_cast<std::size_t>(candidate.obstacle)], point(candidate.vertex, u), candidate,
+                 held);
+}
+
+}  // namespace exmat::runtime

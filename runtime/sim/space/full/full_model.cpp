@@ -1,0 +1,62 @@
+#include "runtime/sim/space/full/full_model.h"
+
+#include <utility>
+
+namespace exmat::runtime {
+namespace {
+
+FullExamples full_examples(const FullSpaceData& data, const ReducedModel& reduced, const ExampleModel& examples,
+                           const FullModel& full) {
+  FullExamples made;
+  made.weights = ExampleWeights(reduced.examples->gram, reduced.examples->h0, data.slopes);
+  if (examples.table) {
+    TargetTableData table = *reduced.targets;
+    table.control_points = data.control_points;
+    made.table.emplace(table);
+  } else {
+    made.from_target = data.from_target.transpose() * examples.target->basis();
+  }
+  if (!full.rigid) return made;
+  const MeshFilter<double> filter = full.space.filter();
+  const Eigen::Map<const RowMatrix> W(filter.functions, filter.vertices, filter.stride);
+  made.rest = W.leftCols(full.space.functions()).transpose() * full.rigid->rest().topRows<3>().transpose();
+  return made;
+}
+
+}  // namespace
+
+FullModelResult build_full_model(const ReducedModel& reduced, const Model& model) {
+  if (model.region_count() > 0)
+    return {nullptr, {"", "/regions", "no local example forces of a body in full space", "some", "take space reduced"}};
+  const bool forced = model.has_whole_body_examples();
+  if (forced && !reduced.full_space)
+    return {nullptr,
+            {"", "/full_space", "this group, since the scene asks for steps in full space", "none",
+             "precompute the bundle again with this scene (--scene)"}};
+  const ObjectData& object = *reduced.object;
+  auto full = std::make_unique<FullModel>(
+      FullSpace(object.mesh, object.materials, object.fixed, forced ? reduced.full_space->filter : RowMatrix()));
+  if (!full->space.is_clamped()) full->rigid.emplace(full->space, object.mesh.vertices);
+  if (model.contact) full->contacts.emplace(*model.contact, full->space, model.frame->origin());
+  if (forced) full->examples = full_examples(*reduced.full_space, reduced, model.examples.front(), *full);
+  full->basis.resize(full->space.size(), model.modes());
+  for (Eigen::Index v = 0; v < object.mesh.vertex_count(); ++v)
+    if (const std::int32_t number = full->space.number(v); number >= 0)
+      full->basis.middleRows<3>(3 * number) = reduced.modal->basis.middleRows<3>(3 * v);
+  // As three scalar problems; fields and displacements order vertices differently.
+  const FullSpace::Scalar mass = full->space.mass();
+  full->projection.resize(full->basis.rows(), full->basis.cols());
+  Eigen::MatrixXd mode(full->space.vertices(), 3);
+  for (Eigen::Index i = 0; i < model.modes(); ++i) {
+    const Eigen::VectorXd field = full->space.to_field(full->basis.col(i));
+    for (int a = 0; a < 3; ++a) mode.col(a) = field(Eigen::seqN(a, mode.rows(), 4));
+    const Eigen::MatrixXd moved = mass * mode;
+    Eigen::VectorXd momentum = Eigen::VectorXd::Zero(field.size()), column(full->space.size());
+    for (int a = 0; a < 3; ++a) momentum(Eigen::seqN(a, mode.rows(), 4)) = moved.col(a);
+    full->space.from_field(momentum, column);
+    full->projection.col(i) = column;
+  }
+  return {std::move(full), {}};
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <optional>
+
+#include "common/model/reduced_model.h"
+#include "runtime/sim/examples/example_weights.h"
+#include "runtime/sim/examples/target_table.h"
+#include "runtime/sim/space/full/full_contacts.h"
+#include "runtime/sim/space/full/full_space.h"
+#include "runtime/sim/space/full/rigid_part.h"
+#include "runtime/sim/step/model.h"
+
+namespace exmat::runtime {
+
+/// What the whole body's examples are in full space: weights and targets in the coefficients c = W^T u [3m], row 3i +
+/// axis.
+struct FullExamples {
+  ExampleWeights weights;
+  std::optional<TargetTable> table;  ///< of c*; else `from_target`
+  Eigen::MatrixXd from_target;       ///< 3m x d: c* of the coordinates that the model's TargetSolver has
+  Eigen::MatrixX3d rest;             ///< m x 3, W^T X of a free body, X about its centre of mass
+};
+
+/// A body prepared for steps in all its vertices: immutable, shared by any number of States. f unknowns, r modes.
+struct FullModel {
+  FullModel() = default;
+  /// For steps of the body alone.
+  explicit FullModel(FullSpace of) : space(std::move(of)) {}
+
+  FullSpace space;
+  std::optional<RigidPart> rigid;        ///< of a free body
+  std::optional<FullContacts> contacts;  ///< where the model has contact
+  std::optional<FullExamples> examples;
+  RowMatrix basis;       ///< f x r, U of the vertices that move
+  RowMatrix projection;  ///< f x r, M U
+};
+
+/// The model, or why there is none, from /object, /modal and, with examples, /full_space; `model` is that of the same
+/// bundle.
+struct FullModelResult {
+  std::unique_ptr<const FullModel> model;
+  Complaint complaint;  ///< without a file
+};
+FullModelResult build_full_model(const ReducedModel& reduced, const Model& model);
+
+}  // namespace exmat::runtime

@@ -1,0 +1,103 @@
+#include "runtime/sim/space/full/rigid_part.h"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <Eigen/SVD>
+
+namespace exmat::runtime {
+namespace {
+
+/// sum of a_i x b_i.
+Eigen::Vector3d sum_of_crosses(const Eigen::Ref<const Eigen::Matrix4Xd>& a,
+                               const Eigen::Ref<const Eigen::Matrix4Xd>& b) noexcept {
+  Eigen::Matrix4d products;
+  products.noalias() = a.lazyProduct(b.transpose());
+  return {products(1, 2) - products(2, 1), products(2, 0) - products(0, 2), products(0, 1) - products(1, 0)};
+}
+
+Eigen::Matrix3d sum_of_products(const Eigen::Matrix4Xd& a, const Eigen::Matrix4Xd& b) noexcept {
+  Eigen::Matrix4d products;
+  products.noalias() = a.lazyProduct(b.transpose());
+  return products.topLeftCorner<3, 3>();
+}
+
+Eigen::Matrix3d rotation_nearest_to(const Eigen::Matrix3d& matrix) noexcept {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d U = svd.matrixU();
+  if ((U * svd.matrixV().transpose()).determinant() < 0) U.col(2) *= -1;
+  return U * svd.matrixV().transpose();
+}
+
+}  // namespace
+
+RigidWorkspace::RigidWorkspace(const FullSpace& space)
+    : arms(Eigen::Matrix4Xd::Zero(4, space.vertices())), weighted(arms) {}
+
+RigidPart::RigidPart(const FullSpace& space, const VertexArray& rest)
+    : mass_matrix_(space.mass()), masses_(mass_matrix_ * Eigen::VectorXd::Ones(space.vertices())) {
+  mass_ = masses_.sum();
+  rest_.setZero(4, space.vertices());
+  for (Eigen::Index v = 0; v < rest.rows(); ++v) rest_.col(space.place(v)).head<3>() = rest.row(v);
+  centre_ = rest_.topRows<3>() * masses_ / mass_;
+  rest_.topRows<3>().colwise() -= centre_;
+  weighted_rest_ = rest_ * mass_matrix_;
+}
+
+void RigidPart::place(const double* u, RigidWorkspace& workspace) const noexcept {
+  const Field moved = as_columns(u);
+  const Eigen::Vector4d mean = moved.lazyProduct(masses_) / mass_;
+  workspace.centre = centre_ + mean.head<3>();
+  workspace.arms = (rest_ + moved).colwise() - mean;
+  workspace.weighted.setZero();
+  for (Eigen::Index i = 0; i < mass_matrix_.outerSize(); ++i)
+    for (FullSpace::Scalar::InnerIterator entry(mass_matrix_, i); entry; ++entry)
+      workspace.weighted.col(i) += entry.value() * workspace.arms.col(entry.col());
+  workspace.rotation = rotation_nearest_to(sum_of_products(workspace.arms, weighted_rest_));
+  const Eigen::Matrix3d second = sum_of_products(workspace.arms, workspace.weighted);
+  workspace.inertia = second.trace() * Eigen::Matrix3d::Identity() - second;
+}
+
+FrameMomenta RigidPart::momenta(const double* v, const RigidWorkspace& workspace) const noexcept {
+  const Eigen::Vector4d linear = as_columns(v).lazyProduct(masses_);
+  return {linear.head<3>(), sum_of_crosses(workspace.weighted, as_columns(v))};
+}
+
+FrameMomenta RigidPart::sums(const double* forces, const RigidWorkspace& workspace) const noexcept {
+  const Field columns = as_columns(forces);
+  const Eigen::Vector4d sum = columns.rowwise().sum();
+  return {sum.head<3>(), sum_of_crosses(workspace.arms, columns)};
+}
+
+FrameVelocity RigidPart::motion(const FrameMomenta& momenta, const RigidWorkspace& workspace) const noexcept {
+  return {momenta.linear / mass_, workspace.inertia.inverse() * momenta.angular};
+}
+
+void RigidPart::add_motion(const FrameVelocity& motion, const RigidWorkspace& workspace, double* v) noexcept {
+  Eigen::Matrix4d turn = Eigen::Matrix4d::Zero();
+  const Eigen::Vector3d& w = motion.angular;
+  turn.topLeftCorner<3, 3>() << 0, -w[2], w[1], w[2], 0, -w[0], -w[1], w[0], 0;
+  const Eigen::Vector4d straight(motion.linear[0], motion.linear[1], motion.linear[2], 0);
+  Eigen::Map<Eigen::Matrix4Xd>(v, 4, workspace.arms.cols()) += (turn.lazyProduct(workspace.arms)).colwise() + straight;
+}
+
+void RigidPart::remove_motion(const RigidWorkspace& workspace, double* v) const noexcept {
+  const FrameVelocity own = motion(momenta(v, workspace), workspace);
+  add_motion({-own.linear, -own.angular}, workspace, v);
+}
+
+// A w = sum m X x R^T v with A = sum m ((X . y) I - y X^T), y = R^T (x - c): the condition on the frame,
+// differentiated.
+Eigen::Vector3d RigidPart::spin(const double* v, const RigidWorkspace& workspace) const noexcept {
+  const Eigen::Matrix3d to_frame = workspace.rotation.transpose();
+  Eigen::Matrix4d velocities, places;
+  velocities.noalias() = as_columns(v).lazyProduct(weighted_rest_.transpose());
+  places.noalias() = workspace.arms.lazyProduct(weighted_rest_.transpose());
+  const Eigen::Matrix3d moving = to_frame * velocities.topLeftCorner<3, 3>();
+  const Eigen::Matrix3d standing = to_frame * places.topLeftCorner<3, 3>();
+  const Eigen::Matrix3d A = standing.trace() * Eigen::Matrix3d::Identity() - standing;
+  // moving(b, a) = sum m X_a v_b.
+  const Eigen::Vector3d turn(moving(2, 1) - moving(1, 2), moving(0, 2) - moving(2, 0), moving(1, 0) - moving(0, 1));
+  return workspace.rotation * (A.inverse() * turn);
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "runtime/sim/frame/placement.h"
+#include "runtime/sim/space/full/full_space.h"
+
+namespace exmat::runtime {
+
+/// Scratch of a RigidPart, sized once; what the last place() found. Fields are [4 x n].
+struct RigidWorkspace {
+  RigidWorkspace() = default;
+  explicit RigidWorkspace(const FullSpace& space);
+
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< of mass, world [m]
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< that fits the rest shape best in the mass
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();       ///< about the centre [kg m^2]
+  Eigen::Matrix4Xd arms;                                   ///< from the centre [m]
+  Eigen::Matrix4Xd weighted;                               ///< M times these [kg m]
+};
+
+/// Rigid motions of a free body in full space: where it stands, its momenta, and what of a velocity they are. The frame
+/// is that of a free reduced body: at the centre of mass, with sum m X x (R^T (x - c) - X) = 0. Immutable; fields are
+/// those of FullSpace. No call but the constructor allocates.
+class RigidPart {
+ public:
+  RigidPart(const FullSpace& space, const VertexArray& rest);
+
+  double mass() const { return mass_; }
+  const Eigen::Vector3d& centre_at_rest() const { return centre_; }
+  const Eigen::Matrix4Xd& rest() const { return rest_; }  ///< X, about the centre [m]
+
+  /// Where the body displaced by `u` stands.
+  void place(const double* u, RigidWorkspace& workspace) const noexcept;
+
+  /// Momenta of the velocities `v` where place() was called, and the rigid motion that has such momenta.
+  FrameMomenta momenta(const double* v, const RigidWorkspace& workspace) const noexcept;
+  /// Sum and torque about the centre of forces there.
+  FrameMomenta sums(const double* forces, const RigidWorkspace& workspace) const noexcept;
+  FrameVelocity motion(const FrameMomenta& momenta, const RigidWorkspace& workspace) const noexcept;
+  /// Adds a rigid motion to `v`; takes off the one that has its momenta.
+  static void add_motion(const FrameVelocity& motion, const RigidWorkspace& workspace, double* v) noexcept;
+  void remove_motion(const RigidWorkspace& workspace, double* v) const noexcept;
+  /// How fast the fitted frame turns while the vertices move by `v`, world [rad/s].
+  Eigen::Vector3d spin(const double* v, const RigidWorkspace& workspace) const noexcept;
+
+ private:
+  using Field = Eigen::Map<const Eigen::Matrix4Xd>;
+  Field as_columns(const double* field) const { return {field, 4, masses_.size()}; }
+
+  FullSpace::Scalar mass_matrix_;
+  Eigen::VectorXd masses_;  // n, its row sums
+  double mass_ = 0;
+  Eigen::Vector3d centre_;
+  Eigen::Matrix4Xd rest_, weighted_rest_;  // X and M X
+};
+
+}  // namespace exmat::runtime
