@@ -23,6 +23,23 @@ void put_to_start(exmat_body& body) noexcept {
 
 namespace {
 
+/// World [m], of a body in full space.
+Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const exmat_body& body) noexcept {
+  Eigen::Vector3d position = points.rest.row(i);
+  for (Eigen::Index c = 0; c < points.corners.cols(); ++c)
+    position += points.shares(i, c) * body.full()->space.displacement(points.corners(i, c), body.state.full->q);
+  return position;
+}
+
+/// [f] of world forces [3k] on the points.
+void add_vertex_forces(const PointSet& points, const double* forces, const FullSpace& space,
+                       Eigen::VectorXd& sum) noexcept {
+  for (Eigen::Index i = 0; i < points.corners.rows(); ++i)
+    for (Eigen::Index c = 0; c < points.corners.cols(); ++c)
+      if (const std::int32_t number = space.number(points.corners(i, c)); number >= 0)
+        sum.segment<3>(3 * number) += points.shares(i, c) * Eigen::Map<const Eigen::Vector3d>(forces + 3 * i);
+}
+
 void put_to_rest(exmat_body& body) noexcept {
   const double time = body.state.time;
   put_to_start(body);
@@ -122,7 +139,9 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
   for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
     const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
     const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
-    const Eigen::Vector3d now = placement.to_world(points->set.rest.row(i / 3).transpose() + displacement);
+    const Eigen::Vector3d now = body->state.full
+                                    ? full_position(points->set, i / 3, *body)
+                                    : placement.to_world(points->set.rest.row(i / 3).transpose() + displacement);
     total += force;
     torque += (now - placement.position).cross(force);
     sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
@@ -131,6 +150,7 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
   if (!all_finite(forces, coordinates) || !sum.allFinite())
     return fail(EXMAT_INVALID_ARGUMENT, "%s: forces: expected finite numbers", __func__);
   body->state.applied_force += sum;
+  if (body->full() != nullptr) add_vertex_forces(points->set, forces, body->full()->space, body->state.vertex_force);
   frame.apply(total, torque, body->state.frame);
   if (!body->capacity) return EXMAT_OK;
   return guarded(__func__, [&] {
@@ -142,6 +162,7 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
 exmat_status exmat_body_clear_forces(exmat_body* body) noexcept {
   EXMAT_REQUIRE(body);
   body->state.applied_force.setZero();
+  body->state.vertex_force.setZero();
   body->model().frame->clear_forces(body->state.frame);
   body->load.setZero();
   return EXMAT_OK;
@@ -153,6 +174,24 @@ exmat_status exmat_body_restart_integrator(exmat_body* body) noexcept {
   return EXMAT_OK;
 }
 
+exmat_status exmat_body_read_point_compliance(const exmat_body* body, const exmat_points* points,
+                                              double* compliance) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  EXMAT_REQUIRE(compliance);
+  if (points->source != body->source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
+  *compliance = 0;
+  FullWorkspace* const scratch = body->world->world.full_scratch(place_of(*body));
+  if (!body->state.full || scratch == nullptr) return EXMAT_OK;
+  return guarded(__func__, [&] {
+    const PointSet& set = points->set;
+    const RowMatrix shares = set.shares / static_cast<double>(set.shares.rows());
+    *compliance = runtime::compliance(*body->full(), {set.corners.data(), static_cast<std::size_t>(set.corners.size())},
+                                      {shares.data(), static_cast<std::size_t>(shares.size())}, *scratch);
+  });
+}
+
 exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* points, float* xyz,
                                        std::int64_t coordinates) noexcept {
   EXMAT_REQUIRE(body);
@@ -161,6 +200,11 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
   if (points->source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, 3 * points->set.positions.points());
+  if (body->state.full) {
+    for (Eigen::Index i = 0; i < points->set.rest.rows(); ++i)
+      Eigen::Map<Eigen::Vector3f>(xyz + 3 * i) = full_position(points->set, i, *body).cast<float>();
+    return EXMAT_OK;
+  }
   points->set.positions.evaluate(body->state.q, body->drawing, xyz);
   if (!body->model().frame->moves()) return EXMAT_OK;
   const Placement placement = body->model().frame->placement(body->state.frame);
@@ -203,8 +247,11 @@ exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion)
                       wanted.angular_velocity.allFinite() && std::isfinite(length);
   if (!finite || !(length > 0))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
+  const RigidPlace before{body->model().frame->placement(body->state.frame),
+                          body->model().frame->velocity(body->state.frame)};
   if (!move_body(body->model(), body->scene, wanted, body->state, scratch_of(*body)))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the body has fixed vertices", __func__);
+  if (body->state.full) move_full(*body->full(), body->model(), before, body->state);
   was_put(*body);
   return EXMAT_OK;
 }
@@ -244,7 +291,7 @@ exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* re
   EXMAT_REQUIRE(body);
   if (result == nullptr) return null_argument(__func__, "energies");
   if (const exmat_status status = check_size(__func__, result->size, kEnergiesSizes)) return status;
-  const Energies now = energies(body->model(), body->scene, body->state);
+  const Energies now = energies(body->full(), body->model(), body->scene, body->state);
   give(exmat_energies{0, now.kinetic, now.elastic, now.potential, now.contact}, result->size, result);
   return EXMAT_OK;
 }

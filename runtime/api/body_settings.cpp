@@ -77,6 +77,25 @@ exmat_status exmat_body_set_integrator(exmat_body* body, std::int32_t integrator
   return EXMAT_OK;
 }
 
+exmat_status exmat_body_set_space(exmat_body* body, std::int32_t space) noexcept {
+  EXMAT_REQUIRE(body);
+  if (space < EXMAT_SPACE_REDUCED || space > EXMAT_SPACE_AUTO)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: space = %" PRId32 ": expected 0 to 2", __func__, space);
+  if (space != EXMAT_SPACE_REDUCED && !body->source->loaded.full)
+    return fail(
+        EXMAT_INVALID_ARGUMENT,
+        "%s: the model was created for steps in the modes alone: set settings.space, or the space of its scene, to "
+        "full or auto",
+        __func__);
+  body->scene.space.space = static_cast<Space>(space);
+  return EXMAT_OK;
+}
+
+std::int32_t exmat_body_space(const exmat_body* body) noexcept {
+  if (body == nullptr) return -1;
+  return body->state.full ? EXMAT_SPACE_FULL : EXMAT_SPACE_REDUCED;
+}
+
 exmat_status exmat_body_set_example_stiffness(exmat_body* body, std::int64_t region, double kappa) noexcept {
   EXMAT_REQUIRE(body);
   if (!is_factor(kappa))

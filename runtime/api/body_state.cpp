@@ -13,12 +13,15 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kLayout = 3;
-constexpr std::size_t kHeadNumbers = 5, kSleepNumbers = 3, kContactNumbers = 10;
+constexpr double kLayout = 4;
+constexpr std::size_t kHeadNumbers = 6, kSleepNumbers = 3, kContactNumbers = 10;
 constexpr double kMostSteps = 9007199254740992;  // 2^53: whole numbers up to here have all their digits
 
 constexpr Eigen::VectorXd State::*kModeArrays[] = {&State::q,          &State::v, &State::q_previous,
                                                    &State::v_previous, &State::a, &State::applied_force};
+
+constexpr Eigen::VectorXd FullMotion::*kVertexArrays[] = {&FullMotion::q, &FullMotion::v, &FullMotion::q_previous,
+                                                          &FullMotion::v_previous};
 
 class Writer {
  public:
@@ -34,8 +37,11 @@ bool may_sleep(const exmat_body& body) { return body.scene.sleep.energy > 0; }
 
 std::size_t contact_count(const exmat_body& body) { return body.state.contacts.count; }
 
-std::size_t size_without_contacts(const exmat_body& body) {
-  std::size_t size = kHeadNumbers + 1 + std::size(kModeArrays) * static_cast<std::size_t>(body.modes());
+std::size_t size_without_contacts(const exmat_body& body, bool in_full_space) {
+  const auto unknowns = static_cast<std::size_t>(body.state.vertex_force.size());
+  std::size_t size = unknowns;  // of the caller's forces
+  if (in_full_space) size += 1 + std::size(kVertexArrays) * unknowns;
+  size += kHeadNumbers + 1 + std::size(kModeArrays) * static_cast<std::size_t>(body.modes());
   size += body.frame_numbers;
   if (may_sleep(body)) size += kSleepNumbers;
   for (const ExampleState& examples : body.state.examples)
@@ -61,17 +67,23 @@ void read_contacts(StateNumbers& reader, std::size_t count, const exmat_body& bo
 }  // namespace
 
 std::size_t state_size(const exmat_body& body) {
-  return size_without_contacts(body) + kContactNumbers * contact_count(body);
+  return size_without_contacts(body, body.state.full.has_value()) + kContactNumbers * contact_count(body);
 }
 
 std::vector<double> write_state(const exmat_body& body) {
   const State& state = body.state;
   Writer writer;
-  for (const double number : {kLayout, body.scene.time_step, static_cast<double>(state.step),
-                              state.begins_anew ? 1.0 : 0.0, static_cast<double>(contact_count(body))})
+  for (const double number :
+       {kLayout, body.scene.time_step, static_cast<double>(state.step), state.begins_anew ? 1.0 : 0.0,
+        static_cast<double>(contact_count(body)), state.full ? 1.0 : 0.0})
     writer.add(number);
   writer.add(state.elastic_energy);
   for (const auto member : kModeArrays) writer.add_all(state.*member);
+  writer.add_all(state.vertex_force);
+  if (state.full) {
+    writer.add(state.full->alone);
+    for (const auto member : kVertexArrays) writer.add_all((*state.full).*member);
+  }
   writer.add_all(body.model().frame->numbers(state.frame));
   for (const ExampleState& examples : state.examples) {
     writer.add_all(examples.weights);
@@ -96,7 +108,8 @@ std::vector<double> write_state(const exmat_body& body) {
 }
 
 void take_state(std::span<const double> numbers, exmat_body& body) {
-  const std::size_t least = size_without_contacts(body);
+  const bool in_full_space = body.full() != nullptr && numbers.size() > kHeadNumbers && numbers[kHeadNumbers - 1] == 1;
+  const std::size_t least = size_without_contacts(body, in_full_space);
   if (numbers.size() < least || (numbers.size() - least) % kContactNumbers != 0)
     throw InvalidArgument(fmt::format("count = {}: expected {} and {} for each contact: is it of another model?",
                                       numbers.size(), least, kContactNumbers));
@@ -116,8 +129,19 @@ void take_state(std::span<const double> numbers, exmat_body& body) {
   if (contacts != (numbers.size() - least) / kContactNumbers)
     throw InvalidArgument(
         fmt::format("numbers: {} contacts: expected {}", contacts, (numbers.size() - least) / kContactNumbers));
+  if (reader.flag("full space") != in_full_space)
+    throw InvalidArgument("numbers: a body in full space: expected one of a model of space full or auto");
   state.elastic_energy = reader.number();
   for (const auto member : kModeArrays) reader.read(state.*member);
+  reader.read(state.vertex_force);
+  if (in_full_space) {
+    enter_full_space(*body.full(), body.model(), state);
+    state.full->alone = reader.number();
+    for (const auto member : kVertexArrays) reader.read((*state.full).*member);
+    state.full->elastic_energy = state.elastic_energy;
+  } else {
+    state.full.reset();
+  }
   body.model().frame->set_numbers(reader.take(body.frame_numbers), state.frame);
   for (ExampleState& examples : state.examples) {
     reader.read(examples.weights);

@@ -32,6 +32,11 @@ Eigen::VectorXd contact_load(const exmat_body& body) {
   return load;
 }
 
+/// A body that steps in all vertices feels all of a load.
+double lost_share(const LoadCapacity& capacity, const exmat_body& body, const Eigen::VectorXd& load) {
+  return body.state.full ? 0 : capacity.lost_share(load);
+}
+
 }  // namespace
 
 namespace exmat::runtime {
@@ -39,8 +44,8 @@ namespace exmat::runtime {
 void measure_lost_work(exmat_body& body) noexcept {
   if (!body.capacity) return;
   try {
-    body.report.lost_applied = body.capacity->lost_share(body.load);
-    body.report.lost_contact = body.capacity->lost_share(contact_load(body));
+    body.report.lost_applied = lost_share(*body.capacity, body, body.load);
+    body.report.lost_contact = lost_share(*body.capacity, body, contact_load(body));
   } catch (const std::exception&) {  // no memory for it: not measured
     body.report.lost_applied = body.report.lost_contact = -1;
   }
@@ -89,7 +94,7 @@ exmat_status exmat_capacity_read_lost(const exmat_capacity* capacity, const exma
   return guarded(__func__, [&] {
     const Placement placement = body->model().frame->placement(body->state.frame);
     const VertexArray own = Eigen::Map<const VertexArray>(forces, coordinates / 3, 3) * placement.rotation;
-    *lost = capacity->capacity->lost_share(capacity->capacity->spread_load(points->set.rest, own));
+    *lost = lost_share(*capacity->capacity, *body, capacity->capacity->spread_load(points->set.rest, own));
   });
 }
 
@@ -98,7 +103,7 @@ exmat_status exmat_capacity_read_contact_lost(const exmat_capacity* capacity, co
   EXMAT_REQUIRE(capacity);
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(lost);
-  return guarded(__func__, [&] { *lost = capacity->capacity->lost_share(contact_load(*body)); });
+  return guarded(__func__, [&] { *lost = lost_share(*capacity->capacity, *body, contact_load(*body)); });
 }
 
 exmat_status exmat_body_set_capacity(exmat_body* body, const exmat_capacity* capacity) noexcept {

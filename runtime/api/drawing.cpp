@@ -21,6 +21,9 @@ PointSet points_on_surface(const exmat_surface& surface, const std::int64_t* tri
   PointSet result;
   result.basis_rows.setZero(3 * shares.rows(), points.basis_rows.cols());
   result.rest.setZero(shares.rows(), 3);
+  const Eigen::Index each = points.corners.cols();
+  result.corners.resize(shares.rows(), 3 * each);
+  result.shares.resize(shares.rows(), 3 * each);
   for (Eigen::Index i = 0; i < shares.rows(); ++i) {
     if (triangles[i] < 0 || triangles[i] >= corners.rows())
       throw InvalidArgument(fmt::format("triangles[{}] = {}: expected 0 to {}", i, triangles[i], corners.rows() - 1));
@@ -29,6 +32,8 @@ PointSet points_on_surface(const exmat_surface& surface, const std::int64_t* tri
       result.basis_rows.middleRows<3>(3 * i) +=
           shares(i, c) * points.basis_rows.middleRows<3>(3 * static_cast<Eigen::Index>(corner));
       result.rest.row(i) += shares(i, c) * points.rest.row(corner);
+      result.corners.block(i, c * each, 1, each) = points.corners.row(corner);
+      result.shares.block(i, c * each, 1, each) = shares(i, c) * points.shares.row(corner);
     }
   }
   result.positions = VertexPositions(result.rest, result.basis_rows);
@@ -156,6 +161,6 @@ exmat_status exmat_body_read_energy_density(const exmat_body* body, exmat_surfac
   if (surface->points.source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the surface is that of another model", __func__);
   EXMAT_REQUIRE_LENGTH(count, surface->drawn.density.points());
-  surface->drawn.density.evaluate(body->state.q, density);
+  surface->drawn.density.evaluate(body->state, body->full(), density);
   return EXMAT_OK;
 }

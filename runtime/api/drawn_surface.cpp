@@ -119,6 +119,8 @@ DensityField::DensityField(const ObjectData& object, const RowMatrix& basis, con
     }
   for (const auto& of_point : shares) begins_.push_back(begins_.back() + static_cast<std::int32_t>(of_point.size()));
   RowMatrix rows(3 * std::ssize(corners), basis.cols());
+  vertices_.resize(corners.size());
+  for (const auto& [vertex, place] : corners) vertices_[static_cast<std::size_t>(place)] = vertex;
   for (const auto& [vertex, place] : corners)
     rows.middleRows<3>(3 * static_cast<Eigen::Index>(place)) =
         basis.middleRows<3>(3 * static_cast<Eigen::Index>(vertex));
@@ -127,8 +129,19 @@ DensityField::DensityField(const ObjectData& object, const RowMatrix& basis, con
   densities_.resize(tets_.size());
 }
 
-void DensityField::evaluate(const Eigen::VectorXd& q, float* density) noexcept {
-  displacements_.evaluate(q, workspace_, moved_.data());
+/// Of the corners: U q, or in the world from that of the first, which has the same energy.
+void DensityField::set_displacements(const State& state, const FullModel* full) noexcept {
+  if (!state.full) return displacements_.evaluate(state.q, workspace_, moved_.data());
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  for (std::size_t i = 0; i < vertices_.size(); ++i) {
+    const Eigen::Vector3d own = full->space.displacement(vertices_[i], state.full->q);
+    if (i == 0) first = own;
+    Eigen::Map<Eigen::Vector3f>(moved_.data() + 3 * i) = (own - first).cast<float>();
+  }
+}
+
+void DensityField::evaluate(const State& state, const FullModel* full, float* density) noexcept {
+  set_displacements(state, full);
   with_material(material_, [&](auto material) {
     for (std::size_t t = 0; t < tets_.size(); ++t) {
       Eigen::Matrix3d gradient = Eigen::Matrix3d::Zero();

@@ -22,10 +22,12 @@ class DensityField {
 
   Eigen::Index points() const { return static_cast<Eigen::Index>(begins_.size()) - 1; }
 
-  /// `density` [k] [J/m^3] at q [r]. Uses its own scratch: one call at a time.
-  void evaluate(const Eigen::VectorXd& q, float* density) noexcept;
+  /// `density` [k] [J/m^3] of a body in this state. Uses its own scratch: one call at a time.
+  void evaluate(const State& state, const FullModel* full, float* density) noexcept;
 
  private:
+  void set_displacements(const State& state, const FullModel* full) noexcept;
+
   struct Tet {
     std::array<std::int32_t, 4> corners{};  ///< of displacements_
     Eigen::Matrix<double, 4, 3> gradients;  ///< of the shape functions [1/m]
@@ -36,7 +38,8 @@ class DensityField {
   std::vector<Tet> tets_;
   std::vector<std::int32_t> begins_{0};                  ///< k + 1, in members_
   std::vector<std::pair<std::int32_t, float>> members_;  ///< tet and share
-  VertexPositions displacements_;                        ///< of the tets' corners: U q
+  std::vector<std::int32_t> vertices_;                   ///< of the object: the tets' corners
+  VertexPositions displacements_;                        ///< of these: U q
   VertexPositions::Workspace workspace_;
   std::vector<float> moved_, densities_;  ///< scratch
 };

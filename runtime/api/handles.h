@@ -60,6 +60,7 @@ struct exmat_body {
 
   const exmat::runtime::Model& model() const { return *source->loaded.model; }
   Eigen::Index modes() const { return state.q.size(); }
+  const exmat::runtime::FullModel* full() const { return source->loaded.full.get(); }
 
   std::shared_ptr<const exmat::runtime::Source> source;
   exmat::runtime::StepScene scene;         ///< the model's, and what was set for this body

@@ -57,6 +57,8 @@ PointSet embedded_points(const RowMatrix& basis, const VertexArray& rest, const 
       points.basis_rows.middleRows<3>(3 * i) += shares(i, c) * basis.middleRows<3>(3 * corners(i, c));
   points.positions = VertexPositions(rest, points.basis_rows);
   points.rest = rest;
+  points.corners = corners;
+  points.shares = shares;
   points.distances = Eigen::VectorXd::Zero(rest.rows());
   return points;
 }
@@ -100,6 +102,9 @@ PointSet read_vertices(const Source& source, std::span<const std::int64_t> ids) 
   points.basis_rows = rows_of(source, Ids(ids.begin(), ids.end()));
   points.positions = VertexPositions(rest, points.basis_rows);
   points.rest = rest;
+  points.corners = Eigen::Map<const Eigen::Matrix<std::int64_t, Eigen::Dynamic, 1>>(ids.data(), std::ssize(ids))
+                       .cast<IndexMatrix::Scalar>();
+  points.shares = RowMatrix::Ones(rest.rows(), 1);
   points.distances = Eigen::VectorXd::Zero(rest.rows());
   return points;
 }
@@ -109,6 +114,9 @@ PointSet read_all_vertices(const Source& source) {
   PointSet points;
   points.positions = VertexPositions(data.object->mesh.vertices, data.modal->basis);
   points.basis_rows.resize(0, data.modal->basis.cols());
+  points.rest = data.object->mesh.vertices;
+  points.corners = IndexVector::LinSpaced(points.rest.rows(), 0, static_cast<std::int32_t>(points.rest.rows() - 1));
+  points.shares = RowMatrix::Ones(points.rest.rows(), 1);
   points.distances = Eigen::VectorXd::Zero(data.object->mesh.vertex_count());
   return points;
 }
@@ -140,6 +148,8 @@ PointSet read_points_at(const Source& source, const VertexArray& rest) {
     }
   points.positions = VertexPositions(rest, points.basis_rows);
   points.rest = rest;
+  points.corners = corners.cast<IndexMatrix::Scalar>();
+  points.shares = shares;
   return points;
 }
 

@@ -23,7 +23,9 @@ ReducedModel read_rest(const Source& source, bool basis);
 struct PointSet {
   VertexPositions positions;
   RowMatrix basis_rows;       ///< 3k x r; 0 x r: for drawing alone
-  VertexArray rest;           ///< k x 3, at rest, world [m]; 0 x 3: for drawing alone
+  VertexArray rest;           ///< k x 3, at rest, world [m]
+  IndexMatrix corners;        ///< k x 1 or 4, vertices of the object that it goes with
+  RowMatrix shares;           ///< likewise; each row adds up to 1
   Eigen::VectorXd distances;  ///< k, to the object at rest [m]
 };
 

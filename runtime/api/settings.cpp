@@ -46,7 +46,7 @@ exmat_settings completed(const exmat_settings* given) {
 }
 
 void check_finite(const exmat_settings& settings) {
-  const std::array<std::pair<const char*, double>, 12> members{{{"time_step", settings.time_step},
+  const std::array<std::pair<const char*, double>, 13> members{{{"time_step", settings.time_step},
                                                                 {"gravity[0]", settings.gravity[0]},
                                                                 {"gravity[1]", settings.gravity[1]},
                                                                 {"gravity[2]", settings.gravity[2]},
@@ -57,7 +57,8 @@ void check_finite(const exmat_settings& settings) {
                                                                 {"example_damping", settings.example_damping},
                                                                 {"example_bias", settings.example_bias},
                                                                 {"sleep_energy", settings.sleep_energy},
-                                                                {"sleep_time", settings.sleep_time}}};
+                                                                {"sleep_time", settings.sleep_time},
+                                                                {"space_release", settings.space_release}}};
   for (const auto& [name, value] : members)
     if (!std::isfinite(value))
       throw InvalidArgument(fmt::format("settings.{} = {}: expected a finite number", name, value));
@@ -69,6 +70,7 @@ void check_ranges(const exmat_settings& settings) {
              {"time_step", settings.time_step},
              {"damping", {{"mass", settings.mass_damping}, {"stiffness", settings.stiffness_damping}}},
              {"newton", {{"max_iterations", settings.newton_iterations}, {"tolerance", settings.newton_tolerance}}},
+             {"space_release", settings.space_release},
              {"examples",
               {{"stiffness", settings.example_stiffness},
                {"damping", settings.example_damping},
@@ -105,6 +107,7 @@ exmat_settings default_settings() {
   settings.target_iterations = examples.target_iterations;
   settings.sleep_energy = scene.sleep.energy;
   settings.sleep_time = scene.sleep.time;
+  settings.space_release = scene.space.release;
   return settings;
 }
 
@@ -124,6 +127,8 @@ SceneConfig scene_of(const std::filesystem::path& bundle, const exmat_settings* 
   scene.newton = {settings.newton_iterations, settings.newton_tolerance};
   scene.sleep = {settings.sleep_energy, settings.sleep_time};
   scene.precision = choice_of<Precision>(settings.precision, "precision");
+  scene.space.space = choice_of<Space>(settings.space, "space");
+  scene.space.release = settings.space_release;
   ExampleForceConfig examples;
   examples.stiffness = settings.example_stiffness;
   examples.damping = settings.example_damping;

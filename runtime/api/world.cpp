@@ -117,7 +117,7 @@ namespace {
 void join(exmat_world& world, const std::shared_ptr<const TouchingSurface>& surface, std::string name,
           exmat_body& body) {
   world.members.reserve(world.members.size() + 1);
-  world.world.add({&body.model(), &body.scene, surface}, body.state);
+  world.world.add({&body.model(), &body.scene, surface, body.full()}, body.state);
   world.members.push_back({world.next_id, std::move(name), &body});
   body.world = &world;
   body.id = world.next_id++;

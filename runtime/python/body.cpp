@@ -177,6 +177,14 @@ void bind_settings(BodyClass& type) {
             set_integrator(body, number_of(py::str(integrator), "integrator", kIntegrators));
           },
           py::arg("integrator"), "\"bdf2\", \"backward_euler\" or \"newmark\", of this body alone.")
+      .def_property(
+          "space", [](BodyObject& body) { return kSpaces[static_cast<std::size_t>(body.get().space())]; },
+          [](BodyObject& body, const std::string& space) {
+            set_space(body, number_of(py::str(space), "space", kSpaces));
+          },
+          "Space of the last step, \"reduced\" or \"full\"; setting it, to \"reduced\", \"full\" or \"auto\", holds "
+          "from the "
+          "next step on, for a model of space \"full\" or \"auto\".")
       .def(
           "set_example_damping",
           [](BodyObject& body, double c_kappa, const py::object& region) {

@@ -46,7 +46,7 @@ using KeptWeights = std::map<std::int64_t, std::vector<double>>;
 py::tuple kept_settings(BodyObject& body) {
   KeptFactors factors;
   for (const auto& [key, number] : body.factors) factors[{static_cast<int>(key.first), key.second}] = number;
-  return py::make_tuple(factors, body.weights, body.gravity, body.damping, body.integrator, body.group);
+  return py::make_tuple(factors, body.weights, body.gravity, body.damping, body.integrator, body.group, body.space);
 }
 
 void set_settings(BodyObject& body, const py::tuple& kept) {
@@ -58,6 +58,7 @@ void set_settings(BodyObject& body, const py::tuple& kept) {
   if (const auto integrator = kept[4].cast<std::optional<std::int32_t>>()) set_integrator(body, *integrator);
   if (const auto group = kept[5].cast<std::optional<std::array<std::uint32_t, 2>>>())
     set_group(body, (*group)[0], (*group)[1]);
+  if (const auto space = kept[6].cast<std::optional<std::int32_t>>()) set_space(body, *space);
 }
 
 void bind_states(py::module_& module) { bind_state(module); }

@@ -17,7 +17,8 @@ exmat_settings settings_of(const py::dict& given) {
       {"example_damping", &exmat_settings::example_damping},
       {"example_bias", &exmat_settings::example_bias},
       {"sleep_energy", &exmat_settings::sleep_energy},
-      {"sleep_time", &exmat_settings::sleep_time}};
+      {"sleep_time", &exmat_settings::sleep_time},
+      {"space_release", &exmat_settings::space_release}};
   const std::map<std::string, std::int32_t exmat_settings::*> counts{
       {"newton_iterations", &exmat_settings::newton_iterations},
       {"target_iterations", &exmat_settings::target_iterations},
@@ -35,6 +36,8 @@ exmat_settings settings_of(const py::dict& given) {
       settings.integrator = number_of(value, "integrator", kIntegrators);
     else if (name == "precision")
       settings.precision = number_of(value, "precision", {"double", "mixed"});
+    else if (name == "space")
+      settings.space = number_of(value, "space", kSpaces);
     else if (name == "internal_force")
       settings.internal_force = number_of(value, "internal_force", {"auto", "cubature", "polynomial"});
     else if (name == "example_target")

@@ -47,6 +47,11 @@ void set_damping(BodyObject& body, const std::array<double, 2>& alpha_and_beta) 
   body.damping = alpha_and_beta;
 }
 
+void set_space(BodyObject& body, std::int32_t space) {
+  body.get().set_space(space);
+  body.space = space;
+}
+
 void set_integrator(BodyObject& body, std::int32_t integrator) {
   body.get().set_integrator(integrator);
   body.integrator = integrator;

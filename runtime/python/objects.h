@@ -136,7 +136,7 @@ struct BodyObject {
   std::map<std::int64_t, std::vector<double>> weights;               ///< likewise
   std::optional<std::array<double, 3>> gravity;                      ///< likewise
   std::optional<std::array<double, 2>> damping;                      ///< likewise
-  std::optional<std::int32_t> integrator;                            ///< likewise
+  std::optional<std::int32_t> integrator, space;                     ///< likewise
   std::optional<std::array<std::uint32_t, 2>> group;                 ///< likewise, and its mask
   ObstacleRecord obstacles;                                          ///< of a world of its own
 };
@@ -204,6 +204,7 @@ void set_factor(BodyObject& body, ExampleFactor factor, double number, std::int6
 void set_gravity(BodyObject& body, const std::array<double, 3>& gravity);
 void set_damping(BodyObject& body, const std::array<double, 2>& alpha_and_beta);
 void set_integrator(BodyObject& body, std::int32_t integrator);
+void set_space(BodyObject& body, std::int32_t space);
 void set_group(BodyObject& body, std::uint32_t group, std::uint32_t mask);
 void set_weights(BodyObject& body, const std::vector<double>& weights, std::int64_t region);
 
@@ -236,6 +237,7 @@ std::int64_t region_of(const Model& model, const py::object& name);
 
 /// A number that is one of `names`.
 std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names);
+inline const std::vector<const char*> kSpaces{"reduced", "full", "auto"};
 inline const std::vector<const char*> kIntegrators{"bdf2", "backward_euler", "newmark"};
 
 exmat_motion read_motion_tuple(const py::tuple& kept);

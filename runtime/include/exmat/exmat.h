@@ -62,7 +62,8 @@ enum { EXMAT_INTERNAL_FORCE_AUTO = 0, EXMAT_CUBATURE = 1, EXMAT_POLYNOMIAL = 2 }
 enum { EXMAT_TARGET_AUTO = 0, EXMAT_TARGET_TABLE = 1, EXMAT_TARGET_SOLVE = 2 };   /* example_target */
 enum { EXMAT_ENERGY_REFERENCE_EXAMPLE = 0, EXMAT_ENERGY_REFERENCE_REST = 1 };     /* energy_reference */
 
-enum { EXMAT_PRECISION_DOUBLE = 0, EXMAT_PRECISION_MIXED = 1 }; /* precision */
+enum { EXMAT_PRECISION_DOUBLE = 0, EXMAT_PRECISION_MIXED = 1 };               /* precision */
+enum { EXMAT_SPACE_REDUCED = 0, EXMAT_SPACE_FULL = 1, EXMAT_SPACE_AUTO = 2 }; /* space */
 
 /* The members of a scene file that belong to a model; schemas/scene.json says what each is. */
 typedef struct exmat_settings {
@@ -87,6 +88,10 @@ typedef struct exmat_settings {
                                 Bodies that touch each other fall asleep and wake together */
   double sleep_time;         /* for so long, > 0 [s]; 0.5 */
   int32_t precision;         /* EXMAT_PRECISION_DOUBLE; of bodies that go side by side, exmat_world_step() */
+  int32_t space;        /* EXMAT_SPACE_REDUCED: steps in the modes of the bundle; _FULL: in all vertices of its mesh,
+                           right under any load; _AUTO: in all vertices while forces of the caller act or obstacles
+                           touch, in the modes else. The last two let exmat_body_set_space() change it */
+  double space_release; /* how long _AUTO stays in all vertices after the last such load, > 0 [s]; 0.5 */
 } exmat_settings;
 
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
@@ -237,6 +242,12 @@ EXMAT_API exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motio
    something smooth do without. */
 EXMAT_API exmat_status exmat_body_restart_integrator(exmat_body* body) EXMAT_NOEXCEPT;
 
+/* How far the mean of the points moves in one step, about, by a force of 1 N that is shared equally by them, of a body
+   that was last stepped in all vertices (EXMAT_SPACE_FULL), else 0 [m/N]. A spring of a host, whose force is that of
+   the step before, is stable with a stiffness well below its inverse. */
+EXMAT_API exmat_status exmat_body_read_point_compliance(const exmat_body* body, const exmat_points* points,
+                                                        double* compliance) EXMAT_NOEXCEPT;
+
 /* World positions `xyz` [coordinates = 3k] [m] in single precision; of all vertices as fast as memory is read. */
 EXMAT_API exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* points, float* xyz,
                                                  int64_t coordinates) EXMAT_NOEXCEPT;
@@ -287,6 +298,13 @@ EXMAT_API exmat_status exmat_body_set_damping(exmat_body* body, double alpha, do
 /* EXMAT_BDF2, ...; the next step takes nothing from the ones before but position and velocity. */
 EXMAT_API exmat_status exmat_body_set_integrator(exmat_body* body, int32_t integrator) EXMAT_NOEXCEPT;
 
+/* EXMAT_SPACE_...; from the next step on. Positions and momenta stay, but for what the modes cannot hold when the body
+   leaves the full space. The model has to be of space _FULL or _AUTO. Bodies that touch others step in the modes. */
+EXMAT_API exmat_status exmat_body_set_space(exmat_body* body, int32_t space) EXMAT_NOEXCEPT;
+
+/* The space that the last step was in: EXMAT_SPACE_REDUCED or EXMAT_SPACE_FULL; negative where `body` is NULL. */
+EXMAT_API int32_t exmat_body_space(const exmat_body* body) EXMAT_NOEXCEPT;
+
 /* Of examples. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model has to have that
    example force: use_examples, or the scene. */
 
@@ -334,8 +352,8 @@ EXMAT_API exmat_status exmat_body_read_contact_load(const exmat_body* body, int6
    earlier, motion, applied forces, targets, contacts. Bodies of the same bundle, settings or scene, with the same
    obstacles, take it and go on to the last bit, in this version of the library. */
 
-/* How many numbers it has now: the same for all bodies of a model, but for 9 for each contact. Negative where `body` is
-   NULL. */
+/* How many numbers it has now: the same for all bodies of a model in one space, but for 10 for each contact. Negative
+   where `body` is NULL. */
 EXMAT_API int64_t exmat_body_state_size(const exmat_body* body) EXMAT_NOEXCEPT;
 
 /* `numbers` [count = exmat_body_state_size()]. */

@@ -270,6 +270,11 @@ class BodyRef {
   }
 
   /// `xyz` [3k].
+  double point_compliance(const Points& points) const {
+    double compliance = 0;
+    check(exmat_body_read_point_compliance(get(), points.get(), &compliance));
+    return compliance;
+  }
   void read_positions(const Points& points, std::span<float> xyz) {
     check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
   }
@@ -319,6 +324,9 @@ class BodyRef {
   void set_gravity(std::span<const double, 3> gravity) { check(exmat_body_set_gravity(get(), gravity.data())); }
   void set_damping(double alpha, double beta) { check(exmat_body_set_damping(get(), alpha, beta)); }
   void set_integrator(std::int32_t integrator) { check(exmat_body_set_integrator(get(), integrator)); }
+  /// EXMAT_SPACE_...; and which of the two the last step was in.
+  void set_space(std::int32_t space) { check(exmat_body_set_space(get(), space)); }
+  std::int32_t space() const { return exmat_body_space(get()); }
   /// `region` -1: the whole body.
   void set_example_stiffness(double kappa, std::int64_t region = -1) {
     check(exmat_body_set_example_stiffness(get(), region, kappa));

@@ -32,6 +32,9 @@ class Model(_exmat.Model):
     use_contact          whether bodies can touch obstacles of add_obstacle() and each other in a World; False
     sleep_energy         a body is left alone once its kinetic energy has been below this [J]; 0: never
     sleep_time           for so long, > 0 [s]; 0.5
+    space                "reduced": steps in the modes of the bundle; "full": in all vertices of its mesh, right under any
+                         load; "auto": in all vertices while applied forces act or obstacles touch, in the modes else
+    space_release        how long "auto" stays in all vertices after the last such load, > 0 [s]; 0.5
     precision            "double", or "mixed": of bodies side by side, with their stiffness in single precision
 
     Raises BadInput (the bundle) and InvalidArgument (a setting).
@@ -60,6 +63,8 @@ class Model(_exmat.Model):
         sleep_energy: Optional[float] = None,
         sleep_time: Optional[float] = None,
         precision: Optional[str] = None,
+        space: Optional[str] = None,
+        space_release: Optional[float] = None,
     ) -> None:
         examples = dict(example_stiffness=example_stiffness, example_damping=example_damping, example_bias=example_bias,
                         example_target=example_target, target_iterations=target_iterations, energy_reference=energy_reference)
@@ -68,7 +73,8 @@ class Model(_exmat.Model):
         others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
                       mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
                       newton_tolerance=newton_tolerance, use_examples=int(use_examples), use_contact=int(use_contact),
-                      sleep_energy=sleep_energy, sleep_time=sleep_time, precision=precision)
+                      sleep_energy=sleep_energy, sleep_time=sleep_time, precision=precision, space=space,
+                      space_release=space_release)
         self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
 
     @classmethod

@@ -29,6 +29,7 @@ constexpr const char* kFalling =
        "obstacles": [{"plane": {"point": [0, -0.02, 0], "normal": [0, 1, 0]}, "stiffness": 1e5, "friction": 0.4}])";
 
 std::vector<Case> cases() {
+  static const std::string falling_in_full_space = std::string(kFalling) + R"(, "space": "full")";
   return {{"clamped",
            {.examples = 3},
            false,
@@ -38,7 +39,14 @@ std::vector<Case> cases() {
           {"carried",
            {.carried = true},
            false,
-           R"(, "body": {"motion": [{"time": 0}, {"time": 0.15, "position": [0, 0.1, 0]}]})"}};
+           R"(, "body": {"motion": [{"time": 0}, {"time": 0.15, "position": [0, 0.1, 0]}]})"},
+          {"full", {}, false, R"(, "space": "full", "damping": {"mass": 0.5, "stiffness": 0.01})"},
+          {"full_and_free", {.free = true}, true, falling_in_full_space.c_str()},
+          {"auto",
+           {},
+           false,
+           R"(, "space": "auto", "space_release": 0.1,
+              "forces": [{"vertices": {"ids": [60]}, "force": [0, 1, 0], "start": 0.05, "end": 0.15}])"}};
 }
 
 class BodyStates : public ::testing::TestWithParam<Case> {
@@ -139,7 +147,7 @@ TEST_F(BadBodyState, IsRefusedAndTheBodyIsAsItWas) {
   };
   EXPECT_THAT(refusal(good.size(), 0), HasSubstr("expected"));
   EXPECT_THAT(refusal(7, std::numeric_limits<double>::infinity()), HasSubstr("numbers: expected finite ones"));
-  EXPECT_THAT(refusal(0, 1), HasSubstr("layout 1: expected 3"));
+  EXPECT_THAT(refusal(0, 1), HasSubstr("layout 1: expected 4"));
   EXPECT_THAT(refusal(1, 0.02), HasSubstr("time step 0.02 s: expected the model's 0.01 s"));
   EXPECT_THAT(refusal(2, 0.5), HasSubstr("steps = 0.5: expected a whole number"));
   EXPECT_THAT(refusal(3, 2), HasSubstr("begins_anew = 2: expected 0 or 1"));
