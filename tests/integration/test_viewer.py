@@ -92,6 +92,11 @@ class Viewer(unittest.TestCase):
         corners = list(triangles)
         for body in dump["bodies"] if bodies is None else [dump["bodies"][k] for k in bodies]:
             placement = np.array(body["placement"]).reshape(3, 4)
+            if body["space"] == "full":  # those of the surface alone
+                points = rest.copy()
+                points[np.unique(surface)] = np.array(body["positions"]).reshape(-1, 3)
+                corners += list(points[surface])
+                continue
             points = (rest + (basis @ np.array(body["reduced"])).reshape(rest.shape)) @ placement[:, :3].T + placement[:, 3]
             corners += list(points[surface])
         for pixels in (projected(corner, dump["camera"]) for corner in corners):
@@ -212,8 +217,11 @@ class Viewer(unittest.TestCase):
 
     def test_lost_work_of_a_hand_is_that_of_the_same_force_in_a_scene(self):
         """The hand is smaller than the bar's edges: what it holds is a vertex."""
-        _, dump = self.picture({"actions": [{"time": 0, "grab": {"hand": "a", "point": [4, 0.5, 1]}},
-                                            {"time": 0, "move": {"hand": "a", "by": [0, 0, 0.2], "duration": 0.1}}]}, "lost")
+        grab = {"time": 0, "grab": {"hand": "a", "point": [4, 0.5, 1]}}
+        move = {"time": 0, "move": {"hand": "a", "by": [0, 0, 0.2], "duration": 0.1}}
+        _, dump = self.picture({"actions": [grab, move]}, "felt")
+        self.assertEqual((dump["lost_work"]["hand"], dump["bodies"][0]["space"]), (0, "full"))
+        _, dump = self.picture({"actions": [{"time": 0, "set": {"space": "reduced"}}, grab, move]}, "lost")
         vertex = 9 * 8 + 3 * 1 + 2
         scene = self.write("pushed.json", {"bundle": "bar.h5", "steps": 1, "forces": [{"vertices": {"ids": [vertex]}, "force": dump["hands"][0]["force"]}]})
         printed = self.run_scene(scene)

@@ -30,8 +30,10 @@ void dump(const Snapshot& snapshot, const Studio& studio, const PictureSize& pic
     json["bodies"].push_back({{"offset", numbers(studio.offsets()[i])},
                               {"reduced", body.q},
                               {"placement", body.placement},
+                              {"space", body.positions.empty() ? "reduced" : "full"},
                               {"weights", body.weights},
                               {"contacts", body.contacts.size()}});
+    if (!body.positions.empty()) json["bodies"].back()["positions"] = body.positions;
   }
   json["hands"] = OrderedJson::array();
   for (const GripSnapshot& grip : snapshot.grips)

@@ -169,7 +169,25 @@ void BodyDrawing::pose(std::span<const float> q, std::span<const float, 12> plac
   glUniform1fv(pose_program_.at("q"), static_cast<GLsizei>(q.size()), q.data());
   pose_program_.set_matrix("placement", columns);
   glDrawArrays(GL_TRIANGLES, 0, 3);
+  find_normals(posed);
+}
 
+void BodyDrawing::place(std::span<const float> positions, PosedBody& posed) const {
+  std::vector<float> texels(4 * static_cast<std::size_t>(kArrayWidth) * static_cast<std::size_t>(rows_for(points_)));
+  for (std::size_t i = 0; i < points_; ++i) {
+    std::ranges::copy(positions.subspan(3 * i, 3), texels.begin() + static_cast<std::ptrdiff_t>(4 * i));
+    texels[4 * i + 3] = 1;
+  }
+  glBindTexture(GL_TEXTURE_2D, posed.positions_.get());
+  glTexSubImage2D(GL_TEXTURE_2D, 0, 0, 0, kArrayWidth, rows_for(points_), kFloats4.given, kFloats4.type, texels.data());
+  find_normals(posed);
+}
+
+void BodyDrawing::find_normals(PosedBody& posed) const {
+  glDisable(GL_BLEND);
+  glDisable(GL_DEPTH_TEST);
+  glDisable(GL_SCISSOR_TEST);
+  glBindVertexArray(empty_.get());
   glBindFramebuffer(GL_FRAMEBUFFER, posed.normal_target_.get());
   glViewport(0, 0, kArrayWidth, rows_for(corners_));
   normal_program_.use();

@@ -39,6 +39,9 @@ class BodyDrawing {
   /// Poses at q [r]; placement [12] as exmat_body_read_placement.
   void pose(std::span<const float> q, std::span<const float, 12> placement, PosedBody& posed) const;
 
+  /// Poses at positions [3k].
+  void place(std::span<const float> positions, PosedBody& posed) const;
+
   /// A field [k] to colour by; empty: zeros.
   void set_field(std::span<const float> field);
   GLuint field() const { return field_.get(); }
@@ -48,6 +51,7 @@ class BodyDrawing {
   std::size_t triangles() const { return triangle_count_; }
 
  private:
+  void find_normals(PosedBody& posed) const;
   void upload_modes(const BodyShape& shape);
   void upload_mesh(const BodyShape& shape);
 

@@ -117,7 +117,11 @@ std::size_t SceneDrawing::triangles() const {
 void SceneDrawing::pose_bodies(const Snapshot& snapshot, const Look& look) {
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const BodySnapshot& body = snapshot.bodies[i];
-    drawings_[bodies_[i].kind].pose(body.q, body.placement, posed_[i]);
+    const BodyDrawing& drawing = drawings_[bodies_[i].kind];
+    if (body.positions.empty())
+      drawing.pose(body.q, body.placement, posed_[i]);
+    else
+      drawing.place(body.positions, posed_[i]);
   }
   if (!look.targets) return;
   std::size_t count = 0;

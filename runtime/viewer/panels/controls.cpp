@@ -169,6 +169,8 @@ void Controls::draw_body(Settings& settings) {
   choice("integrator", nullptr, settings.integrator, std::array<const char*, 3>{"bdf2", "backward_euler", "newmark"});
   choice("internal force", "How it is evaluated; auto: as the bundle says", settings.internal_force,
          std::array<const char*, 3>{"auto", "cubature", "polynomial"});
+  choice("space", "Modes, all vertices, or all while a hand or an obstacle acts", settings.space,
+         std::array<const char*, 3>{"reduced", "full", "auto"});
   label("time step", "The body goes on with its shape and motion; Enter takes it");
   double milliseconds = 1e3 * settings.time_step;
   if (ImGui::InputDouble("##step", &milliseconds, 0, 0, "%.4g ms", ImGuiInputTextFlags_EnterReturnsTrue) &&

@@ -159,7 +159,22 @@ void draw_lost(const Style& style, const char* what, double lost) {
   ImGui::TextWrapped("%s", text.c_str());
 }
 
-void draw_basis(const Style& style, const Studio& studio) {
+/// Why bodies step in all vertices.
+std::string full_space_text(const Snapshot& snapshot, std::size_t full) {
+  const std::string which = snapshot.bodies.size() == 1
+                                ? "The body steps"
+                                : fmt::format("{} of {} bodies step", full, snapshot.bodies.size());
+  return which + (snapshot.grips.empty() ? " in all vertices: something acts that the basis was not made for."
+                                         : " in all vertices: the hand is answered without a basis.");
+}
+
+void draw_basis(const Style& style, const Snapshot& snapshot, const Studio& studio) {
+  const auto full =
+      std::ranges::count_if(snapshot.bodies, [](const BodySnapshot& body) { return !body.positions.empty(); });
+  if (full > 0) {
+    heading(style, "All vertices");
+    ImGui::TextWrapped("%s", full_space_text(snapshot, static_cast<std::size_t>(full)).c_str());
+  }
   const LostWork& lost = studio.lost_work();
   if (!lost.measured) {
     heading(style, "The basis");
@@ -184,7 +199,7 @@ void draw_plots(const Style& style, const Snapshot& snapshot, const History& his
                ImGuiWindowFlags_NoTitleBar | ImGuiWindowFlags_NoMove | ImGuiWindowFlags_NoResize |
                    ImGuiWindowFlags_NoSavedSettings);
   draw_status(style, snapshot, history, frame_seconds);
-  draw_basis(style, studio);
+  draw_basis(style, snapshot, studio);
   draw_weights(style, history, *shapes.front(), studio.settings(0));
   draw_energies(style, history);
   draw_times(style, snapshot, history);

@@ -133,6 +133,7 @@ bool moves_by_script(const Json& json) {
 }  // namespace
 
 bool same_model(const Settings& a, const Settings& b) {
+  if ((a.space == "reduced") != (b.space == "reduced")) return false;
   if (a.time_step != b.time_step || a.internal_force != b.internal_force || a.forces.size() != b.forces.size())
     return false;
   for (std::size_t i = 0; i < a.forces.size(); ++i)
@@ -191,10 +192,15 @@ Settings SceneDocument::settings(std::size_t kind) const {
   }
   settings.integrator = json_.value("integrator", settings.integrator);
   settings.internal_force = own.value("internal_force", settings.internal_force);
+  settings.space = own.value("space", json_.value("space", settings.space));
   if (own.contains("examples")) settings.forces.push_back(force_of(own["examples"]));
   if (own.contains("regions"))
     for (const Json& region : own["regions"]) settings.forces.push_back(force_of(region));
   return settings;
+}
+
+void SceneDocument::prefer_space(const char* space) {
+  if (!json_.contains("space")) json_["space"] = space;
 }
 
 void SceneDocument::set(const Settings& settings, std::size_t kind) {
@@ -210,6 +216,7 @@ void SceneDocument::set(const Settings& settings, std::size_t kind) {
   }
   put(json_, "integrator", settings.integrator, fallback.integrator);
   put(own, "internal_force", settings.internal_force, fallback.internal_force);
+  put(own, "space", settings.space, json_.value("space", fallback.space));
   std::size_t region = 0;
   for (const ForceSettings& force : settings.forces)
     put_force(force.region.empty() ? own["examples"] : own["regions"][region++], force);

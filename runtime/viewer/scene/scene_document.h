@@ -50,6 +50,8 @@ class SceneDocument {
 
   Settings settings(std::size_t kind = 0) const;
   void set(const Settings& settings, std::size_t kind = 0);
+  /// Of bodies of which the scene does not say in which space they step.
+  void prefer_space(const char* space);
 
   /// With this many steps and with the obstacles as they stand, to be run from `file`: names are relative to it. Throws
   /// WorkError where it cannot be written.

@@ -29,6 +29,7 @@ struct Settings {
   double mass_damping = 0, stiffness_damping = 0;  ///< alpha [1/s], beta [s]
   std::string integrator = "bdf2";
   std::string internal_force = "auto";
+  std::string space = "reduced";
   std::vector<ForceSettings> forces;
 
   bool operator==(const Settings&) const = default;

@@ -178,6 +178,7 @@ void ScriptPlayer::set(const Json& set) {
   take(set, "stiffness_damping", settings.stiffness_damping);
   take(set, "integrator", settings.integrator);
   take(set, "internal_force", settings.internal_force);
+  take(set, "space", settings.space);
   const std::string region = set.value("region", std::string());
   const auto force = std::ranges::find(settings.forces, region, &ForceSettings::region);
   const bool of_force =

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 #include <numeric>
+#include <set>
+#include <vector>
 
 namespace exmat::viewer {
 namespace {
@@ -21,10 +23,36 @@ Points point_on(const Surface& surface, const SurfaceHit& place) {
   return Points::on_surface(surface, triangle, shares);
 }
 
-/// The inverse of how much an impulse on the point moves it, by the modes and by rigid motion.
+/// Those points of the surface that the hand covers, each a corner of a triangle; the picked one where it covers none.
+Points patch_of(const Surface& surface, const BodyShape& shape, const SurfaceHit& place) {
+  const auto rest = [&](std::int32_t point) {
+    return Eigen::Map<const Eigen::Vector3d>(shape.rest.data() + 3 * static_cast<std::ptrdiff_t>(point));
+  };
+  const auto corner = [&](std::int64_t triangle, int c) {
+    return shape.triangles[static_cast<std::size_t>(3 * triangle + c)];
+  };
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 3; ++c) centre += place.shares[c] * rest(corner(place.triangle, c));
+  const double radius = kHandSize * shape.bounds.diagonal();
+  std::set<std::int32_t> covered;
+  std::vector<std::int64_t> triangles;
+  std::vector<double> shares;
+  for (std::int64_t triangle = 0; triangle < std::ssize(shape.triangles) / 3; ++triangle)
+    for (int c = 0; c < 3; ++c) {
+      if ((rest(corner(triangle, c)) - centre).norm() > radius || !covered.insert(corner(triangle, c)).second) continue;
+      triangles.push_back(triangle);
+      for (int other = 0; other < 3; ++other) shares.push_back(other == c ? 1 : 0);
+    }
+  return triangles.empty() ? point_on(surface, place) : Points::on_surface(surface, triangles, shares);
+}
+
+/// The inverse of how much an impulse on the points, shared by them, moves their mean, by the modes and by rigid
+/// motion.
 double effective_mass(const Points& points, const BodyShape& shape) {
   const std::vector<float> rows = points.basis(shape.modes);
-  double inverse = std::inner_product(rows.begin(), rows.end(), rows.begin(), 0.0) / 3;
+  std::vector<double> mean(3 * shape.modes);
+  for (std::size_t i = 0; i < rows.size(); ++i) mean[i % mean.size()] += rows[i] / static_cast<double>(points.size());
+  double inverse = std::inner_product(mean.begin(), mean.end(), mean.begin(), 0.0) / 3;
   if (shape.mass > 0) inverse += 3 / shape.mass;
   return inverse > 0 ? 1 / inverse : 0;
 }
@@ -37,7 +65,8 @@ Grip::Grip(int id, std::size_t body, const BodyShape& shape, const Surface& surf
       body_(body),
       place_(place),
       points_(point_on(surface, place)),
-      effective_mass_(effective_mass(points_, shape)),
+      patch_(patch_of(surface, shape, place)),
+      effective_mass_(effective_mass(patch_, shape)),
       longest_(0.6 * shape.bounds.diagonal()) {
   follow(held);
 }
@@ -54,7 +83,14 @@ void Grip::follow(BodyRef& held) {
 }
 
 double Grip::lost(const Capacity& capacity, const BodyRef& held) const {
-  return capacity.lost(held, points_, std::array{force_.x(), force_.y(), force_.z()});
+  return capacity.lost(held, patch_, shared_force());
+}
+
+std::vector<double> Grip::shared_force() const {
+  const Eigen::Vector3d each = force_ / static_cast<double>(patch_.size());
+  std::vector<double> forces;
+  for (std::size_t i = 0; i < patch_.size(); ++i) forces.insert(forces.end(), each.begin(), each.end());
+  return forces;
 }
 
 void Grip::pull(double time_step, double strength, BodyRef& held) {
@@ -62,12 +98,14 @@ void Grip::pull(double time_step, double strength, BodyRef& held) {
   point_ = read_point(held);
   hand_ += (1 - std::exp(-time_step / kHandDelay)) * (target_ - hand_);
   const double per_mass = strength * std::min(kStiffest, kStiffestPerStep / (time_step * time_step));
-  const double stiffness = per_mass * effective_mass_;
-  const double damping = 2 * kDampingRatio * std::sqrt(per_mass) * effective_mass_;
+  const double compliance = held.point_compliance(patch_);
+  const double mass = compliance > 0 ? time_step * time_step / compliance : effective_mass_;
+  const double stiffness = per_mass * mass;
+  const double damping = 2 * kDampingRatio * std::sqrt(per_mass) * mass;
   Eigen::Vector3d reach = hand_ - point_;
   if (reach.norm() > longest_) reach *= longest_ / reach.norm();
   force_ = stiffness * reach + damping / time_step * ((hand_ - hand_before) - (point_ - before));
-  held.apply_forces(points_, std::array{force_.x(), force_.y(), force_.z()});
+  held.apply_forces(patch_, shared_force());
 }
 
 }  // namespace exmat::viewer

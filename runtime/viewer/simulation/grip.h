@@ -2,12 +2,16 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 #include "exmat/exmat.hpp"
 #include "runtime/viewer/simulation/body_shape.h"
 #include "runtime/viewer/view/picking.h"
 
 namespace exmat::viewer {
+
+/// Radius of a hand over the body's size.
+inline constexpr double kHandSize = 0.06;
 
 /// A damped spring from a point of a body's surface to where a hand is.
 class Grip {
@@ -37,12 +41,13 @@ class Grip {
 
  private:
   Eigen::Vector3d read_point(BodyRef& held) const;
+  std::vector<double> shared_force() const;
 
   int id_;
   std::size_t body_;
   SurfaceHit place_;
-  Points points_;
-  double effective_mass_;                  ///< of the point alone [kg]
+  Points points_, patch_;                  ///< where it was taken, and what the hand covers there
+  double effective_mass_;                  ///< of the patch alone, by the modes [kg]
   double longest_;                         ///< that the spring gets [m]
   Eigen::Vector3d point_, target_, hand_;  ///< hand: the target, smoothed
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();

@@ -12,10 +12,13 @@ constexpr double kArrived = 1e-9;        // of the distance that it has to go [m
 
 constexpr std::size_t kMostMeasured = 6000;  // vertices of a body whose load capacity is found while it moves
 constexpr std::size_t kMostTouched = 4;      // bodies whose contacts are
-constexpr double kHandSize = 0.06;           // radius over the body's size
 
 std::int32_t integrator_of(const std::string& name) {
   return name == "newmark" ? EXMAT_NEWMARK : name == "backward_euler" ? EXMAT_BACKWARD_EULER : EXMAT_BDF2;
+}
+
+std::int32_t space_of(const std::string& name) {
+  return name == "full" ? EXMAT_SPACE_FULL : name == "auto" ? EXMAT_SPACE_AUTO : EXMAT_SPACE_REDUCED;
 }
 
 exmat_motion motion_at(const Eigen::Vector3d& position, const exmat_motion& turned, const Eigen::Vector3d& velocity) {
@@ -58,7 +61,21 @@ Simulation::Simulation(std::vector<SceneDocument> documents, int surface_kind)
   has_contact_ = std::ranges::all_of(documents_, [](const SceneDocument& document) {
     return document.is_world() || bundle_info(document.bundle().string()).contact == 1;
   });
-  take(make(documents_));
+  take(make_touchable());
+}
+
+/// Bodies of which the scenes do not say in which space they step do so in all vertices while a hand holds them, if
+/// they can.
+Simulation::Made Simulation::make_touchable() {
+  std::vector<SceneDocument> touchable = documents_;
+  for (SceneDocument& document : touchable) document.prefer_space("auto");
+  try {
+    Made made = make(touchable);
+    documents_ = std::move(touchable);
+    return made;
+  } catch (const Error&) {
+    return make(documents_);
+  }
 }
 
 /// The bodies of the first document, and one of each other one.
@@ -147,6 +164,7 @@ void Simulation::apply_live(std::size_t kind, const Settings& settings) {
     BodyRef& body = bodies_[i];
     body.set_gravity(settings.gravity);
     body.set_damping(settings.mass_damping, settings.stiffness_damping);
+    if (settings.space != before.space) body.set_space(space_of(settings.space));
     if (settings.integrator != before.integrator) body.set_integrator(integrator_of(settings.integrator));
     std::int64_t region = -1;
     for (const ForceSettings& force : settings.forces) {

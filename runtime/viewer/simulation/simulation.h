@@ -107,6 +107,7 @@ class Simulation {
   };
 
   Made make(const std::vector<SceneDocument>& documents) const;
+  Made make_touchable();
   Kind make_kind(const SceneDocument& document, std::size_t of_document, std::size_t number, Model model) const;
   void take(Made made);
   void place_side_by_side();

@@ -27,6 +27,7 @@ struct SnapshotRequest {
 struct BodySnapshot {
   std::vector<float> q;                      ///< r
   std::array<float, 12> placement{};         ///< rotation and shift, without the body's offset
+  std::vector<float> positions;              ///< 3k, world, without the offset [m]; of a body in full space, else empty
   std::vector<float> field;                  ///< k, of strain energy [J/m^3] or contact force [N]; else empty
   std::vector<float> elements;               ///< 3s, world [m]; where asked for
   std::vector<std::vector<double>> weights;  ///< of each example force
