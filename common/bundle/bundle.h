@@ -62,8 +62,9 @@ struct BundleRequest {
   std::vector<LedgerEntry> groups;
   /// Which regions, with their targets or not. One that the file lacks is an InputError. Absent: all that there is.
   std::optional<std::vector<RegionNeeds>> regions{};
-  bool step_only = false;  ///< only datasets whose schema `use` is "step": what stepping needs
-  bool positions = false;  ///< with step_only: also those with `use` "positions": what writing positions needs
+  bool step_only = false;   ///< only datasets whose schema `use` is "step": what stepping needs
+  bool positions = false;   ///< with step_only: also those with `use` "positions": what writing positions needs
+  bool full_space = false;  ///< with step_only: also those with `use` "positions" or "full_space"
 };
 
 /// Reads and validates: magic, version, types, sizes, ranges, finiteness, checksums, cross-references. Throws

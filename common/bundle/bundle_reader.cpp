@@ -202,7 +202,8 @@ const DatasetSchema& BundleReader::schema_of(std::string_view name) const {
 
 bool BundleReader::is_wanted(const DatasetSchema& schema) const {
   if (!request_.step_only || schema.use == Use::kStep) return true;
-  return request_.positions && schema.use == Use::kPositions;
+  if (schema.use == Use::kPositions) return request_.positions || request_.full_space;
+  return request_.full_space && schema.use == Use::kFullSpace;
 }
 
 std::pair<std::int64_t, std::int64_t> BundleReader::matrix_sizes(const Hdf5Dataset& dataset) {

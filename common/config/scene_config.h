@@ -66,7 +66,7 @@ struct NewtonConfig {
   double tolerance = 1e-6;  ///< relative to |f_ext| + |f_int| + |inertia|
 };
 
-/// What the unknowns of steps are.
+/// The unknowns of steps.
 struct SpaceConfig {
   Space space = Space::kReduced;
   double release = 0.5;           ///< [s]

@@ -66,6 +66,7 @@ struct Constraint {
 enum class Use {
   kStep,       ///< to step
   kPositions,  ///< to write positions
+  kFullSpace,  ///< to step in all vertices
   kInspect,    ///< never
 };
 std::string_view name_of(Use use);

@@ -406,12 +406,6 @@ void Pipeline::refuse_full_space() {
   leave_out("full_space", reason);
 }
 
-const TargetSpace& whole_body_targets(const PoseFitter& fitter, const std::vector<TargetSpace>& targets) {
-  std::size_t group = 0;
-  while (!fitter.region(static_cast<Eigen::Index>(group)).empty()) ++group;
-  return targets[group];
-}
-
 std::string generator() { return fmt::format("exmat-precompute {}", version()); }
 
 void Pipeline::read() {
@@ -519,7 +513,7 @@ ReducedModel Pipeline::run() {
   add_contact(model);
   if (motions) add_fidelity(stages, *motions, choice, model);
   if (includes(report_.ledger, "full_space")) {
-    model.full_space = full_space_data(model, system, whole_body_targets(*fitter, targets));
+    model.full_space = full_space_data(model, system, targets.front());
     if (!model.full_space) refuse_full_space();
   }
   if (fitter) settle_examples(stages, model);

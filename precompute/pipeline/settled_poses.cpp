@@ -161,19 +161,22 @@ std::optional<PoseSettler::Shifts> PoseSettler::shifts(double strength) const {
   Shifts found{Eigen::MatrixXd(plain_->modes(), count), {}};
   if (model_.full_space) found.coefficients.resize(model_.full_space->from_target.cols(), count);
   Eigen::VectorXd pull(plain_->modes());
+  std::optional<runtime::TargetTable> full;
+  if (model_.full_space) {
+    TargetTableData data = *model_.targets;
+    data.control_points = model_.full_space->control_points;
+    full.emplace(data);
+  }
   const double share = strength / load_.examples.front().stiffness - 1;
   for (Eigen::Index k = 0; k < count; ++k) {
     const Coordinates q = settled(*plain_, 0, k, strength, load_.gravity);
     if (!q) return std::nullopt;
     force.table->evaluate(Eigen::VectorXd::Unit(count, k), workspace, pull);
     found.pull.col(k) = share * (pull - force.filter.matrix() * *q);
-    if (!model_.full_space) continue;
-    TargetTableData full = *model_.targets;
-    full.control_points = model_.full_space->control_points;
-    const runtime::TargetTable table(full);
-    runtime::TargetTable::Workspace scratch = table.make_workspace();
+    if (!full) continue;
+    runtime::TargetTable::Workspace scratch = full->make_workspace();
     Eigen::VectorXd target(found.coefficients.rows());
-    table.evaluate(Eigen::VectorXd::Unit(count, k), scratch, target);
+    full->evaluate(Eigen::VectorXd::Unit(count, k), scratch, target);
     found.coefficients.col(k) =
         share *
         (target - filter_coefficients(*model_.full_space, model_.modal->basis * *q).reshaped<Eigen::RowMajor>());

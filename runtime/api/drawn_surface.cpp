@@ -129,7 +129,7 @@ DensityField::DensityField(const ObjectData& object, const RowMatrix& basis, con
   densities_.resize(tets_.size());
 }
 
-/// Of the corners: U q, or in the world from that of the first, which has the same energy.
+/// Sets the displacements of the corners: U q, or those in the world less that of the first, which strain as much.
 void DensityField::set_displacements(const State& state, const FullModel* full) noexcept {
   if (!state.full) return displacements_.evaluate(state.q, workspace_, moved_.data());
   Eigen::Vector3d first = Eigen::Vector3d::Zero();

@@ -44,7 +44,7 @@ struct NamedBody {
 /// The frames of one body in an open file, below a group: "" for the root, or "/bodies/NAME".
 class BodyFrames {
  public:
-  /// What the body refers to and the file outlive the writer. Throws WorkError.
+  /// The file and all that `body` refers to outlive the writer. Throws WorkError.
   BodyFrames(Hdf5File& file, std::string group, const NamedBody& body);
   ~BodyFrames();
 

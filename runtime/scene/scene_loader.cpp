@@ -285,7 +285,7 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
   const bool steps_in_full = config.space.space != Space::kReduced;
   const bool positions = config.trajectory || config.meets_bodies || (moves && !config.forces.empty());
-  const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/!steps_in_full, positions};
+  const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions, steps_in_full};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
   check_compensation(config, loaded.data);
   loaded.model = prepare(config, loaded.data);

@@ -242,9 +242,9 @@ EXMAT_API exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motio
    something smooth do without. */
 EXMAT_API exmat_status exmat_body_restart_integrator(exmat_body* body) EXMAT_NOEXCEPT;
 
-/* How far the mean of the points moves in one step, about, by a force of 1 N that is shared equally by them, of a body
-   that was last stepped in all vertices (EXMAT_SPACE_FULL), else 0 [m/N]. A spring of a host, whose force is that of
-   the step before, is stable with a stiffness well below its inverse. */
+/* Compliance of the points in one step, about [m/N]: the way of their mean by a force of 1 N that is shared equally by
+   them, of a body that was last stepped in all vertices (EXMAT_SPACE_FULL), else 0. A spring of a host, whose force is
+   that of the step before, is stable with a stiffness well below its inverse. */
 EXMAT_API exmat_status exmat_body_read_point_compliance(const exmat_body* body, const exmat_points* points,
                                                         double* compliance) EXMAT_NOEXCEPT;
 
@@ -352,7 +352,7 @@ EXMAT_API exmat_status exmat_body_read_contact_load(const exmat_body* body, int6
    earlier, motion, applied forces, targets, contacts. Bodies of the same bundle, settings or scene, with the same
    obstacles, take it and go on to the last bit, in this version of the library. */
 
-/* How many numbers it has now: the same for all bodies of a model in one space, but for 10 for each contact. Negative
+/* Count of its numbers now: the same for all bodies of a model in one space, but for 10 for each contact. Negative
    where `body` is NULL. */
 EXMAT_API int64_t exmat_body_state_size(const exmat_body* body) EXMAT_NOEXCEPT;
 

@@ -63,6 +63,27 @@ ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_c
   set_zero(set.modes());
 }
 
+bool ContactWorkspace::add_candidate(std::size_t number, double own_potential) noexcept {
+  const ContactCandidate& candidate = candidates[number];
+  if (candidate.normal_force > 0) {
+    ++touching;
+    stiffness += candidate.normal_stiffness();
+  }
+  if (!candidate.is_loaded()) return false;
+  loaded[loaded_count++] = number;
+  force += candidate.force;
+  torque += candidate.arm.cross(candidate.force);
+  potential += own_potential;
+  return true;
+}
+
+void ContactWorkspace::refresh_friction(FrictionChange& change) noexcept {
+  for (const std::size_t number : std::span(loaded).first(loaded_count)) {
+    ContactCandidate& candidate = candidates[number];
+    change.refresh(obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
+  }
+}
+
 ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   const auto count = static_cast<int>(data.areas.size());
   const VertexArray rest = data.positions.rowwise() - origin.transpose();
@@ -315,15 +336,7 @@ void ContactSet::evaluate_batch(const BodyPose& pose, bool is_first, Batch& batc
     const std::size_t number = batch.candidates[static_cast<std::size_t>(index)];
     if (is_first && has_steady_distance(placed, candidate))
       workspace.clearances[number] = clearance_of(candidate, point);
-    if (candidate.normal_force > 0) {
-      ++workspace.touching;
-      workspace.stiffness += candidate.normal_stiffness();
-    }
-    if (!candidate.is_loaded()) continue;
-    workspace.loaded[workspace.loaded_count++] = number;
-    workspace.force += candidate.force;
-    workspace.torque += candidate.arm.cross(candidate.force);
-    workspace.potential += potential;
+    if (!workspace.add_candidate(number, potential)) continue;
     batch.vectors.col(loaded) = pose.rotation.transpose() * candidate.force;
     batch.vertices[static_cast<std::size_t>(loaded++)] = candidate.vertex;
   }
@@ -362,11 +375,10 @@ double ContactSet::potential_of(const BodyPose& pose, Batch& batch, ContactWorks
 }
 
 void ContactSet::refresh_friction(ContactWorkspace& workspace, FrictionChange& change) const noexcept {
-  if (workspace.are_all_planes) return workspace.planes.refresh_friction(change);
-  for (const std::size_t number : std::span(workspace.loaded).first(workspace.loaded_count)) {
-    ContactCandidate& candidate = workspace.candidates[number];
-    change.refresh(workspace.obstacles[static_cast<std::size_t>(candidate.obstacle)].obstacle->friction, candidate);
-  }
+  if (workspace.are_all_planes)
+    workspace.planes.refresh_friction(change);
+  else
+    workspace.refresh_friction(change);
 }
 
 double ContactSet::refresh_friction(ContactWorkspace& workspace) const noexcept {

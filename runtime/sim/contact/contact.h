@@ -73,6 +73,12 @@ struct ContactWorkspace : ContactSums {
   PlaneContacts planes;         ///< the candidates
   bool are_all_planes = false;  ///< that stand: what evaluations find is in `planes`, until commit()
 
+  /// Adds what a candidate that was just evaluated feels, its number and its W [J], to the sums; true if it feels
+  /// anything.
+  bool add_candidate(std::size_t number, double potential) noexcept;
+  /// Takes lambda of candidates one by one from the last evaluation.
+  void refresh_friction(FrictionChange& change) noexcept;
+
   // Of the last gather().
   int visited_nodes = 0;
   int tested_vertices = 0;

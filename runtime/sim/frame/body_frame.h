@@ -74,7 +74,7 @@ class BodyFrame {
     return false;
   }
 
-  /// Where a body that steps in full space stands, and its momenta; q and v are of the modes nearest to it there.
+  /// Takes place, motion and momenta of a body that steps in full space; q and v are of the modes nearest to it there.
   virtual void adopt(const FrameMotion& /*motion*/, const FrameMomenta& /*momenta*/, const Eigen::VectorXd& /*q*/,
                      const Eigen::VectorXd& /*v*/, FrameWorkspace& /*workspace*/,
                      FrameState& /*state*/) const noexcept {}

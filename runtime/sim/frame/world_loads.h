@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -28,6 +29,12 @@ struct WorldLoads {
   Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
   std::vector<ScriptedForce> forces;
   std::optional<RigidMotion> carrier;  ///< of a body that is carried: what carries its fixed part
+
+  /// True if a force begins or ends between two times.
+  bool forces_jump(double from, double to) const noexcept {
+    return std::ranges::any_of(forces,
+                               [=](const ScriptedForce& force) { return force.acts_at(from) != force.acts_at(to); });
+  }
 };
 
 }  // namespace exmat::runtime

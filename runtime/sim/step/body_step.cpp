@@ -142,9 +142,8 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) {
 bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept {
   if (state.begins_anew || scene.begins_anew) return true;
   const double midpoint = state.time + 0.5 * scene.time_step;
-  for (const ScriptedForce& force : scene.forces)
-    if (force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step)) return true;
-  return model.frame->jumps(scene, midpoint - scene.time_step, midpoint);
+  const double before = midpoint - scene.time_step;
+  return scene.forces_jump(before, midpoint) || model.frame->jumps(scene, before, midpoint);
 }
 
 BodyStep::BodyStep(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept

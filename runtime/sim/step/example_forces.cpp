@@ -36,18 +36,21 @@ void solve_target(const ExampleModel& model, int most_iterations, const ExampleS
   }
 }
 
+void set_weights(const ExampleWeights& weights, const ExampleSettings& settings, const Eigen::VectorXd& coordinates,
+                 ExampleWorkspace& workspace) noexcept {
+  if (settings.given_weights.size() > 0) {
+    workspace.weights = settings.given_weights;
+    return;
+  }
+  weights.solve(coordinates, workspace.weights_solver, workspace.weights);
+  apply_example_bias(settings.bias, workspace.weights);
+}
+
 void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
                       Workspace& workspace) noexcept {
   const StageTimer timer(workspace.profile, Stage::kWeights);
   for (std::size_t i = 0; i < scene.examples.size(); ++i) {
-    if (!acts(scene.examples[i])) continue;
-    ExampleWorkspace& scratch = workspace.examples[i];
-    if (scene.examples[i].given_weights.size() > 0) {
-      scratch.weights = scene.examples[i].given_weights;
-      continue;
-    }
-    model.examples[i].weights.solve(q, scratch.weights_solver, scratch.weights);
-    apply_example_bias(scene.examples[i].bias, scratch.weights);
+    if (acts(scene.examples[i])) set_weights(model.examples[i].weights, scene.examples[i], q, workspace.examples[i]);
   }
 }
 

@@ -9,6 +9,10 @@ namespace exmat::runtime {
 // The example forces of a step, that of the whole body and those of regions: independent of each other, they add up.
 // docs/step_in_detail.md, "Target". No call allocates or throws. Those that do not act are left out.
 
+/// Sets the weights in the workspace: those given, or those of the coordinates that `weights` takes, after the bias.
+void set_weights(const ExampleWeights& weights, const ExampleSettings& settings, const Eigen::VectorXd& coordinates,
+                 ExampleWorkspace& workspace) noexcept;
+
 /// Weights after the bias at the pose q [r], into the workspace.
 void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
                       Workspace& workspace) noexcept;

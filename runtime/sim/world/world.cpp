@@ -46,6 +46,7 @@ void World::add(const BodyKind& kind, State& state) {
   against_.resize(bodies_.size() + 1);
   if (kind.surface) touching_.push_back(count());
   member.crowd_kind = crowd_.add(*kind.model, *kind.scene);
+  if (kind.full != nullptr && kind.scene->space.space != Space::kReduced) reserve_full(kind);
   bodies_.push_back(std::move(member));
 }
 
@@ -124,10 +125,8 @@ Workspace& World::scratch(int body) noexcept {
 
 void World::prepare(int threads) {
   crowd_.prepare(threads);
-  for (const Member& own : bodies_) {
-    if (own.kind.full != nullptr && own.kind.scene->space.space != Space::kReduced) reserve_full(own.kind);
+  for (const Member& own : bodies_)
     if (own.full != nullptr) own.full->fit(*own.kind.full, *own.kind.scene);
-  }
 }
 
 /// Scratch for the first body of a kind that enters full space: later ones make theirs as they enter.
@@ -163,7 +162,7 @@ bool World::is_in_island(int body) const noexcept {
   return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
 }
 
-/// Which bodies step in full space; those of an island do not.
+/// Puts each body into the space of its next step; those of an island step in the modes.
 void World::choose_spaces() {
   for (int i = 0; i < count(); ++i) {
     Member& own = at(i);

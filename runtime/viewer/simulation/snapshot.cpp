@@ -57,9 +57,7 @@ BodySnapshot Simulation::body_snapshot(std::size_t index, const SnapshotRequest&
   body.read_placement(placement);
   std::ranges::transform(placement, snapshot.placement.begin(),
                          [](double number) { return static_cast<float>(number); });
-  if (body.space() == EXMAT_SPACE_FULL) {
-    snapshot.positions = positions(index);
-  }
+  if (body.space() == EXMAT_SPACE_FULL) snapshot.positions = positions(index);
   snapshot.energies = body.energies();
   snapshot.motion = body.motion();
   if (request.colouring == Colouring::kStrainEnergy) {

@@ -283,9 +283,11 @@ TEST(FullBody, StepsInTheSpaceThatAWorldChooses) {
   };
   EXPECT_EQ(space_after(3), Space::kReduced);
   state.vertex_force.tail<3>() = Eigen::Vector3d(0, 5, 0);
+  state.applied_force = twin.full().basis.transpose() * state.vertex_force;
   EXPECT_EQ(space_after(1), Space::kFull);
   EXPECT_EQ(space_after(50), Space::kFull);
   state.vertex_force.setZero();
+  state.applied_force.setZero();
   EXPECT_EQ(space_after(19), Space::kFull);
   EXPECT_EQ(space_after(3), Space::kReduced);
   scene.space.space = Space::kFull;

@@ -33,7 +33,7 @@ void set_full(const FullModel& full, const Model& model, const State& state, Ful
   motion.begins_anew = true;
 }
 
-/// The reduced coordinates and the frame nearest to where the body is; with momenta that it has.
+/// Sets the reduced coordinates and the frame nearest to where the last step has left the body, with its momenta.
 void set_reduced(const FullModel& full, const Model& model, Workspace& workspace, FullWorkspace& own,
                  State& state) noexcept {
   const FullMotion& motion = *state.full;
@@ -41,10 +41,7 @@ void set_reduced(const FullModel& full, const Model& model, Workspace& workspace
   FrameMotion frame;
   FrameMomenta momenta;
   if (full.rigid) {
-    RigidWorkspace& rigid = own.potential.rigid;
-    full.space.to_field(motion.q, own.trial);
-    full.space.to_field(motion.v, own.field);
-    full.rigid->place(own.trial.data(), rigid);
+    const RigidWorkspace& rigid = own.potential.rigid;
     momenta = full.rigid->momenta(own.field.data(), rigid);
     frame.position = rigid.centre - full.rigid->centre_at_rest();
     frame.orientation = Eigen::Quaterniond(rigid.rotation);
@@ -78,13 +75,8 @@ void find_target(const FullModel& full, const Model& model, const StepScene& sce
   const ExampleSettings& settings = scene.examples.front();
   const FullExamples& examples = *full.examples;
   ExampleWorkspace& scratch = workspace.examples.front();
-  if (settings.given_weights.size() > 0) {
-    scratch.weights = settings.given_weights;
-  } else {
-    step.first_coefficients(own.coefficients_there);
-    examples.weights.solve(own.coefficients_there, scratch.weights_solver, scratch.weights);
-    apply_example_bias(settings.bias, scratch.weights);
-  }
+  if (settings.given_weights.size() == 0) step.first_coefficients(own.coefficients_there);
+  set_weights(examples.weights, settings, own.coefficients_there, scratch);
   if (examples.table) {
     examples.table->evaluate(scratch.weights, own.table, own.target);
   } else {
@@ -116,7 +108,8 @@ bool asks_for_full_space(const StepScene& scene, const StepReport& last, State& 
   const SpaceSettings& settings = scene.space;
   if (settings.space != Space::kAuto) return settings.space == Space::kFull;
   const double midpoint = state.time + 0.5 * scene.time_step;
-  const bool acts = !state.vertex_force.isZero(0) || (settings.contact && last.contacts > 0) ||
+  // That of the caller has a part in the modes, which are far fewer than the vertices.
+  const bool acts = !state.applied_force.isZero(0) || (settings.contact && last.contacts > 0) ||
                     (settings.forces && std::ranges::any_of(scene.forces, [&](const ScriptedForce& force) {
                        return force.acts_at(midpoint);
                      }));
@@ -187,9 +180,7 @@ StepReport step_in_full_space(const FullModel& full, const Model& model, const S
 
 Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept {
   if (!state.full) return energies(model, scene, state);
-  const FullMotion& motion = *state.full;
-  return {full->space.kinetic_energy(motion.v), motion.elastic_energy,
-          -(full->space.gravity_load() * scene.gravity).dot(motion.q), 0};
+  return energies_of(*full, scene, *state.full);
 }
 
 }  // namespace exmat::runtime

@@ -17,11 +17,11 @@ void prepare_full(const FullModel& full, State& state);
 void enter_full_space(const FullModel& full, const Model& model, State& state);
 void leave_full_space(State& state) noexcept;
 
-/// Whether the scene has the body's next step in full space: by `space`, and where that is `auto` since a load acts or
-/// has acted that asks for it. `last` is the body's last step. Counts how long the body was left alone.
+/// True if the body's next step is to be in full space: the scene says so, or it says `auto` and a load acts, or has
+/// acted lately, that asks for it. `last` is the body's last step. Counts how long the body was left alone.
 bool asks_for_full_space(const StepScene& scene, const StepReport& last, State& state) noexcept;
 
-/// Where a body's frame stands and how it moves.
+/// The place and the motion of a body's frame.
 struct RigidPlace {
   Placement placement;
   FrameVelocity velocity;
@@ -33,12 +33,6 @@ void move_full(const FullModel& full, const Model& model, const RigidPlace& befo
 /// steps, whose contacts are then those of this one.
 StepReport step_in_full_space(const FullModel& full, const Model& model, const StepScene& scene, State& state,
                               Workspace& workspace, FullWorkspace& own) noexcept;
-
-/// World position [m] of a vertex of the mesh, at rest at `rest`, of a body in full space.
-inline Eigen::Vector3d vertex_position(const FullModel& full, const State& state, Eigen::Index vertex,
-                                       const Eigen::Vector3d& rest) noexcept {
-  return rest + full.space.displacement(vertex, state.full->q);
-}
 
 /// runtime::energies() of a body in the space that it is in.
 Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept;

@@ -61,15 +61,7 @@ double FullContacts::evaluate(const double* u, ContactWorkspace& contact, double
     candidate.arm = here;
     const double potential =
         evaluate_contact(contact.obstacles[static_cast<std::size_t>(candidate.obstacle)], here, candidate);
-    if (candidate.normal_force > 0) {
-      ++contact.touching;
-      contact.stiffness += candidate.normal_stiffness();
-    }
-    if (!candidate.is_loaded()) continue;
-    contact.loaded[contact.loaded_count++] = i;
-    contact.potential += potential;
-    contact.force += candidate.force;
-    contact.torque += here.cross(candidate.force);
+    if (!contact.add_candidate(i, potential)) continue;
     square += candidate.force.squaredNorm();
     Eigen::Map<Eigen::Vector3d>(gradient + 4 * places_[static_cast<std::size_t>(candidate.vertex)]) -= candidate.force;
   }

@@ -43,19 +43,8 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
   for (Eigen::Index v = 0; v < object.mesh.vertex_count(); ++v)
     if (const std::int32_t number = full->space.number(v); number >= 0)
       full->basis.middleRows<3>(3 * number) = reduced.modal->basis.middleRows<3>(3 * v);
-  // As three scalar problems; fields and displacements order vertices differently.
-  const FullSpace::Scalar mass = full->space.mass();
   full->projection.resize(full->basis.rows(), full->basis.cols());
-  Eigen::MatrixXd mode(full->space.vertices(), 3);
-  for (Eigen::Index i = 0; i < model.modes(); ++i) {
-    const Eigen::VectorXd field = full->space.to_field(full->basis.col(i));
-    for (int a = 0; a < 3; ++a) mode.col(a) = field(Eigen::seqN(a, mode.rows(), 4));
-    const Eigen::MatrixXd moved = mass * mode;
-    Eigen::VectorXd momentum = Eigen::VectorXd::Zero(field.size()), column(full->space.size());
-    for (int a = 0; a < 3; ++a) momentum(Eigen::seqN(a, mode.rows(), 4)) = moved.col(a);
-    full->space.from_field(momentum, column);
-    full->projection.col(i) = column;
-  }
+  for (Eigen::Index i = 0; i < model.modes(); ++i) full->projection.col(i) = full->space.momentum(full->basis.col(i));
   return {std::move(full), {}};
 }
 

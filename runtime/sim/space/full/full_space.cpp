@@ -246,14 +246,25 @@ void FullSpace::from_field(const Eigen::VectorXd& field, Eigen::VectorXd& x) con
     x.segment<3>(3 * vertex_of_[k]) = field.segment<3>(static_cast<Eigen::Index>(4 * k));
 }
 
-double FullSpace::kinetic_energy(const Eigen::VectorXd& v) const noexcept {
-  double sum = 0;
+template <typename Use>
+void FullSpace::for_momenta(const Eigen::VectorXd& v, const Use& use) const {
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
     for (auto k = static_cast<std::size_t>(row_starts_[i]); k < static_cast<std::size_t>(row_starts_[i + 1]); ++k)
       momentum += mass_[k] * v.segment<3>(3 * number_at(columns_[k]));
-    sum += momentum.dot(v.segment<3>(3 * number_at(rows_[i])));
+    use(number_at(rows_[i]), momentum);
   }
+}
+
+Eigen::VectorXd FullSpace::momentum(const Eigen::VectorXd& v) const {
+  Eigen::VectorXd all(v.size());
+  for_momenta(v, [&](std::int32_t vertex, const Eigen::Vector3d& own) { all.segment<3>(3 * vertex) = own; });
+  return all;
+}
+
+double FullSpace::kinetic_energy(const Eigen::VectorXd& v) const noexcept {
+  double sum = 0;
+  for_momenta(v, [&](std::int32_t vertex, const Eigen::Vector3d& own) { sum += own.dot(v.segment<3>(3 * vertex)); });
   return 0.5 * sum;
 }
 

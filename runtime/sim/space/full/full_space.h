@@ -53,11 +53,13 @@ class FullSpace {
     return place(vertex) < 0 ? -1 : vertex_of_[static_cast<std::size_t>(place(vertex))];
   }
   std::int32_t number_at(Eigen::Index place) const { return vertex_of_[static_cast<std::size_t>(place)]; }
-  /// 1/2 v^T M v of velocities [f].
+  /// M v [f] of velocities v, and 1/2 v^T M v.
+  Eigen::VectorXd momentum(const Eigen::VectorXd& v) const;
   double kinetic_energy(const Eigen::VectorXd& v) const noexcept;
   /// Where a vertex of the mesh is displaced to by q [f].
   Eigen::Vector3d displacement(Eigen::Index vertex, const Eigen::VectorXd& q) const {
-    return number(vertex) < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(q.segment<3>(3 * number(vertex)));
+    const std::int32_t own = number(vertex);
+    return own < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(q.segment<3>(3 * own));
   }
   Eigen::Index mesh_vertices() const { return std::ssize(place_of_); }
 
@@ -86,6 +88,10 @@ class FullSpace {
                           float* tangents) const noexcept;
 
  private:
+  /// Calls `use(number, M v)` with the number and the momentum of each vertex that moves.
+  template <typename Use>
+  void for_momenta(const Eigen::VectorXd& v, const Use& use) const;
+
   void order_vertices(const TetMesh& mesh, const FlagVector& fixed);
   void add_matrices(const TetMesh& mesh, const TetMaterials& materials);
   void add_elements(const Elements& elements, const TetMaterials& materials);

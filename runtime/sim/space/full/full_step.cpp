@@ -15,14 +15,17 @@ constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
 constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
 
+bool may_touch(const FullModel& model, const StepScene& scene) { return model.contacts && !scene.obstacles.empty(); }
+
 FullWorkspace::Key key_of(const FullModel& model, const StepScene& scene) {
-  const bool acts = !scene.examples.empty();
+  const bool has_examples = !scene.examples.empty();
   return {scene.time_step,
-          scene.integrator == Integrator::kBdf2 ? 1.0 : 0.0,
           scene.mass_damping,
           scene.stiffness_damping,
-          acts ? scene.examples.front().stiffness : 0,
-          (acts ? scene.examples.front().damping : 0) + (model.contacts && !scene.obstacles.empty() ? 0.0 : -1.0)};
+          has_examples ? scene.examples.front().stiffness : 0,
+          has_examples ? scene.examples.front().damping : 0,
+          scene.integrator == Integrator::kBdf2,
+          may_touch(model, scene)};
 }
 
 FullWorkspace::Linear make_linear(const FullModel& model, const StepScene& scene, double time_scale, bool touches) {
@@ -39,11 +42,8 @@ FullWorkspace::Linear make_linear(const FullModel& model, const StepScene& scene
 }
 
 bool jumps(const StepScene& scene, const Motion& state) {
-  if (state.begins_anew || scene.begins_anew) return true;
   const double midpoint = state.time + 0.5 * scene.time_step;
-  return std::ranges::any_of(scene.forces, [&](const ScriptedForce& force) {
-    return force.acts_at(midpoint) != force.acts_at(midpoint - scene.time_step);
-  });
+  return state.begins_anew || scene.begins_anew || scene.forces_jump(midpoint - scene.time_step, midpoint);
 }
 
 }  // namespace
@@ -92,7 +92,7 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
 
 void FullWorkspace::fit(const FullModel& model, const StepScene& scene) {
   const Key wanted = key_of(model, scene);
-  const bool touches = model.contacts && !scene.obstacles.empty();
+  const bool touches = wanted.may_touch;
   if (touches && contact.blocks.size() < static_cast<std::size_t>(model.contacts->vertices()))
     contact = FullContactScratch(model.contacts->vertices());
   if (key == wanted) return;
@@ -131,7 +131,7 @@ void FullStep::gather_external_force() noexcept {
     if (force.acts_at(midpoint)) external += force.on_vertices;
 }
 
-// With u and v as fields in the workspace's `trial` and `field`.
+// Takes u and v, fields in the workspace's `trial` and `field`.
 bool FullStep::find_contacts() noexcept {
   if (!model_.contacts || contacts_.found == nullptr) return false;
   const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
@@ -210,8 +210,8 @@ void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
   }
 }
 
-// solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a single
-// one.
+// Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a
+// single one.
 void FullStep::precondition() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
@@ -229,7 +229,7 @@ void FullStep::precondition() noexcept {
   }
 }
 
-// image = A search.
+// Sets image = A search.
 void FullStep::multiply() noexcept {
   const Kernels& run = kernels();
   FullWorkspace& work = workspace_;
@@ -373,10 +373,7 @@ NewtonStatus FullStep::minimise_with_friction() noexcept {
   for (int round = 1;; ++round) {
     const NewtonStatus status = minimise();
     FrictionChange friction;
-    for (const std::size_t number : std::span(contacts_.found->loaded).first(contacts_.found->loaded_count)) {
-      ContactCandidate& candidate = contacts_.found->candidates[number];
-      friction.refresh(scene_.obstacles[static_cast<std::size_t>(candidate.obstacle)]->friction, candidate);
-    }
+    contacts_.found->refresh_friction(friction);
     if (status == NewtonStatus::kNonFinite || round == kFrictionRounds || friction.relative() <= kSameFriction)
       return status;
     tangents_are_current_ = false;
@@ -395,14 +392,11 @@ void FullStep::add_external_impulse() noexcept {
 }
 
 // Momenta are those of the start and of the forces of the solution: damping and example force have none, and the turn
-// of the step is not the integrator's to take away.
+// of the step is not the integrator's to take away. Takes v, a field in the workspace's `field`.
 void FullStep::correct_momenta() noexcept {
   FullWorkspace& work = workspace_;
-  RigidWorkspace& rigid = work.potential.rigid;
+  const RigidWorkspace& rigid = work.potential.rigid;
   const double dt = scene_.time_step;
-  space_.to_field(state_.q, work.trial);
-  space_.to_field(state_.v, work.field);
-  model_.rigid->place(work.trial.data(), rigid);
   add_external_impulse();
   FrameMomenta lacking = expected_momenta_;
   if (near_) {
@@ -420,7 +414,9 @@ void FullStep::correct_momenta() noexcept {
 void FullStep::limit_energy(double allowed) noexcept {
   const Energies now = energies(model_, scene_, state_, workspace_);
   const double limit = std::max(0.0, allowed - now.elastic - now.potential);
-  if (now.kinetic > limit) state_.v *= std::sqrt(limit / now.kinetic);
+  if (now.kinetic <= limit) return;
+  state_.v *= std::sqrt(limit / now.kinetic);
+  space_.to_field(state_.v, workspace_.field);
 }
 
 const FullReport& FullStep::finish() noexcept {
@@ -450,16 +446,17 @@ const FullReport& FullStep::finish() noexcept {
     report_.contacts = contacts_.found->touching;
     report_.contact_force = contacts_.found->force;
   }
+  if (model_.rigid || near_) {
+    space_.to_field(state_.q, workspace_.trial);
+    space_.to_field(state_.v, workspace_.field);
+  }
+  if (near_) model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
+  if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
   if (unbalanced)
     limit_energy(energy);
   else if (model_.rigid)
     correct_momenta();
-  if (near_) {
-    space_.to_field(state_.q, workspace_.trial);
-    model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
-  } else if (contacts_.held != nullptr) {
-    contacts_.held->count = 0;
-  }
+  if (!near_ && contacts_.held != nullptr) contacts_.held->count = 0;
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
   state_.begins_anew = near_;
@@ -488,12 +485,15 @@ State make_state(const FullModel& model, FullWorkspace& workspace) {
   return make_state(model, rest, rest, workspace);
 }
 
+Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state) noexcept {
+  const Eigen::Vector3d weight = model.space.gravity_load().transpose() * state.q;
+  return {model.space.kinetic_energy(state.v), state.elastic_energy, -weight.dot(scene.gravity)};
+}
+
 Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept {
-  // Elasticity at q, and the inertia of c_a = 1 and q_a = q - v.
   StepForm& form = workspace.form;
-  form.velocity_factor = form.acceleration_factor = 1;
-  form.velocity_centre = state.q;
-  form.acceleration_centre = state.q - state.v;
+  form.velocity_factor = form.acceleration_factor = 0;
+  form.velocity_centre = form.acceleration_centre = state.q;
   const StepScene bare;
   FullPotential potential(model, bare, form, workspace.potential);
   workspace.external.setZero();
@@ -501,8 +501,7 @@ Energies energies(const FullModel& model, const StepScene& scene, Motion& state,
   workspace.d.setZero();
   potential.evaluate_elements(workspace.d, FullPotential::Tangents::kNone, false);
   state.elastic_energy = potential.elastic_energy();
-  const double kinetic = potential.undamped() - potential.elastic_energy();
-  return {kinetic, state.elastic_energy, -(model.space.gravity_load() * scene.gravity).dot(state.q)};
+  return energies_of(model, scene, state);
 }
 
 }  // namespace exmat::runtime

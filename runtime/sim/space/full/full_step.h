@@ -49,12 +49,16 @@ struct FullWorkspace {
     std::vector<float> matrix;  ///< M (c_a + alpha c_v) + (1 + beta c_v) V, see Kernels::mesh_product()
     float filter_stiffness = 0;
   };
-  /// Numbers of a scene that factors are made of.
-  using Key = std::array<double, 6>;
+  /// The settings of a scene that factors are made of.
+  struct Key {
+    double time_step = 0, mass_damping = 0, stiffness_damping = 0, example_stiffness = 0, example_damping = 0;
+    bool bdf2 = false, may_touch = false;
+    bool operator==(const Key&) const = default;
+  };
 
   FullAccuracy accuracy;
   Linear first, second;  ///< of backward Euler, of BDF2
-  Key key{};
+  Key key;
   StepForm form;
   FullPotentialWorkspace potential;
   Eigen::VectorXd external, moved, rate, acceleration;               ///< f
@@ -118,8 +122,8 @@ class FullStep {
 
   void solve() noexcept;
 
-  /// The state of the end, unless a number is not finite. Its elastic energy is that of the last evaluation: see
-  /// energies().
+  /// Sets the state of the end, unless a number is not finite. Its elastic energy is that of the last evaluation: see
+  /// energies(). Of a free body the workspace then holds where it stands, and in `field` its velocities.
   const FullReport& finish() noexcept;
 
   bool is_near() const noexcept { return near_; }
@@ -175,7 +179,9 @@ FullReport step(const FullModel& model, const StepScene& scene, Motion& state, F
 State make_state(const FullModel& model, FullWorkspace& workspace);
 State make_state(const FullModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& v, FullWorkspace& workspace);
 
-/// As runtime::energies(); sets the state's elastic energy.
+/// Energies of a state, as runtime::energies().
+Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state) noexcept;
+/// The same, its elastic energy evaluated and set.
 Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept;
 
 }  // namespace exmat::runtime
