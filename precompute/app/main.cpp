@@ -1,5 +1,7 @@
 #include <CLI/CLI.hpp>
+#include <cstdlib>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include "common/config/config.h"
 #include "common/console/console.h"
@@ -184,8 +186,18 @@ int run(std::vector<char*> words) {
   });
 }
 
+/// Threads of OpenMP that wait take the processor from those that work, where a machine has other things to do. OpenMP
+/// reads how they are to wait before main() begins, so the program is started once more, unless its user has said it.
+void wait_passively(char** argv) {
+  if (std::getenv("OMP_WAIT_POLICY") != nullptr || std::getenv("GOMP_SPINCOUNT") != nullptr) return;
+  setenv("OMP_WAIT_POLICY", "passive", 1);
+  setenv("GOMP_SPINCOUNT", "400", 1);  // pauses of a processor: 20 us at most
+  execv("/proc/self/exe", argv);       // returns where there is none: then they spin
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
+  wait_passively(argv);
   return precompute::run_on_ranks([&] { return run({argv, argv + argc}); });
 }
