@@ -366,7 +366,8 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
       whole.rigid = rigid_moments(object_.mesh, object_.materials.density, model.modal->basis);
     const RollOut run = final_roll_out(stages, whole, motions);
     return fidelity_of({whole, run, choice.exact, choice.modal, motions.set.runs, motions.set.heldout, choice.trained,
-                        motions.reason, motions.elements ? TrainingSpace::kModes : TrainingSpace::kFullSpace});
+                        motions.reason, motions.loads,
+                        motions.elements ? TrainingSpace::kModes : TrainingSpace::kFullSpace});
   });
   auto& entry = *std::ranges::find(report_.ledger, "fidelity", &LedgerEntry::group);
   entry.included = true;
@@ -375,6 +376,13 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
   log::info(fmt::format("fidelity: {:.2f} % from {} in {} held-out runs, {:.2f} % of modes alone; {}",
                         100 * found.shape_error, motions.elements ? "a body of many modes" : "the full space",
                         found.heldout_runs, 100 * found.modal_error, found.advice));
+  constexpr double kWorse = 1.1, kSmall = 0.02;  // times the error of modes; an error that is none
+  if (found.shape_error > std::max(kWorse * found.modal_error, kSmall))
+    warn(report_.warnings,
+         fmt::format(
+             "training made the body worse: it is {:.2g} % from the full space in held-out runs, modes alone with "
+             "all elements {:.2g} %; {}, or basis.training \"none\"",
+             100 * found.shape_error, 100 * found.modal_error, found.advice));
 }
 
 void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {

@@ -66,11 +66,16 @@ std::string advice(const FidelityInput& input, const FidelityData& fidelity, con
   }
   if (const double lost = largest_loss(input.model); lost > kLost)
     return fmt::format(
-        "near the full space; more shape_space.eigenfunctions would bring it nearer to the poses, of "
+        "near the full space under the loads that were tried; more shape_space.eigenfunctions would bring it nearer to "
+        "the poses, of "
         "which they lose {:.0f} %",
         100 * lost);
-  return "near the full space under these loads; train on others (basis.loads, or another scene) if it is to serve "
-         "them";
+  const bool free = !input.model.object->fixed.any();
+  return fmt::format(
+      "near the full space under what was tried: {}; not tried: {}: train on them (basis.loads, or a scene) if it is "
+      "to "
+      "serve them",
+      tried_text(input.tried, free), untried_text(input.tried, free));
 }
 
 }  // namespace

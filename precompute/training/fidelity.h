@@ -4,6 +4,7 @@
 
 #include "common/model/reduced_model.h"
 #include "precompute/training/roll_out.h"
+#include "precompute/training/training_loads.h"
 
 namespace exmat::precompute {
 
@@ -17,6 +18,7 @@ struct FidelityInput {
   const TrainingRuns& heldout;
   bool trained = false;                             ///< which basis it has
   std::string loads;                                ///< whose loads these are
+  const TrainingLoads& tried;                       ///< what the runs were under
   TrainingSpace space = TrainingSpace::kFullSpace;  ///< what the runs had
 };
 

@@ -121,6 +121,33 @@ TrainingPlan plan_training(const TrainingConfig& config, const SceneConfig* scen
   return {unknown_loads(body), true, "examples, gravity and pushes of all kinds, since no loads are known"};
 }
 
+std::string tried_text(const TrainingLoads& loads, bool free) {
+  std::vector<std::string> tried;
+  if (const double gravity = loads.gravity.norm(); gravity > 0 && !free)
+    tried.push_back(fmt::format("gravity of {:.3g} m/s^2{}", gravity, loads.any_gravity ? " in any direction" : ""));
+  for (const runtime::ExampleSettings& force : loads.examples) {
+    if (!runtime::acts(force)) continue;
+    const double most = std::exp(stiffness_spread(loads));
+    tried.push_back(fmt::format("example forces of kappa {:.2g} to {:.2g} 1/s^2 and bias {:.2g} to {:.2g}",
+                                force.stiffness / most, force.stiffness * most, std::max(0.0, force.bias - kBiasSpread),
+                                std::min(1.0, force.bias + kBiasSpread)));
+  }
+  if (!loads.forces.empty()) tried.push_back(fmt::format("{} forces on vertices", loads.forces.size()));
+  if (loads.patches) tried.emplace_back("pushes on patches of the surface");
+  if (loads.obstacle && free) tried.push_back(fmt::format("throws at a plane with {:.3g} m/s", loads.velocity.norm()));
+  return fmt::format("{}", fmt::join(tried, ", "));
+}
+
+std::string untried_text(const TrainingLoads& loads, bool free) {
+  std::vector<std::string> untried;
+  if (loads.gravity.isZero(0) && !free) untried.emplace_back("gravity");
+  if (std::ranges::none_of(loads.examples, runtime::acts)) untried.emplace_back("example forces");
+  if (loads.forces.empty() && !loads.patches) untried.emplace_back("forces on vertices");
+  if (!loads.obstacle) untried.emplace_back("contact");
+  untried.emplace_back("stronger or weaker ones");
+  return fmt::format("{}", fmt::join(untried, ", "));
+}
+
 std::string text_of(const TrainingLoads& loads) {
   std::string text = fmt::format("gravity {} {}\ndirections {} patches {} stiffness {}\n", text_of(loads.gravity),
                                  loads.any_gravity, loads.any_direction, loads.patches, loads.any_stiffness);

@@ -69,6 +69,15 @@ struct TrainingPlan {
 TrainingPlan plan_training(const TrainingConfig& config, const SceneConfig* scene,
                            const std::vector<std::vector<std::int64_t>>& forces, const TrainingBody& body);
 
+/// How much stronger or weaker than TrainingLoads::examples the runs' are at most, as a logarithm, and how far their
+/// bias is from theirs.
+constexpr double stiffness_spread(const TrainingLoads& loads) { return loads.any_stiffness ? 2.0 : 0.7; }
+inline constexpr double kBiasSpread = 0.3;
+
+/// In words: what runs under these loads have tried, and which kinds of loads they have not.
+std::string tried_text(const TrainingLoads& loads, bool free);
+std::string untried_text(const TrainingLoads& loads, bool free);
+
 /// All of it, for hashes.
 std::string text_of(const TrainingLoads& loads);
 

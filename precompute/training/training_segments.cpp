@@ -101,12 +101,12 @@ Segment SegmentDrawer::segment() {
     const Eigen::Vector3d varied = vary(force.force, 0.4, 1.4, 0.3, loads_.any_direction);
     if (!ceased) segment.forces.push_back({force.vertices, varied});
   }
-  const double spread = loads_.any_stiffness ? 2.0 : 0.7;
+  const double spread = stiffness_spread(loads_);
   for (const runtime::ExampleSettings& examples : loads_.examples) {
     runtime::ExampleSettings varied = examples;
     varied.stiffness *= std::exp(uniform(-spread, spread));
     varied.damping *= uniform(0.5, 2);
-    varied.bias = std::clamp(examples.bias + uniform(-0.3, 0.3), 0.0, 1.0);
+    varied.bias = std::clamp(examples.bias + uniform(-kBiasSpread, kBiasSpread), 0.0, 1.0);
     segment.examples.push_back(varied);
   }
   if (loads_.patches)

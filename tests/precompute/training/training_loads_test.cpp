@@ -51,6 +51,22 @@ TEST(TrainingLoads, SayWhetherTheyDeformTheBody) {
   EXPECT_TRUE(loads.deforms(true));
 }
 
+TEST(TrainingLoads, AreNamedAsTriedOrNot) {
+  const TrainingBody body{.free = false, .size = 1, .angular_frequency = 10, .groups = {""}};
+  const TrainingLoads unknown = unknown_loads(body);
+  // kappa: 40 omega_1^2 times exp(-2) to exp(2).
+  EXPECT_EQ(tried_text(unknown, false),
+            "gravity of 9.81 m/s^2 in any direction, example forces of kappa 5.4e+02 to 3e+04 1/s^2 and bias 0.5 to 1, "
+            "pushes on patches of the surface");
+  EXPECT_EQ(untried_text(unknown, false), "contact, stronger or weaker ones");
+  EXPECT_EQ(untried_text({}, false), "gravity, example forces, forces on vertices, contact, stronger or weaker ones");
+  TrainingLoads thrown;
+  thrown.obstacle.emplace();
+  thrown.velocity = {0, 0, -3};
+  EXPECT_EQ(tried_text(thrown, true), "throws at a plane with 3 m/s");
+  EXPECT_EQ(untried_text(thrown, true), "example forces, forces on vertices, stronger or weaker ones");
+}
+
 TEST(TrainingPlan, TakesTheSceneThenTheAssetThenWhatThereIs) {
   const SceneConfig scene = scene_with_examples();
   TrainingConfig config;
