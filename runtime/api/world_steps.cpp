@@ -1,14 +1,13 @@
 #include <algorithm>
 #include <cinttypes>
 #include <new>
-#include <omp.h>
 
 #include "common/core/fnv_hash.h"
+#include "common/core/thread_team.h"
 #include "common/core/timer.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_steps.h"
-#include "runtime/api/startable_threads.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/scene/bodies.h"
 
@@ -151,8 +150,8 @@ exmat_status exmat_world_step(exmat_world* world, std::int64_t steps, std::int32
   const Held held(*world);
   if (!held.all()) return fail(EXMAT_INVALID_ARGUMENT, "%s: another thread steps a body of the world", __func__);
   const std::int64_t most = std::max<std::int64_t>(1, std::ssize(world->members));
-  const int wanted = threads > 0 ? threads : omp_get_num_procs();
-  int used = startable_threads(static_cast<int>(std::min<std::int64_t>(wanted, most)));
+  const std::int64_t processors = processor_count();
+  int used = static_cast<int>(std::min({threads > 0 ? threads : processors, processors, most}));
   try {
     world->world.prepare(used);
   } catch (const std::bad_alloc&) {

@@ -27,8 +27,8 @@ SEEN_FROM = {"common": (), "runtime": ("common/",), "precompute": ("common/", "r
 WIDEST = 120  # columns of a line of a page
 LEAN = ("common/core", "common/mesh", "common/elastic", "common/model", "runtime/kernels", "runtime/sim")
 LEAN_INCLUDES = LEAN + ("exmat",)
-POSIX = {"fcntl.h", "sys/stat.h", "unistd.h"}  # of these sources alone
-POSIX_SOURCES = {"common/core/atomic_file.cpp", "common/core/command_files.cpp"}
+POSIX = {"fcntl.h", "immintrin.h", "pthread.h", "sched.h", "sys/stat.h", "unistd.h"}  # of these sources alone
+POSIX_SOURCES = {"common/core/atomic_file.cpp", "common/core/command_files.cpp", "common/core/thread_team.cpp"}
 STREAMS = {"iostream", "fstream", "sstream", "ostream", "istream", "iomanip", "cstdio"}
 PRIVATE_HEADERS = {f"precompute/solvers/{name}.h": "precompute/solvers" for name in ("petsc_handles", "solver_access", "team")}
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
@@ -82,7 +82,7 @@ def may_include(folder, other):
 
 
 def lean(root):
-    """The shared kernels and the hot path use the standard library and Eigen only; a world also asks OpenMP for threads."""
+    """The shared kernels and the hot path use the standard library and Eigen only."""
     for name, path in sources(root):
         if not name.startswith(LEAN):
             continue
@@ -90,8 +90,7 @@ def lean(root):
             own = OWN.match(header) and header.startswith(LEAN_INCLUDES)
             standard = re.fullmatch(r"[a-z_0-9]+", header)
             posix = header in POSIX and name in POSIX_SOURCES
-            threads = header == "omp.h" and name.startswith("runtime/sim/world/")
-            if not (own or standard or posix or threads or header.startswith(("Eigen/", "unsupported/Eigen/", "exmat/"))):
+            if not (own or standard or posix or header.startswith(("Eigen/", "unsupported/Eigen/", "exmat/"))):
                 yield f"{name}:{number}: includes {header}"
 
 

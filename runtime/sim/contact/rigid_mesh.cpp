@@ -8,6 +8,8 @@
 #include <numeric>
 #include <utility>
 
+#include "common/core/thread_team.h"
+
 namespace exmat::runtime {
 namespace {
 
@@ -108,18 +110,19 @@ void RigidMesh::sample_cells() {
   for (int axis = 0; axis < 3; ++axis)
     cell_counts_[axis] = 2 + static_cast<int>(std::ceil((all.high[axis] - all.low[axis]) / cell_ - kMeshRounded));
   cell_distances_.resize(static_cast<std::size_t>(cell_counts_.cast<std::int64_t>().prod()));
-  double deepest = deepest_;
-#pragma omp parallel for schedule(dynamic, 1) reduction(max : deepest)
-  for (int z = 0; z < cell_counts_[2]; ++z)
+  std::vector<double> deepest(static_cast<std::size_t>(cell_counts_[2]), deepest_);
+  by_threads(deepest.size(), processor_count(), 1, [&](std::size_t layer, std::size_t) {
+    const int z = static_cast<int>(layer);
     for (int y = 0; y < cell_counts_[1]; ++y)
       for (int x = 0; x < cell_counts_[0]; ++x) {
         const Eigen::Vector3d middle = cells_low_ + cell_ * Eigen::Vector3d(x + 0.5, y + 0.5, z + 0.5);
         const double distance = nearest(middle).distance;
-        deepest = std::max(deepest, -distance);
+        deepest[layer] = std::max(deepest[layer], -distance);
         cell_distances_[static_cast<std::size_t>((z * cell_counts_[1] + y) * cell_counts_[0] + x)] =
             static_cast<float>(distance);
       }
-  deepest_ = deepest;
+  });
+  deepest_ = std::ranges::max(deepest);
 }
 
 TrianglePoint RigidMesh::nearest_on(int face, const Eigen::Vector3d& point) const noexcept {

@@ -1,29 +1,20 @@
 #pragma once
 
-#include <cstddef>
-#include <omp.h>
+#include "common/core/thread_team.h"
 
 namespace exmat::runtime {
 
 /// Calls work(i, thread) for i < count, each once, by so many threads, numbered from 0, that take `share` of them at a
-/// time. One thread alone asks OpenMP for nothing: that takes a tenth of a microsecond.
+/// time. One thread alone asks for nothing: that takes a tenth of a microsecond.
 template <class Work>
 void for_all_by_threads(std::size_t count, int threads, const Work& work, int share) {
-  const auto end = static_cast<std::ptrdiff_t>(count);
-  if (threads == 1 || end < 2) {
-    for (std::ptrdiff_t i = 0; i < end; ++i) work(static_cast<std::size_t>(i), std::size_t{0});
-    return;
-  }
-#pragma omp parallel for schedule(dynamic, share) num_threads(threads)
-  for (std::ptrdiff_t i = 0; i < end; ++i)
-    work(static_cast<std::size_t>(i), static_cast<std::size_t>(omp_get_thread_num()));
+  by_threads(count, threads, static_cast<std::size_t>(share), work);
 }
 
 /// Calls work(i) for i < count, likewise.
 template <class Work>
 void for_all(std::size_t count, int threads, const Work& work, int share = 4) {
-  for_all_by_threads(
-      count, threads, [&](std::size_t i, std::size_t) { work(i); }, share);
+  by_threads(count, threads, static_cast<std::size_t>(share), [&](std::size_t i, std::size_t) { work(i); });
 }
 
 }  // namespace exmat::runtime
