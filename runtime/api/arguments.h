@@ -32,6 +32,17 @@ inline bool all_finite(const double* numbers, std::int64_t count) {
   return std::all_of(numbers, numbers + count, [](double number) { return std::isfinite(number); });
 }
 
+/// Of places [m] and velocities [m/s] that a caller gives: their squares are finite, and places fit into single
+/// precision.
+inline constexpr double kFarthest = 1e30;
+
+/// The first of `count` numbers that is not finite or farther than that; null: none.
+inline const double* find_far(const double* numbers, std::int64_t count) {
+  const double* const far =
+      std::find_if(numbers, numbers + count, [](double number) { return !(std::abs(number) <= kFarthest); });
+  return far != numbers + count ? far : nullptr;
+}
+
 /// Whether a struct that a caller hands over begins with a size that some version of it has.
 inline exmat_status check_size(const char* function, std::size_t size, const StructSizes& sizes) noexcept {
   if (sizes.first <= size && size <= kMostStructBytes) return EXMAT_OK;

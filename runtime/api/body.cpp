@@ -243,10 +243,12 @@ exmat_status exmat_body_set_motion(exmat_body* body, const exmat_motion* motion)
   const double* turn = motion->orientation;
   wanted.orientation = Eigen::Quaterniond(turn[0], turn[1], turn[2], turn[3]);
   const double length = wanted.orientation.norm();
-  const bool finite = wanted.position.allFinite() && wanted.linear_velocity.allFinite() &&
-                      wanted.angular_velocity.allFinite() && std::isfinite(length);
-  if (!finite || !(length > 0))
+  if (!std::isfinite(length) || !(length > 0))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: expected finite numbers and a quaternion that is not 0", __func__);
+  for (const double* const member : {motion->position, motion->linear_velocity, motion->angular_velocity})
+    if (const double* const far = find_far(member, 3))
+      return fail(EXMAT_INVALID_ARGUMENT, "%s: motion: %g: expected finite numbers of at most %g", __func__, *far,
+                  kFarthest);
   const RigidPlace before{body->model().frame->placement(body->state.frame),
                           body->model().frame->velocity(body->state.frame)};
   if (!move_body(body->model(), body->scene, wanted, body->state, scratch_of(*body)))

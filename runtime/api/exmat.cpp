@@ -150,9 +150,7 @@ exmat_status exmat_points_create_at(const exmat_model* model, const double* xyz,
     return fail(EXMAT_INVALID_ARGUMENT, "%s: coordinates = %" PRId64 ": expected 3 for each point", __func__,
                 coordinates);
   if (!all_finite(xyz, coordinates)) return fail(EXMAT_INVALID_ARGUMENT, "%s: xyz: expected finite numbers", __func__);
-  constexpr double kFarthest = 1e30;  // of positions in single precision
-  const double* far = std::find_if(xyz, xyz + coordinates, [](double x) { return std::abs(x) > kFarthest; });
-  if (far != xyz + coordinates)
+  if (const double* const far = find_far(xyz, coordinates))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: xyz[%td] = %g: expected at most %g m", __func__, far - xyz, *far,
                 kFarthest);
   return guarded(__func__, [&] {

@@ -45,10 +45,12 @@ exmat_status exmat_shape_create_mesh(const double* vertices, std::int64_t coordi
                 coordinates);
   if (corners < 3 || corners % 3 != 0 || corners / 3 > kMost)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: corners = %" PRId64 ": expected 3 for each triangle", __func__, corners);
-  if (!all_finite(vertices, coordinates))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: vertices: expected finite numbers", __func__);
-  if (!(thickness >= 0 && std::isfinite(thickness)))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: thickness = %g: expected a finite number >= 0", __func__, thickness);
+  if (const double* const far = find_far(vertices, coordinates))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: vertices[%td] = %g: expected finite numbers of at most %g m", __func__,
+                far - vertices, *far, kFarthest);
+  if (!(thickness >= 0 && thickness <= kFarthest))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: thickness = %g: expected a number >= 0, of at most %g m", __func__,
+                thickness, kFarthest);
   return guarded(__func__, [&] {
     const Eigen::Map<const VertexArray> places(vertices, coordinates / 3, 3);
     const Eigen::Map<const TriangleArray> faces(triangles, corners / 3, 3);
@@ -65,10 +67,12 @@ exmat_status exmat_shape_create_height_field(const double* heights, std::int64_t
   if (rows < 2 || columns < 2 || rows > kMost / columns)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: %" PRId64 " rows, %" PRId64 " columns: expected 2 or more of each",
                 __func__, rows, columns);
-  if (!all_finite(heights, rows * columns))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: heights: expected finite numbers", __func__);
-  if (!(all_finite(spacing, 2) && spacing[0] > 0 && spacing[1] > 0))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: spacing: expected two finite numbers above 0", __func__);
+  if (const double* const far = find_far(heights, rows * columns))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: heights[%td] = %g: expected finite numbers of at most %g m", __func__,
+                far - heights, *far, kFarthest);
+  if (find_far(spacing, 2) != nullptr || !(spacing[0] > 0 && spacing[1] > 0))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: spacing: expected two numbers above 0, of at most %g m", __func__,
+                kFarthest);
   return guarded(__func__, [&] {
     *shape =
         new exmat_shape{nullptr, std::make_shared<const HeightField>(

@@ -30,8 +30,16 @@ exmat_obstacle default_obstacle() noexcept {
 }
 
 Eigen::Vector3d vector_of(const double (&numbers)[3], const char* name) {
-  if (!all_finite(numbers, 3)) throw InvalidArgument(fmt::format("obstacle.{}: expected finite numbers", name));
+  if (const double* const far = find_far(numbers, 3))
+    throw InvalidArgument(fmt::format("{} = {:g}: expected finite numbers of at most {:g}", name, *far, kFarthest));
   return Eigen::Vector3d(numbers);
+}
+
+double length_of(double number, const char* name) {
+  if (!(number > 0 && number <= kFarthest))
+    throw InvalidArgument(
+        fmt::format("obstacle.{} = {:g}: expected a number above 0, of at most {:g}", name, number, kFarthest));
+  return number;
 }
 
 double positive(double number, const char* name) {
@@ -54,22 +62,23 @@ Eigen::Quaterniond rotation_of_numbers(const double (&numbers)[4], const char* n
 }
 
 Shape shape_of(const exmat_obstacle& obstacle) {
-  const Eigen::Vector3d point = vector_of(obstacle.point, "point");
+  const Eigen::Vector3d point = vector_of(obstacle.point, "obstacle.point");
   switch (obstacle.shape) {
     case EXMAT_PLANE: {
-      const Eigen::Vector3d direction = vector_of(obstacle.direction, "direction");
+      const Eigen::Vector3d direction = vector_of(obstacle.direction, "obstacle.direction");
       if (direction.isZero(0)) throw InvalidArgument("obstacle.direction: expected a normal that is not 0");
       return Plane{point, direction.normalized()};
     }
     case EXMAT_SPHERE:
-      return Sphere{point, positive(obstacle.radius, "radius")};
+      return Sphere{point, length_of(obstacle.radius, "radius")};
     case EXMAT_BOX: {
       Eigen::Vector3d half;
-      for (int i = 0; i < 3; ++i) half[i] = positive(obstacle.half_extents[i], "half_extents");
+      for (int i = 0; i < 3; ++i) half[i] = length_of(obstacle.half_extents[i], "half_extents");
       return Box{point, half, rotation_of_numbers(obstacle.orientation, "obstacle.orientation").toRotationMatrix()};
     }
     case EXMAT_CAPSULE:
-      return Capsule{point, point + vector_of(obstacle.direction, "direction"), positive(obstacle.radius, "radius")};
+      return Capsule{point, point + vector_of(obstacle.direction, "obstacle.direction"),
+                     length_of(obstacle.radius, "radius")};
     case EXMAT_MESH:
     case EXMAT_HEIGHT_FIELD:
       throw InvalidArgument(
@@ -160,12 +169,10 @@ exmat_motion motion_of(const MotionSample& sample) {
 
 MotionSample sample_of(const exmat_motion& motion) {
   MotionSample sample;
-  sample.position = Eigen::Vector3d(motion.position);
+  sample.position = vector_of(motion.position, "motion.position");
   sample.rotation = rotation_of_numbers(motion.orientation, "motion.orientation").toRotationMatrix();
-  sample.linear_velocity = Eigen::Vector3d(motion.linear_velocity);
-  sample.angular_velocity = Eigen::Vector3d(motion.angular_velocity);
-  if (!sample.position.allFinite() || !sample.linear_velocity.allFinite() || !sample.angular_velocity.allFinite())
-    throw InvalidArgument("motion: expected finite numbers");
+  sample.linear_velocity = vector_of(motion.linear_velocity, "motion.linear_velocity");
+  sample.angular_velocity = vector_of(motion.angular_velocity, "motion.angular_velocity");
   return sample;
 }
 
@@ -257,7 +264,7 @@ ContactLoad load_on(const exmat_body& body, std::int64_t id) noexcept {
 }
 
 Shape placed_shape(const exmat_shape& shape, const exmat_obstacle& obstacle) {
-  const Eigen::Vector3d position = vector_of(obstacle.point, "point");
+  const Eigen::Vector3d position = vector_of(obstacle.point, "obstacle.point");
   const Eigen::Matrix3d rotation = rotation_of_numbers(obstacle.orientation, "obstacle.orientation").toRotationMatrix();
   if (shape.mesh) return MeshShape{shape.mesh, position, rotation};
   return HeightFieldShape{shape.field, position, rotation};

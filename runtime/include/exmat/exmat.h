@@ -220,7 +220,7 @@ EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_poi
 EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
 
 /* How a free body moves, world frame: displacement of the centre of mass from rest [m], unit quaternion (w first),
-   velocity of the centre of mass [m/s] and angular velocity [rad/s]. */
+   velocity of the centre of mass [m/s] and angular velocity [rad/s]. None is set that is above 1e30. */
 typedef struct exmat_motion {
   size_t size; /* sizeof(exmat_motion), set by the caller */
   double position[3];

@@ -147,7 +147,7 @@ EXMAT_API exmat_status exmat_world_set_state(exmat_world* world, const double* n
 enum { EXMAT_PLANE = 0, EXMAT_SPHERE = 1, EXMAT_BOX = 2, EXMAT_CAPSULE = 3, EXMAT_MESH = 4, EXMAT_HEIGHT_FIELD = 5 };
 
 /* Its shape, in its own frame, which is the world until the obstacle is moved, and its law: pressures on the body's
-   surface. Members that the shape does not name are not looked at. */
+   surface. Members that the shape does not name are not looked at. No length is above 1e30 m. */
 typedef struct exmat_obstacle {
   size_t size;     /* sizeof(exmat_obstacle) where the caller was compiled */
   double point[3]; /* of the plane; centre of sphere and box; where the capsule's axis begins; origin of the axes of a

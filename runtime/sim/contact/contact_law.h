@@ -97,7 +97,8 @@ struct ContactCandidate {
     overlap = std::max(0.0, before - most);
     released = before - overlap;
   }
-  bool is_loaded() const noexcept { return normal_force > 0 || friction_force > 0; }
+  /// So is one whose numbers overflowed: its force tells.
+  bool is_loaded() const noexcept { return !(normal_force <= 0) || friction_force > 0; }
   /// How fast the normal force grows [N/m]; 0 where there is none.
   double normal_stiffness() const noexcept { return normal_force > 0 ? stiffness * (1 + damping) : 0; }
 };

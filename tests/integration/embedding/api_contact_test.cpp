@@ -330,7 +330,8 @@ TEST_F(ApiContactTest, WrongShapesAreRefusedInWords) {
   EXPECT_THAT(refused(corners, {0, 1, 1}, 1), HasSubstr("triangles: expected some"));
   EXPECT_THAT(refused(corners, {0, 1}, 1), HasSubstr("corners = 2"));
   EXPECT_THAT(refused({0, 0}, {0, 1, 2}, 1), HasSubstr("coordinates = 2"));
-  EXPECT_THAT(refused({0, 0, NAN, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, 1), HasSubstr("vertices: expected finite numbers"));
+  EXPECT_THAT(refused({0, 0, NAN, 1, 0, 0, 0, 1, 0}, {0, 1, 2}, 1),
+              HasSubstr("vertices[2] = nan: expected finite numbers of at most 1e+30 m"));
   EXPECT_THAT(refused(corners, {0, 1, 2}, -1), HasSubstr("thickness = -1"));
   const std::array<double, 2> spacing{1, 0};
   EXPECT_EQ(exmat_shape_create_height_field(corners.data(), 3, 3, spacing.data(), &shape), EXMAT_INVALID_ARGUMENT);
