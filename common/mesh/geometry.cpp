@@ -55,6 +55,17 @@ double bounding_box_diagonal(const VertexArray& vertices) {
   return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).norm();
 }
 
+Eigen::Vector3d origin_near(const Eigen::Vector3d& place, double size) {
+  constexpr double kRounding = 0x1p-24, kMostOfSize = 1e-5;
+  if (!(place.cwiseAbs().maxCoeff() * kRounding > kMostOfSize * size)) return Eigen::Vector3d::Zero();
+  return place.array().round();
+}
+
+Eigen::Vector3d origin_near(const VertexArray& vertices) {
+  const Eigen::RowVector3d middle = 0.5 * (vertices.colwise().minCoeff() + vertices.colwise().maxCoeff());
+  return origin_near(middle.transpose(), bounding_box_diagonal(vertices));
+}
+
 double longest_box_edge(const VertexArray& vertices) {
   return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).maxCoeff();
 }

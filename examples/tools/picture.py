@@ -70,12 +70,13 @@ class Run:
         with h5py.File(trajectory) as f:
             frames = frames_of(f["/time"][:], wanted, count)
             pick = lambda name: np.array([f[name][k] for k in frames])
-            self.times, self.positions = pick("/time"), pick("/vertices").astype(float)
+            origin = f.attrs.get("origin", np.zeros(3))
+            self.times, self.positions = pick("/time"), pick("/vertices") + origin
             bodies = list(zip(pick("/body/position"), pick("/body/orientation")))
             # The render mesh, where there is one, in place of the tets' surface.
             self.drawn, self.drawn_rest, self.edges = self.positions, self.rest, True
             if "render" in f:
-                self.drawn, self.surface = pick("/render/vertices").astype(float), f["/render/triangles"][:]
+                self.drawn, self.surface = pick("/render/vertices") + origin, f["/render/triangles"][:]
                 self.drawn_rest, self.edges = drawn_rest, False
         self.displacement = np.array([self.without_rigid_motion(x, centre, *b) for x, b in zip(self.drawn, bodies)])
 

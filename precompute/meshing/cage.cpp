@@ -14,6 +14,7 @@
 #include "common/mesh/checks.h"
 #include "common/mesh/geometry.h"
 #include "common/mesh/nearest_point.h"
+#include "common/mesh/surface_check.h"
 #include "precompute/alignment/surface_tree.h"
 #include "precompute/meshing/mesher_module.h"
 
@@ -108,15 +109,6 @@ bool is_closed(const TriangleArray& triangles) {
       balance[std::minmax(from, to)] += from < to ? 1 : -1;
     }
   return std::ranges::all_of(balance, [](const auto& edge) { return edge.second == 0; });
-}
-
-double enclosed_volume(const SurfaceMesh& surface) {
-  double volume = 0;
-  for (const auto& corners : surface.triangles.rowwise())
-    volume += surface.vertices.row(corners[0])
-                  .dot(Eigen::RowVector3d(surface.vertices.row(corners[1]))
-                           .cross(Eigen::RowVector3d(surface.vertices.row(corners[2]))));
-  return volume / 6;
 }
 
 class CageMaker {
@@ -262,7 +254,7 @@ Cage make_cage(const SurfaceMesh& surface, const CageSettings& settings, const s
   cage.farthest *= unit.diagonal;
   std::tie(cage.least_angle, cage.largest_angle) = dihedral_angles(cage.mesh);
   cage.volume = tet_volumes(cage.mesh).sum();
-  const double own = std::abs(enclosed_volume(surface));
+  const double own = std::abs(enclosed_volume(surface.vertices, surface.triangles));
   if (is_closed(surface.triangles) && own > 0) cage.volume_ratio = cage.volume / own;
   cage.mesher = mesher_module().version;
   log::info(fmt::format(

@@ -38,6 +38,7 @@ void export_point_cache(const ExportOptions& options) {
   print("point cache", options.output.string());
   print("points", fmt::format("{} of {}", summary.points, summary.dataset));
   print("samples", fmt::format("{}, {:g} frames apart", summary.samples, summary.sample_rate));
+  print_origin(summary.origin, "which the points are measured from: the format has no place for it");
 }
 
 void export_usd(const ExportOptions& options) {
@@ -49,6 +50,7 @@ void export_usd(const ExportOptions& options) {
   if (summary.bodies > 1) print("bodies", fmt::format("{}", summary.bodies));
   print("points", fmt::format("{} of {}", summary.points, summary.dataset));
   print("samples", fmt::format("{}, {:g} time codes a second", summary.samples, usd.frame_rate));
+  print_origin(summary.origin, "the translation of each Mesh");
   print("size", fmt::format("{:.3g} MB", static_cast<double>(summary.bytes) / kMegabyte));
 }
 
@@ -175,6 +177,7 @@ void export_gltf(const ExportOptions& options) {
   find_targets(options, drawing);
   const std::int64_t bytes = write_gltf(options.output, drawing.kinds, drawing.bodies, options.up);
   print("glTF", options.output.string());
+  print_origin(origin_of(drawing.kinds, drawing.bodies), "the translation of the node \"origin\"");
   if (drawing.bodies.size() > 1)
     print("bodies", fmt::format("{} of {} meshes", drawing.bodies.size(), drawing.kinds.size()));
   std::int64_t cached = 0;

@@ -67,6 +67,7 @@ void print_summary(const RunSummary& summary, const LoadedWorld& loaded, const W
     print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
   print("state hash", fmt::format("{:016x}", summary.state_hash));
   if (config.trajectory) print("trajectory", config.trajectory->string());
+  print_origin(summary.origin, "which the trajectory's positions are measured from: its attribute \"origin\"");
 }
 
 void print_stage_heading() {

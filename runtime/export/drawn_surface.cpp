@@ -64,7 +64,8 @@ DrawnSurface read_drawn_surface(const std::filesystem::path& bundle, bool mesh) 
     add_render_mesh(model, surface);
   else
     add_surface_of_mesh(model, surface);
-  if (!summary.constrained && model.rigid) surface.origin = model.rigid->centre_of_mass;
+  surface.free = !summary.constrained && model.rigid;
+  surface.origin = surface.free ? model.rigid->centre_of_mass : origin_near(surface.vertices);
   surface.vertices.rowwise() -= surface.origin.transpose();
   return surface;
 }

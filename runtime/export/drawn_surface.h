@@ -16,7 +16,8 @@ struct DrawnSurface {
   VertexArray vertices;                              ///< v x 3, at rest, from the origin [m]
   TriangleArray triangles;                           ///< f x 3
   RowMatrix modes;                                   ///< 3v x r [kg^(-1/2)], row 3k + axis
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of a free body the centre of mass, else 0 [m]
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of a free body the centre of mass, else origin_near() [m]
+  bool free = false;                                 ///< it turns about its origin, else about 0
 
   Eigen::Index vertex_count() const { return vertices.rows(); }
   Eigen::Index mode_count() const { return modes.cols(); }

@@ -1,5 +1,6 @@
 #include "runtime/export/gltf_file.h"
 
+#include <Eigen/Geometry>
 #include <bit>
 #include <cerrno>
 #include <cmath>
@@ -16,6 +17,7 @@
 #include "common/core/atomic_file.h"
 #include "common/core/error.h"
 #include "common/core/version.h"
+#include "common/mesh/geometry.h"
 
 #define TINYGLTF_IMPLEMENTATION
 #include <tiny_gltf.h>
@@ -35,6 +37,18 @@ FloatMatrix vectors_of(const RowMatrix& matrix, Eigen::Index column) {
   FloatMatrix vectors(matrix.rows() / 3, 3);
   vectors.reshaped<Eigen::RowMajor>() = matrix.col(column).cast<float>();
   return vectors;
+}
+
+/// F x 3, where the origin of a body's mesh is in the world [m].
+RowMatrix places_of(const DrawnSurface& surface, const BodyMotion& motion) {
+  RowMatrix places = motion.positions.rowwise() + surface.origin.transpose();
+  if (surface.free) return places;
+  for (Eigen::Index frame = 0; frame < motion.frames(); ++frame) {
+    const auto turn = motion.orientations.row(frame);
+    places.row(frame) = motion.positions.row(frame) +
+                        (Eigen::Quaterniond(turn[0], turn[1], turn[2], turn[3]) * surface.origin).transpose();
+  }
+  return places;
 }
 
 class GltfWriter {
@@ -85,10 +99,17 @@ class GltfWriter {
       upright.name = "y up";
       upright.rotation = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
     }
+    origin_ = origin_of(kinds, bodies);
+    const int above = static_cast<int>(model_.nodes.size());
+    if (!origin_.isZero(0)) {
+      tinygltf::Node& placed = model_.nodes.emplace_back();
+      placed.name = "origin";
+      placed.translation = {origin_.x(), origin_.y(), origin_.z()};
+    }
     first_body_ = static_cast<int>(model_.nodes.size());
     std::vector<int> nodes;
     for (const DrawnBody& drawn : bodies) {
-      const Eigen::Vector3d& origin = kinds[drawn.kind].surface.origin;
+      const Eigen::Vector3d origin = kinds[drawn.kind].surface.origin - origin_;
       nodes.push_back(static_cast<int>(model_.nodes.size()));
       tinygltf::Node& body = model_.nodes.emplace_back();
       body.name = drawn.name;
@@ -98,6 +119,8 @@ class GltfWriter {
       body.weights.resize(static_cast<std::size_t>(drawn.weights.cols()));
       set_first(drawn.weights, body.weights);
     }
+    if (!origin_.isZero(0))
+      model_.nodes[static_cast<std::size_t>(above)].children = std::exchange(nodes, std::vector{above});
     if (up == UpAxis::kZ) model_.nodes.front().children = std::exchange(nodes, {0});
     model_.scenes.front().nodes = nodes;
   }
@@ -149,9 +172,9 @@ class GltfWriter {
 
   void add_channels(const DrawnSurface& surface, const DrawnBody& drawn, int node, tinygltf::Animation& animation) {
     const BodyMotion& motion = *drawn.motion;
-    const RowMatrix places = motion.positions.rowwise() + surface.origin.transpose();
+    const RowMatrix places = places_of(surface, motion).rowwise() - origin_.transpose();
     const RowMatrix& turns = motion.orientations;
-    if (!motion.positions.isZero(0))
+    if (!(places.rowwise() - places.row(0)).isZero(0) || !motion.positions.row(0).isZero(0))
       add_channel(animation, node, "translation", add_floats(places.cast<float>(), TINYGLTF_TYPE_VEC3, kOther));
     if (!turns.rightCols(3).isZero(0)) {
       FloatMatrix quaternions(turns.rows(), 4);
@@ -195,6 +218,9 @@ class GltfWriter {
   }
 
   int add_floats(const FloatMatrix& rows, int type, int use, bool bounded = false) {
+    if (!rows.allFinite())
+      throw InputError({file_, "", "positions that single precision holds, as glTF has them", "larger ones",
+                        "the motion has left every scale; look at its energies"});
     tinygltf::Accessor& accessor = add_array(rows, use);
     accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
     accessor.type = type;
@@ -220,11 +246,20 @@ class GltfWriter {
 
   std::string file_;
   tinygltf::Model model_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   int first_body_ = 0;  // node
   int input_ = 0;       // accessor of the times
 };
 
 }  // namespace
+
+Eigen::Vector3d origin_of(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies) {
+  const DrawnBody& first = bodies.front();
+  const DrawnSurface& surface = kinds[first.kind].surface;
+  Eigen::Vector3d place = surface.origin;
+  if (first.motion) place = places_of(surface, *first.motion).row(0).transpose();
+  return origin_near(place, bounding_box_diagonal(surface.vertices));
+}
 
 std::int64_t write_gltf(const std::filesystem::path& target, const std::vector<DrawnKind>& kinds,
                         const std::vector<DrawnBody>& bodies, UpAxis up) {

@@ -65,6 +65,7 @@ PointCacheSummary write_point_cache(const std::filesystem::path& trajectory, con
     reader.refuse("/bodies", "one body: a point cache holds no more", fmt::format("{} bodies", bodies.size()),
                   fmt::format("write a file for each: --body {}, and so on", bodies.front()));
   PointCacheSummary summary{reader.open_positions(options.mesh), reader.points(), reader.samples()};
+  summary.origin = reader.origin();
   const double seconds = spacing(reader);  // read in any case: times that do not increase are no motion
   if (options.frame_rate && reader.samples() > 1) summary.sample_rate = seconds * *options.frame_rate;
 

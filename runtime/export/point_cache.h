@@ -17,7 +17,8 @@ struct PointCacheOptions {
 struct PointCacheSummary {
   std::string dataset;  ///< that the points are of
   std::int64_t points = 0, samples = 0;
-  double sample_rate = 1;  ///< frames from sample to sample
+  double sample_rate = 1;                            ///< frames from sample to sample
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the trajectory, which the points are measured from [m]
 };
 
 /// Writes the positions of a trajectory as a point cache that Blender's and 3ds Max's mesh caches read (.pc2): of the

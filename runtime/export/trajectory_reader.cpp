@@ -69,6 +69,17 @@ std::string TrajectoryReader::text(const std::string& attribute) const {
   return *text;
 }
 
+Eigen::Vector3d TrajectoryReader::origin() const {
+  const std::string object = group_.empty() ? "/" : group_;
+  if (!file_.has_attribute(object, "origin")) return Eigen::Vector3d::Zero();  // of a format before 6
+  const AttributeValue value = file_.read_attribute(object, "origin");
+  const auto* numbers = std::get_if<std::vector<double>>(&value);
+  const bool sound =
+      numbers != nullptr && numbers->size() == 3 && Eigen::Map<const Eigen::Vector3d>(numbers->data()).allFinite();
+  if (!sound) refuse(group_ + "/@origin", "three finite numbers", "others");
+  return Eigen::Vector3d(numbers->data());
+}
+
 Hdf5Dataset TrajectoryReader::open_dataset(const std::string& path) {
   const DatasetSchema& schema = trajectory_schema().dataset(path);
   Hdf5Dataset dataset = file_.open_dataset(group_ + path);

@@ -26,6 +26,8 @@ class TrajectoryReader {
   bool has(const std::string& dataset) const { return file_.has_dataset(group_ + dataset); }
   /// An attribute of the run, or of the body; empty where the trajectory is older than it.
   std::string text(const std::string& attribute) const;
+  /// What positions are measured from [m].
+  Eigen::Vector3d origin() const;
   /// All rows of a dataset of numbers, F x columns.
   RowMatrix read(const std::string& dataset);
   /// Of the render mesh, or the boundary of the tets.
@@ -36,7 +38,7 @@ class TrajectoryReader {
   const std::string& open_positions(bool mesh);
   std::int64_t samples() const { return positions_.front().sizes()[0]; }
   std::int64_t points() const { return positions_.front().sizes()[1]; }
-  /// The next frame, xyz of each point [m].
+  /// The next frame, xyz of each point from the origin [m].
   void read_next(std::vector<float>& frame);
   /// To be called after the last frame.
   void check_sum() const { check_sum(positions_.front(), crc_); }

@@ -81,6 +81,12 @@ class UsdWriter {
       writer_.add("\n{0}{{\n{0}    uniform token subdivisionScheme = \"none\"\n", pad);
       add_triangles(pad, reader_.triangles(options_.mesh));
     }
+    const Eigen::Vector3d origin = summary.origin = reader_.origin();
+    if (!origin.isZero(0))
+      writer_.add(
+          "{0}    double3 xformOp:translate = ({1}, {2}, {3})\n{0}    uniform token[] xformOpOrder = "
+          "[\"xformOp:translate\"]\n",
+          pad, origin.x(), origin.y(), origin.z());
     const RowMatrix codes = options_.frame_rate * reader_.read("/time");
     summary.dataset = reader_.open_positions(options_.mesh);
     summary.points += reader_.points();

@@ -20,6 +20,7 @@ struct UsdOptions {
 struct UsdSummary {
   std::string dataset;  ///< that the points are of
   std::int64_t bodies = 1, points = 0, samples = 0, bytes = 0;
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the trajectory: the translation of each Mesh [m]
 };
 
 /// Writes the positions of a trajectory as Universal Scene Description in text (.usda): a Mesh with points at each

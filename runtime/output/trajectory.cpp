@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/bundle/file_schemas.h"
+#include "common/core/error.h"
 #include "common/hdf5/xdmf.h"
 #include "common/mesh/geometry.h"
 #include "runtime/output/momentum.h"
@@ -70,12 +71,6 @@ std::span<const double> row_of(const Eigen::VectorXd& vector) {
 
 std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.data(), 3}; }
 
-/// Positions as a row of single precision.
-void append_drawn(const VertexArray& positions, RowWriter& dataset) {
-  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
-  dataset.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
-}
-
 }  // namespace
 
 /// Open datasets, in the order of the format.
@@ -129,11 +124,13 @@ struct BodyFrames::Datasets {
   std::optional<RowWriter> render;  // vertices of the render mesh
 };
 
-BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body)
+BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body, std::optional<Eigen::Vector3d>& origin)
     : model_(body.model),
       frame_(body.frame),
       space_(body.space),
       info_(body.info),
+      file_(file),
+      origin_(origin),
       group_(std::move(group)),
       tets_(group_ + "/tets"),
       vertices_(group_ + "/vertices"),
@@ -175,6 +172,16 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
     datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
 }
 
+/// Positions from the origin as a row of single precision.
+void BodyFrames::append_drawn(const VertexArray& positions, RowWriter& dataset) const {
+  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn =
+      (positions.rowwise() - origin_->transpose()).cast<float>();
+  if (!drawn.allFinite())
+    throw WorkError(fmt::format("{}: a position at {:g} s is beyond single precision, {:.3g} m", file_.name(),
+                                times_.back(), positions.cwiseAbs().maxCoeff()));
+  dataset.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
+}
+
 /// World positions and velocities, and displacements in the body's frame.
 void BodyFrames::set_positions(const State& state, VertexArray& positions) {
   const VertexArray& rest = model_.object->mesh.vertices;
@@ -199,6 +206,10 @@ void BodyFrames::set_positions(const State& state, VertexArray& positions) {
 void BodyFrames::append_positions(const State& state) {
   VertexArray positions(displacements_.rows(), 3);
   set_positions(state, positions);
+  if (!origin_) origin_ = origin_near(positions);
+  if (times_.size() == 1)
+    file_.write_attribute(group_.empty() ? "/" : group_, "origin",
+                          std::vector<double>(origin_->data(), origin_->data() + 3));
   append_drawn(positions, datasets_->positions);
   if (model_.render) append_render_mesh(positions);
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
@@ -244,12 +255,13 @@ TrajectoryWriter::TrajectoryWriter(const std::filesystem::path& path, const std:
     for (const char* name : {"asset_name", "input_sha256", "bundle"}) file_.write_attribute("/", name, std::string());
     file_.write_attribute("/", "integrator", first.info.integrator);
     file_.write_attribute("/", "time_step", first.info.time_step);
+    file_.write_attribute("/", "origin", std::vector<double>(3));
     write_group(file_, group_schema("/bodies"), "/bodies");
   }
   for (const NamedBody& body : bodies) {
     const std::string group = body.name.empty() ? "" : fill_name("/bodies/{body}", kBodyPlaceholder, body.name);
     if (!group.empty()) write_group(file_, group_schema("/bodies/{body}"), group);
-    frames_.push_back(std::make_unique<BodyFrames>(file_, group, body));
+    frames_.push_back(std::make_unique<BodyFrames>(file_, group, body, origin_));
     names_.push_back(body.name.empty() ? body.model.asset_name : body.name);
   }
 }

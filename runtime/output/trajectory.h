@@ -44,11 +44,13 @@ struct NamedBody {
 /// The frames of one body in an open file, below a group: "" for the root, or "/bodies/NAME".
 class BodyFrames {
  public:
-  /// The file and all that `body` refers to outlive the writer. Throws WorkError.
-  BodyFrames(Hdf5File& file, std::string group, const NamedBody& body);
+  /// The file and all that `body` refers to outlive the writer, and so does the `origin` of positions, which the first
+  /// frame of any body sets for all. Throws WorkError.
+  BodyFrames(Hdf5File& file, std::string group, const NamedBody& body, std::optional<Eigen::Vector3d>& origin);
   ~BodyFrames();
 
-  /// The next frame. `step_seconds`: wall-clock time of the step that led to it.
+  /// The next frame. `step_seconds`: wall-clock time of the step that led to it. Throws WorkError, also where positions
+  /// are beyond single precision.
   void append(const State& state, const Energies& energies, double step_seconds);
 
   /// To be called after the last frame. Throws WorkError.
@@ -68,11 +70,14 @@ class BodyFrames {
   void append_positions(const State& state);
   void set_positions(const State& state, VertexArray& positions);
   void append_render_mesh(const VertexArray& positions);
+  void append_drawn(const VertexArray& positions, RowWriter& dataset) const;
 
   const ReducedModel& model_;
   const BodyFrame& frame_;
   const FullSpace* space_;
   TrajectoryInfo info_;
+  Hdf5File& file_;
+  std::optional<Eigen::Vector3d>& origin_;
   std::string group_, tets_, vertices_, render_triangles_, render_vertices_;  // paths
   std::unique_ptr<Datasets> datasets_;
   Eigen::VectorXd rest_masses_;             ///< n_t
@@ -99,6 +104,8 @@ class TrajectoryWriter {
   void finish();
 
   std::size_t bodies() const { return frames_.size(); }
+  /// What positions are measured from, once there is a frame [m].
+  Eigen::Vector3d origin() const { return origin_.value_or(Eigen::Vector3d::Zero()); }
   /// Largest displacement of a vertex in the frames so far [m].
   double largest_displacement() const;
 
@@ -106,6 +113,7 @@ class TrajectoryWriter {
   std::vector<std::string> names_;
   AtomicFile output_;
   Hdf5File file_;
+  std::optional<Eigen::Vector3d> origin_;
   std::vector<std::unique_ptr<BodyFrames>> frames_;
 };
 

@@ -211,6 +211,7 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
   if (trajectory) {
     trajectory->finish();
     summary.largest_displacement = trajectory->largest_displacement();
+    summary.origin = trajectory->origin();
   }
   if (options.dump_state) {
     bodies.remember(before);

@@ -48,15 +48,16 @@ struct RunSummary {
   std::int64_t slept_steps = 0;        ///< that bodies slept through; of all bodies
   Samples touching_pairs;              ///< of bodies near enough to touch
   int most_pairs = 0;
-  int largest_island = 0;                        ///< bodies solved together
-  std::int64_t unconverged_islands = 0;          ///< of all steps
-  double deepest = 0;                            ///< that a vertex is inside another body at the end [m]
-  Energies start, end;                           ///< of all bodies
-  std::optional<StartOverlap> overlap;           ///< the deepest, where bodies overlap something at the start
-  std::uint64_t state_hash = 0;                  ///< of all bodies, at the end; see Bodies::hash
-  std::optional<double> largest_displacement;    ///< over the written frames [m]; only with a trajectory
-  std::vector<HardestContact> hardest_contacts;  ///< of each kind; only if asked for
-  std::optional<StageSamples> stage_seconds;     ///< only if asked for
+  int largest_island = 0;                            ///< bodies solved together
+  std::int64_t unconverged_islands = 0;              ///< of all steps
+  double deepest = 0;                                ///< that a vertex is inside another body at the end [m]
+  Energies start, end;                               ///< of all bodies
+  std::optional<StartOverlap> overlap;               ///< the deepest, where bodies overlap something at the start
+  std::uint64_t state_hash = 0;                      ///< of all bodies, at the end; see Bodies::hash
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the trajectory [m]
+  std::optional<double> largest_displacement;        ///< over the written frames [m]; only with a trajectory
+  std::vector<HardestContact> hardest_contacts;      ///< of each kind; only if asked for
+  std::optional<StageSamples> stage_seconds;         ///< only if asked for
 };
 
 struct RunOptions {

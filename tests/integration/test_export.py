@@ -310,6 +310,51 @@ class Export(unittest.TestCase):
             if mesh:
                 self.assertAlmostEqual(volume, 4, delta=1e-5)  # closed, outward
 
+    def bar_at(self, shift, kind, name):
+        """A run of the bar at another place: its positions in double, where they are measured from, and what was printed."""
+        lines = bar()[0].splitlines()
+        for k in range(2, 2 + int(lines[1].split()[0])):
+            number, *place = lines[k].split()
+            lines[k] = " ".join([number, *(repr(float(x) + s) for x, s in zip(place, shift))])
+        (self.folder / f"{name}.veg").write_text("\n".join(lines) + "\n")
+        asset = json.loads((self.folder / f"{kind}.json").read_text())
+        asset["object"] = {key: value for key, value in asset["object"].items() if key != "render_mesh"} | {"mesh": f"{name}.veg"}
+        write_json(self.folder / f"{name}.json", asset | {"needs": ["rigid"]})
+        self.call(PRECOMPUTE, "bundle", f"{name}.json", "-o", f"{name}.h5")
+        write_json(self.folder / f"{name}_scene.json", {"bundle": f"{name}.h5", "time_step": 0.01, "steps": 40, "gravity": [0, 0, -9.81],
+                                                        "output": {"trajectory": f"{name}_run.h5", "every": 10}})
+        printed = self.call(RUNTIME, "run", f"{name}_scene.json")
+        with h5py.File(self.folder / f"{name}_run.h5") as f:
+            return f["vertices"][:].astype(float), f.attrs["origin"], printed
+
+    def placed_mesh(self, name):
+        """Points of the mesh of a .glb at rest, in double, and the translation of its node "origin"."""
+        document, arrays = contents(self.folder / f"{name}.glb")
+        nodes = {node["name"]: node for node in document["nodes"]}
+        origin = np.array(nodes.get("origin", {}).get("translation", [0, 0, 0]))
+        (body,) = [node for node in document["nodes"] if "mesh" in node]
+        return arrays[document["meshes"][0]["primitives"][0]["attributes"]["POSITION"]] + np.array(body["translation"]) + origin, origin
+
+    def test_far_from_zero_positions_have_an_origin(self):
+        shift = np.array([452345.5, 5412345.25, 312])
+        for kind in ("free", "clamped"):
+            near, none, printed = self.bar_at((0, 0, 0), kind, f"near_{kind}")
+            self.assertFalse(none.any())
+            self.assertNotIn("origin ", printed)
+            far, origin, printed = self.bar_at(shift, kind, f"far_{kind}")
+            self.assertTrue((origin == np.round(origin)).all() and abs(origin - shift).max() < 3)
+            self.assertIn(f"origin {16 * ' '}{origin[0]:.0f} {origin[1]:.0f} {origin[2]:.0f} m", printed)
+            self.assertLess(abs(far + (origin - shift) - near).max(), 2e-6)
+            for name in ("near", "far"):
+                self.export(f"{name}_{kind}_run.h5", "-o", f"{name}_{kind}.glb")
+            (drawn_near, none), (drawn_far, origin) = self.placed_mesh(f"near_{kind}"), self.placed_mesh(f"far_{kind}")
+            self.assertFalse(none.any())
+            self.assertTrue(origin.all())
+            self.assertLess(abs(drawn_far - shift - drawn_near).max(), 2e-6)
+            self.assertIn("origin ", self.export(f"far_{kind}_run.h5", "-o", "far.usda"))
+            self.assertIn(f"xformOp:translate = ({origin[0]:.0f}, ", (self.folder / "far.usda").read_text())
+            self.assertIn("origin ", self.export(f"far_{kind}_run.h5", "-o", "far.pc2"))
+
     def refused(self, *words, status=2):
         before = set(self.folder.iterdir())
         message = self.call(RUNTIME, "export", *words, status=status)

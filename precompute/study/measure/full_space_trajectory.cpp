@@ -132,7 +132,12 @@ FullSpaceTrajectory::~FullSpaceTrajectory() = default;
 void FullSpaceTrajectory::append(double step_seconds) {
   const VertexArray positions = world_positions(body_.model, body_.state);
   const runtime::Energies now = energies(body_.model, body_.scene, body_.state);
-  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn = positions.cast<float>();
+  if (times_.empty()) {
+    origin_ = origin_near(positions);
+    file_.write_attribute("/", "origin", std::vector<double>(origin_.data(), origin_.data() + 3));
+  }
+  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn =
+      (positions.rowwise() - origin_.transpose()).cast<float>();
   times_.push_back(body_.state.time);
   datasets_->time.append(body_.state.time);
   datasets_->positions.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));

@@ -45,6 +45,7 @@ class FullSpaceTrajectory {
   std::unique_ptr<Datasets> datasets_;
   SparseMatrix mass_;  // n x n
   std::vector<double> times_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  ///< that positions are measured from [m]
   InvertedTets inverted_;
 };
 

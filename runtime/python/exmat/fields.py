@@ -134,8 +134,13 @@ class Trajectory(_File):
 
     @property
     def vertices(self) -> Field:
-        """Positions, world frame, (F, n, 3) [m]."""
+        """Positions, world frame, from `origin`, (F, n, 3) [m]."""
         return self["vertices"]
+
+    @property
+    def origin(self) -> Any:
+        """What vertices are measured from, (3,) [m]: 0 unless single precision would lose them there."""
+        return np.asarray(self.attributes.get("origin", (0.0, 0.0, 0.0)))
 
     @property
     def tets(self) -> Any:
