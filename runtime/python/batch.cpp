@@ -132,7 +132,8 @@ World apart() {
 
 BatchObject::BatchObject(std::shared_ptr<ModelObject> its_model, std::int64_t count)
     : WorldObject(apart()), model(std::move(its_model)) {
-  if (count < 1) throw Error(EXMAT_INVALID_ARGUMENT, "count: expected at least 1");
+  constexpr std::int64_t kMost = 1000000;  // as a scene's instances
+  if (count < 1 || count > kMost) throw Error(EXMAT_INVALID_ARGUMENT, "count: expected 1 to 1000000");
   for (std::int64_t i = 0; i < count; ++i) add_body(*this, std::make_shared<BodyObject>(model));
 }
 

@@ -13,11 +13,11 @@ std::shared_ptr<SurfaceObject> surface_of(const std::shared_ptr<ModelObject>& mo
   return std::make_shared<SurfaceObject>(model, number_of(py::str(kind), "kind", kSurfaces));
 }
 
-std::shared_ptr<PointsObject> points_on(const SurfaceObject& surface, const Ids& triangles, const Numbers& shares) {
+std::shared_ptr<PointsObject> points_on(const SurfaceObject& surface, const py::object& given, const Numbers& shares) {
+  const Ids triangles = whole_numbers(given, "triangles");
   if (triangles.ndim() != 1) throw Error(EXMAT_INVALID_ARGUMENT, "triangles: expected an array of one dimension");
   require_shape(shares, "shares", {triangles.size(), 3});
-  const std::span<const std::int64_t> ids(triangles.data(), static_cast<std::size_t>(triangles.size()));
-  return std::make_shared<PointsObject>(Points::on_surface(surface.surface, ids, read_span(shares)),
+  return std::make_shared<PointsObject>(Points::on_surface(surface.surface, read_span(triangles), read_span(shares)),
                                         surface.model.shared());
 }
 

@@ -6,6 +6,17 @@
 namespace exmat::python {
 namespace {
 
+/// `value` as what a setting is.
+template <typename Value>
+Value setting(const std::string& name, const py::handle& value, const char* expected) {
+  try {
+    return value.cast<Value>();
+  } catch (const std::runtime_error&) {  // of another type
+    const std::string found = py::str(py::repr(value));
+    throw Error(EXMAT_INVALID_ARGUMENT, (name + " = " + found + ": expected " + expected).c_str());
+  }
+}
+
 exmat_settings settings_of(const py::dict& given) {
   exmat_settings settings = default_settings();
   const std::map<std::string, double exmat_settings::*> numbers{
@@ -27,11 +38,11 @@ exmat_settings settings_of(const py::dict& given) {
   for (const auto& [key, value] : given) {
     const auto name = key.cast<std::string>();
     if (const auto number = numbers.find(name); number != numbers.end())
-      settings.*(number->second) = value.cast<double>();
+      settings.*(number->second) = setting<double>(name, value, "a number");
     else if (const auto count = counts.find(name); count != counts.end())
-      settings.*(count->second) = value.cast<std::int32_t>();
+      settings.*(count->second) = setting<std::int32_t>(name, value, "a whole number");
     else if (name == "gravity")
-      std::ranges::copy(value.cast<std::array<double, 3>>(), settings.gravity);
+      std::ranges::copy(setting<std::array<double, 3>>(name, value, "three numbers [m/s^2]"), settings.gravity);
     else if (name == "integrator")
       settings.integrator = number_of(value, "integrator", kIntegrators);
     else if (name == "precision")
@@ -76,9 +87,10 @@ std::shared_ptr<PointsObject> made(Points points, const std::shared_ptr<ModelObj
   return std::make_shared<PointsObject>(std::move(points), model);
 }
 
-std::shared_ptr<PointsObject> vertices(const std::shared_ptr<ModelObject>& model, const Ids& ids) {
+std::shared_ptr<PointsObject> vertices(const std::shared_ptr<ModelObject>& model, const py::object& given) {
+  const Ids ids = whole_numbers(given, "ids");
   if (ids.ndim() != 1) throw Error(EXMAT_INVALID_ARGUMENT, "ids: expected an array of one dimension");
-  const std::span<const std::int64_t> span(ids.data(), static_cast<std::size_t>(ids.size()));
+  const std::span<const std::int64_t> span = read_span(ids);
   return made(without_lock([&] { return Points::vertices(model->model, span); }), model);
 }
 

@@ -80,14 +80,28 @@ void set_state(BodyObject& body, const StateObject& state) {
 }
 
 std::int32_t number_of(const py::handle& value, const char* setting, const std::vector<const char*>& names) {
-  const auto name = value.cast<std::string>();
   std::string expected;
   for (std::size_t i = 0; i < names.size(); ++i) {
-    if (name == names[i]) return static_cast<std::int32_t>(i);
+    if (value.equal(py::str(names[i]))) return static_cast<std::int32_t>(i);
     expected += (i > 0 ? ", " : "") + std::string(names[i]);
   }
-  throw Error(EXMAT_INVALID_ARGUMENT,
-              (std::string(setting) + " = '" + name + "': expected one of " + expected).c_str());
+  throw Error(
+      EXMAT_INVALID_ARGUMENT,
+      (std::string(setting) + " = " + std::string(py::str(py::repr(value))) + ": expected one of " + expected).c_str());
+}
+
+Ids whole_numbers(const py::object& values, const char* name) {
+  const auto expected = [&](const std::string& what) {
+    return Error(EXMAT_INVALID_ARGUMENT, (std::string(name) + ": expected " + what).c_str());
+  };
+  const py::array given = py::array::ensure(values);
+  if (!given) throw expected("whole numbers");
+  const char kind = given.dtype().kind();
+  if (kind != 'i' && kind != 'u' && given.size() > 0) throw expected("whole numbers");
+  Ids numbers = given.cast<Ids>();
+  if (kind == 'u' && std::ranges::any_of(read_span(numbers), [](std::int64_t number) { return number < 0; }))
+    throw expected("whole numbers below 2^63");
+  return numbers;
 }
 
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 #include <string>
 #include <utility>
 #include <vector>
@@ -21,7 +22,7 @@ namespace exmat::python {
 namespace py = pybind11;
 
 using Numbers = py::array_t<double, py::array::c_style | py::array::forcecast>;
-using Ids = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;
+using Ids = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>;  ///< made by whole_numbers()
 
 /// r modes, K examples of the whole body.
 struct ModelObject {
@@ -243,6 +244,9 @@ inline const std::vector<const char*> kIntegrators{"bdf2", "backward_euler", "ne
 exmat_motion read_motion_tuple(const py::tuple& kept);
 py::tuple motion_tuple(const exmat_motion& motion);
 
+/// Whole numbers that fit; throws InvalidArgument of Python where `values` are others.
+Ids whole_numbers(const py::object& values, const char* name);
+
 /// Throws InvalidArgument of Python unless `array` has this shape.
 void require_shape(const py::array& array, const char* name, const std::vector<py::ssize_t>& shape);
 
@@ -279,8 +283,9 @@ auto span_of(Array& array) {
   using Number = typename Array::value_type;
   return std::span<Number>(array.mutable_data(), static_cast<std::size_t>(array.size()));
 }
-inline std::span<const double> read_span(const Numbers& array) {
-  return {array.data(), static_cast<std::size_t>(array.size())};
+template <typename Array>
+auto read_span(const Array& array) {
+  return std::span<const typename Array::value_type>(array.data(), static_cast<std::size_t>(array.size()));
 }
 
 }  // namespace exmat::python
@@ -300,7 +305,20 @@ struct MadeCaster : type_caster_base<Object> {
   }
 };
 
+/// Says what it expects where pybind11 lists types of C++.
+template <std::size_t kCount>
+struct FewNumbersCaster : array_caster<std::array<double, kCount>, double, false, kCount> {
+  bool load(handle source, bool convert) {
+    if (array_caster<std::array<double, kCount>, double, false, kCount>::load(source, convert)) return true;
+    if (!convert) return false;  // another overload may take it
+    const std::string found = str(repr(source));
+    throw type_error("expected " + std::to_string(kCount) + " numbers, found " + found);
+  }
+};
+
 // clang-format off
+template <> struct type_caster<std::array<double, 3>> : FewNumbersCaster<3> {};
+template <> struct type_caster<std::array<double, 4>> : FewNumbersCaster<4> {};
 template <> struct type_caster<exmat::python::ModelObject> : MadeCaster<exmat::python::ModelObject> {};
 template <> struct type_caster<exmat::python::PointsObject> : MadeCaster<exmat::python::PointsObject> {};
 template <> struct type_caster<exmat::python::BodyObject> : MadeCaster<exmat::python::BodyObject> {};

@@ -55,13 +55,11 @@ SharedShape capsule(const Vector3& start, const Vector3& end, double radius) {
 
 /// Rows of three, whole numbers that fit.
 std::vector<std::int32_t> corners_of(const py::array& triangles) {
-  if (triangles.dtype().kind() != 'i' && triangles.dtype().kind() != 'u')
-    throw Error(EXMAT_INVALID_ARGUMENT, "triangles: expected whole numbers");
+  const Ids numbers = whole_numbers(triangles, "triangles");
   if (triangles.ndim() != 2) throw Error(EXMAT_INVALID_ARGUMENT, "triangles: expected an array of shape (f, 3)");
   require_shape(triangles, "triangles", {triangles.shape(0), 3});
-  const auto numbers = triangles.cast<Ids>();
   std::vector<std::int32_t> corners;
-  for (const std::int64_t corner : std::span(numbers.data(), static_cast<std::size_t>(numbers.size())))
+  for (const std::int64_t corner : read_span(numbers))
     corners.push_back(static_cast<std::int32_t>(std::clamp<std::int64_t>(corner, -1, 2147483647)));
   return corners;
 }

@@ -13,7 +13,10 @@ Trajectory and Bundle open the files; exmat.precompute makes bundles.
 
 Units are SI, positions those of the world. r modes, K examples, n vertices.
 """
-from . import precompute
+import copyreg
+from typing import Any
+
+from . import _exmat, precompute
 from ._exmat import (Batch, Body, Capacity, ContactLaw, Energies, Motion, Obstacle, Points, Report, Shape, State, Surface, WorldReport,
                      WorldState, state_hash)
 from ._exmat import version as __version__
@@ -21,6 +24,18 @@ from .errors import BadInput, Cancelled, Error, Failure, InvalidArgument, NonFin
 from .fields import Bundle, Field, Trajectory
 from .model import Model
 from .world import World
+
+
+def _reduce(kept: Any) -> Any:
+    """As pickle's later protocols do it; by the first two pybind11 ends the interpreter."""
+    read_state = getattr(type(kept), "__getstate__", None)
+    if read_state is None or read_state is getattr(object, "__getstate__", None):
+        raise TypeError(f"cannot pickle {type(kept).__name__!r} object")
+    return copyreg.__newobj__, (type(kept),), read_state(kept)  # type: ignore[attr-defined]
+
+
+for _class in [value for value in vars(_exmat).values() if isinstance(value, type)]:
+    _class.__reduce__ = _reduce  # type: ignore[assignment]
 
 __all__ = ["BadInput", "Batch", "Body", "Bundle", "Cancelled", "Capacity", "ContactLaw", "Energies", "Error", "Failure", "Field", "InvalidArgument", "Model",
            "Motion", "NonFinite", "Obstacle", "Points", "Report", "Shape", "State", "Surface", "Trajectory", "World", "WorldReport",

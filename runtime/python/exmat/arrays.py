@@ -14,18 +14,28 @@ def array(values: Any, name: str, width: int, kind: str) -> Any:
     given = np.asarray(values)
     if given.ndim != 2 or given.shape[1] != width:
         raise InvalidArgument(f"{name}: shape {given.shape}: expected (..., {width})")
-    if "i" in kind and given.dtype.kind not in "iu":
-        raise InvalidArgument(f"{name}: expected whole numbers")
+    if given.dtype.kind not in "fiu":
+        raise InvalidArgument(f"{name}: expected numbers")
     return np.ascontiguousarray(given, kind)
+
+
+def cells(values: Any, name: str, width: int, vertices: int, kind: str) -> Any:
+    """`values` as (..., width) of the type `kind`, at least one row, all of them vertices from 0 to `vertices` - 1."""
+    given = np.asarray(values)
+    if given.ndim == 2 and given.shape[1] == width and given.dtype.kind not in "iu":
+        raise InvalidArgument(f"{name}: expected whole numbers")
+    converted = array(given, name, width, kind)
+    if len(given) == 0:
+        raise InvalidArgument(f"{name}: expected at least one")
+    for row, column in np.argwhere((given < 0) | (given >= vertices)):
+        raise InvalidArgument(f"{name}[{row}, {column}] = {given[row, column]}: expected a vertex, 0 to {vertices - 1}")
+    return converted
 
 
 def surface_arrays(vertices: Any, triangles: Any) -> Tuple[Any, Any]:
     """A surface's vertices (v, 3) and triangles (f, 3), checked."""
     points = array(vertices, "vertices", 3, "f8")
-    faces = array(triangles, "triangles", 3, "i8")
-    if len(faces) == 0 or faces.min() < 0 or faces.max() >= len(points):
-        raise InvalidArgument(f"triangles: expected at least one, of vertices from 0 to {len(points) - 1}")
-    return points, faces
+    return points, cells(triangles, "triangles", 3, len(points), "i8")
 
 
-__all__: List[str] = ["StrPath", "array", "surface_arrays"]
+__all__: List[str] = ["StrPath", "array", "cells", "surface_arrays"]

@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
-from .arrays import StrPath, array, surface_arrays
+from .arrays import StrPath, array, cells, surface_arrays
 from .errors import InvalidArgument
 from .surfaces import write_glb
 
@@ -16,15 +16,13 @@ PATHS = ("mesh", "surface", "render_mesh", "file", "landmarks", "asset", "scene"
 def write_mesh(path: StrPath, vertices: Any, tets: Any) -> None:
     """Writes a tet mesh, `vertices` (n, 3) [m] and `tets` (n_t, 4) of 0-based vertices, as legacy .vtk in double precision."""
     points = array(vertices, "vertices", 3, ">f8")
-    cells = array(tets, "tets", 4, ">i4")
-    if len(cells) == 0 or cells.min() < 0 or cells.max() >= len(points):
-        raise InvalidArgument(f"tets: expected vertices of 0 to {len(points) - 1}")
-    counted = np.column_stack([np.full(len(cells), 4, ">i4"), cells]).astype(">i4")
+    corners = cells(tets, "tets", 4, len(points), ">i4")
+    counted = np.column_stack([np.full(len(corners), 4, ">i4"), corners]).astype(">i4")
     with open(path, "wb") as file:
         file.write(b"# vtk DataFile Version 3.0\nexmat\nBINARY\nDATASET UNSTRUCTURED_GRID\n")
         file.write(f"POINTS {len(points)} double\n".encode() + points.tobytes())
-        file.write(f"\nCELLS {len(cells)} {5 * len(cells)}\n".encode() + counted.tobytes())
-        file.write(f"\nCELL_TYPES {len(cells)}\n".encode() + np.full(len(cells), 10, ">i4").tobytes() + b"\n")
+        file.write(f"\nCELLS {len(corners)} {5 * len(corners)}\n".encode() + counted.tobytes())
+        file.write(f"\nCELL_TYPES {len(corners)}\n".encode() + np.full(len(corners), 10, ">i4").tobytes() + b"\n")
 
 
 def write_surface(path: StrPath, vertices: Any, triangles: Any) -> None:
@@ -41,9 +39,10 @@ def write_asset(asset: Union[StrPath, Mapping[str, Any]], folder: pathlib.Path) 
         return pathlib.Path(asset)
     members: Dict[str, Any] = plain_members(asset)
     given = asset.get("object", {})
-    if isinstance(given, Mapping):
-        _take_object(given, members["object"], folder)
     examples = asset.get("examples", [])
+    if not isinstance(given, Mapping) or not isinstance(examples, (list, tuple)) or not all(isinstance(example, Mapping) for example in examples):
+        return _write_json(folder / "asset.json", members)  # which the program refuses
+    _take_object(given, members.get("object", {}), folder)
     _take_surfaces(given, examples, members, folder)
     for place, example in enumerate(examples):
         if "mesh" not in example:
@@ -83,6 +82,8 @@ def _take_surfaces(given: Any, examples: Any, members: Dict[str, Any], folder: p
         elif surface is None or isinstance(surface, (str, os.PathLike)):
             raise InvalidArgument(f"examples[{place}].surface: expected (vertices, triangles), or vertices alone where the object's surface is "
                                   "given in arrays; found vertices alone")
+        elif "name" not in example:
+            raise InvalidArgument(f"examples[{place}]: expected a name, found none")
         else:
             poses[example["name"]] = pose
             del members["examples"][place]["surface"]
@@ -146,7 +147,10 @@ def _write_json(path: pathlib.Path, members: Mapping[str, Any]) -> pathlib.Path:
 
 
 def json_text(members: Mapping[str, Any]) -> str:
-    return json.dumps(members, indent=1)
+    try:
+        return json.dumps(members, indent=1)
+    except TypeError as error:
+        raise InvalidArgument(f"expected members as JSON has them: {error}") from None
 
 
 __all__: List[str] = ["json_text", "plain_members", "write_asset", "write_members", "write_mesh", "write_surface"]

@@ -5,7 +5,7 @@ from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 from . import _exmat
 from .arrays import StrPath
-from .errors import BadInput
+from .errors import BadInput, InvalidArgument
 from .inputs import json_text, plain_members
 
 
@@ -72,7 +72,8 @@ class Model(_exmat.Model):
             use_examples = any(value is not None for value in examples.values())
         others = dict(time_step=time_step, gravity=gravity, integrator=integrator, internal_force=internal_force,
                       mass_damping=mass_damping, stiffness_damping=stiffness_damping, newton_iterations=newton_iterations,
-                      newton_tolerance=newton_tolerance, use_examples=int(use_examples), use_contact=int(use_contact),
+                      newton_tolerance=newton_tolerance, use_examples=_flag("use_examples", use_examples),
+                      use_contact=_flag("use_contact", use_contact),
                       sleep_energy=sleep_energy, sleep_time=sleep_time, precision=precision, space=space,
                       space_release=space_release)
         self._load(bundle, {name: value for name, value in {**others, **examples}.items() if value is not None})
@@ -126,6 +127,12 @@ class Model(_exmat.Model):
 
     def __repr__(self) -> str:
         return f"<exmat.Model {_name(self._recipe)}: {self.modes} modes, {self.vertices} vertices, {self.examples} examples>"
+
+
+def _flag(name: str, value: Any) -> int:
+    if value not in (False, True):
+        raise InvalidArgument(f"{name} = {value!r}: expected True or False")
+    return int(value)
 
 
 def _name(recipe: Tuple[str, Any, Optional[Dict[str, Any]]]) -> str:

@@ -1,6 +1,9 @@
 """Exceptions, threads and memory."""
 import gc
+import os
+import pickle
 import resource
+import signal
 import threading
 
 import numpy as np
@@ -140,3 +143,92 @@ def test_points_beyond_all_bodies_are_refused(model):
     for far in (1e155, 1e300):
         with pytest.raises(exmat.InvalidArgument, match=r"^xyz\[0\] = 1e\+[0-9]+: expected at most 1e\+30 m$"):  # no function of C
             exmat.Points.at(model, [[far, 0, 0]])
+
+
+@pytest.mark.parametrize("ids, found", [(np.array([2**63], "u8"), r"below 2\^63"), ([0.5], "whole numbers"), ([2**64], "whole numbers"), ([True], "whole"),
+                                        (["1"], "whole numbers"), ([2**32], r"ids\[0\] = 4294967296: expected vertices"), (None, "whole numbers")])
+def test_indices_that_do_not_fit_are_refused(model, ids, found):
+    with pytest.raises(exmat.InvalidArgument, match=found):
+        exmat.Points(model, ids)
+
+
+def test_indices_of_meshes_do_not_wrap():
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    for tets, message in ((np.array([[0, 1, 2, 3 + 2**32]]), r"tets\[0, 3\] = 4294967299: expected a vertex, 0 to 3"),
+                          (np.array([[0, 1, 2, 2**64 - 1]], "u8"), r"tets\[0, 3\] = 18446744073709551615: expected a vertex"),
+                          ([[0, 1, 2, -1]], r"tets\[0, 3\] = -1: expected a vertex"), ([[0, 1, 2, None]], "tets: expected whole numbers"),
+                          (np.zeros((0, 4), int), "tets: expected at least one")):
+        with pytest.raises(exmat.InvalidArgument, match=message):
+            exmat.precompute.check({"name": "tet", "object": {"mesh": (corners, tets)}})
+    faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    exmat.Shape.mesh(corners, faces.astype("u8"))
+    for triangles, message in ((faces + 2**32, "expected"), (faces.astype("u8") + 2**63, r"below 2\^63"), (faces * 1.0, "whole numbers")):
+        with pytest.raises(exmat.InvalidArgument, match=message):
+            exmat.Shape.mesh(corners, triangles)
+
+
+@pytest.mark.parametrize("protocol", range(pickle.HIGHEST_PROTOCOL + 1))
+def test_every_protocol_of_pickle_keeps_a_body(body, protocol):
+    body.step(3)
+    assert exmat.state_hash([pickle.loads(pickle.dumps(body, protocol))]) == exmat.state_hash([body])
+    with pytest.raises(TypeError, match="cannot pickle 'Points' object"):
+        pickle.dumps(exmat.Points(body.model, [0]), protocol)
+
+
+@pytest.mark.parametrize("settings, message", [
+    ({"gravity": 9.81}, r"gravity = 9.81: expected three numbers \[m/s\^2\]"), ({"gravity": (1, 2)}, r"gravity = \(1, 2\): expected three numbers"),
+    ({"time_step": "1e-3"}, "time_step = '1e-3': expected a number"), ({"newton_iterations": 2.5}, "newton_iterations = 2.5: expected a whole number"),
+    ({"newton_iterations": 2**40}, "newton_iterations = 1099511627776: expected a whole number"), ({"integrator": 3}, "integrator = 3: expected one of bdf2"),
+    ({"use_examples": "no"}, "use_examples = 'no': expected True or False"), ({"use_contact": 2}, "use_contact = 2: expected True or False")])
+def test_settings_of_another_type_are_named(model, settings, message):
+    with pytest.raises(exmat.InvalidArgument, match=message):
+        exmat.Model(model._recipe[1], **settings)
+
+
+def test_vectors_of_another_length_are_named(body):
+    for call in (lambda: body.set_gravity(9.81), lambda: exmat.Motion(position=9.81), lambda: exmat.Shape.sphere(1, center=9.81)):
+        with pytest.raises(TypeError, match="expected 3 numbers, found 9.81"):
+            call()
+    with pytest.raises(TypeError, match=r"expected 4 numbers, found \(1, 0, 0\)"):
+        exmat.Motion(orientation=(1, 0, 0))
+
+
+def test_members_that_are_none_are_refused_in_words(model, tmp_path):
+    for members in ({"object": None}, {"object": {"mesh": "a.msh"}, "examples": None}, {"object": {"mesh": "a.msh"}, "examples": ["a"]}):
+        with pytest.raises(exmat.BadInput, match="expected"):
+            exmat.precompute.check({"name": "x", **members})
+    with pytest.raises(exmat.InvalidArgument, match="not JSON serializable"):
+        exmat.precompute.check({"name": "x", "object": {"mesh": "a.msh", "material": {1, 2}}})
+    with pytest.raises(exmat.InvalidArgument, match="count: expected 1 to 1000000"):
+        exmat.Batch(model, 2**62)
+
+
+def test_motion_of_absurd_speed_is_refused(free_bundle):
+    body = exmat.Body(exmat.Model(free_bundle))
+    for motion in (exmat.Motion(linear_velocity=(1e306, 0, 0)), exmat.Motion(position=(0, 1e31, 0)), exmat.Motion(angular_velocity=(0, 0, -1e300))):
+        with pytest.raises(exmat.InvalidArgument, match=r"motion: -?1e\+[0-9]+: expected finite numbers of at most 1e\+30"):
+            body.motion = motion
+
+
+def test_obstacles_beyond_all_scales_are_refused():
+    world = exmat.World()
+    for shape, message in ((exmat.Shape.sphere(1e31), r"obstacle.radius = 1e\+31: expected a number above 0, of at most 1e\+30"),
+                           (exmat.Shape.sphere(1, center=(0, 1e154, 0)), r"obstacle.point = 1e\+154: expected finite numbers of at most 1e\+30"),
+                           (exmat.Shape.box((1, 1, np.inf)), "obstacle.half_extents = inf")):
+        with pytest.raises(exmat.InvalidArgument, match=message):
+            world.add_obstacle(shape)
+    ball = world.add_obstacle(exmat.Shape.sphere(1e30))
+    with pytest.raises(exmat.InvalidArgument, match=r"motion.linear_velocity = 1e\+306"):
+        world.move_obstacle(ball, exmat.Motion(linear_velocity=(1e306, 0, 0)))
+
+
+def test_a_child_of_fork_steps_on(model):
+    batch = exmat.Batch(model, 20)
+    batch.step(2, threads=2)
+    child = os.fork()
+    if child == 0:
+        signal.alarm(60)  # a child that waits for threads which it does not have
+        batch.step(2, threads=2)
+        os._exit(0)
+    assert os.waitpid(child, 0)[1] == 0
+    batch.step(2, threads=2)
