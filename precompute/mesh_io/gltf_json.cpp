@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/core/error.h"
+#include "common/core/log.h"
 #include "common/surface_io/text_input.h"
 
 namespace exmat::precompute {
@@ -295,6 +296,14 @@ bool is_too_deep(std::string_view text) {
   return false;
 }
 
+// Throws Json::exception. Programs cut long names inside a character: what is no UTF-8 becomes U+FFFD.
+Json parse_with_cut_names(const std::string& file, std::string_view text) {
+  const std::string quoted = Json(text).dump(-1, ' ', false, Json::error_handler_t::replace);
+  Json root = Json::parse(Json::parse(quoted).get<std::string>());
+  log::info(fmt::format("{}: names that are no UTF-8, such as cut ones, are read with U+FFFD in that place", file));
+  return root;
+}
+
 }  // namespace
 
 Json shapes_of_gltf(const std::string& file, std::string_view text, bool is_binary) {
@@ -303,7 +312,11 @@ Json shapes_of_gltf(const std::string& file, std::string_view text, bool is_bina
   try {
     root = Json::parse(text);
   } catch (const Json::exception& error) {
-    throw InputError({file, "", "JSON", error.what(), "is this a whole glTF file?"});
+    try {
+      root = parse_with_cut_names(file, text);
+    } catch (const Json::exception&) {
+      throw InputError({file, "", "JSON", error.what(), "is this a whole glTF file?"});
+    }
   }
   return ShapeReader(file, is_binary).read(root);
 }

@@ -138,6 +138,20 @@ TEST_F(ReadGltf, KeepsTargetsOfOneNameInOneMeshApart) {
   EXPECT_EQ(names.size(), 4);
 }
 
+TEST_F(ReadGltf, TakesNamesThatWereCutInsideACharacter) {
+  GltfWriter writer = square();
+  json& targets = primitive(writer)["targets"];
+  for (int k = 0; k < 2; ++k) targets.push_back({{"POSITION", writer.positions(std::vector<double>(12, 1))}});
+  writer.json["meshes"][0]["extras"]["targetNames"] = {"AB", "CD"};
+  std::string bytes = writer.glb();
+  bytes.replace(bytes.find("AB"), 2, "a\xc3");
+  bytes.replace(bytes.find("CD"), 2, "a\xe2");
+  const SurfaceFile surface = read_gltf(folder_.write("cut.glb", bytes));
+  ASSERT_EQ(surface.morphs.size(), 2);
+  EXPECT_EQ(surface.morphs[0].name, "a\xef\xbf\xbd");
+  EXPECT_EQ(surface.morphs[1].name, "a\xef\xbf\xbd 2");
+}
+
 TEST_F(ReadGltf, TakesTargetsOfOneNameInSeveralMeshesAsOne) {
   GltfWriter writer;
   const int positions = writer.positions(kSquare), up = writer.positions({0, 0, 1, 0, 0, 1, 0, 0, 1, 0, 0, 1});
