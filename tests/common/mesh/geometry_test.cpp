@@ -126,5 +126,15 @@ TEST(SurfaceTriangles, OfOneTetAreItsFaces) {
   EXPECT_EQ(surface_triangles(mesh.tets).rows(), 4);
 }
 
+// Single precision has 24 bits: half a unit of the last place at 168 m is 1e-5 m.
+TEST(OriginNear, IsZeroUnlessSinglePrecisionWouldMoveTheBody) {
+  EXPECT_EQ(origin_near(Eigen::Vector3d(1, -167, 3), 1), Eigen::Vector3d::Zero());
+  EXPECT_EQ(origin_near(Eigen::Vector3d(1.2, -168.4, 3), 1), Eigen::Vector3d(1, -168, 3));
+  EXPECT_EQ(origin_near(Eigen::Vector3d(1.2, -168.4, 3), 2), Eigen::Vector3d::Zero());
+  VertexArray far(2, 3);
+  far << 452345.25, 5412345.25, 312, 452346.25, 5412345.75, 312.5;
+  EXPECT_EQ(origin_near(far), Eigen::Vector3d(452346, 5412346, 312));
+}
+
 }  // namespace
 }  // namespace exmat
