@@ -1,6 +1,7 @@
 #include "common/core/thread_team.h"
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -112,7 +113,8 @@ class Team {
 class Teams {
  public:
   static Teams& all() noexcept {
-    static Teams* const teams = new Teams;
+    alignas(Teams) static std::array<unsigned char, sizeof(Teams)> place;
+    static Teams* const teams = new (place.data()) Teams;
     return *teams;
   }
 

@@ -41,6 +41,7 @@ TEST(ThreadTeam, ThreadsTakePart) {
 TEST(ThreadTeam, SeveralCallersHaveTeamsOfTheirOwn) {
   std::array<std::vector<int>, 4> totals;
   std::vector<std::thread> callers;
+  callers.reserve(totals.size());
   for (auto& total : totals)
     callers.emplace_back([&total] {
       total.assign(100, 0);
