@@ -10,6 +10,7 @@
 #include "common/bundle/file_schemas.h"
 #include "common/core/progress.h"
 #include "common/hdf5/xdmf.h"
+#include "common/mesh/geometry.h"
 #include "runtime/scene/samples.h"
 
 namespace exmat::precompute {
