@@ -24,10 +24,12 @@ void put_to_start(exmat_body& body) noexcept {
 namespace {
 
 /// World [m], of a body in full space.
-Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const exmat_body& body) noexcept {
+Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const Placement& placement,
+                              const exmat_body& body) noexcept {
   Eigen::Vector3d position = points.rest.row(i);
   for (Eigen::Index c = 0; c < points.corners.cols(); ++c)
-    position += points.shares(i, c) * body.full()->space.displacement(points.corners(i, c), body.state.full->q);
+    position += points.shares(i, c) *
+                full_displacement(*body.full(), placement, *body.state.full, points.corners(i, c));
   return position;
 }
 
@@ -140,7 +142,7 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
     const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
     const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
     const Eigen::Vector3d now = body->state.full
-                                    ? full_position(points->set, i / 3, *body)
+                                    ? full_position(points->set, i / 3, placement, *body)
                                     : placement.to_world(points->set.rest.row(i / 3).transpose() + displacement);
     total += force;
     torque += (now - placement.position).cross(force);
@@ -200,14 +202,14 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
   if (points->source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, 3 * points->set.positions.points());
+  const Placement placement = body->model().frame->placement(body->state.frame);
   if (body->state.full) {
     for (Eigen::Index i = 0; i < points->set.rest.rows(); ++i)
-      Eigen::Map<Eigen::Vector3f>(xyz + 3 * i) = full_position(points->set, i, *body).cast<float>();
+      Eigen::Map<Eigen::Vector3f>(xyz + 3 * i) = full_position(points->set, i, placement, *body).cast<float>();
     return EXMAT_OK;
   }
   points->set.positions.evaluate(body->state.q, body->drawing, xyz);
   if (!body->model().frame->moves()) return EXMAT_OK;
-  const Placement placement = body->model().frame->placement(body->state.frame);
   for (std::int64_t i = 0; i < coordinates; i += 3) {
     Eigen::Map<Eigen::Vector3f> point(xyz + i);
     point = placement.to_world(point.cast<double>()).cast<float>();

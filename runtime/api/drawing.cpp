@@ -161,6 +161,7 @@ exmat_status exmat_body_read_energy_density(const exmat_body* body, exmat_surfac
   if (surface->points.source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the surface is that of another model", __func__);
   EXMAT_REQUIRE_LENGTH(count, surface->drawn.density.points());
-  surface->drawn.density.evaluate(body->state, body->full(), density);
+  const Placement placement = body->model().frame->placement(body->state.frame);
+  surface->drawn.density.evaluate(body->state, body->full(), placement, density);
   return EXMAT_OK;
 }

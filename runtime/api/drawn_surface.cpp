@@ -130,18 +130,19 @@ DensityField::DensityField(const ObjectData& object, const RowMatrix& basis, con
 }
 
 /// Sets the displacements of the corners: U q, or those in the world less that of the first, which strain as much.
-void DensityField::set_displacements(const State& state, const FullModel* full) noexcept {
+void DensityField::set_displacements(const State& state, const FullModel* full, const Placement& frame) noexcept {
   if (!state.full) return displacements_.evaluate(state.q, workspace_, moved_.data());
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   for (std::size_t i = 0; i < vertices_.size(); ++i) {
-    const Eigen::Vector3d own = full->space.displacement(vertices_[i], state.full->q);
+    const Eigen::Vector3d own = full_displacement(*full, frame, *state.full, vertices_[i]);
     if (i == 0) first = own;
     Eigen::Map<Eigen::Vector3f>(moved_.data() + 3 * i) = (own - first).cast<float>();
   }
 }
 
-void DensityField::evaluate(const State& state, const FullModel* full, float* density) noexcept {
-  set_displacements(state, full);
+void DensityField::evaluate(const State& state, const FullModel* full, const Placement& frame,
+                            float* density) noexcept {
+  set_displacements(state, full, frame);
   with_material(material_, [&](auto material) {
     for (std::size_t t = 0; t < tets_.size(); ++t) {
       Eigen::Matrix3d gradient = Eigen::Matrix3d::Zero();

@@ -23,10 +23,10 @@ class DensityField {
   Eigen::Index points() const { return static_cast<Eigen::Index>(begins_.size()) - 1; }
 
   /// `density` [k] [J/m^3] of a body in this state. Uses its own scratch: one call at a time.
-  void evaluate(const State& state, const FullModel* full, float* density) noexcept;
+  void evaluate(const State& state, const FullModel* full, const Placement& frame, float* density) noexcept;
 
  private:
-  void set_displacements(const State& state, const FullModel* full) noexcept;
+  void set_displacements(const State& state, const FullModel* full, const Placement& frame) noexcept;
 
   struct Tet {
     std::array<std::int32_t, 4> corners{};  ///< of displacements_

@@ -127,7 +127,7 @@ struct BodyFrames::Datasets {
 BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body, std::optional<Eigen::Vector3d>& origin)
     : model_(body.model),
       frame_(body.frame),
-      space_(body.space),
+      full_(body.full),
       info_(body.info),
       file_(file),
       origin_(origin),
@@ -187,9 +187,10 @@ void BodyFrames::set_positions(const State& state, VertexArray& positions) {
   const VertexArray& rest = model_.object->mesh.vertices;
   const Placement placement = frame_.placement(state.frame);
   if (state.full) {
+    const FrameVelocity velocity = frame_.velocity(state.frame);
     for (Eigen::Index v = 0; v < rest.rows(); ++v) {
-      positions.row(v) = rest.row(v) + space_->displacement(v, state.full->q).transpose();
-      velocities_.row(v) = space_->displacement(v, state.full->v);
+      positions.row(v) = rest.row(v) + full_displacement(*full_, placement, *state.full, v).transpose();
+      velocities_.row(v) = full_velocity(*full_, placement, velocity, *state.full, v);
     }
     displacements_ = ((positions.rowwise() - placement.position.transpose()) * placement.rotation).rowwise() +
                      placement.origin.transpose();

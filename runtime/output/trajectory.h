@@ -11,7 +11,7 @@
 #include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/xdmf.h"
 #include "common/model/reduced_model.h"
-#include "runtime/sim/space/full/full_space.h"
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -38,7 +38,7 @@ struct NamedBody {
   const ReducedModel& model;  ///< holds /object and the basis, perhaps /render
   const BodyFrame& frame;
   TrajectoryInfo info;
-  const FullSpace* space = nullptr;  ///< of a body that may step in full space
+  const FullModel* full = nullptr;  ///< of a body that may step in full space
 };
 
 /// The frames of one body in an open file, below a group: "" for the root, or "/bodies/NAME".
@@ -74,7 +74,7 @@ class BodyFrames {
 
   const ReducedModel& model_;
   const BodyFrame& frame_;
-  const FullSpace* space_;
+  const FullModel* full_;
   TrajectoryInfo info_;
   Hdf5File& file_;
   std::optional<Eigen::Vector3d>& origin_;

@@ -5,20 +5,9 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kBesideKey = 1e-6;  // of a step
-
 const MotionSample& sample_of(const FrameState& state) { return std::get_if<CarriedState>(&state)->frame; }
 CarriedWorkspace& own(FrameWorkspace& workspace) { return *std::get_if<CarriedWorkspace>(&workspace); }
 const CarriedWorkspace& own(const FrameWorkspace& workspace) { return *std::get_if<CarriedWorkspace>(&workspace); }
-
-/// The motion at `time`, with the accelerations `beside` [s] it: they may jump at keys, and a step has those within it.
-MotionSample sample_beside(const RigidMotion& motion, double time, double beside) {
-  MotionSample sample = motion.sample(time);
-  const MotionSample within = motion.sample(time + beside);
-  sample.linear_acceleration = within.linear_acceleration;
-  sample.angular_acceleration = within.angular_acceleration;
-  return sample;
-}
 
 Placement placement_of(const MotionSample& sample) {
   return {Eigen::Vector3d::Zero(), sample.position, sample.rotation};
@@ -90,7 +79,7 @@ void CarriedFrame::take(const FrameStep& step, const MotionSample& sample, Frame
 
 void CarriedFrame::begin(const FrameStep& step, FrameWorkspace& workspace,
                          Eigen::VectorXd& external_force) const noexcept {
-  take(step, sample_beside(*step.loads.carrier, step.end, -kBesideKey * step.time_step), workspace, external_force);
+  take(step, step.loads.carrier->sample(step.end, -kBesideKey * step.time_step), workspace, external_force);
 }
 
 FrameVelocity CarriedFrame::expected_velocity(const FrameState& /*state*/,
@@ -104,7 +93,7 @@ bool CarriedFrame::jumps(const WorldLoads& loads, double from, double to) const 
 
 void CarriedFrame::enter_start(const FrameStep& step, FrameWorkspace& workspace,
                                Eigen::VectorXd& external_force) const noexcept {
-  take(step, sample_beside(*step.loads.carrier, step.start, kBesideKey * step.time_step), workspace, external_force);
+  take(step, step.loads.carrier->sample(step.start, kBesideKey * step.time_step), workspace, external_force);
 }
 
 void CarriedFrame::add_start_force(const FrameStep& step, const FrameState& /*state*/, FrameWorkspace& workspace,

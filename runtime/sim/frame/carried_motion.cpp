@@ -1,16 +1,6 @@
 #include "runtime/sim/frame/carried_motion.h"
 
 namespace exmat::runtime {
-namespace {
-
-/// Acceleration that the frame gives to a point of the frame.
-Eigen::Vector3d acceleration_at(const MotionSample& frame, const Eigen::Vector3d& point) {
-  const Eigen::Vector3d arm = frame.rotation * point;
-  return frame.linear_acceleration + frame.angular_acceleration.cross(arm) +
-         frame.angular_velocity.cross(frame.angular_velocity.cross(arm));
-}
-
-}  // namespace
 
 CarriedWorkspace::CarriedWorkspace(const CarriedInertia& carried)
     : moments(carried.moments.make_moments()),
@@ -29,7 +19,7 @@ void set_frame(const MotionSample& frame, CarriedWorkspace& workspace) noexcept 
 void add_carried_load(const CarriedInertia& carried, const RowMatrix& gravity_load, const Eigen::Vector3d& gravity,
                       const CarriedWorkspace& workspace, Eigen::VectorXd& force) noexcept {
   const MotionSample& frame = workspace.frame;
-  const Eigen::Vector3d felt = gravity - acceleration_at(frame, carried.moments.centre_of_mass());
+  const Eigen::Vector3d felt = gravity - frame.acceleration_of(carried.moments.centre_of_mass());
   force.noalias() += gravity_load.transpose() * (frame.rotation.transpose() * felt);
   force.noalias() -= carried.spin_load.transpose() * workspace.spin_rate;
 }

@@ -99,6 +99,14 @@ MotionSample RigidMotion::sample(double time) const noexcept {
   return sample;
 }
 
+MotionSample RigidMotion::sample(double time, double beside) const noexcept {
+  MotionSample here = sample(time);
+  const MotionSample within = sample(time + beside);
+  here.linear_acceleration = within.linear_acceleration;
+  here.angular_acceleration = within.angular_acceleration;
+  return here;
+}
+
 bool RigidMotion::has_key(double from, double to) const noexcept {
   const auto within = [=](double time) { return from <= time && time < to; };
   return std::any_of(segments_.begin(), segments_.end(), [&](const Segment& segment) {

@@ -32,7 +32,14 @@ struct MotionSample {
   Eigen::Vector3d velocity_at(const Eigen::Vector3d& point) const noexcept {
     return linear_velocity + angular_velocity.cross(point - position);
   }
+  /// World acceleration of a point of the frame [m/s^2].
+  Eigen::Vector3d acceleration_of(const Eigen::Vector3d& point) const noexcept {
+    const Eigen::Vector3d arm = rotation * point;
+    return linear_acceleration + angular_acceleration.cross(arm) + angular_velocity.cross(angular_velocity.cross(arm));
+  }
 };
+
+inline constexpr double kBesideKey = 1e-6;  ///< of a step
 
 /// A prescribed rigid motion through keyframes: cubic Hermite positions (non-uniform Catmull-Rom) and cubic Bezier
 /// orientations (Kim, Kim and Shin 1995), both C1; accelerations may jump at keys. Held at rest before the first key
@@ -49,6 +56,8 @@ class RigidMotion {
 
   /// Velocities and accelerations are the exact derivatives of the pose.
   MotionSample sample(double time) const noexcept;
+  /// The same with the accelerations `beside` [s] it: they may jump at keys, and a step has those within it.
+  MotionSample sample(double time, double beside) const noexcept;
 
   /// Whether a key, where accelerations may jump, lies in [from, to).
   bool has_key(double from, double to) const noexcept;

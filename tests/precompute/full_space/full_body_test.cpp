@@ -1,6 +1,7 @@
 #include "runtime/sim/space/full/full_body.h"
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <gtest/gtest.h>
 
 #include "precompute/shape_space/filter_functions.h"
@@ -260,6 +261,93 @@ TEST(FullBody, EntersAndLeavesWhereItIs) {
     const auto now = *model.frame->momenta(state.frame), then = *model.frame->momenta(before.frame);
     EXPECT_LE((now.linear - then.linear).norm(), 1e-12 * then.linear.norm());
     EXPECT_LE((now.angular - then.angular).norm(), 1e-12 * then.angular.norm());
+  }
+}
+
+/// A carried bar under a push in the space of all its vertices and in that of all its modes, whose equations are those
+/// of the frame: fictitious forces in place of inertia in the world.
+struct CarriedTwin {
+  explicit CarriedTwin(int examples)
+      : bar(complete_bar({.cells = {4, 1, 1}, .carried = true, .examples = examples})), has_examples(examples > 0) {
+    if (has_examples) bar.model.full_space = full_space_data_of(bar.model);
+    model = std::move(runtime::build_model(bar.model, {.examples = has_examples, .carried = true}).model);
+    full = std::move(runtime::build_full_model(bar.model, *model).model);
+  }
+
+  runtime::StepScene scene(double time_step, Integrator integrator) const {
+    const Eigen::Vector3d axis = Eigen::Vector3d(0.4, -0.3, 0.8).normalized();
+    const auto turned = [&](double angle) { return Eigen::Quaterniond(Eigen::AngleAxisd(angle, axis)); };
+    runtime::StepScene scene;
+    scene.time_step = time_step;
+    scene.integrator = integrator;
+    scene.mass_damping = 0.5;
+    scene.stiffness_damping = 0.005;
+    scene.newton = scene.space.newton = {100, kTight};
+    scene.gravity = {0, -9, 3};
+    scene.gravity_force = runtime::gravity_force(*model, scene.gravity);
+    scene.carrier = runtime::RigidMotion(std::vector<runtime::Keyframe>{
+        {0, {0, 0, 0}, turned(0)}, {0.16, {0.1, 0.2, -0.1}, turned(0.9)}, {0.32, {-0.1, 0.3, 0.2}, turned(1.6)}});
+    if (has_examples) scene.examples = {{.stiffness = 300, .damping = 2, .bias = 0.4, .target_iterations = 50}};
+    return scene;
+  }
+
+  runtime::State start(const runtime::StepScene& scene) const {
+    runtime::State state = runtime::make_state(*model);
+    runtime::FrameWorkspace frame = model->frame->make_workspace();
+    model->frame->follow(scene, 0, state.q, state.v, frame, state.frame);
+    return state;
+  }
+
+  /// Largest distance of the two after 0.32 s over the largest displacement in the frame.
+  double difference(double time_step, Integrator integrator = Integrator::kBdf2) const {
+    const runtime::StepScene of = scene(time_step, integrator);
+    runtime::State reduced = start(of), state = reduced;
+    runtime::enter_full_space(*full, *model, state);
+    runtime::Workspace workspace(*model, of), beside(*model, of);
+    runtime::FullWorkspace own(*full, of);
+    for (int i = 0; i < static_cast<int>(std::lround(0.32 / time_step)); ++i) {
+      EXPECT_EQ(runtime::step_in_full_space(*full, *model, of, state, workspace, own).status, 0U) << i;
+      EXPECT_EQ(runtime::step(*model, of, reduced, beside).status, 0U) << i;
+    }
+    const double size = (full->basis * reduced.q).lpNorm<Eigen::Infinity>();
+    EXPECT_GE(size, 0.02);
+    const runtime::Energies now = runtime::energies(full.get(), *model, of, state),
+                            expected = runtime::energies(*model, of, reduced);
+    energies_off = std::max({std::abs(now.kinetic / expected.kinetic - 1), std::abs(now.elastic / expected.elastic - 1),
+                             std::abs(now.potential / expected.potential - 1)});
+    coordinates_off = (state.q - reduced.q).norm() / reduced.q.norm();
+    fixed_off = 0;
+    const VertexArray& rest = bar.model.object->mesh.vertices;
+    for (Eigen::Index v = 0; v < rest.rows(); ++v) {
+      if (bar.model.object->fixed[v] == 0) continue;
+      const Eigen::Vector3d moved =
+          runtime::full_displacement(*full, model->frame->placement(state.frame), *state.full, v);
+      fixed_off = std::max(
+          fixed_off,
+          (rest.row(v).transpose() + moved - of.carrier->sample(state.time).to_world(rest.row(v).transpose())).norm());
+    }
+    runtime::enter_full_space(*full, *model, reduced);
+    return (state.full->q - reduced.full->q).lpNorm<Eigen::Infinity>() / size;
+  }
+
+  test::Bar bar;
+  bool has_examples;
+  std::unique_ptr<const runtime::Model> model;
+  std::unique_ptr<const runtime::FullModel> full;
+  mutable double energies_off = 0, coordinates_off = 0, fixed_off = 0;
+};
+
+// Both are of second order, of errors of their own: a quarter as far apart at half the time step, a little less where
+// weights change.
+TEST(FullBody, IsTheReducedBodyOfAllModesWhereItIsCarried) {
+  for (const int examples : {0, 3}) {
+    const CarriedTwin twin(examples);
+    const double coarse = twin.difference(0.002), fine = twin.difference(0.001);
+    EXPECT_GE(coarse / fine, 3.4) << examples;
+    EXPECT_LE(fine, 5e-3) << examples;
+    EXPECT_LE(twin.energies_off, 1e-2) << examples;
+    EXPECT_LE(twin.coordinates_off, 1e-2) << examples;
+    EXPECT_LE(twin.fixed_off, 1e-15) << examples;
   }
 }
 

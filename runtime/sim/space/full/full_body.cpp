@@ -13,11 +13,12 @@ namespace {
 void set_full(const FullModel& full, const Model& model, const State& state, FullMotion& motion) noexcept {
   motion.q.noalias() = full.basis * state.q;
   motion.v.noalias() = full.basis * state.v;
-  if (full.rigid) {
+  if (full.rigid || full.carried) {
     const Placement at = model.frame->placement(state.frame);
     const FrameVelocity velocity = model.frame->velocity(state.frame);
+    const Eigen::Matrix4Xd& from_origin = full.rigid ? full.rigid->rest() : full.carried->rest();
     for (Eigen::Index place = 0; place < full.space.vertices(); ++place) {
-      const Eigen::Vector3d rest = full.rigid->rest().col(place).head<3>();
+      const Eigen::Vector3d rest = from_origin.col(place).head<3>();
       const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
       const Eigen::Vector3d arm = at.rotation * (rest + motion.q.segment<3>(dof));
       motion.v.segment<3>(dof) = velocity.at(arm) + (at.rotation * motion.v.segment<3>(dof)).eval();
@@ -34,8 +35,8 @@ void set_full(const FullModel& full, const Model& model, const State& state, Ful
 }
 
 /// Sets the reduced coordinates and the frame nearest to where the last step has left the body, with its momenta.
-void set_reduced(const FullModel& full, const Model& model, Workspace& workspace, FullWorkspace& own,
-                 State& state) noexcept {
+void set_reduced(const FullModel& full, const Model& model, const StepScene& scene, Workspace& workspace,
+                 FullWorkspace& own, State& state) noexcept {
   const FullMotion& motion = *state.full;
   const Eigen::VectorXd *q = &motion.q, *v = &motion.v;
   FrameMotion frame;
@@ -57,11 +58,24 @@ void set_reduced(const FullModel& full, const Model& model, Workspace& workspace
     q = &own.moved;
     v = &own.rate;
   }
+  if (full.carried) {
+    const MotionSample at = scene.carrier->sample(motion.time);
+    full.carried->own_velocity(at, motion.q, motion.v, own.field);
+    full.space.from_field(own.field, own.rate);
+    for (Eigen::Index place = 0; place < full.space.vertices(); ++place) {
+      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
+      const Eigen::Vector3d rest = full.carried->rest().col(place).head<3>();
+      own.moved.segment<3>(dof) = at.to_frame(rest + motion.q.segment<3>(dof)) - rest;
+    }
+    q = &own.moved;
+    v = &own.rate;
+  }
   state.q.noalias() = full.projection.transpose() * *q;
   state.v.noalias() = full.projection.transpose() * *v;
   state.q_previous = state.q;
   state.v_previous = state.v;
   if (full.rigid) model.frame->adopt(frame, momenta, state.q, state.v, workspace.frame, state.frame);
+  if (full.carried) model.frame->follow(scene, motion.time, state.q, state.v, workspace.frame, state.frame);
   state.step = motion.step;
   state.time = motion.time;
   state.elastic_energy = motion.elastic_energy;
@@ -160,7 +174,7 @@ StepReport step_in_full_space(const FullModel& full, const Model& model, const S
   report.status |= target.status;
   report.target_iterations = target.target_iterations;
   if ((report.status & kStepNonFinite) != 0) return report;
-  set_reduced(full, model, workspace, own, state);
+  set_reduced(full, model, scene, workspace, own, state);
   commit_weights(scene, workspace, state);
   commit_targets(model, scene, workspace, state);
   if (step.is_near()) {
@@ -176,6 +190,24 @@ StepReport step_in_full_space(const FullModel& full, const Model& model, const S
     motion.q_previous = motion.q;
   }
   return report;
+}
+
+Eigen::Vector3d full_displacement(const FullModel& full, const Placement& frame, const FullMotion& motion,
+                                  Eigen::Index vertex) noexcept {
+  const std::int32_t own = full.space.number(vertex);
+  if (own >= 0) return motion.q.segment<3>(3 * own);
+  if (!full.carried) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d rest = full.carried->rest().col(full.space.place(vertex)).head<3>();
+  return frame.to_world(rest) - rest;
+}
+
+Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, const FrameVelocity& velocity,
+                              const FullMotion& motion, Eigen::Index vertex) noexcept {
+  const std::int32_t own = full.space.number(vertex);
+  if (own >= 0) return motion.v.segment<3>(3 * own);
+  if (!full.carried) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d rest = full.carried->rest().col(full.space.place(vertex)).head<3>();
+  return velocity.at(frame.rotation * rest);
 }
 
 Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept {

@@ -34,6 +34,13 @@ void move_full(const FullModel& full, const Model& model, const RigidPlace& befo
 StepReport step_in_full_space(const FullModel& full, const Model& model, const StepScene& scene, State& state,
                               Workspace& workspace, FullWorkspace& own) noexcept;
 
+/// Where a vertex of the mesh is displaced to from where it was meshed, and its velocity, world [m], [m/s]; of a body
+/// whose frame is there and moves so.
+Eigen::Vector3d full_displacement(const FullModel& full, const Placement& frame, const FullMotion& motion,
+                                  Eigen::Index vertex) noexcept;
+Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, const FrameVelocity& velocity,
+                              const FullMotion& motion, Eigen::Index vertex) noexcept;
+
 /// runtime::energies() of a body in the space that it is in.
 Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept;
 

@@ -16,10 +16,13 @@ FullExamples full_examples(const FullSpaceData& data, const ReducedModel& reduce
   } else {
     made.from_target = data.from_target.transpose() * examples.target->basis();
   }
-  if (!full.rigid) return made;
+  if (!full.rigid && !full.carried) return made;
   const MeshFilter<double> filter = full.space.filter();
-  const Eigen::Map<const RowMatrix> W(filter.functions, filter.vertices, filter.stride);
-  made.rest = W.leftCols(full.space.functions()).transpose() * full.rigid->rest().topRows<3>().transpose();
+  const Eigen::Map<const RowMatrix> all(filter.functions, filter.vertices, filter.stride);
+  const auto W = all.leftCols(full.space.functions());
+  const Eigen::Matrix4Xd& rest = full.rigid ? full.rigid->rest() : full.carried->rest();
+  made.rest = W.transpose() * rest.topLeftCorner(3, filter.vertices).transpose();
+  made.ones = W.colwise().sum();
   return made;
 }
 
@@ -34,8 +37,11 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
             {"", "/full_space", "this group, since the scene asks for steps in full space", "none",
              "precompute the bundle again with this scene (--scene)"}};
   const ObjectData& object = *reduced.object;
+  const bool is_carried = model.frame->is_driven();
   auto full = std::make_unique<FullModel>(
-      FullSpace(object.mesh, object.materials, object.fixed, forced ? reduced.full_space->filter : RowMatrix()));
+      FullSpace(object.mesh, object.materials, object.fixed, forced ? reduced.full_space->filter : RowMatrix(),
+                is_carried ? FixedVertices::kDriven : FixedVertices::kStay));
+  if (is_carried) full->carried.emplace(full->space, object.mesh.vertices);
   if (!full->space.is_clamped()) full->rigid.emplace(full->space, object.mesh.vertices);
   if (model.contact) full->contacts.emplace(*model.contact, full->space, model.frame->origin());
   if (forced) full->examples = full_examples(*reduced.full_space, reduced, model.examples.front(), *full);

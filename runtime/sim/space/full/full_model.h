@@ -7,6 +7,7 @@
 #include "common/model/reduced_model.h"
 #include "runtime/sim/examples/example_weights.h"
 #include "runtime/sim/examples/target_table.h"
+#include "runtime/sim/space/full/carried_part.h"
 #include "runtime/sim/space/full/full_contacts.h"
 #include "runtime/sim/space/full/full_space.h"
 #include "runtime/sim/space/full/rigid_part.h"
@@ -20,7 +21,22 @@ struct FullExamples {
   ExampleWeights weights;
   std::optional<TargetTable> table;  ///< of c*; else `from_target`
   Eigen::MatrixXd from_target;       ///< 3m x d: c* of the coordinates that the model's TargetSolver has
-  Eigen::MatrixX3d rest;             ///< m x 3, W^T X of a free body, X about its centre of mass
+  Eigen::MatrixX3d rest;             ///< m x 3, W^T X of a body whose frame moves, X about the frame's origin
+  Eigen::VectorXd ones;              ///< [m] W^T 1 of such a body; 0 of a free one
+
+  /// A coefficient of the deformation in a frame that moves, and that of the displacement in the world.
+  struct Frame {
+    Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the origin, world [m]
+  };
+  Eigen::Vector3d to_world(Eigen::Index k, const Frame& frame, const Eigen::Vector3d& own) const noexcept {
+    const Eigen::Vector3d at_rest = rest.row(k);
+    return frame.rotation * (at_rest + own) + ones[k] * frame.position - at_rest;
+  }
+  Eigen::Vector3d to_frame(Eigen::Index k, const Frame& frame, const Eigen::Vector3d& moved) const noexcept {
+    const Eigen::Vector3d at_rest = rest.row(k);
+    return frame.rotation.transpose() * (at_rest + moved - ones[k] * frame.position) - at_rest;
+  }
 };
 
 /// A body prepared for steps in all its vertices: immutable, shared by any number of States. f unknowns, r modes.
@@ -31,6 +47,7 @@ struct FullModel {
 
   FullSpace space;
   std::optional<RigidPart> rigid;        ///< of a free body
+  std::optional<CarriedPart> carried;    ///< of a body whose fixed vertices a motion carries
   std::optional<FullContacts> contacts;  ///< where the model has contact
   std::optional<FullExamples> examples;
   RowMatrix basis;       ///< f x r, U of the vertices that move

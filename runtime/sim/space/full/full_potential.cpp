@@ -16,6 +16,7 @@ FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
       offset(start),
       rate(start),
       external(start),
+      frame_rate(start),
       unused(start),
       x(start.size()),
       a(x),
@@ -51,12 +52,25 @@ MeshInertia FullPotential::terms() const noexcept {
           scene_.stiffness_damping * form_.velocity_factor};
 }
 
-double FullPotential::undamped_at_start(double elastic_energy) noexcept {
+// The inertia of fixed vertices is that of their acceleration, and nothing of their rate is beside the frame's.
+void FullPotential::drive(const MotionSample& from, const MotionSample& to) noexcept {
+  const CarriedPart& carried = *model_.carried;
+  FullPotentialWorkspace& work = workspace_;
+  frame_ = to;
+  carried.place_fixed(from, work.start);
+  for (Eigen::Index place = space_.vertices(); place < space_.places(); ++place) {
+    const Eigen::Vector3d way = carried.displacement(to, place) - carried.displacement(from, place);
+    work.offset.segment<3>(4 * place) = carried.acceleration(to, place) / form_.acceleration_factor - way;
+    work.rate.segment<3>(4 * place) = carried.velocity(to, place) / form_.velocity_factor - way;
+  }
+}
+
+double FullPotential::undamped_at(const Eigen::VectorXd& d, double elastic_energy) noexcept {
   const Eigen::Index size = space_.field_size();
-  Field(workspace_.a.data(), size) = workspace_.offset;
+  Field(workspace_.a.data(), size) = workspace_.offset + d;
   std::array<double, kMeshSums> sums{};
   kernels().mesh_inertia(space_.arrays(), terms(), workspace_.inertia.data(), workspace_.force.data(), sums.data());
-  return sums[0] + elastic_energy;
+  return sums[0] + elastic_energy - workspace_.external.dot(d);
 }
 
 void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangents, bool freeze) noexcept {
@@ -68,6 +82,10 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   if (model_.rigid) {
     if (freeze) model_.rigid->place(work.x.data(), work.rigid);
     if (damps()) model_.rigid->remove_motion(work.rigid, work.w.data());
+  }
+  if (model_.carried && damps()) {
+    if (freeze) model_.carried->frame_velocity(frame_, work.x.data(), 1 / form_.velocity_factor, work.frame_rate);
+    Field(work.w.data(), size) -= work.frame_rate;
   }
   const MeshArrays mesh = space_.arrays();
   const ElementLaw law = space_.law();
@@ -100,6 +118,7 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>();
   total.value -= work_;
   gradient = inertia + force - work.external;
+  gradient.tail(4 * space_.driven()).setZero();
   if (filters()) add_filter_force(total, gradient);
   if (contact_ != nullptr) add_contacts(evaluation, gradient);
   return evaluation;

@@ -16,6 +16,7 @@ struct FullPotentialWorkspace {
   explicit FullPotentialWorkspace(const FullModel& model);
 
   Eigen::VectorXd start, offset, rate, external;         ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
+  Eigen::VectorXd frame_rate;                            ///< of q - q_v, what the frame of a carried body makes
   Eigen::VectorXd unused;                                ///< a gradient that nobody asked for
   AlignedArray x, a, w, inertia, force;                  ///< fields at the last d
   AlignedArray frozen;                                   ///< tangents of damping, see Kernels::mesh_force()
@@ -28,8 +29,8 @@ struct FullPotentialWorkspace {
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + c_v/2 (q - q_v)^T D (q - q_v)
 ///     + kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2,
 /// D = alpha M + beta K, K of the iterate that was last frozen, and with obstacles near their potential. Of a free body
-/// q - q_v is that without the rigid motion that has its momenta, as the body stands at that iterate. Problem of
-/// search_line(). No call allocates.
+/// q - q_v is that without the rigid motion that has its momenta, of a carried one without that of its frame, as the
+/// body stands at that iterate. Problem of search_line(). No call allocates.
 class FullPotential {
  public:
   FullPotential(const FullModel& model, const StepScene& scene, const StepForm& form, FullPotentialWorkspace& workspace)
@@ -41,8 +42,11 @@ class FullPotential {
   /// Fields at d = 0 of the form's centres; q_n [f] and f_ext [f].
   void begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept;
 
-  /// Inertia, elasticity and external force alone: at d = 0, of the elastic energy there, and at the last d.
-  double undamped_at_start(double elastic_energy) noexcept;
+  /// After begin(), of a carried body: where its frame was and is to be.
+  void drive(const MotionSample& from, const MotionSample& to) noexcept;
+
+  /// Inertia, elasticity and external force alone: at `d`, of the elastic energy there, and at the last d.
+  double undamped_at(const Eigen::VectorXd& d, double elastic_energy) noexcept;
   double undamped() const noexcept { return sums_[0] + sums_[2] - work_; }
   double elastic_energy() const noexcept { return sums_[2]; }
 
@@ -81,6 +85,7 @@ class FullPotential {
   const StepForm& form_;
   FullPotentialWorkspace& workspace_;
   ContactWorkspace* contact_ = nullptr;
+  MotionSample frame_;  ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;
 };

@@ -72,15 +72,15 @@ Eigen::VectorXd diagonal_of_inverse(const Eigen::SparseMatrix<double>& L) {
 }  // namespace
 
 FullSpace::FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed,
-                     const RowMatrix& filter)
+                     const RowMatrix& filter, FixedVertices fixed_vertices)
     : model_(materials.model), clamped_(fixed.any()) {
-  order_vertices(mesh, fixed);
+  order_vertices(mesh, fixed, fixed_vertices);
   add_matrices(mesh, materials);
   add_elements(elements_of(mesh, materials), materials);
   add_filter(filter);
 }
 
-void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed) {
+void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed, FixedVertices fixed_vertices) {
   std::vector<std::int32_t> moving(static_cast<std::size_t>(mesh.vertex_count()), -1);
   std::int32_t count = 0;
   for (Eigen::Index v = 0; v < mesh.vertex_count(); ++v)
@@ -108,12 +108,16 @@ void FullSpace::order_vertices(const TetMesh& mesh, const FlagVector& fixed) {
   std::vector<std::int32_t> place(static_cast<std::size_t>(count));
   for (std::int32_t k = 0; k < count; ++k) place[static_cast<std::size_t>(vertex_of_[static_cast<std::size_t>(k)])] = k;
   place_of_ = moving;
-  for (std::int32_t& at : place_of_)
-    if (at >= 0) at = place[static_cast<std::size_t>(at)];
+  for (std::int32_t& at : place_of_) {
+    if (at >= 0)
+      at = place[static_cast<std::size_t>(at)];
+    else if (fixed_vertices == FixedVertices::kDriven)
+      at = count + static_cast<std::int32_t>(driven_++);
+  }
 }
 
 void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials) {
-  const Eigen::Index n = vertices();
+  const Eigen::Index n = places();
   std::vector<std::set<std::int32_t>> neighbours(static_cast<std::size_t>(n));
   const auto for_pairs = [&](Eigen::Index t, auto&& work) {
     for (int i = 0; i < 4; ++i)
@@ -154,8 +158,8 @@ void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials)
       laplacian_[k] += (kShearShare * lame.mu + kVolumeShare * lame.lambda) * laplacian;
     });
     for (int i = 0; i < 4; ++i)
-      if (const std::int32_t place = place_of_[static_cast<std::size_t>(mesh.tets(t, i))]; place >= 0)
-        gravity_load_.middleRows<3>(3 * vertex_of_[static_cast<std::size_t>(place)]).diagonal().array() += mass / 4;
+      if (const std::int32_t own = number(mesh.tets(t, i)); own >= 0)
+        gravity_load_.middleRows<3>(3 * own).diagonal().array() += mass / 4;
   }
 }
 
@@ -205,13 +209,12 @@ void FullSpace::add_filter(const RowMatrix& filter) {
   stride_ = (functions_ + kMeshLanes - 1) / kMeshLanes * kMeshLanes;
   filter_ = AlignedArray(vertices() * stride_);
   for (Eigen::Index v = 0; functions_ > 0 && v < filter.rows(); ++v)
-    if (const std::int32_t place = place_of_[static_cast<std::size_t>(v)]; place >= 0)
-      for (Eigen::Index k = 0; k < functions_; ++k) filter_[place * stride_ + k] = filter(v, k);
+    if (number(v) >= 0)
+      for (Eigen::Index k = 0; k < functions_; ++k) filter_[place(v) * stride_ + k] = filter(v, k);
   // A translation of a free body is no deformation: W' = W - (M 1) (1^T W) / m.
   if (!clamped_ && functions_ > 0) {
-    const Eigen::VectorXd masses = mass() * Eigen::VectorXd::Ones(vertices());
     Eigen::Map<RowMatrix> W(filter_.data(), vertices(), stride_);
-    W -= masses / masses.sum() * W.colwise().sum().eval();
+    W -= masses() / masses().sum() * W.colwise().sum().eval();
   }
   rounded_filter_ = AlignedFloats(vertices() * stride_);
   std::copy_n(filter_.data(), vertices() * stride_, rounded_filter_.data());
@@ -221,7 +224,7 @@ FullSpace::Scalar FullSpace::scalar_matrix(const std::vector<double>& values) co
   std::vector<Eigen::Triplet<double>> entries;
   for (std::size_t i = 0; i < rows_.size(); ++i)
     for (auto k = static_cast<std::size_t>(row_starts_[i]); k < static_cast<std::size_t>(row_starts_[i + 1]); ++k)
-      entries.emplace_back(rows_[i], columns_[k], values[k]);
+      if (std::max(rows_[i], columns_[k]) < vertices()) entries.emplace_back(rows_[i], columns_[k], values[k]);
   Scalar matrix(vertices(), vertices());
   matrix.setFromTriplets(entries.begin(), entries.end());
   return matrix;
@@ -246,31 +249,27 @@ void FullSpace::from_field(const Eigen::VectorXd& field, Eigen::VectorXd& x) con
     x.segment<3>(3 * vertex_of_[k]) = field.segment<3>(static_cast<Eigen::Index>(4 * k));
 }
 
-template <typename Use>
-void FullSpace::for_momenta(const Eigen::VectorXd& v, const Use& use) const {
-  for (std::size_t i = 0; i < rows_.size(); ++i) {
-    Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
-    for (auto k = static_cast<std::size_t>(row_starts_[i]); k < static_cast<std::size_t>(row_starts_[i + 1]); ++k)
-      momentum += mass_[k] * v.segment<3>(3 * number_at(columns_[k]));
-    use(number_at(rows_[i]), momentum);
-  }
+Eigen::VectorXd FullSpace::masses() const {
+  Eigen::VectorXd all(places());
+  const auto all_move = [](Eigen::Index) { return Eigen::Vector3d(1, 0, 0); };
+  for_momenta(all_move, [&](Eigen::Index place, const Eigen::Vector3d& own) { all[place] = own[0]; });
+  return all;
 }
 
 Eigen::VectorXd FullSpace::momentum(const Eigen::VectorXd& v) const {
   Eigen::VectorXd all(v.size());
-  for_momenta(v, [&](std::int32_t vertex, const Eigen::Vector3d& own) { all.segment<3>(3 * vertex) = own; });
+  const auto velocity = [&](Eigen::Index place) -> Eigen::Vector3d {
+    return place < vertices() ? Eigen::Vector3d(v.segment<3>(3 * number_at(place))) : Eigen::Vector3d::Zero();
+  };
+  for_momenta(velocity, [&](Eigen::Index place, const Eigen::Vector3d& own) {
+    if (place < vertices()) all.segment<3>(3 * number_at(place)) = own;
+  });
   return all;
-}
-
-double FullSpace::kinetic_energy(const Eigen::VectorXd& v) const noexcept {
-  double sum = 0;
-  for_momenta(v, [&](std::int32_t vertex, const Eigen::Vector3d& own) { sum += own.dot(v.segment<3>(3 * vertex)); });
-  return 0.5 * sum;
 }
 
 MeshArrays FullSpace::arrays() const noexcept {
   MeshArrays mesh;
-  mesh.vertices = vertices();
+  mesh.vertices = places();
   mesh.panels = padded_elements() / kMeshLanes;
   mesh.starts = starts_.data();
   mesh.corners = corners_.data();

@@ -29,38 +29,44 @@ class AlignedFloats {
   Eigen::Index size_ = 0;
 };
 
-/// The space of all displacements of a mesh whose fixed vertices stay, and what a step sums over in it. Immutable.
+/// Whether the fixed vertices of a body stay where they were meshed, or go where something else takes them.
+enum class FixedVertices { kStay, kDriven };
+
+/// The space of all displacements of a mesh's vertices that are not fixed, and what a step sums over in it. Immutable.
 /// n vertices that move, f = 3n unknowns in the order of the vertices, as in runtime::State. Fields are what the
-/// kernels take: four numbers a vertex, the vertices in an order of elimination that keeps sparse factors sparse.
+/// kernels take: four numbers a vertex, the vertices in an order of elimination that keeps sparse factors sparse; where
+/// the p fixed ones are driven these come last, else they have no place.
 class FullSpace {
  public:
   FullSpace() = default;
   /// `filter` [vertices of the mesh x m], none or W of the shape filter P = W W^T (x) I3 of a linear example force.
-  FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed, const RowMatrix& filter = {});
+  FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed, const RowMatrix& filter = {},
+            FixedVertices fixed_vertices = FixedVertices::kStay);
 
   Eigen::Index size() const { return 3 * vertices(); }              ///< f
   Eigen::Index vertices() const { return std::ssize(vertex_of_); }  ///< n
-  Eigen::Index field_size() const { return 4 * vertices(); }        ///< of a field
+  Eigen::Index driven() const { return driven_; }                   ///< p, where they have places in fields
+  Eigen::Index places() const { return vertices() + driven_; }
+  Eigen::Index field_size() const { return 4 * places(); }          ///< of a field
   Eigen::Index functions() const { return functions_; }             ///< m
   bool is_clamped() const { return clamped_; }                      ///< whether a vertex is fixed
   double edge() const { return edge_; }                             ///< mean length of the edges [m]
   double wave_rate() const { return wave_rate_; }                   ///< of the fastest waves, edges a second [1/s]
   double extent() const { return extent_; }                         ///< largest coordinate at rest [m]
   const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
-  /// Of a vertex of the mesh: its place in fields, and its number among those that move; -1 where it is fixed.
+  /// Of a vertex of the mesh: its place in fields, -1 where it has none, and its number among those that move, -1 where
+  /// it is fixed.
   std::int32_t place(Eigen::Index vertex) const { return place_of_[static_cast<std::size_t>(vertex)]; }
   std::int32_t number(Eigen::Index vertex) const {
-    return place(vertex) < 0 ? -1 : vertex_of_[static_cast<std::size_t>(place(vertex))];
+    const std::int32_t own = place(vertex);
+    return own < 0 || own >= vertices() ? -1 : number_at(own);
   }
   std::int32_t number_at(Eigen::Index place) const { return vertex_of_[static_cast<std::size_t>(place)]; }
-  /// M v [f] of velocities v, and 1/2 v^T M v.
+  /// M v [f] of velocities v of the vertices that move, the fixed ones at rest.
   Eigen::VectorXd momentum(const Eigen::VectorXd& v) const;
-  double kinetic_energy(const Eigen::VectorXd& v) const noexcept;
-  /// Where a vertex of the mesh is displaced to by q [f].
-  Eigen::Vector3d displacement(Eigen::Index vertex, const Eigen::VectorXd& q) const {
-    const std::int32_t own = number(vertex);
-    return own < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(q.segment<3>(3 * own));
-  }
+  /// 1/2 v^T M v; `driven(place)`: the velocity of a driven vertex.
+  template <typename Driven>
+  double kinetic_energy(const Eigen::VectorXd& v, const Driven& driven) const noexcept;
   Eigen::Index mesh_vertices() const { return std::ssize(place_of_); }
 
   Eigen::VectorXd to_field(const Eigen::VectorXd& x) const;
@@ -71,6 +77,7 @@ class FullSpace {
   /// and mu [N/m], and times the stiffness that the preconditioner takes for theirs [N/m].
   using Scalar = Eigen::SparseMatrix<double, Eigen::RowMajor>;
   Scalar mass() const { return scalar_matrix(mass_); }
+  Eigen::VectorXd masses() const;  ///< of each place, row sums over all [kg]
   Scalar preconditioning_stiffness() const { return scalar_matrix(laplacian_); }
   Eigen::Index entries() const { return std::ssize(columns_); }
   double mass_value(Eigen::Index k) const { return mass_[static_cast<std::size_t>(k)]; }
@@ -88,11 +95,18 @@ class FullSpace {
                           float* tangents) const noexcept;
 
  private:
-  /// Calls `use(number, M v)` with the number and the momentum of each vertex that moves.
-  template <typename Use>
-  void for_momenta(const Eigen::VectorXd& v, const Use& use) const;
+  /// Calls `use(place, (M v)_place)` of all places; `velocity(place)`.
+  template <typename Velocity, typename Use>
+  void for_momenta(const Velocity& velocity, const Use& use) const {
+    for (std::size_t i = 0; i < rows_.size(); ++i) {
+      Eigen::Vector3d momentum = Eigen::Vector3d::Zero();
+      for (auto k = static_cast<std::size_t>(row_starts_[i]); k < static_cast<std::size_t>(row_starts_[i + 1]); ++k)
+        momentum += mass_[k] * velocity(columns_[k]);
+      use(rows_[i], momentum);
+    }
+  }
 
-  void order_vertices(const TetMesh& mesh, const FlagVector& fixed);
+  void order_vertices(const TetMesh& mesh, const FlagVector& fixed, FixedVertices fixed_vertices);
   void add_matrices(const TetMesh& mesh, const TetMaterials& materials);
   void add_elements(const Elements& elements, const TetMaterials& materials);
   void add_filter(const RowMatrix& filter);
@@ -102,7 +116,8 @@ class FullSpace {
   bool clamped_ = false;
   double edge_ = 0, extent_ = 0, wave_rate_ = 0;
   std::vector<std::int32_t> vertex_of_;  ///< of each place in a field, among those that move
-  std::vector<std::int32_t> place_of_;   ///< of each vertex of the mesh, -1 where it is fixed
+  std::vector<std::int32_t> place_of_;   ///< of each vertex of the mesh, -1 where it has none
+  Eigen::Index driven_ = 0;
   Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load_;
   std::vector<std::int32_t> starts_{0}, corners_;
   std::vector<double> gradients_;
@@ -114,6 +129,16 @@ class FullSpace {
   AlignedArray filter_;
   AlignedFloats rounded_filter_;
 };
+
+template <typename Driven>
+double FullSpace::kinetic_energy(const Eigen::VectorXd& v, const Driven& driven) const noexcept {
+  const auto velocity = [&](Eigen::Index place) -> Eigen::Vector3d {
+    return place < vertices() ? Eigen::Vector3d(v.segment<3>(3 * number_at(place))) : driven(place);
+  };
+  double sum = 0;
+  for_momenta(velocity, [&](Eigen::Index place, const Eigen::Vector3d& own) { sum += own.dot(velocity(place)); });
+  return 0.5 * sum;
+}
 
 /// (M (c_a + alpha c_v) + (1 + beta c_v) L + k W W^T)^-1, factored once for these numbers, in single precision.
 class FullPreconditioner {

@@ -43,7 +43,14 @@ FullWorkspace::Linear make_linear(const FullModel& model, const StepScene& scene
 
 bool jumps(const StepScene& scene, const Motion& state) {
   const double midpoint = state.time + 0.5 * scene.time_step;
-  return state.begins_anew || scene.begins_anew || scene.forces_jump(midpoint - scene.time_step, midpoint);
+  const double before = midpoint - scene.time_step;
+  return state.begins_anew || scene.begins_anew || scene.forces_jump(before, midpoint) ||
+         (scene.carrier && scene.carrier->has_key(before, midpoint));
+}
+
+/// Where the frame of a carried body is; the identity where nothing carries it.
+MotionSample frame_at(const StepScene& scene, double time) {
+  return scene.carrier ? scene.carrier->sample(time) : MotionSample();
 }
 
 }  // namespace
@@ -51,7 +58,7 @@ bool jumps(const StepScene& scene, const Motion& state) {
 const char* unsupported(const FullModel& model, const StepScene& scene) noexcept {
   if (scene.integrator == Integrator::kNewmark) return "Newmark's integrator";
   if (!scene.obstacles.empty() && !model.contacts) return "obstacles, since the bundle has no /contact";
-  if (scene.carrier) return "a motion that carries the body";
+  if (scene.carrier && !model.carried) return "a motion that carries the body";
   if (scene.examples.size() > 1) return "more than one example force";
   const bool acts_example = std::ranges::any_of(scene.examples, acts);
   if (acts_example && scene.examples.front().elastic) return "an elastic example force";
@@ -160,26 +167,51 @@ void FullStep::begin() noexcept {
     backward_euler_form(history, scene_.time_step, workspace_.form);
   linear_ = second_order ? &workspace_.second : &workspace_.first;
   potential_.begin(state_.q, workspace_.external);
+  if (model_.carried) {
+    const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
+    from_ = frame_at(scene_, state_.time);
+    if (scene_.carrier) to_ = scene_.carrier->sample(end, -kBesideKey * scene_.time_step);
+    potential_.drive(from_, to_);
+  }
   if (model_.rigid) add_external_impulse();
   choose_first_iterate();
 }
 
+/// Beside that of the frame of a carried body, in the frame; a field.
+void FullStep::own_velocity(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                            Eigen::VectorXd& own) const noexcept {
+  if (model_.carried)
+    model_.carried->own_velocity(frame_at(scene_, time), q, v, own);
+  else
+    space_.to_field(v, own);
+}
+
+/// From such a way to that in the world.
+void FullStep::carry(Eigen::VectorXd& d) const noexcept {
+  if (model_.carried) model_.carried->carry(from_, to_, workspace_.potential.start, d);
+}
+
 void FullStep::choose_first_iterate() noexcept {
-  Eigen::VectorXd& d = workspace_.d;
-  space_.to_field(state_.v, d);
+  Eigen::VectorXd &d = workspace_.d, &at_rest = workspace_.trial;
+  own_velocity(state_.time, state_.q, state_.v, d);
   if (!is_checked()) {
-    space_.to_field(state_.v_previous, workspace_.trial);
+    own_velocity(state_.time - scene_.time_step, state_.q_previous, state_.v_previous, workspace_.trial);
     d = 1.5 * d - 0.5 * workspace_.trial;
   }
   d *= scene_.time_step;
   predicted_ = is_checked() || (!anew_ && largest_move(d) <= kMostPredicted * space_.edge());
-  const double at_start = is_checked() ? potential_.undamped_at_start(state_.elastic_energy) : 0;
-  if (!predicted_) d.setZero();
+  at_rest.setZero();
+  carry(at_rest);
+  const double at_start = is_checked() ? potential_.undamped_at(at_rest, state_.elastic_energy) : 0;
+  if (predicted_)
+    carry(d);
+  else
+    d = at_rest;
   potential_.evaluate_elements(d, FullPotential::Tangents::kExact, true);
-  if (!is_checked() || potential_.undamped() <= at_start || d.isZero(0)) return;
+  if (!is_checked() || potential_.undamped() <= at_start || d == at_rest) return;
   ++report_.line_search_evaluations;
   predicted_ = false;
-  d.setZero();
+  d = at_rest;
   potential_.evaluate_elements(d, FullPotential::Tangents::kExact, true);
 }
 
@@ -196,16 +228,19 @@ void FullStep::first_iterate(Eigen::VectorXd& u) const noexcept {
   u += state_.q;
 }
 
+FullExamples::Frame FullStep::frame_of_examples() const noexcept {
+  if (model_.carried) return {to_.rotation, to_.position};
+  return {workspace_.potential.rigid.rotation, Eigen::Vector3d::Zero()};
+}
+
 void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
   potential_.set_coefficients();
+  const FullExamples::Frame frame = frame_of_examples();
   const FullPotentialWorkspace& work = workspace_.potential;
   const Eigen::Index stride = space_.filter().stride;
   for (Eigen::Index k = 0; k < space_.functions(); ++k) {
     Eigen::Vector3d own(work.coefficients[k], work.coefficients[stride + k], work.coefficients[2 * stride + k]);
-    if (model_.rigid) {
-      const Eigen::Vector3d rest = model_.examples->rest.row(k);
-      own = work.rigid.rotation.transpose() * (rest + own) - rest;
-    }
+    if (moves()) own = model_.examples->to_frame(k, frame, own);
     coefficients.segment<3>(3 * k) = own;
   }
 }
@@ -452,7 +487,7 @@ const FullReport& FullStep::finish() noexcept {
   }
   if (near_) model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
-  if (unbalanced)
+  if (unbalanced && !model_.carried)
     limit_energy(energy);
   else if (model_.rigid)
     correct_momenta();
@@ -487,7 +522,10 @@ State make_state(const FullModel& model, FullWorkspace& workspace) {
 
 Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state) noexcept {
   const Eigen::Vector3d weight = model.space.gravity_load().transpose() * state.q;
-  return {model.space.kinetic_energy(state.v), state.elastic_energy, -weight.dot(scene.gravity)};
+  const MotionSample frame = frame_at(scene, state.time);
+  const auto driven = [&](Eigen::Index place) { return model.carried->velocity(frame, place); };
+  const double fixed = model.carried ? model.carried->fixed_potential(frame, scene.gravity) : 0;
+  return {model.space.kinetic_energy(state.v, driven), state.elastic_energy, fixed - weight.dot(scene.gravity)};
 }
 
 Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept {
@@ -498,6 +536,7 @@ Energies energies(const FullModel& model, const StepScene& scene, Motion& state,
   FullPotential potential(model, bare, form, workspace.potential);
   workspace.external.setZero();
   potential.begin(state.q, workspace.external);
+  if (model.carried) model.carried->place_fixed(frame_at(scene, state.time), workspace.potential.start);
   workspace.d.setZero();
   potential.evaluate_elements(workspace.d, FullPotential::Tangents::kNone, false);
   state.elastic_energy = potential.elastic_energy();

@@ -91,7 +91,8 @@ struct FullContactMemory {
 /// runtime::step(), damping frozen at the first iterate. Newton's method with the tangents of the first iterate for as
 /// long as they serve, in single precision, its directions by conjugate gradients preconditioned by one constant sparse
 /// factor. A free body moves in the world; after each step its velocities get the rigid motion that its momenta lack of
-/// those that forces have made. No call allocates.
+/// those that forces have made. A carried one does, too: its fixed vertices are where their frame is at the end of the
+/// step. No call allocates.
 class FullStep {
  public:
   FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
@@ -104,18 +105,15 @@ class FullStep {
 
   /// Displacement [f] at the first iterate, of which weights and target are made.
   void first_iterate(Eigen::VectorXd& u) const noexcept;
-  /// W^T u [3m] there, of a free body that of its deformation.
+  /// W^T u [3m] there, of a body whose frame moves that of its deformation.
   void first_coefficients(Eigen::VectorXd& coefficients) noexcept;
   /// c*(k, a), of a free body that of its deformation.
   template <typename Coefficients>
   void set_target(const Coefficients& target) noexcept {
-    const Eigen::Matrix3d& turn = workspace_.potential.rigid.rotation;
+    const FullExamples::Frame frame = frame_of_examples();
     for (Eigen::Index k = 0; k < space_.functions(); ++k) {
       Eigen::Vector3d own(target(k, 0), target(k, 1), target(k, 2));
-      if (model_.rigid) {
-        const Eigen::Vector3d rest = model_.examples->rest.row(k);
-        own = turn * (rest + own) - rest;
-      }
+      if (moves()) own = model_.examples->to_world(k, frame, own);
       for (int a = 0; a < 3; ++a) workspace_.potential.target[a * space_.filter().stride + k] = own[a];
     }
   }
@@ -132,6 +130,11 @@ class FullStep {
   enum class Outcome { kFound, kIndefinite };
   static constexpr double kStiffStep = 10;  ///< edges that waves go
 
+  bool moves() const noexcept { return model_.rigid || model_.carried; }
+  FullExamples::Frame frame_of_examples() const noexcept;
+  void own_velocity(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
+                    Eigen::VectorXd& own) const noexcept;
+  void carry(Eigen::VectorXd& d) const noexcept;
   bool find_contacts() noexcept;
   void gather_external_force() noexcept;
   void choose_first_iterate() noexcept;
@@ -166,6 +169,7 @@ class FullStep {
   PotentialEvaluation here_;
   NewtonStatus status_ = NewtonStatus::kConverged;
   FrameMomenta expected_momenta_;  ///< that external forces make of those of the start
+  MotionSample from_, to_;         ///< frame of a carried body where the step begins and ends
   bool anew_ = false, near_ = false, predicted_ = false, at_first_iterate_ = true;
   bool tangents_are_current_ = true, projected_ = false;
   double unchecked_from_ = 0;  ///< residual before a step that no line search checked; 0: a line search did

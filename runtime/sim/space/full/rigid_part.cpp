@@ -34,7 +34,7 @@ RigidWorkspace::RigidWorkspace(const FullSpace& space)
     : arms(Eigen::Matrix4Xd::Zero(4, space.vertices())), weighted(arms) {}
 
 RigidPart::RigidPart(const FullSpace& space, const VertexArray& rest)
-    : mass_matrix_(space.mass()), masses_(mass_matrix_ * Eigen::VectorXd::Ones(space.vertices())) {
+    : mass_matrix_(space.mass()), masses_(space.masses()) {
   mass_ = masses_.sum();
   rest_.setZero(4, space.vertices());
   for (Eigen::Index v = 0; v < rest.rows(); ++v) rest_.col(space.place(v)).head<3>() = rest.row(v);
