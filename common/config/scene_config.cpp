@@ -217,6 +217,7 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   if (!json.contains("bodies")) {
     WorldConfig world = world_of(scene_of(json, file));
     world.contact.release = member_or(json, "contact", Json::object()).value("release", world.contact.release);
+    world.full_bodies = json.value("full_bodies", world.full_bodies);
     return world;
   }
   refuse_members_of_one_body(json, file);
@@ -244,6 +245,7 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   world.contact.friction = contact.value("friction", world.contact.friction);
   world.contact.self = contact.value("self", world.contact.self);
   world.contact.release = contact.value("release", world.contact.release);
+  world.full_bodies = json.value("full_bodies", world.full_bodies);
   set_meetings(world);
   return world;
 }

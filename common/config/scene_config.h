@@ -207,6 +207,7 @@ struct WorldConfig {
   std::int64_t steps = 1000;
   std::vector<BodiesConfig> bodies;
   BodyContactConfig contact;
+  int full_bodies = 1000000;  ///< of space `auto`, that step in all vertices at once
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;
 };

@@ -8,41 +8,33 @@
 
 #include "common/model/reduced_model.h"
 #include "precompute/full_space/full_space_model.h"
-#include "runtime/sim/contact/body_contact.h"
+#include "runtime/sim/contact/moving_surface.h"
 
 namespace exmat::precompute {
 
-/// The surface of a body where a step begins, in the frame that fits the body best, and how it moves: a surface of one
-/// mode, the way that the body's velocity leads, of which the search of the run time finds what is near.
+/// The surface of a body where a step begins, in the frame that fits the body best, as searches of the run time take
+/// it.
 class MovingSurface {
  public:
   /// `data` with /object and /contact.
   MovingSurface(const ReducedModel& data, const FullSpaceModel& model, const FullSpaceState& state);
 
-  runtime::TouchingBody touching() const { return {set_, touching_, {placement_, q_}, {{}, v_}}; }
-  runtime::SurfaceShape& shape() { return shape_; }
+  runtime::TouchingBody touching() const { return surface_.touching(); }
+  runtime::SurfaceShape& shape() { return surface_.shape(); }
 
   const runtime::Placement& placement() const { return placement_; }
   const Eigen::AlignedBox3d& box() const { return box_; }  ///< about it, world [m]
-  double speed() const { return speed_; }                  ///< of its fastest vertex [m/s]
-
-  const runtime::ContactSet& set() const { return set_; }
-  std::int32_t object_vertex(int vertex) const { return set_.object_vertex(vertex); }
-  /// The corners that a material point of the surface, in its frame, lies between, and their shares.
-  std::array<std::int32_t, 3> corners(const Eigen::Vector3d& point, Eigen::Vector3d& shares);
+  double speed() const { return surface_.speed(); }        ///< of its fastest vertex [m/s]
+  std::int32_t object_vertex(int vertex) const { return touching().set.object_vertex(vertex); }
+  std::int32_t corner(int triangle, int c) const { return surface_.object_corner(triangle, c); }
 
  private:
   runtime::Placement placement_;
-  Eigen::VectorXd q_, v_;  // 1
-  runtime::ContactSet set_;
-  runtime::TouchingSurface touching_;
-  runtime::SurfaceShape shape_;
-  const TriangleArray* triangles_;
+  runtime::MovingSurface surface_;
   Eigen::AlignedBox3d box_;
-  double speed_ = 0;
 };
 
-/// What vertices that are inside another body remember; `vertex` is the place in ContactData.
+/// What vertices that are inside another body remember.
 using HeldVertices = std::vector<runtime::HeldBodyContact>;
 
 /// Contact of the vertices of one body, a, with the surface of another, b, in one step: candidates, normals and nearest

@@ -28,8 +28,8 @@ Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const Plac
                               const exmat_body& body) noexcept {
   Eigen::Vector3d position = points.rest.row(i);
   for (Eigen::Index c = 0; c < points.corners.cols(); ++c)
-    position += points.shares(i, c) *
-                full_displacement(*body.full(), placement, *body.state.full, points.corners(i, c));
+    position +=
+        points.shares(i, c) * full_displacement(*body.full(), placement, *body.state.full, points.corners(i, c));
   return position;
 }
 

@@ -162,6 +162,7 @@ std::unique_ptr<exmat_world> load(const WorldConfig& config) {
   auto world = std::make_unique<exmat_world>(exmat_contact_law{sizeof(exmat_contact_law), contact.stiffness,
                                                                contact.damping, contact.friction, contact.self ? 1 : 0,
                                                                config.is_list ? 0 : 1, contact.release});
+  world->world.set_full_bodies(config.full_bodies);
   take_obstacles(loaded.obstacles, *world);
   std::vector<std::shared_ptr<const Source>> sources;
   for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
@@ -270,6 +271,13 @@ exmat_status exmat_world_set_contact_law(exmat_world* world, const exmat_contact
     world->law = given;
     world->world.set_law(contact_law_of(given));
   });
+}
+
+exmat_status exmat_world_set_full_bodies(exmat_world* world, std::int32_t most) noexcept {
+  EXMAT_REQUIRE(world);
+  if (most < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: most: expected 0 or more, found %d", __func__, most);
+  world->world.set_full_bodies(most);
+  return EXMAT_OK;
 }
 
 exmat_status exmat_world_read_contact_law(const exmat_world* world, exmat_contact_law* law) noexcept {

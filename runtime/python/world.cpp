@@ -322,6 +322,9 @@ WorldClass bind_world(py::module_& module) {
       .def("set_contact_law", &set_law, py::kw_only(), py::arg("stiffness") = py::none(),
            py::arg("damping") = py::none(), py::arg("friction") = py::none(), py::arg("release") = py::none(),
            "What is None stays.")
+      .def(
+          "set_full_bodies", [](WorldObject& world, int most) { world.get().set_full_bodies(most); }, py::arg("most"),
+          "Most bodies of space \"auto\" that step in all vertices at once; at first any number.")
       .def("step", &step_world, py::arg("n") = 1, py::arg("threads") = 0,
            "Takes `n` steps of all bodies by up to `threads` threads, 0: one for each processor; the results do not "
            "depend on their number. Returns a WorldReport. Raises NonFinite, which names the first such body: it and "

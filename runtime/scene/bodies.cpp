@@ -39,7 +39,9 @@ Bodies::Bodies(const LoadedWorld& loaded, const WorldConfig& config)
       scenes_(scenes_at_start(loaded)),
       world_(starts(),
              {config.contact.stiffness, config.contact.damping, config.contact.friction, config.contact.release}),
-      threads_(std::min(omp_get_max_threads(), world_.count())) {}
+      threads_(std::min(omp_get_max_threads(), world_.count())) {
+  world_.set_full_bodies(config.full_bodies);
+}
 
 std::vector<WorldBodyStart> Bodies::starts() const {
   std::vector<std::vector<ExampleState>> examples;

@@ -224,15 +224,10 @@ std::unique_ptr<const FullModel> prepare_full_space(const SceneConfig& config, c
 }
 
 void check_full_space(const SceneConfig& config, const LoadedScene& loaded) {
-  const std::string space = fmt::format("\"{}\"", name_of(config.space.space));
-  const auto refuse = [&](const std::string& found, const char* advice) {
-    throw InputError(
-        {config.file.string(), config.place + "/space", "\"reduced\", where a scene has " + found, space, advice});
-  };
-  if (const char* reason = unsupported(*loaded.full, loaded.scene)) refuse(reason, "");
-  if (config.space.space == Space::kFull && config.meets_bodies)
-    refuse("bodies that may touch each other or themselves",
-           "\"auto\" steps in all vertices those that touch no other body at the time");
+  if (const char* reason = unsupported(*loaded.full, loaded.scene))
+    throw InputError({config.file.string(), config.place + "/space",
+                      std::string("\"reduced\", where a scene has ") + reason,
+                      fmt::format("\"{}\"", name_of(config.space.space)), ""});
 }
 
 std::string describe_target(const ExampleModel& examples, const ExampleSettings& settings) {

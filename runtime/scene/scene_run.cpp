@@ -33,8 +33,7 @@ std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedWorld& loaded, con
   for (const LoadedBody& body : loaded.bodies) {
     const LoadedScene& kind = loaded.kinds[body.kind].loaded;
     bodies.push_back({body.name, kind.data, *kind.model->frame,
-                      trajectory_info(kind, config.bodies[body.kind].scene, config),
-                      kind.full.get()});
+                      trajectory_info(kind, config.bodies[body.kind].scene, config), kind.full.get()});
     if (!config.is_list) break;
   }
   return std::make_unique<TrajectoryWriter>(*config.trajectory, bodies);

@@ -71,6 +71,22 @@ TEST_F(StudyProgram, MixedPrecisionIsMeasuredAgainstDouble) {
   EXPECT_NEAR(mixed["position"]["mean"], error, difference + 1e-12) << "the triangle inequality";
 }
 
+// All vertices leave nothing out: what is left is what directions of a step are solved to. Steps of eight modes are off
+// by what these lose.
+TEST_F(StudyProgram, SpacesAreMeasuredBesideEachOther) {
+  write_study(R"({"sweeps": [ { "basis_size": [8], "space": ["reduced", "full"] } ]})"_json);
+  const Outcome outcome = study("out");
+  ASSERT_EQ(outcome.status, 0) << outcome.errors;
+  const Json json = results("out");
+  ASSERT_EQ(json["points"].size(), 2U);
+  EXPECT_EQ(json["points"][1]["settings"]["space"], "full");
+  EXPECT_EQ(json["points"][0]["bundle"], json["points"][1]["bundle"]);
+  const double reduced = json["points"][0]["errors"]["position"]["mean"],
+               full = json["points"][1]["errors"]["position"]["mean"];
+  EXPECT_LT(full, 5e-3);
+  EXPECT_LT(full, 0.5 * reduced);
+}
+
 TEST_F(StudyProgram, MeasuresAndAnswersABudget) {
   write_study();
   const Outcome outcome = study("out", {"--max-error", "1000"});

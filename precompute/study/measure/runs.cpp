@@ -3,6 +3,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <functional>
+#include <optional>
 #include <utility>
 
 #include "common/bundle/bundle.h"
@@ -13,6 +14,8 @@
 #include "runtime/scene/samples.h"
 #include "runtime/sim/frame/world_vertices.h"
 #include "runtime/sim/lanes/lane_step.h"
+#include "runtime/sim/space/full/full_body.h"
+#include "runtime/sim/world/world.h"
 
 namespace exmat::precompute {
 namespace {
@@ -109,7 +112,18 @@ Eigen::VectorXd start_of(const SceneConfig& config, const ReducedModel& data) {
 
 }  // namespace
 
-WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state) {
+WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state,
+                       const runtime::FullModel* full) {
+  if (state.full) {
+    const runtime::Placement placement = frame.placement(state.frame);
+    const runtime::FrameVelocity velocity = frame.velocity(state.frame);
+    WorldFrame found{data.object->mesh.vertices, data.object->mesh.vertices};
+    for (Eigen::Index v = 0; v < found.positions.rows(); ++v) {
+      found.positions.row(v) += runtime::full_displacement(*full, placement, *state.full, v).transpose();
+      found.velocities.row(v) = runtime::full_velocity(*full, placement, velocity, *state.full, v);
+    }
+    return found;
+  }
   WorldFrame found{data.object->mesh.vertices + field(data, state.q), field(data, state.v)};
   if (frame.moves())
     runtime::to_world(frame.placement(state.frame), frame.velocity(state.frame), found.positions, found.velocities);
@@ -118,25 +132,37 @@ WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame
 
 namespace {
 
-// Takes steps of one body as a scene's instances take them: with mixed precision in a lane, the others idle.
+// Takes steps of one body as a scene's instances take them: with mixed precision in a lane, the others idle; where it
+// has two spaces in the one that a world chooses.
 class Stepper {
  public:
-  explicit Stepper(const runtime::LoadedScene& loaded)
+  Stepper(const runtime::LoadedScene& loaded, runtime::State& state)
       : loaded_(loaded),
+        state_(state),
         in_lanes_(loaded.scene.precision == Precision::kMixed &&
                   runtime::can_step_side_by_side(*loaded.model, loaded.scene)),
-        workspace_(*loaded.model, loaded.scene, in_lanes_ ? runtime::kLanes : 1) {}
+        workspace_(*loaded.model, loaded.scene, in_lanes_ ? runtime::kLanes : 1) {
+    if (!loaded.full) return;
+    world_.emplace(runtime::ContactLaw{});
+    world_->add({loaded.model.get(), &loaded.scene, nullptr, loaded.full.get()}, state);
+  }
 
-  runtime::StepReport step(runtime::State& state) {
-    if (!in_lanes_) return runtime::step(*loaded_.model, loaded_.scene, state, workspace_.body(0));
+  runtime::StepReport step() {
+    if (world_) {
+      world_->step(1);
+      return world_->report(0);
+    }
+    if (!in_lanes_) return runtime::step(*loaded_.model, loaded_.scene, state_, workspace_.body(0));
     runtime::StepReport report;
-    const runtime::LaneBody body{&loaded_.scene, &state};
+    const runtime::LaneBody body{&loaded_.scene, &state_};
     runtime::step_in_lanes(*loaded_.model, {&body, 1}, workspace_, {&report, 1});
     return report;
   }
 
  private:
   const runtime::LoadedScene& loaded_;
+  runtime::State& state_;
+  std::optional<runtime::World> world_;
   bool in_lanes_;
   runtime::LaneWorkspace workspace_;
 };
@@ -155,7 +181,7 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
                       "measure scenes with the values between the keys, one by one"});
   const runtime::LoadedScene loaded = runtime::load_run(config);
   runtime::State state = loaded.start;
-  Stepper stepper(loaded);
+  Stepper stepper(loaded, state);
   CentreVelocity centre;
   if (!config.obstacles.empty() && loaded.model->frame->momenta(state.frame))
     centre = [&] { return loaded.model->frame->motion(state.frame).linear_velocity; };
@@ -165,13 +191,13 @@ ReducedRun run_reduced(const SceneConfig& config, const std::vector<double>& tim
   result.internal_force = loaded.model->internal_force.polynomial() ? "polynomial" : "cubature";
   result.target = target_of(loaded);
   result.frames = run(
-      config.time_step, times, [&] { return stepper.step(state); },
+      config.time_step, times, [&] { return stepper.step(); },
       [&](BodyFrames& frames) {
-        WorldFrame now = world_frame(loaded.data, *loaded.model->frame, state);
+        WorldFrame now = world_frame(loaded.data, *loaded.model->frame, state, loaded.full.get());
         frames.positions.push_back(std::move(now.positions));
         frames.velocities.push_back(std::move(now.velocities));
       },
-      [&] { return runtime::energies(*loaded.model, loaded.scene, state); }, centre);
+      [&] { return runtime::energies(loaded.full.get(), *loaded.model, loaded.scene, state); }, centre);
   return result;
 }
 

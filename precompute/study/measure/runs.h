@@ -18,7 +18,8 @@ struct WorldFrame {
 };
 
 /// Of the reduced body of a bundle in a state of its frame; `data` with /object and /modal.
-WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state);
+WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state,
+                       const runtime::FullModel* full = nullptr);
 
 /// What came of a reduced run.
 struct ReducedRun {

@@ -1,12 +1,14 @@
 #include "precompute/study/measure/timing.h"
 
 #include <algorithm>
+#include <optional>
 
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/scene/samples.h"
 #include "runtime/scene/scene_loader.h"
 #include "runtime/sim/step/stepper.h"
+#include "runtime/sim/world/world.h"
 
 namespace exmat::precompute {
 namespace {
@@ -82,10 +84,18 @@ class TimedScene {
   template <typename Add>
   void round(std::int64_t most, Add add) {
     runtime::State state = loaded_.start;
+    std::optional<runtime::World> world;
+    if (loaded_.full) {
+      world.emplace(runtime::ContactLaw{});
+      world->add({loaded_.model.get(), &loaded_.scene, nullptr, loaded_.full.get()}, state);
+    }
     const Timer total;
     for (std::int64_t i = 0; i < most && (i < kFewestSteps || total.seconds() < kRoundSeconds); ++i) {
       const Timer timer;
-      runtime::step(*loaded_.model, loaded_.scene, state, workspace_);
+      if (world)
+        world->step(1);
+      else
+        runtime::step(*loaded_.model, loaded_.scene, state, workspace_);
       add(timer.seconds());
     }
   }

@@ -110,6 +110,7 @@ struct Varying {
             fmt::format("{} linear modes", s.linear_modes),
             "training " + s.training,
             s.precision + " precision",
+            "space " + s.space,
             force_of(s)};
   }
   std::vector<std::set<std::string>> values_;

@@ -106,6 +106,7 @@ Ordered scene_fragment(const StudyResult& result, const PointResult& point) {
   Ordered json{{"time_step", point.settings.time_step}, {"integrator", point.settings.integrator}};
   const auto differs = [&](const PointResult& other) { return other.settings.precision != point.settings.precision; };
   if (std::ranges::any_of(result.points, differs)) json["precision"] = point.settings.precision;
+  if (point.settings.space != name_of(Space::kReduced)) json["space"] = point.settings.space;
   if (point.target == kNoTarget) return json;
   Ordered force{{"target", point.target}};
   if (const auto& stiffness = point.settings.elastic_stiffness)

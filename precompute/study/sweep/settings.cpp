@@ -66,6 +66,7 @@ std::vector<PointSettings> product(const SweepConfig& sweep, const PointSettings
   multiply(points, sweep.internal_force, &PointSettings::internal_force);
   multiply(points, sweep.target, &PointSettings::target);
   multiply(points, sweep.precision, &PointSettings::precision);
+  multiply(points, sweep.space, &PointSettings::space);
   multiply(points, sweep.elastic_stiffness, &PointSettings::elastic_stiffness);
   return points;
 }
@@ -103,6 +104,7 @@ PointSettings own_settings(const AssetConfig& asset, const SceneConfig& scene) {
   if (asset.cubature_method == CubatureMethod::kAllElements) own.internal_force = kAllElements;
   own.target = own_target(scene);
   own.precision = name_of(scene.precision);
+  own.space = name_of(scene.space.space);
   return normalised(own, own, asset, has_examples(scene));
 }
 
@@ -164,6 +166,7 @@ SceneConfig with_settings(SceneConfig scene, const PointSettings& settings) {
                              ? ForceMethod::kCubature
                              : from_name<ForceMethod>(settings.internal_force).value();
   scene.precision = from_name<Precision>(settings.precision).value();
+  scene.space.space = from_name<Space>(settings.space).value();
   // A scene without examples has none to set.
   const TargetSource target = from_name<TargetSource>(settings.target).value_or(TargetSource::kAuto);
   if (scene.examples) scene.examples->target = target;
@@ -186,6 +189,7 @@ nlohmann::ordered_json to_json(const PointSettings& settings) {
   json["internal_force"] = settings.internal_force;
   json["target"] = settings.target;
   json["precision"] = settings.precision;
+  json["space"] = settings.space;
   json["elastic_stiffness"] = nullptr;
   if (settings.elastic_stiffness) json["elastic_stiffness"] = *settings.elastic_stiffness;
   return json;
@@ -204,6 +208,7 @@ PointSettings settings_from_json(const nlohmann::ordered_json& json) {
   settings.internal_force = json.at("internal_force").get<std::string>();
   settings.target = json.at("target").get<std::string>();
   settings.precision = json.at("precision").get<std::string>();
+  settings.space = json.at("space").get<std::string>();
   if (!json.at("elastic_stiffness").is_null()) settings.elastic_stiffness = json.at("elastic_stiffness").get<double>();
   return settings;
 }
@@ -215,6 +220,7 @@ std::string describe(const PointSettings& settings) {
   text += fmt::format("{}, {:g} ms, {}, {}, target {}", settings.material, 1e3 * settings.time_step,
                       settings.integrator, settings.internal_force, settings.target);
   if (settings.precision == name_of(Precision::kMixed)) text += ", mixed precision";
+  if (settings.space != name_of(Space::kReduced)) text += fmt::format(", space {}", settings.space);
   if (settings.elastic_stiffness) text += fmt::format(", elastic force of {:g}", *settings.elastic_stiffness);
   return text;
 }

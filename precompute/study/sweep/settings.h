@@ -28,6 +28,7 @@ struct PointSettings {
   std::string internal_force;                 ///< "auto", "cubature", "polynomial" or "all_elements"
   std::string target;                         ///< "auto", "table" or "solve"; "none" without examples
   std::string precision = "double";           ///< or "mixed", as in the scene
+  std::string space = "reduced";              ///< or "full", "auto", as in the scene
   std::optional<double> elastic_stiffness{};  ///< e of elastic example forces; absent: forces as the scene has them
 
   auto operator<=>(const PointSettings&) const = default;

@@ -24,6 +24,7 @@ SweepConfig read_sweep(const Json& json) {
           .internal_force = list<std::string>(json, "internal_force"),
           .target = list<std::string>(json, "target"),
           .precision = list<std::string>(json, "precision"),
+          .space = list<std::string>(json, "space"),
           .elastic_stiffness = list<double>(json, "elastic_stiffness")};
 }
 

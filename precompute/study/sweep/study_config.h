@@ -23,6 +23,7 @@ struct SweepConfig {
   std::vector<std::string> internal_force{};  ///< "cubature", "polynomial", "all_elements"
   std::vector<std::string> target{};          ///< "table", "solve"
   std::vector<std::string> precision{};       ///< "double", "mixed"
+  std::vector<std::string> space{};           ///< "reduced", "full"
   std::vector<double> elastic_stiffness{};    ///< e, of elastic example forces
 };
 

@@ -62,7 +62,7 @@ void Planner::read_inputs() {
 // Settings that make a bundle; the run time chooses between cubature and polynomial.
 Ordered bundle_settings(const PointSettings& settings) {
   Ordered json = to_json(settings);
-  for (const char* name : {"time_step", "integrator", "target", "precision"}) json.erase(name);
+  for (const char* name : {"time_step", "integrator", "target", "precision", "space"}) json.erase(name);
   if (settings.internal_force == "polynomial") json["internal_force"] = "cubature";
   return json;
 }
@@ -76,11 +76,13 @@ std::size_t Planner::plan_bundle(const PointSettings& settings, const std::vecto
     const Needs more = needs_of(with_settings(scene_, other));
     if (other.internal_force == "polynomial") needs.internal_force = ForceMethod::kPolynomial;
     if (more.targets) needs.targets = true;
+    if (more.full_space) needs.full_space = true;
     if (other.target != "solve") needs.regions = more.regions;
   }
   BundlePlan plan;
   plan.key = key_of(plan_, {{"bundle", own},
                             {"targets", needs.targets},
+                            {"full_space", needs.full_space},
                             {"internal_force", name_of(needs.internal_force)},
                             {"tables", needs.regions && !needs.regions->empty() && needs.regions->front().targets}});
   const auto found = std::ranges::find(plan_.bundles, plan.key, &BundlePlan::key);
@@ -96,6 +98,7 @@ std::size_t Planner::plan_reference(const PointSettings& settings, std::size_t b
   PointSettings own = settings;
   own.time_step = config_.reference.time_step.value_or(settings.time_step);
   own.integrator = config_.reference.integrator.value_or(settings.integrator);
+  own.space = name_of(Space::kReduced);  // the reference is of code of its own
   Ordered identity{{"reference", own.material}, {"time_step", own.time_step}, {"integrator", own.integrator}};
   if (result_.has_examples) identity["eigenfunctions"] = own.eigenfunctions;
   if (own.elastic_stiffness) identity["elastic_stiffness"] = *own.elastic_stiffness;

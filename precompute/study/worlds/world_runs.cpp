@@ -133,7 +133,7 @@ WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>&
   const auto record = [&](std::size_t i, BodyFrames& frames) {
     const auto body = static_cast<int>(i);
     const runtime::LoadedScene& kind = loaded.kinds[loaded.bodies[i].kind].loaded;
-    WorldFrame now = world_frame(kind.data, *kind.model->frame, world.state(body));
+    WorldFrame now = world_frame(kind.data, *kind.model->frame, world.state(body), kind.full.get());
     frames.positions.push_back(std::move(now.positions));
     frames.velocities.push_back(std::move(now.velocities));
     add_energies(runtime::energies(*kind.model, kind.scene, world.state(body)), frames);

@@ -124,6 +124,8 @@ void WorldStudy::require_measurable() const {
   refuse_member(config_.sources.has_value(), "/sources");
   refuse_member(std::ranges::any_of(config_.sweeps, [](const SweepConfig& sweep) { return !sweep.precision.empty(); }),
                 "/sweeps/precision");
+  refuse_member(std::ranges::any_of(config_.sweeps, [](const SweepConfig& sweep) { return !sweep.space.empty(); }),
+                "/sweeps/space");
 }
 
 void WorldStudy::read_assets() {

@@ -59,6 +59,10 @@ EXMAT_API double exmat_world_time(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_set_contact_law(exmat_world* world, const exmat_contact_law* law) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_contact_law(const exmat_world* world, exmat_contact_law* law) EXMAT_NOEXCEPT;
 
+/* Most bodies of space EXMAT_SPACE_AUTO that step in all vertices at once, >= 0; at first any number. Those that the
+   host pushes hardest come first, then those that something acted on last. */
+EXMAT_API exmat_status exmat_world_set_full_bodies(exmat_world* world, int32_t most) EXMAT_NOEXCEPT;
+
 /* The world's from now on, as it is and where it is, at the time of the world, which is the first body's. `id` >= 0 is
    a number that no later body of the world gets. What it overlaps pushes it out; obstacles of the world that it had of
    its own stay behind. Unless bodies are apart, its model has to know of contact, and the surface of a model's first

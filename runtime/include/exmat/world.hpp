@@ -34,6 +34,8 @@ class WorldRef {
     check(exmat_world_set_contact_law(get(), &law));
   }
 
+  void set_full_bodies(std::int32_t most) { check(exmat_world_set_full_bodies(get(), most)); }
+
   std::size_t size() const noexcept { return static_cast<std::size_t>(exmat_world_bodies(get())); }
   std::vector<std::int64_t> ids() const {
     std::vector<std::int64_t> ids(size());

@@ -26,6 +26,8 @@ struct HeldBodyContact {
 struct BodyCandidate : ContactCandidate {
   Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< of y, frame of the other body [m]
   Eigen::Vector3d surface_arm = Eigen::Vector3d::Zero();  ///< y - position of the other body [m]; last evaluation
+  int triangle = 0;                                       ///< of the surface that y is on
+  Eigen::Vector3d shares = Eigen::Vector3d::Zero();       ///< of its corners in y
 };
 
 /// Candidates of a pair of bodies, one's vertices against the other's surface. Grows where more are met than before.
@@ -73,6 +75,48 @@ struct TouchingBody {
   BodyVelocity velocity;
 };
 
+/// A reduced body at a pose as its contacts with others see it: where its vertices and points of its surface are, and
+/// what forces there do to it. Arms are from its position, world [m]; columns are about world axes, as
+/// ContactSet::add_stiffness() has them, `rigid` is 6 or 0.
+struct ReducedSide {
+  const ContactSet& set;
+  const BodyPose& pose;
+  int rigid = 0;
+
+  const Eigen::Vector3d& position() const noexcept { return pose.position; }
+  Eigen::Vector3d arm(int vertex) const noexcept { return set.world_arm(vertex, pose); }
+  Eigen::Vector3d surface_arm(const BodyCandidates& candidates, std::size_t i) const noexcept {
+    return candidates.surface_arm(i, pose);
+  }
+  void add_force(const BodyCandidate& candidate, ContactSums& sums) const noexcept {
+    const Eigen::Vector3d force = pose.rotation.transpose() * candidate.force;
+    sums.generalised += set.basis_rows(candidate.vertex).transpose().lazyProduct(force);
+  }
+  void add_surface_force(const BodyCandidates& candidates, std::size_t i, ContactSums& sums) const noexcept {
+    const Eigen::Vector3d force = pose.rotation.transpose() * candidates.all[i].force;
+    sums.generalised -= candidates.rows(i).transpose().lazyProduct(force);
+  }
+  Eigen::Index unknowns() const noexcept { return rigid + pose.q.size(); }
+  template <class Column>
+  void set_column(const BodyCandidate& candidate, const Eigen::Vector3d& direction, Column&& column) const {
+    set_column(set.basis_rows(candidate.vertex), candidate.arm, direction, column);
+  }
+  template <class Column>
+  void set_surface_column(const BodyCandidates& candidates, std::size_t i, const Eigen::Vector3d& direction,
+                          Column&& column) const {
+    set_column(candidates.rows(i), candidates.all[i].surface_arm, direction, column);
+  }
+
+ private:
+  template <class Rows, class Column>
+  void set_column(const Rows& rows, const Eigen::Vector3d& arm, const Eigen::Vector3d& direction,
+                  Column& column) const {
+    if (rigid > 0) column.template head<6>() << direction, arm.cross(direction);
+    const Eigen::Vector3d turned = pose.rotation.transpose() * direction;
+    column.tail(pose.q.size()) = rows.transpose().lazyProduct(turned);
+  }
+};
+
 /// A search for the candidates of a step.
 struct CandidateSearch {
   double time_step = 0;                      ///< [s]
@@ -104,25 +148,28 @@ class BodyContact {
   /// pushes.
   void gather_own(const TouchingBody& body, const CandidateSearch& search, BodyCandidates& candidates) const;
 
+  // Sides A and B as ReducedSide.
+
   /// Adds forces, torques, potential and touching vertices to those of either body; the potential to a's alone. `way`:
   /// how far vertices and surface have gone, at most, from where they were when set_clearances() was called [m].
-  void evaluate(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way, BodyCandidates& candidates,
-                ContactSums& sums_a, ContactSums& sums_b) const noexcept;
+  template <class A, class B>
+  void evaluate(const A& a, const B& b, double way, BodyCandidates& candidates, ContactSums& sums_a,
+                ContactSums& sums_b) const noexcept;
 
   /// After the first evaluation: vertices that touch nothing are not looked at as long as they cannot have come near.
   void set_clearances(const BodyPose& a, const BodyPose& b, BodyCandidates& candidates) const noexcept;
 
   /// W alone [J].
-  double potential(const ContactSet& set, const BodyPose& a, const BodyPose& b, double way,
-                   const BodyCandidates& candidates) const noexcept;
+  template <class A, class B>
+  double potential(const A& a, const B& b, double way, const BodyCandidates& candidates) const noexcept;
 
   void refresh_friction(BodyCandidates& candidates, FrictionChange& change) const noexcept;
 
-  /// -df/dx = J^T K J at the poses, column by column: sqrt(w) J^T d of either body [(rigid + r) x columns], about
-  /// world axes as ContactSet::add_stiffness() has them. `rigid` of each is 6 or 0. Returns the number of columns.
-  static Eigen::Index stiffness_columns(const ContactSet& set, int rigid_a, int rigid_b, const BodyPose& a,
-                                        const BodyPose& b, const BodyCandidates& candidates, Eigen::MatrixXd& columns_a,
-                                        Eigen::MatrixXd& columns_b);
+  /// -df/dx = J^T K J of the last evaluation, column by column: sqrt(w) J^T d of either body [unknowns() x columns].
+  /// Returns the number of columns.
+  template <class A, class B>
+  static Eigen::Index stiffness_columns(const A& a, const B& b, const BodyCandidates& candidates,
+                                        Eigen::MatrixXd& columns_a, Eigen::MatrixXd& columns_b);
 
   /// What has to be remembered of the last evaluation.
   void commit(const BodyPose& a, const BodyPose& b, const BodyCandidates& candidates,
@@ -131,5 +178,70 @@ class BodyContact {
  private:
   ContactLaw law_;
 };
+
+template <class A, class B>
+void BodyContact::evaluate(const A& a, const B& b, double way, BodyCandidates& candidates, ContactSums& sums_a,
+                           ContactSums& sums_b) const noexcept {
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    BodyCandidate& candidate = candidates.all[i];
+    if (candidate.clearance > way) {
+      leave_untouched(candidate);
+      continue;
+    }
+    candidate.arm = a.arm(candidate.vertex);
+    candidate.surface_arm = b.surface_arm(candidates, i);
+    const Eigen::Vector3d place = a.position() + candidate.arm - b.position() - candidate.surface_arm;
+    const double potential = evaluate_contact(candidate.normal.dot(place), candidate.normal, place, candidate);
+    if (!candidate.is_loaded()) continue;
+    if (candidate.normal_force > 0) {
+      ++sums_a.touching;
+      ++sums_b.touching;
+      sums_a.stiffness += candidate.normal_stiffness();
+      sums_b.stiffness += candidate.normal_stiffness();
+    }
+    sums_a.force += candidate.force;
+    sums_a.torque += candidate.arm.cross(candidate.force);
+    a.add_force(candidate, sums_a);
+    sums_a.potential += potential;
+    sums_b.force -= candidate.force;
+    sums_b.torque -= candidate.surface_arm.cross(candidate.force);
+    b.add_surface_force(candidates, i, sums_b);
+  }
+}
+
+template <class A, class B>
+double BodyContact::potential(const A& a, const B& b, double way, const BodyCandidates& candidates) const noexcept {
+  double sum = 0;
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    const BodyCandidate& candidate = candidates.all[i];
+    if (candidate.clearance > way) continue;
+    const Eigen::Vector3d place = a.position() + a.arm(candidate.vertex) - b.position() - b.surface_arm(candidates, i);
+    sum += contact_potential(candidate, candidate.normal.dot(place), place);
+  }
+  return sum;
+}
+
+template <class A, class B>
+Eigen::Index BodyContact::stiffness_columns(const A& a, const B& b, const BodyCandidates& candidates,
+                                            Eigen::MatrixXd& columns_a, Eigen::MatrixXd& columns_b) {
+  Eigen::Index needed = 0;  // most candidates touch nothing
+  for (const BodyCandidate& candidate : candidates.all) needed += candidate.is_loaded() ? 3 : 0;
+  const auto make_room = [needed](Eigen::Index rows, Eigen::MatrixXd& columns) {
+    if (columns.rows() != rows || columns.cols() < needed) columns.resize(rows, 2 * needed);
+  };
+  make_room(a.unknowns(), columns_a);
+  make_room(b.unknowns(), columns_b);
+  Eigen::Index used = 0;
+  for (std::size_t i = 0; i < candidates.all.size(); ++i) {
+    const BodyCandidate& candidate = candidates.all[i];
+    if (!candidate.is_loaded()) continue;
+    const StiffnessFactors factors(candidate);
+    for (int k = 0; k < factors.count; ++k, ++used) {
+      a.set_column(candidate, factors.columns.col(k), columns_a.col(used));
+      b.set_surface_column(candidates, i, factors.columns.col(k), columns_b.col(used));
+    }
+  }
+  return used;
+}
 
 }  // namespace exmat::runtime

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "common/mesh/geometry.h"
@@ -77,12 +78,14 @@ BodySurface::BodySurface(const VertexArray& rest, const RowMatrix& basis, Triang
                          const Eigen::Vector3d& origin)
     : rest_(rest.rowwise() - origin.transpose()),
       rows_(basis, Eigen::VectorXi::LinSpaced(rest.rows(), 0, static_cast<int>(rest.rows()) - 1)),
+      object_vertices_(static_cast<std::size_t>(rest.rows())),
       triangles_(std::move(triangles)),
       neighbours_(neighbours_of(triangles_)),
       fan_starts_(static_cast<std::size_t>(rest.rows()) + 1, 0),
       tree_(triangles_, rest_, basis, kLeafTriangles, /*full_leaves=*/true),
       leaves_(rest_, triangles_, tree_),
       reach_(rest.rows() > 0 ? rest_.rowwise().norm().maxCoeff() : 0) {
+  std::iota(object_vertices_.begin(), object_vertices_.end(), 0);
   for (const std::int32_t vertex : triangles_.reshaped<Eigen::RowMajor>())
     ++fan_starts_[static_cast<std::size_t>(vertex) + 1];
   for (std::size_t i = 1; i < fan_starts_.size(); ++i) fan_starts_[i] += fan_starts_[i - 1];
@@ -107,7 +110,20 @@ BodySurface BodySurface::of_tets(const TetArray& tets, const VertexArray& rest, 
   RowMatrix rows(3 * kept.size(), basis.cols());
   for (std::size_t i = 0; i < kept.size(); ++i)
     rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * kept[i]);
-  return {rest(kept, Eigen::all), rows, std::move(triangles), origin};
+  BodySurface surface(rest(kept, Eigen::all), rows, std::move(triangles), origin);
+  surface.object_vertices_ = std::move(kept);
+  return surface;
+}
+
+void BodySurface::move(const VertexArray& positions, const VertexArray& velocities) {
+  rest_ = positions;
+  rows_.set_one_mode(velocities);
+  if (rest_.rows() == 0) return;
+  reach_ = rest_.rowwise().norm().maxCoeff();
+  tree_.fit(velocities.rowwise().norm().maxCoeff(), [this](int item, Eigen::AlignedBox3d& box) {
+    const int triangle = tree_.order()[static_cast<std::size_t>(item)];
+    for (int c = 0; c < 3; ++c) box.extend(rest_.row(triangles_(triangle, c)).transpose());
+  });
 }
 
 SurfaceShape BodySurface::make_shape() const {

@@ -75,6 +75,14 @@ class BodySurface {
   static BodySurface of_tets(const TetArray& tets, const VertexArray& rest, const RowMatrix& basis,
                              const Eigen::Vector3d& origin);
 
+  /// The same of ContactSet::move(). What approaches are told by stays as it was.
+  void move(const VertexArray& positions, const VertexArray& velocities);
+
+  Eigen::Index vertices() const noexcept { return rest_.rows(); }
+  /// Of a vertex: its number in the object.
+  int object_vertex(int vertex) const noexcept { return object_vertices_[static_cast<std::size_t>(vertex)]; }
+  int corner(int triangle, int c) const noexcept { return triangles_(triangle, c); }
+
   Eigen::Index modes() const noexcept { return rows_.modes(); }
   Eigen::Index triangles() const noexcept { return triangles_.rows(); }
 
@@ -159,6 +167,7 @@ class BodySurface {
 
   VertexArray rest_;  // k x 3, X
   VertexRows rows_;   // of the basis
+  std::vector<int> object_vertices_;
   TriangleArray triangles_;
   TriangleArray neighbours_;            // f x 3, across the edge that begins at each corner; -1: none
   std::vector<int> fan_starts_, fans_;  // triangles of each vertex

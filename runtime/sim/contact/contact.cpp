@@ -98,6 +98,15 @@ ContactSet::ContactSet(const ContactData& data, const Eigen::Vector3d& origin) {
   if (count > 0) reach_ = rest.rowwise().norm().maxCoeff();
 }
 
+void ContactSet::move(const VertexArray& positions, const VertexArray& velocities) {
+  rest_ = positions;
+  rows_.set_one_mode(velocities);
+  if (rest_.rows() == 0) return;
+  reach_ = rest_.rowwise().norm().maxCoeff();
+  tree_.fit(velocities.rowwise().norm().maxCoeff(),
+            [this](int vertex, Eigen::AlignedBox3d& box) { box.extend(rest_.row(vertex).transpose()); });
+}
+
 ContactState ContactSet::make_state(std::size_t obstacle_count) const {
   return {std::vector<HeldContact>(obstacle_count * static_cast<std::size_t>(vertices())), 0,
           NearPlanes(vertices(), modes(), obstacle_count)};

@@ -112,6 +112,10 @@ class ContactSet {
   int object_vertex(int vertex) const noexcept { return object_vertices_[static_cast<std::size_t>(vertex)]; }
   int data_index(int vertex) const noexcept { return data_indices_[static_cast<std::size_t>(vertex)]; }
 
+  /// The vertices stand at `positions` [k x 3, m] in the frame of the body and go by `velocities` [k x 3, m/s],
+  /// whatever its modes are: from now on it has one, the way that they go, at q = 0.
+  void move(const VertexArray& positions, const VertexArray& velocities);
+
   /// Nothing touches.
   ContactState make_state(std::size_t obstacle_count) const;
 

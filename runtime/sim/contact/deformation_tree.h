@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <vector>
 
@@ -47,6 +48,34 @@ class DeformationTree {
 
   const MovementBound& movement() const noexcept { return movement_; }  ///< of its points
 
+  /// The same branches about points that stand wherever they do and move at no more than `fastest` [m/s]: from now on
+  /// of one mode, the way that they go, at q = 0. `extend(i, box)` extends a box by the i-th item in the order of the
+  /// leaves. Allocates in its first call.
+  template <class Extend>
+  void fit(double fastest, const Extend& extend) {
+    boxes_.resize(nodes_.size());
+    if (means_.cols() != 1) {
+      means_.setZero(3 * std::ssize(nodes_), 1);
+      deviations_.setZero(std::ssize(nodes_), 1);
+      for (Node& node : nodes_) node.deviation_norm = 0;
+      movement_.modes.resize(1);
+    }
+    movement_.norm = fastest;
+    movement_.modes[0] = fastest;
+    for (std::size_t at = nodes_.size(); at-- > 0;) {
+      Node& node = nodes_[at];
+      Eigen::AlignedBox3d& box = boxes_[at];
+      if (node.is_leaf) {
+        box.setEmpty();
+        for (int i = node.first; i < node.last; ++i) extend(i, box);
+      } else {
+        box = boxes_[at + 1].merged(boxes_[static_cast<std::size_t>(nodes_[at + 1].next)]);
+      }
+      node.centre = box.center();
+      node.radius = 0.5 * box.diagonal().norm();
+    }
+  }
+
  private:
   struct Points;
   void build(const Points& points, int first, int last);
@@ -57,6 +86,7 @@ class DeformationTree {
   RowMatrix means_;       // 3 nodes x r
   RowMatrix deviations_;  // nodes x r
   MovementBound movement_;
+  std::vector<Eigen::AlignedBox3d> boxes_;  // of the nodes, of fit()
 };
 
 }  // namespace exmat::runtime

@@ -31,6 +31,19 @@ class VertexRows {
       }
   }
 
+  /// Of one mode, by which each vertex moves as its row of `velocities` says.
+  void set_one_mode(const VertexArray& velocities) {
+    if (modes_ != 1) {
+      modes_ = 1;
+      numbers_ = AlignedArray(velocities.size() * stride());
+    }
+    double* to = numbers_.data();
+    for (const double velocity : velocities.reshaped<Eigen::RowMajor>()) {
+      *to = velocity;
+      to += stride();
+    }
+  }
+
   Eigen::Index modes() const noexcept { return modes_; }
   Eigen::Index stride() const noexcept { return padded(modes_); }  ///< numbers of a row
   const double* data() const noexcept { return numbers_.data(); }

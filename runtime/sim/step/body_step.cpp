@@ -126,7 +126,9 @@ void commit(const Model& model, const StepScene& scene, double elastic_energy, W
   commit_targets(model, scene, workspace, state);
 }
 
-void add_newton_report(const NewtonReport& newton, StepReport& report) {
+}  // namespace
+
+void add_newton_report(const NewtonReport& newton, StepReport& report) noexcept {
   report.newton_iterations = newton.iterations;
   report.line_search_evaluations += newton.line_search_evaluations;
   report.factorisations = newton.factorisations;
@@ -136,8 +138,6 @@ void add_newton_report(const NewtonReport& newton, StepReport& report) {
   if (newton.status == NewtonStatus::kIterationLimit) report.status |= kStepIterationLimit;
   if (newton.status == NewtonStatus::kStagnated) report.status |= kStepStagnated;
 }
-
-}  // namespace
 
 bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept {
   if (state.begins_anew || scene.begins_anew) return true;

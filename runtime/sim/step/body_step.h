@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "runtime/sim/solver/newton.h"
 #include "runtime/sim/step/incremental_potential.h"
 #include "runtime/sim/step/model.h"
 #include "runtime/sim/step/scene.h"
@@ -14,6 +15,9 @@ namespace exmat::runtime {
 /// Whether the next step has no smooth past: the first one, or one that a scripted force begins or ends with, or in
 /// which a setting of the scene or the accelerations of the frame jump.
 bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept;
+
+/// The counts, the residual and the end of a minimisation.
+void add_newton_report(const NewtonReport& newton, StepReport& report) noexcept;
 
 /// Of the two first iterates: whether their potentials differ by more than rounding of the elastic energy may.
 inline bool are_clearly_apart(double a, double b, double elastic_energy) noexcept {

@@ -17,20 +17,39 @@ constexpr double kSolutionError = 1e-3;       // of conjugate gradients, in the 
 constexpr int kMostGradients = 400;
 constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
 constexpr double kGain = 1e-12;     // of the kinetic energy: rounding
+// Likewise where bodies step in all vertices: each of their iterations costs as much as many of others.
+constexpr double kFullSolutionError = 0.03;
+
+bool has_full(std::span<WorldBody* const> bodies) noexcept {
+  return std::ranges::any_of(bodies, [](const WorldBody* own) { return own->full != nullptr; });
+}
+
+/// Those of the first body, or of the first in full space.
+const NewtonSettings& newton_of(std::span<WorldBody* const> bodies) noexcept {
+  for (const WorldBody* const own : bodies)
+    if (own->full) return own->scene.space.newton;
+  return bodies.front()->scene.newton;
+}
 
 }  // namespace
 
 IslandProblem::IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                              std::span<const std::vector<Incidence>> incidences, int threads,
                              IslandWorkspace& workspace)
-    : bodies_(bodies), pairs_(pairs), incidences_(incidences), threads_(threads), workspace_(workspace) {
+    : bodies_(bodies),
+      pairs_(pairs),
+      incidences_(incidences),
+      threads_(threads),
+      workspace_(workspace),
+      tolerance_(newton_of(bodies).tolerance),
+      has_full_(has_full(bodies)) {
   workspace.unknowns.resize(bodies.size());
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     body(i).offset = unknowns_;
     workspace.unknowns[i].resize(body(i).unknowns());
     unknowns_ += body(i).unknowns();
   }
-  is_dense_ = unknowns_ <= kDenseUnknowns;
+  is_dense_ = unknowns_ <= kDenseUnknowns && !has_full_;
   workspace.newton.resize_vectors(unknowns_);
   workspace.x.resize(unknowns_);
   workspace.evaluations.resize(bodies.size());
@@ -57,8 +76,23 @@ const WorldBody& IslandProblem::second(const PairContact& pair) const noexcept {
 void IslandProblem::place(const Eigen::VectorXd& x) noexcept {
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     workspace_.unknowns[i] = x.segment(body(i).offset, body(i).unknowns());
-    body(i).placement = body(i).problem->place(workspace_.unknowns[i]);
+    if (!body(i).full) body(i).placement = body(i).problem->place(workspace_.unknowns[i]);
   });
+}
+
+/// Gradient of a body in full space with what pairs add.
+PotentialEvaluation IslandProblem::finish_full(std::size_t i, PotentialEvaluation evaluation) const noexcept {
+  WorldBody& own = body(i);
+  double squares = 0, stiffness = 0;
+  for (const auto& [index, side] : incidences_[i]) {
+    const PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
+    squares += pair.add_forces(side, own);
+    stiffness += pair.sums(side).stiffness;
+    evaluation.potential.value += pair.sums(side).potential;
+    evaluation.potential.magnitude += pair.sums(side).potential;
+  }
+  evaluation.force_scale += std::sqrt(squares) + kPlaceRounding * own.full->reach() * stiffness / tolerance_;
+  return evaluation;
 }
 
 PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool is_first,
@@ -66,12 +100,22 @@ PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool i
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     Eigen::VectorXd& own = workspace_.unknowns[i];
     own = x.segment(body(i).offset, body(i).unknowns());
+    if (body(i).full) {
+      workspace_.evaluations[i] = body(i).full->evaluate(own, /*started=*/is_first);
+      body(i).placement = body(i).full->placement();
+      return;
+    }
     workspace_.evaluations[i] = body(i).problem->evaluate_alone(own, is_first);
     body(i).placement = body(i).problem->place(own);
   });
   for_all(pairs_.size(), threads_, [&](std::size_t p) { pairs_[p]->evaluate(first(*pairs_[p]), second(*pairs_[p])); });
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     WorldBody& own = body(i);
+    if (own.full) {
+      workspace_.evaluations[i] = finish_full(i, workspace_.evaluations[i]);
+      gradient.segment(own.offset, own.unknowns()) = own.full->gradient();
+      return;
+    }
     for (const auto& [pair, side] : incidences_[i])
       own.near().contact.add(pairs_[static_cast<std::size_t>(pair)]->sums(side));
     Eigen::VectorXd& part = own.near().newton.gradient;
@@ -93,7 +137,7 @@ PotentialEvaluation IslandProblem::evaluate(const Eigen::VectorXd& x, Eigen::Vec
                                             Eigen::MatrixXd& /*hessian*/) noexcept {
   PotentialEvaluation evaluation = evaluate_all(x, /*is_first=*/true, gradient);
   for (WorldBody* const own : bodies_)
-    evaluation.potential.value += own->model.frame->accept_rigid(own->workspace.frame);
+    if (!own->full) evaluation.potential.value += own->model.frame->accept_rigid(own->workspace.frame);
   assemble();
   return evaluation;
 }
@@ -107,6 +151,11 @@ PotentialValue IslandProblem::value(const Eigen::VectorXd& x) noexcept {
   for_all(bodies, threads_, [&](std::size_t i) {
     Eigen::VectorXd& own = workspace_.unknowns[i];
     own = x.segment(body(i).offset, body(i).unknowns());
+    if (body(i).full) {
+      workspace_.values[i] = body(i).full->value(own);
+      body(i).placement = body(i).full->placement();
+      return;
+    }
     workspace_.values[i] = body(i).problem->value(own);
     body(i).placement = body(i).problem->place(own);
   });
@@ -124,13 +173,19 @@ PotentialValue IslandProblem::value(const Eigen::VectorXd& x) noexcept {
 
 void IslandProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& /*hessian*/) noexcept {
   place(x);
-  for_all(bodies_.size(), threads_,
-          [&](std::size_t i) { body(i).problem->evaluate_elastic_hessian(body(i).pose(), tangent); });
+  is_projected_ = tangent != Tangent::kExact;
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    if (body(i).full)
+      body(i).full->start(workspace_.unknowns[i], tangent);
+    else
+      body(i).problem->evaluate_elastic_hessian(body(i).pose(), tangent);
+  });
   assemble();
 }
 
 void IslandProblem::accept(PotentialEvaluation& evaluation) noexcept {
-  for (WorldBody* const own : bodies_) own->problem->accept(evaluation);
+  for (WorldBody* const own : bodies_)
+    if (!own->full) own->problem->accept(evaluation);
 }
 
 /// Own Hessians of the bodies, in their own workspaces, and the couplings of the pairs, at the poses of the last
@@ -140,6 +195,12 @@ void IslandProblem::assemble() noexcept {
           [&](std::size_t p) { pairs_[p]->set_columns(first(*pairs_[p]), second(*pairs_[p])); });
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     WorldBody& own = body(i);
+    if (own.full) {
+      own.full->begin_blocks();
+      for (const auto& [pair, side] : incidences_[i]) pairs_[static_cast<std::size_t>(pair)]->add_blocks(side, own);
+      own.full->end_blocks();
+      return;
+    }
     own.problem->start_stiffness(own.pose());
     for (const auto& [pair, side] : incidences_[i])
       pairs_[static_cast<std::size_t>(pair)]->add_stiffness(side, own.near().stiffness);
@@ -171,6 +232,10 @@ bool IslandProblem::factorise() noexcept {
     return kernels().cholesky(workspace_.dense.data(), unknowns_, unknowns_, workspace_.factor.data());
   }
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    if (body(i).full) {
+      workspace_.values[i].value = 1;
+      return;
+    }
     NewtonWorkspace& own = body(i).near().newton;
     const Eigen::Index size = own.hessian.rows();
     const bool positive = kernels().cholesky(own.hessian.data(), size, size, own.factor.data());
@@ -181,7 +246,8 @@ bool IslandProblem::factorise() noexcept {
 }
 
 void IslandProblem::shift(double share) noexcept {
-  for (WorldBody* const own : bodies_) shift_diagonal(share, own->near().newton.hessian);
+  for (WorldBody* const own : bodies_)
+    if (!own->full) shift_diagonal(share, own->near().newton.hessian);
 }
 
 void IslandProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
@@ -195,11 +261,20 @@ void IslandProblem::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product)
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     const WorldBody& own = body(i);
     auto part = product.segment(own.offset, own.unknowns());
-    part.noalias() = own.near().newton.hessian.selfadjointView<Eigen::Lower>() * x.segment(own.offset, own.unknowns());
+    if (own.full)
+      own.full->multiply(x.segment(own.offset, own.unknowns()), part);
+    else
+      part.noalias() =
+          own.near().newton.hessian.selfadjointView<Eigen::Lower>() * x.segment(own.offset, own.unknowns());
     for (const auto& [index, side] : incidences_[i]) {
       const PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
       if (pair.is_own()) continue;
       const WorldBody& other = side == 0 ? second(pair) : first(pair);
+      if (own.full || other.full) {
+        const WorldBody &a = first(pair), &b = second(pair);
+        pair.add_product(side, a, x.segment(a.offset, a.unknowns()), b, x.segment(b.offset, b.unknowns()), part);
+        continue;
+      }
       const auto theirs = x.segment(other.offset, other.unknowns());
       if (side == 0)
         part.noalias() += pair.coupling() * theirs;
@@ -212,6 +287,10 @@ void IslandProblem::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product)
 void IslandProblem::precondition(const Eigen::VectorXd& residual, Eigen::VectorXd& result) noexcept {
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     const WorldBody& own = body(i);
+    if (own.full) {
+      own.full->precondition(residual.segment(own.offset, own.unknowns()), result.segment(own.offset, own.unknowns()));
+      return;
+    }
     NewtonWorkspace& factors = body(i).near().newton;
     Eigen::Map<Eigen::VectorXd> part(factors.direction.data(), own.unknowns());
     part = residual.segment(own.offset, own.unknowns());
@@ -220,8 +299,24 @@ void IslandProblem::precondition(const Eigen::VectorXd& residual, Eigen::VectorX
   });
 }
 
-/// Where the matrix is not positive definite, the iterate before it shows: a direction of descent in any case.
+/// Tangents of bodies in full space become positive semi-definite. False where they are.
+bool IslandProblem::project() noexcept {
+  if (!has_full_ || is_projected_) return false;
+  is_projected_ = true;
+  for_all(bodies_.size(), threads_, [&](std::size_t i) {
+    if (body(i).full) body(i).full->start(workspace_.unknowns[i], Tangent::kPositiveSemidefinite);
+  });
+  return true;
+}
+
+/// Where the matrix is not positive definite, the iterate before it shows: a direction of descent in any case. Bodies
+/// in full space multiply in single precision: forces are taken over their norm.
 void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept {
+  const double size = has_full_ ? x.norm() : 1;
+  if (has_full_) {
+    workspace_.right = x / size;
+    x = workspace_.right;
+  }
   Eigen::VectorXd &residual = workspace_.residual, &z = workspace_.preconditioned, &p = workspace_.direction,
                   &product = workspace_.product;
   residual = x;
@@ -229,14 +324,19 @@ void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept 
   p = z;
   x.setZero();
   double square = residual.dot(z);
-  const double enough = kSolutionError * kSolutionError * square;
+  const double error = has_full_ ? kFullSolutionError : kSolutionError;
+  const double enough = error * error * square;
   for (int iteration = 0; iteration < kMostGradients && square > enough; ++iteration) {
     multiply(p, product);
     ++conjugate_gradients_;
     const double curvature = p.dot(product);
     if (!(curvature > 0)) {
+      if (project()) {
+        x = size * workspace_.right;
+        return solve_by_gradients(x);
+      }
       if (iteration == 0) x = p;
-      return;
+      break;
     }
     const double length = square / curvature;
     x += length * p;
@@ -246,6 +346,7 @@ void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept 
     p = z + next / square * p;
     square = next;
   }
+  if (has_full_) x *= size;
 }
 
 namespace {
@@ -254,7 +355,10 @@ namespace {
 double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
   FrictionChange change;
   for (WorldBody* const own : bodies) {
-    own->contact().refresh_friction(own->near().contact, change);
+    if (own->full)
+      own->near().contact.refresh_friction(change);
+    else
+      own->contact().refresh_friction(own->near().contact, change);
   }
   for (PairContact* const pair : pairs) pair->refresh_friction(change);
   return change.relative();
@@ -265,14 +369,21 @@ double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContac
 NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                       int threads, IslandWorkspace& workspace) noexcept {
   const auto restart = [&] {
-    for_all(bodies.size(), threads, [&](std::size_t i) { bodies[i]->step->potential().start(bodies[i]->near().q); });
+    for_all(bodies.size(), threads, [&](std::size_t i) {
+      WorldBody& own = *bodies[i];
+      if (own.full)
+        own.full->start(workspace.x.segment(own.offset, own.unknowns()), Tangent::kExact);
+      else
+        own.step->potential().start(own.near().q);
+    });
   };
   const auto refresh = [&] { return refresh_friction(bodies, pairs); };
-  return minimise_with_friction(problem, bodies.front()->scene.newton, workspace.x, workspace.newton, restart, refresh);
+  return minimise_with_friction(problem, newton_of(bodies), workspace.x, workspace.newton, restart, refresh);
 }
 
 /// The unknowns of a body that stays where it is.
 void stay(WorldBody& body, Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  if (body.full) return body.full->stay(x);
   x.setZero();
   if (body.rigid() == 0) return;
   Eigen::VectorXd& own = body.near().x;
@@ -307,19 +418,26 @@ bool is_above_start(IslandProblem& problem, std::span<WorldBody* const> bodies, 
 NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                           std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
   IslandProblem problem(bodies, pairs, incidences, threads, workspace);
-  for (const WorldBody* const own : bodies) workspace.x.segment(own->offset, own->unknowns()) = own->near().x;
+  for (const WorldBody* const own : bodies)
+    workspace.x.segment(own->offset, own->unknowns()) = own->full ? own->full->first_iterate() : own->near().x;
   NewtonReport total = minimise(problem, bodies, pairs, threads, workspace);
   bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated;
   if (total.status == NewtonStatus::kConverged && is_doubtful(total, bodies))
     again = is_above_start(problem, bodies, workspace);
   if (again) {
     stay(bodies, workspace.x);
-    for (WorldBody* const own : bodies) own->step->potential().start(own->state.q);
+    for (WorldBody* const own : bodies) {
+      if (own->full)
+        own->full->start(workspace.x.segment(own->offset, own->unknowns()), Tangent::kExact);
+      else
+        own->step->potential().start(own->state.q);
+    }
     add(minimise(problem, bodies, pairs, threads, workspace), total);
     if (total.status == NewtonStatus::kConverged && is_above_start(problem, bodies, workspace))
       total.status = NewtonStatus::kStagnated;
   }
-  for (WorldBody* const own : bodies) own->near().x = workspace.x.segment(own->offset, own->unknowns());
+  for (WorldBody* const own : bodies)
+    if (!own->full) own->near().x = workspace.x.segment(own->offset, own->unknowns());
   return total;
 }
 
@@ -331,7 +449,7 @@ struct IslandEnergy {
 IslandEnergy energy_of(std::span<WorldBody* const> bodies) noexcept {
   IslandEnergy sum;
   for (const WorldBody* const own : bodies) {
-    const Energies energy = energies(own->model, own->scene, own->state);
+    const Energies energy = own->energies();
     sum.kinetic += energy.kinetic;
     sum.total += energy.total();
   }
@@ -378,8 +496,7 @@ void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* con
   }
   if (!(now.total > allowed) || !(now.kinetic > 0)) return;
   const double share = std::max(0.0, 1 - (now.total - allowed) / now.kinetic);
-  for (WorldBody* const own : bodies)
-    own->step->limit_kinetic_energy(share * own->model.frame->kinetic_energy(own->state.v, own->state.frame));
+  for (WorldBody* const own : bodies) own->limit_kinetic_energy(share);
 }
 
 /// What the step has done to the accounts of the pairs. `closed`: they never gain more together than the bodies have
@@ -409,6 +526,10 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   for_all(bodies.size(), threads, [&](std::size_t i) {
     WorldBody& own = *bodies[i];
     own.start_velocity = own.model.frame->velocity(own.state.frame).linear;
+    if (own.full) {
+      if (!own.full->begin()) own.full->fail();
+      return;
+    }
     own.step.emplace(own.model, own.scene, own.state, own.workspace);
     own.step->begin(/*touches_others=*/true);
     if (own.step->prepare()) {
@@ -422,10 +543,12 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
   const bool converged = newton.status == NewtonStatus::kConverged;
   begin_of(bodies, workspace.begin);
+  std::vector<FrameMomenta> from_others(bodies.size());  // of others, of bodies in full space
   const bool isolated = is_isolated(bodies, workspace.begin);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
-    Eigen::Vector3d torque = own.near().contact.torque;
+    Eigen::Vector3d torque = own.full ? Eigen::Vector3d(0, 0, 0) : own.near().contact.torque;
+    FrameMomenta others;
     for (const auto& [index, side] : incidences[i]) {
       const PairContact& pair = *pairs[static_cast<std::size_t>(index)];
       const WorldBody &a = *bodies[static_cast<std::size_t>(pair.body(0))],
@@ -434,11 +557,28 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
         return body.placement.position - body.model.frame->placement(body.state.frame).position;
       };
       torque += pair.torque_correction(a, way(a), b, way(b));
+      if (!own.full) continue;
+      torque += pair.sums(side).torque;
+      others.linear += pair.sums(side).force;
     }
-    finish_contact(own.model, own.state, converged, torque, own.workspace);
+    others.angular = torque;
+    from_others[i] = others;
+    if (!own.full) finish_contact(own.model, own.state, converged, torque, own.workspace);
   }
-  for (WorldBody* const own : bodies) own->step->take(newton);
-  const auto is_finite = [](const WorldBody* own) { return (own->step->report().status & kStepNonFinite) == 0; };
+  for (std::size_t i = 0; i < bodies.size(); ++i) {
+    WorldBody& own = *bodies[i];
+    if (!own.full) {
+      own.report = own.step->take(newton);
+      continue;
+    }
+    own.report = own.full->finish(newton.status, workspace.x.segment(own.offset, own.unknowns()), from_others[i]);
+    add_newton_report(newton, own.report);
+    own.placement.rotation = own.model.frame->placement(own.state.frame).rotation;
+    for (const auto& [index, side] : incidences[i])
+      own.report.contacts += pairs[static_cast<std::size_t>(index)]->sums(side).touching;
+    own.report.contact_force += from_others[i].linear;
+  }
+  const auto is_finite = [](const WorldBody* own) { return (own->report.status & kStepNonFinite) == 0; };
   if (std::ranges::all_of(bodies, is_finite)) {
     const double allowed = start.bodies.total + (converged ? start.accounts : start.springs);
     const bool gains = isolated && energy_of(bodies).total > allowed + kGain * start.bodies.kinetic;
@@ -450,12 +590,17 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   }
   bool rest = true;
   for (WorldBody* const own : bodies) {
-    own->report = own->step->report();
+    if (!own->full) own->report = own->step->report();
     if (newton.status == NewtonStatus::kStagnated) own->report.status |= kStepStagnated;
     rest = rests(own->model, own->scene, own->report, own->state) && rest;
   }
   if (rest)
-    for (WorldBody* const own : bodies) put_to_sleep(own->model, own->state, own->workspace);
+    for (WorldBody* const own : bodies) {
+      if (own->full)
+        put_full_to_sleep(own->model, own->state, own->workspace);
+      else
+        put_to_sleep(own->model, own->state, own->workspace);
+    }
   return newton;
 }
 

@@ -18,6 +18,7 @@ struct IslandWorkspace {
   std::vector<PotentialEvaluation> evaluations;  ///< of each body
   std::vector<PotentialValue> values;            ///< of each body, then of each pair
   std::vector<Eigen::VectorXd> unknowns;         ///< of each body
+  Eigen::VectorXd right;                         ///< of conjugate gradients, where bodies are in full space
   IslandBegin begin;
 
   // Linear solutions.
@@ -34,8 +35,9 @@ struct Incidence {
 
 /// Bodies that touch in a step and the contacts between them: what one step of all of them minimises, the sum of their
 /// own potentials and that of the contacts, in the unknowns of all. For newton_minimise. Small islands are factorised;
-/// larger ones solve by conjugate gradients, preconditioned by the factors of the bodies' own Hessians. Sums are taken
-/// in the order of bodies and pairs, whatever the number of threads.
+/// larger ones, and those with bodies in full space, solve by conjugate gradients, preconditioned by the factors of the
+/// bodies' own Hessians or what stands for them. Sums are taken in the order of bodies and pairs, whatever the number
+/// of threads.
 class IslandProblem {
  public:
   static constexpr bool kSeeksLowest = true;
@@ -62,10 +64,12 @@ class IslandProblem {
   const WorldBody& second(const PairContact& pair) const noexcept;
   void place(const Eigen::VectorXd& x) noexcept;
   PotentialEvaluation evaluate_all(const Eigen::VectorXd& x, bool is_first, Eigen::VectorXd& gradient) noexcept;
+  PotentialEvaluation finish_full(std::size_t i, PotentialEvaluation evaluation) const noexcept;
   void assemble() noexcept;
   void assemble_dense() noexcept;
   void multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product) const noexcept;
   void precondition(const Eigen::VectorXd& residual, Eigen::VectorXd& result) noexcept;
+  bool project() noexcept;
   void solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept;
 
   std::span<WorldBody* const> bodies_;
@@ -74,6 +78,8 @@ class IslandProblem {
   int threads_;
   IslandWorkspace& workspace_;
   Eigen::Index unknowns_ = 0;
+  double tolerance_;  ///< of Newton's method
+  bool has_full_, is_projected_ = false;
   bool is_dense_ = false;
   int conjugate_gradients_ = 0;
 };

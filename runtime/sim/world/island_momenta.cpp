@@ -19,9 +19,8 @@ struct Together {
     centre /= mass;
     for (const WorldBody* const own : bodies) {
       const Eigen::Vector3d arm = position_of(*own) - centre;
-      inertia += own->model.frame->inertia(own->workspace.frame, own->state.frame) +
-                 own->model.frame->inertia_of_momenta()->mass() *
-                     (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
+      inertia += own->inertia() + own->model.frame->inertia_of_momenta()->mass() *
+                                      (arm.squaredNorm() * Eigen::Matrix3d::Identity() - arm * arm.transpose());
     }
   }
 
@@ -56,8 +55,7 @@ IslandMomenta momenta_of(std::span<WorldBody* const> bodies, const Eigen::Vector
 /// Every velocity becomes `share` of what it is and that of the rigid motion of all, `added` about `centre`, beside it.
 void add_motion(std::span<WorldBody* const> bodies, double share, const FrameVelocity& added,
                 const Eigen::Vector3d& centre) {
-  for (WorldBody* const own : bodies)
-    own->step->add_motion(share, {added.at(position_of(*own) - centre), added.angular});
+  for (WorldBody* const own : bodies) own->add_motion(share, {added.at(position_of(*own) - centre), added.angular});
 }
 
 /// Without turning, by which their energy could change.
@@ -66,6 +64,11 @@ void go_on_together(std::span<WorldBody* const> bodies, const IslandBegin& begin
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
     const BodyBegin& from = begin.bodies[i];
+    if (own.full) {
+      own.full->step().put(from.q, from.elastic_energy, own.scene.time_step / mass * begin.momenta.total.linear);
+      own.placement = own.model.frame->placement(own.state.frame);
+      continue;
+    }
     FrameMotion motion = from.motion;
     motion.position += own.scene.time_step / mass * begin.momenta.total.linear;
     motion.linear_velocity.setZero();
@@ -89,13 +92,14 @@ void begin_of(std::span<WorldBody* const> bodies, IslandBegin& begin) {
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     const WorldBody* const own = bodies[i];
     const BodyFrame& frame = *own->model.frame;
-    const std::optional<FrameMomenta> momenta = frame.expected_momenta(own->workspace.frame);
+    const std::optional<FrameMomenta> momenta =
+        own->full ? own->full->expected_momenta() : frame.expected_momenta(own->workspace.frame);
     if (!momenta || own->near().contact.candidate_count > 0) return;
     // The centre of mass goes along its momentum: where the step begins and where it ends give the same.
     sum.linear += momenta->linear;
     sum.angular += momenta->angular + (position_of(*own) - begin.momenta.about).cross(momenta->linear);
     begin.bodies[i].motion = frame.motion(own->state.frame);
-    begin.bodies[i].q = own->state.q;
+    begin.bodies[i].q = own->state.full ? own->state.full->q : own->state.q;
     begin.bodies[i].elastic_energy = own->state.elastic_energy;
   }
   begin.is_alone = true;
@@ -114,7 +118,7 @@ bool take_momenta(std::span<WorldBody* const> bodies, const IslandBegin& begin, 
                               {momenta.total.linear - now.total.linear, momenta.total.angular - now.total.angular}};
   add_motion(bodies, 1, together.motion_of(missing), together.centre);
   double kinetic = 0;
-  for (const WorldBody* const own : bodies) kinetic += own->model.frame->kinetic_energy(own->state.v, own->state.frame);
+  for (const WorldBody* const own : bodies) kinetic += own->kinetic_energy();
   if (kinetic <= allowed) return false;
   const FrameVelocity rigid = together.motion_of(momenta);
   const double share = std::sqrt((allowed - least) / (kinetic - least));

@@ -18,7 +18,7 @@ struct IslandMomenta {
 /// A body where a step begins.
 struct BodyBegin {
   FrameMotion motion;
-  Eigen::VectorXd q;
+  Eigen::VectorXd q;          ///< of a body in full space all of its displacement
   double elastic_energy = 0;  ///< [J]
 };
 

@@ -3,16 +3,23 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "runtime/sim/step/contact_step.h"
 
 namespace exmat::runtime {
 namespace {
 
-/// A body where the step begins.
-TouchingBody touching(const WorldBody& body) {
-  return {body.contact(), *body.touching, pose_of(body.model, body.state),
-          BodyVelocity{body.model.frame->velocity(body.state.frame), body.state.v}};
+/// Calls work(a, b) with the two bodies at their iterates as contacts see them.
+template <class Work>
+auto see(const WorldBody& first, const WorldBody& second, const Work& work) {
+  const BodyPose first_pose = first.pose(), second_pose = second.pose();
+  const auto with_second = [&](const auto& a) {
+    if (second.full) return work(a, second.full_side());
+    return work(a, ReducedSide{second.contact(), second_pose, second.rigid()});
+  };
+  if (first.full) return with_second(first.full_side());
+  return with_second(ReducedSide{first.contact(), first_pose, first.rigid()});
 }
 
 double energy_of_spring(const ContactCandidate& candidate, double depth) {
@@ -21,7 +28,7 @@ double energy_of_spring(const ContactCandidate& candidate, double depth) {
 
 /// Columns about world axes become those of the unknowns.
 void to_unknowns(const WorldBody& body, const Eigen::VectorXd& x, Eigen::Index used, Eigen::MatrixXd& columns) {
-  if (body.rigid() == 0) return;
+  if (body.rigid() == 0 || body.full) return;
   const Eigen::Matrix3d turn = body.model.frame->turn_to_world(x, body.placement).transpose();
   for (Eigen::Index i = 0; i < used; ++i) {
     const Eigen::Vector3d turned = turn * columns.block<3, 1>(3, i);
@@ -45,11 +52,16 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
   const auto at = static_cast<std::size_t>(side);
   const std::vector<HeldBodyContact>& held = held_ != nullptr ? held_->held[at] : none;
   const BodyContact contact(half_);
-  const CandidateSearch search{own.scene.time_step, margin, own.anew || other.anew, held, other.shape, near_[at]};
+  NearVertices& near = near_[at];
+  if (own.full || other.full) {  // what has been found is of surfaces that move by q
+    near.radius = -1;
+    near.without = 1;
+  }
+  const CandidateSearch search{own.scene.time_step, margin, own.anew || other.anew, held, other.placed_shape(), near};
   if (is_own())
-    contact.gather_own(touching(own), search, candidates_[at]);
+    contact.gather_own(own.touching_body(), search, candidates_[at]);
   else
-    contact.gather(touching(own), touching(other), search, candidates_[at]);
+    contact.gather(own.touching_body(), other.touching_body(), search, candidates_[at]);
 }
 
 void PairContact::begin_account() noexcept {
@@ -105,6 +117,7 @@ double PairContact::spring_energy() const noexcept {
 }
 
 double PairContact::way_since_first(const WorldBody& first, const WorldBody& second) const noexcept {
+  if (first.full || second.full) return std::numeric_limits<double>::infinity();
   return first.way_bound(first_[0], first_q_[0]) + second.way_bound(first_[1], first_q_[1]);
 }
 
@@ -119,9 +132,10 @@ void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
   }
   const double way = is_first ? 0 : way_since_first(first, second);
   const BodyContact contact(half_);
-  contact.evaluate(first.contact(), first.pose(), second.pose(), way, candidates_[0], sums_[0],
-                   sums_[is_own() ? 0 : 1]);
-  contact.evaluate(second.contact(), second.pose(), first.pose(), way, candidates_[1], sums_[1], sums_[0]);
+  see(first, second, [&](const auto& a, const auto& b) {
+    contact.evaluate(a, b, way, candidates_[0], sums_[0], sums_[is_own() ? 0 : 1]);
+    contact.evaluate(b, a, way, candidates_[1], sums_[1], sums_[0]);
+  });
   if (!is_first) return;
   contact.set_clearances(first.pose(), second.pose(), candidates_[0]);
   contact.set_clearances(second.pose(), first.pose(), candidates_[1]);
@@ -130,18 +144,31 @@ void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
 double PairContact::potential(const WorldBody& first, const WorldBody& second) const noexcept {
   const BodyContact contact(half_);
   const double way = way_since_first(first, second);
-  return contact.potential(first.contact(), first.pose(), second.pose(), way, candidates_[0]) +
-         contact.potential(second.contact(), second.pose(), first.pose(), way, candidates_[1]);
+  return see(first, second, [&](const auto& a, const auto& b) {
+    return contact.potential(a, b, way, candidates_[0]) + contact.potential(b, a, way, candidates_[1]);
+  });
 }
 
 void PairContact::set_columns(const WorldBody& first, const WorldBody& second) {
-  for (std::size_t at = 0; at < 2; ++at) {
-    const WorldBody& own = at == 0 ? first : second;
-    const WorldBody& other = at == 0 ? second : first;
-    used_[at] = BodyContact::stiffness_columns(own.contact(), own.rigid(), other.rigid(), own.pose(), other.pose(),
-                                               candidates_[at], own_columns_[at], other_columns_[at]);
-  }
+  see(first, second, [&](const auto& a, const auto& b) {
+    used_[0] = BodyContact::stiffness_columns(a, b, candidates_[0], own_columns_[0], other_columns_[0]);
+    used_[1] = BodyContact::stiffness_columns(b, a, candidates_[1], own_columns_[1], other_columns_[1]);
+  });
+  if (first.full || second.full) set_directions();
   if (is_own()) own_columns_[0].leftCols(used_[0]) -= other_columns_[0].leftCols(used_[0]);
+}
+
+/// Those of the columns.
+void PairContact::set_directions() {
+  for (std::size_t at = 0; at < 2; ++at) {
+    directions_[at].clear();
+    const std::vector<BodyCandidate>& all = candidates_[at].all;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      if (!all[i].is_loaded()) continue;
+      const StiffnessFactors factors(all[i]);
+      for (int k = 0; k < factors.count; ++k) directions_[at].push_back({factors.columns.col(k), i});
+    }
+  }
 }
 
 void PairContact::add_stiffness(int side, Eigen::MatrixXd& stiffness) const {
@@ -154,15 +181,99 @@ void PairContact::add_stiffness(int side, Eigen::MatrixXd& stiffness) const {
 void PairContact::set_coupling(const WorldBody& first, const Eigen::VectorXd& x_first, const WorldBody& second,
                                const Eigen::VectorXd& x_second) {
   if (is_own()) return;
-  coupling_.setZero(first.unknowns(), second.unknowns());
   to_unknowns(first, x_first, used_[0], own_columns_[0]);
   to_unknowns(second, x_second, used_[0], other_columns_[0]);
   to_unknowns(second, x_second, used_[1], own_columns_[1]);
   to_unknowns(first, x_first, used_[1], other_columns_[1]);
+  coupling_.setZero(own_columns_[0].rows(), own_columns_[1].rows());
+  if (coupling_.size() == 0) return;
   if (used_[0] > 0)
     coupling_.noalias() -= own_columns_[0].leftCols(used_[0]) * other_columns_[0].leftCols(used_[0]).transpose();
   if (used_[1] > 0)
     coupling_.noalias() -= other_columns_[1].leftCols(used_[1]) * own_columns_[1].leftCols(used_[1]).transpose();
+}
+
+template <class Work>
+void PairContact::for_full(int side, const WorldBody& own, const Work& work) const {
+  const FullMember& member = *own.full;
+  const MovingSurface& surface = member.surface();
+  const auto at = static_cast<std::size_t>(side);
+  for (const BodyCandidate& candidate : candidates_[at].all)
+    if (candidate.is_loaded()) work(candidate, member.place(surface.touching().set.object_vertex(candidate.vertex)), 1);
+  for (const BodyCandidate& candidate : candidates_[1 - at].all)
+    for (int c = 0; c < (candidate.is_loaded() ? 3 : 0); ++c)
+      work(candidate, member.place(surface.object_corner(candidate.triangle, c)), -candidate.shares[c]);
+}
+
+double PairContact::add_forces(int side, WorldBody& own) const {
+  double squares = 0;
+  Eigen::VectorXd& gradient = own.full->gradient();
+  for_full(side, own, [&](const BodyCandidate& candidate, std::int32_t place, double share) {
+    if (place < 0) return;
+    gradient.segment<3>(4 * place) -= share * candidate.force;
+    squares += share * share * candidate.force.squaredNorm();
+  });
+  return squares;
+}
+
+void PairContact::add_blocks(int side, WorldBody& own) const {
+  for_full(side, own, [&](const BodyCandidate& candidate, std::int32_t place, double share) {
+    if (place < 0 || share == 0) return;
+    const StiffnessFactors factors(candidate);
+    own.full->push(place, share * share * (factors.used() * factors.used().transpose()));
+  });
+}
+
+Eigen::Vector3d PairContact::vertex_way(const WorldBody& own, const BodyCandidate& candidate,
+                                        const Eigen::Ref<const Eigen::VectorXd>& x) {
+  const std::int32_t place = own.full->place(own.full->surface().touching().set.object_vertex(candidate.vertex));
+  return place < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(x.segment<3>(4 * place));
+}
+
+Eigen::Vector3d PairContact::surface_way(const WorldBody& other, const BodyCandidate& candidate,
+                                         const Eigen::Ref<const Eigen::VectorXd>& x) {
+  Eigen::Vector3d way = Eigen::Vector3d::Zero();
+  for (int c = 0; c < 3; ++c)
+    if (const std::int32_t place = other.full->place(other.full->surface().object_corner(candidate.triangle, c));
+        place >= 0)
+      way += candidate.shares[c] * x.segment<3>(4 * place);
+  return way;
+}
+
+void PairContact::add_product(int side, const WorldBody& first, const Eigen::Ref<const Eigen::VectorXd>& x_first,
+                              const WorldBody& second, const Eigen::Ref<const Eigen::VectorXd>& x_second,
+                              Eigen::Ref<Eigen::VectorXd> product) const {
+  for (std::size_t at = 0; at < 2; ++at) {
+    const bool is_first = at == 0, is_own = static_cast<int>(at) == side;
+    const WorldBody &own = is_first ? first : second, &other = is_first ? second : first;
+    const auto &x_own = is_first ? x_first : x_second, &x_other = is_first ? x_second : x_first;
+    for (Eigen::Index k = 0; k < used_[at]; ++k) {
+      const auto& [direction, number] = directions_[at][static_cast<std::size_t>(k)];
+      const BodyCandidate& candidate = candidates_[at].all[number];
+      const double way_own =
+          own.full ? direction.dot(vertex_way(own, candidate, x_own)) : own_columns_[at].col(k).dot(x_own);
+      const double way_other =
+          other.full ? direction.dot(surface_way(other, candidate, x_other)) : other_columns_[at].col(k).dot(x_other);
+      const WorldBody& body = is_own ? own : other;
+      if (!body.full) {  // what its own way does is in its Hessian
+        if (is_own)
+          product -= way_other * own_columns_[at].col(k);
+        else
+          product -= way_own * other_columns_[at].col(k);
+        continue;
+      }
+      const Eigen::Vector3d force = (way_own - way_other) * direction;
+      const FullMember& member = *body.full;
+      if (is_own) {
+        const std::int32_t place = member.place(member.surface().touching().set.object_vertex(candidate.vertex));
+        if (place >= 0) product.segment<3>(4 * place) += force;
+        continue;
+      }
+      for (int c = 0; c < 3; ++c)
+        if (const std::int32_t place = member.place(member.surface().object_corner(candidate.triangle, c)); place >= 0)
+          product.segment<3>(4 * place) -= candidate.shares[c] * force;
+    }
+  }
 }
 
 void PairContact::refresh_friction(FrictionChange& change) noexcept {

@@ -85,6 +85,18 @@ class PairContact {
                     const Eigen::VectorXd& x_second);
   const Eigen::MatrixXd& coupling() const noexcept { return coupling_; }  ///< first's unknowns x second's
 
+  // Where one of the two is in full space, or both are: coupling() is empty then.
+
+  /// Subtracts the forces on a side's body, in full space, from its gradient. Returns the square of their norm [N^2].
+  double add_forces(int side, WorldBody& own) const;
+  /// Adds what pushes the vertices of such a body to its blocks.
+  void add_blocks(int side, WorldBody& own) const;
+  /// Adds to the product of the Hessian what the contacts make of `x` in the unknowns of a side's body, for a reduced
+  /// one of the other's x alone. After set_coupling().
+  void add_product(int side, const WorldBody& first, const Eigen::Ref<const Eigen::VectorXd>& x_first,
+                   const WorldBody& second, const Eigen::Ref<const Eigen::VectorXd>& x_second,
+                   Eigen::Ref<Eigen::VectorXd> product) const;
+
   void refresh_friction(FrictionChange& change) noexcept;
 
   /// What has to be added to the torque on either body [N m], if both move freely, for the angular momentum of the two
@@ -100,6 +112,15 @@ class PairContact {
   void commit(const WorldBody& first, const WorldBody& second, HeldPair& held) const;
 
  private:
+  /// Calls work(candidate, place, share) for each vertex of a side's body that a loaded candidate pushes.
+  template <class Work>
+  void for_full(int side, const WorldBody& own, const Work& work) const;
+  void set_directions();
+  /// How far `x` moves the vertex of a candidate, and the point of the surface, of a body in full space.
+  static Eigen::Vector3d vertex_way(const WorldBody& own, const BodyCandidate& candidate,
+                                    const Eigen::Ref<const Eigen::VectorXd>& x);
+  static Eigen::Vector3d surface_way(const WorldBody& other, const BodyCandidate& candidate,
+                                     const Eigen::Ref<const Eigen::VectorXd>& x);
   /// How far vertices of one and the surface of the other may have gone from where they were at the first evaluation
   /// [m].
   double way_since_first(const WorldBody& first, const WorldBody& second) const noexcept;
@@ -118,6 +139,12 @@ class PairContact {
   // Columns of the candidates of each, of the side's body and of the other.
   std::array<Eigen::MatrixXd, 2> own_columns_, other_columns_;
   std::array<Eigen::Index, 2> used_{};
+  /// Of a column: the direction that is in it, times the root of its stiffness, and its candidate.
+  struct Direction {
+    Eigen::Vector3d direction;
+    std::size_t candidate;
+  };
+  std::array<std::vector<Direction>, 2> directions_;  // of the columns, where a body is in full space
   Eigen::MatrixXd coupling_;
 };
 

@@ -142,6 +142,15 @@ void World::reserve_full(const BodyKind& kind) {
 void World::enter_full(Member& member) {
   enter_full_space(*member.kind.full, *member.kind.model, *member.state);
   if (member.full != nullptr) return;
+  take_full_scratch(member);
+  if (!member.touching) return;
+  WorldBody& own = *member.touching;
+  own.full = std::make_unique<FullMember>(*member.kind.full, own.model, own.scene, own.state, own.workspace,
+                                          *member.full, *own.touching);
+  member.is_bounded = false;
+}
+
+void World::take_full_scratch(Member& member) {
   const auto idle = std::ranges::find(idle_full_, member.kind.full, [](const auto& own) { return own.first; });
   if (idle == idle_full_.end()) {
     member.full =
@@ -155,6 +164,7 @@ void World::enter_full(Member& member) {
 
 void World::leave_full(Member& member) noexcept {
   leave_full_space(*member.state);
+  if (member.touching) member.touching->full.reset();
   if (member.full != nullptr) idle_full_.emplace_back(member.kind.full, std::move(member.full));
 }
 
@@ -162,23 +172,52 @@ bool World::is_in_island(int body) const noexcept {
   return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
 }
 
-/// Puts each body into the space of its next step; those of an island step in the modes.
+/// To touch other bodies does not ask for it, and where a body may touch itself, it steps in its modes.
+bool World::asks_for_full(int body) {
+  Member& own = at(body);
+  const State& state = *own.state;
+  StepReport last = own.report;
+  if (is_in_island(body)) last.contacts = 0;
+  const bool asks = asks_for_full_space(*own.kind.scene, last, *own.state);
+  const bool meets_itself =
+      asks && own.touching && own.touching->touching->may_meet_itself(state.q, state.v, own.kind.scene->time_step);
+  return asks && !meets_itself;
+}
+
+/// Puts each body into the space of its next step.
 void World::choose_spaces() {
-  for (int i = 0; i < count(); ++i) {
-    Member& own = at(i);
-    if (own.kind.full == nullptr || own.asleep) continue;
-    if (!is_in_island(i) && asks_for_full_space(*own.kind.scene, own.report, *own.state))
+  const auto put = [this](Member& own, bool in_full) {
+    if (in_full)
       enter_full(own);
     else if (own.state->full)
       leave_full(own);
+  };
+  asking_.clear();
+  for (int i = 0; i < count(); ++i) {
+    Member& own = at(i);
+    if (own.kind.full == nullptr || own.asleep) continue;
+    const bool asks = asks_for_full(i);
+    if (asks && own.kind.scene->space.space == Space::kAuto)
+      asking_.push_back(i);
+    else
+      put(own, asks);
   }
+  const auto pushed = [this](int body) { return at(body).state->applied_force.squaredNorm(); };
+  const auto alone = [this](int body) { return at(body).state->full ? at(body).state->full->alone : 0; };
+  const auto before = [&](int a, int b) {
+    const double push_a = pushed(a), push_b = pushed(b);
+    if (push_a != push_b) return push_a > push_b;
+    return alone(a) != alone(b) ? alone(a) < alone(b) : a < b;
+  };
+  if (std::ssize(asking_) > most_full_) std::ranges::sort(asking_, before);
+  for (std::size_t k = 0; k < asking_.size(); ++k) put(at(asking_[k]), static_cast<int>(k) < most_full_);
 }
 
 WorldReport World::step(int threads, StepObserver* observer) {
   prepare(threads);
   find_sleepers(threads);
-  find_contacts(threads);
   choose_spaces();
+  find_contacts(threads);
   step_crowd(threads, observer);
   step_islands(threads, observer);
   WorldReport report;
@@ -262,13 +301,23 @@ void World::bound(int body) {
   Member& member = at(body);
   if (member.asleep && member.is_bounded) return;
   member.is_bounded = member.asleep;
-  const WorldBody& own = *member.touching;
+  WorldBody& own = *member.touching;
   const double dt = own.scene.time_step;
+  const auto index = static_cast<std::size_t>(body);
+  if (own.full) {
+    own.full->place_surface();
+    const MovingSurface& surface = own.full->surface();
+    const double straight = dt * linear_velocity(own).norm();
+    margins_[index] =
+        kContactMarginSteps * std::max(0.0, dt * surface.speed() - straight) + dt * dt * own.scene.gravity.norm();
+    balls_[index] = surface.bound();
+    balls_[index].radius += margins_[index] + kContactMarginSteps * straight;
+    return;
+  }
   const BodyPose pose = pose_of(own.model, own.state);
   const BodyVelocity velocity{own.model.frame->velocity(own.state.frame), own.state.v};
   const double travel = own.contact().travel_bound(pose, velocity, dt);
   const double straight = dt * velocity.linear.norm();
-  const auto index = static_cast<std::size_t>(body);
   margins_[index] = kContactMarginSteps * (travel - straight) + dt * dt * own.scene.gravity.norm();
   const DeformationTree::Ball ball = own.surface.bound(own.state.q);
   balls_[index] = {pose.position + pose.rotation * ball.centre,
@@ -345,7 +394,7 @@ void World::gather(int threads) {
   for_all(bodies_.size(), threads, [this](std::size_t i) {
     if (against_[i].empty()) return;
     WorldBody& other = touching(static_cast<int>(i));
-    other.surface.place(other.state.q, other.shape);
+    if (!other.full) other.surface.place(other.state.q, other.shape);
     for (const auto& [index, side] : against_[i]) {
       PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
       const int own = pair.body(side);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -81,6 +82,11 @@ class World {
   /// Contacts at the end of the last step, in the order of pairs of bodies and of the vertices of each.
   void read_touches(std::vector<BodyTouch>& touches) const;
 
+  /// Bodies of space `auto` that may step in all vertices at once: those that the caller pushes hardest, then those
+  /// that something acted on last. The rest step in their modes.
+  void set_full_bodies(int most) noexcept { most_full_ = most; }
+  int full_bodies() const noexcept { return most_full_; }
+
   /// Times the stages of steps, if set; kOther stays what it is.
   void set_profile(WorldProfile* profile) noexcept { profile_ = profile; }
 
@@ -118,7 +124,9 @@ class World {
   void unite();
   void collect_islands();
   void choose_spaces();
+  bool asks_for_full(int body);
   void enter_full(Member& member);
+  void take_full_scratch(Member& member);
   void leave_full(Member& member) noexcept;
   void reserve_full(const BodyKind& kind);
   bool is_in_island(int body) const noexcept;
@@ -142,6 +150,8 @@ class World {
   /// Scratch of steps in full space that no body has now, with the model that it is for; never fewer than those made.
   std::vector<std::pair<const FullModel*, std::unique_ptr<FullWorkspace>>> idle_full_;
   ContactLaw law_;
+  int most_full_ = std::numeric_limits<int>::max();
+  std::vector<int> asking_;  // bodies of space `auto` that ask for the full one
   std::vector<HeldPair> held_, next_held_;
   WorldProfile* profile_ = nullptr;
 

@@ -1,13 +1,14 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <optional>
 
 #include "runtime/sim/contact/body_contact.h"
-#include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/step/body_step.h"
 #include "runtime/sim/step/contact_problem.h"
+#include "runtime/sim/world/full_member.h"
 
 namespace exmat::runtime {
 
@@ -38,10 +39,11 @@ struct WorldBody {
   Workspace workspace;
   SurfaceShape shape;
   StepReport report;
-  bool anew = true;  ///< no step has led to where it is: what it overlaps was not watched coming
+  bool anew = true;                  ///< no step has led to where it is: what it overlaps was not watched coming
+  std::unique_ptr<FullMember> full;  ///< while it is in full space
 
   // Of one step.
-  std::optional<BodyStep> step;
+  std::optional<BodyStep> step;  ///< not of one in full space, as the problem
   std::optional<ContactProblem> problem;
   Eigen::Vector3d start_velocity = Eigen::Vector3d::Zero();  ///< of the centre of mass, where the step begins [m/s]
   Placement placement;                                       ///< at the iterate
@@ -51,7 +53,36 @@ struct WorldBody {
   const ContactProblemWorkspace& near() const noexcept { return *workspace.near; }
   const ContactSet& contact() const noexcept { return *model.contact; }
   int rigid() const noexcept { return static_cast<int>(model.frame->rigid_unknowns()); }
-  Eigen::Index unknowns() const noexcept { return near().x.size(); }
+  Eigen::Index unknowns() const noexcept { return full ? full->unknowns() : near().x.size(); }
+  /// Where a step begins.
+  TouchingBody touching_body() const {
+    if (full) return full->surface().touching();
+    return {contact(),
+            *touching,
+            {model.frame->placement(state.frame), state.q},
+            BodyVelocity{model.frame->velocity(state.frame), state.v}};
+  }
+  /// At the iterate, of a body in full space.
+  FullSide full_side() const { return {*full, full->surface(), placement}; }
+  SurfaceShape& placed_shape() noexcept { return full ? full->surface().shape() : shape; }
+  Energies energies() const noexcept { return full ? full->energies() : runtime::energies(model, scene, state); }
+  /// After a step: what it has is to be this share of it at most.
+  void limit_kinetic_energy(double share) noexcept {
+    if (!full)
+      step->limit_kinetic_energy(share * model.frame->kinetic_energy(state.v, state.frame));
+    else if (!model.frame->is_driven())
+      full->step().add_motion(std::sqrt(share), {});
+  }
+  /// After a step: every velocity becomes `share` of what it is and that of a rigid motion beside it.
+  void add_motion(double share, const FrameVelocity& added) noexcept {
+    full ? full->step().add_motion(share, added) : step->add_motion(share, added);
+  }
+  Eigen::Matrix3d inertia() const noexcept {
+    return full ? full->inertia() : model.frame->inertia(workspace.frame, state.frame);
+  }
+  double kinetic_energy() const noexcept {
+    return full ? full->energies().kinetic : model.frame->kinetic_energy(state.v, state.frame);
+  }
   BodyPose pose() const noexcept { return {placement, near().q}; }  ///< at the iterate
   /// Bound on how far its vertices and its surface are from where they were at another pose [m].
   double way_bound(const Placement& from, const Eigen::VectorXd& from_q) const noexcept {

@@ -1,5 +1,7 @@
-// Bodies that meet, at the ends of every range: which of them gain energy or end. All of them, or so many at random.
-// docs/stability.md, "Bodies that meet".
+// Bodies that meet, at the ends of every range: which of them gain energy or end.
+//   exmat-meetings [COUNT [FULL]]
+// takes COUNT of them at random, 0: all; FULL of the two bodies step in all vertices. docs/stability.md, "Bodies that
+// meet".
 
 #include <chrono>
 #include <cstdio>
@@ -26,8 +28,9 @@ void print(const Meeting& meeting, const MeetingResult& result) {
 
 int main(int argc, char** argv) {
   namespace test = exmat::runtime::test;
-  const std::vector<Meeting> meetings =
-      argc > 1 ? test::some_meetings(std::strtoul(argv[1], nullptr, 10), 7) : test::all_meetings();
+  const std::size_t count = argc > 1 ? std::strtoul(argv[1], nullptr, 10) : 0;
+  std::vector<Meeting> meetings = count > 0 ? test::some_meetings(count, 7) : test::all_meetings();
+  for (Meeting& meeting : meetings) meeting.full = argc > 2 ? std::atoi(argv[2]) : 0;
   int gain = 0, ended = 0, drifted = 0, unconverged = 0, steps = 0;
   double highest = 0;
   const auto begin = std::chrono::steady_clock::now();

@@ -34,54 +34,6 @@ void set_full(const FullModel& full, const Model& model, const State& state, Ful
   motion.begins_anew = true;
 }
 
-/// Sets the reduced coordinates and the frame nearest to where the last step has left the body, with its momenta.
-void set_reduced(const FullModel& full, const Model& model, const StepScene& scene, Workspace& workspace,
-                 FullWorkspace& own, State& state) noexcept {
-  const FullMotion& motion = *state.full;
-  const Eigen::VectorXd *q = &motion.q, *v = &motion.v;
-  FrameMotion frame;
-  FrameMomenta momenta;
-  if (full.rigid) {
-    const RigidWorkspace& rigid = own.potential.rigid;
-    momenta = full.rigid->momenta(own.field.data(), rigid);
-    frame.position = rigid.centre - full.rigid->centre_at_rest();
-    frame.orientation = Eigen::Quaterniond(rigid.rotation);
-    frame.linear_velocity = momenta.linear / full.rigid->mass();
-    frame.angular_velocity = full.rigid->spin(own.field.data(), rigid);
-    RigidPart::add_motion({-frame.linear_velocity, -frame.angular_velocity}, rigid, own.field.data());
-    for (Eigen::Index place = 0; place < full.space.vertices(); ++place) {
-      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
-      own.moved.segment<3>(dof) =
-          rigid.rotation.transpose() * rigid.arms.col(place).head<3>() - full.rigid->rest().col(place).head<3>();
-      own.rate.segment<3>(dof) = rigid.rotation.transpose() * own.field.segment<3>(4 * place);
-    }
-    q = &own.moved;
-    v = &own.rate;
-  }
-  if (full.carried) {
-    const MotionSample at = scene.carrier->sample(motion.time);
-    full.carried->own_velocity(at, motion.q, motion.v, own.field);
-    full.space.from_field(own.field, own.rate);
-    for (Eigen::Index place = 0; place < full.space.vertices(); ++place) {
-      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
-      const Eigen::Vector3d rest = full.carried->rest().col(place).head<3>();
-      own.moved.segment<3>(dof) = at.to_frame(rest + motion.q.segment<3>(dof)) - rest;
-    }
-    q = &own.moved;
-    v = &own.rate;
-  }
-  state.q.noalias() = full.projection.transpose() * *q;
-  state.v.noalias() = full.projection.transpose() * *v;
-  state.q_previous = state.q;
-  state.v_previous = state.v;
-  if (full.rigid) model.frame->adopt(frame, momenta, state.q, state.v, workspace.frame, state.frame);
-  if (full.carried) model.frame->follow(scene, motion.time, state.q, state.v, workspace.frame, state.frame);
-  state.step = motion.step;
-  state.time = motion.time;
-  state.elastic_energy = motion.elastic_energy;
-  state.begins_anew = motion.begins_anew;
-}
-
 /// Weights at the first iterate, into the workspace, and the target of the step.
 void find_target(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
                  Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
@@ -153,43 +105,134 @@ void move_full(const FullModel& full, const Model& model, const RigidPlace& befo
   motion.v_previous = motion.v;
 }
 
+FullBodyStep::FullBodyStep(const FullModel& full, const Model& model, const StepScene& scene, State& state,
+                           Workspace& workspace, FullWorkspace& own) noexcept
+    : full_(full),
+      model_(model),
+      scene_(scene),
+      state_(state),
+      workspace_(workspace),
+      own_(own),
+      step_(full, scene, *state.full, own,
+            full.contacts && !scene.obstacles.empty() ? FullContactMemory{&state.contacts, &workspace.near->contact}
+                                                      : FullContactMemory{}) {}
+
+bool FullBodyStep::begin(bool touches_others) noexcept {
+  FullMotion& motion = *state_.full;
+  motion.step = state_.step;
+  motion.time = state_.time;
+  motion.begins_anew = state_.begins_anew;
+  motion.applied_force = state_.vertex_force;
+  if (workspace_.near) {
+    workspace_.near->contact.candidate_count = 0;
+    workspace_.near->contact.set_zero(workspace_.near->contact.generalised.size());
+  }
+  step_.begin(touches_others);
+  find_target(full_, model_, scene_, state_, workspace_, step_, own_, report_);
+  return (report_.status & kStepNonFinite) == 0;
+}
+
+/// Sets the reduced coordinates and the frame nearest to where the body is, with its momenta.
+void FullBodyStep::set_reduced() noexcept {
+  const FullModel& full = full_;
+  FullWorkspace& own = own_;
+  const FullMotion& motion = *state_.full;
+  const Eigen::VectorXd *q = &motion.q, *v = &motion.v;
+  FrameMotion frame;
+  FrameMomenta momenta;
+  if (full.rigid) {
+    const RigidWorkspace& rigid = own.potential.rigid;
+    momenta = full.rigid->momenta(own.field.data(), rigid);
+    frame.position = rigid.centre - full.rigid->centre_at_rest();
+    frame.orientation = Eigen::Quaterniond(rigid.rotation);
+    frame.linear_velocity = momenta.linear / full.rigid->mass();
+    frame.angular_velocity = full.rigid->spin(own.field.data(), rigid);
+    RigidPart::add_motion({-frame.linear_velocity, -frame.angular_velocity}, rigid, own.field.data());
+    for (Eigen::Index place = 0; place < full.space.vertices(); ++place) {
+      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
+      own.moved.segment<3>(dof) =
+          rigid.rotation.transpose() * rigid.arms.col(place).head<3>() - full.rigid->rest().col(place).head<3>();
+      own.rate.segment<3>(dof) = rigid.rotation.transpose() * own.field.segment<3>(4 * place);
+    }
+    q = &own.moved;
+    v = &own.rate;
+  }
+  if (full.carried) {
+    const MotionSample at = scene_.carrier->sample(motion.time);
+    full.carried->own_velocity(at, motion.q, motion.v, own.field);
+    full.space.from_field(own.field, own.rate);
+    for (Eigen::Index place = 0; place < full.space.vertices(); ++place) {
+      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
+      const Eigen::Vector3d rest = full.carried->rest().col(place).head<3>();
+      own.moved.segment<3>(dof) = at.to_frame(rest + motion.q.segment<3>(dof)) - rest;
+    }
+    q = &own.moved;
+    v = &own.rate;
+  }
+  state_.q.noalias() = full.projection.transpose() * *q;
+  state_.v.noalias() = full.projection.transpose() * *v;
+  state_.q_previous = state_.q;
+  state_.v_previous = state_.v;
+  if (full.rigid) model_.frame->adopt(frame, momenta, state_.q, state_.v, workspace_.frame, state_.frame);
+  if (full.carried) model_.frame->follow(scene_, motion.time, state_.q, state_.v, workspace_.frame, state_.frame);
+  state_.step = motion.step;
+  state_.time = motion.time;
+  state_.elastic_energy = motion.elastic_energy;
+  state_.begins_anew = motion.begins_anew;
+}
+
+const StepReport& FullBodyStep::finish(const FrameMomenta& others) noexcept {
+  const StepReport target = report_;
+  report_ = step_.finish(others);
+  report_.status |= target.status;
+  report_.target_iterations = target.target_iterations;
+  if ((report_.status & kStepNonFinite) != 0) return report_;
+  set_reduced();
+  commit_weights(scene_, workspace_, state_);
+  commit_targets(model_, scene_, workspace_, state_);
+  if (step_.is_near()) {
+    ContactWorkspace& found = workspace_.near->contact;
+    const Eigen::Vector3d centre = model_.frame->placement(state_.frame).position;
+    for (ContactCandidate& candidate : std::span(found.candidates).first(found.candidate_count))
+      candidate.arm -= centre;
+    found.torque -= centre.cross(found.force);
+  }
+  return report_;
+}
+
+void FullBodyStep::add_motion(double share, const FrameVelocity& added) noexcept {
+  step_.add_motion(share, added);
+  set_reduced();
+}
+
+void FullBodyStep::put(const Eigen::VectorXd& q, double elastic_energy, const Eigen::Vector3d& way) noexcept {
+  FullMotion& motion = *state_.full;
+  for (Eigen::Index i = 0; i < q.size(); i += 3) motion.q.segment<3>(i) = q.segment<3>(i) + way;
+  motion.elastic_energy = elastic_energy;
+  full_.space.to_field(motion.q, own_.trial);
+  std::ranges::copy(own_.trial, own_.potential.x.data());
+  if (full_.rigid) full_.rigid->place(own_.trial.data(), own_.potential.rigid);
+  add_motion(0, {});
+}
+
 StepReport step_in_full_space(const FullModel& full, const Model& model, const StepScene& scene, State& state,
                               Workspace& workspace, FullWorkspace& own) noexcept {
   if (sleeps(model, scene, state)) return sleep_through(scene, state);
-  FullMotion& motion = *state.full;
-  motion.step = state.step;
-  motion.time = state.time;
-  motion.begins_anew = state.begins_anew;
-  motion.applied_force = state.vertex_force;
-  const bool may_touch = full.contacts && !scene.obstacles.empty();
-  ContactWorkspace* const found = workspace.near ? &workspace.near->contact : nullptr;
-  if (found != nullptr) found->candidate_count = 0;
-  FullStep step(full, scene, motion, own, may_touch ? FullContactMemory{&state.contacts, found} : FullContactMemory{});
-  step.begin();
-  StepReport target;
-  find_target(full, model, scene, state, workspace, step, own, target);
-  if ((target.status & kStepNonFinite) != 0) return target;
-  step.solve();
-  StepReport report = step.finish();
-  report.status |= target.status;
-  report.target_iterations = target.target_iterations;
-  if ((report.status & kStepNonFinite) != 0) return report;
-  set_reduced(full, model, scene, workspace, own, state);
-  commit_weights(scene, workspace, state);
-  commit_targets(model, scene, workspace, state);
-  if (step.is_near()) {
-    const Eigen::Vector3d centre = model.frame->placement(state.frame).position;
-    for (ContactCandidate& candidate : std::span(found->candidates).first(found->candidate_count))
-      candidate.arm -= centre;
-    found->torque -= centre.cross(found->force);
-  }
-  if (rests(model, scene, report, state)) {
-    put_to_sleep(model, state, workspace);
-    motion.v.setZero();
-    motion.v_previous.setZero();
-    motion.q_previous = motion.q;
-  }
+  FullBodyStep step(full, model, scene, state, workspace, own);
+  if (!step.begin()) return step.report();
+  step.step().solve();
+  const StepReport report = step.finish();
+  if ((report.status & kStepNonFinite) == 0 && rests(model, scene, report, state))
+    put_full_to_sleep(model, state, workspace);
   return report;
+}
+
+void put_full_to_sleep(const Model& model, State& state, Workspace& workspace) noexcept {
+  put_to_sleep(model, state, workspace);
+  FullMotion& motion = *state.full;
+  motion.v.setZero();
+  motion.v_previous.setZero();
+  motion.q_previous = motion.q;
 }
 
 Eigen::Vector3d full_displacement(const FullModel& full, const Placement& frame, const FullMotion& motion,

@@ -29,10 +29,48 @@ struct RigidPlace {
 /// After the frame of a free body in full space was set: its vertices go with it from where the frame was.
 void move_full(const FullModel& full, const Model& model, const RigidPlace& before, State& state) noexcept;
 
-/// One step of a body in full space; its reduced coordinates and its frame follow. `workspace` is that of reduced
-/// steps, whose contacts are then those of this one.
+/// One step of a body in full space in parts: begin(), a solution of step(), finish(). Its reduced coordinates and its
+/// frame follow. `workspace` is that of reduced steps, whose contacts are then those of this one. Refers to all that it
+/// is made of. No call allocates.
+class FullBodyStep {
+ public:
+  FullBodyStep(const FullModel& full, const Model& model, const StepScene& scene, State& state, Workspace& workspace,
+               FullWorkspace& own) noexcept;
+
+  /// FullStep::begin(), weights and target. False where numbers are not finite.
+  bool begin(bool touches_others = false) noexcept;
+
+  FullStep& step() noexcept { return step_; }
+
+  /// FullStep::finish().
+  const StepReport& finish(const FrameMomenta& others = {}) noexcept;
+  const StepReport& report() const noexcept { return report_; }
+
+  // After finish(), of a step that was solved with those of others.
+
+  void add_motion(double share, const FrameVelocity& added) noexcept;
+  /// The body stands still where it was displaced to by `q` [f], moved on by `way` [m].
+  void put(const Eigen::VectorXd& q, double elastic_energy, const Eigen::Vector3d& way) noexcept;
+
+ private:
+  void set_reduced() noexcept;
+
+  const FullModel& full_;
+  const Model& model_;
+  const StepScene& scene_;
+  State& state_;
+  Workspace& workspace_;
+  FullWorkspace& own_;
+  FullStep step_;
+  StepReport report_;
+};
+
+/// All of that of a body that touches no other.
 StepReport step_in_full_space(const FullModel& full, const Model& model, const StepScene& scene, State& state,
                               Workspace& workspace, FullWorkspace& own) noexcept;
+
+/// It stands still, and sleeps from the next step on.
+void put_full_to_sleep(const Model& model, State& state, Workspace& workspace) noexcept;
 
 /// Where a vertex of the mesh is displaced to from where it was meshed, and its velocity, world [m], [m/s]; of a body
 /// whose frame is there and moves so.

@@ -68,23 +68,38 @@ double FullContacts::evaluate(const double* u, ContactWorkspace& contact, double
   return std::sqrt(square);
 }
 
-void FullContacts::set_blocks(const ContactWorkspace& contact, const Eigen::VectorXd& inverse_diagonal,
-                              FullContactScratch& scratch) const noexcept {
-  scratch.block_count = 0;
+void FullContacts::add_blocks(const ContactWorkspace& contact, FullContactScratch& scratch) const noexcept {
   for (const std::size_t number : std::span(contact.loaded).first(contact.loaded_count)) {
     const ContactCandidate& candidate = contact.candidates[number];
     const StiffnessFactors factors(candidate);
     const Eigen::Matrix3f stiffness = (factors.used().lazyProduct(factors.used().transpose())).cast<float>();
-    const Eigen::Index place = places_[static_cast<std::size_t>(candidate.vertex)];
-    // Candidates come in the order of their vertices.
-    if (scratch.block_count > 0 && scratch.blocks[scratch.block_count - 1].place == place)
-      scratch.blocks[scratch.block_count - 1].stiffness += stiffness;
-    else
-      scratch.blocks[scratch.block_count++] = {place, stiffness, {}};
+    FullContactScratch::Block& block = scratch.at(places_[static_cast<std::size_t>(candidate.vertex)]);
+    block.stiffness += stiffness;
+    block.pushed += stiffness;
   }
+}
+
+void FullContactScratch::clear() noexcept {
+  for (const Block& block : std::span(blocks).first(block_count)) block_of[static_cast<std::size_t>(block.place)] = -1;
+  block_count = 0;
+}
+
+FullContactScratch::Block& FullContactScratch::at(Eigen::Index place) noexcept {
+  std::int32_t& number = block_of[static_cast<std::size_t>(place)];
+  if (number < 0) {
+    number = static_cast<std::int32_t>(block_count++);
+    Block& fresh = blocks[static_cast<std::size_t>(number)];
+    fresh.place = place;
+    fresh.stiffness.setZero();
+    fresh.pushed.setZero();
+  }
+  return blocks[static_cast<std::size_t>(number)];
+}
+
+void FullContactScratch::set_scales(const Eigen::VectorXd& inverse_diagonal) noexcept {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
-  for (auto& block : std::span(scratch.blocks).first(scratch.block_count)) {
-    solver.computeDirect(block.stiffness);
+  for (Block& block : std::span(blocks).first(block_count)) {
+    solver.computeDirect(block.pushed);
     const Eigen::Array3f shares =
         1 + static_cast<float>(inverse_diagonal[block.place]) * solver.eigenvalues().array().max(0);
     block.scale = solver.eigenvectors() * shares.rsqrt().matrix().asDiagonal() * solver.eigenvectors().transpose();

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <vector>
 
 #include "runtime/sim/contact/contact.h"
@@ -11,20 +12,30 @@ namespace exmat::runtime {
 /// Scratch of the contacts of one step, sized once: their stiffness as conjugate gradients take it.
 struct FullContactScratch {
   FullContactScratch() = default;
-  explicit FullContactScratch(Eigen::Index vertices) : blocks(static_cast<std::size_t>(vertices)) {}
+  explicit FullContactScratch(Eigen::Index vertices) : blocks(static_cast<std::size_t>(vertices)) {
+    block_of.assign(blocks.size(), -1);
+  }
 
-  /// Of a candidate that pushes or rubs.
+  /// Of a vertex that something pushes or rubs.
   struct Block {
-    Eigen::Index place = 0;     ///< of its vertex in fields
-    Eigen::Matrix3f stiffness;  ///< -df/dx [N/m]
-    Eigen::Matrix3f scale;      ///< (I + z K)^-1/2, z of the inverse of what is preconditioned there
+    Eigen::Index place = 0;     ///< in fields
+    Eigen::Matrix3f stiffness;  ///< -df/dx of obstacles [N/m]
+    Eigen::Matrix3f pushed;     ///< the same of all that pushes it
+    Eigen::Matrix3f scale;      ///< (I + z K)^-1/2, K of all, z of the inverse of what is preconditioned there
   };
-  std::vector<Block> blocks;  ///< the first block_count, at most one of each vertex
+  std::vector<Block> blocks;  ///< the first block_count
   std::size_t block_count = 0;
+  std::vector<std::int32_t> block_of;  ///< of a place, -1: none
+
+  void clear() noexcept;
+  /// That of a vertex that moves, zero where it is a new one.
+  Block& at(Eigen::Index place) noexcept;
+  /// `inverse_diagonal` [n] as FullPreconditioner has it.
+  void set_scales(const Eigen::VectorXd& inverse_diagonal) noexcept;
 };
 
 /// Contact of a body in full space with obstacles: ContactSet in all vertices, by the same law and with the same
-/// scratch and memory. One step: gather and freeze in begin(), then evaluate() and set_blocks() as often as needed,
+/// scratch and memory. One step: gather and freeze in begin(), then evaluate() and add_blocks() as often as needed,
 /// then commit(). Displacements u are fields of FullSpace. Immutable; no call but the constructor allocates.
 class FullContacts {
  public:
@@ -40,9 +51,8 @@ class FullContacts {
   /// about the world's origin. Returns the norm of the forces [N].
   double evaluate(const double* u, ContactWorkspace& contact, double* gradient) const noexcept;
 
-  /// Stiffness of the last evaluation; `inverse_diagonal` [n] as FullPreconditioner has it.
-  void set_blocks(const ContactWorkspace& contact, const Eigen::VectorXd& inverse_diagonal,
-                  FullContactScratch& scratch) const noexcept;
+  /// Adds the stiffness of the last evaluation, without scales.
+  void add_blocks(const ContactWorkspace& contact, FullContactScratch& scratch) const noexcept;
 
   /// Writes the contacts of the last evaluation, anchors moved where they slid, the body at u.
   void commit(const double* u, const ContactWorkspace& contact, ContactState& held) const noexcept;

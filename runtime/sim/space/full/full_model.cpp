@@ -38,9 +38,10 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
              "precompute the bundle again with this scene (--scene)"}};
   const ObjectData& object = *reduced.object;
   const bool is_carried = model.frame->is_driven();
-  auto full = std::make_unique<FullModel>(
-      FullSpace(object.mesh, object.materials, object.fixed, forced ? reduced.full_space->filter : RowMatrix(),
-                is_carried ? FixedVertices::kDriven : FixedVertices::kStay));
+  auto full = std::make_unique<FullModel>(FullSpace(object.mesh, object.materials, object.fixed,
+                                                    forced ? reduced.full_space->filter : RowMatrix(),
+                                                    is_carried ? FixedVertices::kDriven : FixedVertices::kStay));
+  full->rest = object.mesh.vertices;
   if (is_carried) full->carried.emplace(full->space, object.mesh.vertices);
   if (!full->space.is_clamped()) full->rigid.emplace(full->space, object.mesh.vertices);
   if (model.contact) full->contacts.emplace(*model.contact, full->space, model.frame->origin());

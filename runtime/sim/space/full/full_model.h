@@ -50,6 +50,7 @@ struct FullModel {
   std::optional<CarriedPart> carried;    ///< of a body whose fixed vertices a motion carries
   std::optional<FullContacts> contacts;  ///< where the model has contact
   std::optional<FullExamples> examples;
+  VertexArray rest;      ///< n x 3, X of all vertices of the mesh, world [m]
   RowMatrix basis;       ///< f x r, U of the vertices that move
   RowMatrix projection;  ///< f x r, M U
 };

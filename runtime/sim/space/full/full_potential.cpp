@@ -7,8 +7,6 @@ namespace {
 
 using Field = Eigen::Map<Eigen::VectorXd>;
 
-constexpr double kGapRounding = 4 * std::numeric_limits<double>::epsilon();  // of the place of a vertex
-
 }  // namespace
 
 FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
@@ -112,7 +110,9 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   FullPotentialWorkspace& work = workspace_;
   const Field inertia(work.inertia.data(), size), force(work.force.data(), size);
   PotentialEvaluation evaluation;
-  evaluation.force_scale = external_norm_ + inertia.norm() + force.norm();
+  // A vertex is known to rounding: no residual comes below what that makes of its force.
+  evaluation.force_scale = external_norm_ + inertia.norm() + force.norm() +
+                           kPlaceRounding * reach_ * space_.stiffness() / scene_.space.newton.tolerance;
   PotentialValue& total = evaluation.potential;
   total.value = sums_[0] + sums_[1] + sums_[2];
   total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>();
@@ -145,8 +145,7 @@ void FullPotential::add_contacts(PotentialEvaluation& evaluation, Eigen::VectorX
   evaluation.force_scale += model_.contacts->evaluate(workspace_.x.data(), *contact_, gradient.data());
   evaluation.potential.value += contact_->potential;
   evaluation.potential.magnitude += contact_->potential;
-  // A gap is known to the rounding of where its vertex is: no residual comes below what that makes of its force.
-  evaluation.force_scale += kGapRounding * reach_ * contact_->stiffness / scene_.space.newton.tolerance;
+  evaluation.force_scale += kPlaceRounding * reach_ * contact_->stiffness / scene_.space.newton.tolerance;
 }
 
 }  // namespace exmat::runtime

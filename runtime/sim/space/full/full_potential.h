@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <limits>
 
 #include "runtime/sim/solver/line_search.h"
 #include "runtime/sim/space/full/full_model.h"
@@ -9,6 +10,8 @@
 #include "runtime/sim/step/scene.h"
 
 namespace exmat::runtime {
+
+inline constexpr double kPlaceRounding = 4 * std::numeric_limits<double>::epsilon();  ///< of where a vertex is
 
 /// Scratch of a FullPotential, sized once.
 struct FullPotentialWorkspace {

@@ -142,6 +142,7 @@ void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials)
   gravity_load_.setZero(size(), 3);
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   const double beta = materials.formulation == Formulation::kSmoothed ? materials.variance_factor : 0;
+  Eigen::VectorXd stiffness = Eigen::VectorXd::Zero(n);
   for (Eigen::Index t = 0; t < mesh.tet_count(); ++t) {
     const Gradients gradients = shape_gradients(tet_positions(mesh, t));
     const LameParameters lame = lame_parameters(materials.youngs_modulus[t], materials.poisson_ratio[t]);
@@ -155,12 +156,15 @@ void FullSpace::add_matrices(const TetMesh& mesh, const TetMaterials& materials)
       const double laplacian = volumes[t] * gradients.row(i).dot(gradients.row(j));
       mass_[k] += mass * (i == j ? 0.1 : 0.05);
       variance_matrix_[k] += beta * lame.mu * laplacian;
-      laplacian_[k] += (kShearShare * lame.mu + kVolumeShare * lame.lambda) * laplacian;
+      const double share = (kShearShare * lame.mu + kVolumeShare * lame.lambda) * laplacian;
+      laplacian_[k] += share;
+      if (i == j) stiffness[static_cast<Eigen::Index>(row)] += share;
     });
     for (int i = 0; i < 4; ++i)
       if (const std::int32_t own = number(mesh.tets(t, i)); own >= 0)
         gravity_load_.middleRows<3>(3 * own).diagonal().array() += mass / 4;
   }
+  stiffness_ = stiffness.norm();
 }
 
 void FullSpace::add_elements(const Elements& elements, const TetMaterials& materials) {

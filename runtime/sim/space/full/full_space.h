@@ -47,12 +47,13 @@ class FullSpace {
   Eigen::Index vertices() const { return std::ssize(vertex_of_); }  ///< n
   Eigen::Index driven() const { return driven_; }                   ///< p, where they have places in fields
   Eigen::Index places() const { return vertices() + driven_; }
-  Eigen::Index field_size() const { return 4 * places(); }          ///< of a field
-  Eigen::Index functions() const { return functions_; }             ///< m
-  bool is_clamped() const { return clamped_; }                      ///< whether a vertex is fixed
-  double edge() const { return edge_; }                             ///< mean length of the edges [m]
-  double wave_rate() const { return wave_rate_; }                   ///< of the fastest waves, edges a second [1/s]
-  double extent() const { return extent_; }                         ///< largest coordinate at rest [m]
+  Eigen::Index field_size() const { return 4 * places(); }  ///< of a field
+  Eigen::Index functions() const { return functions_; }     ///< m
+  bool is_clamped() const { return clamped_; }              ///< whether a vertex is fixed
+  double edge() const { return edge_; }                     ///< mean length of the edges [m]
+  double wave_rate() const { return wave_rate_; }           ///< of the fastest waves, edges a second [1/s]
+  double extent() const { return extent_; }                 ///< largest coordinate at rest [m]
+  double stiffness() const { return stiffness_; }           ///< norm of those of the vertices, about [N/m]
   const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
   /// Of a vertex of the mesh: its place in fields, -1 where it has none, and its number among those that move, -1 where
   /// it is fixed.
@@ -114,7 +115,7 @@ class FullSpace {
 
   MaterialModel model_ = MaterialModel::kStVenantKirchhoff;
   bool clamped_ = false;
-  double edge_ = 0, extent_ = 0, wave_rate_ = 0;
+  double edge_ = 0, extent_ = 0, wave_rate_ = 0, stiffness_ = 0;
   std::vector<std::int32_t> vertex_of_;  ///< of each place in a field, among those that move
   std::vector<std::int32_t> place_of_;   ///< of each vertex of the mesh, -1 where it has none
   Eigen::Index driven_ = 0;

@@ -15,17 +15,14 @@ constexpr double kLongStep = 0.008;     // [s]
 constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and without damping of stiffness
 constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
 
-bool may_touch(const FullModel& model, const StepScene& scene) { return model.contacts && !scene.obstacles.empty(); }
-
-FullWorkspace::Key key_of(const FullModel& model, const StepScene& scene) {
+FullWorkspace::Key key_of(const StepScene& scene) {
   const bool has_examples = !scene.examples.empty();
   return {scene.time_step,
           scene.mass_damping,
           scene.stiffness_damping,
           has_examples ? scene.examples.front().stiffness : 0,
           has_examples ? scene.examples.front().damping : 0,
-          scene.integrator == Integrator::kBdf2,
-          may_touch(model, scene)};
+          scene.integrator == Integrator::kBdf2};
 }
 
 FullWorkspace::Linear make_linear(const FullModel& model, const StepScene& scene, double time_scale, bool touches) {
@@ -98,10 +95,9 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
 }
 
 void FullWorkspace::fit(const FullModel& model, const StepScene& scene) {
-  const Key wanted = key_of(model, scene);
-  const bool touches = wanted.may_touch;
-  if (touches && contact.blocks.size() < static_cast<std::size_t>(model.contacts->vertices()))
-    contact = FullContactScratch(model.contacts->vertices());
+  const Key wanted = key_of(scene);
+  const bool touches = model.contacts.has_value();
+  if (touches && contact.blocks.empty()) contact = FullContactScratch(model.space.vertices());
   if (key == wanted) return;
   first = make_linear(model, scene, scene.time_step, touches);
   second = scene.integrator == Integrator::kBdf2 ? make_linear(model, scene, 2 * scene.time_step / 3, false) : first;
@@ -146,7 +142,8 @@ bool FullStep::find_contacts() noexcept {
                                 workspace_.field.data(), *contacts_.held, *contacts_.found);
 }
 
-void FullStep::begin() noexcept {
+void FullStep::begin(bool touches_others) noexcept {
+  among_others_ = touches_others;
   anew_ = jumps(scene_, state_);
   gather_external_force();
   if (model_.rigid || model_.contacts) {
@@ -160,7 +157,7 @@ void FullStep::begin() noexcept {
     expected_momenta_ = model_.rigid->momenta(workspace_.field.data(), workspace_.potential.rigid);
   }
   const StepHistory history{state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous};
-  const bool second_order = scene_.integrator == Integrator::kBdf2 && !anew_ && !near_;
+  const bool second_order = scene_.integrator == Integrator::kBdf2 && !anew_ && !near_ && !touches_others;
   if (second_order)
     bdf2_form(history, scene_.time_step, workspace_.form);
   else
@@ -191,6 +188,11 @@ void FullStep::carry(Eigen::VectorXd& d) const noexcept {
   if (model_.carried) model_.carried->carry(from_, to_, workspace_.potential.start, d);
 }
 
+void FullStep::stay(Eigen::VectorXd& d) const noexcept {
+  d.setZero();
+  carry(d);
+}
+
 void FullStep::choose_first_iterate() noexcept {
   Eigen::VectorXd &d = workspace_.d, &at_rest = workspace_.trial;
   own_velocity(state_.time, state_.q, state_.v, d);
@@ -200,8 +202,7 @@ void FullStep::choose_first_iterate() noexcept {
   }
   d *= scene_.time_step;
   predicted_ = is_checked() || (!anew_ && largest_move(d) <= kMostPredicted * space_.edge());
-  at_rest.setZero();
-  carry(at_rest);
+  stay(at_rest);
   const double at_start = is_checked() ? potential_.undamped_at(at_rest, state_.elastic_energy) : 0;
   if (predicted_)
     carry(d);
@@ -250,7 +251,8 @@ void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
 void FullStep::precondition() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
-  if (!near_) return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
+  if (work.contact.block_count == 0)
+    return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
   const auto blocks = std::span(work.contact.blocks).first(work.contact.block_count);
   work.scaled.vector() = work.residual.vector();
   for (const auto& block : blocks) {
@@ -275,11 +277,17 @@ void FullStep::multiply() noexcept {
     run.mesh_rounded_coefficients(filter, work.search.data(), work.coefficients.data());
     run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
   }
-  if (!near_) return;
   for (const auto& block : std::span(work.contact.blocks).first(work.contact.block_count))
     work.image.vector().segment<3>(4 * block.place) +=
         block.stiffness * work.search.vector().segment<3>(4 * block.place);
 }
+
+void FullStep::begin_blocks() noexcept {
+  workspace_.contact.clear();
+  if (near_) model_.contacts->add_blocks(*contacts_.found, workspace_.contact);
+}
+
+void FullStep::set_scales() noexcept { workspace_.contact.set_scales(linear_->preconditioner.inverse_diagonal()); }
 
 // Preconditioned conjugate gradients from 0, of the gradient over its norm: forces of a body that comes to rest would
 // be too small for single precision.
@@ -287,7 +295,8 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
   FullWorkspace& work = workspace_;
   auto residual = work.residual.vector(), solved = work.solved.vector(), search = work.search.vector(),
        image = work.image.vector(), sum = work.sum.vector();
-  if (near_) model_.contacts->set_blocks(*contacts_.found, linear_->preconditioner.inverse_diagonal(), work.contact);
+  begin_blocks();
+  set_scales();
   const double size = work.gradient.norm();
   residual = (work.gradient * (-1 / size)).cast<float>();
   precondition();
@@ -426,14 +435,27 @@ void FullStep::add_external_impulse() noexcept {
   expected_momenta_.angular += 0.5 * scene_.time_step * impulse.angular;
 }
 
+FrameMomenta FullStep::expected_momenta() const noexcept {
+  const FrameMomenta impulse = model_.rigid->sums(workspace_.potential.external.data(), workspace_.potential.rigid);
+  const double half = 0.5 * scene_.time_step;
+  return {expected_momenta_.linear + half * impulse.linear, expected_momenta_.angular + half * impulse.angular};
+}
+
+void FullStep::set_solution(NewtonStatus status, const Eigen::VectorXd& d) noexcept {
+  status_ = status;
+  workspace_.d = d;
+}
+
 // Momenta are those of the start and of the forces of the solution: damping and example force have none, and the turn
 // of the step is not the integrator's to take away. Takes v, a field in the workspace's `field`.
-void FullStep::correct_momenta() noexcept {
+void FullStep::correct_momenta(const FrameMomenta& others) noexcept {
   FullWorkspace& work = workspace_;
   const RigidWorkspace& rigid = work.potential.rigid;
   const double dt = scene_.time_step;
   add_external_impulse();
   FrameMomenta lacking = expected_momenta_;
+  lacking.linear += dt * others.linear;
+  lacking.angular += dt * others.angular;
   if (near_) {
     lacking.linear += dt * contacts_.found->force;
     lacking.angular += dt * (contacts_.found->torque - rigid.centre.cross(contacts_.found->force));
@@ -443,6 +465,18 @@ void FullStep::correct_momenta() noexcept {
   lacking.angular -= own.angular;
   RigidPart::add_motion(model_.rigid->motion(lacking, rigid), rigid, work.field.data());
   space_.from_field(work.field, state_.v);
+  move_centre((own.linear + lacking.linear) / model_.rigid->mass());
+}
+
+// The centre of mass goes as its velocity says: what it is beside that would turn into angular momentum.
+void FullStep::move_centre(const Eigen::Vector3d& velocity) noexcept {
+  FullWorkspace& work = workspace_;
+  RigidWorkspace& rigid = work.potential.rigid;
+  space_.to_field(work.form.velocity_centre, work.trial);
+  const Eigen::Vector3d shift =
+      model_.rigid->centre(work.trial.data()) + velocity / work.form.velocity_factor - rigid.centre;
+  for (Eigen::Index i = 0; i < state_.q.size(); i += 3) state_.q.segment<3>(i) += shift;
+  rigid.centre += shift;
 }
 
 // A solution that did not converge may hold contact forces that throw the body.
@@ -454,14 +488,21 @@ void FullStep::limit_energy(double allowed) noexcept {
   space_.to_field(state_.v, workspace_.field);
 }
 
-const FullReport& FullStep::finish() noexcept {
+void FullStep::add_motion(double share, const FrameVelocity& added) noexcept {
+  space_.to_field(state_.v, workspace_.field);
+  workspace_.field *= share;
+  if (model_.rigid) RigidPart::add_motion(added, workspace_.potential.rigid, workspace_.field.data());
+  space_.from_field(workspace_.field, state_.v);
+}
+
+const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   if (status_ == NewtonStatus::kIterationLimit) report_.status |= kStepIterationLimit;
   if (status_ == NewtonStatus::kStagnated) report_.status |= kStepStagnated;
   if (status_ == NewtonStatus::kNonFinite || !workspace_.d.allFinite() || !std::isfinite(potential_.elastic_energy())) {
     report_.status |= kStepNonFinite;
     return report_;
   }
-  const bool unbalanced = near_ && status_ != NewtonStatus::kConverged;
+  const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
   double energy = 0;
   Eigen::VectorXd& d = workspace_.moved;
   space_.from_field(workspace_.d, d);
@@ -470,7 +511,7 @@ const FullReport& FullStep::finish() noexcept {
   workspace_.rate = form.velocity_factor * (d + (state_.q - form.velocity_centre));
   workspace_.acceleration = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
   const double elastic = potential_.elastic_energy();
-  if (unbalanced) energy = energies(model_, scene_, state_, workspace_).total();
+  if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_).total();
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   state_.v = workspace_.rate;
@@ -481,20 +522,20 @@ const FullReport& FullStep::finish() noexcept {
     report_.contacts = contacts_.found->touching;
     report_.contact_force = contacts_.found->force;
   }
-  if (model_.rigid || near_) {
+  if (model_.rigid || near_ || among_others_) {
     space_.to_field(state_.q, workspace_.trial);
     space_.to_field(state_.v, workspace_.field);
   }
   if (near_) model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
-  if (unbalanced && !model_.carried)
+  if (unbalanced && !among_others_ && !model_.carried)
     limit_energy(energy);
-  else if (model_.rigid)
-    correct_momenta();
+  else if (model_.rigid && !unbalanced)
+    correct_momenta(others);
   if (!near_ && contacts_.held != nullptr) contacts_.held->count = 0;
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
-  state_.begins_anew = near_;
+  state_.begins_anew = near_ || among_others_;
   return report_;
 }
 

@@ -52,7 +52,7 @@ struct FullWorkspace {
   /// The settings of a scene that factors are made of.
   struct Key {
     double time_step = 0, mass_damping = 0, stiffness_damping = 0, example_stiffness = 0, example_damping = 0;
-    bool bdf2 = false, may_touch = false;
+    bool bdf2 = false;
     bool operator==(const Key&) const = default;
   };
 
@@ -100,8 +100,8 @@ class FullStep {
 
   /// Obstacles near, and the first iterate: the predictor q_n + dt v_n or q_n, whichever has the lower potential; where
   /// ends of directions are taken unchecked, the predictor unless it moves a vertex by half an edge or the step has no
-  /// smooth past.
-  void begin() noexcept;
+  /// smooth past. `touches_others`: other bodies are near; the step is solved with theirs.
+  void begin(bool touches_others = false) noexcept;
 
   /// Displacement [f] at the first iterate, of which weights and target are made.
   void first_iterate(Eigen::VectorXd& u) const noexcept;
@@ -120,11 +120,32 @@ class FullStep {
 
   void solve() noexcept;
 
+  // In place of solve(), of a step that is solved with those of others.
+
+  FullPotential& potential() noexcept { return potential_; }
+  /// d of a body that stays, or goes along with what carries it, a field.
+  void stay(Eigen::VectorXd& d) const noexcept;
+  /// Begins the blocks of the workspace's contacts with the stiffness of obstacles; others may add to what pushes, then
+  /// scales are set.
+  void begin_blocks() noexcept;
+  void set_scales() noexcept;
+  /// The workspace's image = A search, and its solved = B residual, B near the inverse of A. Fields.
+  void multiply() noexcept;
+  void precondition() noexcept;
+  void set_solution(NewtonStatus status, const Eigen::VectorXd& d) noexcept;
+
   /// Sets the state of the end, unless a number is not finite. Its elastic energy is that of the last evaluation: see
   /// energies(). Of a free body the workspace then holds where it stands, and in `field` its velocities.
-  const FullReport& finish() noexcept;
+  /// `others`: force [N] and torque about the centre of mass [N m] of other bodies.
+  const FullReport& finish(const FrameMomenta& others = {}) noexcept;
+
+  /// After finish(), of a step with others: velocities become `share` of what they are, and of a free body those of a
+  /// rigid motion beside it.
+  void add_motion(double share, const FrameVelocity& added) noexcept;
 
   bool is_near() const noexcept { return near_; }
+  /// After begin(): the momenta that external forces alone make of those of a free body.
+  FrameMomenta expected_momenta() const noexcept;
 
  private:
   enum class Outcome { kFound, kIndefinite };
@@ -140,21 +161,21 @@ class FullStep {
   void choose_first_iterate() noexcept;
   NewtonStatus minimise() noexcept;
   NewtonStatus minimise_with_friction() noexcept;
-  void precondition() noexcept;
-  void multiply() noexcept;
   Outcome find_direction(double tolerance) noexcept;
   void project() noexcept;
-  /// Near obstacles, where the caller asks for it, and where waves go so far in a step that the predictor leads away
-  /// from the solution: what an unchecked direction leaves then would grow.
+  /// Near obstacles or bodies, where the caller asks for it, and where waves go so far in a step that the predictor
+  /// leads away from the solution: what an unchecked direction leaves then would grow.
   bool is_checked() const noexcept {
-    return near_ || workspace_.accuracy.unchecked_move == 0 || space_.wave_rate() * scene_.time_step > kStiffStep;
+    return near_ || among_others_ || workspace_.accuracy.unchecked_move == 0 ||
+           space_.wave_rate() * scene_.time_step > kStiffStep;
   }
   double direction_tolerance() const noexcept;
   bool is_short() const noexcept;
   double largest_move(const Eigen::VectorXd& field) const noexcept;
   bool move() noexcept;
   void add_external_impulse() noexcept;
-  void correct_momenta() noexcept;
+  void correct_momenta(const FrameMomenta& others) noexcept;
+  void move_centre(const Eigen::Vector3d& velocity) noexcept;
   void limit_energy(double allowed) noexcept;
 
   const FullModel& model_;
@@ -170,7 +191,7 @@ class FullStep {
   NewtonStatus status_ = NewtonStatus::kConverged;
   FrameMomenta expected_momenta_;  ///< that external forces make of those of the start
   MotionSample from_, to_;         ///< frame of a carried body where the step begins and ends
-  bool anew_ = false, near_ = false, predicted_ = false, at_first_iterate_ = true;
+  bool anew_ = false, near_ = false, among_others_ = false, predicted_ = false, at_first_iterate_ = true;
   bool tangents_are_current_ = true, projected_ = false;
   double unchecked_from_ = 0;  ///< residual before a step that no line search checked; 0: a line search did
 };

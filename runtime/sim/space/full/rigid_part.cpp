@@ -46,7 +46,7 @@ RigidPart::RigidPart(const FullSpace& space, const VertexArray& rest)
 void RigidPart::place(const double* u, RigidWorkspace& workspace) const noexcept {
   const Field moved = as_columns(u);
   const Eigen::Vector4d mean = moved.lazyProduct(masses_) / mass_;
-  workspace.centre = centre_ + mean.head<3>();
+  workspace.centre = centre(u);
   workspace.arms = (rest_ + moved).colwise() - mean;
   workspace.weighted.setZero();
   for (Eigen::Index i = 0; i < mass_matrix_.outerSize(); ++i)

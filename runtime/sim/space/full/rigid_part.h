@@ -30,7 +30,11 @@ class RigidPart {
   const Eigen::Vector3d& centre_at_rest() const { return centre_; }
   const Eigen::Matrix4Xd& rest() const { return rest_; }  ///< X, about the centre [m]
 
-  /// Where the body displaced by `u` stands.
+  /// Centre of mass of the body displaced by `u`, world [m].
+  Eigen::Vector3d centre(const double* u) const noexcept {
+    return centre_ + (as_columns(u).lazyProduct(masses_) / mass_).head<3>();
+  }
+  /// Where it stands.
   void place(const double* u, RigidWorkspace& workspace) const noexcept;
 
   /// Momenta of the velocities `v` where place() was called, and the rigid motion that has such momenta.

@@ -110,7 +110,8 @@ TEST_F(Settings, CompareElasticForcesWithThoseOfTheScene) {
 TEST_F(Settings, AreAppliedToAssetAndScene) {
   asset_.cubature_tolerance = 0.01;
   scene_.regions.push_back({"left", {}});
-  const PointSettings point{5, 7, 9, "none", 11, "corotational", 0.002, "newmark", "cubature", "solve", "mixed"};
+  const PointSettings point{5,     7,         9,          "none",  11,      "corotational",
+                            0.002, "newmark", "cubature", "solve", "mixed", "full"};
   const AssetConfig asset = with_settings(asset_, point);
   EXPECT_EQ(asset.eigenfunctions, 5);
   EXPECT_EQ(asset.basis_size, 7);
@@ -121,6 +122,7 @@ TEST_F(Settings, AreAppliedToAssetAndScene) {
   EXPECT_EQ(asset.material.model, MaterialModel::kCorotational);
   const SceneConfig scene = with_settings(scene_, point);
   EXPECT_EQ(scene.precision, Precision::kMixed);
+  EXPECT_EQ(scene.space.space, Space::kFull);
   EXPECT_EQ(scene.time_step, 0.002);
   EXPECT_EQ(scene.integrator, Integrator::kNewmark);
   EXPECT_EQ(scene.examples->target, TargetSource::kSolve);
@@ -148,7 +150,8 @@ TEST_F(Settings, SurviveJson) {
   study_.sweeps = {{.linear_modes = {7},
                     .time_step = {1.0 / 3},
                     .internal_force = {"cubature", "all_elements"},
-                    .precision = {"double", "mixed"}}};
+                    .precision = {"double", "mixed"},
+                    .space = {"reduced", "full"}}};
   for (const PointSettings& point : expanded())
     EXPECT_EQ(settings_from_json(nlohmann::ordered_json::parse(to_json(point).dump())), point);
 }

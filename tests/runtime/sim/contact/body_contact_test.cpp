@@ -47,8 +47,9 @@ struct Overlap {
       return result;
     };
     const Eigen::VectorXd qa_moved = qa + da.tail(qa.size()), qb_moved = qb + db.tail(qb.size());
-    return contact.potential(*blocks.model->contact, {moved(start_a, da), qa_moved}, {moved(start_b, db), qb_moved}, 0,
-                             candidates);
+    const BodyPose pose_a{moved(start_a, da), qa_moved}, pose_b{moved(start_b, db), qb_moved};
+    const ContactSet& set = *blocks.model->contact;
+    return contact.potential(ReducedSide{set, pose_a}, ReducedSide{set, pose_b}, 0, candidates);
   }
 
   Blocks blocks{kTimeStep};
@@ -65,8 +66,9 @@ TEST(BodyContact, ForcesAreThoseOfThePotentialAndEqualAndOpposite) {
   const auto evaluate = [&] {
     a.set_zero(modes);
     b.set_zero(modes);
-    overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, overlap.qa},
-                             {overlap.start_b, overlap.qb}, 0, overlap.candidates, a, b);
+    const ContactSet& set = *overlap.blocks.model->contact;
+    const BodyPose pose_a{overlap.start_a, overlap.qa}, pose_b{overlap.start_b, overlap.qb};
+    overlap.contact.evaluate(ReducedSide{set, pose_a}, ReducedSide{set, pose_b}, 0, overlap.candidates, a, b);
   };
   evaluate();
   FrictionChange change;
@@ -98,17 +100,19 @@ TEST(BodyContact, StiffnessIsTheDerivativeOfTheForces) {
     ContactSums a, b;
     a.set_zero(modes);
     b.set_zero(modes);
-    overlap.contact.evaluate(*overlap.blocks.model->contact, {overlap.start_a, qa}, {overlap.start_b, overlap.qb}, 0,
-                             overlap.candidates, a, b);
+    const ContactSet& set = *overlap.blocks.model->contact;
+    const BodyPose pose_a{overlap.start_a, qa}, pose_b{overlap.start_b, overlap.qb};
+    overlap.contact.evaluate(ReducedSide{set, pose_a}, ReducedSide{set, pose_b}, 0, overlap.candidates, a, b);
     Eigen::VectorXd force(6 + modes);
     force << b.force, b.torque, b.generalised;
     return force;
   };
   force_of_b(overlap.qa);
   Eigen::MatrixXd columns_a, columns_b;
-  const Eigen::Index used =
-      BodyContact::stiffness_columns(*overlap.blocks.model->contact, 6, 6, {overlap.start_a, overlap.qa},
-                                     {overlap.start_b, overlap.qb}, overlap.candidates, columns_a, columns_b);
+  const ContactSet& set = *overlap.blocks.model->contact;
+  const BodyPose pose_a{overlap.start_a, overlap.qa}, pose_b{overlap.start_b, overlap.qb};
+  const Eigen::Index used = BodyContact::stiffness_columns(ReducedSide{set, pose_a, 6}, ReducedSide{set, pose_b, 6},
+                                                           overlap.candidates, columns_a, columns_b);
   ASSERT_GT(used, 3);
   // -d f_b / d q_a = -columns_b columns_a^T: linear but where contacts begin or end.
   const Eigen::MatrixXd expected = columns_b.leftCols(used) * columns_a.leftCols(used).transpose();
@@ -137,7 +141,7 @@ TEST(BodyContact, FindsWhatIsNearAndWhatWasInside) {
                        {FrameVelocity{}, overlap.vb}};
   ContactSums sums;
   sums.set_zero(overlap.qa.size());
-  overlap.contact.evaluate(a.set, a.pose, b.pose, 0, overlap.candidates, sums, sums);
+  overlap.contact.evaluate(ReducedSide{a.set, a.pose}, ReducedSide{b.set, b.pose}, 0, overlap.candidates, sums, sums);
   std::vector<HeldBodyContact> held;
   overlap.contact.commit(a.pose, b.pose, overlap.candidates, held);
   BodyCandidates closest, again;
@@ -168,7 +172,7 @@ TEST(BodyContact, WhatIsDeepWithoutHavingComeInDoesNotPush) {
     overlap.contact.gather(a, b, {kTimeStep, 0.1, anew, {}, shape, near}, found);
     ContactSums sums;
     sums.set_zero(overlap.qa.size());
-    overlap.contact.evaluate(a.set, a.pose, b.pose, 0, found, sums, sums);
+    overlap.contact.evaluate(ReducedSide{a.set, a.pose}, ReducedSide{b.set, b.pose}, 0, found, sums, sums);
     return found;
   };
   const auto deeper_than = [](const BodyCandidates& found, double depth) {

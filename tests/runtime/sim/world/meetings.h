@@ -6,6 +6,7 @@
 #include <random>
 #include <vector>
 
+#include "runtime/sim/space/full/full_body.h"
 #include "tests/runtime/sim/world/touching_blocks.h"
 
 namespace exmat::runtime::test {
@@ -19,6 +20,7 @@ struct Meeting {
   bool damped = false;          ///< of the contact, beside friction of 0.4
   int bodies = 0;               ///< of kMeetingBodies
   int start = 0;                ///< of kMeetingStarts
+  int full = 0;                 ///< how many of the two step in all vertices
 };
 
 /// A cube and a bar.
@@ -41,10 +43,20 @@ struct MeetingResult {
   int steps = 0, touching = 0, non_finite = 0, unconverged = 0;
 };
 
-inline Blocks meeting_blocks(const Meeting& meeting) {
+struct MeetingBlocks : Blocks {
+  MeetingBlocks(double time_step, const exmat::test::BarOptions& options) : Blocks(time_step, options) {
+    full = std::move(build_full_model(bar.model, *model).model);
+    full_scene = scene;
+    full_scene.space.space = Space::kFull;
+  }
+  std::unique_ptr<const FullModel> full;
+  StepScene full_scene;
+};
+
+inline MeetingBlocks meeting_blocks(const Meeting& meeting) {
   exmat::test::BarOptions options = kMeetingBodies[static_cast<std::size_t>(meeting.bodies)];
   options.youngs_modulus = meeting.youngs_modulus;
-  return Blocks(meeting.time_step, options);
+  return {meeting.time_step, options};
 }
 
 inline ContactLaw law_of(const Meeting& meeting) {
@@ -52,17 +64,23 @@ inline ContactLaw law_of(const Meeting& meeting) {
                         : ContactLaw{meeting.stiffness, 0, 0};
 }
 
-inline World meeting_world(const Blocks& blocks, const Meeting& meeting) {
+inline World meeting_world(const MeetingBlocks& blocks, const Meeting& meeting) {
   const auto& [offset, angle] = kMeetingStarts[static_cast<std::size_t>(meeting.start)];
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 0.5).normalized()));
   std::vector<WorldBodyStart> bodies;
   bodies.push_back(blocks.body({0, 0, 0}, {meeting.speed, 0, 0}));
   bodies.push_back(blocks.body(offset, {-meeting.speed, 0, 0}, Eigen::Vector3d::Zero(), turn));
+  for (int i = 0; i < meeting.full; ++i) {
+    auto& [kind, state] = bodies[static_cast<std::size_t>(i)];
+    kind.scene = &blocks.full_scene;
+    kind.full = blocks.full.get();
+    prepare_full(*blocks.full, state);
+  }
   return World(std::move(bodies), law_of(meeting));
 }
 
 /// Until either would have gone three lengths by itself, at least 20 steps.
-inline MeetingResult meet(const Blocks& blocks, const Meeting& meeting) {
+inline MeetingResult meet(const MeetingBlocks& blocks, const Meeting& meeting) {
   World world = meeting_world(blocks, meeting);
   MeetingResult result;
   const Momenta before = momenta(blocks, world);

@@ -11,9 +11,9 @@ using test::Meeting;
 constexpr double kGain = 1e-6;  // BDF2 in free flight and the residuals of Newton's method
 
 std::string name_of(const Meeting& meeting) {
-  return fmt::format("E {:g} Pa, {:g} m/s, {:g} N/m^3, {:g} s, damped {}, body {}, start {}", meeting.youngs_modulus,
-                     meeting.speed, meeting.stiffness, meeting.time_step, meeting.damped, meeting.bodies,
-                     meeting.start);
+  return fmt::format("E {:g} Pa, {:g} m/s, {:g} N/m^3, {:g} s, damped {}, body {}, start {}, {} in full space",
+                     meeting.youngs_modulus, meeting.speed, meeting.stiffness, meeting.time_step, meeting.damped,
+                     meeting.bodies, meeting.start, meeting.full);
 }
 
 void expect_no_gain(const Meeting& meeting) {
@@ -27,6 +27,15 @@ void expect_no_gain(const Meeting& meeting) {
 // The driver exmat-meetings takes all of them.
 TEST(Meetings, NoneGainsEnergyOrEnds) {
   for (const Meeting& meeting : test::some_meetings(60, 20261127)) expect_no_gain(meeting);
+}
+
+TEST(Meetings, NoneGainsEnergyOrEndsInFullSpace) {
+  for (Meeting& meeting : test::some_meetings(24, 20261128)) {
+    meeting.full = 1;
+    expect_no_gain(meeting);
+    meeting.full = 2;
+    expect_no_gain(meeting);
+  }
 }
 
 // Before contacts had an account these ended with up to ten million times their energy.
@@ -44,24 +53,28 @@ TEST(Meetings, NoneOfThoseThatGainedDoes) {
 }
 
 TEST(Meetings, GoOnFromTheirMemoryToTheLastBit) {
-  const Meeting meeting{1e4, 5, 1e9, 1.0 / 60, true, 1, 2};
-  const test::Blocks blocks = test::meeting_blocks(meeting);
-  World world = test::meeting_world(blocks, meeting);
-  for (int i = 0; i < 8; ++i) world.step(1);
-  ASSERT_EQ(world.held().size(), 1U);
-  EXPECT_GT(world.held().front().account, 0);
-  std::vector<WorldBodyStart> bodies{blocks.body({0, 0, 0}), blocks.body({0, 0, 0})};
-  for (int i = 0; i < 2; ++i) bodies[static_cast<std::size_t>(i)].state = world.state(i);
-  World other(std::move(bodies), test::law_of(meeting));
-  other.set_memory(world.held(), {false, false});
-  EXPECT_EQ(other.energies().total(), world.energies().total());
-  for (int i = 0; i < 20; ++i) {
-    world.step(1);
-    other.step(1);
-  }
-  for (int i = 0; i < 2; ++i) {
-    EXPECT_EQ(world.state(i).q, other.state(i).q);
-    EXPECT_EQ(free_state(world.state(i)).position, free_state(other.state(i)).position);
+  for (const int full : {0, 1, 2}) {
+    const Meeting meeting{1e4, 5, 1e9, 1.0 / 60, true, 1, 2, full};
+    const test::MeetingBlocks blocks = test::meeting_blocks(meeting);
+    World world = test::meeting_world(blocks, meeting);
+    for (int i = 0; i < 8; ++i) world.step(1);
+    ASSERT_EQ(world.held().size(), 1U);
+    EXPECT_GT(world.held().front().account, 0);
+    World other = test::meeting_world(blocks, meeting);
+    for (int i = 0; i < 2; ++i) other.state(i) = world.state(i);
+    other.set_memory(world.held(), {false, false});
+    EXPECT_EQ(other.energies().total(), world.energies().total());
+    for (int i = 0; i < 20; ++i) {
+      world.step(1);
+      other.step(2);
+    }
+    for (int i = 0; i < 2; ++i) {
+      EXPECT_EQ(world.state(i).q, other.state(i).q);
+      EXPECT_EQ(free_state(world.state(i)).position, free_state(other.state(i)).position);
+      if (i < full) {
+        EXPECT_EQ(world.state(i).full->q, other.state(i).full->q);
+      }
+    }
   }
 }
 
