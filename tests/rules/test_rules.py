@@ -175,9 +175,38 @@ class Linking(unittest.TestCase):
 
 
 class Naming(unittest.TestCase):
-    """clang-tidy's identifier naming, as in .clang-tidy, over every source that is compiled."""
+    """Names as .clang-tidy asks for them, in every source that is compiled."""
 
-    BAD = "struct bad_type {\n  int Function();\n};\nconstexpr int limit = 1;\n"
+    BAD = """struct bad_type {
+  int Function();
+};
+constexpr int limit = 1;
+enum class Colour { red };
+class Kept {
+  int bare;
+};
+template <class T>
+int Inner(T value) {
+  constexpr int most = 2;
+  struct local_type {
+    int x;
+  };
+  return local_type{most}.x + value;
+}
+"""
+    GOOD = """// NOLINTBEGIN(readability-identifier-naming): of another library
+struct foreign_type {
+  virtual int Call();
+};
+// NOLINTEND(readability-identifier-naming)
+struct Own : foreign_type {
+  Own() = default;
+  bool operator==(const Own&) const = default;
+  int Call() override;
+};
+template <class T>
+inline constexpr T kZero = 0;
+"""
 
     def test_holds_in_the_project(self):
         self.assertEqual(naming.violations(ROOT, BUILD), [])
@@ -201,8 +230,11 @@ class Naming(unittest.TestCase):
 
     def test_catches_planted_violations(self):
         found = self.planted({"common/core/x.cpp": '#include "common/core/x.h"\n', "common/core/x.h": self.BAD, "runtime/sim/y.cpp": "int good() { return 1; }\n"})
-        for name in ("bad_type", "Function", "limit"):
+        for name in ("type bad_type", "function Function", "constant limit", "constant red", "member bare", "function Inner", "constant most", "type local_type"):
             self.assertIn(name, found)
+
+    def test_let_sound_names_pass(self):
+        self.assertEqual(self.planted({"common/core/x.cpp": self.GOOD}), "")
 
     def test_reads_the_sources_of_a_unity_build(self):
         self.assertIn("limit", self.planted({"common/core/x.h": self.BAD, "common/x.cpp": '#include "common/core/x.h"\n'}, unity=True))
