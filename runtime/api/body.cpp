@@ -23,7 +23,7 @@ void put_to_start(exmat_body& body) noexcept {
 
 namespace {
 
-/// World [m], of a body in full space.
+/// World position [m] of a point of a body in full space.
 Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const Placement& placement,
                               const exmat_body& body) noexcept {
   Eigen::Vector3d position = points.rest.row(i);
@@ -31,6 +31,14 @@ Eigen::Vector3d full_position(const PointSet& points, Eigen::Index i, const Plac
     position +=
         points.shares(i, c) * full_displacement(*body.full(), placement, *body.state.full, points.corners(i, c));
   return position;
+}
+
+/// World position [m] of a point that has rows of the basis.
+Eigen::Vector3d position(const PointSet& points, Eigen::Index i, const exmat_body& body,
+                         const Placement& placement) noexcept {
+  if (body.state.full) return full_position(points, i, placement, body);
+  const Eigen::Vector3d displacement = points.basis_rows.middleRows<3>(3 * i).lazyProduct(body.state.q);
+  return placement.to_world(points.rest.row(i).transpose() + displacement);
 }
 
 /// [f] of world forces [3k] on the points.
@@ -126,12 +134,8 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
   EXMAT_REQUIRE(forces);
   if (points->source != body->source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
+  if (const exmat_status status = require_rows(__func__, points->set)) return status;
   const RowMatrix& rows = points->set.basis_rows;
-  if (rows.rows() == 0)
-    return fail(EXMAT_INVALID_ARGUMENT,
-                "%s: points of exmat_points_create_all_vertices() can only be read; create those to be pushed by "
-                "exmat_points_create_vertices()",
-                __func__);
   EXMAT_REQUIRE_LENGTH(coordinates, rows.rows());
   const BodyFrame& frame = *body->model().frame;
   const Placement placement = frame.placement(body->state.frame);
@@ -140,12 +144,8 @@ exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_points* point
   Eigen::Vector3d total = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
   for (Eigen::Index i = 0; i < rows.rows(); i += 3) {
     const Eigen::Vector3d force = Eigen::Map<const Eigen::Vector3d>(forces + i);
-    const Eigen::Vector3d displacement = rows.middleRows<3>(i).lazyProduct(body->state.q);
-    const Eigen::Vector3d now = body->state.full
-                                    ? full_position(points->set, i / 3, placement, *body)
-                                    : placement.to_world(points->set.rest.row(i / 3).transpose() + displacement);
     total += force;
-    torque += (now - placement.position).cross(force);
+    torque += (position(points->set, i / 3, *body, placement) - placement.position).cross(force);
     sum += rows.middleRows<3>(i).transpose().lazyProduct(placement.rotation.transpose() * force);
   }
   // A force that is not finite makes every sum so, unless it is where nothing moves.
@@ -214,6 +214,21 @@ exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* poi
     Eigen::Map<Eigen::Vector3f> point(xyz + i);
     point = placement.to_world(point.cast<double>()).cast<float>();
   }
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_positions_double(const exmat_body* body, const exmat_points* points, double* xyz,
+                                              std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  EXMAT_REQUIRE(xyz);
+  if (points->source != body->source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", __func__);
+  if (const exmat_status status = require_rows(__func__, points->set)) return status;
+  EXMAT_REQUIRE_LENGTH(coordinates, points->set.basis_rows.rows());
+  const Placement placement = body->model().frame->placement(body->state.frame);
+  for (Eigen::Index i = 0; i < points->set.rest.rows(); ++i)
+    Eigen::Map<Eigen::Vector3d>(xyz + 3 * i) = position(points->set, i, *body, placement);
   return EXMAT_OK;
 }
 

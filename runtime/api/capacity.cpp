@@ -1,6 +1,5 @@
 #include <cmath>
 
-#include "common/bundle/bundle.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_steps.h"
@@ -11,13 +10,6 @@ using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
-
-ReducedModel read_object(const Source& source) {
-  const std::string reason = "load capacity is asked for";
-  ReducedModel data = read_bundle(source.bundle, {.groups = {{"object", true, 0, reason}, {"modal", true, 0, reason}}});
-  require_same_bundle(source, data);
-  return data;
-}
 
 /// [3n] on the vertices of a body at the end of its last step, in its own frame.
 Eigen::VectorXd contact_load(const exmat_body& body) {
@@ -66,7 +58,7 @@ exmat_status exmat_capacity_create(const exmat_model* model, double spread, exma
   return guarded(__func__, [&] {
     const ReducedModel data = [&] {
       const std::lock_guard lock(reading());
-      return read_object(*model->source);
+      return read_groups(*model->source, {"object", "modal"});
     }();
     *capacity = new exmat_capacity{model->source, std::make_shared<const LoadCapacity>(data, spread)};
   });

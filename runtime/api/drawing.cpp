@@ -41,11 +41,6 @@ PointSet points_on_surface(const exmat_surface& surface, const std::int64_t* tri
   return result;
 }
 
-exmat_status require_rows(const char* function, const exmat_points& points) {
-  if (points.set.basis_rows.rows() > 0) return EXMAT_OK;
-  return fail(EXMAT_INVALID_ARGUMENT, "%s: points of exmat_points_create_all_vertices() can only be drawn", function);
-}
-
 }  // namespace
 
 exmat_status exmat_surface_create(const exmat_model* model, std::int32_t kind, exmat_surface** surface) noexcept {
@@ -127,7 +122,7 @@ exmat_status exmat_points_create_elements(const exmat_model* model, exmat_points
 exmat_status exmat_points_read_rest(const exmat_points* points, double* rest, std::int64_t coordinates) noexcept {
   EXMAT_REQUIRE(points);
   EXMAT_REQUIRE(rest);
-  if (const exmat_status status = require_rows(__func__, *points)) return status;
+  if (const exmat_status status = require_rows(__func__, points->set)) return status;
   EXMAT_REQUIRE_LENGTH(coordinates, points->set.rest.size());
   std::copy_n(points->set.rest.data(), coordinates, rest);
   return EXMAT_OK;
@@ -136,7 +131,7 @@ exmat_status exmat_points_read_rest(const exmat_points* points, double* rest, st
 exmat_status exmat_points_read_basis(const exmat_points* points, float* rows, std::int64_t count) noexcept {
   EXMAT_REQUIRE(points);
   EXMAT_REQUIRE(rows);
-  if (const exmat_status status = require_rows(__func__, *points)) return status;
+  if (const exmat_status status = require_rows(__func__, points->set)) return status;
   const RowMatrix& basis = points->set.basis_rows;
   EXMAT_REQUIRE_LENGTH(count, basis.size());
   std::transform(basis.data(), basis.data() + count, rows, [](double entry) { return static_cast<float>(entry); });

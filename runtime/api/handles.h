@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/mesh/assembly.h"
 #include "exmat/exmat.h"
 #include "runtime/api/contact_record.h"
 #include "runtime/api/drawn_surface.h"
@@ -45,6 +46,10 @@ struct exmat_shape {
 struct exmat_surface {
   exmat_points points;
   exmat::runtime::ModelSurface drawn;
+};
+
+struct exmat_matrix {
+  exmat::SparseMatrix entries;
 };
 
 struct exmat_capacity {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <fmt/format.h>
-#include <vector>
 
 #include "common/bundle/bundle.h"
 #include "common/mesh/elements.h"
@@ -33,6 +32,14 @@ RowMatrix rows_of(const Source& source, const Ids& ids) {
 
 }  // namespace
 
+exmat_status require_rows(const char* function, const PointSet& points) noexcept {
+  if (points.basis_rows.rows() > 0) return EXMAT_OK;
+  return fail(EXMAT_INVALID_ARGUMENT,
+              "%s: points of exmat_points_create_all_vertices() can only be read, in single precision; "
+              "exmat_points_create_vertices() makes those that can be pushed",
+              function);
+}
+
 void require_same_bundle(const Source& source, const ReducedModel& data) {
   const BundleSummary& summary = source.loaded.summary;
   if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
@@ -44,6 +51,14 @@ ReducedModel read_rest(const Source& source, bool basis) {
   const std::string reason = "points are asked for";
   const std::vector<LedgerEntry> groups{{"object", true, 0, reason}, {"modal", basis, 0, reason}};
   ReducedModel data = read_bundle(source.bundle, {.groups = groups, .step_only = true, .positions = true});
+  require_same_bundle(source, data);
+  return data;
+}
+
+ReducedModel read_groups(const Source& source, const std::vector<std::string>& groups) {
+  std::vector<LedgerEntry> wanted;
+  for (const std::string& group : groups) wanted.push_back({group, true, 0, "a host program asks for it"});
+  ReducedModel data = read_bundle(source.bundle, {.groups = wanted});
   require_same_bundle(source, data);
   return data;
 }
@@ -64,11 +79,7 @@ PointSet embedded_points(const RowMatrix& basis, const VertexArray& rest, const 
 }
 
 PointSet read_elements(const Source& source) {
-  const std::string reason = "points are asked for";
-  const std::vector<LedgerEntry> groups{
-      {"object", true, 0, reason}, {"modal", true, 0, reason}, {"cubature", true, 0, reason}};
-  const ReducedModel data = read_bundle(source.bundle, {.groups = groups});
-  require_same_bundle(source, data);
+  const ReducedModel data = read_groups(source, {"object", "modal", "cubature"});
   const TetMesh& mesh = data.object->mesh;
   const bool rings = data.object->materials.formulation == Formulation::kSmoothed;
   const IndexVector centres = rings ? elements_of(mesh, data.object->materials).centres : IndexVector();

@@ -3,7 +3,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <span>
+#include <string>
+#include <vector>
 
+#include "exmat/exmat.h"
 #include "runtime/scene/scene_loader.h"
 #include "runtime/sim/step/vertex_positions.h"
 
@@ -36,6 +39,12 @@ PointSet read_all_vertices(const Source& source);
 PointSet read_points_at(const Source& source, const VertexArray& points);
 /// The cubature elements: the centroids of tets, the vertices of rings.
 PointSet read_elements(const Source& source);
+
+/// Refuses the points of read_all_vertices(), which have no rows of the basis in double precision.
+exmat_status require_rows(const char* function, const PointSet& points) noexcept;
+
+/// All of these groups of a source's bundle. Throws as read_rest().
+ReducedModel read_groups(const Source& source, const std::vector<std::string>& groups);
 
 /// Throws InputError where `data` is not of the bundle that was loaded.
 void require_same_bundle(const Source& source, const ReducedModel& data);

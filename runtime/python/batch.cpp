@@ -58,9 +58,12 @@ py::array_t<std::uint32_t> status(BatchObject& batch) {
                                [](BodyRef& body, std::span<std::uint32_t> row) { row[0] = body.report().status; });
 }
 
-py::array_t<float> positions(BatchObject& batch, const PointsObject& points, const py::object& out) {
-  return gather<float>(batch, out, {static_cast<py::ssize_t>(points.count), 3},
-                       [&](BodyRef& body, std::span<float> row) { body.read_positions(points.points, row); });
+py::array positions(BatchObject& batch, const PointsObject& points, const py::object& out) {
+  return in_precision_of(out, [&](auto number) {
+    using Number = decltype(number);
+    return gather<Number>(batch, out, {static_cast<py::ssize_t>(points.count), 3},
+                          [&](BodyRef& body, std::span<Number> row) { body.read_positions(points.points, row); });
+  });
 }
 
 void set_reduced(BatchObject& batch, const Numbers& q, const Numbers& v) {
@@ -168,7 +171,7 @@ BatchClass bind_batch(py::module_& module) {
           "time", [](BatchObject& batch) { return batch.get().time(); }, "That of all its bodies [s].")
       .def_property_readonly("status", &status, "Bits of Report.status of the last call, shape (N,), uint32. A copy.")
       .def("positions", &positions, py::arg("points"), py::arg("out") = py::none(),
-           "World positions of k points, shape (N, k, 3), float32 [m], into `out` or a new array.")
+           "World positions of k points, shape (N, k, 3) [m], as Body.positions().")
       .def("set_reduced", &set_reduced, py::arg("q"), py::arg("v"),
            "All back to time 0, each body with its row of `q` and `v`, shapes (N, r).")
       .def(

@@ -30,10 +30,8 @@ void apply_forces(BodyObject& body, const PointsObject& points, const Numbers& f
   body.get().apply_forces(points.points, read_span(forces));
 }
 
-py::array_t<float> positions(BodyObject& body, const PointsObject& points, const py::object& out) {
-  auto xyz = target_array<float>(out, {static_cast<py::ssize_t>(points.count), 3});
-  body.get().read_positions(points.points, span_of(xyz));
-  return xyz;
+py::array positions(BodyObject& body, const PointsObject& points, const py::object& out) {
+  return positions_of(body, points.points, points.count, out);
 }
 
 py::array_t<double> region_weights(BodyObject& body, const std::string& name) {
@@ -133,8 +131,8 @@ void bind_readings(BodyClass& type) {
       .def("region_weights", &region_weights, py::arg("region"),
            "Those of a region, by its name: shape (K of the region,). A copy.")
       .def("positions", &positions, py::arg("points"), py::arg("out") = py::none(),
-           "World positions of k points, shape (k, 3), float32 [m]: into `out`, a contiguous array that is returned, "
-           "or a new one.")
+           "World positions of k points, shape (k, 3) [m]: into `out`, a contiguous array that is returned, or a new "
+           "one. In single precision, or in double where `out` is float64 (not of all_vertices()).")
       .def_property_readonly(
           "energies", [](BodyObject& body) { return body.get().energies(); }, "Energies of the last step.");
 }

@@ -21,10 +21,8 @@ std::shared_ptr<PointsObject> points_on(const SurfaceObject& surface, const py::
                                         surface.model.shared());
 }
 
-py::array_t<float> surface_positions(BodyObject& body, const SurfaceObject& surface, const py::object& out) {
-  auto xyz = target_array<float>(out, {static_cast<py::ssize_t>(surface.count), 3});
-  body.get().read_positions(surface.surface, span_of(xyz));
-  return xyz;
+py::array surface_positions(BodyObject& body, const SurfaceObject& surface, const py::object& out) {
+  return positions_of(body, surface.surface, surface.count, out);
 }
 
 py::array_t<float> energy_density(BodyObject& body, SurfaceObject& surface) {

@@ -126,6 +126,21 @@ py::array_t<double> example_pose(const ModelObject& model, const std::string& ex
   return array_of(model.model.example_pose(region_of(model.model, region), number), {model.modes});
 }
 
+py::tuple elasticity(const ModelObject& model, const Numbers& q) {
+  require_shape(q, "q", {static_cast<py::ssize_t>(model.modes)});
+  const Elasticity at = model.model.elasticity(read_span(q));
+  return py::make_tuple(at.energy, array_of(at.force), array_of(at.tangent, {model.modes, model.modes}));
+}
+
+/// As scipy.sparse takes them.
+py::tuple compressed_rows(const ModelObject& model, std::int32_t kind) {
+  const CompressedRows rows = [&] {
+    const py::gil_scoped_release unlocked;
+    return model.model.matrix(kind);
+  }();
+  return py::make_tuple(array_of(rows.values), array_of(rows.columns), array_of(rows.starts));
+}
+
 void bind_points(py::module_& module) {
   py::class_<PointsObject, std::shared_ptr<PointsObject>>(
       module, "Points", "k material points of a model's bodies, in the order given; they never change.")
@@ -192,6 +207,15 @@ void bind_model(py::module_& module) {
            "Names of the examples, of the whole body or of a region by its name, in the order of the weights.")
       .def("example_pose", &example_pose, py::arg("example"), py::arg("region") = py::none(),
            "The pose of an example by its name: q of shape (r,) [kg^(1/2) m]. A copy.")
+      .def("elasticity", &elasticity, py::arg("q"),
+           "At reduced coordinates `q` of shape (r,): elastic energy [J] as steps take it, its derivative, shape (r,), "
+           "and its Hessian, shape (r, r).")
+      .def(
+          "_mass", [](const ModelObject& model) { return compressed_rows(model, EXMAT_MASS); },
+          "Values, columns and starts of rows.")
+      .def(
+          "_stiffness", [](const ModelObject& model) { return compressed_rows(model, EXMAT_STIFFNESS); },
+          "Values, columns and starts of rows.")
       .def_property_readonly(
           "element_weights",
           [](const ModelObject& model) {

@@ -273,6 +273,10 @@ py::array_t<Number> array_of(const std::vector<Number>& numbers, const std::vect
   std::ranges::copy(numbers, array.mutable_data());
   return array;
 }
+template <typename Number>
+py::array_t<Number> array_of(const std::vector<Number>& numbers) {
+  return array_of(numbers, {numbers.size()});
+}
 
 inline py::array_t<double> array_of(const double* numbers, std::size_t count) {
   return py::array_t<double>(static_cast<py::ssize_t>(count), numbers);
@@ -286,6 +290,22 @@ auto span_of(Array& array) {
 template <typename Array>
 auto read_span(const Array& array) {
   return std::span<const typename Array::value_type>(array.data(), static_cast<std::size_t>(array.size()));
+}
+
+/// What read(0.0) returns where `out` is of doubles, else read(0.0F).
+template <typename Read>
+py::array in_precision_of(const py::object& out, const Read& read) {
+  return py::isinstance<py::array_t<double>>(out) ? py::array(read(0.0)) : py::array(read(0.0F));
+}
+
+/// World positions [k x 3] of the k points of Points or of a Surface: into `out`, of either precision, or a new array.
+template <typename Of>
+py::array positions_of(BodyObject& body, const Of& points, std::size_t k, const py::object& out) {
+  return in_precision_of(out, [&](auto number) {
+    auto xyz = target_array<decltype(number)>(out, {static_cast<py::ssize_t>(k), 3});
+    body.get().read_positions(points, span_of(xyz));
+    return xyz;
+  });
 }
 
 }  // namespace exmat::python

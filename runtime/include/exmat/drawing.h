@@ -1,6 +1,7 @@
 /*
  * What programs need to draw bodies by themselves, and to look inside: surfaces and points on them, cubature elements,
- * energies, targets, times, load capacity. A part of exmat.h, which includes it and says what all of it has in common.
+ * energies, targets, times, elasticity, load capacity. A part of exmat.h, which includes it and says what all of it has
+ * in common.
  */
 #ifndef EXMAT_DRAWING_H
 #define EXMAT_DRAWING_H
@@ -109,6 +110,29 @@ typedef struct exmat_profile {
 } exmat_profile;
 EXMAT_API exmat_status exmat_world_set_profiled(exmat_world* world, int32_t profiled) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_profile(const exmat_world* world, exmat_profile* profile) EXMAT_NOEXCEPT;
+
+/* ---- elasticity ------------------------------------------------------------------------------------------------ */
+
+/* At reduced coordinates `q` [modes = r]: the elastic `energy` [J] that steps take, by the polynomial or by cubature,
+   its derivative `force` [r], and its Hessian `tangent` [r x r], symmetric and as it is, indefinite or not. A result
+   may be NULL. */
+EXMAT_API exmat_status exmat_model_read_elasticity(const exmat_model* model, const double* q, int64_t modes,
+                                                   double* energy, double* force, double* tangent) EXMAT_NOEXCEPT;
+
+/* A sparse matrix of the object with all its degrees of freedom, 3n x 3n, x y z of one vertex after another, the fixed
+   ones among them. Both triangles are stored. */
+typedef struct exmat_matrix exmat_matrix;
+
+/* The consistent mass M [kg], and the stiffness K [N/m], the Hessian of the elastic energy at rest. */
+enum { EXMAT_MASS = 0, EXMAT_STIFFNESS = 1 };
+EXMAT_API exmat_status exmat_matrix_create(const exmat_model* model, int32_t kind,
+                                           exmat_matrix** matrix) EXMAT_NOEXCEPT;
+EXMAT_API void exmat_matrix_destroy(exmat_matrix* matrix) EXMAT_NOEXCEPT;
+EXMAT_API int64_t exmat_matrix_entries(const exmat_matrix* matrix) EXMAT_NOEXCEPT; /* negative where it is NULL */
+/* By compressed rows: row i has the `columns`, ascending, and `values` [entries] from starts[i] to starts[i + 1],
+   `starts` [3n + 1]. */
+EXMAT_API exmat_status exmat_matrix_read(const exmat_matrix* matrix, int64_t* starts, int64_t* columns, double* values,
+                                         int64_t entries) EXMAT_NOEXCEPT;
 
 /* ---- load capacity ---------------------------------------------------------------------------------------------- */
 

@@ -84,6 +84,29 @@ inline void BodyRef::read_positions(const Surface& surface, std::span<float> xyz
   check(exmat_body_read_positions(get(), surface.handle(), xyz.data(), detail::length(xyz)));
 }
 
+inline void BodyRef::read_positions(const Surface& surface, std::span<double> xyz) const {
+  check(exmat_body_read_positions_double(get(), surface.handle(), xyz.data(), detail::length(xyz)));
+}
+
+inline Elasticity Model::elasticity(std::span<const double> q) const {
+  Elasticity at{0, std::vector<double>(q.size()), std::vector<double>(q.size() * q.size())};
+  check(
+      exmat_model_read_elasticity(get(), q.data(), detail::length(q), &at.energy, at.force.data(), at.tangent.data()));
+  return at;
+}
+
+inline CompressedRows Model::matrix(std::int32_t kind) const {
+  exmat_matrix* made = nullptr;
+  check(exmat_matrix_create(get(), kind, &made));
+  const Owner<exmat_matrix, exmat_matrix_destroy> matrix(made);
+  const auto entries = static_cast<std::size_t>(exmat_matrix_entries(made));
+  CompressedRows rows{std::vector<std::int64_t>(3 * vertices() + 1), std::vector<std::int64_t>(entries),
+                      std::vector<double>(entries)};
+  check(
+      exmat_matrix_read(made, rows.starts.data(), rows.columns.data(), rows.values.data(), exmat_matrix_entries(made)));
+  return rows;
+}
+
 inline void BodyRef::read_energy_density(Surface& surface, std::span<float> density) const {
   check(exmat_body_read_energy_density(get(), surface.get(), density.data(), detail::length(density)));
 }

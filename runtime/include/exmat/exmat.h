@@ -252,6 +252,10 @@ EXMAT_API exmat_status exmat_body_read_point_compliance(const exmat_body* body, 
 EXMAT_API exmat_status exmat_body_read_positions(exmat_body* body, const exmat_points* points, float* xyz,
                                                  int64_t coordinates) EXMAT_NOEXCEPT;
 
+/* The same in double precision; not of exmat_points_create_all_vertices(). */
+EXMAT_API exmat_status exmat_body_read_positions_double(const exmat_body* body, const exmat_points* points, double* xyz,
+                                                        int64_t coordinates) EXMAT_NOEXCEPT;
+
 /* Reduced displacement `q` and velocity `v`, [modes = r] each; either may be NULL. */
 EXMAT_API exmat_status exmat_body_read_reduced(const exmat_body* body, double* q, double* v,
                                                int64_t modes) EXMAT_NOEXCEPT;

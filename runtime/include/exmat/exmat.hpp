@@ -65,6 +65,18 @@ inline exmat_obstacle default_obstacle() {
   return obstacle;
 }
 
+/// Energy [J], its derivative [r] and Hessian [r x r] by the reduced coordinates.
+struct Elasticity {
+  double energy = 0;
+  std::vector<double> force, tangent;
+};
+
+/// A square sparse matrix: row i has the entries from starts[i] to starts[i + 1], their columns ascending.
+struct CompressedRows {
+  std::vector<std::int64_t> starts, columns;
+  std::vector<double> values;
+};
+
 /// A bundle prepared for stepping. All of these are moved, not copied; one that was moved from is empty.
 class Model {
  public:
@@ -116,6 +128,10 @@ class Model {
     check(exmat_model_read_element_weights(get(), weights.data(), static_cast<std::int64_t>(weights.size())));
     return weights;
   }
+  /// At `q` [r].
+  Elasticity elasticity(std::span<const double> q) const;
+  /// EXMAT_MASS or EXMAT_STIFFNESS.
+  CompressedRows matrix(std::int32_t kind) const;
   double time_step() const noexcept { return exmat_model_time_step(get()); }
   std::string input_sha256() const { return exmat_model_input_sha256(get()); }
 
@@ -278,7 +294,11 @@ class BodyRef {
   void read_positions(const Points& points, std::span<float> xyz) {
     check(exmat_body_read_positions(get(), points.get(), xyz.data(), detail::length(xyz)));
   }
+  void read_positions(const Points& points, std::span<double> xyz) const {
+    check(exmat_body_read_positions_double(get(), points.get(), xyz.data(), detail::length(xyz)));
+  }
   void read_positions(const Surface& surface, std::span<float> xyz);
+  void read_positions(const Surface& surface, std::span<double> xyz) const;
   /// [12] three rows of a rotation and a shift.
   void read_placement(std::span<double, 12> placement) const {
     check(exmat_body_read_placement(get(), placement.data()));

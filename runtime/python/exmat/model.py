@@ -1,4 +1,5 @@
 """Models: bundles prepared for stepping."""
+import importlib
 import os
 import pathlib
 from typing import Any, Dict, Mapping, Optional, Sequence, Tuple, Union
@@ -114,6 +115,24 @@ class Model(_exmat.Model):
         _exmat.Model.__init__(model, world, kind)
         model._recipe = ("world", (recipe, kind), None)
         return model
+
+    def mass_matrix(self) -> Any:
+        """The consistent mass M of the object, shape (3n, 3n) [kg]: x y z of one vertex after another, the fixed ones among them.
+
+        A scipy.sparse.csr_matrix; where SciPy is missing, the tuple (data, indices, indptr) that would make one.
+        """
+        return self._sparse(self._mass())
+
+    def stiffness_matrix(self) -> Any:
+        """The stiffness K of the object, the Hessian of its elastic energy at rest [N/m]: as mass_matrix()."""
+        return self._sparse(self._stiffness())
+
+    def _sparse(self, rows: Tuple[Any, Any, Any]) -> Any:
+        try:
+            sparse = importlib.import_module("scipy.sparse")
+        except ImportError:
+            return rows
+        return sparse.csr_matrix(rows, shape=(3 * self.vertices, 3 * self.vertices))
 
     def __copy__(self) -> "Model":
         return self

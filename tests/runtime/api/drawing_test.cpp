@@ -1,9 +1,12 @@
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/bundle/bundle.h"
+#include "common/mesh/assembly.h"
 #include "common/mesh/geometry.h"
 #include "exmat/exmat.hpp"
 #include "runtime/api/drawn_surface.h"
@@ -13,6 +16,7 @@
 namespace exmat::runtime {
 namespace {
 
+using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 
 /// What exmat.hpp has of drawing, beside the bar that the bundle was made of.
@@ -259,6 +263,69 @@ TEST_F(Drawing, WeightsOfASceneAreThoseThatAreSet) {
     EXPECT_EQ(error.status(), EXMAT_BAD_INPUT);
     EXPECT_THAT(error.what(), HasSubstr("/examples/weights: expected 3 numbers"));
   }
+}
+
+TEST_F(Drawing, PositionsInDoublePrecisionAreThoseOfTheBasis) {
+  const exmat::Model model = make();
+  exmat::Body body(model);
+  const Eigen::VectorXd q = some_pose();
+  put(body, q);
+  const exmat::Points points = exmat::Points::vertices(model, std::array<std::int64_t, 2>{7, 3});
+  std::array<double, 6> found{};
+  body.read_positions(points, found);
+  for (const auto& [row, vertex] : {std::pair(0, 7), std::pair(3, 3)}) {
+    const Eigen::Vector3d expected =
+        bar_.model.object->mesh.vertices.row(vertex).transpose() + bar_.basis().middleRows<3>(3 * vertex) * q;
+    EXPECT_LE((Eigen::Map<const Eigen::Vector3d>(found.data() + row) - expected).norm(), 1e-14);
+  }
+  std::array<double, 5> wrong{};
+  EXPECT_THROW(body.read_positions(points, wrong), exmat::Error);
+  std::vector<double> all(3 * model.vertices());
+  EXPECT_THROW(body.read_positions(exmat::Points::all_vertices(model), all), exmat::Error);
+}
+
+// A central difference of step h errs by h^2, and by rounding over h.
+TEST_F(Drawing, ForceAndTangentAreDerivativesOfTheEnergy) {
+  constexpr double kStep = 1e-5;
+  const exmat::Model model = make();
+  const Eigen::VectorXd q = some_pose();
+  const exmat::Elasticity at = model.elasticity(std::vector<double>(q.begin(), q.end()));
+  const auto r = static_cast<std::size_t>(q.size());
+  const double most_force = std::ranges::max(at.force, {}, [](double x) { return std::abs(x); });
+  const double most_tangent = std::ranges::max(at.tangent, {}, [](double x) { return std::abs(x); });
+  for (std::size_t i = 0; i < r; ++i) {
+    std::vector<double> up(q.begin(), q.end()), down = up;
+    up[i] += kStep;
+    down[i] -= kStep;
+    const exmat::Elasticity above = model.elasticity(up), below = model.elasticity(down);
+    EXPECT_NEAR((above.energy - below.energy) / (2 * kStep), at.force[i], 1e-6 * std::abs(most_force));
+    for (std::size_t j = 0; j < r; ++j) {
+      EXPECT_NEAR((above.force[j] - below.force[j]) / (2 * kStep), at.tangent[r * j + i],
+                  1e-6 * std::abs(most_tangent));
+      EXPECT_EQ(at.tangent[r * j + i], at.tangent[r * i + j]);
+    }
+  }
+  double energy = 0;
+  EXPECT_EQ(exmat_model_read_elasticity(model.get(), q.data(), q.size(), &energy, nullptr, nullptr), EXMAT_OK);
+  EXPECT_EQ(energy, at.energy);
+  EXPECT_THROW(model.elasticity(std::vector<double>(r + 1)), exmat::Error);
+  EXPECT_THROW(model.elasticity(std::vector<double>(r, NAN)), exmat::Error);
+}
+
+TEST_F(Drawing, MatricesAreThoseOfTheMesh) {
+  const exmat::Model model = make();
+  const ObjectData& object = *bar_.model.object;
+  for (const auto& [kind, expected] :
+       {std::pair(EXMAT_MASS, expand_to_vectors(scalar_mass(object.mesh, object.materials.density))),
+        std::pair(EXMAT_STIFFNESS, elastic_stiffness(object.mesh, object.materials))}) {
+    const exmat::CompressedRows rows = model.matrix(kind);
+    EXPECT_THAT(rows.starts, ElementsAreArray(expected.outerIndexPtr(), static_cast<std::size_t>(expected.rows()) + 1));
+    const auto entries = static_cast<std::size_t>(expected.nonZeros());
+    EXPECT_THAT(rows.columns, ElementsAreArray(expected.innerIndexPtr(), entries));
+    EXPECT_THAT(rows.values, ElementsAreArray(expected.valuePtr(), entries));
+  }
+  EXPECT_THROW(model.matrix(2), exmat::Error);
+  EXPECT_EQ(exmat_matrix_entries(nullptr), -1);
 }
 
 TEST_F(Drawing, ProfilesAddUpToLessThanTheCallTook) {

@@ -82,7 +82,7 @@ def test_out_is_filled_and_refused_where_it_does_not_fit(body):
     points = exmat.Points(body.model, [1, 2])
     out = np.empty((2, 3), np.float32)
     assert body.positions(points, out) is out and body.positions(points, out=out) is out
-    for bad in (np.empty((2, 3)), np.empty((3, 2), np.float32), np.empty((2, 6), np.float32)[:, ::2], np.asfortranarray(out)):
+    for bad in (np.empty((2, 3), int), np.empty((2, 2)), np.empty((3, 2), np.float32), np.empty((2, 6), np.float32)[:, ::2], np.asfortranarray(out)):
         with pytest.raises(exmat.InvalidArgument, match="out: "):
             body.positions(points, bad)
     out.flags.writeable = False

@@ -51,6 +51,70 @@ def test_points_stand_where_rest_basis_and_placement_say(spinning):
     np.testing.assert_allclose(np.linalg.det(spinning.placement[:, :3]), 1, rtol=1e-12)
 
 
+# The basis of a surface is rounded to single precision, the positions are not.
+@pytest.mark.parametrize("step", [0, 100])
+def test_positions_in_double_precision_are_those_of_the_bundle(free_bundle, step):
+    body = exmat.Body(exmat.Model(free_bundle, gravity=(0, 0, -1)))
+    body.motion = exmat.Motion(position=(1, 2, 3), angular_velocity=(1, 3, 2))
+    body.step(step)
+    with exmat.Bundle(free_bundle) as file:
+        expected = placed(body, file["object/vertices"][:], file["modal/basis"][:])
+    ids = np.arange(len(expected))
+    points, out = exmat.Points(body.model, ids), np.empty((len(ids), 3))
+    assert body.positions(points, out) is out
+    np.testing.assert_allclose(out, expected, rtol=0, atol=1e-13)
+    np.testing.assert_array_equal(out.astype("f4"), body.positions(points, np.empty_like(out)).astype("f4"))
+    surface = exmat.Surface(body.model)
+    np.testing.assert_array_equal(body.positions(surface, np.empty((len(surface), 3))), out[surface.vertices])
+    with pytest.raises(exmat.InvalidArgument, match="single precision"):
+        body.positions(exmat.Points.all_vertices(body.model), out)
+    batch = exmat.Batch(body.model, 2)
+    batch.set_reduced(np.stack([body.q, 0 * body.q]), np.zeros((2, body.model.modes)))
+    both = batch.positions(points, np.empty((2, *out.shape)))
+    with exmat.Bundle(free_bundle) as file:
+        np.testing.assert_allclose(both[1], file["object/vertices"][:], rtol=0, atol=1e-13)
+
+
+# Central differences of step h err by h^2 and by rounding over h: 1e-6 of the largest entry is well above both.
+def test_force_and_tangent_are_derivatives_of_the_energy(model):
+    q = 0.3 * model.example_pose("twist")
+    h = 1e-5 * np.linalg.norm(q)
+    energy, force, tangent = model.elasticity(q)
+    sides = [[model.elasticity(q + side * h * axis) for side in (1, -1)] for axis in np.eye(model.modes)]
+    np.testing.assert_allclose([(a[0] - b[0]) / (2 * h) for a, b in sides], force, rtol=0, atol=1e-6 * abs(force).max())
+    np.testing.assert_allclose([(a[1] - b[1]) / (2 * h) for a, b in sides], tangent, rtol=0, atol=1e-6 * abs(tangent).max())
+    np.testing.assert_array_equal(tangent, tangent.T)
+    still = exmat.Body(model)
+    still.set_reduced(q, 0 * q)
+    assert still.energies.elastic == pytest.approx(energy, rel=1e-12)
+    for wrong in (q[1:], q * np.nan):
+        with pytest.raises(exmat.InvalidArgument):
+            model.elasticity(wrong)
+
+
+def test_matrices_are_those_that_the_bundle_was_made_of(model, bundle, monkeypatch):
+    linalg = pytest.importorskip("scipy.sparse.linalg")
+    with exmat.Bundle(bundle) as file:
+        vertices, density, basis = file["object/vertices"][:], file["object/density"][:], file["modal/basis"][:].reshape(-1, model.modes)
+        frequencies, free = file["modal/frequencies"][:], np.repeat(file["object/fixed"][:] == 0, 3)
+    mass, stiffness = model.mass_matrix(), model.stiffness_matrix()
+    assert mass.shape == stiffness.shape == (basis.shape[0],) * 2
+    for matrix in (mass, stiffness):
+        assert abs(matrix - matrix.T).max() <= 1e-15 * abs(matrix).max() and matrix.has_sorted_indices
+    np.testing.assert_allclose(basis.T @ (mass @ basis), np.eye(model.modes), rtol=0, atol=1e-9)
+    volume = (vertices.max(0) - vertices.min(0)).prod()
+    along = np.tile([1.0, 0, 0], len(vertices))
+    assert along @ (mass @ along) == pytest.approx(density[0] * volume, rel=1e-12)
+    assert abs(stiffness @ along).max() <= 1e-9 * abs(stiffness).max()
+    squares = linalg.eigsh(stiffness[free][:, free].tocsc(), 3, mass[free][:, free].tocsc(), sigma=0, return_eigenvectors=False)
+    np.testing.assert_allclose(np.sqrt(np.sort(squares)) / (2 * np.pi), frequencies[:3], rtol=1e-8)
+    monkeypatch.setitem(__import__("sys").modules, "scipy.sparse", None)
+    data, indices, indptr = model.mass_matrix()
+    np.testing.assert_array_equal(data, mass.data)
+    np.testing.assert_array_equal(indices, mass.indices)
+    np.testing.assert_array_equal(indptr, mass.indptr)
+
+
 def test_points_on_triangles_lie_between_their_corners(spinning):
     surface = exmat.Surface(spinning.model)
     triangles, shares = [0, 7, 7], [[1 / 3, 1 / 3, 1 / 3], [0.2, 0.3, 0.5], [1, 0, 0]]
