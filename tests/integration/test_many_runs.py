@@ -17,7 +17,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 PROGRAM = Path(sys.argv.pop(1)).resolve() / "exmat-precompute"
-RUNS = int(sys.argv.pop(1)) if len(sys.argv) > 1 else 120
+RUNS = int(sys.argv.pop(1)) if len(sys.argv) > 1 else 64
 AT_ONCE = 16
 KILLED = 20
 SHARED_MEMORY = Path("/dev/shm")

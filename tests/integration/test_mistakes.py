@@ -19,7 +19,7 @@ import numpy as np
 PROGRAM = Path(sys.argv[1]).resolve() / "exmat-precompute"
 ALL = "--all" in sys.argv
 PAGE = Path(sys.argv[sys.argv.index("--page") + 1]) if "--page" in sys.argv else None
-SHARE = 12  # one of so many is tried by default
+SHARE = 18  # one of so many is tried by default
 BEGIN, END = "<!-- mistakes: begin -->", "<!-- mistakes: end -->"
 RIGHT, WARNED, REFUSED = "right", "warned", "refused"
 MESH_TURN = 2.0

