@@ -28,7 +28,7 @@ struct RegionSummary {
   EnergyReference energy_reference = EnergyReference::kExample;  ///< of its targets, where they are there
 };
 
-/// What a bundle says of itself: read from its attributes and table of contents alone.
+/// Summary of a bundle, read from its attributes and table of contents alone.
 struct BundleSummary {
   std::string asset_name, generator, input_sha256;
   std::vector<std::string> groups;  ///< present, in bundle order
@@ -45,12 +45,12 @@ struct BundleSummary {
 };
 BundleSummary summarise_bundle(const std::filesystem::path& path);
 
-/// What of these needs the bundle serves: internal_force `auto` becomes its choice, targets are not needed where it has
-/// none of that energy_reference, and the space of targets where it has none or the targets serve. Of the regions
-/// likewise; all of them where the needs name none.
+/// The part of these needs that the bundle serves: internal_force `auto` becomes its choice, targets are not needed
+/// where it has none of that energy_reference, and the space of targets where it has none or the targets serve. Of the
+/// regions likewise; all of them where the needs name none.
 Needs fit_needs(Needs needs, const BundleSummary& summary);
 
-/// What was read from a bundle: dataset path and bytes, in order.
+/// Record of a dataset that was read: path and bytes.
 struct ReadRecord {
   std::string dataset;
   std::size_t bytes = 0;

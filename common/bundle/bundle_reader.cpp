@@ -20,7 +20,7 @@ const AttributeSchema& find_attribute(const std::vector<AttributeSchema>& attrib
   return *found;
 }
 
-// What of an asset brings a group.
+// Member of an asset that brings a group.
 std::string asset_member(std::string_view group) {
   if (group == "polynomial") return "\"polynomial\" as internal_force";
   if (group == "render") return "object.render_mesh";

@@ -35,7 +35,7 @@ class BundleReader {
   std::vector<std::string> region_names() const;
 
   ReducedModel read(const BundleRequest& request);
-  /// Of the root.
+  /// Attribute of the root group.
   std::string text_attribute(const std::string& name) const;
   /// Reads an attribute of another group.
   template <typename T>

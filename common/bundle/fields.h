@@ -300,8 +300,8 @@ inline constexpr std::string_view kExampleDatasets[] = {"gram", "h0", "hq"};
 /// there is none.
 void add_group(ReducedModel& model, std::string_view group);
 
-/// How the list above and a schema differ, one message each; empty where each schema entry is bound to a member of its
-/// type.
+/// Differences between the list above and a schema, one message each; empty where each schema entry is bound to a
+/// member of its type.
 std::vector<std::string> binding_faults(const FileSchema& schema);
 
 /// A member as its dataset's memory: rows x cols, row-major.

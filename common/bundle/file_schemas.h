@@ -10,7 +10,7 @@ namespace exmat {
 const FileSchema& bundle_schema();
 const FileSchema& trajectory_schema();
 
-// What stands in their paths for the name of an example, a region or a body; see fill_name().
+// Placeholders in their paths for the name of an example, a region or a body; see fill_name().
 inline constexpr std::string_view kExamplePlaceholder = "{example}";
 inline constexpr std::string_view kRegionPlaceholder = "{region}";
 inline constexpr std::string_view kBodyPlaceholder = "{body}";

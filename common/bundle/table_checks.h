@@ -8,12 +8,12 @@
 
 namespace exmat {
 
-// What the schema cannot say of a table of targets.
+// Checks of a table of targets beyond the schema.
 
-/// Whether the rows are all vectors of integers >= 0 that add up to `degree`, lexicographic, descending.
+/// Fault unless the rows are all vectors of integers >= 0 that add up to `degree`, lexicographic, descending.
 std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMatrix& rows);
 
-/// Whether they begin at 0 and end at 1, with others between for two examples only.
+/// Fault unless they begin at 0 and end at 1, with others between for two examples only.
 std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index examples);
 
 }  // namespace exmat

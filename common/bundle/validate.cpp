@@ -84,7 +84,7 @@ class Validator {
       note("/@features", "\"" + body + "\"", "a list without it");
   }
 
-  // What the schema does not know; unknown groups are named once, not entered.
+  // Reports what the schema does not know; unknown groups are named once, not entered.
   void check_extras(const std::string& group) {
     for (const std::string& name : reader_.file().list(group)) {
       const std::string path = group == "/" ? "/" + name : group + "/" + name;

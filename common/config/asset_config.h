@@ -32,11 +32,11 @@ struct FileSelection {
 struct IdSelection {
   std::vector<std::int64_t> ids;
 };
-/// What is nearest to a part of the object's surface, by its name in the file.
+/// Vertices nearest to a part of the object's surface, by its name in the file.
 struct PartSelection {
   std::string name;
 };
-/// What is nearest to a part of the object's surface that has a colour.
+/// Vertices nearest to a part of the object's surface that has a colour.
 struct ColourSelection {
   std::array<double, 3> colour{};  ///< red, green, blue, 0 to 1
   double within = 0.1;             ///< largest difference of each
@@ -81,7 +81,7 @@ struct ExampleConfig {
   std::optional<std::string> morph{};   ///< of `surface`, else of the object's
   std::optional<std::int64_t> frame{};  ///< of a point cache
 
-  /// What its messages name: the file that it is read from.
+  /// The file that its messages name: the one that it is read from.
   const std::filesystem::path& file(const std::filesystem::path& object_surface) const {
     return surface ? *surface : morph ? object_surface : mesh;
   }
@@ -126,7 +126,7 @@ struct ForceLoadConfig {
   double force = 0;  ///< on each vertex [N]
 };
 
-/// What will act on a body, where no scene says so.
+/// Loads that will act on a body, where no scene says so.
 struct LoadsConfig {
   std::vector<ForceLoadConfig> forces;
   std::optional<double> example_stiffness, example_damping, example_bias;  ///< as in a scene

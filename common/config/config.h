@@ -18,7 +18,7 @@ SceneConfig load_scene(const std::filesystem::path& file);
 /// The same of a scene of any number of bodies. load_scene() refuses those that list them.
 WorldConfig load_world(const std::filesystem::path& file);
 
-/// Of the content of an ASSET.json; `file` is for messages, and paths are relative to it. Throws as load_asset.
+/// Reads the content of an ASSET.json; `file` is for messages, and paths are relative to it. Throws as load_asset.
 AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
 
 /// Likewise of the content of a SCENE.json of one body. Throws as load_scene.
@@ -35,7 +35,7 @@ void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfi
 /// Throws InputError that names the scene's member where the bundle is not there.
 void require_bundle(const SceneConfig& scene);
 
-/// What a scene needs of its bundle.
+/// Needs of a scene from its bundle.
 Needs needs_of(const SceneConfig& scene);
 
 }  // namespace exmat

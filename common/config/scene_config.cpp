@@ -90,7 +90,7 @@ void read_gravity(const Json& json, const std::filesystem::path& file, const std
   scene.gravity = read_strongest(json["gravity"], scene.gravity_keys);
 }
 
-/// Of the members of a scene of one body, those of `own` from `place` of the file.
+/// Scene of one body from the shared members and those of `own`, at `place` of the file.
 SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem::path& file, const std::string& place) {
   SceneConfig scene;
   scene.file = file;

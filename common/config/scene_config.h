@@ -33,7 +33,7 @@ struct KeysConfig {
   bool empty() const { return times.empty(); }
 };
 
-/// Of an example force.
+/// Keys of an example force.
 struct ExampleKeysConfig {
   KeysConfig stiffness, damping, bias, weights;
 
@@ -116,7 +116,7 @@ struct HeightFieldConfig {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
 };
 
-/// What the body may touch; all per area of its surface.
+/// Obstacle that bodies may touch; all per area of their surface.
 struct ObstacleConfig {
   std::variant<PlaneConfig, SphereConfig, BoxConfig, CapsuleConfig, MeshConfig, HeightFieldConfig> shape;
   double stiffness = 1e6;              ///< pressure per depth [N/m^3]
@@ -132,7 +132,7 @@ struct PoseConfig {
   double weight = 1;
 };
 
-/// Where a body starts, and what carries it. Position to velocities are a free body's, motion a constrained one's.
+/// Start of a body, and what carries it. Position to velocities are a free body's, motion a constrained one's.
 struct BodyConfig {
   std::optional<Eigen::Vector3d> position;        ///< displacement of the centre of mass from rest [m]
   std::optional<Eigen::Quaterniond> orientation;  ///< about the centre of mass, unit
@@ -173,10 +173,10 @@ struct SceneConfig {
   bool render = false;  ///< the trajectory holds the render mesh
 };
 
-/// Where a scene has keys of a setting: its JSON pointer; empty where it has none.
+/// JSON pointer of the first setting with keys; empty where there is none.
 std::string place_of_keys(const SceneConfig& scene);
 
-/// How bodies touch each other; all per area of their surfaces.
+/// Law of contact between bodies; all per area of their surfaces.
 struct BodyContactConfig {
   double stiffness = 1e6;  ///< pressure per depth [N/m^3]
   double damping = 0;      ///< pressure per approach velocity [N s/m^3]
@@ -185,7 +185,7 @@ struct BodyContactConfig {
   double release = 1;      ///< how fast what overlaps at the start is let out, obstacles included [m/s]
 };
 
-/// Where a body stands beyond what its BodyConfig says.
+/// Place of a body beyond what its BodyConfig says.
 struct BodyPlace {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< [m]
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit

@@ -65,7 +65,7 @@ std::string own_suffix() {
   return own_prefix() + std::to_string(::getpid()) + '-' + hexadecimal(random) + std::string(kExtension);
 }
 
-// Whether a name is that of a temporary file, beginning with `prefix`, of a process that is no more.
+// True if a name is that of a temporary file, beginning with `prefix`, of a process that is no more.
 bool is_left_behind(std::string_view name, std::string_view prefix) {
   if (!name.starts_with(prefix) || !name.ends_with(kExtension)) return false;
   name.remove_prefix(prefix.size());
@@ -79,7 +79,7 @@ std::filesystem::path folder_of(const std::filesystem::path& target) {
   return target.has_parent_path() ? target.parent_path() : std::filesystem::path(".");
 }
 
-// What cannot be listed or removed stays: it is in nobody's way.
+// A file that cannot be listed or removed stays: it is in nobody's way.
 void remove_left_behind(const std::filesystem::path& target) {
   const std::string prefix = target.filename().string() + own_prefix();
   std::error_code error;

@@ -4,7 +4,7 @@
 
 namespace exmat {
 
-/// Of the project, as in CMakeLists.txt: "0.1.0".
+/// Version of the project, as in CMakeLists.txt: "0.1.0".
 std::string_view version();
 
 }  // namespace exmat

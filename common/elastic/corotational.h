@@ -12,7 +12,7 @@ namespace exmat {
 /// Corotational linear elasticity: Psi = mu |F - R|^2 + lambda/2 (tr S - 3)^2, F = R S with R the nearest rotation,
 /// also where F is inverted; there S has one negative eigenvalue.
 ///
-/// Where two eigenvalues of S add up to zero R is not unique and the energy has a kink.
+/// If two eigenvalues of S add up to zero, R is not unique and the energy has a kink.
 struct Corotational {
   /// Bounds 1 / (s_i + s_j), so that the tangent is finite at the kink.
   static constexpr double kLeastGap = 1e-6;
@@ -33,7 +33,7 @@ struct Corotational {
     return tangent_of(principal_tangent(svd.stretches, lame), svd);
   }
 
-  /// Of the second-order terms of P: -mu (W W - W e - e W) + lambda (W:W / 2 I + tr e W), e and W the symmetric and the
+  /// Second-order terms of P: -mu (W W - W e - e W) + lambda (W:W / 2 I + tr e W), e and W the symmetric and the
   /// skew part of H.
   static Eigen::Matrix3d rest_second_derivative(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B,
                                                 const LameParameters& lame) {

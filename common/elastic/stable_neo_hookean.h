@@ -55,7 +55,7 @@ struct StableNeoHookean {
     return D;
   }
 
-  /// Of the second-order terms of P: -3/4 mu' cof H + mu'/16 (H:H - t^2) I + mu'/8 t H + lambda' m I
+  /// Second-order terms of P: -3/4 mu' cof H + mu'/16 (H:H - t^2) I + mu'/8 t H + lambda' m I
   /// + lambda' t (t I - H^T), t = tr H, m = (t^2 - tr H^2) / 2.
   static Eigen::Matrix3d rest_second_derivative(const Eigen::Matrix3d& A, const Eigen::Matrix3d& B,
                                                 const LameParameters& lame) {

@@ -12,7 +12,7 @@
 
 namespace exmat::hdf5_access {
 
-// What the parts of hdf5_file.h have in common; of this folder alone.
+// Shared by the sources of hdf5_file.h; private to this folder.
 
 /// Deflate expands at most 1032 times.
 inline constexpr std::size_t kMaxExpansion = 1100;

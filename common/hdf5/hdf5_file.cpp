@@ -62,7 +62,7 @@ struct Superblock {
            std::equal(kSignature.begin(), kSignature.begin() + static_cast<std::ptrdiff_t>(known), bytes.begin());
   }
 
-  // Where the file should end; nothing for layouts that HDF5 has to judge itself.
+  // Expected end of the file; nothing for layouts that HDF5 has to judge itself.
   std::optional<std::uint64_t> end_of_file() const {
     const unsigned version = bytes[8];
     if (version <= 1 && bytes[13] == 8) return little_endian(version == 0 ? 40 : 44);
@@ -110,7 +110,7 @@ std::string name_by_index(hid_t group, hsize_t index) {
   H5Lget_name_by_idx(group, ".", H5_INDEX_NAME, H5_ITER_INC, index, name.data(), name.size() + 1, H5P_DEFAULT);
   return name;
 }
-// Whether every part of the path is there as a hard link: a bundle refers to no other file. What cannot be read is said
+// True if every part of the path is there as a hard link: a bundle refers to no other file. What cannot be read is said
 // at once: HDF5 1.10 keeps an object header of which it could read the first part only, and whoever asks again finds
 // less in it, without an error.
 bool has_link(hid_t file, const std::string& name, const std::string& path) {

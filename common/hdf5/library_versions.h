@@ -4,7 +4,7 @@
 
 namespace exmat {
 
-/// Of what both programs are built on: "HDF5 1.10.8, Eigen 3.4.0".
+/// Versions of the libraries of both programs: "HDF5 1.10.8, Eigen 3.4.0".
 std::string library_versions();
 
 }  // namespace exmat

@@ -107,7 +107,7 @@ std::vector<Extent> parse_dims(const std::string& text) {
   return dims;
 }
 
-// What attributes and datasets have in common.
+// Members that attributes and datasets have in common.
 template <typename Entry>
 void parse_value(const Json& json, Entry& entry) {
   entry.type = parse_type(json.at("type"));

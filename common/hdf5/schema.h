@@ -120,7 +120,7 @@ FileSchema parse_file_schema(std::string_view json);
 /// "/examples/{example}/reduced" with the placeholder's name filled in; other paths stay.
 std::string fill_name(std::string_view schema_path, std::string_view placeholder, std::string_view name);
 
-/// Whether a path of the schema stands for one in the file, and no more.
+/// True if a path of the schema stands for one in the file, and no more.
 bool is_single(std::string_view schema_path);
 
 /// Values of symbols such as n and r, each with what gave it its value, for messages. With r come R = r (r + 1) / 2 and

@@ -13,7 +13,7 @@ namespace {
 
 using Kind = Constraint::Kind;
 
-// Of the largest entry; products such as E^T E are symmetric to rounding only.
+// Tolerance relative to the largest entry: products such as E^T E are symmetric to rounding only.
 constexpr double kSymmetryTolerance = 1e-9;
 
 // "[12][0][2]" of a flat index.

@@ -9,7 +9,7 @@
 
 namespace exmat {
 
-/// What a value should be and what it is, as in Complaint.
+/// Expected and found value, as in Complaint.
 struct ValueFault {
   std::string expected;
   std::string found;

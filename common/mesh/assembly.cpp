@@ -29,7 +29,7 @@ SparseMatrix vertex_pattern(Eigen::Index vertices, const IndexLists& lists) {
                                         zeros.data());
 }
 
-// Where (row, column) is among the stored entries.
+// Position of (row, column) among the stored entries.
 Eigen::Index position(const SparseMatrix& matrix, Eigen::Index row, int column) {
   const int* columns = matrix.innerIndexPtr();
   return std::lower_bound(columns + matrix.outerIndexPtr()[row], columns + matrix.outerIndexPtr()[row + 1], column) -

@@ -14,7 +14,7 @@ struct MeshCheckOptions {
   bool drop_smaller_components = false;  ///< keeps the component of the largest volume
 };
 
-/// What check_mesh changed.
+/// Changes that check_mesh made.
 struct MeshReport {
   Eigen::Index reoriented_tets = 0;
   Eigen::Index dropped_degenerate_tets = 0;

@@ -8,8 +8,8 @@
 
 namespace exmat {
 
-/// What keeps a surface from being the boundary of a solid: an edge of such a boundary belongs to two triangles, which
-/// run along it in opposite directions.
+/// Faults that keep a surface from being the boundary of a solid: an edge of such a boundary belongs to two triangles,
+/// which run along it in opposite directions.
 struct SurfaceFaults {
   std::int64_t open = 0;                      ///< edges of one triangle
   std::int64_t turned = 0;                    ///< edges that both triangles run along the same way
@@ -25,7 +25,7 @@ SurfaceFaults surface_faults(const TriangleArray& triangles);
 /// Vertices at one place become the first of them there; triangles that lose a corner by it are left out.
 void weld(const VertexArray& vertices, TriangleArray& triangles);
 
-/// Of what closed triangles that look outward enclose; negative where they look inward [m^3].
+/// Volume inside closed triangles that face outward; negative where they face inward [m^3].
 double enclosed_volume(const VertexArray& vertices, const TriangleArray& triangles);
 
 }  // namespace exmat

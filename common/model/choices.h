@@ -4,13 +4,13 @@
 
 namespace exmat {
 
-// What assets and scenes choose between, by the names in their files and in bundles (schemas/).
+// Choices of assets and scenes, by the names in their files and in bundles (schemas/).
 
 enum class Integrator { kBdf2, kBackwardEuler, kNewmark };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<Integrator>{"bdf2", "backward_euler", "newmark"};
 
-/// Of bodies side by side: mixed has stiffness in single precision.
+/// Precision of bodies side by side: mixed has stiffness in single precision.
 enum class Precision { kDouble, kMixed };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Precision>{"double", "mixed"};
@@ -21,23 +21,23 @@ enum class Space { kReduced, kFull, kAuto };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<Space>{"reduced", "full", "auto"};
 
-/// How the internal force is computed; `auto` as the bundle says, or by measurement where the bundle is made.
+/// Method of the internal force; `auto` as the bundle says, or by measurement where the bundle is made.
 enum class ForceMethod { kAuto, kCubature, kPolynomial };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<ForceMethod>{"auto", "cubature", "polynomial"};
 
-/// Where targets come from; `auto` is the bundle's table if it has one.
+/// Source of targets; `auto` is the bundle's table if it has one.
 enum class TargetSource { kAuto, kTable, kSolve };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<TargetSource>{"auto", "table", "solve"};
 
-/// Where the loads of the runs come from that bases learn from; `auto` is the scene, else the asset's loads, else
+/// Source of the loads in the runs that bases learn from; `auto` is the scene, else the asset's loads, else
 /// examples, gravity and pushes of all kinds where there are examples.
 enum class Training { kAuto, kNone, kScene, kLoads };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<Training>{"auto", "none", "scene", "loads"};
 
-/// What runs of training have: all degrees of freedom, or those of many modes.
+/// Unknowns of training runs: all degrees of freedom, or those of many modes.
 enum class TrainingSpace { kAuto, kFullSpace, kModes };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<TrainingSpace>{"auto", "full_space", "modes"};
@@ -50,13 +50,13 @@ enum class EnergyReference {
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<EnergyReference>{"example", "rest"};
 
-/// What an example force is the slope of: a spring to the target, or the elastic energy with the target as the
+/// Potential of an example force: a spring to the target, or the elastic energy with the target as the
 /// undeformed shape. docs/method.md, "Force".
 enum class ExampleForceLaw { kLinear, kElastic };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<ExampleForceLaw>{"linear", "elastic"};
 
-/// What a setting is between its keys: the value of the last one, or on the line to the next.
+/// Interpolation of a setting between its keys: the value of the last one, or linear.
 enum class Interpolation { kLinear, kStep };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Interpolation>{"linear", "step"};
@@ -66,17 +66,17 @@ enum class Weighting { kEigenvalue, kNone };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Weighting>{"eigenvalue", "none"};
 
-/// How poses are carried to the object. docs/alignment.md.
+/// Method that carries poses to the object. docs/alignment.md.
 enum class AlignmentMethod { kAuto, kCoupled, kLandmarks, kMap };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<AlignmentMethod>{"auto", "coupled", "landmarks", "map"};
 
-/// Whether the examples stand in the object's frame; `auto` if the rest example does.
+/// Frame of the examples: the object's (shared), any (free), or (auto) shared if the rest example stands in it.
 enum class AlignmentFrame { kAuto, kShared, kFree };
 template <>
 inline constexpr std::array<std::string_view, 3> kNames<AlignmentFrame>{"auto", "shared", "free"};
 
-/// How cubature elements and their weights are chosen.
+/// Method that chooses cubature elements and their weights.
 enum class CubatureMethod { kGreedySwap, kGreedy, kNnHtp, kAllElements };
 template <>
 inline constexpr std::array<std::string_view, 4> kNames<CubatureMethod>{"greedy_swap", "greedy", "nn_htp",

@@ -13,7 +13,7 @@ namespace exmat {
 /// Most examples, the rest pose among them, that a table of targets is made for; it takes two.
 inline constexpr std::int64_t kMostTableExamples = 4;
 
-/// What a scene asks of one region.
+/// Needs of a scene from one region.
 struct RegionNeeds {
   std::string name;
   bool targets = true;  ///< its table of targets
@@ -22,7 +22,7 @@ struct RegionNeeds {
   bool target_elasticity = false;  ///< what an elastic example force takes
 };
 
-/// What a scene (or an asset's `needs`) asks of a bundle beyond the object, its modes and its cubature.
+/// Needs of a scene (or an asset's `needs`) from a bundle beyond the object, its modes and its cubature.
 struct Needs {
   bool examples = true;                               ///< /shape_space, /examples, /projection
   bool rigid = true;                                  ///< /rigid, of a free body

@@ -88,7 +88,7 @@ std::size_t index_of(const std::array<std::string_view, 3>& names, std::string_v
   return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
 }
 
-// Whether it has a property that is one number.
+// True if it has a property that is one number.
 bool has(const Element& element, std::string_view name) {
   return std::ranges::any_of(element.properties, [&](const Property& p) { return p.name == name && !p.count; });
 }
@@ -184,7 +184,7 @@ void PlyReader::check_properties(const Element& element) const {
     cursor_.fail("a list of integers 'vertex_indices' of the faces", "none");
 }
 
-// Of each property at least a number, or the count of a list.
+// Each property has at least one number, or the count of a list.
 void PlyReader::check_count(const Element& element) const {
   std::size_t bytes = 0;
   for (const Property& property : element.properties)
@@ -234,7 +234,7 @@ void PlyReader::read_list(const Element& element, const Property& property) {
   std::vector<std::int32_t> polygon;
   for (std::int64_t k = 0; k < count; ++k) {
     const std::int64_t index = cursor_.read_integer_of(property.type, "a vertex of a face");
-    // Where the vertices come last, check_faces knows how many there are.
+    // If the vertices come last, check_faces knows how many there are.
     const std::int64_t end = vertices_.empty() ? 2147483647 : std::ssize(vertices_);
     if (index < 0 || index >= end)
       cursor_.fail(fmt::format("a vertex from 0 to {}", end - 1), fmt::format("{}", index));

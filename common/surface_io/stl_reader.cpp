@@ -37,7 +37,7 @@ std::string lower(std::string_view text) {
 
 bool is_text(std::string_view bytes) {
   if (lower(bytes.substr(0, 5)) != "solid") return false;
-  // What a text has nowhere, a binary file has in its header or its count.
+  // A zero byte: no text has one, a binary file has some in its header or its count.
   return bytes.substr(0, kHeaderBytes + kCountBytes).find('\0') == std::string_view::npos;
 }
 

@@ -17,7 +17,7 @@ struct NumberType {
 /// stay in. Every fault is an InputError whose place is a line of a text file or a byte of a binary one.
 class ValueCursor {
  public:
-  /// Where the next value of a text may stand: on the same line, or on any after it.
+  /// Place of the next value of a text: on the same line, or on any after it.
   enum class Layout { kLine, kAnywhere };
 
   /// `bytes` must outlive the cursor. `comment` begins one that ends with its line; none where it is zero.
@@ -55,7 +55,7 @@ class ValueCursor {
   /// A whole line of text, without the blanks around it.
   std::string_view read_text_line(std::string_view what);
 
-  /// Whether nothing but blanks is left.
+  /// True if nothing but blanks is left.
   bool at_end() const;
   /// To the next line that is not blank.
   void skip_blank_lines();

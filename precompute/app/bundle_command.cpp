@@ -96,7 +96,7 @@ std::optional<Needs> scene_needs(const BundleOptions& options, const std::option
   return needs;
 }
 
-// Whether the bundle is there and was computed from these inputs, by this version.
+// True if the bundle is there and was computed from these inputs, by this version.
 bool is_up_to_date(const BundleOptions& options, const AssetConfig& asset, const Needs& needs,
                    const precompute::BuildOptions& build, BuildReport& report) {
   if (!std::filesystem::exists(options.bundle)) return false;

@@ -19,7 +19,7 @@ class FullSpaceStep {
   FullSpaceStep(const FullSpaceStep&) = delete;
   FullSpaceStep& operator=(const FullSpaceStep&) = delete;
 
-  /// Whether the potential can be minimised: all numbers are finite. Near obstacles and others it is that of backward
+  /// True if the potential can be minimised: all numbers are finite. Near obstacles and others it is that of backward
   /// Euler.
   bool begin(bool touches_others);
 

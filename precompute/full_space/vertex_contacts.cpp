@@ -14,7 +14,7 @@ Eigen::Vector3d VertexContacts::point(int vertex, const Eigen::VectorXd& u) cons
   return rest_.row(vertex).transpose() + u.segment<3>(dofs_[static_cast<std::size_t>(vertex)]);
 }
 
-/// Whether an obstacle goes through the body in the step rather than up to it.
+/// True if an obstacle goes through the body in the step rather than up to it.
 bool VertexContacts::sweeps(const runtime::PlacedObstacle& placed, const Eigen::VectorXd& u) const {
   const double limit = runtime::kSweep * runtime::shortest_passage(placed.obstacle->shape);
   for (int vertex = 0; vertex < vertices(); ++vertex)

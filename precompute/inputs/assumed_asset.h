@@ -8,7 +8,7 @@
 
 namespace exmat::precompute {
 
-/// Whether the extension is that of a file of surfaces.
+/// True if the extension is that of a file of surfaces.
 bool is_surface_file(const std::filesystem::path& file);
 
 /// The content of the ASSET.json that a surface alone stands for, with every member that matters written out: its morph

@@ -30,7 +30,7 @@ class GltfAccessors {
   std::vector<std::uint32_t> read_indices(int accessor, std::size_t end) const;
   /// True if it has no numbers of its own.
   bool is_zeros(int accessor) const { return at(accessor).bufferView < 0 && !at(accessor).sparse.isSparse; }
-  /// Whether it has one number a row.
+  /// True if it has one number a row.
   bool is_scalar(int accessor) const { return at(accessor).type == TINYGLTF_TYPE_SCALAR; }
 
  private:

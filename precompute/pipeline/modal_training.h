@@ -5,7 +5,7 @@
 
 namespace exmat::precompute {
 
-/// Whether runs of training are to have the degrees of freedom of many modes: one step in full space would take
+/// True if runs of training are to have the degrees of freedom of many modes: one step in full space would take
 /// seconds where there are more than 50,000 of them.
 bool trains_in_modes(TrainingSpace space, const ElasticSystem& system);
 

@@ -28,7 +28,7 @@ void fix_signs(Eigen::MatrixXd& columns);
 /// pairs by as much.
 constexpr double kClusterGap = 0.02;
 
-/// Whether a cut behind the first `count` of the values splits a cluster; `values` holds at least one more.
+/// True if a cut behind the first `count` of the values splits a cluster; `values` holds at least one more.
 bool splits_cluster(const Eigen::VectorXd& values, Eigen::Index count);
 
 /// The next larger count whose cut splits no cluster, or the number of values where there is none.

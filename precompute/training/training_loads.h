@@ -34,7 +34,7 @@ struct TrainingLoads {
   std::optional<double> mass_damping, stiffness_damping;  ///< alpha [1/s], beta [s], where they are known
   double duration = 0;  ///< [s] for which one run has these very loads, forces from their start to their end; 0: none
 
-  /// Whether any of it deforms a body: gravity does not where it is free.
+  /// True if any of it deforms a body: gravity does not where it is free.
   bool deforms(bool free) const;
 };
 

@@ -83,16 +83,16 @@ class Run {
   double surface_density() const {  // mass over the area that it lies on [kg/m^2]
     return test_.body.density * body_.reduced.object->mesh.vertices.col(2).maxCoeff();
   }
-  /// Whether the body ends up in a rotation about another axis than a principal one, which bends it for ever.
+  /// True if the body ends up in a rotation about another axis than a principal one, which bends it for ever.
   bool tumbles() const {
     return test_.body.free && ((test_.spin > 0 && !test_.principal_axis) || !scene_.forces.empty() || rocks());
   }
-  /// Whether it rocks or rolls for long: on round ground, or as it is bent itself.
+  /// True if it rocks or rolls for long: on round ground, or as it is bent itself.
   bool rocks() const {
     return test_.ground == Ground::kSphere || test_.ground == Ground::kCapsule ||
            (test_.ground != Ground::kNone && !scene_.examples.empty());
   }
-  /// Whether the run stays in the range where displacements are below so many L in linear elasticity.
+  /// True if the run stays in the range where displacements are below so many L in linear elasticity.
   bool small(double sizes) const;
   bool conservative() const;
   void judge_all();
@@ -321,7 +321,7 @@ bool Run::small(double sizes) const {
          !(test_.spin > 0);
 }
 
-// Whether the energy that energies() adds up may not grow but by the work of the tip's load: obstacles that stand
+// True if the energy that energies() adds up may not grow but by the work of the tip's load: obstacles that stand
 // still store some of it.
 bool Run::conservative() const {
   return scene_.examples.empty() && test_.ground != Ground::kPress && !(test_.body.free && !scene_.forces.empty());

@@ -353,7 +353,7 @@ void add_product(Cases& cases) {
           add_let_go({.youngs_modulus = E, .poisson_ratio = nu, .density = density}, time_step, cases);
 }
 
-/// Whether lanes take it: one body by elements that touches nothing, whose examples pull linearly.
+/// True if lanes take it: one body by elements that touches nothing, whose examples pull linearly.
 bool goes_in_lanes(const StabilityCase& test) {
   return test.ground == Ground::kNone && test.company == Company::kNone && !test.body.polynomial && !test.body.elastic;
 }

@@ -63,7 +63,7 @@ struct StudyResult {
   const char* headline() const { return free_body ? "shape" : "position"; }
   /// Null where it is not among the references.
   const ReferenceResult* reference_of(const PointResult& point) const;
-  /// Whether the full space that a point is measured against is free of inverted tets.
+  /// True if the full space that a point is measured against is free of inverted tets.
   bool has_truth(const PointResult& point) const;
   /// One sentence of what is wrong with the references and what to do; empty where nothing is.
   std::string truth_warning() const;

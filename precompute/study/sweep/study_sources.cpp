@@ -331,7 +331,7 @@ ErrorSplit Split::measure() {
   return split;
 }
 
-// Whether any example force of the point is elastic.
+// True if any example force of the point is elastic.
 bool has_elastic_force(const SceneConfig& scene) {
   const Needs needs = needs_of(scene);
   return needs.target_elasticity ||

@@ -59,7 +59,7 @@ nlohmann::ordered_json to_json(const WorldStudyResult& result);
 /// One header line, then for each point a line of all bodies and one of each.
 std::string world_results_csv(const WorldStudyResult& result);
 
-/// Whether a study's scene is one of several bodies.
+/// True if a study's scene is one of several bodies.
 bool is_of_bodies(const StudyConfig& config);
 
 /// A study of a scene of several bodies: bundles each of its kinds with the settings of each point, and measures their

@@ -16,7 +16,7 @@ extern "C" {
 
 /* ---- what to draw ---------------------------------------------------------------------------------------------- */
 
-/* What a bundle holds, before a model is made of it. */
+/* Contents of a bundle, before a model is made of it. */
 typedef struct exmat_bundle_info {
   size_t size;                       /* sizeof(exmat_bundle_info), set by the caller */
   int64_t modes, vertices, elements; /* r, n, cubature elements */
@@ -35,7 +35,7 @@ EXMAT_API exmat_status exmat_bundle_read_region_name(const char* bundle_path, in
    placement before each frame; what draws may do the sum itself, on a GPU. */
 typedef struct exmat_surface exmat_surface;
 
-/* Of the tets' boundary, of the render mesh, or of this where the bundle has one and else of that. */
+/* Creates the surface of the tets' boundary, of the render mesh, or (auto) of the render mesh if the bundle has one. */
 enum { EXMAT_SURFACE_AUTO = 0, EXMAT_SURFACE_OBJECT = 1, EXMAT_SURFACE_RENDER = 2 };
 EXMAT_API exmat_status exmat_surface_create(const exmat_model* model, int32_t kind,
                                             exmat_surface** surface) EXMAT_NOEXCEPT;
@@ -89,7 +89,7 @@ EXMAT_API exmat_status exmat_body_read_placement(const exmat_body* body, double*
 EXMAT_API exmat_status exmat_body_read_energy_density(const exmat_body* body, exmat_surface* surface, float* density,
                                                       int64_t count) EXMAT_NOEXCEPT;
 
-/* Of the whole body (region -1) or of a region: name of an example, NULL where there is none such; its pose as reduced
+/* Name of an example of the whole body (region -1) or of a region, NULL where there is none such; its pose as reduced
    coordinates `q` [modes = r]. */
 EXMAT_API const char* exmat_model_example_name(const exmat_model* model, int64_t region,
                                                int64_t example) EXMAT_NOEXCEPT;
@@ -100,7 +100,7 @@ EXMAT_API exmat_status exmat_model_read_example_pose(const exmat_model* model, i
 EXMAT_API exmat_status exmat_body_read_target(const exmat_body* body, int64_t region, double* q,
                                               int64_t modes) EXMAT_NOEXCEPT;
 
-/* Where the time of the last call that stepped the world went, of one that is profiled; sums over its steps [s]. The
+/* Times of the stages of the last call that stepped a profiled world, summed over its steps [s]. The
    first five are the stages of bodies that touch no other, as the threads' clocks add up; the rest are those of the
    world, on the wall clock. */
 typedef struct exmat_profile {
@@ -136,7 +136,7 @@ EXMAT_API exmat_status exmat_matrix_read(const exmat_matrix* matrix, int64_t* st
 
 /* ---- load capacity ---------------------------------------------------------------------------------------------- */
 
-/* How much of a force the modes of a model can answer: the share of its work that they lose, beside the same mesh with
+/* The share of a force's work that the modes of a model lose, beside the same mesh with
    all degrees of freedom, both about the rest shape, in a time of the body's slowest vibration (docs/method.md). Made
    of what the bundle holds of the object; factorises a matrix of all degrees of freedom: seconds from some ten thousand
    vertices on. Immutable: any number of threads may use it. */

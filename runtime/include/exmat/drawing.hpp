@@ -111,7 +111,7 @@ inline void BodyRef::read_energy_density(Surface& surface, std::span<float> dens
   check(exmat_body_read_energy_density(get(), surface.get(), density.data(), detail::length(density)));
 }
 
-/// What the modes of a model lose of forces. `spread` [m] as in exmat_capacity_create().
+/// The share of a force's work that the modes of a model lose. `spread` [m] as in exmat_capacity_create().
 class Capacity {
  public:
   Capacity(const Model& model, double spread) {

@@ -49,7 +49,7 @@ typedef enum exmat_status {
 /* Message of this thread's last failure, "" before the first; valid until the next one. */
 EXMAT_API const char* exmat_last_error(void) EXMAT_NOEXCEPT;
 
-/* Of the library: "0.1.0". */
+/* Version of the library: "0.1.0". */
 EXMAT_API const char* exmat_version(void) EXMAT_NOEXCEPT;
 
 /* ---- models ---------------------------------------------------------------------------------------------------- */
@@ -97,11 +97,11 @@ typedef struct exmat_settings {
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
 EXMAT_API exmat_status exmat_settings_default(exmat_settings* settings, size_t size) EXMAT_NOEXCEPT;
 
-/* Of a bundle; `settings` NULL: the defaults. Reads what these settings need, no more. */
+/* Loads a bundle, as far as the settings need it; `settings` NULL: the defaults. */
 EXMAT_API exmat_status exmat_model_create(const char* bundle_path, const exmat_settings* settings,
                                           exmat_model** model) EXMAT_NOEXCEPT;
 
-/* Of a scene file, its scripted forces included. Its steps, instances and output are not the model's business. */
+/* Loads a scene file and its bundle, scripted forces included; its steps, instances and output are ignored. */
 EXMAT_API exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) EXMAT_NOEXCEPT;
 
 /* The same of the text of a scene file; `path` names it in messages, and names in it are relative to that path's
@@ -122,7 +122,7 @@ EXMAT_API int64_t exmat_model_regions(const exmat_model* model) EXMAT_NOEXCEPT;
 EXMAT_API int64_t exmat_model_region_examples(const exmat_model* model, int64_t region) EXMAT_NOEXCEPT;
 EXMAT_API const char* exmat_model_region_name(const exmat_model* model, int64_t region) EXMAT_NOEXCEPT;
 EXMAT_API double exmat_model_time_step(const exmat_model* model) EXMAT_NOEXCEPT; /* [s] */
-/* What the bundle was made of, as 64 hexadecimal digits: equal where its arrays are. NULL where `model` is NULL. */
+/* Hash of the bundle's inputs, 64 hexadecimal digits: equal where its arrays are. NULL where `model` is NULL. */
 EXMAT_API const char* exmat_model_input_sha256(const exmat_model* model) EXMAT_NOEXCEPT;
 
 /* ---- points ---------------------------------------------------------------------------------------------------- */
@@ -187,7 +187,7 @@ enum {
   EXMAT_STEP_ASLEEP = 32               /* no fault: the body rests, see sleep_energy; its contacts are not told */
 };
 
-/* What the steps of one call did: sums, unless said otherwise. */
+/* Results of the steps of one call: sums, unless said otherwise. */
 typedef struct exmat_report {
   size_t size;     /* sizeof(exmat_report), set by the caller */
   int64_t steps;   /* taken; fewer than asked for only with EXMAT_NON_FINITE */
@@ -208,7 +208,7 @@ typedef struct exmat_report {
 /* Takes `steps` >= 0 steps of a body in a world of its own, fewer with EXMAT_NON_FINITE. `report` may be NULL. */
 EXMAT_API exmat_status exmat_body_step(exmat_body* body, int64_t steps, exmat_report* report) EXMAT_NOEXCEPT;
 
-/* Of the last call that stepped this body. */
+/* Reads the report of the last call that stepped this body. */
 EXMAT_API exmat_status exmat_body_read_report(const exmat_body* body, exmat_report* report) EXMAT_NOEXCEPT;
 
 /* Adds `forces` [coordinates = 3k] [N] on the points, constant in the world, to those that act in every step from now
@@ -219,8 +219,8 @@ EXMAT_API exmat_status exmat_body_apply_forces(exmat_body* body, const exmat_poi
                                                int64_t coordinates) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_body_clear_forces(exmat_body* body) EXMAT_NOEXCEPT;
 
-/* How a free body moves, world frame: displacement of the centre of mass from rest [m], unit quaternion (w first),
-   velocity of the centre of mass [m/s] and angular velocity [rad/s]. None is set that is above 1e30. */
+/* Motion of a free body as a whole, world frame: displacement of the centre of mass from rest [m], unit quaternion (w
+   first), velocity of the centre of mass [m/s] and angular velocity [rad/s]. None is set that is above 1e30. */
 typedef struct exmat_motion {
   size_t size; /* sizeof(exmat_motion), set by the caller */
   double position[3];
@@ -274,7 +274,7 @@ EXMAT_API const double* exmat_body_displacement(const exmat_body* body) EXMAT_NO
 EXMAT_API const double* exmat_body_velocity(const exmat_body* body) EXMAT_NOEXCEPT;
 EXMAT_API const double* exmat_body_weights(const exmat_body* body) EXMAT_NOEXCEPT;
 
-/* Of the last step. */
+/* Energies at the end of the last step. */
 typedef struct exmat_energies {
   size_t size;      /* sizeof(exmat_energies), set by the caller */
   double kinetic;   /* of the body in the world [J] */
@@ -289,9 +289,9 @@ EXMAT_API double exmat_body_time(const exmat_body* body) EXMAT_NOEXCEPT;
 
 /* ---- settings of one body -------------------------------------------------------------------------------------- */
 
-/* Of the body, instead of the model's, until set again; exmat_body_reset() keeps them. What the scene keys in time, its
-   keys set again before each step. A state does not hold them. They
-   may change between any two steps; after an abrupt change exmat_body_restart_integrator() keeps impulses exact. */
+/* Settings of this body in place of the model's, until set again; exmat_body_reset() keeps them. What the scene keys in
+   time, its keys set again before each step. A state does not hold them. They may change between any two steps; after
+   an abrupt change exmat_body_restart_integrator() keeps impulses exact. */
 
 /* `gravity` [3], world [m/s^2]. */
 EXMAT_API exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) EXMAT_NOEXCEPT;
@@ -310,8 +310,8 @@ EXMAT_API exmat_status exmat_body_set_space(exmat_body* body, int32_t space) EXM
 /* The space that the last step was in: EXMAT_SPACE_REDUCED or EXMAT_SPACE_FULL; negative where `body` is NULL. */
 EXMAT_API int32_t exmat_body_space(const exmat_body* body) EXMAT_NOEXCEPT;
 
-/* Of examples. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model has to have that
-   example force: use_examples, or the scene. */
+/* Settings of the example force. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model
+   has to have that example force: use_examples, or the scene. */
 
 /* kappa >= 0 [1/s^2]. */
 EXMAT_API exmat_status exmat_body_set_example_stiffness(exmat_body* body, int64_t region, double kappa) EXMAT_NOEXCEPT;
@@ -339,14 +339,14 @@ typedef struct exmat_contact {
   double depth;       /* of the vertex in the obstacle; negative where damping alone acts [m] */
 } exmat_contact;
 
-/* How many; negative where `body` is NULL. And `contacts` [count] in order of vertex and obstacle; `size` is
+/* Number of contacts; negative where `body` is NULL. And `contacts` [count] in order of vertex and obstacle; `size` is
    sizeof(exmat_contact). */
 EXMAT_API int64_t exmat_body_contacts(const exmat_body* body) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_body_read_contacts(const exmat_body* body, exmat_contact* contacts, int64_t count,
                                                 size_t size) EXMAT_NOEXCEPT;
 
-/* What contacts did in the last call that stepped the body, as a constant force [3] [N] and torque [3] [N m] over its
-   steps, world: on the obstacle `id`, about the origin of its frame; or, -1, on the body, about its centre of mass
+/* Load of the contacts in the last call that stepped the body, as a constant force [3] [N] and torque [3] [N m] over
+   its steps, world: on the obstacle `id`, about the origin of its frame; or, -1, on the body, about its centre of mass
    where it is free, else about the origin of the frame that it deforms in. Either may be NULL. */
 EXMAT_API exmat_status exmat_body_read_contact_load(const exmat_body* body, int64_t id, double* force,
                                                     double* torque) EXMAT_NOEXCEPT;

@@ -17,7 +17,7 @@
 
 namespace exmat {
 
-/// What a function of exmat.h returned, with its message.
+/// A status that a function of exmat.h returned, with its message.
 class Error : public std::runtime_error {
  public:
   Error(exmat_status status, const char* message) : std::runtime_error(message), status_(status) {}
@@ -92,7 +92,7 @@ class Model {
     return Model(model);
   }
 
-  /// Of the text of a scene file; `path` names it.
+  /// Loads the text of a scene file; `path` names it.
   static Model from_text(const std::string& scene, const std::string& path, bool use_contact = false) {
     exmat_model* model = nullptr;
     check(exmat_model_create_from_text(scene.c_str(), path.c_str(), use_contact ? 1 : 0, &model));
@@ -103,14 +103,14 @@ class Model {
   std::size_t vertices() const noexcept { return static_cast<std::size_t>(exmat_model_vertices(get())); }
   std::size_t examples() const noexcept { return static_cast<std::size_t>(exmat_model_examples(get())); }
   std::size_t regions() const noexcept { return static_cast<std::size_t>(exmat_model_regions(get())); }
-  /// Of region < regions().
+  /// Number of examples of region < regions().
   std::size_t region_examples(std::size_t region) const noexcept {
     return static_cast<std::size_t>(exmat_model_region_examples(get(), static_cast<std::int64_t>(region)));
   }
   std::string region_name(std::size_t region) const {
     return exmat_model_region_name(get(), static_cast<std::int64_t>(region));
   }
-  /// Of the whole body, -1, or of a region.
+  /// Name of an example of the whole body, -1, or of a region.
   std::string example_name(std::int64_t region, std::size_t example) const {
     const char* name = exmat_model_example_name(get(), region, static_cast<std::int64_t>(example));
     return name != nullptr ? name : "";
@@ -258,7 +258,7 @@ class BodyRef {
     check(exmat_body_step(get(), steps, &report));
     return report;
   }
-  /// Of the last steps, also where they threw.
+  /// Report of the last steps, also where they threw.
   exmat_report report() const {
     exmat_report report;
     report.size = sizeof report;
@@ -334,7 +334,7 @@ class BodyRef {
   }
   double time() const noexcept { return exmat_body_time(get()); }
 
-  /// Of the body; they change with it. `modes` is the model's r, `examples` its K.
+  /// Views of the body's numbers, which change with it. `modes` is the model's r, `examples` its K.
   std::span<const double> displacement(std::size_t modes) const noexcept {
     return {exmat_body_displacement(get()), modes};
   }

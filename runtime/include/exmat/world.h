@@ -15,7 +15,7 @@ extern "C" {
 
 /* ---- worlds ---------------------------------------------------------------------------------------------------- */
 
-/* How bodies touch each other, all per area of their surfaces. */
+/* Law of the contact between bodies, all per area of their surfaces. */
 typedef struct exmat_contact_law {
   size_t size;      /* sizeof(exmat_contact_law) where the caller was compiled */
   double stiffness; /* pressure per depth, > 0 [N/m^3]; 1e6 */
@@ -32,8 +32,8 @@ EXMAT_API exmat_status exmat_contact_law_default(exmat_contact_law* law, size_t 
 /* Without bodies; `law` NULL: the defaults. */
 EXMAT_API exmat_status exmat_world_create(const exmat_contact_law* law, exmat_world** world) EXMAT_NOEXCEPT;
 
-/* Of a scene file: all its bodies, where they start, and its obstacles. Ids of either are 0, 1, ... in its order. The
-   `instances` of a scene with a single "bundle" are apart. */
+/* Loads a scene file: all its bodies, where they start, and its obstacles. Ids of either are 0, 1, ... in its order.
+   The `instances` of a scene with a single "bundle" are apart. */
 EXMAT_API exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world** world) EXMAT_NOEXCEPT;
 
 /* The same of the text of a scene file; `path` names it in messages, and names in it are relative to that path's
@@ -72,7 +72,7 @@ EXMAT_API exmat_status exmat_world_add_body(exmat_world* world, exmat_body* body
 /* Takes a body out and gives it back: `body` is the caller's again, in a world of its own. */
 EXMAT_API exmat_status exmat_world_remove_body(exmat_world* world, int64_t id, exmat_body** body) EXMAT_NOEXCEPT;
 
-/* How many there are; negative where `world` is NULL. And `ids` [count] of all, in ascending order. */
+/* Number of bodies; negative where `world` is NULL. And `ids` [count] of all, in ascending order. */
 EXMAT_API int64_t exmat_world_bodies(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_body_ids(const exmat_world* world, int64_t* ids, int64_t count) EXMAT_NOEXCEPT;
 
@@ -80,7 +80,7 @@ EXMAT_API exmat_status exmat_world_read_body_ids(const exmat_world* world, int64
    several: "teddy_12"; "" of a body that was added. */
 EXMAT_API exmat_body* exmat_world_body(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
 EXMAT_API const char* exmat_world_body_name(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
-/* Of a body of a scene its place among the scene's "bodies", 0-based: those of one place have one model. Negative of a
+/* The place of a scene's body among the scene's "bodies", 0-based: those of one place have one model. Negative of a
    body that was added, and where there is none. */
 EXMAT_API int64_t exmat_world_body_kind(const exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
 
@@ -89,7 +89,7 @@ EXMAT_API int64_t exmat_world_body_kind(const exmat_world* world, int64_t id) EX
 EXMAT_API exmat_status exmat_body_set_group(exmat_body* body, uint32_t group, uint32_t mask) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_body_read_group(const exmat_body* body, uint32_t* group, uint32_t* mask) EXMAT_NOEXCEPT;
 
-/* What the steps of one call did. */
+/* Results of the steps of one call. */
 typedef struct exmat_world_report {
   size_t size;                 /* sizeof(exmat_world_report), set by the caller */
   int64_t steps;               /* taken; fewer than asked for only with EXMAT_NON_FINITE */
@@ -123,12 +123,12 @@ typedef struct exmat_body_contact {
   double depth;       /* of the vertex in the other; negative where damping alone acts [m] */
 } exmat_body_contact;
 
-/* How many; negative where `world` is NULL. And `contacts` [count]; `size` is sizeof(exmat_body_contact). */
+/* Number of contacts; negative where `world` is NULL. And `contacts` [count]; `size` is sizeof(exmat_body_contact). */
 EXMAT_API int64_t exmat_world_contacts(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_contacts(const exmat_world* world, exmat_body_contact* contacts, int64_t count,
                                                  size_t size) EXMAT_NOEXCEPT;
 
-/* Of all bodies. */
+/* Reads the energies of all bodies together. */
 EXMAT_API exmat_status exmat_world_read_energies(const exmat_world* world, exmat_energies* energies) EXMAT_NOEXCEPT;
 
 /* Hash over the bits of all bodies in the order of their ids, as exmat_bodies_hash(). */
@@ -199,17 +199,17 @@ EXMAT_API void exmat_shape_destroy(exmat_shape* shape) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_add_shape(exmat_world* world, const exmat_shape* shape,
                                              const exmat_obstacle* obstacle, int64_t* id) EXMAT_NOEXCEPT;
 
-/* What it held by friction is let go. */
+/* Removes an obstacle, and what it held by friction is let go. */
 EXMAT_API exmat_status exmat_world_remove_obstacle(exmat_world* world, int64_t id) EXMAT_NOEXCEPT;
 
-/* How many there are; negative where `world` is NULL. And `ids` [count] of all, in ascending order. */
+/* Number of obstacles; negative where `world` is NULL. And `ids` [count] of all, in ascending order. */
 EXMAT_API int64_t exmat_world_obstacles(const exmat_world* world) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_read_obstacle_ids(const exmat_world* world, int64_t* ids,
                                                      int64_t count) EXMAT_NOEXCEPT;
 
-/* Where the obstacle's frame is now and how it moves on from here, straight and about a fixed axis, until it is moved
-   again: to be called before each step, or each few, with the pose and the velocities of the host's rigid body. What
-   touches is carried along by the velocities and not by a jump of the pose. */
+/* Sets where the obstacle's frame is now and how it moves on from here, straight and about a fixed axis, until it is
+   moved again: to be called before each step, or each few, with the pose and the velocities of the host's rigid body.
+   What touches is carried along by the velocities and not by a jump of the pose. */
 EXMAT_API exmat_status exmat_world_move_obstacle(exmat_world* world, int64_t id,
                                                  const exmat_motion* motion) EXMAT_NOEXCEPT;
 
@@ -221,7 +221,7 @@ EXMAT_API exmat_status exmat_world_read_obstacle(const exmat_world* world, int64
 EXMAT_API exmat_status exmat_world_set_obstacle_law(exmat_world* world, int64_t id, double stiffness, double damping,
                                                     double friction) EXMAT_NOEXCEPT;
 
-/* What the contacts of all bodies with an obstacle did to it in the last call that stepped the world, as a constant
+/* Load of all bodies' contacts on an obstacle in the last call that stepped the world, as a constant
    force [3] [N] and torque [3] [N m] about the origin of its frame, world. Either may be NULL. */
 EXMAT_API exmat_status exmat_world_read_obstacle_load(const exmat_world* world, int64_t id, double* force,
                                                       double* torque) EXMAT_NOEXCEPT;

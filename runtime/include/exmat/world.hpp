@@ -42,7 +42,7 @@ class WorldRef {
     check(exmat_world_read_body_ids(get(), ids.data(), static_cast<std::int64_t>(ids.size())));
     return ids;
   }
-  /// Of an id of ids().
+  /// The body of an id of ids().
   BodyRef body(std::int64_t id) const noexcept { return BodyRef(exmat_world_body(get(), id)); }
   std::string name(std::int64_t id) const { return exmat_world_body_name(get(), id); }
   std::int64_t kind(std::int64_t id) const noexcept { return exmat_world_body_kind(get(), id); }
@@ -92,7 +92,7 @@ class WorldRef {
     check(exmat_world_add_obstacle(get(), &obstacle, &id));
     return id;
   }
-  /// Of that shape: its law, point and orientation are those of `obstacle`.
+  /// Adds an obstacle of that shape with the law, point and orientation of `obstacle`.
   std::int64_t add_shape(const Shape& shape, exmat_obstacle obstacle) {
     obstacle.size = sizeof obstacle;
     std::int64_t id = -1;
@@ -131,7 +131,7 @@ class WorldRef {
     check(exmat_world_read_obstacle_triangles(get(), id, corners.data(), static_cast<std::int64_t>(corners.size())));
     return corners;
   }
-  /// Of the contacts of all bodies on an obstacle; force and torque [3] each, either may be null.
+  /// Reads the load of all bodies' contacts on an obstacle; force and torque [3] each, either may be null.
   void read_obstacle_load(std::int64_t id, double* force, double* torque) const {
     check(exmat_world_read_obstacle_load(get(), id, force, torque));
   }
@@ -160,13 +160,13 @@ class World : public WorldRef {
     check(exmat_world_create(&law, &world_));
     handle_.reset(world_);
   }
-  /// Of a scene file.
+  /// Loads a scene file.
   static World from_scene(const std::string& scene) {
     exmat_world* world = nullptr;
     check(exmat_world_create_from_scene(scene.c_str(), &world));
     return World(world);
   }
-  /// Of the text of such a file, which `path` names.
+  /// Loads the text of such a file, which `path` names.
   static World from_text(const std::string& scene, const std::string& path, bool use_contact = false) {
     exmat_world* world = nullptr;
     check(exmat_world_create_from_text(scene.c_str(), path.c_str(), use_contact ? 1 : 0, &world));

@@ -104,7 +104,7 @@ struct Gathering {
     return own_place;
   }
 
-  /// What it remembers, null where it was not inside.
+  /// Memory of the vertex, null where it was not inside.
   const HeldBodyContact* held_of(int vertex) {
     while (last != held.end() && last->vertex < vertex) ++last;
     return last != held.end() && last->vertex == vertex ? &*last : nullptr;
@@ -265,7 +265,7 @@ void gather_from(Gathering& gathering, NearVertices& near, const TestAll& test_a
     if (distance - way <= radius) gathering.test(vertex);
 }
 
-/// Of the last evaluation, the vertex from y [m].
+/// Place of the candidate's vertex in the last evaluation, from y [m].
 Eigen::Vector3d place_of(const BodyPose& a, const BodyPose& b, const BodyCandidate& candidate) {
   return a.position + candidate.arm - b.position - candidate.surface_arm;
 }

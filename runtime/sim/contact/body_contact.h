@@ -10,7 +10,7 @@
 
 namespace exmat::runtime {
 
-/// What a vertex that is inside another body remembers from step to step.
+/// Memory of a vertex that is inside another body, from step to step.
 struct HeldBodyContact {
   int vertex = 0;
   double gap = 0;                                     ///< at the end of the last step [m]
@@ -60,7 +60,7 @@ struct NearVertices {
   int served = 0;            ///< steps, by the last search
   int without = 0;           ///< so many more steps look for themselves: the last search did not serve enough
   std::vector<Found> found;  ///< in ascending order
-  // Where the bodies were.
+  // Poses of the bodies in the search.
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
 
@@ -171,7 +171,7 @@ class BodyContact {
   static Eigen::Index stiffness_columns(const A& a, const B& b, const BodyCandidates& candidates,
                                         Eigen::MatrixXd& columns_a, Eigen::MatrixXd& columns_b);
 
-  /// What has to be remembered of the last evaluation.
+  /// Stores what the next step has to remember of the last evaluation.
   void commit(const BodyPose& a, const BodyPose& b, const BodyCandidates& candidates,
               std::vector<HeldBodyContact>& held) const;
 

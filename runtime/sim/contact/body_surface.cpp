@@ -26,7 +26,7 @@ constexpr double kSameWay = 0.5;     // cosine
 // (a + b)^2 <= (1 + kWayShare) a^2 + (1 + 1 / kWayShare) b^2, b the way that is left.
 constexpr double kWayShare = 0.3;
 
-/// What a search accepts of branches and triangles that it cannot exclude by a bound on the squared distance from them,
+/// Acceptance test of a search for branches and triangles that a bound on the squared distance does not exclude,
 /// and how it bounds the triangles of a leaf.
 template <class Accepts, class Excludes, class ExcludesTriangle, class BoundTriangles>
 struct SearchFilter {
@@ -40,13 +40,13 @@ template <class Accepts, class Excludes, class ExcludesTriangle, class BoundTria
 SearchFilter(Accepts, Excludes, ExcludesTriangle, BoundTriangles)
     -> SearchFilter<Accepts, Excludes, ExcludesTriangle, BoundTriangles>;
 
-/// Of one of the triangles of a leaf.
+/// Corner of one of the triangles of a leaf.
 Eigen::Vector3d corner_of(const double* corners, int triangle, int corner) {
   const double* x = corners + 3 * corner * kLanes + triangle;
   return {x[0], x[kLanes], x[2 * kLanes]};
 }
 
-/// Of the point against what moves as a box of velocities holds [m/s].
+/// Largest speed of the point against what moves with velocities of a box [m/s].
 double fastest_against(const ClosingPoint& closing, const Eigen::AlignedBox3d& velocities) {
   return (velocities.max() - closing.velocity)
       .cwiseAbs()
@@ -195,7 +195,7 @@ std::ptrdiff_t BodySurface::near_leaves(const LeafQuery& query, const LeafPanel*
   return leaves_.near(shape.leaves, shape.moves, query, panels, count, kept);
 }
 
-/// Whether a branch is small enough for the boxes of its own triangles.
+/// True if a branch is small enough for the boxes of its own triangles.
 bool BodySurface::is_block(int node) const noexcept {
   const DeformationTree::Node& branch = tree_.node(node);
   return branch.last - branch.first <= kBlockTriangles;

@@ -22,7 +22,7 @@ struct SurfaceHit {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();      ///< unit, outward: the gradient of the distance
 };
 
-/// How a point of a body moves that parts of the body's own surface may come near to, and what is far: what is farther
+/// Motion of a point that parts of the body's own surface may come near to, and its limit: far is what is farther
 /// away than `near` and the way of the two against each other in `time`.
 struct ClosingPoint {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the point in the frame of the body [m/s]
@@ -48,7 +48,7 @@ struct SurfaceShape {
   std::vector<Eigen::AlignedBox3d> boxes;    ///< of branches within a block, from the positions
   std::vector<int> position_of, ball_of, box_of;
 
-  // Where it was placed with a velocity, beside positions and boxes.
+  // Velocities beside positions and boxes, if it was placed with one.
   bool moves = false;
   AlignedArray v;          ///< padded(r)
   VertexArray velocities;  ///< [m/s]
@@ -63,7 +63,7 @@ struct SurfaceShape {
 /// call but the constructor and make_shape() allocates.
 class BodySurface {
  public:
-  /// Where to look, by near_leaves(); without, the tree tells.
+  /// Leaves to search, by near_leaves(); without them the tree is searched.
   using Leaves = std::optional<std::span<const LeafPanel>>;
 
   BodySurface() = default;
@@ -95,7 +95,7 @@ class BodySurface {
   void place(const Eigen::VectorXd& q, const Eigen::VectorXd& v, SurfaceShape& shape) const noexcept;
   /// After place(): the whole of it at once.
   void place_all(SurfaceShape& shape) const noexcept;
-  /// Of a shape that moves, after place_all(): the largest speed of a vertex in the frame of the body [m/s].
+  /// Largest speed of a vertex of a moving shape in the frame of the body, after place_all() [m/s].
   double fastest(const SurfaceShape& shape) const noexcept;
   /// Those of some leaves, of all_leaves() at first, where parts of the surface may have come near to some points by
   /// nearest_approached() with a closing point, or approach_distance(), with kSurelyApproached as the share of the
@@ -127,7 +127,7 @@ class BodySurface {
                                                const ClosingPoint* closing = nullptr,
                                                Leaves leaves = std::nullopt) const noexcept;
 
-  /// How far away what nearest_approached() finds is at least, within `radius`, as long as the point and the surface
+  /// Least distance of what nearest_approached() finds within `radius`, as long as the point and the surface
   /// move by no more than `way` together [m] beyond that; infinity where it finds nothing.
   double approach_distance(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place,
                            double radius, double way, SurfaceShape& shape, Leaves leaves = std::nullopt) const noexcept;

@@ -13,7 +13,7 @@ namespace {
 constexpr int kLeafVertices = 16;
 constexpr int kBatch = 48;  // vertices, or factors of the stiffness: they stay in the first-level cache
 
-/// Whether the distance that a candidate feels changes by no more than its vertex goes: not by a side plane, nor over
+/// True if the distance that a candidate feels changes by no more than its vertex goes: not by a side plane, nor over
 /// the border of ground.
 bool has_steady_distance(const PlacedObstacle& placed, const ContactCandidate& candidate) {
   return candidate.passage.kind == Passage::Kind::kNearest &&

@@ -14,12 +14,12 @@
 
 namespace exmat::runtime {
 
-/// Where a body is: x = position + rotation (X + U q), rest positions X about the frame's origin.
+/// Pose of a body: x = position + rotation (X + U q), rest positions X about the frame's origin.
 struct BodyPose : Placement {
   const Eigen::VectorXd& q;  ///< [r]
 };
 
-/// How it moves: the velocity at x is linear + angular x (x - position) + rotation U v.
+/// Velocities of a body: at x it is linear + angular x (x - position) + rotation U v.
 struct BodyVelocity : FrameVelocity {
   const Eigen::VectorXd& v;  ///< [r]
 };
@@ -31,7 +31,7 @@ double way_bound(double reach, const MovementBound& movement, const BodyPose& po
 
 class ContactSet;
 
-/// What contacts do to a body, of one evaluation.
+/// Sums of the contact forces on a body in one evaluation.
 struct ContactSums {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< sum of f_i, world [N]
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< sum of (x_i - position) x f_i, world [N m]
@@ -79,7 +79,7 @@ struct ContactWorkspace : ContactSums {
   /// Takes lambda of candidates one by one from the last evaluation.
   void refresh_friction(FrictionChange& change) noexcept;
 
-  // Of the last gather().
+  // Counts of the last gather().
   int visited_nodes = 0;
   int tested_vertices = 0;
 
@@ -107,7 +107,7 @@ class ContactSet {
   Eigen::Index vertices() const noexcept { return areas_.size(); }
   Eigen::Index modes() const noexcept { return rows_.modes(); }
 
-  /// Of a vertex: its number in the object, and its place in ContactData, which is the number, too, where the data has
+  /// Number of a vertex in the object, and its place in ContactData, which is the number, too, where the data has
   /// none; the set has an order of its own.
   int object_vertex(int vertex) const noexcept { return object_vertices_[static_cast<std::size_t>(vertex)]; }
   int data_index(int vertex) const noexcept { return data_indices_[static_cast<std::size_t>(vertex)]; }
@@ -161,7 +161,7 @@ class ContactSet {
   /// Writes the contacts of the last evaluation, anchors moved where they slid; the candidates are complete after it.
   void commit(const BodyPose& pose, ContactWorkspace& workspace, ContactState& state) const noexcept;
 
-  // Of one vertex.
+  // Functions of one vertex.
 
   /// x - position, world [m].
   Eigen::Vector3d world_arm(int vertex, const BodyPose& pose) const noexcept;

@@ -30,7 +30,7 @@ inline constexpr int kFrictionRounds = 3;      ///< solutions of one step for th
 inline constexpr double kSameFriction = 0.05;  ///< relative change of friction that needs no further one
 inline constexpr double kEntrySteps = 2;       ///< of its way: a vertex that is deeper has not come in
 
-/// Of a pair of surfaces, per area.
+/// Stiffness, damping and friction of a pair of surfaces, per area.
 struct ContactLaw {
   double stiffness = 0;       ///< pressure per depth, > 0 [N/m^3]
   double damping = 0;         ///< pressure per approach velocity, >= 0 [N s/m^3]
@@ -41,7 +41,7 @@ struct ContactLaw {
   ContactLaw half() const noexcept { return {0.5 * stiffness, 0.5 * damping, friction, release}; }
 };
 
-/// What a touching vertex remembers from step to step.
+/// Memory of a touching vertex from step to step.
 struct HeldContact {
   int vertex = 0, obstacle = 0;
   double normal_force = 0;                           ///< at the end of the last step [N]
@@ -57,7 +57,7 @@ struct ContactState {
   std::size_t count = 0;
   NearPlanes near_planes;  ///< saves searches; results are the same without
 
-  /// How far the farthest of them is from the surface that it came in by, where that is not the nearest [m].
+  /// Distance of the farthest of them from the surface that it came in by, where that is not the nearest [m].
   double longest_way_out() const noexcept;
 };
 
@@ -77,11 +77,11 @@ struct ContactCandidate {
   double released = 0;                                ///< of it where the step begins [m]
   Passage passage;                                    ///< of obstacles
 
-  /// How far its vertex may go from where it was at the first evaluation without being touched [m]; negative: it has to
-  /// be looked at.
+  /// Clearance: the way of its vertex from the first evaluation on which nothing touches it [m]; negative: it has to be
+  /// looked at.
   double clearance = -1;
 
-  // Of the last evaluation.
+  // Results of the last evaluation.
   NearestHint hint;                                     ///< of nearest_surface_point()
   bool by_plane = false;                                ///< its surface was the passage's plane
   double gap = 0;                                       ///< [m]; 0 where it was not looked at
@@ -91,7 +91,8 @@ struct ContactCandidate {
   Eigen::Vector3d slip = Eigen::Vector3d::Zero();       ///< y, tangential [m]
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of the normal force, where there is one
 
-  /// Of a vertex that is `depth` inside [m], `before` of it without a push so far [m]: releases `most` [m].
+  /// Releases at most `most` [m] of the overlap of a vertex `depth` inside [m], of which `before` had no push so far
+  /// [m].
   void release_overlap(double depth, double before, double most) noexcept {
     before = std::clamp(before, 0.0, std::max(0.0, depth));
     overlap = std::max(0.0, before - most);
@@ -99,15 +100,15 @@ struct ContactCandidate {
   }
   /// So is one whose numbers overflowed: its force tells.
   bool is_loaded() const noexcept { return !(normal_force <= 0) || friction_force > 0; }
-  /// How fast the normal force grows [N/m]; 0 where there is none.
+  /// Derivative of the normal force by the depth [N/m]; 0 where there is no force.
   double normal_stiffness() const noexcept { return normal_force > 0 ? stiffness * (1 + damping) : 0; }
 };
 
-/// What the vertex of a candidate remembers, or null. Candidates come in order; `next`, 0 before the first one, is
+/// The memory of the candidate's vertex, or null. Candidates come in order; `next`, 0 before the first one, is
 /// where the search in `state` goes on.
 const HeldContact* find_held(const ContactState& state, std::size_t& next, const ContactCandidate& candidate) noexcept;
 
-/// Where a vertex begins a step, and where its velocity leads.
+/// Start of a vertex in a step, and the end to which its velocity leads.
 struct VertexMotion {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< where the step begins, world [m]
   Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< a step on
@@ -146,7 +147,7 @@ struct StiffnessFactors {
 /// After the first evaluation: how far the vertex may go from there and still feel nothing.
 double clearance_of(const ContactCandidate& candidate, const Eigen::Vector3d& point) noexcept;
 
-/// What an evaluation is of a vertex that has gone no farther than its clearance from the first.
+/// Evaluates a vertex that has gone no farther than its clearance from the first evaluation.
 void leave_untouched(ContactCandidate& candidate) noexcept;
 
 /// W [J] of the vertex at `point` whose distance is `gap` [m].
@@ -156,11 +157,11 @@ double contact_potential(const ContactCandidate& candidate, double gap, const Ei
 double contact_potential(const PlacedObstacle& placed, const ContactCandidate& candidate,
                          const Eigen::Vector3d& point) noexcept;
 
-/// How much friction has changed by taking lambda anew.
+/// Change of the friction forces when lambda is updated.
 struct FrictionChange {
   double change = 0, largest = 0;  ///< of mu lambda [N]
 
-  /// Of one contact.
+  /// Adds one contact.
   void add(double former, double now) noexcept {
     change = std::max(change, std::abs(now - former));
     largest = std::max({largest, now, former});
@@ -175,7 +176,7 @@ struct FrictionChange {
 double refresh_friction(const std::vector<PlacedObstacle>& obstacles,
                         std::vector<ContactCandidate>& candidates) noexcept;
 
-/// How far the tangential spring of a touching candidate is stretched at the end of the step, its vertex at `point`
+/// Stretch of a touching candidate's tangential spring at the end of the step, its vertex at `point`
 /// [m].
 Eigen::Vector3d held_stretch(double friction, const Eigen::Vector3d& point, const ContactCandidate& candidate) noexcept;
 

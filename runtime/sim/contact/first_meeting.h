@@ -5,7 +5,7 @@
 
 namespace exmat::runtime {
 
-/// Where the way from one place outside a surface to another first meets it, by steps as long as the distance
+/// First meeting with a surface on the way between two places, the first outside, by steps as long as the distance
 /// (conservative advancement, Mirtich 1996): to a thousandth of the way. `nearest(point, left)` is an optional, with
 /// `distance` and `normal`, of what is within `left` [m] of a point. Empty where the way meets nothing.
 template <class Nearest>

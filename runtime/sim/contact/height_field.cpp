@@ -95,7 +95,7 @@ TrianglePoint HeightField::nearest_on(int triangle, const Eigen::Vector3d& point
   return nearest_on_triangle(point, a, b, c);
 }
 
-/// Of what is within `reach`, nearer blocks first.
+/// Searches within `reach`, nearer blocks first.
 template <HeightField::Search kSearch>
 HeightField::Found HeightField::search(const Eigen::Vector3d& point, double reach) const noexcept {
   struct Waiting {

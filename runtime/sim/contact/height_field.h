@@ -24,7 +24,7 @@ class HeightField {
   const Eigen::Vector2d& spacing() const noexcept { return spacing_; }
 
   int triangles() const noexcept { return 2 * levels_.front().columns * levels_.front().rows; }
-  /// Of a triangle, 0 <= triangle < triangles(), counter-clockwise from above.
+  /// Corners of a triangle, 0 <= triangle < triangles(), counter-clockwise from above.
   std::array<Eigen::Vector3d, 3> corners(Eigen::Index triangle) const noexcept;
 
   SurfacePoint nearest(const Eigen::Vector3d& point) const noexcept;
@@ -34,7 +34,7 @@ class HeightField {
   /// False only where the signed distance is above `radius`.
   bool may_be_within(const Eigen::Vector3d& point, double radius) const noexcept;
 
-  /// Of the surface; beyond the border that of the nearest point of it.
+  /// Height of the surface; beyond the border that of its nearest point.
   double height_at(double x, double y) const noexcept;
 
  private:

@@ -5,7 +5,7 @@
 
 namespace exmat::runtime {
 
-/// How far q moves any point of a body, at most: the least of two bounds, of which either is often many times the
+/// Bound on how far q moves any point of a body: the lesser of two, of which either is often many times the
 /// other. r modes.
 struct MovementBound {
   double norm = 0;           ///< the largest singular value of the rows of any point [kg^-1/2]

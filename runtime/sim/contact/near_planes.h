@@ -16,13 +16,13 @@ namespace exmat::runtime {
 class NearPlanes {
  public:
   NearPlanes() = default;
-  /// Of a body of so many vertices and modes; what it remembers never takes more.
+  /// Allocates for a body of so many vertices and modes, once.
   NearPlanes(Eigen::Index vertices, Eigen::Index modes, std::size_t obstacles);
 
-  /// Whether every obstacle is a plane that stands.
+  /// True if every obstacle is a plane that stands.
   static bool serve(std::span<const PlacedObstacle> obstacles) noexcept;
 
-  /// Where a body is: its frame and q [r]; its points are at most `reach` from the frame's origin at rest [m], and q
+  /// Pose of a body: its frame and q [r]; its points are at most `reach` from the frame's origin at rest [m], and q
   /// moves them as `movement` allows.
   struct Pose {
     const Placement& placement;
@@ -31,7 +31,7 @@ class NearPlanes {
     const MovementBound& movement;
   };
 
-  /// Whether all vertices that are at most `margin` [m] away are known. Counts the steps that a search serves.
+  /// True if all vertices that are at most `margin` [m] away are known. Counts the steps that a search serves.
   bool knows(std::span<const PlacedObstacle> obstacles, const Pose& pose, double margin) noexcept;
 
   /// After that: whether a search is to go farther, and be remembered.
@@ -47,7 +47,7 @@ class NearPlanes {
   std::size_t count() const noexcept { return count_; }
   int vertex(std::size_t index) const noexcept { return vertices_[index]; }
 
-  /// Whether one of them may be at most `margin` away from a plane.
+  /// True if one of them may be at most `margin` away from a plane.
   bool may_be_near(std::size_t index, double margin) const noexcept;
 
  private:

@@ -60,7 +60,7 @@ double signed_distance(const Shape& shape, const Eigen::Vector3d& point) noexcep
 /// False only where it is above `radius`.
 bool may_be_within(const Shape& shape, const Eigen::Vector3d& point, double radius) noexcept;
 
-/// How far any point in it is from its surface at most; infinite of a half space and of ground [m].
+/// Largest distance of a point inside from the surface; infinite for half spaces and ground [m].
 double deepest(const Shape& shape) noexcept;
 
 /// The shortest way that may lead through it: 0 where it is not known, as of meshes [m].
@@ -68,7 +68,7 @@ double shortest_passage(const Shape& shape) noexcept;
 
 inline constexpr double kRelease = 1;  ///< [m/s] of overlaps at the start, where nothing else is said
 
-/// What a body may touch. Per area of the body's surface, so that results do not depend on its tessellation.
+/// Obstacle that bodies may touch. Its law is per area of a body's surface, so that results do not depend on the mesh.
 struct Obstacle {
   Shape shape;
   RigidMotion motion;    ///< of the shape's frame
@@ -102,8 +102,8 @@ struct PlacedObstacle {
   double turn = 0;           ///< bound on how far its points move beside each other in the step, over how far apart
   bool sweeps = false;       ///< it goes so far in the step that the way to it counts, not where it ends alone
   bool is_fixed = false;     ///< its frame is the world's
-  /// What it is where it is a plane that stands, else null: the rule, and to look at it takes less time than to ask for
-  /// the kind of a shape.
+  /// The shape if it is a plane at rest, which most obstacles are, else null; quicker than to ask for the kind of a
+  /// shape.
   const Plane* plane = nullptr;
 
   PlacedObstacle() = default;
@@ -114,17 +114,17 @@ struct PlacedObstacle {
     if (is_fixed) plane = std::get_if<Plane>(&placed.shape);
   }
 
-  /// Where its material point at this world position goes in the step.
+  /// End of the step of its material point at this world position.
   Eigen::Vector3d carried(const Eigen::Vector3d& point) const noexcept {
     return is_fixed ? point : pose.to_world(start.to_frame(point));
   }
 
-  /// How far its material points in a ball go in the step, at most [m].
+  /// Longest way of its material points in a ball in the step [m].
   double sweep(const Eigen::Vector3d& centre, double radius) const noexcept {
     return (carried(centre) - centre).norm() + turn * radius;
   }
 
-  /// Whether anything in a ball at the beginning of the step, which moves by no more than half of `margin` in it, may
+  /// True if anything in a ball at the beginning of the step, which moves by no more than half of `margin` in it, may
   /// touch the obstacle in the step.
   bool may_meet(const Eigen::Vector3d& centre, double radius, double margin) const noexcept;
 

@@ -13,7 +13,7 @@ constexpr double kSameSide = 0.5;  // cosine
 constexpr double kBegun = 0.5;     // of the depth: a way inward that may end on another side
 constexpr double kBeyond = 1e-3;   // of the way out, to begin outside
 
-/// Whether a vertex that came in by `side` has left it, where its nearest point is `there`.
+/// True if a vertex that came in by `side` has left it, where its nearest point is `there`.
 bool has_passed(const SidePlane& side, const SurfacePoint& there, const Eigen::Vector3d& point) {
   if (side.nearest(point).distance >= 0) return false;
   return there.distance > 0 || there.normal.dot(side.normal) < kOtherSide;
@@ -24,7 +24,7 @@ Passage passage_by(const PlacedObstacle& placed, const SidePlane& side, const Ei
   return {passes ? Passage::Kind::kThrough : Passage::Kind::kWatched, side};
 }
 
-/// Of a vertex that is inside.
+/// Passage of a vertex that begins inside.
 Passage passage_from_inside(const PlacedObstacle& placed, const VertexWay& way, const SurfacePoint& nearest) {
   const Shape& shape = placed.obstacle->shape;
   const SidePlane side{nearest.point, nearest.normal};
@@ -35,7 +35,7 @@ Passage passage_from_inside(const PlacedObstacle& placed, const VertexWay& way, 
   return {Passage::Kind::kWatched, side};
 }
 
-/// Whether the surface that a vertex came in by is the nearest again, and not far.
+/// True if the surface that a vertex came in by is the nearest again, and not far.
 bool is_back(const PlacedObstacle& placed, const SurfacePoint& nearest, const Eigen::Vector3d& way_out) {
   const double length = way_out.norm();
   return nearest.distance < 0 && nearest.normal.dot(way_out) > kSameSide * length &&

@@ -7,7 +7,7 @@
 
 namespace exmat::runtime {
 
-// What keeps fast vertices from passing through: docs/step_in_detail.md, "Fast bodies".
+// Continuous collision detection of vertices: docs/step_in_detail.md, "Fast bodies".
 
 inline constexpr double kFast = 0.125;  ///< of the shortest passage, or of a body's radius: shorter ways pass nothing
 inline constexpr double kOtherSide = -0.1;  ///< cosine of normals that look apart by more than those beside an edge
@@ -22,7 +22,7 @@ struct SidePlane {
   }
 };
 
-/// How a vertex goes in a step, as the obstacle sees it at the end of the step; world.
+/// Way of a vertex in a step, as the obstacle sees it at the end of the step; world.
 struct VertexWay {
   Eigen::Vector3d carried = Eigen::Vector3d::Zero();    ///< where the obstacle would carry it from where it is [m]
   Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< where it goes by its velocity
@@ -40,7 +40,7 @@ struct Passage {
   SidePlane side;
 };
 
-/// Where a way from outside first meets the surface, to a thousandth of the way; nothing where it does not.
+/// First meeting of a way from outside with the surface, to a thousandth of the way; nothing where there is none.
 std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::Vector3d& from,
                                      const Eigen::Vector3d& to) noexcept;
 
@@ -49,7 +49,7 @@ std::optional<SidePlane> first_entry(const PlacedObstacle& placed, const Eigen::
 Passage find_passage(const PlacedObstacle& placed, const VertexWay& way, const SurfacePoint& nearest,
                      const Eigen::Vector3d& way_out) noexcept;
 
-/// What a vertex at `point` feels; `by_plane` says whether it is the side plane.
+/// The surface point that pushes a vertex at `point`; `by_plane` says whether it is the side plane.
 SurfacePoint felt_surface(const PlacedObstacle& placed, const Passage& passage, const Eigen::Vector3d& point,
                           NearestHint& hint, bool& by_plane) noexcept;
 

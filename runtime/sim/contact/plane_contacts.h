@@ -24,7 +24,7 @@ class PlaneContacts {
     const Placement& placement;  ///< position and rotation
     const AlignedArray& q;       ///< padded(r)
   };
-  /// What an evaluation adds up, see ContactSums.
+  /// Sums of an evaluation, see ContactSums.
   struct Sums {
     Eigen::Vector3d force, torque;
     double potential, stiffness;

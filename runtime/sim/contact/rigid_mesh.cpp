@@ -130,7 +130,7 @@ TrianglePoint RigidMesh::nearest_on(int face, const Eigen::Vector3d& point) cons
   return nearest_on_triangle(point, corners[0], corners[1], corners[2]);
 }
 
-/// Of what is within `reach`, nearer branches first.
+/// Searches within `reach`, nearer branches first.
 template <RigidMesh::Search kSearch>
 RigidMesh::Found RigidMesh::search(const Eigen::Vector3d& point, double reach) const noexcept {
   struct Waiting {

@@ -21,12 +21,12 @@ class RigidMesh {
 
   Eigen::Index triangles() const noexcept { return static_cast<Eigen::Index>(faces_.size()); }
   double thickness() const noexcept { return thickness_; }
-  /// Of a triangle, 0 <= triangle < triangles(), in an order of its own.
+  /// Corners of a triangle, 0 <= triangle < triangles(), in an order of its own.
   const std::array<Eigen::Vector3d, 3>& corners(Eigen::Index triangle) const noexcept {
     return faces_[static_cast<std::size_t>(triangle)].corners;
   }
 
-  /// How far points in it are from its surface at most, to some percent of its size [m].
+  /// Largest distance of a point inside from the surface, to some percent of the size [m].
   double deepest() const noexcept { return deepest_; }
 
   SurfacePoint nearest(const Eigen::Vector3d& point) const noexcept;

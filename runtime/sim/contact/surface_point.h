@@ -12,14 +12,14 @@ struct SurfacePoint {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
 };
 
-/// What a search for a nearest point leaves to the next one of a point nearby: which triangle it is on, and how near no
-/// other is. Saves time alone: results do not depend on it.
+/// Hint that a search for a nearest point leaves to the next one nearby: its triangle, and how near no other is. Saves
+/// time alone: results do not depend on it.
 struct NearestHint {
   int triangle = -1;  ///< -1: none
   double others = 0;  ///< all others are as far from `from` as this, or farther [m]
   Eigen::Vector3d from = Eigen::Vector3d::Zero();
 
-  /// Whether a triangle whose distance from `point` is `distance` is the nearest alone.
+  /// True if a triangle whose distance from `point` is `distance` is the nearest alone.
   bool holds(const Eigen::Vector3d& point, double distance) const noexcept {
     const double room = others - distance;
     return room > 0 && (point - from).squaredNorm() < room * room;

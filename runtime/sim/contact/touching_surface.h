@@ -12,7 +12,7 @@ namespace exmat::runtime {
 struct TouchingSurface {
   TouchingSurface(const ContactSet& set, BodySurface of, bool meets_itself = false);
 
-  /// Whether parts of it may have come near to each other at q [r], moving at v [r/s], within a step of `time_step`
+  /// True if parts of it may have come near to each other at q [r], moving at v [r/s], within a step of `time_step`
   /// [s]. O(r); never, where it does not meet itself.
   bool may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step) const noexcept;
 

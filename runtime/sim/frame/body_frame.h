@@ -55,7 +55,7 @@ class BodyFrame {
   virtual Eigen::Vector3d centre_of_mass() const noexcept { return Eigen::Vector3d::Zero(); }
   /// Of a body that is moved by its momenta, else null: such bodies rotate side by side (sim/lanes).
   virtual const DeformingInertia* inertia_of_momenta() const noexcept { return nullptr; }
-  /// Whether it exerts forces on q that depend on q and its velocity and have no potential.
+  /// True if it exerts forces on q that depend on q and its velocity and have no potential.
   virtual bool exerts_forces() const noexcept { return false; }
 
   // ---- Its state.
@@ -130,7 +130,7 @@ class BodyFrame {
   virtual Eigen::Matrix3d inertia(const FrameWorkspace& /*workspace*/, const FrameState& /*state*/) const noexcept {
     return Eigen::Matrix3d::Zero();
   }
-  /// Whether something outside moves it whatever energy that takes.
+  /// True if something outside moves it whatever energy that takes.
   virtual bool is_driven() const noexcept { return false; }
 
   // ---- A step, in this order.
@@ -149,7 +149,7 @@ class BodyFrame {
   virtual std::optional<FrameMomenta> expected_momenta(const FrameWorkspace& /*workspace*/) const noexcept {
     return std::nullopt;
   }
-  /// Whether its accelerations may jump in [from, to).
+  /// True if its accelerations may jump in [from, to).
   virtual bool jumps(const WorldLoads& /*loads*/, double /*from*/, double /*to*/) const noexcept { return false; }
 
   /// External force and force() of the beginning of the step, for an acceleration there; leave_start() goes back to the

@@ -58,7 +58,7 @@ class DeformingInertia {
   /// d2/dq2 (1/2 w^T J w) [r x r], positive semi-definite, added `factor` times to the lower triangle.
   void add_centrifugal(const Eigen::Vector3d& spin, double factor, Eigen::MatrixXd& matrix) const noexcept;
 
-  /// Whether the Hessian c_v^2 I + ... is to have what the centrifugal force takes from it: where that is neither so
+  /// True if the Hessian c_v^2 I + ... is to have what the centrifugal force takes from it: where that is neither so
   /// much that it could leave it indefinite nor too little to change an iteration.
   static bool softens(const Eigen::Vector3d& spin, double velocity_factor) noexcept;
   /// What it takes, where it does.

@@ -59,10 +59,10 @@ class RigidMotion {
   /// The same with the accelerations `beside` [s] it: they may jump at keys, and a step has those within it.
   MotionSample sample(double time, double beside) const noexcept;
 
-  /// Whether a key, where accelerations may jump, lies in [from, to).
+  /// True if a key, where accelerations may jump, lies in [from, to).
   bool has_key(double from, double to) const noexcept;
 
-  /// Whether the pose changes at all.
+  /// True if the pose changes at all.
   bool moves() const noexcept { return !segments_.empty() || goes_on_; }
 
  private:

@@ -15,7 +15,7 @@ class LaneExamples {
  public:
   explicit LaneExamples(const ExampleModel& model);
 
-  /// Whether weights and targets of this model are found side by side: few examples that are well apart, and a table of
+  /// True if weights and targets of this model are found side by side: few examples that are well apart, and a table of
   /// one piece. Otherwise they are the caller's to set.
   bool finds_targets() const noexcept { return scratch_.size() > 0; }
 

@@ -168,7 +168,7 @@ class LaneStep {
     if (!begins_with_predictor || !workspace_.predictor_was_lower_) evaluate_stiffness(energy_);
   }
 
-  /// Whether the predictor is where the step begins.
+  /// True if the predictor is where the step begins.
   bool is_one_iterate(Eigen::Index lane) const noexcept { return (trial_.row(lane) == start_.row(lane)).all(); }
 
   bool finds_targets_side_by_side() const noexcept {

@@ -14,7 +14,7 @@ namespace exmat::runtime {
 /// Fewer bodies than these are faster one after the other.
 inline constexpr std::ptrdiff_t kFewestLanes = 4;
 
-/// Whether steps of this model in this scene can be taken side by side: elasticity by cubature, linear example forces
+/// True if steps of this model in this scene can be taken side by side: elasticity by cubature, linear example forces
 /// of a symmetric filter.
 bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept;
 

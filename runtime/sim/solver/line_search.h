@@ -32,9 +32,9 @@ struct SearchLine {
   const PotentialValue& start;
   double slope = 0;  ///< gradient^T direction, below 0
 
-  /// Whether the potential cannot tell the end of the full step from its beginning.
+  /// True if the potential cannot tell the end of the full step from its beginning.
   bool below_rounding() const { return std::abs(slope) <= kRounding * start.magnitude; }
-  /// Whether the end of the full step is lower as far as its slope there tells, the values being equal but for terms
+  /// True if the end of the full step is lower as far as its slope there tells, the values being equal but for terms
   /// that cancel (the approximate condition of Hager and Zhang 2005).
   bool is_lower_by_slope(const PotentialValue& value, double slope_there) const {
     return value.value <= start.value + kNearRounding * start.magnitude && std::abs(slope_there) <= 0.9 * -slope &&

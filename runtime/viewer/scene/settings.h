@@ -35,7 +35,7 @@ struct Settings {
   bool operator==(const Settings&) const = default;
 };
 
-/// Whether a body can go on under `b` as it went under `a`, without a new model.
+/// True if a body can go on under `b` as it went under `a`, without a new model.
 bool same_model(const Settings& a, const Settings& b);
 
 }  // namespace exmat::viewer

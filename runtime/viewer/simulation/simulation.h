@@ -29,7 +29,7 @@ class Simulation {
   const Eigen::Vector3d& offset(std::size_t body) const { return slots_[body].offset; }
   std::shared_ptr<const BodyShape> shape(std::size_t kind) const { return kinds_[kind].shape; }
   const std::string& kind_name(std::size_t kind) const { return kinds_[kind].name; }
-  /// Whether bodies touch each other.
+  /// True if bodies touch each other.
   bool is_world() const { return bodies_.world().contact_law().apart == 0; }
   bool has_contact() const { return has_contact_; }
 

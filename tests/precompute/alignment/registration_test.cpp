@@ -19,7 +19,7 @@ bool in_the_bar(const Eigen::Vector3d& x) {
   return std::abs(x[0]) < kLength / 2 && std::abs(x[1]) < 0.4 && std::abs(x[2]) < 0.3;
 }
 
-// Whether the bar, bent by kAngle, holds a point: the bend undone.
+// True if the bar, bent by kAngle, holds a point: the bend undone.
 bool in_the_bent_bar(const Eigen::Vector3d& x) {
   const double radius = kLength / kAngle;
   const Eigen::Vector2d from_axis(x[0], radius - x[2]);

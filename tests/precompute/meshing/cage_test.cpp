@@ -18,7 +18,7 @@ using test::box_surface;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-// Whether a point is in some tet, by the signs of the four volumes that it makes with the faces.
+// True if a point is in some tet, by the signs of the four volumes that it makes with the faces.
 bool is_inside(const TetMesh& mesh, const Eigen::RowVector3d& point) {
   const auto volume = [](const Eigen::RowVector3d& a, const Eigen::RowVector3d& b, const Eigen::RowVector3d& c,
                          const Eigen::RowVector3d& d) { return (b - a).dot(Eigen::RowVector3d((c - a).cross(d - a))); };

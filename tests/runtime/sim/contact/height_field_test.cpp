@@ -44,7 +44,7 @@ Eigen::Vector3d random_point(int i) {
   return {0.3 + 0.5 * unit[0], 0.75 + unit[1], 0.4 * unit[2]};
 }
 
-/// Whether a ray upward meets a triangle.
+/// True if a ray upward meets a triangle.
 bool is_below(const VertexArray& x, const TriangleArray& triangles, const Eigen::Vector3d& point) {
   for (Eigen::Index t = 0; t < triangles.rows(); ++t) {
     const Eigen::Vector3d a = x.row(triangles(t, 0)), b = x.row(triangles(t, 1)), c = x.row(triangles(t, 2));

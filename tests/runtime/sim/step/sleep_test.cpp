@@ -39,7 +39,7 @@ struct Hanging {
     if (!workspace) workspace.emplace(*model, scene);
     return runtime::step(*model, scene, state, *workspace);
   }
-  /// Whether it is asleep after at most so many steps.
+  /// True if it is asleep after at most so many steps.
   bool rests_within(int steps) {
     for (int n = 0; n < steps && !state.sleep.asleep; ++n) step();
     return state.sleep.asleep;
