@@ -53,8 +53,8 @@ object's. "Settled" is the total in the last tenth of the time.
 | --- | {rules} |
 {split}
 The part of the eigenfunctions says how far the motion moves with twice as many. It is not a distance from a limit:
-functions finer than a few edges follow the tessellation more than the pose. Where the mesh has no more of them, the
-part is not known.
+functions finer than a few edges follow the tessellation more than the pose. If the mesh has no more of them, the part
+is not known.
 
 ![The bar's error by its sources](bar-cuboid-sources.svg)
 """
