@@ -37,24 +37,6 @@ void write_run(Hdf5File& file, const std::string& group, const ReducedModel& mod
   file.write_attribute(group, "time_step", info.time_step);
 }
 
-/// The groups of one body below `parent`.
-void write_groups(Hdf5File& file, const std::string& parent, const ReducedModel& model, const TrajectoryInfo& info) {
-  const auto regional = [](const WeightInfo& weights) { return !weights.region.empty(); };
-  for (const GroupSchema& group : trajectory_schema().groups) {
-    if (group.group == "bodies") continue;
-    if (group.group == "examples" && std::ranges::all_of(info.weights, regional)) continue;
-    if (group.group == "regions" && std::ranges::none_of(info.weights, regional)) continue;
-    if (group.group == "render" && !model.render) continue;
-    if (is_single(group.path)) {
-      write_group(file, group, parent + group.path);
-      continue;
-    }
-    for (const WeightInfo& weights : info.weights)
-      if (regional(weights))
-        write_group(file, group, parent + fill_name(group.path, kRegionPlaceholder, weights.region));
-  }
-}
-
 Hdf5File create_file(const AtomicFile& output) {
   Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
   write_header(file, trajectory_schema(), generator_name());
@@ -65,64 +47,7 @@ const GroupSchema& group_schema(std::string_view path) {
   return *std::ranges::find(trajectory_schema().groups, path, &GroupSchema::path);
 }
 
-std::span<const double> row_of(const Eigen::VectorXd& vector) {
-  return {vector.data(), static_cast<std::size_t>(vector.size())};
-}
-
-std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.data(), 3}; }
-
 }  // namespace
-
-/// Open datasets, in the order of the format.
-struct BodyFrames::Datasets {
-  Datasets(Hdf5File& file, const std::string& group, const SymbolSizes& sizes, const std::vector<WeightInfo>& forces)
-      : file_(file), group_(group), sizes_(sizes) {
-    for (const WeightInfo& force : forces) {
-      DatasetSchema schema =
-          trajectory_schema().dataset(force.region.empty() ? "/examples/weights" : "/regions/{region}/weights");
-      schema.path = group + fill_name(schema.path, kRegionPlaceholder, force.region);
-      SymbolSizes own = sizes;
-      own.set("K", force.count, "the bundle");
-      weights.emplace_back(file, schema, own);
-    }
-    if (sizes.find("v") != nullptr) render.emplace(rows("/render/vertices"));
-  }
-
-  void finish() {
-    for (RowWriter* dataset : {&time, &positions, &reduced, &reduced_velocity, &body_position, &body_orientation,
-                               &linear_momentum, &angular_momentum, &kinetic, &elastic, &potential, &step_time})
-      dataset->finish();
-    for (RowWriter& dataset : weights) dataset.finish();
-    if (render) render->finish();
-  }
-
- private:
-  RowWriter rows(const char* path) const {
-    DatasetSchema schema = trajectory_schema().dataset(path);
-    schema.path = group_ + schema.path;
-    return {file_, schema, sizes_};
-  }
-
-  Hdf5File& file_;
-  const std::string& group_;
-  const SymbolSizes& sizes_;
-
- public:
-  RowWriter time = rows("/time");
-  RowWriter positions = rows("/vertices");
-  RowWriter reduced = rows("/reduced");
-  RowWriter reduced_velocity = rows("/reduced_velocity");
-  RowWriter body_position = rows("/body/position");
-  RowWriter body_orientation = rows("/body/orientation");
-  RowWriter linear_momentum = rows("/linear_momentum");
-  RowWriter angular_momentum = rows("/angular_momentum");
-  RowWriter kinetic = rows("/energy/kinetic");
-  RowWriter elastic = rows("/energy/elastic");
-  RowWriter potential = rows("/energy/potential");
-  RowWriter step_time = rows("/step_time");
-  std::vector<RowWriter> weights;   // as TrajectoryInfo::weights
-  std::optional<RowWriter> render;  // vertices of the render mesh
-};
 
 BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body, std::optional<Eigen::Vector3d>& origin)
     : model_(body.model),
@@ -140,7 +65,7 @@ BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body,
       displacements_(model_.object->mesh.vertex_count(), 3),
       velocities_(model_.object->mesh.vertex_count(), 3) {
   write_run(file, group_.empty() ? "/" : group_, model_, info_);
-  write_groups(file, group_, model_, info_);
+  write_body_groups(file, group_, model_.render.has_value(), info_.weights);
   const SymbolSizes sizes = sizes_of(model_, info_);
   const auto write = [&](const char* name, const auto& array) {
     const DatasetSchema& schema = trajectory_schema().dataset(name);
@@ -148,7 +73,7 @@ BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body,
   };
   write("/tets", model_.object->mesh.tets);
   if (model_.render) write("/render/triangles", model_.render->triangles);
-  datasets_ = std::make_unique<Datasets>(file, group_, sizes, info_.weights);
+  datasets_ = std::make_unique<TrajectoryRows>(file, group_, sizes, info_.weights);
 }
 
 BodyFrames::~BodyFrames() = default;
@@ -160,8 +85,8 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
   times_.push_back(state.time);
   datasets_->time.append(state.time);
   append_positions(state);
-  datasets_->reduced.append(row_of(state.q));
-  datasets_->reduced_velocity.append(row_of(state.v));
+  datasets_->reduced->append(row_of(state.q));
+  datasets_->reduced_velocity->append(row_of(state.v));
   datasets_->body_position.append(row_of(motion.position));
   datasets_->body_orientation.append(std::span<const double>(orientation));
   datasets_->kinetic.append(energies.kinetic);
@@ -170,16 +95,6 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
   datasets_->step_time.append(step_seconds);
   for (std::size_t i = 0; i < info_.weights.size(); ++i)
     datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
-}
-
-/// Positions from the origin as a row of single precision.
-void BodyFrames::append_drawn(const VertexArray& positions, RowWriter& dataset) const {
-  const Eigen::Matrix<float, Eigen::Dynamic, 3, Eigen::RowMajor> drawn =
-      (positions.rowwise() - origin_->transpose()).cast<float>();
-  if (!drawn.allFinite())
-    throw WorkError(fmt::format("{}: a position at {:g} s is beyond single precision, {:.3g} m", file_.name(),
-                                times_.back(), positions.cwiseAbs().maxCoeff()));
-  dataset.append(std::span<const float>(drawn.data(), static_cast<std::size_t>(drawn.size())));
 }
 
 /// World positions and velocities, and displacements in the body's frame.
@@ -211,7 +126,7 @@ void BodyFrames::append_positions(const State& state) {
   if (times_.size() == 1)
     file_.write_attribute(group_.empty() ? "/" : group_, "origin",
                           std::vector<double>(origin_->data(), origin_->data() + 3));
-  append_drawn(positions, datasets_->positions);
+  datasets_->append_drawn(times_.back(), positions, *origin_, datasets_->positions);
   if (model_.render) append_render_mesh(positions);
   largest_displacement_ = std::max(largest_displacement_, displacements_.rowwise().norm().maxCoeff());
   const std::optional<FrameMomenta> own = frame_.momenta(state.frame);
@@ -230,7 +145,7 @@ void BodyFrames::append_render_mesh(const VertexArray& positions) {
     drawn.row(k) = render.barycentric(k, 0) * positions.row(corners[0]);
     for (int c = 1; c < 4; ++c) drawn.row(k) += render.barycentric(k, c) * positions.row(corners[c]);
   }
-  append_drawn(drawn, *datasets_->render);
+  datasets_->append_drawn(times_.back(), drawn, *origin_, *datasets_->render);
 }
 
 void BodyFrames::finish() {

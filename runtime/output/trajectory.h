@@ -11,19 +11,13 @@
 #include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/xdmf.h"
 #include "common/model/reduced_model.h"
+#include "runtime/output/trajectory_rows.h"
 #include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
 
-/// An example force whose weights a trajectory shows.
-struct WeightInfo {
-  std::size_t force = 0;   ///< in State::examples
-  std::string region;      ///< empty: the whole body
-  std::int64_t count = 0;  ///< K
-};
-
-/// What a trajectory says of its run.
+/// Attributes of a run in its trajectory.
 struct TrajectoryInfo {
   std::string integrator;
   std::string bundle;       ///< path from the folder of the trajectory
@@ -66,11 +60,9 @@ class BodyFrames {
   double largest_displacement() const { return largest_displacement_; }
 
  private:
-  struct Datasets;
   void append_positions(const State& state);
   void set_positions(const State& state, VertexArray& positions);
   void append_render_mesh(const VertexArray& positions);
-  void append_drawn(const VertexArray& positions, RowWriter& dataset) const;
 
   const ReducedModel& model_;
   const BodyFrame& frame_;
@@ -79,7 +71,7 @@ class BodyFrames {
   Hdf5File& file_;
   std::optional<Eigen::Vector3d>& origin_;
   std::string group_, tets_, vertices_, render_triangles_, render_vertices_;  // paths
-  std::unique_ptr<Datasets> datasets_;
+  std::unique_ptr<TrajectoryRows> datasets_;
   Eigen::VectorXd rest_masses_;             ///< n_t
   VertexArray displacements_, velocities_;  ///< n x 3
   std::vector<double> times_;

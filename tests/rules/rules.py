@@ -61,7 +61,7 @@ def folder_of(name):
 
 def direction(root):
     """Every source is in a folder of the layers and includes its own folder and those below it alone; precompute measures with
-    runtime/sim and sees no more of the run time, but for precompute/study, which runs scenes."""
+    runtime/sim and sees no more of the run time, but for precompute/study, which runs scenes and writes their trajectories."""
     for name, path in sources(root):
         folder = folder_of(name)
         if folder is None:
@@ -78,7 +78,7 @@ def may_include(folder, other):
     (stage, depth), (other_stage, other_depth) = INNER[folder], INNER.get(other, (None, 0))
     if stage == other_stage:
         return depth <= other_depth
-    return other is not None and other.startswith(SEEN_FROM[stage] + (("runtime/scene",) if folder.startswith("precompute/study/") else ()))
+    return other is not None and other.startswith(SEEN_FROM[stage] + (("runtime/scene", "runtime/output") if folder.startswith("precompute/study/") else ()))
 
 
 def lean(root):

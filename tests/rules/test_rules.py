@@ -95,7 +95,7 @@ PLANTED = [
 ]
 
 HARMLESS = [
-    ("precompute/study/measure/x.cpp", '#include "runtime/scene/bodies.h"\n'),
+    ("precompute/study/measure/x.cpp", '#include "runtime/output/trajectory_rows.h"\n#include "runtime/scene/bodies.h"\n'),
     ("precompute/targets/x.cpp", '#include "runtime/sim/examples/target.h"\n'),
     ("runtime/sim/step/x.h", "// throw nothing, try nothing\n#include <Eigen/Core>\n#include <cmath>\n"),
     ("common/hdf5/x.cpp", "#include <hdf5.h>\n"),

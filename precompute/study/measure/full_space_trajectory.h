@@ -11,6 +11,7 @@
 #include "common/hdf5/hdf5_file.h"
 #include "precompute/study/measure/inverted_tets.h"
 #include "precompute/study/measure/runs.h"
+#include "runtime/output/trajectory_rows.h"
 
 namespace exmat::precompute {
 
@@ -34,15 +35,14 @@ class FullSpaceTrajectory {
   const InvertedTets& inverted() const { return inverted_; }
 
  private:
-  struct Datasets;
-  struct Weights;
   void append_motion(const VertexArray& positions);
 
   const ReducedModel& data_;
   const FullSpaceRun& body_;
   AtomicFile output_;
+  std::vector<runtime::WeightInfo> weights_;
   Hdf5File file_;
-  std::unique_ptr<Datasets> datasets_;
+  std::unique_ptr<runtime::TrajectoryRows> datasets_;
   SparseMatrix mass_;  // n x n
   std::vector<double> times_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();  ///< that positions are measured from [m]

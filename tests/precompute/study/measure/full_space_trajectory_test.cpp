@@ -75,6 +75,7 @@ TEST_F(FullSpaceFile, IsAsTheSchemaSays) {
   sizes.set("n_t", bar_.model.object->mesh.tet_count(), "the bar");
   sizes.set("K", 3, "the bar");
   sizes.set("F", 6, "the scene");
+  EXPECT_FALSE(opened.has_group("/bodies")) << "it has one body, at the root";
   const std::set<std::string> none{"/reduced", "/reduced_velocity", "/regions/{region}/weights", "/render/triangles",
                                    "/render/vertices"};
   for (const DatasetSchema& schema : trajectory_schema().datasets) {
