@@ -22,7 +22,7 @@ struct Case {
   double time_step;
   std::int64_t steps;
   double most;    // error that is allowed
-  double former;  // that of targets in the modal basis and no training
+  double former;  // that of targets in the modal basis and no training; 0: the smaller bodies show it
 };
 
 void PrintTo(const Case& c, std::ostream* out) { *out << c.folder; }
@@ -67,7 +67,7 @@ INSTANTIATE_TEST_SUITE_P(
     Scenes, FidelityOf,
     ::testing::Values(Case{"04_bar_cuboid", MaterialModel::kStVenantKirchhoff, 0.004, 500, 0.03, 0.057},
                       Case{"07_teddy_global", MaterialModel::kStVenantKirchhoff, 0.004, 375, 0.03, 0.381},
-                      Case{"06_cross", MaterialModel::kStableNeoHookean, 0.005, 120, 0.05, 0.483}),
+                      Case{"06_cross", MaterialModel::kStableNeoHookean, 0.005, 120, 0.05, 0}),
     [](const auto& scene) { return std::string(scene.param.folder).substr(3); });
 
 TEST_P(FidelityOf, AScenesExamplesIsThatOfTheFullSpace) {
@@ -77,6 +77,7 @@ TEST_P(FidelityOf, AScenesExamplesIsThatOfTheFullSpace) {
   const double found = error(model, reference);
   EXPECT_LE(found, GetParam().most);
   RecordProperty("error", fmt::format("{:.4f}", found));
+  if (GetParam().former == 0) return;
 
   // The fault that there was: no training, and targets in the span of the basis.
   asset_.training.from = Training::kNone;
