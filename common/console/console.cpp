@@ -110,6 +110,7 @@ std::string usage_message(const CLI::App& app, const CLI::ParseError& error) {
       if (message == option->get_name() + " is required") message = option->get_name(false, true) + " is required";
   if (!app.get_subcommands().empty()) return message;
   std::vector<std::string> names;
+  names.reserve(commands.size());
   for (const CLI::App* command : commands) names.push_back(command->get_name());
   for (const std::string& word : app.remaining()) {
     if (word.starts_with("-")) continue;

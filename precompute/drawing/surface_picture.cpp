@@ -105,14 +105,14 @@ std::string pixels(std::vector<Facing> triangles) {
       for (int x = first(0); x <= last(0); ++x) {
         const Eigen::Vector2d middle(x + 0.5, y + 0.5);
         if (side(0, 1, middle) >= 0 && side(1, 2, middle) >= 0 && side(2, 0, middle) >= 0)
-          colours[static_cast<std::size_t>(y * kSide + x)] = one.colour;
+          colours[static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(x)] = one.colour;
       }
   }
   std::string text = "<g fill=\"none\" shape-rendering=\"crispEdges\">\n";
   for (int y = 0; y < kSide; ++y)
     for (int x = 0, end = 0; x < kSide; x = end) {
       const auto colour = [&](int column) -> const std::string& {
-        return colours[static_cast<std::size_t>(y * kSide + column)];
+        return colours[static_cast<std::size_t>(y) * kSide + static_cast<std::size_t>(column)];
       };
       for (end = x + 1; end < kSide && colour(end) == colour(x);) ++end;
       if (!colour(x).empty())

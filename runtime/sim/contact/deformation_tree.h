@@ -43,7 +43,8 @@ class DeformationTree {
   Ball ball(int node, const Eigen::VectorXd& q, double q_norm) const noexcept {
     const Node& branch = this->node(node);
     const double spread = std::min(deviations_.row(node).dot(q.cwiseAbs()), branch.deviation_norm * q_norm);
-    return {branch.centre + means_.middleRows<3>(3 * node).lazyProduct(q), branch.radius + spread};
+    return {branch.centre + means_.middleRows<3>(3 * static_cast<Eigen::Index>(node)).lazyProduct(q),
+            branch.radius + spread};
   }
 
   const MovementBound& movement() const noexcept { return movement_; }  ///< of its points

@@ -49,7 +49,7 @@ class VertexRows {
   const double* data() const noexcept { return numbers_.data(); }
 
   Rows operator[](int vertex) const noexcept {  ///< 3 x r
-    return {numbers_.data() + 3 * vertex * stride(), 3, modes_, Eigen::OuterStride<>(stride())};
+    return {numbers_.data() + 3 * stride() * vertex, 3, modes_, Eigen::OuterStride<>(stride())};
   }
   /// [3 count]: the rows of each of `vertices` times x [stride].
   void products(const int* vertices, std::ptrdiff_t count, const AlignedArray& x, double* products) const noexcept {
