@@ -69,7 +69,7 @@ constexpr std::ptrdiff_t lane_rows(std::ptrdiff_t modes) { return (modes + kLane
 constexpr std::ptrdiff_t lane_triangle(std::ptrdiff_t modes) {
   return lane_rows(modes) * (lane_rows(modes) + kLaneBlock) / 2 * kLanes;
 }
-/// Where the entry of row i and column j <= i is, of the first lane.
+/// Position of the entry of row i and column j <= i, of the first lane.
 constexpr std::ptrdiff_t lane_entry(std::ptrdiff_t i, std::ptrdiff_t j) {
   const std::ptrdiff_t row = i / kLaneBlock, column = j / kLaneBlock;
   return ((row * (row + 1) / 2 + column) * kLaneBlock * kLaneBlock + i % kLaneBlock * kLaneBlock + j % kLaneBlock) *
@@ -88,28 +88,28 @@ struct StiffnessPolynomialArrays {
 };
 inline constexpr std::ptrdiff_t kMostPolynomialModes = 32;
 
-/// What a step of kLanes bodies keeps: vectors [r] and numbers of each, see StepForm and IncrementalPotential.
+/// Form of a step of kLanes bodies: vectors [r] and numbers of each, see StepForm and IncrementalPotential.
 struct LaneForm {
   std::ptrdiff_t modes = 0;
   const double *start = nullptr, *external = nullptr, *velocity_centre = nullptr, *acceleration_centre = nullptr;
   const double *velocity_factor = nullptr, *acceleration_factor = nullptr, *mass_damping = nullptr,
                *stiffness_damping = nullptr;
 };
-/// Of lanes_assemble(): offset . (A offset), linear . offset, and the squares of the internal force, of x less the
+/// Sums of lanes_assemble(): offset . (A offset), linear . offset, and the squares of the internal force, of x less the
 /// centre of the acceleration, of x and of the gradient.
 inline constexpr std::ptrdiff_t kLaneSums = 6;
 
 /// The rotation of kLanes free bodies, see DeformingInertia and FreeMotionWorkspace. r modes, padded to `stride`.
 struct LaneRotationArrays {
-  // Of the model.
+  // Arrays of the model.
   std::ptrdiff_t modes = 0, stride = 0;
   const double* stacked = nullptr;         ///< 9 stride x r by columns: S_ab of six pairs, A_c
   const double* linear = nullptr;          ///< r x 6 by columns
   const double* second_moments = nullptr;  ///< 6
-  // Of a step of each body: c_v, q_v [r], and the problem of its spin.
+  // Numbers of a step of each body: c_v, q_v [r], and the problem of its spin.
   const double *velocity_factor = nullptr, *velocity_centre = nullptr;
   const double *momentum = nullptr, *offset = nullptr, *factor = nullptr;
-  // What the calls below leave for each other.
+  // Results that the calls below leave for each other.
   double *spin = nullptr, *rotation = nullptr;  ///< 3 each, the spin as its first guess at first
   double* inverse_inertia = nullptr;            ///< 9
   double* products = nullptr;                   ///< 9 x r, stacked q
@@ -125,7 +125,7 @@ struct RotationArrays {
   const double* turning_panels = nullptr;  ///< 3 r rows padded, -A_c
   const double* linear = nullptr;          ///< r x 6 by columns, p1_ab
 };
-/// Of the products of a pose: S_ab q of xx, yy, zz, yz, xz, xy at first; from here on -A_c q.
+/// Layout of the products of a pose: S_ab q of xx, yy, zz, yz, xz, xy at first; from here on -A_c q.
 constexpr std::ptrdiff_t rotation_turns(std::ptrdiff_t modes) { return padded(modes + padded(5 * modes)); }
 constexpr std::ptrdiff_t rotation_products(std::ptrdiff_t modes) { return rotation_turns(modes) + padded(3 * modes); }
 
@@ -157,7 +157,7 @@ struct LeafBoxes {
   const double* velocities = nullptr;  ///< null where nothing moves
   const double* rest = nullptr;        ///< of the places at rest
 };
-/// What is looked for near some points. Their boxes are six numbers, as above.
+/// Query for leaves near some points. Their boxes are six numbers, as above.
 struct LeafQuery {
   double places[6] = {}, velocities[6] = {}, rest[6] = {};
   double radius = 0;             ///< what is farther away is far
@@ -173,7 +173,7 @@ struct LeafPanel {
 /// kLanes vertices beside planes that stand, by the law of contact_law.h, whose names these are. Lanes that are not in
 /// use have no stiffness.
 struct alignas(kAlignment) PlaneContactPanel {
-  // Of a step.
+  // Constants of a step.
   double rest[3][kLanes] = {};     ///< X, frame of the body [m]
   double normal[3][kLanes] = {};   ///< n_0
   double start[3][kLanes] = {};    ///< x_0 [m]
@@ -183,14 +183,14 @@ struct alignas(kAlignment) PlaneContactPanel {
   double damping[kLanes] = {};     ///< gamma
   double share[kLanes] = {};       ///< 1 / (1 + gamma)
   double friction[kLanes] = {};    ///< mu lambda [N]
-  // Of the last evaluation.
+  // Results of the last evaluation.
   double arm[3][kLanes] = {};        ///< x - position [m]
   double force[3][kLanes] = {};      ///< on the vertex [N]
   double slip[3][kLanes] = {};       ///< y [m]
   double normal_force[kLanes] = {};  ///< [N]
   double gap[kLanes] = {};           ///< [m]
 };
-/// What evaluations add up: force and torque, W, the stiffness of those that touch, and their number.
+/// Sums of evaluations: force and torque, W, the stiffness of those that touch, and their number.
 inline constexpr std::ptrdiff_t kPlaneSums = 9;
 inline constexpr std::ptrdiff_t kPlaneFactors = 3 * kLanes;
 
@@ -267,7 +267,7 @@ struct Kernels {
   /// y [panels x kLanes] = A x, A in panels of kLanes rows, each by columns.
   void (*panel_product)(const double* A, std::ptrdiff_t panels, std::ptrdiff_t columns, const double* x, double* y);
 
-  // Of the rotation of one body. Products of the pose: rotation_products(); products of the velocity [3 r] are -A_c v.
+  // Rotation of one body. Products of the pose: rotation_products(); products of the velocity [3 r] are -A_c v.
 
   /// Products of the pose q [r], and sums [6] = q . (p1_ab + S_ab q). Where there is a `centre` [r], not null, its
   /// -A_c centre too [padded(3 r)].
@@ -301,7 +301,8 @@ struct Kernels {
   void (*positions)(const float* rest, const float* basis, std::ptrdiff_t blocks, std::ptrdiff_t modes, const float* q,
                     float* positions);
 
-  // Of vertices, whose three rows have `stride` numbers each, a multiple of kLanes; row 3 v is the first of vertex v.
+  // Products of vertices, whose three rows have `stride` numbers each, a multiple of kLanes; row 3 v is the first of
+  // vertex v.
 
   /// products [3 count]: the rows of each of `vertices` times x [stride].
   void (*vertex_products)(const double* rows, std::ptrdiff_t stride, const int* vertices, std::ptrdiff_t count,
@@ -316,11 +317,11 @@ struct Kernels {
   /// are whole.
   void (*add_squares)(const double* factors, std::ptrdiff_t count, std::ptrdiff_t stride, double* squares);
 
-  // Of kLanes vertices beside planes, at a pose [12]: rotation by rows, position. products [3 x kLanes], by vertices:
-  // how far each is from rest, frame of the body.
+  // Contacts of kLanes vertices beside planes, at a pose [12]: rotation by rows, position. products [3 x kLanes], by
+  // vertices: how far each is from rest, frame of the body.
 
-  /// What they feel; forces in the body's frame, as the products are, into `turned`. sums [kPlaneSums x kLanes] += what
-  /// each adds. Returns a bit for each that has a normal force or friction.
+  /// Evaluates the contacts; forces in the body's frame, as the products are, into `turned`. sums [kPlaneSums x kLanes]
+  /// += what each adds. Returns a bit for each that has a normal force or friction.
   unsigned (*plane_contacts)(PlaneContactPanel&, const double* pose, const double* products, double* turned,
                              double* sums);
   /// sums [kLanes] += W.
@@ -330,7 +331,7 @@ struct Kernels {
   std::ptrdiff_t (*plane_factors)(const PlaneContactPanel&, const double* pose, double* vectors, double* rigid,
                                   int* lanes);
 
-  // Of kLanes triangles: corners [3 x 3 x kLanes], of each corner its x, y and z.
+  // Distances from kLanes triangles: corners [3 x 3 x kLanes], of each corner its x, y and z.
 
   /// squared [kLanes]: of the distance of a point [3] from each, or less by the rounding of its terms. Returns a bit
   /// for each that is at most `limit`.
@@ -351,7 +352,8 @@ struct Kernels {
   std::ptrdiff_t (*near_leaves)(const LeafBoxes&, const LeafQuery&, const LeafPanel* panels, std::ptrdiff_t count,
                                 LeafPanel* kept);
 
-  // Of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies [kLanes].
+  // Elasticity of kLanes bodies side by side, see above; the law is that of a material, without shifts. Energies
+  // [kLanes].
   void (*lanes_energy)(const ElementArrays&, const ElementLaw&, const double* q, double* energy);
   void (*lanes_force)(const ElementArrays&, const ElementLaw&, const double* q, double* energy, double* force);
   void (*lanes_force_and_stiffness)(const ElementArrays&, const ElementLaw&, const double* q, double* energy,
@@ -385,7 +387,7 @@ struct Kernels {
   /// offset = x - start, gradient = internal + linear + A offset; sums [kLaneSums].
   void (*lanes_assemble)(const LaneForm&, const double* x, const double* quadratic, const double* linear,
                          const double* internal, double* offset, double* gradient, double* sums);
-  /// Of a step, before the calls below.
+  /// Begins a step, before the calls below.
   void (*lanes_begin_rotation)(const LaneRotationArrays&);
   /// Moments at x [r], and the spins of those that are active (not zero) with the velocity c_v (x - q_v), by Newton's
   /// method from the last ones: `found` is 1 where there is one and the turn is below a radian, else 0. force [r] as
@@ -405,7 +407,7 @@ struct Kernels {
   /// values: all polynomials at weights [K], in order; scratch: lane_bernstein_scratch(D, K).
   void (*lanes_bernstein)(const BernsteinArrays&, const double* weights, double* scratch, double* values);
 
-  // Of a whole mesh, see above; the law is that of a material, without shifts, times the volumes.
+  // Elasticity of a whole mesh, see above; the law is that of a material, without shifts, times the volumes.
 
   /// inertia = c_a M a, force = c_v (alpha M + beta V) w + V x, V the variance matrix; sums [kMeshSums] of these terms.
   void (*mesh_inertia)(const MeshArrays&, const MeshInertia&, double* inertia, double* force, double* sums);

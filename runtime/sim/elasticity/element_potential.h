@@ -60,7 +60,7 @@ class ElementPotential {
   void stiffness(const ElementLaw& law, const Eigen::VectorXd& x, Tangent tangent, Workspace& workspace,
                  Eigen::MatrixXd& stiffness) const noexcept;
 
-  /// Of kLanes bodies side by side, by a law of one material: see Kernels.
+  /// The same for kLanes bodies side by side, by a law of one material: see Kernels.
   void lanes_energy(const ElementLaw& law, const double* x, double* energy) const noexcept {
     kernels().lanes_energy(arrays(), law, x, energy);
   }
@@ -81,7 +81,7 @@ class ElementPotential {
     return 162.0 * static_cast<double>(elements_ * modes_) +
            9.0 * static_cast<double>(elements_ * modes_ * (modes_ + 1));
   }
-  /// Of the constant arrays that one evaluation reads.
+  /// Bytes of the constant arrays that one evaluation reads.
   double force_bytes() const { return static_cast<double>(sizeof(double) * by_mode_.size()); }
   double stiffness_bytes() const { return static_cast<double>(sizeof(double) * by_element_.size()); }
 

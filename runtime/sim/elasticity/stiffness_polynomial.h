@@ -24,7 +24,7 @@ class StiffnessPolynomial {
 
   StiffnessPolynomialArrays arrays() const noexcept;
 
-  /// Of one body.
+  /// Operations for one body.
   static double flops(Eigen::Index modes);
 
  private:

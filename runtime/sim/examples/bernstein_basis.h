@@ -31,7 +31,7 @@ class BernsteinBasis {
 
   /// [N x K], in order.
   IndexMatrix exponents() const;
-  /// Of the polynomial with these exponents [K], which add up to D.
+  /// Number of the polynomial with these exponents [K], which add up to D.
   Eigen::Index number(const Eigen::VectorXi& exponents) const;
 
   /// `values` [N] at w [K], w >= 0. Values far below rounding, near corners and edges, become exactly zero.

@@ -39,8 +39,8 @@ class TargetTable {
   /// `target` [r] = p*(w) in reduced coordinates; weights [K] >= 0 add up to 1.
   void evaluate(const Eigen::VectorXd& weights, Workspace& workspace, Eigen::VectorXd& target) const noexcept;
 
-  /// Of kLanes bodies side by side (kernels.h): weights [K] and target [r] of each, for tables of one piece; scratch
-  /// lanes_scratch().
+  /// Evaluates kLanes bodies side by side (kernels.h): weights [K] and target [r] of each, for tables of one piece;
+  /// scratch lanes_scratch().
   void evaluate_lanes(const double* weights, double* scratch, double* target) const noexcept;
   Eigen::Index lanes_scratch() const noexcept;
 

@@ -16,7 +16,7 @@
 
 namespace exmat::runtime {
 
-/// What a frame carries from step to step, part of a State; nothing for a clamped body.
+/// State of a frame from step to step, part of a State; empty for a clamped body.
 using FrameState = std::variant<std::monostate, FreeState, CarriedState>;
 
 /// Scratch of a step, sized once; nothing for a clamped body.
@@ -46,14 +46,14 @@ class BodyFrame {
 
   // ---- What it is.
 
-  /// How it moves, in words; empty where it stands still.
+  /// Description of its motion; empty if it stands still.
   virtual std::string_view description() const noexcept { return {}; }
   bool moves() const noexcept { return !description().empty(); }
-  /// What rest positions are measured from: Placement::origin.
+  /// Origin of rest positions: Placement::origin.
   virtual Eigen::Vector3d origin() const noexcept { return Eigen::Vector3d::Zero(); }
-  /// Of the body at rest, world [m]; 0 of a frame that does not move.
+  /// Centre of mass at rest, world [m]; 0 for a frame that does not move.
   virtual Eigen::Vector3d centre_of_mass() const noexcept { return Eigen::Vector3d::Zero(); }
-  /// Of a body that is moved by its momenta, else null: such bodies rotate side by side (sim/lanes).
+  /// Inertia of a body that its momenta move, else null: such bodies rotate side by side (sim/lanes).
   virtual const DeformingInertia* inertia_of_momenta() const noexcept { return nullptr; }
   /// True if it exerts forces on q that depend on q and its velocity and have no potential.
   virtual bool exerts_forces() const noexcept { return false; }
@@ -82,7 +82,7 @@ class BodyFrame {
   virtual Placement placement(const FrameState& /*state*/) const noexcept { return {}; }
   virtual FrameVelocity velocity(const FrameState& /*state*/) const noexcept { return {}; }
   virtual FrameMotion motion(const FrameState& /*state*/) const noexcept { return {}; }
-  /// Of the body, where they are what the frame moves by.
+  /// Momenta of the body, if the frame moves by them.
   virtual std::optional<FrameMomenta> momenta(const FrameState& /*state*/) const noexcept { return std::nullopt; }
   /// [rad/s] in the world.
   virtual double turn_rate(const FrameState& /*state*/) const noexcept { return 0; }
@@ -98,11 +98,11 @@ class BodyFrame {
   virtual double kinetic_energy(const Eigen::VectorXd& v, const FrameState& /*state*/) const noexcept {
     return 0.5 * v.squaredNorm();
   }
-  /// Of gravity [m/s^2], beyond that of q [J].
+  /// Potential energy in gravity [m/s^2], beyond that of q [J].
   virtual double potential_energy(const Eigen::Vector3d& /*gravity*/, const FrameState& /*state*/) const noexcept {
     return 0;
   }
-  /// What it integrates by itself, for hashes: c, the quaternion's x y z w, p, L of a free body.
+  /// Coordinates that it integrates by itself, for hashes: c, the quaternion's x y z w, p, L of a free body.
   using Coordinates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 13, 1>;
   virtual Coordinates coordinates(const FrameState& /*state*/) const noexcept { return {}; }
 
@@ -161,7 +161,7 @@ class BodyFrame {
   virtual void leave_start(const FrameStep& /*step*/, FrameWorkspace& /*workspace*/,
                            Eigen::VectorXd& /*external_force*/) const noexcept {}
 
-  // Of frames that exert forces, q with the velocity c_v (q - q_v).
+  // Functions of frames that exert forces, q with the velocity c_v (q - q_v).
 
   /// Evaluates force(). False where there is no motion of the frame for q.
   virtual bool update_force(const Eigen::VectorXd& /*q*/, double /*velocity_factor*/,
@@ -186,7 +186,7 @@ class BodyFrame {
                                                     FrameWorkspace& /*workspace*/) const noexcept {
     return nullptr;
   }
-  /// Where the step has no solution: takes a motion that always exists instead. False where there is none.
+  /// Takes a motion that always exists when the step has no solution. False where there is none.
   virtual bool fall_back(const FrameStep& /*step*/, FrameWorkspace& /*workspace*/) const noexcept { return false; }
 
   /// Takes the solution: q and v are those of the end of the step, `a` [r] = rate (v - ...) so far.
@@ -196,13 +196,13 @@ class BodyFrame {
 
   // ---- A step near obstacles, by backward Euler, in the unknowns x = (rigid unknowns of the frame, q - q_n).
 
-  /// How many unknowns the frame has: 6 where contacts move it (d [m] and the rotation vector t [rad] of the step),
+  /// Number of the frame's unknowns: 6 where contacts move it (d [m] and the rotation vector t [rad] of the step),
   /// else none.
   virtual Eigen::Index rigid_unknowns() const noexcept { return 0; }
   /// Takes the frame's motion as unknowns, from those of free flight at q [r], into the head of x.
   virtual void begin_contact(const FrameState& /*state*/, const Eigen::VectorXd& /*q*/, double /*time_step*/,
                              FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*x*/) const noexcept {}
-  /// Where it stands at x, at the end of the step.
+  /// Placement at x, at the end of the step.
   virtual Placement place(const Eigen::VectorXd& /*x*/, FrameWorkspace& /*workspace*/) const noexcept { return {}; }
   /// The rotation vector in the world [rad] of a change of the unknown t at x.
   virtual Eigen::Matrix3d turn_to_world(const Eigen::VectorXd& /*x*/, const Placement& /*placement*/) const noexcept {
@@ -235,8 +235,8 @@ class BodyFrame {
 /// The world itself: a body whose fixed vertices stay where they are.
 class ClampedFrame final : public BodyFrame {};
 
-/// Of the bundle's body: free where it has /rigid, unless a motion carries its fixed part. `carried` takes spin_load of
-/// `rigid`; gravity_load [3 x r].
+/// Makes the frame of the bundle's body: free if it has /rigid, unless a motion carries its fixed part. `carried` takes
+/// spin_load of `rigid`; gravity_load [3 x r].
 std::shared_ptr<const BodyFrame> make_frame(const RigidData* rigid, bool carried, const RowMatrix& gravity_load);
 
 }  // namespace exmat::runtime

@@ -19,7 +19,7 @@ struct CarriedInertia {
   Eigen::Matrix3Xd spin_load;  ///< 3 x r, sum m X x U about the centre of mass
 };
 
-/// Where the body is carried, and what its motion adds to the kinetic energy; part of a State.
+/// Frame of a carried body, and the kinetic energy of its motion; part of a State.
 struct CarriedState {
   MotionSample frame;
   double kinetic_energy = 0;      ///< of all of it in the world [J]

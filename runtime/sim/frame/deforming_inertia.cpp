@@ -71,7 +71,7 @@ void DeformingInertia::moments(const Eigen::VectorXd& q, const Eigen::VectorXd& 
   set_inertia(changes, moments);
 }
 
-/// Of the changes of P_ab.
+/// Sets the inertia from the changes of P_ab.
 void DeformingInertia::set_inertia(const Eigen::Matrix<double, 6, 1>& changes, Moments& moments) const noexcept {
   const Eigen::Matrix<double, 6, 1> P = pairs_ + changes;
   const double trace = P[0] + P[1] + P[2];

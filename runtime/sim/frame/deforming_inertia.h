@@ -13,7 +13,7 @@ namespace exmat::runtime {
 /// the mass of the modes, the identity. Immutable; no call allocates or throws.
 class DeformingInertia {
  public:
-  /// What depends on q alone.
+  /// Moments that depend on q alone.
   struct Moments {
     Eigen::Index modes = 0;
     AlignedArray products;    ///< S_ab q of the six symmetric S_ab, and H^T: rotation_products()
@@ -61,7 +61,7 @@ class DeformingInertia {
   /// True if the Hessian c_v^2 I + ... is to have what the centrifugal force takes from it: where that is neither so
   /// much that it could leave it indefinite nor too little to change an iteration.
   static bool softens(const Eigen::Vector3d& spin, double velocity_factor) noexcept;
-  /// What it takes, where it does.
+  /// Adds what the centrifugal force takes, if softens().
   void add_softening(const Eigen::Vector3d& spin, double velocity_factor, Eigen::MatrixXd& hessian) const noexcept;
 
   /// Those of one body, and the constants of those of several.

@@ -7,7 +7,7 @@
 
 namespace exmat::runtime {
 
-/// Where a free body is and how it moves: x = c + R (X + U q). World frame unless it says body frame. The momenta are
+/// Pose and momenta of a free body: x = c + R (X + U q). World frame unless it says body frame. The momenta are
 /// what it carries; spin and velocities follow from them.
 struct FreeState {
   double mass = 0;                                                  ///< [kg]
@@ -61,7 +61,7 @@ struct FreeMotionWorkspace {
 /// implicit Euler instead of implicit midpoint.
 void begin_rotation(const FreeState& body, double time_step, bool dissipative, FreeMotionWorkspace& workspace) noexcept;
 
-/// Where the body turns too far in the step for begin_rotation()'s problem: gives it the turn that a rigid body of its
+/// For a body that turns too far in the step for begin_rotation()'s problem: gives it the turn that a rigid body of its
 /// shape and motion at the beginning makes, by implicit Euler in sub-steps of at most 0.3 rad or a thousandth of the
 /// step. Keeps L exactly, and the energy of a rigid body from growing. The spin then follows from L in that frame.
 void turn_rigidly(const DeformingInertia& frame, const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step,

@@ -6,7 +6,7 @@
 
 namespace exmat::runtime {
 
-/// Where a rigid frame is at a time. The orientation is a unit quaternion.
+/// Pose of a rigid frame at a time. The orientation is a unit quaternion.
 struct Keyframe {
   double time = 0;                                                  ///< [s]
   Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of the frame's origin, world [m]

@@ -5,7 +5,7 @@
 
 namespace exmat::runtime {
 
-/// Where the frame of a body stands: x = position + rotation (X + u - origin), with X + u the body in the world as its
+/// Placement of a body's frame: x = position + rotation (X + u - origin), with X + u the body in the world as its
 /// rest mesh and its deformation place it.
 struct Placement {
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();        ///< of the frame at rest, world [m]
@@ -17,7 +17,7 @@ struct Placement {
   }
 };
 
-/// How a frame moves: its material point at x has the velocity linear + angular x (x - position).
+/// Velocities of a frame: its material point at x has linear + angular x (x - position).
 struct FrameVelocity {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero();   ///< world [m/s]
   Eigen::Vector3d angular = Eigen::Vector3d::Zero();  ///< world [rad/s]

@@ -23,7 +23,7 @@ struct ScriptedForce {
   bool acts_at(double time) const noexcept { return start <= time && time < end; }
 };
 
-/// What acts on a body from outside, but for what it touches and what its host applies.
+/// Loads on a body from outside, except contacts and what its host applies.
 struct WorldLoads {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; moves a free body
   Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g

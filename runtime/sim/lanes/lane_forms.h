@@ -6,7 +6,7 @@
 
 namespace exmat::runtime {
 
-/// What a step of each of kLanes bodies of r modes begins with: poses, external forces, forms of the integrators and
+/// Start of a step of kLanes bodies of r modes: poses, external forces, forms of the integrators and
 /// damping. Sized once.
 struct LaneForms {
   LaneForms() = default;

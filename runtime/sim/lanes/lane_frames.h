@@ -23,7 +23,7 @@ class LaneFrames {
   /// Once the problems are set; velocities are c_v (q - q_v), numbers and vectors that stay.
   void begin(const LaneNumbers& velocity_factor, const LaneVectors& velocity_centre) noexcept;
 
-  // Of those that are chosen (not zero).
+  // Functions of the lanes that are chosen (not zero).
 
   /// `gradient` [r] = minus the forces at q; 1 where a frame has a motion for it, else 0.
   LaneNumbers update(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& q,
@@ -33,7 +33,7 @@ class LaneFrames {
   void gyroscopic_products(std::span<Workspace* const> bodies, const LaneNumbers& chosen, const LaneVectors& x,
                            LaneVectors& products) noexcept;
 
-  /// What the end of a body's step is made of.
+  /// Hands a lane's results to the end of its body's step.
   void take(Eigen::Index lane, Workspace& body) const noexcept;
 
  private:

@@ -30,7 +30,7 @@ class LaneRotation {
   /// Its product with x [r], after add_stiffness().
   void gyroscopic_product(const LaneVectors& x, LaneVectors& product) noexcept;
 
-  /// Of the pose last given: what the end of a body's step is made of.
+  /// Hands the rotation at the pose last given to the end of a body's step.
   void take(Eigen::Index lane, FreeMotionWorkspace& body) const noexcept;
 
  private:

@@ -21,7 +21,7 @@ bool can_step_side_by_side(const Model& model, const StepScene& scene) noexcept;
 /// Scratch of bodies of one model, sized once. One per thread.
 class LaneWorkspace {
  public:
-  /// Of groups of up to `bodies` in [1, kLanes].
+  /// Memory for groups of up to `bodies` in [1, kLanes].
   LaneWorkspace(const Model& model, const StepScene& scene, std::size_t bodies = kLanes);
 
   /// Scratch of a lane whose body has none of its own: what its step left, as Workspace of step().

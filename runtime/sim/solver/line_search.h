@@ -23,7 +23,7 @@ inline constexpr int kHalvings = 30;            // at most, of one direction
 inline constexpr double kNearRounding = 1e-10;  // of a potential's magnitude: its terms may cancel
 inline constexpr double kRounding = 4 * std::numeric_limits<double>::epsilon();  // of a potential's magnitude
 
-/// Where a search begins, and which way it goes. All but the slope are referred to.
+/// Start and direction of a search. All but the slope are referred to.
 template <class Direction>
 struct SearchLine {
   const Eigen::VectorXd& x;
@@ -46,7 +46,7 @@ struct SearchLine {
   }
 };
 
-/// Where a search ends; of the size of x, and referred to.
+/// End of a search; of the size of x, and referred to.
 struct SearchEnd {
   Eigen::VectorXd& x;
   Eigen::VectorXd& gradient;

@@ -57,7 +57,7 @@ inline std::optional<NewtonStatus> reason_to_end(const NewtonReport& report, con
   return std::nullopt;
 }
 
-/// Of one size, allocated once.
+/// Memory of a solution of one size, allocated once.
 struct NewtonWorkspace {
   explicit NewtonWorkspace(Eigen::Index size = 0)
       : gradient(size),

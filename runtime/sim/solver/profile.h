@@ -11,7 +11,7 @@ enum class Stage { kWeights, kTarget, kInternalForce, kSolve, kContact, kOutput 
 inline constexpr std::array<std::string_view, 6> kStageNames{"weights", "target",  "internal_force",
                                                              "solve",   "contact", "output"};
 
-/// Of a step of a World; other: what is left of it.
+/// Stages of a step of a World; other: the rest of it.
 enum class WorldStage { kBroadPhase, kCandidates, kSingleBodies, kIslands, kOther };
 
 inline constexpr std::array<std::string_view, 5> kWorldStageNames{"broad_phase", "candidates", "single_bodies",
