@@ -9,10 +9,11 @@
 
 namespace exmat::precompute {
 
-/// What the bundle is to hold: of the scene if there is one, else of the asset's `needs`, else all that applies.
+/// Needs that the bundle is to serve: those of the scene if there is one, else of the asset's `needs`, else all that
+/// applies.
 Needs resolve_needs(const AssetConfig& asset, const std::optional<Needs>& scene_needs);
 
-/// What a scene asks of a region; nothing where it does not name it.
+/// Needs of a scene from a region; nothing where it does not name it.
 std::optional<RegionNeeds> needs_of_region(const Needs& needs, const std::string& name);
 
 /// Every region that the needs name is one of the asset's: throws InputError where it is not.

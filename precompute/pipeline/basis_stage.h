@@ -12,7 +12,7 @@
 
 namespace exmat::precompute {
 
-/// What is known of a body before it has a basis.
+/// Stages of a body before it has a basis.
 struct BodyStages {
   const AssetConfig& asset;
   const ObjectInput& object;
@@ -36,7 +36,7 @@ struct Motions {
   std::string reason;                    ///< whose loads they are
   std::optional<CubatureData> elements;  ///< of the body of many modes that ran them in place of the full space
 
-  /// Of the snapshots, those of the run of the very loads, which comes first.
+  /// Number of snapshots of the run of the very loads, which comes first.
   Eigen::Index own_columns() const { return loads.duration > 0 ? set.runs.chain_ends.front() : 0; }
 };
 
@@ -56,12 +56,12 @@ BasisChoice choose_basis(const BodyStages& stages, const ReducedModel& body, con
 /// Puts the basis into a model that has /object, with shape space, examples and targets in it.
 void put_basis(const BodyStages& stages, const Eigen::MatrixXd& basis, ReducedModel& model);
 
-/// How far the body of this cubature is from the full space in the held-out runs, with forces by its elements alone;
+/// Distance of the body with this cubature from the full space in the held-out runs, with forces by its elements alone;
 /// `model` has the basis.
 RollOut cubature_roll_out(const BodyStages& stages, const ReducedModel& model, const CubatureData& cubature,
                           const Motions& motions);
 
-/// How far the finished model is from the full space in the held-out runs.
+/// Distance of the finished model from the full space in the held-out runs.
 RollOut final_roll_out(const BodyStages& stages, const ReducedModel& model, const Motions& motions);
 
 }  // namespace exmat::precompute

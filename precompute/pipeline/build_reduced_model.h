@@ -15,7 +15,7 @@
 
 namespace exmat::precompute {
 
-/// What a build may take beside the asset.
+/// Options of a build beside the asset.
 struct BuildOptions {
   std::filesystem::path alignment_report{}, cache{};  ///< folders that it writes into; empty: none
   const SceneConfig* scene = nullptr;                 ///< whose loads basis and cubature may learn from

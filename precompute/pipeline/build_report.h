@@ -21,7 +21,7 @@ struct StageTime {
   std::int64_t peak_memory_bytes = 0;  ///< most that any rank had until the stage's end
 };
 
-/// What came of a run beside the model.
+/// Results of a run beside the model.
 struct BuildReport {
   std::vector<StageTime> stages;    ///< that ended, in order
   std::vector<LedgerEntry> ledger;  ///< groups in and out, and why; bytes are the writer's to fill in

@@ -10,7 +10,7 @@
 
 namespace exmat::precompute {
 
-/// How a run of `exmat-precompute bundle` went, as far as it came: what --report writes.
+/// Course of a run of `exmat-precompute bundle`, as far as it came, for --report.
 struct RunReport {
   std::string asset, bundle;
   std::string status = "failed";  ///< "done", "unchanged" (--if-changed) or "failed"

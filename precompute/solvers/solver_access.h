@@ -11,7 +11,7 @@
 
 namespace exmat::precompute {
 
-/// What a solver solves by.
+/// Method of a solver.
 enum class Means : std::int64_t {
   kMumps,      ///< factors in double
   kMixed,      ///< factors in single precision, on the leader alone

@@ -25,11 +25,12 @@ struct TrajectoryErrors {
   std::optional<double> rebound;       ///< of the velocity of the centre of mass after contact, where both had one
   std::size_t worst_frame = 0;         ///< where the distances of the headline are largest
 
-  /// What is chosen by: shape, where it is there, else position.
+  /// Error that points are chosen by: shape, where it is there, else position.
   const RelativeError& headline() const { return shape ? *shape : position; }
 };
 
-/// Of `frames` against those of the reference at the same times. `rest` [n x 3]; `mass` [n x n], weighted by density.
+/// Errors of `frames` against those of the reference at the same times. `rest` [n x 3]; `mass` [n x n], weighted by
+/// density.
 TrajectoryErrors trajectory_errors(const BodyFrames& frames, const BodyFrames& reference, const VertexArray& rest,
                                    const SparseMatrix& mass, bool free_body);
 

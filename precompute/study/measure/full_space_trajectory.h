@@ -20,8 +20,8 @@ namespace exmat::precompute {
 /// not before; without it nothing is left.
 class FullSpaceTrajectory {
  public:
-  /// Of a body of `data`, whose names and mesh it takes; both outlive the writer. `frames` will be appended. Throws
-  /// WorkError.
+  /// Opens the file for a body of `data`, whose names and mesh it takes; both outlive the writer. `frames` will be
+  /// appended. Throws WorkError.
   FullSpaceTrajectory(const std::filesystem::path& file, const SceneConfig& config, const ReducedModel& data,
                       const FullSpaceRun& body, std::int64_t frames);
   ~FullSpaceTrajectory();
@@ -49,7 +49,7 @@ class FullSpaceTrajectory {
   InvertedTets inverted_;
 };
 
-/// What came of a run in full space.
+/// Results of a run in full space.
 struct FullSpaceSummary {
   std::int64_t steps = 0, frames = 0, unconverged = 0;
   double step_seconds = 0, newton_iterations = 0;  ///< median, mean

@@ -7,7 +7,7 @@
 
 namespace exmat::precompute {
 
-/// How far a motion may be ahead or behind, of the duration.
+/// Largest lead or lag of a motion, of the duration.
 inline constexpr double kPhaseReach = 0.05;
 
 /// F distances |.|_M of each frame from the motion of the reference between `reach` [s] before and after it, which goes

@@ -5,7 +5,7 @@
 
 namespace exmat::precompute {
 
-/// How the centre of mass moves when a contact with obstacles is over.
+/// Motion of the centre of mass after a contact with obstacles.
 struct Rebound {
   double time = 0;                                     ///< [s] end of the first step without contact
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< then, world [m/s]

@@ -17,18 +17,19 @@ struct WorldFrame {
   VertexArray positions, velocities;
 };
 
-/// Of the reduced body of a bundle in a state of its frame; `data` with /object and /modal.
+/// World frame of a bundle's body in a state of its frame; `data` with /object and /modal, `full` of one that may step in
+/// full space.
 WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state,
                        const runtime::FullModel* full = nullptr);
 
-/// What came of a reduced run.
+/// Results of a reduced run.
 struct ReducedRun {
   BodyFrames frames;
   std::size_t modes = 0, elements = 0;  ///< r, s
   std::string internal_force, target;   ///< as the run took them: "polynomial", "cubature"; "table", "solve", "none"
 };
 
-/// How targets of a loaded scene are found.
+/// Source of a loaded scene's targets: table, solve or none.
 std::string target_of(const runtime::LoadedScene& loaded);
 
 /// Steps a scene that writes positions up to the last of `times`, each a multiple of its time step. Throws WorkError

@@ -10,7 +10,7 @@
 
 namespace exmat::precompute {
 
-/// How much is timed.
+/// Rounds and steps that are timed.
 struct TimingConfig {
   int rounds = 5;             ///< over all points; > 0
   std::int64_t steps = 2000;  ///< most of a point in a round, which ends after a quarter of a second; > 0
@@ -20,7 +20,7 @@ struct TimingConfig {
 inline constexpr std::array<std::string_view, 5> kTimedStages{"weights", "target", "internal_force", "solve",
                                                               "contact"};
 
-/// Of one step on one thread [s].
+/// Times of one step on one thread [s].
 struct StepTimes {
   double median = 0, p95 = 0;
   double interpolation = 0;                          ///< weights and target, median: t_interp of the paper's Table 2

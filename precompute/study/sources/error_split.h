@@ -9,7 +9,7 @@
 
 namespace exmat::precompute {
 
-/// What the full problem is replaced by on the way to a reduced motion, step by step.
+/// Approximations on the way from the full problem to a reduced motion, step by step.
 /// docs/error_metrics.md, "Errors by source".
 enum class ErrorSource { kTimeStep, kEigenfunctions, kAlignment, kTargets, kBasis, kCubature, kTable };
 
@@ -53,7 +53,7 @@ struct ChainMotion {
 ErrorSplit split_error(const std::vector<ChainMotion>& chain, const std::vector<ErrorPart>& others,
                        const VertexArray& rest, const SparseMatrix& mass, bool free_body);
 
-/// What a source's setting is in the point whose error was split.
+/// Settings of the sources in the point whose error was split.
 struct PointKnobs {
   int eigenfunctions = 0, basis_size = 0;
   std::size_t elements = 0;
@@ -65,7 +65,7 @@ struct PointKnobs {
 /// The sentence about the largest part.
 std::string advice_on(const ErrorSplit& split, const PointKnobs& knobs);
 
-/// What to turn where the part of a source is too large: names of settings.
+/// Names of the settings to turn if the part of a source is too large.
 std::string setting_of(ErrorSource source);
 
 }  // namespace exmat::precompute

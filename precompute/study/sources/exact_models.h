@@ -13,7 +13,7 @@
 
 namespace exmat::precompute {
 
-// What the motions between the full problem and a reduced one are made of: models in which some of the approximations
+// Models of the motions between the full problem and a reduced one, in which some of the approximations
 // are exact. Models are whole bundles.
 
 /// Throws InputError where the object of an asset has another mesh.

@@ -7,7 +7,7 @@
 
 namespace exmat::precompute {
 
-// What readers and programs are shown of a split; `headline` is "shape" or "position".
+// A split as text and JSON; `headline` is "shape" or "position".
 
 /// An <svg> element: the parts stacked, for all of the time and for its last tenth, the total marked on both.
 std::string split_svg(const ErrorSplit& split, const std::string& headline);

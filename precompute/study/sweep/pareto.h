@@ -6,13 +6,13 @@
 
 namespace exmat::precompute {
 
-/// What a choice weighs: both >= 0, smaller is better. One that is not finite is never chosen.
+/// Time and error that a choice weighs: both >= 0, smaller is better. One that is not finite is never chosen.
 struct Outcome {
   double error = 0;    ///< relative
   double seconds = 0;  ///< of a step
 };
 
-/// What a choice has to meet; absent: no limit.
+/// Limits of a choice; absent: none.
 struct Budget {
   std::optional<double> seconds;
   std::optional<double> error;
@@ -22,8 +22,8 @@ struct Budget {
 /// time, of equal ones the first.
 std::vector<std::size_t> pareto_front(const std::vector<Outcome>& outcomes);
 
-/// Of the outcomes that meet the budget the most accurate if it limits the time, else the fastest; nothing if none
-/// does.
+/// Chooses among the outcomes that meet the budget the most accurate if it limits the time, else the fastest; nothing
+/// if none does.
 std::optional<std::size_t> choose(const std::vector<Outcome>& outcomes, const Budget& budget);
 
 /// The outcome that exceeds the limits of the budget by the smallest factor; nothing if none is finite.

@@ -13,7 +13,7 @@
 
 namespace exmat::precompute {
 
-/// What came of one point of a study.
+/// Results of one point of a study.
 struct PointResult {
   PointSettings settings;
   std::string key, bundle, reference;  ///< names of its files

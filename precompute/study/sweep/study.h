@@ -59,7 +59,7 @@ struct StudyResult {
 
   std::size_t failures() const;  ///< points and sources of errors
 
-  /// What points are chosen by, TrajectoryErrors::headline(): "shape" or "position".
+  /// Error that points are chosen by, TrajectoryErrors::headline(): "shape" or "position".
   const char* headline() const { return free_body ? "shape" : "position"; }
   /// Null where it is not among the references.
   const ReferenceResult* reference_of(const PointResult& point) const;

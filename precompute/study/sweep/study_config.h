@@ -27,13 +27,13 @@ struct SweepConfig {
   std::vector<double> elastic_stiffness{};    ///< e, of elastic example forces
 };
 
-/// How the full space is integrated; absent: as the point.
+/// Integration of the full space; absent: as the point.
 struct ReferenceConfig {
   std::optional<double> time_step;  ///< [s]
   std::optional<std::string> integrator;
 };
 
-/// How the error of one point is split by its sources.
+/// Settings of the split of one point's error by its sources.
 struct SourcesConfig {
   std::optional<int> eigenfunctions;  ///< m of the full problem; absent: twice the point's, or the largest of the study
   int time_steps = 2;                 ///< of the full problem, for one of the point's; 1: that source is left out

@@ -40,7 +40,7 @@ struct PointPlan {
   std::optional<std::size_t> all_elements;  ///< the point with all elements to compare with
 };
 
-/// What the points of a study need, each once. Keys name the files of its folder.
+/// Bundles, references and runs that the points of a study need, each once. Keys name the files of its folder.
 struct StudyPlan {
   std::string inputs;  ///< hash of all files and of what is the same for all points
   TetMesh mesh;        ///< of the object

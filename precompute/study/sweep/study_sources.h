@@ -11,7 +11,7 @@
 
 namespace exmat::precompute {
 
-/// What the errors of a study's point are split by.
+/// Inputs of the split of a study's point.
 struct SourcesInput {
   const StudyConfig& config;  ///< with `sources`
   const AssetConfig& asset;

@@ -10,7 +10,7 @@
 
 namespace exmat::precompute {
 
-/// What came of a run of a scene of several bodies.
+/// Results of a run of a scene of several bodies.
 struct WorldRun {
   std::vector<std::string> names;            ///< of the bodies
   std::vector<std::size_t> kinds;            ///< of each, its place among the scene's "bodies"

@@ -13,7 +13,7 @@
 
 namespace exmat::precompute {
 
-/// What a motion of one body is off by, or of all.
+/// Errors of the motion of one body, or of all.
 struct WorldError {
   std::string name;  ///< of the body; "all": of all together
   RelativeError position, velocity;
@@ -21,7 +21,7 @@ struct WorldError {
   double energy = 0;
 };
 
-/// What came of one point of a study of several bodies.
+/// Results of one point of a study of several bodies.
 struct WorldPointResult {
   std::vector<PointSettings> settings;       ///< of each entry of the scene's bodies
   std::string key, failure;                  ///< empty: none, and the rest is there
