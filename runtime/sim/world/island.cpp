@@ -590,7 +590,10 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   }
   bool rest = true;
   for (WorldBody* const own : bodies) {
-    if (!own->full) own->report = own->step->report();
+    if (!own->full)
+      own->report = own->step->report();
+    else if (!own->state.q.allFinite() || !own->state.v.allFinite())  // by what limited the energy
+      own->report.status |= kStepNonFinite;
     if (newton.status == NewtonStatus::kStagnated) own->report.status |= kStepStagnated;
     rest = rests(own->model, own->scene, own->report, own->state) && rest;
   }

@@ -29,7 +29,9 @@ struct Together {
     return momenta.total.angular - (centre - momenta.about).cross(momenta.total.linear);
   }
   FrameVelocity motion_of(const IslandMomenta& momenta) const {
-    return {momenta.total.linear / mass, inertia.inverse() * angular_momentum(momenta)};
+    FrameVelocity motion{momenta.total.linear / mass, inertia.inverse() * angular_momentum(momenta)};
+    if (!motion.angular.allFinite()) motion.angular.setZero();  // the inertia overflows: they are too far apart to turn
+    return motion;
   }
   /// Of the rigid motion that has these momenta: no other has less.
   double energy_of(const IslandMomenta& momenta) const {

@@ -64,7 +64,7 @@ struct Meeting {
   void run(int steps) {
     for (int i = 0; i < steps; ++i) {
       const runtime::WorldReport report = world.step(1);
-      for (int k = 0; k < 2; ++k) ASSERT_EQ(world.report(k).status & runtime::kStepNonFinite, 0U) << i << " body " << k << " full " << states[k].full.has_value() << " islands " << report.islands << " q " << states[k].q.norm()<<" f "<<states[k].applied_force.norm();
+      for (int k = 0; k < 2; ++k) ASSERT_EQ(world.report(k).status & runtime::kStepNonFinite, 0U) << i;
       // Where nothing pushes, forces are those of rounding, which no solution is above.
       if (world.report(0).contacts > 0) unconverged += report.unconverged_islands;
       touching += report.touching_pairs;
@@ -150,7 +150,7 @@ TEST_P(FullMeetings, MeetAsByRungeAndKuttaToTheOrderOfTheStep) {
 
 // The harder one is pushed, and only one may be in full space; the other takes its place when it is let go.
 TEST(FullBodies, AsManyAsMayStepInAllVerticesDo) {
-  Meeting meeting({Space::kAuto, Space::kAuto}, {}, 1e-3);
+  Meeting meeting({Space::kAuto, Space::kAuto}, {.stiffness = 3e6}, 1e-3);
   for (runtime::StepScene& scene : meeting.scenes) scene.space.release = 0.01;
   meeting.start(kHeadOn);
   meeting.world.set_full_bodies(1);

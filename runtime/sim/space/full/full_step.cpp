@@ -498,11 +498,6 @@ void FullStep::add_motion(double share, const FrameVelocity& added) noexcept {
 const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   if (status_ == NewtonStatus::kIterationLimit) report_.status |= kStepIterationLimit;
   if (status_ == NewtonStatus::kStagnated) report_.status |= kStepStagnated;
-  if (status_ == NewtonStatus::kNonFinite || !workspace_.d.allFinite() || !std::isfinite(potential_.elastic_energy())) {
-    report_.status |= kStepNonFinite;
-    return report_;
-  }
-  const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
   double energy = 0;
   Eigen::VectorXd& d = workspace_.moved;
   space_.from_field(workspace_.d, d);
@@ -510,6 +505,14 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   const StepForm& form = workspace_.form;
   workspace_.rate = form.velocity_factor * (d + (state_.q - form.velocity_centre));
   workspace_.acceleration = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
+  // Squares leave room for what is made of these numbers.
+  double size = workspace_.rate.squaredNorm() + others.linear.squaredNorm() + others.angular.squaredNorm();
+  if (near_) size += contacts_.found->force.squaredNorm() + contacts_.found->torque.squaredNorm();
+  if (status_ == NewtonStatus::kNonFinite || !d.allFinite() || !std::isfinite(size + potential_.elastic_energy())) {
+    report_.status |= kStepNonFinite;
+    return report_;
+  }
+  const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
   const double elastic = potential_.elastic_energy();
   if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_).total();
   state_.q_previous = state_.q;

@@ -64,18 +64,23 @@ inline ContactLaw law_of(const Meeting& meeting) {
                         : ContactLaw{meeting.stiffness, 0, 0};
 }
 
+/// So many of the bodies step in all vertices.
+inline void put_in_full_space(const MeetingBlocks& blocks, int count, std::vector<WorldBodyStart>& bodies) {
+  for (int i = 0; i < count; ++i) {
+    auto& [kind, state] = bodies[static_cast<std::size_t>(i)];
+    kind.scene = &blocks.full_scene;
+    kind.full = blocks.full.get();
+    prepare_full(*blocks.full, state);
+  }
+}
+
 inline World meeting_world(const MeetingBlocks& blocks, const Meeting& meeting) {
   const auto& [offset, angle] = kMeetingStarts[static_cast<std::size_t>(meeting.start)];
   const Eigen::Quaterniond turn(Eigen::AngleAxisd(angle, Eigen::Vector3d(1, 2, 0.5).normalized()));
   std::vector<WorldBodyStart> bodies;
   bodies.push_back(blocks.body({0, 0, 0}, {meeting.speed, 0, 0}));
   bodies.push_back(blocks.body(offset, {-meeting.speed, 0, 0}, Eigen::Vector3d::Zero(), turn));
-  for (int i = 0; i < meeting.full; ++i) {
-    auto& [kind, state] = bodies[static_cast<std::size_t>(i)];
-    kind.scene = &blocks.full_scene;
-    kind.full = blocks.full.get();
-    prepare_full(*blocks.full, state);
-  }
+  put_in_full_space(blocks, meeting.full, bodies);
   return World(std::move(bodies), law_of(meeting));
 }
 

@@ -99,11 +99,14 @@ TEST(Meetings, APileOfSoftBodiesGainsNoEnergy) {
 // Whatever they are given, a step is finite or says that it is not.
 TEST(Meetings, WhatOverflowsIsReported) {
   for (const double speed : {1e10, 1e150, 1e306, 1e308})
-    for (const double stiffness : {5e-324, 1e7, 1e300}) {
-      SCOPED_TRACE(testing::Message() << speed << " m/s, " << stiffness << " N/m^3");
-      const test::Blocks blocks(1e-3);
-      World world({blocks.body({0, 0, 0}, {speed, 0, 0}), blocks.body({0.45, 0.02, 0}), blocks.body({0, 0.15, 0.05})},
-                  {stiffness, 0, 0.5});
+    for (const auto& [stiffness, full] : {std::pair(5e-324, 0), std::pair(1e7, 0), std::pair(1e300, 0),
+                                          std::pair(5e-324, 2), std::pair(1e7, 1), std::pair(1e300, 3)}) {
+      SCOPED_TRACE(testing::Message() << speed << " m/s, " << stiffness << " N/m^3, " << full << " in full space");
+      const test::MeetingBlocks blocks(1e-3, test::Blocks::free_block());
+      std::vector<WorldBodyStart> bodies{blocks.body({0, 0, 0}, {speed, 0, 0}), blocks.body({0.45, 0.02, 0}),
+                                         blocks.body({0, 0.15, 0.05})};
+      test::put_in_full_space(blocks, full, bodies);
+      World world(std::move(bodies), {stiffness, 0, 0.5});
       for (int i = 0; i < 3; ++i) {
         world.step(1);
         for (int body = 0; body < world.count(); ++body) {
