@@ -17,8 +17,8 @@ struct WorldFrame {
   VertexArray positions, velocities;
 };
 
-/// World frame of a bundle's body in a state of its frame; `data` with /object and /modal, `full` of one that may step in
-/// full space.
+/// World frame of a bundle's body in a state of its frame; `data` with /object and /modal, `full` of a body that may
+/// step in full space.
 WorldFrame world_frame(const ReducedModel& data, const runtime::BodyFrame& frame, const runtime::State& state,
                        const runtime::FullModel* full = nullptr);
 
