@@ -36,11 +36,12 @@ SurfaceContacts::SurfaceContacts(const runtime::ContactLaw& law, MovingSurface& 
     : contact_(law), a_(a), b_(b) {
   runtime::NearVertices near;
   contact_.gather(a.touching(), b.touching(), {time_step, margin, anew, held, b.shape(), near}, candidates_);
-  for (const runtime::BodyCandidate& candidate : candidates_.all) {
+  for (std::size_t i = 0; i < candidates_.all.size(); ++i) {
+    const auto& [triangle, shares] = candidates_.places[i];
     Place& place = places_.emplace_back();
-    place.vertex = a.object_vertex(candidate.vertex);
-    place.shares = candidate.shares;
-    for (int c = 0; c < 3; ++c) place.corners[static_cast<std::size_t>(c)] = b.corner(candidate.triangle, c);
+    place.vertex = a.object_vertex(candidates_.all[i].vertex);
+    place.shares = shares;
+    for (int c = 0; c < 3; ++c) place.corners[static_cast<std::size_t>(c)] = b.corner(triangle, c);
   }
 }
 

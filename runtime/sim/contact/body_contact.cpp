@@ -153,8 +153,8 @@ struct Gathering {
     append_rows(candidates, b.pose.q.size());
     const auto set_place = [&](const SurfaceHit& found) {
       candidate.rest = b.touching.surface.rest_of(found);
-      candidate.triangle = found.triangle;
-      candidate.shares = found.barycentric;
+      candidates.places.resize(std::max(candidates.places.size(), candidates.all.size()));
+      candidates.places[index] = {found.triangle, found.barycentric};
       b.touching.surface.basis_of(found, candidates.rows(index));
       return candidates.surface_arm(index, b.pose);
     };

@@ -26,14 +26,19 @@ struct HeldBodyContact {
 struct BodyCandidate : ContactCandidate {
   Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< of y, frame of the other body [m]
   Eigen::Vector3d surface_arm = Eigen::Vector3d::Zero();  ///< y - position of the other body [m]; last evaluation
-  int triangle = 0;                                       ///< of the surface that y is on
-  Eigen::Vector3d shares = Eigen::Vector3d::Zero();       ///< of its corners in y
+};
+
+/// The triangle of the other body's surface that y is on, and the shares of its corners in it.
+struct SurfacePlace {
+  int triangle = 0;
+  Eigen::Vector3d shares = Eigen::Vector3d::Zero();
 };
 
 /// Candidates of a pair of bodies, one's vertices against the other's surface. Grows where more are met than before.
 struct BodyCandidates {
   std::vector<BodyCandidate> all;
-  RowMatrix basis;  ///< 3 of `all` x r and more, rows of the basis at each y
+  std::vector<SurfacePlace> places;  ///< of their y; at least as many
+  RowMatrix basis;                   ///< 3 of `all` x r and more, rows of the basis at each y
   /// The poses of the first evaluation after gather(), a's and b's, which clearances are about.
   bool has_first = false;
   std::array<Placement, 2> first{};

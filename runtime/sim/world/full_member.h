@@ -92,10 +92,9 @@ struct FullSide {
     return member.position(surface.touching().set.object_vertex(vertex)) - placement.position;
   }
   Eigen::Vector3d surface_arm(const BodyCandidates& candidates, std::size_t i) const noexcept {
-    const BodyCandidate& candidate = candidates.all[i];
+    const SurfacePlace& place = candidates.places[i];
     Eigen::Vector3d sum = -placement.position;
-    for (int c = 0; c < 3; ++c)
-      sum += candidate.shares[c] * member.position(surface.object_corner(candidate.triangle, c));
+    for (int c = 0; c < 3; ++c) sum += place.shares[c] * member.position(surface.object_corner(place.triangle, c));
     return sum;
   }
   void add_force(const BodyCandidate&, ContactSums&) const noexcept {}

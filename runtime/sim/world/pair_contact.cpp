@@ -200,9 +200,11 @@ void PairContact::for_full(int side, const WorldBody& own, const Work& work) con
   const auto at = static_cast<std::size_t>(side);
   for (const BodyCandidate& candidate : candidates_[at].all)
     if (candidate.is_loaded()) work(candidate, member.place(surface.touching().set.object_vertex(candidate.vertex)), 1);
-  for (const BodyCandidate& candidate : candidates_[1 - at].all)
-    for (int c = 0; c < (candidate.is_loaded() ? 3 : 0); ++c)
-      work(candidate, member.place(surface.object_corner(candidate.triangle, c)), -candidate.shares[c]);
+  const BodyCandidates& others = candidates_[1 - at];
+  for (std::size_t i = 0; i < others.all.size(); ++i)
+    for (int c = 0; c < (others.all[i].is_loaded() ? 3 : 0); ++c)
+      work(others.all[i], member.place(surface.object_corner(others.places[i].triangle, c)),
+           -others.places[i].shares[c]);
 }
 
 double PairContact::add_forces(int side, WorldBody& own) const {
@@ -230,13 +232,12 @@ Eigen::Vector3d PairContact::vertex_way(const WorldBody& own, const BodyCandidat
   return place < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(x.segment<3>(4 * place));
 }
 
-Eigen::Vector3d PairContact::surface_way(const WorldBody& other, const BodyCandidate& candidate,
+Eigen::Vector3d PairContact::surface_way(const WorldBody& other, const SurfacePlace& on,
                                          const Eigen::Ref<const Eigen::VectorXd>& x) {
   Eigen::Vector3d way = Eigen::Vector3d::Zero();
   for (int c = 0; c < 3; ++c)
-    if (const std::int32_t place = other.full->place(other.full->surface().object_corner(candidate.triangle, c));
-        place >= 0)
-      way += candidate.shares[c] * x.segment<3>(4 * place);
+    if (const std::int32_t place = other.full->place(other.full->surface().object_corner(on.triangle, c)); place >= 0)
+      way += on.shares[c] * x.segment<3>(4 * place);
   return way;
 }
 
@@ -250,10 +251,11 @@ void PairContact::add_product(int side, const WorldBody& first, const Eigen::Ref
     for (Eigen::Index k = 0; k < used_[at]; ++k) {
       const auto& [direction, number] = directions_[at][static_cast<std::size_t>(k)];
       const BodyCandidate& candidate = candidates_[at].all[number];
+      const SurfacePlace& on = candidates_[at].places[number];
       const double way_own =
           own.full ? direction.dot(vertex_way(own, candidate, x_own)) : own_columns_[at].col(k).dot(x_own);
       const double way_other =
-          other.full ? direction.dot(surface_way(other, candidate, x_other)) : other_columns_[at].col(k).dot(x_other);
+          other.full ? direction.dot(surface_way(other, on, x_other)) : other_columns_[at].col(k).dot(x_other);
       const WorldBody& body = is_own ? own : other;
       if (!body.full) {  // what its own way does is in its Hessian
         if (is_own)
@@ -270,8 +272,8 @@ void PairContact::add_product(int side, const WorldBody& first, const Eigen::Ref
         continue;
       }
       for (int c = 0; c < 3; ++c)
-        if (const std::int32_t place = member.place(member.surface().object_corner(candidate.triangle, c)); place >= 0)
-          product.segment<3>(4 * place) -= candidate.shares[c] * force;
+        if (const std::int32_t place = member.place(member.surface().object_corner(on.triangle, c)); place >= 0)
+          product.segment<3>(4 * place) -= on.shares[c] * force;
     }
   }
 }

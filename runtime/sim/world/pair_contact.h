@@ -119,7 +119,7 @@ class PairContact {
   /// How far `x` moves the vertex of a candidate, and the point of the surface, of a body in full space.
   static Eigen::Vector3d vertex_way(const WorldBody& own, const BodyCandidate& candidate,
                                     const Eigen::Ref<const Eigen::VectorXd>& x);
-  static Eigen::Vector3d surface_way(const WorldBody& other, const BodyCandidate& candidate,
+  static Eigen::Vector3d surface_way(const WorldBody& other, const SurfacePlace& on,
                                      const Eigen::Ref<const Eigen::VectorXd>& x);
   /// How far vertices of one and the surface of the other may have gone from where they were at the first evaluation
   /// [m].
