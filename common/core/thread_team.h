@@ -17,7 +17,7 @@ struct SharedLoop {
 /// child of fork() has threads of its own.
 void run_shared(const SharedLoop& loop) noexcept;
 
-/// How many this process may run on at once, at least 1.
+/// Number of processors that this process may run on at once, at least 1.
 int processor_count() noexcept;
 
 /// Calls work(i, thread) for i < count, each once, likewise. One thread alone costs nothing.

@@ -27,10 +27,10 @@ double bounding_box_diagonal(const VertexArray& vertices);
 /// Its longest edge [m].
 double longest_box_edge(const VertexArray& vertices);
 
-/// What places near `place` are measured from, in whole metres: 0 where single precision moves them by less than 1e-5
+/// Origin of places near `place`, in whole metres: 0 where single precision moves them by less than 1e-5
 /// of `size` [m] from there, else a place beside them.
 Eigen::Vector3d origin_near(const Eigen::Vector3d& place, double size);
-/// Of vertices that are drawn.
+/// Origin of vertices that are drawn.
 Eigen::Vector3d origin_near(const VertexArray& vertices);
 
 /// n_f x 3 outward-oriented boundary triangles, in the order of their tets.

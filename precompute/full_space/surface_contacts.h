@@ -25,7 +25,7 @@ class MovingSurface {
   const runtime::Placement& placement() const { return placement_; }
   const Eigen::AlignedBox3d& box() const { return box_; }  ///< about it, world [m]
   double speed() const { return surface_.speed(); }        ///< of its fastest vertex [m/s]
-  std::int32_t object_vertex(int vertex) const { return touching().set.object_vertex(vertex); }
+  std::int32_t object_vertex(int vertex) const { return surface_.object_vertex(vertex); }
   std::int32_t corner(int triangle, int c) const { return surface_.object_corner(triangle, c); }
 
  private:
@@ -34,7 +34,7 @@ class MovingSurface {
   Eigen::AlignedBox3d box_;
 };
 
-/// What vertices that are inside another body remember.
+/// Memory of the vertices that are inside another body.
 using HeldVertices = std::vector<runtime::HeldBodyContact>;
 
 /// Contact of the vertices of one body, a, with the surface of another, b, in one step: candidates, normals and nearest

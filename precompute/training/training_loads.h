@@ -69,8 +69,8 @@ struct TrainingPlan {
 TrainingPlan plan_training(const TrainingConfig& config, const SceneConfig* scene,
                            const std::vector<std::vector<std::int64_t>>& forces, const TrainingBody& body);
 
-/// How much stronger or weaker than TrainingLoads::examples the runs' are at most, as a logarithm, and how far their
-/// bias is from theirs.
+/// Largest logarithm of the ratio of the runs' stiffness to that of TrainingLoads::examples, either way, and largest
+/// difference of their bias.
 constexpr double stiffness_spread(const TrainingLoads& loads) { return loads.any_stiffness ? 2.0 : 0.7; }
 inline constexpr double kBiasSpread = 0.3;
 

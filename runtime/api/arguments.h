@@ -32,8 +32,8 @@ inline bool all_finite(const double* numbers, std::int64_t count) {
   return std::all_of(numbers, numbers + count, [](double number) { return std::isfinite(number); });
 }
 
-/// Of places [m] and velocities [m/s] that a caller gives: their squares are finite, and places fit into single
-/// precision.
+/// Largest number in places [m] and velocities [m/s] that a caller gives: squares are finite, and places fit into
+/// single precision.
 inline constexpr double kFarthest = 1e30;
 
 /// The first of `count` numbers that is not finite or farther than that; null: none.

@@ -30,7 +30,8 @@ struct DrawnBody {
   std::optional<BodyMotion> motion;  ///< at the same times as the others
 };
 
-/// What bodies are placed from, since animations are in single precision: origin_near() of where the first one begins.
+/// Origin that bodies are placed from, since animations are in single precision: origin_near() of where the first one
+/// begins.
 Eigen::Vector3d origin_of(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies);
 
 /// Writes surfaces with morph targets as binary glTF 2.0, in single precision: a mesh for each kind, a node for each

@@ -26,7 +26,7 @@ class TrajectoryReader {
   bool has(const std::string& dataset) const { return file_.has_dataset(group_ + dataset); }
   /// An attribute of the run, or of the body; empty where the trajectory is older than it.
   std::string text(const std::string& attribute) const;
-  /// What positions are measured from [m].
+  /// Point that positions are measured from [m].
   Eigen::Vector3d origin() const;
   /// All rows of a dataset of numbers, F x columns.
   RowMatrix read(const std::string& dataset);

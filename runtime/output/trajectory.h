@@ -96,7 +96,7 @@ class TrajectoryWriter {
   void finish();
 
   std::size_t bodies() const { return frames_.size(); }
-  /// What positions are measured from, once there is a frame [m].
+  /// Point that positions are measured from, once there is a frame [m].
   Eigen::Vector3d origin() const { return origin_.value_or(Eigen::Vector3d::Zero()); }
   /// Largest displacement of a vertex in the frames so far [m].
   double largest_displacement() const;

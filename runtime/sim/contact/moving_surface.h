@@ -31,6 +31,7 @@ class MovingSurface {
   TouchingBody touching() const { return {set_, touching_, {placement_, q_}, {{}, v_}}; }
   SurfaceShape& shape() noexcept { return shape_; }
   const BodySurface& surface() const noexcept { return touching_.surface; }
+  int object_vertex(int vertex) const noexcept { return set_.object_vertex(vertex); }
   int object_corner(int triangle, int c) const noexcept {
     return surface().object_vertex(surface().corner(triangle, c));
   }

@@ -45,9 +45,24 @@ class FullMember {
     const std::int32_t place = full_.space.place(object_vertex);
     return place < 0 ? rest : rest + Eigen::Map<const Eigen::Vector3d>(own_.potential.x.data() + 4 * place);
   }
-  /// In fields, -1 of a vertex that does not move freely.
-  std::int32_t place(int object_vertex) const noexcept {
-    return full_.space.number(object_vertex) < 0 ? -1 : full_.space.place(object_vertex);
+  /// Calls work(place, share) with the place in fields of the candidate's vertex, or with those of the corners around y
+  /// and less their shares; of vertices that move freely.
+  template <class Work>
+  void for_places(const BodyCandidates& candidates, std::size_t i, bool is_vertex, const Work& work) const {
+    const auto take = [&](int object_vertex, double share) {
+      if (full_.space.number(object_vertex) >= 0 && share != 0) work(full_.space.place(object_vertex), share);
+    };
+    if (is_vertex) return take(surface_.object_vertex(candidates.all[i].vertex), 1);
+    const SurfacePlace& on = candidates.places[i];
+    for (int c = 0; c < 3; ++c) take(surface_.object_corner(on.triangle, c), -on.shares[c]);
+  }
+  /// How far a field moves them.
+  Eigen::Vector3d way(const BodyCandidates& candidates, std::size_t i, bool is_vertex,
+                      const Eigen::Ref<const Eigen::VectorXd>& x) const {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for_places(candidates, i, is_vertex,
+               [&](std::int32_t place, double share) { sum += share * x.segment<3>(4 * place); });
+    return sum;
   }
   /// How far rounding may put a vertex, over kGapRounding [m].
   double reach() const noexcept { return full_.space.extent() + state_.full->q.lpNorm<Eigen::Infinity>(); }
@@ -89,7 +104,7 @@ struct FullSide {
 
   const Eigen::Vector3d& position() const noexcept { return placement.position; }
   Eigen::Vector3d arm(int vertex) const noexcept {
-    return member.position(surface.touching().set.object_vertex(vertex)) - placement.position;
+    return member.position(surface.object_vertex(vertex)) - placement.position;
   }
   Eigen::Vector3d surface_arm(const BodyCandidates& candidates, std::size_t i) const noexcept {
     const SurfacePlace& place = candidates.places[i];

@@ -258,24 +258,28 @@ void IslandProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
 }
 
 void IslandProblem::multiply(const Eigen::VectorXd& x, Eigen::VectorXd& product) const noexcept {
+  const auto of = [&x](const WorldBody& own) { return x.segment(own.offset, own.unknowns()); };
+  const auto in_full_space = [this](const PairContact& pair) { return first(pair).full || second(pair).full; };
+  if (has_full_)
+    for_all(pairs_.size(), threads_, [&](std::size_t p) {
+      PairContact& pair = *pairs_[p];
+      if (in_full_space(pair)) pair.set_ways(first(pair), of(first(pair)), second(pair), of(second(pair)));
+    });
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     const WorldBody& own = body(i);
     auto part = product.segment(own.offset, own.unknowns());
     if (own.full)
-      own.full->multiply(x.segment(own.offset, own.unknowns()), part);
+      own.full->multiply(of(own), part);
     else
-      part.noalias() =
-          own.near().newton.hessian.selfadjointView<Eigen::Lower>() * x.segment(own.offset, own.unknowns());
+      part.noalias() = own.near().newton.hessian.selfadjointView<Eigen::Lower>() * of(own);
     for (const auto& [index, side] : incidences_[i]) {
       const PairContact& pair = *pairs_[static_cast<std::size_t>(index)];
       if (pair.is_own()) continue;
-      const WorldBody& other = side == 0 ? second(pair) : first(pair);
-      if (own.full || other.full) {
-        const WorldBody &a = first(pair), &b = second(pair);
-        pair.add_product(side, a, x.segment(a.offset, a.unknowns()), b, x.segment(b.offset, b.unknowns()), part);
+      if (in_full_space(pair)) {
+        pair.add_product(side, own, part);
         continue;
       }
-      const auto theirs = x.segment(other.offset, other.unknowns());
+      const auto theirs = of(side == 0 ? second(pair) : first(pair));
       if (side == 0)
         part.noalias() += pair.coupling() * theirs;
       else
@@ -364,18 +368,20 @@ double refresh_friction(std::span<WorldBody* const> bodies, std::span<PairContac
   return change.relative();
 }
 
+/// Starts the elastic potential of a body: of a reduced one at q, of one in full space at its part of x.
+void start_at(WorldBody& own, const Eigen::VectorXd& x, const Eigen::VectorXd& q) noexcept {
+  if (own.full)
+    own.full->start(x.segment(own.offset, own.unknowns()), Tangent::kExact);
+  else
+    own.step->potential().start(q);
+}
+
 /// Minimises with friction as it follows, from workspace.x; that of the first round begins where the elastic potential
 /// was started.
 NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                       int threads, IslandWorkspace& workspace) noexcept {
   const auto restart = [&] {
-    for_all(bodies.size(), threads, [&](std::size_t i) {
-      WorldBody& own = *bodies[i];
-      if (own.full)
-        own.full->start(workspace.x.segment(own.offset, own.unknowns()), Tangent::kExact);
-      else
-        own.step->potential().start(own.near().q);
-    });
+    for_all(bodies.size(), threads, [&](std::size_t i) { start_at(*bodies[i], workspace.x, bodies[i]->near().q); });
   };
   const auto refresh = [&] { return refresh_friction(bodies, pairs); };
   return minimise_with_friction(problem, newton_of(bodies), workspace.x, workspace.newton, restart, refresh);
@@ -426,12 +432,7 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
     again = is_above_start(problem, bodies, workspace);
   if (again) {
     stay(bodies, workspace.x);
-    for (WorldBody* const own : bodies) {
-      if (own->full)
-        own->full->start(workspace.x.segment(own->offset, own->unknowns()), Tangent::kExact);
-      else
-        own->step->potential().start(own->state.q);
-    }
+    for (WorldBody* const own : bodies) start_at(*own, workspace.x, own->state.q);
     add(minimise(problem, bodies, pairs, threads, workspace), total);
     if (total.status == NewtonStatus::kConverged && is_above_start(problem, bodies, workspace))
       total.status = NewtonStatus::kStagnated;
@@ -543,7 +544,7 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
   const bool converged = newton.status == NewtonStatus::kConverged;
   begin_of(bodies, workspace.begin);
-  std::vector<FrameMomenta> from_others(bodies.size());  // of others, of bodies in full space
+  workspace.from_others.resize(bodies.size());
   const bool isolated = is_isolated(bodies, workspace.begin);
   for (std::size_t i = 0; i < bodies.size(); ++i) {
     WorldBody& own = *bodies[i];
@@ -562,7 +563,7 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
       others.linear += pair.sums(side).force;
     }
     others.angular = torque;
-    from_others[i] = others;
+    workspace.from_others[i] = others;
     if (!own.full) finish_contact(own.model, own.state, converged, torque, own.workspace);
   }
   for (std::size_t i = 0; i < bodies.size(); ++i) {
@@ -571,12 +572,13 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
       own.report = own.step->take(newton);
       continue;
     }
-    own.report = own.full->finish(newton.status, workspace.x.segment(own.offset, own.unknowns()), from_others[i]);
+    own.report =
+        own.full->finish(newton.status, workspace.x.segment(own.offset, own.unknowns()), workspace.from_others[i]);
     add_newton_report(newton, own.report);
     own.placement.rotation = own.model.frame->placement(own.state.frame).rotation;
     for (const auto& [index, side] : incidences[i])
       own.report.contacts += pairs[static_cast<std::size_t>(index)]->sums(side).touching;
-    own.report.contact_force += from_others[i].linear;
+    own.report.contact_force += workspace.from_others[i].linear;
   }
   const auto is_finite = [](const WorldBody* own) { return (own->report.status & kStepNonFinite) == 0; };
   if (std::ranges::all_of(bodies, is_finite)) {

@@ -20,6 +20,7 @@ struct IslandWorkspace {
   std::vector<Eigen::VectorXd> unknowns;         ///< of each body
   Eigen::VectorXd right;                         ///< of conjugate gradients, where bodies are in full space
   IslandBegin begin;
+  std::vector<FrameMomenta> from_others;  ///< force and torque of other bodies on each
 
   // Linear solutions.
   Eigen::MatrixXd dense;  ///< all unknowns of a small island, lower triangle

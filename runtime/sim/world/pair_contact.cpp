@@ -194,24 +194,20 @@ void PairContact::set_coupling(const WorldBody& first, const Eigen::VectorXd& x_
 }
 
 template <class Work>
-void PairContact::for_full(int side, const WorldBody& own, const Work& work) const {
-  const FullMember& member = *own.full;
-  const MovingSurface& surface = member.surface();
-  const auto at = static_cast<std::size_t>(side);
-  for (const BodyCandidate& candidate : candidates_[at].all)
-    if (candidate.is_loaded()) work(candidate, member.place(surface.touching().set.object_vertex(candidate.vertex)), 1);
-  const BodyCandidates& others = candidates_[1 - at];
-  for (std::size_t i = 0; i < others.all.size(); ++i)
-    for (int c = 0; c < (others.all[i].is_loaded() ? 3 : 0); ++c)
-      work(others.all[i], member.place(surface.object_corner(others.places[i].triangle, c)),
-           -others.places[i].shares[c]);
+void PairContact::for_full(int side, const FullMember& member, const Work& work) const {
+  for (const bool is_vertex : {true, false}) {
+    const BodyCandidates& candidates = candidates_[static_cast<std::size_t>(is_vertex ? side : 1 - side)];
+    for (std::size_t i = 0; i < candidates.all.size(); ++i)
+      if (candidates.all[i].is_loaded())
+        member.for_places(candidates, i, is_vertex,
+                          [&](std::int32_t place, double share) { work(candidates.all[i], place, share); });
+  }
 }
 
 double PairContact::add_forces(int side, WorldBody& own) const {
   double squares = 0;
   Eigen::VectorXd& gradient = own.full->gradient();
-  for_full(side, own, [&](const BodyCandidate& candidate, std::int32_t place, double share) {
-    if (place < 0) return;
+  for_full(side, *own.full, [&](const BodyCandidate& candidate, std::int32_t place, double share) {
     gradient.segment<3>(4 * place) -= share * candidate.force;
     squares += share * share * candidate.force.squaredNorm();
   });
@@ -219,61 +215,42 @@ double PairContact::add_forces(int side, WorldBody& own) const {
 }
 
 void PairContact::add_blocks(int side, WorldBody& own) const {
-  for_full(side, own, [&](const BodyCandidate& candidate, std::int32_t place, double share) {
-    if (place < 0 || share == 0) return;
+  for_full(side, *own.full, [&](const BodyCandidate& candidate, std::int32_t place, double share) {
     const StiffnessFactors factors(candidate);
     own.full->push(place, share * share * (factors.used() * factors.used().transpose()));
   });
 }
 
-Eigen::Vector3d PairContact::vertex_way(const WorldBody& own, const BodyCandidate& candidate,
-                                        const Eigen::Ref<const Eigen::VectorXd>& x) {
-  const std::int32_t place = own.full->place(own.full->surface().touching().set.object_vertex(candidate.vertex));
-  return place < 0 ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(x.segment<3>(4 * place));
-}
-
-Eigen::Vector3d PairContact::surface_way(const WorldBody& other, const SurfacePlace& on,
-                                         const Eigen::Ref<const Eigen::VectorXd>& x) {
-  Eigen::Vector3d way = Eigen::Vector3d::Zero();
-  for (int c = 0; c < 3; ++c)
-    if (const std::int32_t place = other.full->place(other.full->surface().object_corner(on.triangle, c)); place >= 0)
-      way += on.shares[c] * x.segment<3>(4 * place);
-  return way;
-}
-
-void PairContact::add_product(int side, const WorldBody& first, const Eigen::Ref<const Eigen::VectorXd>& x_first,
-                              const WorldBody& second, const Eigen::Ref<const Eigen::VectorXd>& x_second,
-                              Eigen::Ref<Eigen::VectorXd> product) const {
+void PairContact::set_ways(const WorldBody& first, const Eigen::Ref<const Eigen::VectorXd>& x_first,
+                           const WorldBody& second, const Eigen::Ref<const Eigen::VectorXd>& x_second) {
   for (std::size_t at = 0; at < 2; ++at) {
-    const bool is_first = at == 0, is_own = static_cast<int>(at) == side;
-    const WorldBody &own = is_first ? first : second, &other = is_first ? second : first;
-    const auto &x_own = is_first ? x_first : x_second, &x_other = is_first ? x_second : x_first;
+    const WorldBody &own = at == 0 ? first : second, &other = at == 0 ? second : first;
+    const auto &x_own = at == 0 ? x_first : x_second, &x_other = at == 0 ? x_second : x_first;
+    ways_[at].resize(2, used_[at]);
     for (Eigen::Index k = 0; k < used_[at]; ++k) {
       const auto& [direction, number] = directions_[at][static_cast<std::size_t>(k)];
-      const BodyCandidate& candidate = candidates_[at].all[number];
-      const SurfacePlace& on = candidates_[at].places[number];
-      const double way_own =
-          own.full ? direction.dot(vertex_way(own, candidate, x_own)) : own_columns_[at].col(k).dot(x_own);
-      const double way_other =
-          other.full ? direction.dot(surface_way(other, on, x_other)) : other_columns_[at].col(k).dot(x_other);
-      const WorldBody& body = is_own ? own : other;
-      if (!body.full) {  // what its own way does is in its Hessian
-        if (is_own)
-          product -= way_other * own_columns_[at].col(k);
-        else
-          product -= way_own * other_columns_[at].col(k);
-        continue;
-      }
-      const Eigen::Vector3d force = (way_own - way_other) * direction;
-      const FullMember& member = *body.full;
-      if (is_own) {
-        const std::int32_t place = member.place(member.surface().touching().set.object_vertex(candidate.vertex));
-        if (place >= 0) product.segment<3>(4 * place) += force;
-        continue;
-      }
-      for (int c = 0; c < 3; ++c)
-        if (const std::int32_t place = member.place(member.surface().object_corner(on.triangle, c)); place >= 0)
-          product.segment<3>(4 * place) -= on.shares[c] * force;
+      ways_[at](0, k) = own.full ? direction.dot(own.full->way(candidates_[at], number, /*is_vertex=*/true, x_own))
+                                 : own_columns_[at].col(k).dot(x_own);
+      ways_[at](1, k) = other.full
+                            ? direction.dot(other.full->way(candidates_[at], number, /*is_vertex=*/false, x_other))
+                            : -other_columns_[at].col(k).dot(x_other);
+    }
+  }
+}
+
+void PairContact::add_product(int side, const WorldBody& body, Eigen::Ref<Eigen::VectorXd> product) const {
+  for (std::size_t at = 0; at < 2; ++at) {
+    const bool is_vertex = static_cast<int>(at) == side;
+    if (!body.full) {  // what its own way does is in its Hessian
+      const auto own = (is_vertex ? own_columns_[at] : other_columns_[at]).leftCols(used_[at]);
+      product.noalias() += (is_vertex ? 1 : -1) * (own * ways_[at].row(is_vertex ? 1 : 0).transpose());
+      continue;
+    }
+    for (Eigen::Index k = 0; k < used_[at]; ++k) {
+      const auto& [direction, number] = directions_[at][static_cast<std::size_t>(k)];
+      const Eigen::Vector3d force = ways_[at].col(k).sum() * direction;
+      body.full->for_places(candidates_[at], number, is_vertex,
+                            [&](std::int32_t place, double share) { product.segment<3>(4 * place) += share * force; });
     }
   }
 }

@@ -91,11 +91,12 @@ class PairContact {
   double add_forces(int side, WorldBody& own) const;
   /// Adds what pushes the vertices of such a body to its blocks.
   void add_blocks(int side, WorldBody& own) const;
-  /// Adds to the product of the Hessian what the contacts make of `x` in the unknowns of a side's body, for a reduced
-  /// one of the other's x alone. After set_coupling().
-  void add_product(int side, const WorldBody& first, const Eigen::Ref<const Eigen::VectorXd>& x_first,
-                   const WorldBody& second, const Eigen::Ref<const Eigen::VectorXd>& x_second,
-                   Eigen::Ref<Eigen::VectorXd> product) const;
+  /// After set_coupling(): how far `x` moves the two along the columns, of each of them once for both.
+  void set_ways(const WorldBody& first, const Eigen::Ref<const Eigen::VectorXd>& x_first, const WorldBody& second,
+                const Eigen::Ref<const Eigen::VectorXd>& x_second);
+  /// After that: adds to the product of the Hessian with this x the part of a side's body; of a reduced one that of the
+  /// other's x alone.
+  void add_product(int side, const WorldBody& body, Eigen::Ref<Eigen::VectorXd> product) const;
 
   void refresh_friction(FrictionChange& change) noexcept;
 
@@ -114,13 +115,8 @@ class PairContact {
  private:
   /// Calls work(candidate, place, share) for each vertex of a side's body that a loaded candidate pushes.
   template <class Work>
-  void for_full(int side, const WorldBody& own, const Work& work) const;
+  void for_full(int side, const FullMember& member, const Work& work) const;
   void set_directions();
-  /// How far `x` moves the vertex of a candidate, and the point of the surface, of a body in full space.
-  static Eigen::Vector3d vertex_way(const WorldBody& own, const BodyCandidate& candidate,
-                                    const Eigen::Ref<const Eigen::VectorXd>& x);
-  static Eigen::Vector3d surface_way(const WorldBody& other, const SurfacePlace& on,
-                                     const Eigen::Ref<const Eigen::VectorXd>& x);
   /// How far vertices of one and the surface of the other may have gone from where they were at the first evaluation
   /// [m].
   double way_since_first(const WorldBody& first, const WorldBody& second) const noexcept;
@@ -144,7 +140,9 @@ class PairContact {
     Eigen::Vector3d direction;
     std::size_t candidate;
   };
-  std::array<std::vector<Direction>, 2> directions_;  // of the columns, where a body is in full space
+  // Where a body is in full space, of the columns: the directions, and the ways of the vertex and against it of y.
+  std::array<std::vector<Direction>, 2> directions_;
+  std::array<Eigen::Matrix2Xd, 2> ways_;
   Eigen::MatrixXd coupling_;
 };
 

@@ -218,7 +218,8 @@ void FullSpace::add_filter(const RowMatrix& filter) {
   // A translation of a free body is no deformation: W' = W - (M 1) (1^T W) / m.
   if (!clamped_ && functions_ > 0) {
     Eigen::Map<RowMatrix> W(filter_.data(), vertices(), stride_);
-    W -= masses() / masses().sum() * W.colwise().sum().eval();
+    const Eigen::VectorXd shares = masses();
+    W -= shares / shares.sum() * W.colwise().sum().eval();
   }
   rounded_filter_ = AlignedFloats(vertices() * stride_);
   std::copy_n(filter_.data(), vertices() * stride_, rounded_filter_.data());
