@@ -67,6 +67,7 @@ BundleSummary summarise_bundle(const std::filesystem::path& path) {
   }
   if (summary.has_targets) reader.read_attribute("/targets", "/targets", "energy_reference", summary.energy_reference);
   summary.render_vertices = value_of(sizes, "v");
+  summary.bones = value_of(sizes, "b");
   if (includes(groups, "regions"))
     for (const std::string& name : reader.region_names()) summary.regions.push_back(summarise_region(reader, name));
   return summary;

@@ -42,6 +42,7 @@ struct BundleSummary {
   bool knows_scene = false;                                      ///< its basis has learned from the loads of a scene
   std::vector<RegionSummary> regions;
   std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
+  std::int64_t bones = 0;            ///< of /skeleton, likewise
 };
 BundleSummary summarise_bundle(const std::filesystem::path& path);
 

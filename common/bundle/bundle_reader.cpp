@@ -237,6 +237,7 @@ void BundleReader::check_model(const ReducedModel& model) {
   attempt([&] { check_fixed_vertices(model); });
   if (model.targets) check_targets("/targets", *model.targets);
   if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
+  if (model.skeleton) attempt([&] { check_skeleton(*model.skeleton); });
   check_elements(model);
   for (const RegionData& region : model.regions) {
     const std::string path = "/regions/" + region.name;
@@ -327,6 +328,13 @@ void BundleReader::check_barycentric(const RowMatrix& rows) const {
   for (Eigen::Index k = 0; k < rows.rows(); ++k)
     if (std::abs(rows.row(k).sum() - 1) > kRounding * rows.row(k).cwiseAbs().sum())
       refuse(path, fmt::format("numbers that add up to 1 in row {}", k), fmt::format("{}", rows.row(k).sum()));
+}
+
+void BundleReader::check_skeleton(const SkeletonData& skeleton) const {
+  for (const char* path : {"/skeleton@bones", "/skeleton@animations", "/skeleton/parents", "/skeleton/bind",
+                           "/skeleton/weights", "/skeleton/first_frames", "/skeleton/times", "/skeleton/poses"})
+    if (!is_sound(path)) return;
+  if (const auto fault = skeleton_fault(skeleton)) refuse(fault->place, fault->expected, fault->found);
 }
 
 void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,

@@ -28,8 +28,10 @@ class FieldLister {
 
   template <typename T>
   void attribute(std::string_view name, const T& member) {
-    const bool is_text = std::holds_alternative<std::string>(to_attribute(member));
-    const bool is_integer = std::holds_alternative<std::int64_t>(to_attribute(member));
+    const AttributeValue value = to_attribute(member);
+    const bool is_text =
+        std::holds_alternative<std::string>(value) || std::holds_alternative<std::vector<std::string>>(value);
+    const bool is_integer = std::holds_alternative<std::int64_t>(value);
     types[group_ + "@" + std::string(name)] = is_text      ? ElementType::kString
                                               : is_integer ? ElementType::kInt64
                                                            : ElementType::kFloat64;
@@ -92,6 +94,8 @@ void add_group(ReducedModel& model, std::string_view group) {
     model.contact.emplace();
   else if (group == "render")
     model.render.emplace();
+  else if (group == "skeleton")
+    model.skeleton.emplace();
   else
     throw std::logic_error("no member of the model is bound to the group " + std::string(group));
 }

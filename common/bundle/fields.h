@@ -265,6 +265,19 @@ void visit_render(Render& render, Visitor& visit) {
   visit.dataset("triangles", render.triangles);
 }
 
+template <typename Skeleton, typename Visitor>
+void visit_skeleton(Skeleton& skeleton, Visitor& visit) {
+  enter(kTopPlace, "/skeleton", visit);
+  visit.attribute("bones", skeleton.bones);
+  visit.attribute("animations", skeleton.animations);
+  visit.dataset("parents", skeleton.parents);
+  visit.dataset("bind", skeleton.bind);
+  visit.dataset("weights", skeleton.weights);
+  visit.dataset("first_frames", skeleton.first_frames);
+  visit.dataset("times", skeleton.times);
+  visit.dataset("poses", skeleton.poses);
+}
+
 /// Visits the groups that the model holds, in bundle order. Model is ReducedModel or const ReducedModel.
 template <typename Model, typename Visitor>
 void visit_fields(Model& model, Visitor& visit) {
@@ -288,6 +301,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.rigid) visit_rigid(*model.rigid, visit);
   if (model.contact) visit_contact(*model.contact, visit);
   if (model.render) visit_render(*model.render, visit);
+  if (model.skeleton) visit_skeleton(*model.skeleton, visit);
 }
 
 /// Root attributes that are no members of the model; write_bundle and read_bundle know them by name.

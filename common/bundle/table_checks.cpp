@@ -1,5 +1,6 @@
 #include "common/bundle/table_checks.h"
 
+#include <Eigen/LU>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <string>
@@ -47,6 +48,40 @@ std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index
     return ValueFault{fmt::format("2 knots for {} examples", examples), fmt::format("{}", knots.size())};
   if (knots[0] != 0) return ValueFault{"0 at [0]", fmt::format("{}", knots[0])};
   if (knots[last] != 1) return ValueFault{fmt::format("1 at [{}]", last), fmt::format("{}", knots[last])};
+  return std::nullopt;
+}
+
+std::optional<PlacedFault> skeleton_fault(const SkeletonData& skeleton) {
+  constexpr double kRounding = 1e-9;
+  const Eigen::Index bones = skeleton.parents.size(), frames = skeleton.times.size();
+  if (std::ssize(skeleton.bones) != bones)
+    return PlacedFault{"/skeleton@bones", fmt::format("{} names", bones), std::to_string(skeleton.bones.size())};
+  for (Eigen::Index b = 0; b < bones; ++b) {
+    if (skeleton.parents[b] < -1 || skeleton.parents[b] >= b)
+      return PlacedFault{"/skeleton/parents", fmt::format("for bone {} a bone before it, or -1", b),
+                         std::to_string(skeleton.parents[b])};
+    if (!(std::abs(skeleton.bind.block<3, 3>(3 * b, 0).determinant()) > 0))
+      return PlacedFault{"/skeleton/bind", "axes of bones that can be inverted", fmt::format("others for bone {}", b)};
+  }
+  for (Eigen::Index v = 0; v < skeleton.weights.rows(); ++v)
+    if (std::abs(skeleton.weights.row(v).sum() - 1) > kRounding)
+      return PlacedFault{"/skeleton/weights", fmt::format("numbers that add up to 1 in row {}", v),
+                         fmt::format("{}", skeleton.weights.row(v).sum())};
+  const IndexVector& first = skeleton.first_frames;
+  if (first.size() != std::ssize(skeleton.animations) + 1)
+    return PlacedFault{"/skeleton@animations", fmt::format("{} names", first.size() - 1),
+                       std::to_string(skeleton.animations.size())};
+  const bool ascend = (first.head(first.size() - 1).array() < first.tail(first.size() - 1).array()).all();
+  if (!ascend || first[0] != 0 || first[first.size() - 1] != frames)
+    return PlacedFault{"/skeleton/first_frames", fmt::format("numbers that ascend from 0 to {}", frames), "others"};
+  for (Eigen::Index a = 0; a + 1 < first.size(); ++a)
+    for (Eigen::Index f = first[a]; f + 1 < first[a + 1]; ++f)
+      if (skeleton.times[f] >= skeleton.times[f + 1])
+        return PlacedFault{"/skeleton/times", "times that ascend in each animation", fmt::format("others at {}", f)};
+  for (Eigen::Index k = 0; k < skeleton.poses.rows(); ++k)
+    if (std::abs(skeleton.poses.row(k).tail(4).norm() - 1) > kRounding)
+      return PlacedFault{"/skeleton/poses", fmt::format("a unit quaternion in row {}", k),
+                         fmt::format("one of length {}", skeleton.poses.row(k).tail(4).norm())};
   return std::nullopt;
 }
 

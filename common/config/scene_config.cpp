@@ -81,6 +81,12 @@ BodyConfig read_body(const Json& json, const std::filesystem::path& file, const 
   if (json.contains("reduced")) body.reduced = read_numbers(json["reduced"]);
   if (json.contains("pose")) body.pose = PoseConfig{json["pose"]["example"], json["pose"].value("weight", 1.0)};
   body.motion = read_motion(member_or(json, "motion", Json::array()), file, place + "/motion");
+  if (json.contains("animation")) {
+    const Json& animation = json["animation"];
+    const AnimationConfig absent;
+    body.animation = AnimationConfig{animation["name"], animation.value("speed", absent.speed),
+                                     animation.value("loop", absent.loop), animation.value("start", absent.start)};
+  }
   return body;
 }
 
@@ -266,7 +272,7 @@ Needs needs_of(const SceneConfig& scene) {
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
               .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
-              .full_space = scene.space.space != Space::kReduced,
+              .full_space = scene.space.space != Space::kReduced || scene.body.animation,
               .contact = scene.meets_others || scene.meets_bodies || !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};

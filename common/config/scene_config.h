@@ -132,6 +132,13 @@ struct PoseConfig {
   double weight = 1;
 };
 
+struct AnimationConfig {
+  std::string name;
+  double speed = 1;
+  bool loop = true;
+  double start = 0;  ///< [s]
+};
+
 /// Start of a body, and what carries it. Position to velocities are a free body's, motion a constrained one's.
 struct BodyConfig {
   std::optional<Eigen::Vector3d> position;        ///< displacement of the centre of mass from rest [m]
@@ -139,7 +146,8 @@ struct BodyConfig {
   std::optional<Eigen::Vector3d> linear_velocity, angular_velocity;  ///< world [m/s], [rad/s]
   std::optional<Eigen::VectorXd> reduced;                            ///< q; this or pose, or neither
   std::optional<PoseConfig> pose;
-  std::vector<KeyframeConfig> motion;  ///< of the fixed vertices: x = position + orientation X, X the rest mesh
+  std::vector<KeyframeConfig> motion;        ///< of the fixed vertices: x = position + orientation X, X the rest mesh
+  std::optional<AnimationConfig> animation;  ///< of the bones of a body on a skeleton
 };
 
 /// SCENE.json after validation, paths resolved against its folder. schemas/scene.json.

@@ -26,10 +26,11 @@ LedgerEntry plan_target_elasticity(const Needs& needs, const LedgerEntry& exampl
   return {"target_elasticity", true, 0, "an elastic example force is asked for"};
 }
 
-LedgerEntry plan_full_space(const Needs& needs, const LedgerEntry& examples) {
-  if (!needs.full_space) return {"full_space", false, 0, "no steps in full space are asked for"};
+LedgerEntry plan_full_space(const Needs& needs, const LedgerEntry& examples, bool skeleton) {
+  if (!needs.full_space && !skeleton) return {"full_space", false, 0, "no steps in full space are asked for"};
   if (!examples.included) return {"full_space", false, 0, examples.reason + "; the mesh is enough"};
-  return {"full_space", true, 0, "steps in full space are asked for"};
+  return {"full_space", true, 0,
+          skeleton ? "a body on bones steps in full space" : "steps in full space are asked for"};
 }
 
 LedgerEntry plan_polynomial(const Needs& needs) {
@@ -55,7 +56,7 @@ LedgerEntry plan_render(const Needs& needs, bool render_mesh) {
 }  // namespace
 
 std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
-                                     std::int64_t region_count, bool render_mesh) {
+                                     std::int64_t region_count, bool render_mesh, bool skeleton) {
   const std::string example_reason = example_count == 0 && region_count > 0 ? "every example is of a region"
                                      : example_count == 0                   ? "the asset has no examples"
                                      : !needs.examples                      ? "no example force is asked for"
@@ -76,12 +77,13 @@ std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::
       plan_targets(needs, examples, example_count),
       plan_target_space(needs, examples),
       plan_target_elasticity(needs, examples),
-      plan_full_space(needs, examples),
+      plan_full_space(needs, examples, skeleton),
       {"fidelity", needs.fidelity, 0, needs.fidelity ? "runs in full space to compare with" : "nothing was trained on"},
       regions,
       {"rigid", rigid, 0, rigid_reason},
       {"contact", needs.contact, 0, needs.contact ? "contact is asked for" : "no contact is asked for"},
-      plan_render(needs, render_mesh)};
+      plan_render(needs, render_mesh),
+      {"skeleton", skeleton, 0, skeleton ? "the body hangs on bones" : "the object has no bones"}};
 }
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group) {

@@ -48,10 +48,10 @@ struct LedgerEntry {
 };
 
 /// One entry per group of the bundle, in bundle order, bytes 0, of an asset with so many examples of the whole body,
-/// the rest pose among them, so many regions and perhaps a render mesh. Both stages decide by this list alone.
-/// docs/overview.md.
+/// the rest pose among them, so many regions and perhaps a render mesh and a skeleton. Both stages decide by this list
+/// alone. docs/overview.md.
 std::vector<LedgerEntry> plan_groups(const Needs& needs, bool constrained, std::int64_t example_count,
-                                     std::int64_t region_count = 0, bool render_mesh = false);
+                                     std::int64_t region_count = 0, bool render_mesh = false, bool skeleton = false);
 
 bool includes(const std::vector<LedgerEntry>& ledger, std::string_view group);
 

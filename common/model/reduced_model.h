@@ -239,6 +239,18 @@ struct RenderData {
   double farthest = 0;       ///< distance of the farthest vertex from the body [m]
 };
 
+/// Group /skeleton: the bones that a body hangs on. docs/characters.md.
+struct SkeletonData {
+  std::vector<std::string> bones;       ///< b names, parents first
+  std::vector<std::string> animations;  ///< names
+  IndexVector parents;                  ///< b, -1 of a root
+  RowMatrix bind;                       ///< 3b x 4 (dataset b 3 4), bone to world where the mesh is at rest [1], [m]
+  RowMatrix weights;                    ///< n x b, >= 0, rows add up to 1
+  IndexVector first_frames;             ///< of each animation, and the end of the last
+  Eigen::VectorXd times;                ///< F, of the frames, ascending from 0 in each animation [s]
+  RowMatrix poses;  ///< F b x 7 (dataset F b 7), joint [m] and turn from the bind pose, a quaternion, w first
+};
+
 /// Everything a scene may need of one asset. Absent groups were left out (docs/overview.md).
 struct ReducedModel {
   std::string asset_name;
@@ -256,6 +268,7 @@ struct ReducedModel {
   std::optional<TargetElasticityData> target_elasticity;
   std::optional<FullSpaceData> full_space;
   std::optional<FidelityData> fidelity;
+  std::optional<SkeletonData> skeleton;
   std::vector<RegionData> regions;  ///< in index order; none: no such group
   std::optional<RigidData> rigid;
   std::optional<ContactData> contact;

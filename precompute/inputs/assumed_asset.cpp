@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::array<std::string_view, 5> kExtensions = {".glb", ".gltf", ".obj", ".ply", ".stl"};
 constexpr double kDensity = 1000, kGravity = 9.81;  // [kg/m^3], [m/s^2]
-constexpr const char* kClamp = "_FIXED";
+constexpr std::array<const char*, 2> kClamps{"_FIXED", "_PINNED"};
 constexpr std::size_t kLongestName = 64, kMostExamples = 64;  // of schemas/asset.json
 
 // With two digits: what is assumed is no measurement.
@@ -90,7 +90,10 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                 {"basis", {{"size", 30}}},
                 {"cubature", {{"elements", 60}}},
                 {"seed", 1}};
-  if (file.parts.contains(kClamp)) asset["object"]["fixed"] = {{"part", kClamp}};
+  for (const char* clamp : kClamps)
+    if (file.parts.contains(clamp)) asset["object"]["fixed"] = {{"part", clamp}};
+  // A body on a skeleton steps in all vertices: its basis serves no step.
+  if (file.skeleton) asset["basis"]["training"] = "none";
   Json examples = Json::array();
   std::vector<std::string> morphs;
   for (const MorphTarget& morph : file.morphs) morphs.push_back(morph.name);

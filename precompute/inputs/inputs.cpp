@@ -12,6 +12,7 @@
 #include "precompute/inputs/correspondence_files.h"
 #include "precompute/inputs/object_materials.h"
 #include "precompute/inputs/object_size.h"
+#include "precompute/inputs/object_skeleton.h"
 #include "precompute/inputs/object_surface.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/surface_file.h"
@@ -403,6 +404,10 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
                        checked.file.tet_sets, checked.file.materials, checked.report.kept_tets, files);
   require_numbers(object.mesh, object.materials, asset.file.string());
   object.fixed = flag(asset.fixed, 0);
+  if (object.surface && object.surface->file().skeleton) {
+    object.skeleton = skeleton_of_cage(*object.surface);
+    if (!asset.fixed) object.fixed = pin_to_bones(*object.surface, *object.skeleton, object.warnings);
+  }
   object.contact = flag(asset.contact_vertices, 1);
   if (asset.training.loads)
     for (const ForceLoadConfig& force : asset.training.loads->forces)

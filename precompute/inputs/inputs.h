@@ -25,6 +25,8 @@ struct ObjectInput {
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file
   VertexArray file_positions;                          ///< of all vertices in the file
   std::vector<std::vector<std::int64_t>> pushed;       ///< vertices of each of the forces of basis.loads
+  std::optional<SkeletonData> skeleton{};              ///< of a surface with bones, for the vertices of the mesh
+  std::vector<std::string> warnings{};                 ///< of its bones
   std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh encloses; none where tets were given
 };
 

@@ -33,6 +33,10 @@ SurfaceFile read_recorded_surface(const std::filesystem::path& path, const Asset
   SurfaceFile file = read_surface_file(path);
   file.mesh.vertices *= asset.length_unit;
   for (MorphTarget& morph : file.morphs) morph.positions *= asset.length_unit;
+  if (file.skeleton) {
+    file.skeleton->bind.col(3) *= asset.length_unit;
+    file.skeleton->poses.leftCols<3>() *= asset.length_unit;
+  }
   files.insert(files.end(), file.files.begin(), file.files.end());
   for (const std::string& remark : file.remarks) log::info(fmt::format("{}: {}", path.string(), remark));
   return file;

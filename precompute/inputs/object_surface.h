@@ -24,6 +24,7 @@ class ObjectSurface {
   const SurfaceFile& file() const { return file_; }
   const Cage& cage() const { return cage_; }
   const Embedding& embedding() const { return embedding_; }
+  const SurfaceTree& tree() const { return tree_; }
 
   /// The ids of the points [k x 3] that a part or a colour of the surface is nearest to; other selections as they are.
   /// `place` in the asset is for messages.

@@ -175,6 +175,11 @@ Eigen::VectorXd GltfAccessors::read_scalars(int accessor) const {
   return read(accessor, at(accessor).normalized).col(0);
 }
 
+RowMatrix GltfAccessors::read_rows(int accessor, int type, const char* name) const {
+  if (at(accessor).type != type) fail(place_of_accessor(accessor) + "/type", name, "another type");
+  return read(accessor, at(accessor).normalized);
+}
+
 std::vector<std::uint32_t> GltfAccessors::read_indices(int accessor, std::size_t end) const {
   const tinygltf::Accessor& source = at(accessor);
   const std::string place = place_of_accessor(accessor);

@@ -26,6 +26,8 @@ class GltfAccessors {
   VertexArray read_colours(int accessor) const;
   /// Of a SCALAR of any type.
   Eigen::VectorXd read_scalars(int accessor) const;
+  /// Rows of the type that `name` says, in parts of the largest where they are normalised.
+  RowMatrix read_rows(int accessor, int type, const char* name) const;
   /// Of a SCALAR of unsigned integers; each is below `end`.
   std::vector<std::uint32_t> read_indices(int accessor, std::size_t end) const;
   /// True if it has no numbers of its own.

@@ -60,6 +60,8 @@ class ShapeReader {
   Json primitive(const Member& from, const Json& accessors) const;
   Json mesh(const Member& from, const Json& accessors) const;
   Json node(const Member& from) const;
+  Json skin(const Member& from) const;
+  Json animation(const Member& from) const;
 
   const std::string& file_;
   bool is_binary_;
@@ -197,7 +199,9 @@ Json ShapeReader::kept_attributes(const Member& attributes, bool of_target) cons
   require_object(attributes);
   Json to = Json::object();
   for (const auto& [name, value] : attributes.value->items()) {
-    if (name != "POSITION" && (of_target || (name != "COLOR_0" && !name.starts_with('_')))) continue;
+    if (name != "POSITION" && (of_target || (name != "COLOR_0" && !name.starts_with('_') &&
+                                             !name.starts_with("JOINTS_") && !name.starts_with("WEIGHTS_"))))
+      continue;
     check_integer({&value, attributes.place + "/" + name});
     to[name] = value;
   }
@@ -248,6 +252,39 @@ Json ShapeReader::node(const Member& from) const {
   return to;
 }
 
+Json ShapeReader::skin(const Member& from) const {
+  Json to = {{"joints", Json::array()}};
+  keep_string(from, to, "name");
+  keep_integers(from, to, {"inverseBindMatrices"});
+  keep_index_list(from, to, "joints");
+  return to;
+}
+
+Json ShapeReader::animation(const Member& from) const {
+  Json to = {{"channels", Json::array()}, {"samplers", Json::array()}};
+  keep_string(from, to, "name");
+  for (const Member& channel : elements(from, "channels")) {
+    require_object(channel);
+    Json kept = Json::object();
+    keep_integers(channel, kept, {"sampler"}, true);
+    const Member target = checked(channel, "target", Json::value_t::object, "an object");
+    if (!target.value) fail(target.place, "an object", "none");
+    kept["target"] = Json::object();
+    keep_integers(target, kept["target"], {"node"});
+    keep_string(target, kept["target"], "path");
+    if (!kept["target"].contains("path")) fail(target.place + "/path", "a string", "none");
+    to["channels"].push_back(kept);
+  }
+  for (const Member& sampler : elements(from, "samplers")) {
+    require_object(sampler);
+    Json kept = {{"interpolation", "LINEAR"}};
+    keep_integers(sampler, kept, {"input", "output"}, true);
+    keep_string(sampler, kept, "interpolation");
+    to["samplers"].push_back(kept);
+  }
+  return to;
+}
+
 Json ShapeReader::read(const Json& value) {
   const Member root{&value, ""};
   require_object(root);
@@ -276,6 +313,9 @@ Json ShapeReader::read(const Json& value) {
     keep_string(from, to, "name");
     return to;
   });
+  keep_all("skins", [&](const Member& from) { return skin(from); });
+  // Morph weights and extensions move no bones.
+  keep_all("animations", [&](const Member& from) { return animation(from); });
   keep_integers(root, shapes, {"scene"});
   return shapes;
 }

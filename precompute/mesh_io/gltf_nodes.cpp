@@ -10,27 +10,6 @@ namespace {
 
 std::string place_of_node(int node) { return fmt::format("/nodes/{}", node); }
 
-Eigen::Affine3d transform_of(const std::string& file, const tinygltf::Node& node, const std::string& place) {
-  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
-  if (!node.matrix.empty()) {
-    transform.matrix() = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
-    if (transform.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
-      fail_in_gltf(file, place + "/matrix", "a last row of 0 0 0 1", "another");
-    return transform;
-  }
-  if (!node.translation.empty()) transform.translate(Eigen::Vector3d(node.translation.data()));
-  if (!node.rotation.empty()) {
-    Eigen::Quaterniond rotation;
-    rotation.coeffs() = Eigen::Vector4d(node.rotation.data());
-    const double norm = rotation.norm();
-    if (!(norm > 1e-6 && norm < 1e6))
-      fail_in_gltf(file, place + "/rotation", "a unit quaternion", fmt::format("one of length {:.6g}", norm));
-    transform.rotate(rotation.normalized());
-  }
-  if (!node.scale.empty()) transform.scale(Eigen::Vector3d(node.scale.data()));
-  return transform;
-}
-
 class Walk {
  public:
   Walk(const std::string& file, const tinygltf::Model& model, const NodeVisitor& visitor)
@@ -75,7 +54,7 @@ class Walk {
       fail_in_gltf(file_, place, "nodes that are trees", fmt::format("node {} twice", node),
                    "a node may be no child of itself or of two");
     seen_[index] = 1;
-    steps_.push_back({node, parent * transform_of(file_, model_.nodes[index], place_of_node(node))});
+    steps_.push_back({node, parent * own_transform(file_, model_.nodes[index], place_of_node(node))});
   }
 
   void step() {
@@ -100,6 +79,33 @@ class Walk {
 };
 
 }  // namespace
+
+Eigen::Affine3d own_transform(const std::string& file, const tinygltf::Node& node, const std::string& place) {
+  Eigen::Affine3d transform = Eigen::Affine3d::Identity();
+  if (!node.matrix.empty()) {
+    transform.matrix() = Eigen::Map<const Eigen::Matrix4d>(node.matrix.data());
+    if (transform.matrix().row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+      fail_in_gltf(file, place + "/matrix", "a last row of 0 0 0 1", "another");
+    return transform;
+  }
+  if (!node.translation.empty()) transform.translate(Eigen::Vector3d(node.translation.data()));
+  if (!node.rotation.empty()) {
+    Eigen::Quaterniond rotation;
+    rotation.coeffs() = Eigen::Vector4d(node.rotation.data());
+    const double norm = rotation.norm();
+    if (!(norm > 1e-6 && norm < 1e6))
+      fail_in_gltf(file, place + "/rotation", "a unit quaternion", fmt::format("one of length {:.6g}", norm));
+    transform.rotate(rotation.normalized());
+  }
+  if (!node.scale.empty()) transform.scale(Eigen::Vector3d(node.scale.data()));
+  return transform;
+}
+
+std::string unique_name(const std::string& name, const std::set<std::string>& taken) {
+  std::string unique = name;
+  for (int number = 2; taken.contains(unique); ++number) unique = fmt::format("{} {}", name, number);
+  return unique;
+}
 
 void visit_nodes(const std::string& file, const tinygltf::Model& model, const NodeVisitor& visitor) {
   Walk(file, model, visitor).run();

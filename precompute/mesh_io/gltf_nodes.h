@@ -2,11 +2,18 @@
 
 #include <Eigen/Geometry>
 #include <functional>
+#include <set>
 #include <string>
 
 #include "precompute/mesh_io/gltf_document.h"
 
 namespace exmat::precompute {
+
+/// From a node to its parent. Throws InputError where that is no transform.
+Eigen::Affine3d own_transform(const std::string& file, const tinygltf::Node& node, const std::string& place);
+
+/// The name, or with the first number from 2 on that makes it another than those taken.
+std::string unique_name(const std::string& name, const std::set<std::string>& taken);
 
 /// What a walk over nodes calls: each node with its transform to the scene, then its children, then its end.
 struct NodeVisitor {

@@ -12,6 +12,7 @@
 #include "precompute/mesh_io/gltf_accessor.h"
 #include "precompute/mesh_io/gltf_document.h"
 #include "precompute/mesh_io/gltf_nodes.h"
+#include "precompute/mesh_io/gltf_skeleton.h"
 
 namespace exmat::precompute {
 namespace {
@@ -38,17 +39,13 @@ std::vector<Triangle> triangles_of(const std::vector<std::uint32_t>& corners, in
   return triangles;
 }
 
-/// The name, or with the first number from 2 on that makes it another than those taken.
-std::string unique_name(const std::string& name, const std::set<std::string>& taken) {
-  std::string unique = name;
-  for (int number = 2; taken.contains(unique); ++number) unique = fmt::format("{} {}", name, number);
-  return unique;
-}
-
 class GltfReader {
  public:
   explicit GltfReader(const std::filesystem::path& file)
-      : file_(file.string()), document_(read_gltf_document(file)), accessors_(file_, document_) {}
+      : file_(file.string()),
+        document_(read_gltf_document(file)),
+        accessors_(file_, document_),
+        skeleton_(file_, document_, accessors_) {}
 
   SurfaceFile read();
 
@@ -64,6 +61,8 @@ class GltfReader {
     const tinygltf::Mesh& mesh;
     std::string place;
     const Eigen::Affine3d& to_scene;
+    int skin;                           // -1: all hangs on `bone`
+    std::size_t bone;                   // of the node
     std::vector<std::size_t> morphs{};  // of its targets
     std::map<std::vector<std::pair<std::string, int>>, std::size_t>
         first{};  // vertex of the primitives with these attributes
@@ -74,6 +73,8 @@ class GltfReader {
   void name_targets(Instance& instance);
   void add_primitive(Instance& instance, const tinygltf::Primitive& primitive, const std::string& place);
   std::size_t add_vertices(Instance& instance, const tinygltf::Primitive& primitive, const std::string& place);
+  void add_bones(const Instance& instance, const tinygltf::Primitive& primitive, std::size_t count,
+                 const std::string& place);
   void add_attributes(const tinygltf::Primitive& primitive, std::size_t first, std::size_t count);
   void add_target(const Instance& instance, std::size_t target, const tinygltf::Primitive& primitive,
                   const VertexArray& base, std::size_t first, const std::string& place);
@@ -87,8 +88,10 @@ class GltfReader {
   const std::string file_;
   const GltfDocument document_;
   const GltfAccessors accessors_;
+  const GltfSkeleton skeleton_;
   std::vector<std::array<double, 3>> vertices_, colours_;
   bool has_colours_ = false;
+  std::vector<std::map<std::size_t, double>> bones_;  // weights of each vertex
   std::vector<Triangle> triangles_;
   std::vector<std::string> morph_names_;
   std::map<std::string, std::size_t> morph_of_name_;
@@ -115,14 +118,14 @@ void GltfReader::begin_node(int index, const Eigen::Affine3d& to_scene) {
   first_of_node_[static_cast<std::size_t>(index)] = triangles_.size();
   if (node.mesh < 0) return;
   const std::string place = fmt::format("/nodes/{}", index);
-  if (node.skin >= 0)
-    fail_in_gltf(file_, place + "/skin", "a mesh without a skin", fmt::format("skin {}", node.skin),
-                 "apply the armature and export its poses as shape keys");
+  if (node.skin >= static_cast<int>(document_.model.skins.size()))
+    fail_in_gltf(file_, place + "/skin", fmt::format("a skin below {}", document_.model.skins.size()),
+                 std::to_string(node.skin));
   if (static_cast<std::size_t>(node.mesh) >= document_.model.meshes.size())
     fail_in_gltf(file_, place + "/mesh", fmt::format("a mesh below {}", document_.model.meshes.size()),
                  std::to_string(node.mesh));
   Instance instance{document_.model.meshes[static_cast<std::size_t>(node.mesh)], fmt::format("/meshes/{}", node.mesh),
-                    to_scene};
+                    node.skin >= 0 ? skeleton_.to_scene(node.skin) : to_scene, node.skin, skeleton_.bone_above(index)};
   ++nodes_with_meshes_;
   meshes_.insert(node.mesh);
   name_targets(instance);
@@ -213,15 +216,51 @@ std::size_t GltfReader::add_vertices(Instance& instance, const tinygltf::Primiti
   const VertexArray base = accessors_.read_positions(accessor), positions = to_scene(base, instance);
   for (const auto& x : positions.rowwise()) vertices_.push_back({x[0], x[1], x[2]});
   colours_.resize(vertices_.size(), {1, 1, 1});
+  if (!skeleton_.empty()) add_bones(instance, primitive, count, place);
   add_attributes(primitive, first, count);
   for (std::size_t k = 0; k < primitive.targets.size(); ++k)
     if (primitive.targets[k].contains("POSITION")) add_target(instance, k, primitive, base, first, place);
   return first;
 }
 
+// Influences of any number of sets, which exporters round and need not add up to 1; a vertex without any hangs on the
+// bone that the node hangs on.
+void GltfReader::add_bones(const Instance& instance, const tinygltf::Primitive& primitive, std::size_t count,
+                           const std::string& place) {
+  const std::size_t first = bones_.size();
+  bones_.resize(first + count);
+  for (int set = 0; instance.skin >= 0; ++set) {
+    const auto joints = primitive.attributes.find(fmt::format("JOINTS_{}", set));
+    const auto weights = primitive.attributes.find(fmt::format("WEIGHTS_{}", set));
+    if (joints == primitive.attributes.end() || weights == primitive.attributes.end()) break;
+    const RowMatrix numbers =
+        accessors_.read_rows(matching(joints->second, count), TINYGLTF_TYPE_VEC4, "VEC4, of joints");
+    const RowMatrix shares =
+        accessors_.read_rows(matching(weights->second, count), TINYGLTF_TYPE_VEC4, "VEC4, of weights");
+    for (std::size_t v = 0; v < count; ++v)
+      for (Eigen::Index k = 0; k < 4; ++k) {
+        const double share = shares(static_cast<Eigen::Index>(v), k);
+        if (!(share > 0)) continue;
+        const auto joint = static_cast<std::size_t>(std::max(0.0, numbers(static_cast<Eigen::Index>(v), k)));
+        if (joint >= skeleton_.joints(instance.skin))
+          fail_in_gltf(file_, fmt::format("{}/attributes/JOINTS_{}", place, set),
+                       fmt::format("joints below {}", skeleton_.joints(instance.skin)), std::to_string(joint));
+        bones_[first + v][skeleton_.bone(instance.skin, joint)] += share;
+      }
+  }
+  for (std::size_t v = first; v < bones_.size(); ++v) {
+    double sum = 0;
+    for (const auto& [bone, share] : bones_[v]) sum += share;
+    if (sum > 0)
+      for (auto& [bone, share] : bones_[v]) share /= sum;
+    else
+      bones_[v] = {{instance.skin >= 0 ? skeleton_.bone(instance.skin, 0) : instance.bone, 1}};
+  }
+}
+
 void GltfReader::add_attributes(const tinygltf::Primitive& primitive, std::size_t first, std::size_t count) {
   for (const auto& [name, accessor] : primitive.attributes) {
-    if (name == "POSITION") continue;
+    if (name == "POSITION" || name.starts_with("JOINTS_") || name.starts_with("WEIGHTS_")) continue;
     if (name == "COLOR_0") {
       const VertexArray colours = accessors_.read_colours(matching(accessor, count));
       for (std::size_t v = 0; v < count; ++v)
@@ -279,6 +318,13 @@ SurfaceFile GltfReader::finish() {
   surface.mesh = {vertex_array(vertices_), triangle_array(triangles_)};
   if (has_colours_) surface.colours = vertex_array(colours_);
   surface.files = document_.files;
+  if (!skeleton_.empty()) {
+    surface.skeleton = skeleton_.data(surface.remarks);
+    surface.skeleton->weights.setZero(std::ssize(bones_), static_cast<Eigen::Index>(skeleton_.size()));
+    for (std::size_t v = 0; v < bones_.size(); ++v)
+      for (const auto& [bone, share] : bones_[v])
+        surface.skeleton->weights(static_cast<Eigen::Index>(v), static_cast<Eigen::Index>(bone)) = share;
+  }
   add_morphs(surface);
   add_remarks(surface);
   parts_.finish(surface, document_.bytes);

@@ -11,7 +11,10 @@ namespace exmat::precompute {
 /// triangles' vertices of materials, meshes and nodes (with what hangs below them), and vertices whose custom scalar
 /// attribute is above 0.5, by its name with the underscore. Vertices without colours are white where others have some.
 ///
-/// Throws InputError (see read_gltf_document), also for skins, for nodes that are no tree and for shapes that repeat
+/// Of a file with skins the mesh is where its bones were bound, on a skeleton; what has no skin hangs on the
+/// bone above it.
+///
+/// Throws InputError (see read_gltf_document), also for nodes that are no tree and for shapes that repeat
 /// what is in the file so often that they are out of proportion to its bytes.
 SurfaceFile read_gltf(const std::filesystem::path& file);
 

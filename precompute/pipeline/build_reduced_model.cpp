@@ -386,6 +386,12 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
 }
 
 void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
+  if (object_.skeleton) {
+    log::info("settled poses: left out, of a body on bones, whose vertices all move");
+    for (ExampleData& example : model.examples->examples)
+      example.best_error = example.settled_error = example.shape_space_error;
+    return;
+  }
   std::optional<SettlingLoad> load;
   if (options_.scene != nullptr) {
     TrainingBody body{.free = !stages.system.constrained(), .size = 1, .angular_frequency = 1};
@@ -407,6 +413,9 @@ void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
 
 void Pipeline::refuse_full_space() {
   const std::string reason = "parts of the body have several densities";
+  if (object_.skeleton)
+    throw InputError({asset_.file.string(), "/object/material", "one density of all parts of a body on bones",
+                      "several", "a body on bones steps in all vertices, where examples ask for that"});
   if (options_.scene != nullptr && options_.scene->space.space != Space::kReduced)
     throw InputError({options_.scene->file.string(), options_.scene->place + "/space", "\"reduced\", since " + reason,
                       fmt::format("\"{}\"", name_of(options_.scene->space.space)),
@@ -420,9 +429,10 @@ void Pipeline::read() {
   if (needs_.internal_force == ForceMethod::kPolynomial) require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs, cache_); });
   warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
+  std::ranges::copy(object_.warnings, std::back_inserter(report_.warnings));
   require_regions(asset_, needs_);
   report_.ledger = plan_groups(needs_, object_.fixed.any(), example_count(asset_), std::ssize(asset_.regions),
-                               asset_.render_mesh.has_value());
+                               asset_.render_mesh.has_value(), object_.skeleton.has_value());
   if (includes(report_.ledger, "shape_space")) {
     examples_ = timed("reading the examples", [&] { return read_examples(asset_, object_, report_.inputs, cache_); });
     keep_needed(needs_, includes(report_.ledger, "examples"), *examples_);
@@ -438,6 +448,7 @@ ReducedModel Pipeline::run() {
   compare_with_quadratic_tets();
   ReducedModel model;
   model.render = std::move(render_);
+  model.skeleton = object_.skeleton;
   model.asset_name = asset_.name;
   model.generator = generator();
   model.input_sha256 = report_.input_sha256;
@@ -563,6 +574,7 @@ std::vector<AlignmentOutcome> check_inputs(const AssetConfig& asset, const std::
   report.inputs.push_back(asset.file);
   const auto object = read_object(asset, report.inputs);
   warn_of_size(object, asset.object_mesh.string(), report.warnings);
+  std::ranges::copy(object.warnings, std::back_inserter(report.warnings));
   if (asset.render_mesh) read_render_mesh(asset, object, report.inputs, report.warnings);
   if (const auto found = mesh_stiffness(object.mesh, object.materials, object.fixed, asset.name))
     say_stiffness(asset.name, object.materials.formulation, *found, report.warnings);

@@ -109,6 +109,9 @@ exmat_status exmat_body_set_reduced(exmat_body* body, const double* q, const dou
   EXMAT_REQUIRE_LENGTH(modes, body->modes());
   if (!all_finite(q, modes) || !all_finite(v, modes))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: q, v: expected finite numbers", __func__);
+  if (body->model().skeleton)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: expected a body without a skeleton, which steps in all its vertices",
+                __func__);
   put_to_rest(*body);
   State& state = body->state;
   state.q = state.q_previous = Eigen::Map<const Eigen::VectorXd>(q, modes);

@@ -87,6 +87,9 @@ exmat_status exmat_body_set_space(exmat_body* body, std::int32_t space) noexcept
         "%s: the model was created for steps in the modes alone: set settings.space, or the space of its scene, to "
         "full or auto",
         __func__);
+  if (space != EXMAT_SPACE_FULL && body->model().skeleton)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: space = %" PRId32 ": expected EXMAT_SPACE_FULL: the body is on a skeleton",
+                __func__, space);
   body->scene.space.space = static_cast<Space>(space);
   return EXMAT_OK;
 }

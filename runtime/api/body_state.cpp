@@ -41,6 +41,7 @@ std::size_t size_without_contacts(const exmat_body& body, bool in_full_space) {
   const auto unknowns = static_cast<std::size_t>(body.state.vertex_force.size());
   std::size_t size = unknowns;  // of the caller's forces
   if (in_full_space) size += 1 + std::size(kVertexArrays) * unknowns;
+  if (body.model().skeleton) size += static_cast<std::size_t>(numbers_of(*body.start.full->skeleton).size());
   size += kHeadNumbers + 1 + std::size(kModeArrays) * static_cast<std::size_t>(body.modes());
   size += body.frame_numbers;
   if (may_sleep(body)) size += kSleepNumbers;
@@ -83,6 +84,7 @@ std::vector<double> write_state(const exmat_body& body) {
   if (state.full) {
     writer.add(state.full->alone);
     for (const auto member : kVertexArrays) writer.add_all((*state.full).*member);
+    if (state.full->skeleton) writer.add_all(numbers_of(*state.full->skeleton));
   }
   writer.add_all(body.model().frame->numbers(state.frame));
   for (const ExampleState& examples : state.examples) {
@@ -131,6 +133,8 @@ void take_state(std::span<const double> numbers, exmat_body& body) {
         fmt::format("numbers: {} contacts: expected {}", contacts, (numbers.size() - least) / kContactNumbers));
   if (reader.flag("full space") != in_full_space)
     throw InvalidArgument("numbers: a body in full space: expected one of a model of space full or auto");
+  if (!in_full_space && body.model().skeleton)
+    throw InvalidArgument("numbers: a body in its modes: expected one on a skeleton, in full space");
   state.elastic_energy = reader.number();
   for (const auto member : kModeArrays) reader.read(state.*member);
   reader.read(state.vertex_force);
@@ -138,6 +142,11 @@ void take_state(std::span<const double> numbers, exmat_body& body) {
     enter_full_space(*body.full(), body.model(), state);
     state.full->alone = reader.number();
     for (const auto member : kVertexArrays) reader.read((*state.full).*member);
+    if (state.full->skeleton) {
+      Eigen::VectorXd bones = numbers_of(*state.full->skeleton);
+      reader.read(bones);
+      set_numbers(bones, *state.full->skeleton);
+    }
     state.full->elastic_energy = state.elastic_energy;
   } else {
     state.full.reset();

@@ -10,8 +10,8 @@ namespace exmat::runtime {
 namespace {
 
 void print_groups(const ReducedModel& model, const BundleSummary& summary) {
-  std::vector<LedgerEntry> ledger =
-      plan_groups({}, summary.constrained, summary.examples, std::ssize(summary.regions), summary.render_vertices > 0);
+  std::vector<LedgerEntry> ledger = plan_groups({}, summary.constrained, summary.examples, std::ssize(summary.regions),
+                                                summary.render_vertices > 0, summary.bones > 0);
   fill_bytes(model, ledger);
   fmt::print("\n{:<18} {:>14}\n", "group", "bytes");
   for (const LedgerEntry& entry : ledger)

@@ -184,6 +184,24 @@ void bind_settings(BodyClass& type) {
           "from the "
           "next step on, for a model of space \"full\" or \"auto\".")
       .def(
+          "set_bones",
+          [](BodyObject& body, const Numbers& transforms, bool teleport) {
+            require_shape(transforms, "transforms", {static_cast<py::ssize_t>(body.model->model.bones()), 3, 4});
+            body.get().set_bones(read_span(transforms), teleport);
+          },
+          py::arg("transforms"), py::arg("teleport") = false,
+          "Where the bones are at the end of the next step, and of those after it until the next call: shape (b, 3, "
+          "4), "
+          "as Model.bound_bones. teleport: the body is there at once, without a motion that led there; so is the first "
+          "call's.")
+      .def_property_readonly(
+          "bones",
+          [](BodyObject& body) {
+            const std::size_t bones = body.model->model.bones();
+            return array_of(body.get().bones(bones), {bones, 3, 4});
+          },
+          "The bones at the end of the last step: shape (b, 3, 4). A copy.")
+      .def(
           "set_example_damping",
           [](BodyObject& body, double c_kappa, const py::object& region) {
             set_factor(body, ExampleFactor::kDamping, c_kappa, region_of(body.model->model, region));

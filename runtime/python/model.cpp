@@ -126,6 +126,13 @@ py::array_t<double> example_pose(const ModelObject& model, const std::string& ex
   return array_of(model.model.example_pose(region_of(model.model, region), number), {model.modes});
 }
 
+py::array_t<double> animated_bones(const ModelObject& model, const std::string& animation, double time) {
+  for (std::size_t i = 0; i < model.model.animations(); ++i)
+    if (model.model.animation_name(i) == animation)
+      return array_of(model.model.animated_bones(i, time), {model.model.bones(), 3, 4});
+  throw Error(EXMAT_INVALID_ARGUMENT, ("animation: the model has none that is named " + animation).c_str());
+}
+
 py::tuple elasticity(const ModelObject& model, const Numbers& q) {
   require_shape(q, "q", {static_cast<py::ssize_t>(model.modes)});
   const Elasticity at = model.model.elasticity(read_span(q));
@@ -223,6 +230,37 @@ void bind_model(py::module_& module) {
             return array_of(weights, {weights.size()});
           },
           "How many elements of the object each cubature element stands for: shape (s,). A copy.")
+      .def_property_readonly(
+          "bones",
+          [](const ModelObject& model) {
+            py::dict bones;
+            for (std::size_t i = 0; i < model.model.bones(); ++i) {
+              const std::int64_t parent = model.model.bone_parent(i);
+              bones[py::str(model.model.bone_name(i))] =
+                  parent < 0 ? py::object(py::none())
+                             : py::object(py::str(model.model.bone_name(static_cast<std::size_t>(parent))));
+            }
+            return bones;
+          },
+          "Of each bone of the skeleton its name and its parent's, None of a root, parents first; empty without one.")
+      .def_property_readonly(
+          "bound_bones",
+          [](const ModelObject& model) {
+            return array_of(model.model.bound_bones(), {model.model.bones(), 3, 4});
+          },
+          "Matrices that take the bones to the world where the mesh is at rest: shape (b, 3, 4), the last column the "
+          "joint [m]. A copy.")
+      .def_property_readonly(
+          "animations",
+          [](const ModelObject& model) {
+            py::dict animations;
+            for (std::size_t i = 0; i < model.model.animations(); ++i)
+              animations[py::str(model.model.animation_name(i))] = model.model.animation_duration(i);
+            return animations;
+          },
+          "Of each animation of the skeleton its name and its duration [s].")
+      .def("animated_bones", &animated_bones, py::arg("animation"), py::arg("time"),
+           "The bones at a time [s] of an animation by its name, which is held at its ends: shape (b, 3, 4). A copy.")
       .def_property_readonly(
           "time_step", [](const ModelObject& model) { return model.model.time_step(); }, "[s].")
       .def_readonly("input_sha256", &ModelObject::sha, "What the bundle was made of, 64 hexadecimal digits.");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <string_view>
 #include <utility>
 
@@ -146,6 +147,10 @@ StepScene step_scene(const SceneConfig& config, const Obstacles* obstacles, Load
                  {config.space.newton.max_iterations, config.space.newton.tolerance}};
   scene.meeting = config.meeting;
   scene.obstacles = obstacles != nullptr ? obstacles_of(config.meeting, *obstacles) : make_obstacles(config);
+  if (loaded.model->skeleton) scene.space.space = Space::kFull;
+  if (const auto& animation = config.body.animation)
+    scene.animation = BonePlay{loaded.model->skeleton->find_animation(animation->name), animation->speed,
+                               animation->start, animation->loop};
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
@@ -160,6 +165,12 @@ State start_state(const SceneConfig& config, const LoadedScene& loaded) {
   State state = make_state(*loaded.model, start_coordinates(config, loaded.data, modes), Eigen::VectorXd::Zero(modes));
   prepare_contacts(*loaded.model, loaded.scene.obstacles.size(), state);
   if (loaded.full) prepare_full(*loaded.full, state);
+  if (loaded.model->skeleton) {
+    enter_full_space(*loaded.full, *loaded.model, state);
+    BonePoses bones = loaded.model->skeleton->bound();
+    if (loaded.scene.animation) loaded.scene.animation->sample(0, bones);
+    put_on_bones(*loaded.full, bones, state);
+  }
   const BodyFrame& frame = *loaded.model->frame;
   FrameWorkspace workspace = frame.make_workspace();
   frame.follow(loaded.scene, state.time, state.q, state.v, workspace, state.frame);
@@ -214,6 +225,22 @@ std::unique_ptr<const Model> prepare(const SceneConfig& config, const ReducedMod
   if (result.model) return std::move(result.model);
   result.complaint.file = config.bundle.string();
   throw InputError(std::move(result.complaint));
+}
+
+void check_animation(const SceneConfig& config, const LoadedScene& loaded) {
+  if (!config.body.animation) return;
+  const std::string place = config.place + "/body/animation";
+  const Skeleton* skeleton = loaded.model->skeleton.get();
+  if (skeleton == nullptr)
+    throw InputError({config.file.string(), place, "a bundle of a surface with bones",
+                      config.bundle.string() + ", which has none", ""});
+  if (skeleton->find_animation(config.body.animation->name) != nullptr) return;
+  std::vector<std::string> names;
+  for (const BoneAnimation& animation : skeleton->animations()) names.push_back(animation.name());
+  throw InputError(
+      {config.file.string(), place + "/name",
+       names.empty() ? "no animation, since the bundle has none" : fmt::format("\"{}\"", fmt::join(names, "\" or \"")),
+       fmt::format("\"{}\"", config.body.animation->name), ""});
 }
 
 std::unique_ptr<const FullModel> prepare_full_space(const SceneConfig& config, const LoadedScene& loaded) {
@@ -274,11 +301,13 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   check_render(config, loaded.summary);
   Needs needs = fit_needs(needs_of(config), loaded.summary);
   needs.render = needs.render && config.trajectory;
+  // A body on bones steps in all its vertices.
+  const bool on_bones = loaded.summary.bones > 0;
   loaded.ledger = plan_groups(needs, loaded.summary.constrained, loaded.summary.examples,
-                              std::ssize(loaded.summary.regions), loaded.summary.render_vertices > 0);
+                              std::ssize(loaded.summary.regions), loaded.summary.render_vertices > 0, on_bones);
   // A force on a body that moves needs to know where it acts.
   const bool moves = !loaded.summary.constrained || !config.body.motion.empty();
-  const bool steps_in_full = config.space.space != Space::kReduced;
+  const bool steps_in_full = on_bones || config.space.space != Space::kReduced;
   const bool positions = config.trajectory || config.meets_bodies || (moves && !config.forces.empty());
   const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions, steps_in_full};
   loaded.data = read_bundle(config.bundle, request, &loaded.records);
@@ -286,6 +315,7 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   loaded.model = prepare(config, loaded.data);
   if (steps_in_full) loaded.full = prepare_full_space(config, loaded);
   loaded.keys = make_keys(config, *loaded.model);
+  check_animation(config, loaded);
   loaded.scene = step_scene(config, obstacles, loaded);
   if (steps_in_full) check_full_space(config, loaded);
   loaded.start = start_state(config, loaded);
@@ -335,6 +365,11 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
         scene.space.space == Space::kAuto
             ? fmt::format("; until {:g} s after a load that the bundle was not made for", scene.space.release)
             : ", in all steps"));
+  if (model.skeleton)
+    plan.push_back(fmt::format("skeleton: {} bones hold {} vertices, {}", model.skeleton->size(),
+                               loaded.full->space.driven(),
+                               scene.animation ? "moved by \"" + scene.animation->animation->name() + "\""
+                                               : std::string("which stay where they were bound")));
   if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {
     plan.push_back(
         fmt::format("damping: mass {:g} 1/s, stiffness {:g} s", scene.mass_damping, scene.stiffness_damping));

@@ -81,6 +81,8 @@ class BodyReader {
     examples.target_converged = from["target_converged"];
   }
   void read_full_space(State& state) const {
+    if (loaded_.model->skeleton && !(body_.contains("full_space") && body_["full_space"].contains("skeleton")))
+      refuse("/full_space/skeleton", "the bones of the body", "none");
     state.full.reset();
     if (!body_.contains("full_space")) return;
     if (!loaded_.full) refuse("/full_space", "no such member of a body of space \"reduced\"", "one");
@@ -91,6 +93,11 @@ class BodyReader {
     enter_full_space(*loaded_.full, *loaded_.model, state);
     for (const auto& [name, member] : kVertexArrays)
       read_array(std::string("full_space/") + name, from[name], (*state.full).*member);
+    if (state.full->skeleton) {
+      Eigen::VectorXd bones = numbers_of(*state.full->skeleton);
+      read_array("full_space/skeleton", from["skeleton"], bones);
+      set_numbers(bones, *state.full->skeleton);
+    }
     state.full->alone = from["alone"];
     state.full->elastic_energy = state.elastic_energy;
     state.begins_anew = begins_anew;
@@ -145,6 +152,7 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
     if (state.full) {
       full["alone"] = state.full->alone;
       for (const auto& [name, member] : kVertexArrays) full[name] = array_of((*state.full).*member);
+      if (state.full->skeleton) full["skeleton"] = array_of(numbers_of(*state.full->skeleton));
     }
   }
   for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count)) {

@@ -310,6 +310,41 @@ EXMAT_API exmat_status exmat_body_set_space(exmat_body* body, int32_t space) EXM
 /* The space that the last step was in: EXMAT_SPACE_REDUCED or EXMAT_SPACE_FULL; negative where `body` is NULL. */
 EXMAT_API int32_t exmat_body_space(const exmat_body* body) EXMAT_NOEXCEPT;
 
+/* Bodies on a skeleton, of surfaces with a skin. Such a body steps in all vertices of its mesh: those that hang on one
+   bone alone go exactly where it goes, all others are flesh. A bone's transform [12] takes it to the world: a 3 x 4
+   matrix by rows, its last column the joint [m], as the world matrix of its node in glTF; where axes are stretched the
+   nearest rotation is taken. */
+
+/* Number of bones, and of animations; 0 without a skeleton, negative where `model` is NULL. */
+EXMAT_API int64_t exmat_model_bones(const exmat_model* model) EXMAT_NOEXCEPT;
+EXMAT_API int64_t exmat_model_animations(const exmat_model* model) EXMAT_NOEXCEPT;
+
+/* NULL where there is none, and owned by the model. */
+EXMAT_API const char* exmat_model_bone_name(const exmat_model* model, int64_t bone) EXMAT_NOEXCEPT;
+EXMAT_API const char* exmat_model_animation_name(const exmat_model* model, int64_t animation) EXMAT_NOEXCEPT;
+
+/* -1 of a root. Parents come before their children. */
+EXMAT_API int64_t exmat_model_bone_parent(const exmat_model* model, int64_t bone) EXMAT_NOEXCEPT;
+
+/* [s]; negative where there is none. */
+EXMAT_API double exmat_model_animation_duration(const exmat_model* model, int64_t animation) EXMAT_NOEXCEPT;
+
+/* Transforms of all bones where the mesh is at rest, and at a time of an animation, which is held at its ends.
+   `count`: 12 times the bones. */
+EXMAT_API exmat_status exmat_model_read_bones(const exmat_model* model, double* transforms,
+                                              int64_t count) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_model_read_animation(const exmat_model* model, int64_t animation, double time,
+                                                  double* transforms, int64_t count) EXMAT_NOEXCEPT;
+
+/* Where the bones are at the end of the next step, and of those after it until the next call, in place of the scene's
+   animation. Velocities come from where they were. `teleport`: not 0 puts the body there at once, at rest beside its
+   bones, without a motion from where it was; the first call of a body does so in any case. `bones`: their number. */
+EXMAT_API exmat_status exmat_body_set_bones(exmat_body* body, const double* transforms, int64_t bones,
+                                            int32_t teleport) EXMAT_NOEXCEPT;
+
+/* Transforms of all bones at the end of the last step. */
+EXMAT_API exmat_status exmat_body_read_bones(const exmat_body* body, double* transforms, int64_t count) EXMAT_NOEXCEPT;
+
 /* Settings of the example force. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model
    has to have that example force: use_examples, or the scene. */
 

@@ -132,6 +132,35 @@ class Model {
   Elasticity elasticity(std::span<const double> q) const;
   /// EXMAT_MASS or EXMAT_STIFFNESS.
   CompressedRows matrix(std::int32_t kind) const;
+  /// Bones of the skeleton, and its animations; 0 of both without one.
+  std::size_t bones() const noexcept { return static_cast<std::size_t>(exmat_model_bones(get())); }
+  std::size_t animations() const noexcept { return static_cast<std::size_t>(exmat_model_animations(get())); }
+  /// bone < bones(); parent -1 of a root.
+  std::string bone_name(std::size_t bone) const {
+    return exmat_model_bone_name(get(), static_cast<std::int64_t>(bone));
+  }
+  std::int64_t bone_parent(std::size_t bone) const noexcept {
+    return exmat_model_bone_parent(get(), static_cast<std::int64_t>(bone));
+  }
+  /// [12 bones()] where the mesh is at rest.
+  std::vector<double> bound_bones() const {
+    std::vector<double> transforms(12 * bones());
+    check(exmat_model_read_bones(get(), transforms.data(), static_cast<std::int64_t>(transforms.size())));
+    return transforms;
+  }
+  /// animation < animations(); its name, its duration [s] and its bones [12 bones()] at a time.
+  std::string animation_name(std::size_t animation) const {
+    return exmat_model_animation_name(get(), static_cast<std::int64_t>(animation));
+  }
+  double animation_duration(std::size_t animation) const noexcept {
+    return exmat_model_animation_duration(get(), static_cast<std::int64_t>(animation));
+  }
+  std::vector<double> animated_bones(std::size_t animation, double time) const {
+    std::vector<double> transforms(12 * bones());
+    check(exmat_model_read_animation(get(), static_cast<std::int64_t>(animation), time, transforms.data(),
+                                     static_cast<std::int64_t>(transforms.size())));
+    return transforms;
+  }
   double time_step() const noexcept { return exmat_model_time_step(get()); }
   std::string input_sha256() const { return exmat_model_input_sha256(get()); }
 
@@ -347,6 +376,16 @@ class BodyRef {
   /// EXMAT_SPACE_...; and which of the two the last step was in.
   void set_space(std::int32_t space) { check(exmat_body_set_space(get(), space)); }
   std::int32_t space() const { return exmat_body_space(get()); }
+  /// [12 bones] of the model's bones, at the end of the next step; `teleport`: at once. And those of the last step.
+  void set_bones(std::span<const double> transforms, bool teleport = false) {
+    check(exmat_body_set_bones(get(), transforms.data(), static_cast<std::int64_t>(transforms.size() / 12),
+                               teleport ? 1 : 0));
+  }
+  std::vector<double> bones(std::size_t count) const {
+    std::vector<double> transforms(12 * count);
+    check(exmat_body_read_bones(get(), transforms.data(), static_cast<std::int64_t>(transforms.size())));
+    return transforms;
+  }
   /// `region` -1: the whole body.
   void set_example_stiffness(double kappa, std::int64_t region = -1) {
     check(exmat_body_set_example_stiffness(get(), region, kappa));

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "runtime/sim/frame/motion.h"
+#include "runtime/sim/frame/skeleton.h"
 
 namespace exmat::runtime {
 
@@ -29,6 +30,7 @@ struct WorldLoads {
   Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
   std::vector<ScriptedForce> forces;
   std::optional<RigidMotion> carrier;  ///< of a body that is carried: what carries its fixed part
+  std::optional<BonePlay> animation;   ///< of a body on a skeleton; none: its host moves the bones
 
   /// True if a force begins or ends between two times.
   bool forces_jump(double from, double to) const noexcept {

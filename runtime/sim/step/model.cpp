@@ -117,6 +117,7 @@ ModelResult build_model(const ReducedModel& reduced, const ModelOptions& options
   if (options.carried && !(reduced.rigid && reduced.rigid->spin_load.size() > 0))
     return {nullptr, missing_group("/rigid/spin_load")};
   model->frame = make_frame(reduced.rigid ? &*reduced.rigid : nullptr, options.carried, model->gravity_load);
+  if (reduced.skeleton) model->skeleton = std::make_shared<const Skeleton>(*reduced.skeleton);
   if (reduced.contact) model->contact.emplace(*reduced.contact, model->frame->origin());
   const RestModel rest{reduced.object->materials.model, cubature};
   if (options.examples && reduced.examples) {

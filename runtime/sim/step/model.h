@@ -17,6 +17,7 @@
 #include "runtime/sim/examples/target_elasticity.h"
 #include "runtime/sim/examples/target_table.h"
 #include "runtime/sim/frame/body_frame.h"
+#include "runtime/sim/frame/skeleton.h"
 
 namespace exmat::runtime {
 
@@ -35,10 +36,11 @@ struct ExampleModel {
 /// A reduced body prepared for stepping: immutable, shared by any number of States.
 struct Model {
   InternalForce internal_force;
-  RowMatrix gravity_load;                  ///< 3 x r
-  std::shared_ptr<const BodyFrame> frame;  ///< what the body deforms in
-  std::optional<ContactSet> contact;       ///< of a scene with obstacles
-  std::vector<ExampleModel> examples;      ///< the whole body's, then those of regions; none where prepared without
+  RowMatrix gravity_load;                    ///< 3 x r
+  std::shared_ptr<const BodyFrame> frame;    ///< what the body deforms in
+  std::shared_ptr<const Skeleton> skeleton;  ///< that the body hangs on; null: on none
+  std::optional<ContactSet> contact;         ///< of a scene with obstacles
+  std::vector<ExampleModel> examples;        ///< the whole body's, then those of regions; none where prepared without
 
   Eigen::Index modes() const { return internal_force.modes(); }
   bool has_whole_body_examples() const { return !examples.empty() && examples.front().region.empty(); }

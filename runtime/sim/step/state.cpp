@@ -2,6 +2,39 @@
 
 namespace exmat::runtime {
 
+namespace {
+
+constexpr Eigen::VectorXd SkeletonMotion::*kSkeletonArrays[] = {
+    &SkeletonMotion::own, &SkeletonMotion::own_previous, &SkeletonMotion::way_previous, &SkeletonMotion::q,
+    &SkeletonMotion::v,   &SkeletonMotion::q_previous,   &SkeletonMotion::v_previous};
+
+// Calls use(number) of all that is no flag, in a fixed order.
+template <typename Bones, typename Use>
+void for_numbers(Bones& motion, const Use& use) {
+  for (auto* poses : {&motion.bones, &motion.next})
+    for (auto& pose : *poses) {
+      for (int axis = 0; axis < 3; ++axis) use(pose.joint[axis]);
+      for (int k = 0; k < 4; ++k) use(pose.turn.coeffs()[k]);
+    }
+  for (const auto member : kSkeletonArrays)
+    for (Eigen::Index i = 0; i < (motion.*member).size(); ++i) use((motion.*member)[i]);
+}
+
+}  // namespace
+
+Eigen::VectorXd numbers_of(const SkeletonMotion& motion) {
+  std::vector<double> numbers{motion.anew ? 1.0 : 0.0, motion.bound ? 1.0 : 0.0};
+  for_numbers(motion, [&](const double& number) { numbers.push_back(number); });
+  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), std::ssize(numbers));
+}
+
+void set_numbers(const Eigen::VectorXd& numbers, SkeletonMotion& motion) {
+  motion.anew = numbers[0] != 0;
+  motion.bound = numbers[1] != 0;
+  Eigen::Index at = 2;
+  for_numbers(motion, [&](double& number) { number = numbers[at++]; });
+}
+
 State make_state(const Model& model) {
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(model.modes());
   return make_state(model, zero, zero);

@@ -6,6 +6,7 @@
 #include <variant>
 #include <vector>
 
+#include "runtime/sim/frame/skeleton.h"
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
@@ -38,9 +39,24 @@ struct Motion {
   bool begins_anew = true;                 ///< the last step was no smooth one: the first, or one near obstacles
 };
 
+/// A body in full space on a skeleton.
+struct SkeletonMotion {
+  BonePoses bones, next;                         ///< at the end of the last step and of the next
+  bool anew = true;                              ///< the bones were put where they are: no motion has led there
+  bool bound = true;                             ///< nobody has moved them yet
+  Eigen::VectorXd own, own_previous;             ///< [f] displacement of the vertices that move beside their bones
+  Eigen::VectorXd way_previous;                  ///< [f] that the bones alone made in the last step
+  Eigen::VectorXd q, v, q_previous, v_previous;  ///< [3p] displacement and velocity of the fixed vertices
+};
+
+/// All of that as numbers, and back; sizes stay.
+Eigen::VectorXd numbers_of(const SkeletonMotion& motion);
+void set_numbers(const Eigen::VectorXd& numbers, SkeletonMotion& motion);
+
 /// A body that steps in all vertices: q is the displacement of those that move from where they were meshed, world [m].
 struct FullMotion : Motion {
   double alone = 0;  ///< since something acted on it that asks for this space [s]
+  std::optional<SkeletonMotion> skeleton;
 };
 
 /// All that a body carries from step to step. r modes. Of a body in full space the reduced coordinates are those of the

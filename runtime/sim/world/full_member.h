@@ -82,7 +82,8 @@ class FullMember {
   /// Momenta that external forces alone make, or nothing of a body that is not free.
   std::optional<FrameMomenta> expected_momenta() noexcept;
   Eigen::Matrix3d inertia() const noexcept { return own_.potential.rigid.inertia; }  ///< after finish() [kg m^2]
-  Energies energies() const noexcept { return energies_of(full_, scene_, *state_.full); }
+  bool is_driven() const noexcept { return full_.is_driven(); }
+  Energies energies() const noexcept { return runtime::energies(&full_, model_, scene_, state_); }
 
  private:
   const FullModel& full_;

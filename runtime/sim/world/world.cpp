@@ -172,7 +172,8 @@ bool World::is_in_island(int body) const noexcept {
   return !island_of_.empty() && island_of_[static_cast<std::size_t>(body)] >= 0;
 }
 
-/// To touch other bodies does not ask for it, and where a body may touch itself, it steps in its modes.
+/// To touch other bodies does not ask for it, and where a body may touch itself, it steps in its modes, unless it hangs
+/// on bones.
 bool World::asks_for_full(int body) {
   Member& own = at(body);
   const State& state = *own.state;
@@ -181,7 +182,7 @@ bool World::asks_for_full(int body) {
   const bool asks = asks_for_full_space(*own.kind.scene, last, *own.state);
   const bool meets_itself =
       asks && own.touching && own.touching->touching->may_meet_itself(state.q, state.v, own.kind.scene->time_step);
-  return asks && !meets_itself;
+  return asks && (!meets_itself || own.kind.full->skin);
 }
 
 /// Puts each body into the space of its next step.

@@ -70,7 +70,7 @@ struct WorldBody {
   void limit_kinetic_energy(double share) noexcept {
     if (!full)
       step->limit_kinetic_energy(share * model.frame->kinetic_energy(state.v, state.frame));
-    else if (!model.frame->is_driven())
+    else if (!full->is_driven())
       full->step().add_motion(std::sqrt(share), {});
   }
   /// After a step: every velocity becomes `share` of what it is and that of a rigid motion beside it.

@@ -52,7 +52,7 @@ std::vector<std::string> datasets_of(const std::vector<ReadRecord>& record) {
 }
 
 BundleRequest request_for(const Needs& needs, bool constrained, bool step_only, bool positions) {
-  return {plan_groups(needs, constrained, 3, 2, true), needs.regions, step_only, positions};
+  return {plan_groups(needs, constrained, 3, 2, true, true), needs.regions, step_only, positions};
 }
 
 const Needs kLeastNeeds{.examples = false,
@@ -199,7 +199,7 @@ TEST(Bundle, IsSummarised) {
   EXPECT_FALSE(summary.constrained);
   EXPECT_THAT(summary.groups, ElementsAre("object", "shape_space", "examples", "modal", "cubature", "polynomial",
                                           "projection", "targets", "target_space", "target_elasticity", "full_space",
-                                          "fidelity", "regions", "rigid", "contact", "render"));
+                                          "fidelity", "regions", "rigid", "contact", "render", "skeleton"));
   EXPECT_EQ(summary.render_vertices, 3);
   ASSERT_EQ(summary.regions.size(), 2U);
   EXPECT_EQ(summary.regions[0].name, "far right");

@@ -236,6 +236,24 @@ std::vector<RegionData> small_regions(const ReducedModel& model) {
   return regions;
 }
 
+SkeletonData small_skeleton() {
+  SkeletonData skeleton;
+  skeleton.bones = {"hip", "head"};
+  skeleton.animations = {"nod", "still"};
+  skeleton.parents = IndexVector{{-1, 0}};
+  skeleton.bind.resize(6, 4);
+  skeleton.bind << 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 2, 0, 1, -2, 0, 0, 0, 0, 0, 2, 0;
+  skeleton.weights.resize(5, 2);
+  skeleton.weights << 1, 0, 1, 0, 0.5, 0.5, 0.25, 0.75, 0, 1;
+  skeleton.first_frames = IndexVector{{0, 2, 3}};
+  skeleton.times = Eigen::VectorXd{{0, 0.5, 0}};
+  skeleton.poses = RowMatrix::Zero(6, 7);
+  skeleton.poses.col(0).setLinSpaced(0, 1);
+  skeleton.poses.col(3).setOnes();
+  skeleton.poses.row(3) << 0, 1, 0, 0.6, 0, 0, 0.8;
+  return skeleton;
+}
+
 }  // namespace
 
 ReducedModel small_model(bool constrained, bool with_examples) {
@@ -263,6 +281,7 @@ ReducedModel small_model(bool constrained, bool with_examples) {
   if (!constrained) model.rigid = small_rigid();
   model.contact = small_contact(model);
   model.render = small_render();
+  model.skeleton = small_skeleton();
   return model;
 }
 

@@ -334,8 +334,7 @@ const std::vector<Malformed> kMalformed{
        w.json["extensionsRequired"] = {"KHR_materials_unlit", "EXT_mesh_gpu_instancing"};
      },
      "/extensionsRequired/1", "no extension but", "EXT_mesh_gpu_instancing", "without this extension"},
-    {"Skin", [](W& w) { w.json["nodes"][0]["skin"] = 0; }, "/nodes/0/skin", "a mesh without a skin", "skin 0",
-     "apply the armature and export its poses as shape keys"},
+    {"Skin", [](W& w) { w.json["nodes"][0]["skin"] = 0; }, "/nodes/0/skin", "a skin below 0", "0", ""},
     {"OldVersion", [](W& w) { w.json["asset"]["version"] = "1.0"; }, "/asset/version", "version 2.0", "1.0"},
     {"NoAsset", [](W& w) { w.json.erase("asset"); }, "/asset", "the version", "none"},
     {"NegativeOffset", [](W& w) { w.json["accessors"][0]["byteOffset"] = -4; }, "/accessors/0/byteOffset",

@@ -58,7 +58,9 @@ int GltfWriter::view(std::string_view bytes, int stride) {
 }
 
 int GltfWriter::accessor(GltfType type, const std::string& shape, const std::vector<double>& numbers, bool normalized) {
-  const std::size_t components = shape == "SCALAR" ? 1 : static_cast<std::size_t>(shape.back() - '0');
+  const std::size_t components = shape == "SCALAR" ? 1
+                                 : shape == "MAT4" ? 16
+                                                   : static_cast<std::size_t>(shape.back() - '0');
   Json accessor = {{"bufferView", view(gltf_bytes(type, numbers))},
                    {"componentType", static_cast<int>(type)},
                    {"count", numbers.size() / components},

@@ -63,6 +63,39 @@ void enter_full_space(const FullModel& full, const Model& model, State& state) {
   motion.q = motion.v = motion.q_previous = motion.v_previous = motion.a = motion.applied_force = zero;
   if (state.vertex_force.size() == 0) prepare_full(full, state);
   set_full(full, model, state, motion);
+  if (!full.skin) return;
+  SkeletonMotion& bones = motion.skeleton.emplace();
+  bones.own = motion.q;
+  bones.own_previous = bones.way_previous = zero;
+  bones.q.setZero(3 * full.space.driven());
+  bones.v = bones.q_previous = bones.v_previous = bones.q;
+  bones.bones = bones.next = model.skeleton->bound();
+  put_on_bones(full, bones.bones, state);
+}
+
+void put_on_bones(const FullModel& full, const BonePoses& bones, State& state) noexcept {
+  FullMotion& motion = *state.full;
+  SkeletonMotion& own = *motion.skeleton;
+  std::ranges::copy(bones, own.bones.begin());
+  std::ranges::copy(bones, own.next.begin());
+  for (Eigen::Index place = 0; place < full.space.places(); ++place) {
+    const SkinPlace at = full.skin->place(bones, place);
+    if (place < full.space.vertices()) {
+      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
+      motion.q.segment<3>(dof) = full.skin->displacement(at, place) + at.turn * own.own.segment<3>(dof);
+    } else {
+      own.q.segment<3>(3 * (place - full.space.vertices())) = full.skin->displacement(at, place);
+    }
+  }
+  motion.v.setZero();
+  motion.q_previous = motion.q;
+  motion.v_previous.setZero();
+  own.v.setZero();
+  own.q_previous = own.q;
+  own.v_previous.setZero();
+  own.own_previous = own.own;
+  own.way_previous.setZero();
+  own.anew = motion.begins_anew = state.begins_anew = true;
 }
 
 void leave_full_space(State& state) noexcept {
@@ -115,7 +148,8 @@ FullBodyStep::FullBodyStep(const FullModel& full, const Model& model, const Step
       own_(own),
       step_(full, scene, *state.full, own,
             full.contacts && !scene.obstacles.empty() ? FullContactMemory{&state.contacts, &workspace.near->contact}
-                                                      : FullContactMemory{}) {}
+                                                      : FullContactMemory{},
+            full.skin ? &*state.full->skeleton : nullptr) {}
 
 bool FullBodyStep::begin(bool touches_others) noexcept {
   FullMotion& motion = *state_.full;
@@ -167,6 +201,12 @@ void FullBodyStep::set_reduced() noexcept {
       own.moved.segment<3>(dof) = at.to_frame(rest + motion.q.segment<3>(dof)) - rest;
     }
     q = &own.moved;
+    v = &own.rate;
+  }
+  if (full.skin) {
+    const SkeletonMotion& bones = *motion.skeleton;
+    own.rate = (bones.own - bones.own_previous) / scene_.time_step;
+    q = &bones.own;
     v = &own.rate;
   }
   state_.q.noalias() = full.projection.transpose() * *q;
@@ -222,7 +262,7 @@ StepReport step_in_full_space(const FullModel& full, const Model& model, const S
   if (!step.begin()) return step.report();
   step.step().solve();
   const StepReport report = step.finish();
-  if ((report.status & kStepNonFinite) == 0 && rests(model, scene, report, state))
+  if ((report.status & kStepNonFinite) == 0 && !full.skin && rests(model, scene, report, state))
     put_full_to_sleep(model, state, workspace);
   return report;
 }
@@ -239,6 +279,7 @@ Eigen::Vector3d full_displacement(const FullModel& full, const Placement& frame,
                                   Eigen::Index vertex) noexcept {
   const std::int32_t own = full.space.number(vertex);
   if (own >= 0) return motion.q.segment<3>(3 * own);
+  if (full.skin) return motion.skeleton->q.segment<3>(3 * (full.space.place(vertex) - full.space.vertices()));
   if (!full.carried) return Eigen::Vector3d::Zero();
   const Eigen::Vector3d rest = full.carried->rest().col(full.space.place(vertex)).head<3>();
   return frame.to_world(rest) - rest;
@@ -248,6 +289,7 @@ Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, con
                               const FullMotion& motion, Eigen::Index vertex) noexcept {
   const std::int32_t own = full.space.number(vertex);
   if (own >= 0) return motion.v.segment<3>(3 * own);
+  if (full.skin) return motion.skeleton->v.segment<3>(3 * (full.space.place(vertex) - full.space.vertices()));
   if (!full.carried) return Eigen::Vector3d::Zero();
   const Eigen::Vector3d rest = full.carried->rest().col(full.space.place(vertex)).head<3>();
   return velocity.at(frame.rotation * rest);
@@ -255,7 +297,7 @@ Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, con
 
 Energies energies(const FullModel* full, const Model& model, const StepScene& scene, const State& state) noexcept {
   if (!state.full) return energies(model, scene, state);
-  return energies_of(*full, scene, *state.full);
+  return energies_of(*full, scene, *state.full, state.full->skeleton ? &*state.full->skeleton : nullptr);
 }
 
 }  // namespace exmat::runtime

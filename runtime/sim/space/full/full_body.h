@@ -17,6 +17,10 @@ void prepare_full(const FullModel& full, State& state);
 void enter_full_space(const FullModel& full, const Model& model, State& state);
 void leave_full_space(State& state) noexcept;
 
+/// Puts a body in full space onto its skeleton as `bones` are: what it is displaced by beside them stays and turns
+/// along, and in the next step it goes with them. No call allocates.
+void put_on_bones(const FullModel& full, const BonePoses& bones, State& state) noexcept;
+
 /// True if the body's next step is to be in full space: the scene says so, or it says `auto` and a load acts, or has
 /// acted lately, that asks for it. `last` is the body's last step. Counts how long the body was left alone.
 bool asks_for_full_space(const StepScene& scene, const StepReport& last, State& state) noexcept;

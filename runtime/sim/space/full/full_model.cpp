@@ -36,13 +36,16 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
     return {nullptr,
             {"", "/full_space", "this group, since the scene asks for steps in full space", "none",
              "precompute the bundle again with this scene (--scene)"}};
+  if (reduced.skeleton && model.frame->is_driven())
+    return {nullptr, {"", "/skeleton", "no motion that carries the body", "one", "its bones carry it"}};
   const ObjectData& object = *reduced.object;
   const bool is_carried = model.frame->is_driven();
-  auto full = std::make_unique<FullModel>(FullSpace(object.mesh, object.materials, object.fixed,
-                                                    forced ? reduced.full_space->filter : RowMatrix(),
-                                                    is_carried ? FixedVertices::kDriven : FixedVertices::kStay));
+  auto full = std::make_unique<FullModel>(
+      FullSpace(object.mesh, object.materials, object.fixed, forced ? reduced.full_space->filter : RowMatrix(),
+                is_carried || reduced.skeleton ? FixedVertices::kDriven : FixedVertices::kStay));
   full->rest = object.mesh.vertices;
   if (is_carried) full->carried.emplace(full->space, object.mesh.vertices);
+  if (reduced.skeleton) full->skin.emplace(full->space, object.mesh.vertices, *reduced.skeleton);
   if (!full->space.is_clamped()) full->rigid.emplace(full->space, object.mesh.vertices);
   if (model.contact) full->contacts.emplace(*model.contact, full->space, model.frame->origin());
   if (forced) full->examples = full_examples(*reduced.full_space, reduced, model.examples.front(), *full);

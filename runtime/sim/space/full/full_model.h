@@ -11,6 +11,7 @@
 #include "runtime/sim/space/full/full_contacts.h"
 #include "runtime/sim/space/full/full_space.h"
 #include "runtime/sim/space/full/rigid_part.h"
+#include "runtime/sim/space/full/skinned_part.h"
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
@@ -48,8 +49,12 @@ struct FullModel {
   FullSpace space;
   std::optional<RigidPart> rigid;        ///< of a free body
   std::optional<CarriedPart> carried;    ///< of a body whose fixed vertices a motion carries
+  std::optional<SkinnedPart> skin;       ///< of a body on a skeleton
   std::optional<FullContacts> contacts;  ///< where the model has contact
   std::optional<FullExamples> examples;
+  /// Whether the fixed vertices go where something takes them.
+  bool is_driven() const { return carried || skin; }
+
   VertexArray rest;      ///< n x 3, X of all vertices of the mesh, world [m]
   RowMatrix basis;       ///< f x r, U of the vertices that move
   RowMatrix projection;  ///< f x r, M U

@@ -27,6 +27,9 @@ FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
       target(coefficients),
       rate_coefficients(coefficients) {
   if (model.rigid) rigid = RigidWorkspace(model.space);
+  if (!model.skin) return;
+  skin = model.skin->make_pose();
+  turned = start;
 }
 
 void FullPotential::begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept {
@@ -63,6 +66,24 @@ void FullPotential::drive(const MotionSample& from, const MotionSample& to) noex
   }
 }
 
+void FullPotential::hang(const SkeletonMotion& bones, const StepForm& fixed, const Eigen::VectorXd& way,
+                         bool second_order) noexcept {
+  FullPotentialWorkspace& work = workspace_;
+  // As the form differentiates what the vertices are displaced by, so it does the bones' part of it.
+  work.frame_rate = way;
+  if (second_order) {
+    space_.to_field(bones.way_previous, work.unused);
+    work.frame_rate -= work.unused / 3;
+  }
+  for (Eigen::Index place = space_.vertices(), at = 0; place < space_.places(); ++place, at += 3) {
+    const Eigen::Vector3d here = bones.q.segment<3>(at);
+    work.start.segment<3>(4 * place) = here;
+    work.offset.segment<3>(4 * place) = here - fixed.acceleration_centre.segment<3>(at);
+    work.rate.segment<3>(4 * place) = here - fixed.velocity_centre.segment<3>(at);
+    work.frame_rate.segment<3>(4 * place) = work.rate.segment<3>(4 * place) + way.segment<3>(4 * place);
+  }
+}
+
 double FullPotential::undamped_at(const Eigen::VectorXd& d, double elastic_energy) noexcept {
   const Eigen::Index size = space_.field_size();
   Field(workspace_.a.data(), size) = workspace_.offset + d;
@@ -85,6 +106,7 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
     if (freeze) model_.carried->frame_velocity(frame_, work.x.data(), 1 / form_.velocity_factor, work.frame_rate);
     Field(work.w.data(), size) -= work.frame_rate;
   }
+  if (model_.skin && damps()) Field(work.w.data(), size) -= work.frame_rate;
   const MeshArrays mesh = space_.arrays();
   const ElementLaw law = space_.law();
   const MeshInertia own = terms();
@@ -102,7 +124,12 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
 }
 
 void FullPotential::set_coefficients() noexcept {
-  kernels().mesh_coefficients(space_.filter(), workspace_.x.data(), workspace_.coefficients.data());
+  const double* field = workspace_.x.data();
+  if (model_.skin) {
+    model_.skin->to_own(workspace_.skin, field, workspace_.turned.data());
+    field = workspace_.turned.data();
+  }
+  kernels().mesh_coefficients(space_.filter(), field, workspace_.coefficients.data());
 }
 
 PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) noexcept {
@@ -128,7 +155,14 @@ void FullPotential::add_filter_force(PotentialValue& total, Eigen::VectorXd& gra
   FullPotentialWorkspace& work = workspace_;
   set_coefficients();
   const double kappa = filter_stiffness(), damping = filter_damping();
-  if (damping > 0) kernels().mesh_coefficients(space_.filter(), work.w.data(), work.rate_coefficients.data());
+  if (damping > 0) {
+    const double* rate = work.w.data();
+    if (model_.skin) {
+      model_.skin->turn_back(work.skin, rate, work.turned.data());
+      rate = work.turned.data();
+    }
+    kernels().mesh_coefficients(space_.filter(), rate, work.rate_coefficients.data());
+  }
   double energy = 0;
   for (Eigen::Index i = 0; i < work.coefficients.size(); ++i) {
     const double from_target = work.coefficients[i] - work.target[i];
@@ -136,7 +170,14 @@ void FullPotential::add_filter_force(PotentialValue& total, Eigen::VectorXd& gra
     energy += 0.5 * (kappa * from_target * from_target + damping * rate * rate);
     work.coefficients[i] = kappa * from_target + damping * rate;
   }
-  kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), gradient.data());
+  if (model_.skin) {
+    work.turned.setZero();
+    kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), work.turned.data());
+    model_.skin->turn(work.skin, work.turned.data(), work.turned.data());
+    gradient += work.turned;
+  } else {
+    kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), gradient.data());
+  }
   total.value += energy;
   total.magnitude += energy;
 }

@@ -8,6 +8,7 @@
 #include "runtime/sim/space/full/full_model.h"
 #include "runtime/sim/step/integrator.h"
 #include "runtime/sim/step/scene.h"
+#include "runtime/sim/step/state.h"
 
 namespace exmat::runtime {
 
@@ -18,12 +19,14 @@ struct FullPotentialWorkspace {
   FullPotentialWorkspace() = default;
   explicit FullPotentialWorkspace(const FullModel& model);
 
-  Eigen::VectorXd start, offset, rate, external;         ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
-  Eigen::VectorXd frame_rate;                            ///< of q - q_v, what the frame of a carried body makes
-  Eigen::VectorXd unused;                                ///< a gradient that nobody asked for
-  AlignedArray x, a, w, inertia, force;                  ///< fields at the last d
-  AlignedArray frozen;                                   ///< tangents of damping, see Kernels::mesh_force()
-  AlignedFloats tangents;                                ///< of the Hessian
+  Eigen::VectorXd start, offset, rate, external;  ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
+  Eigen::VectorXd frame_rate;            ///< of q - q_v, what the frame of a carried body makes, or the bones alone
+  SkinPose skin;                         ///< of a body on a skeleton: at the end of the step
+  Eigen::VectorXd turned;                ///< a field in its bones' axes
+  Eigen::VectorXd unused;                ///< a gradient that nobody asked for
+  AlignedArray x, a, w, inertia, force;  ///< fields at the last d
+  AlignedArray frozen;                   ///< tangents of damping, see Kernels::mesh_force()
+  AlignedFloats tangents;                ///< of the Hessian
   AlignedArray coefficients, target, rate_coefficients;  ///< 3 x stride: W^T q at the last d, c*, W^T (q - q_v)
   RigidWorkspace rigid;                                  ///< of a free body, where freeze() was last called
 };
@@ -47,6 +50,11 @@ class FullPotential {
 
   /// After begin(), of a carried body: where its frame was and is to be.
   void drive(const MotionSample& from, const MotionSample& to) noexcept;
+
+  /// After begin(), of a body on a skeleton, the workspace's skin at the end of the step: the fixed vertices have a
+  /// form of their own, and the bones alone make this way [field] in the step, and made `way_previous` [f] in the one
+  /// before, which counts where the form is of second order.
+  void hang(const SkeletonMotion& bones, const StepForm& fixed, const Eigen::VectorXd& way, bool second_order) noexcept;
 
   /// Inertia, elasticity and external force alone: at `d`, of the elastic energy there, and at the last d.
   double undamped_at(const Eigen::VectorXd& d, double elastic_energy) noexcept;

@@ -56,6 +56,7 @@ const char* unsupported(const FullModel& model, const StepScene& scene) noexcept
   if (scene.integrator == Integrator::kNewmark) return "Newmark's integrator";
   if (!scene.obstacles.empty() && !model.contacts) return "obstacles, since the bundle has no /contact";
   if (scene.carrier && !model.carried) return "a motion that carries the body";
+  if (scene.animation && !model.skin) return "an animation of bones";
   if (scene.examples.size() > 1) return "more than one example force";
   const bool acts_example = std::ranges::any_of(scene.examples, acts);
   if (acts_example && scene.examples.front().elastic) return "an elastic example force";
@@ -69,6 +70,8 @@ const char* unsupported(const FullModel& model, const StepScene& scene) noexcept
 FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, const FullAccuracy& of)
     : accuracy(of),
       form{0, 0, Eigen::VectorXd::Zero(model.space.size()), Eigen::VectorXd::Zero(model.space.size())},
+      fixed_form{0, 0, Eigen::VectorXd::Zero(3 * model.space.driven()),
+                 Eigen::VectorXd::Zero(3 * model.space.driven())},
       potential(model),
       external(form.velocity_centre),
       moved(external),
@@ -86,6 +89,8 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
       sum(residual),
       coefficients(3 * model.space.filter().stride),
       scaled(residual),
+      turned(residual),
+      turned_image(residual),
       field(d) {
   fit(model, scene);
   if (!model.examples) return;
@@ -116,13 +121,14 @@ double compliance(const FullModel& model, std::span<const std::int32_t> vertices
 }
 
 FullStep::FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-                   const FullContactMemory& contacts) noexcept
+                   const FullContactMemory& contacts, SkeletonMotion* bones) noexcept
     : model_(model),
       space_(model.space),
       scene_(scene),
       state_(state),
       workspace_(workspace),
       contacts_(contacts),
+      bones_(bones),
       potential_(model, scene, workspace.form, workspace.potential) {}
 
 void FullStep::gather_external_force() noexcept {
@@ -144,8 +150,9 @@ bool FullStep::find_contacts() noexcept {
 
 void FullStep::begin(bool touches_others) noexcept {
   among_others_ = touches_others;
-  anew_ = jumps(scene_, state_);
+  anew_ = jumps(scene_, state_) || (bones_ != nullptr && bones_->anew);
   gather_external_force();
+  if (model_.skin) take_along();
   if (model_.rigid || model_.contacts) {
     space_.to_field(state_.q, workspace_.trial);
     space_.to_field(state_.v, workspace_.field);
@@ -170,8 +177,61 @@ void FullStep::begin(bool touches_others) noexcept {
     if (scene_.carrier) to_ = scene_.carrier->sample(end, -kBesideKey * scene_.time_step);
     potential_.drive(from_, to_);
   }
+  if (model_.skin) hang(second_order);
   if (model_.rigid) add_external_impulse();
   choose_first_iterate();
+}
+
+// Where the bones are at the end of the step. A body that was put on them has the velocity that they then make.
+void FullStep::take_along() noexcept {
+  const SkinnedPart& skin = *model_.skin;
+  SkeletonMotion& bones = *bones_;
+  FullPotentialWorkspace& work = workspace_.potential;
+  const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
+  if (scene_.animation) scene_.animation->sample(end, bones.next);
+  skin.place(bones.next, work.skin);
+  if (!bones.anew) return;
+  space_.to_field(state_.q, work.start);
+  stay(workspace_.trial);
+  space_.from_field(workspace_.trial, state_.v);
+  state_.v /= scene_.time_step;
+  for (Eigen::Index at = 0; at < bones.q.size(); at += 3)
+    bones.v.segment<3>(at) =
+        (skin.displacement(work.skin, space_.vertices() + at / 3) - bones.q.segment<3>(at)) / scene_.time_step;
+  state_.v_previous = state_.v;
+  bones.v_previous = bones.v;
+}
+
+void FullStep::hang(bool second_order) noexcept {
+  SkeletonMotion& bones = *bones_;
+  const StepHistory history{bones.q, bones.v, bones.q_previous, bones.v, bones.v_previous};
+  if (second_order)
+    bdf2_form(history, scene_.time_step, workspace_.fixed_form);
+  else
+    backward_euler_form(history, scene_.time_step, workspace_.fixed_form);
+  for (Eigen::Index place = space_.vertices(), at = 0; place < space_.places(); ++place, at += 3)
+    workspace_.potential.start.segment<3>(4 * place) = bones.q.segment<3>(at);
+  stay(workspace_.trial);
+  potential_.hang(bones, workspace_.fixed_form, workspace_.trial, second_order);
+  space_.from_field(workspace_.trial, bones.way_previous);
+}
+
+// After the state of the end was set.
+void FullStep::end_bones() noexcept {
+  SkeletonMotion& bones = *bones_;
+  FullPotentialWorkspace& work = workspace_.potential;
+  const StepForm& form = workspace_.fixed_form;
+  bones.q_previous = bones.q;
+  bones.v_previous = bones.v;
+  for (Eigen::Index place = space_.vertices(), at = 0; place < space_.places(); ++place, at += 3)
+    bones.q.segment<3>(at) = model_.skin->displacement(work.skin, place);
+  bones.v = form.velocity_factor * (bones.q - form.velocity_centre);
+  space_.to_field(state_.q, workspace_.trial);
+  model_.skin->to_own(work.skin, workspace_.trial.data(), workspace_.field.data());
+  bones.own_previous = bones.own;
+  space_.from_field(workspace_.field, bones.own);
+  bones.bones = bones.next;
+  bones.anew = false;
 }
 
 /// Beside that of the frame of a carried body, in the frame; a field.
@@ -179,6 +239,12 @@ void FullStep::own_velocity(double time, const Eigen::VectorXd& q, const Eigen::
                             Eigen::VectorXd& own) const noexcept {
   if (model_.carried)
     model_.carried->own_velocity(frame_at(scene_, time), q, v, own);
+  else if (model_.skin)
+    for (Eigen::Index place = 0; place < space_.places(); ++place) {
+      const Eigen::Index at = place < space_.vertices() ? 3 * space_.number_at(place) : 0;
+      own.segment<3>(4 * place) = (bones_->own - bones_->own_previous).segment<3>(at) / scene_.time_step;
+      if (place >= space_.vertices()) own.segment<3>(4 * place).setZero();
+    }
   else
     space_.to_field(v, own);
 }
@@ -186,6 +252,11 @@ void FullStep::own_velocity(double time, const Eigen::VectorXd& q, const Eigen::
 /// From such a way to that in the world.
 void FullStep::carry(Eigen::VectorXd& d) const noexcept {
   if (model_.carried) model_.carried->carry(from_, to_, workspace_.potential.start, d);
+  if (!model_.skin) return;
+  space_.to_field(bones_->own, workspace_.field);
+  workspace_.field += d;
+  model_.skin->to_world(workspace_.potential.skin, workspace_.field.data(), d.data());
+  d -= workspace_.potential.start;
 }
 
 void FullStep::stay(Eigen::VectorXd& d) const noexcept {
@@ -251,7 +322,8 @@ void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
 void FullStep::precondition() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
-  if (work.contact.block_count == 0)
+  const bool turns = model_.skin && linear_->filter_stiffness > 0;
+  if (work.contact.block_count == 0 && !turns)
     return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
   const auto blocks = std::span(work.contact.blocks).first(work.contact.block_count);
   work.scaled.vector() = work.residual.vector();
@@ -259,7 +331,10 @@ void FullStep::precondition() noexcept {
     auto own = work.scaled.vector().segment<3>(4 * block.place);
     own = (block.scale * own).eval();
   }
+  // The filter is that of the displacement in the axes of the bones.
+  if (turns) model_.skin->turn_back(work.potential.skin, work.scaled.data(), work.scaled.data());
   linear_->preconditioner.solve(run, work.scaled, work.solved, work.coefficients);
+  if (turns) model_.skin->turn(work.potential.skin, work.solved.data(), work.solved.data());
   for (const auto& block : blocks) {
     auto own = work.solved.vector().segment<3>(4 * block.place);
     own = (block.scale * own).eval();
@@ -274,8 +349,21 @@ void FullStep::multiply() noexcept {
                    work.image.data());
   if (linear_->filter_stiffness > 0) {
     const MeshFilter<float> filter = space_.rounded_filter();
-    run.mesh_rounded_coefficients(filter, work.search.data(), work.coefficients.data());
-    run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
+    const float* search = work.search.data();
+    if (model_.skin) {
+      model_.skin->turn_back(work.potential.skin, search, work.turned.data());
+      search = work.turned.data();
+    }
+    run.mesh_rounded_coefficients(filter, search, work.coefficients.data());
+    if (model_.skin) {
+      work.turned_image.vector().setZero();
+      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(),
+                                     work.turned_image.data());
+      model_.skin->turn(work.potential.skin, work.turned_image.data(), work.turned_image.data());
+      work.image.vector() += work.turned_image.vector();
+    } else {
+      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
+    }
   }
   for (const auto& block : std::span(work.contact.blocks).first(work.contact.block_count))
     work.image.vector().segment<3>(4 * block.place) +=
@@ -514,7 +602,7 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   }
   const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
   const double elastic = potential_.elastic_energy();
-  if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_).total();
+  if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_, bones_).total();
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   state_.v = workspace_.rate;
@@ -531,10 +619,11 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   }
   if (near_) model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
-  if (unbalanced && !among_others_ && !model_.carried)
+  if (unbalanced && !among_others_ && !model_.is_driven())
     limit_energy(energy);
   else if (model_.rigid && !unbalanced)
     correct_momenta(others);
+  if (model_.skin) end_bones();
   if (!near_ && contacts_.held != nullptr) contacts_.held->count = 0;
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
@@ -564,15 +653,24 @@ State make_state(const FullModel& model, FullWorkspace& workspace) {
   return make_state(model, rest, rest, workspace);
 }
 
-Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state) noexcept {
+Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state,
+                     const SkeletonMotion* bones) noexcept {
   const Eigen::Vector3d weight = model.space.gravity_load().transpose() * state.q;
+  if (model.skin) {
+    const auto own = [&](Eigen::Index place) -> Eigen::Vector3d {
+      return bones->v.segment<3>(3 * (place - model.space.vertices()));
+    };
+    return {model.space.kinetic_energy(state.v, own), state.elastic_energy,
+            model.skin->fixed_potential(bones->q, scene.gravity) - weight.dot(scene.gravity)};
+  }
   const MotionSample frame = frame_at(scene, state.time);
   const auto driven = [&](Eigen::Index place) { return model.carried->velocity(frame, place); };
   const double fixed = model.carried ? model.carried->fixed_potential(frame, scene.gravity) : 0;
   return {model.space.kinetic_energy(state.v, driven), state.elastic_energy, fixed - weight.dot(scene.gravity)};
 }
 
-Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept {
+Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+                  const SkeletonMotion* bones) noexcept {
   StepForm& form = workspace.form;
   form.velocity_factor = form.acceleration_factor = 0;
   form.velocity_centre = form.acceleration_centre = state.q;
@@ -581,10 +679,13 @@ Energies energies(const FullModel& model, const StepScene& scene, Motion& state,
   workspace.external.setZero();
   potential.begin(state.q, workspace.external);
   if (model.carried) model.carried->place_fixed(frame_at(scene, state.time), workspace.potential.start);
+  if (model.skin)
+    for (Eigen::Index place = model.space.vertices(), at = 0; place < model.space.places(); ++place, at += 3)
+      workspace.potential.start.segment<3>(4 * place) = bones->q.segment<3>(at);
   workspace.d.setZero();
   potential.evaluate_elements(workspace.d, FullPotential::Tangents::kNone, false);
   state.elastic_energy = potential.elastic_energy();
-  return energies_of(model, scene, state);
+  return energies_of(model, scene, state, bones);
 }
 
 }  // namespace exmat::runtime

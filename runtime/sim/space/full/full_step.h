@@ -60,11 +60,13 @@ struct FullWorkspace {
   Linear first, second;  ///< of backward Euler, of BDF2
   Key key;
   StepForm form;
+  StepForm fixed_form;  ///< of the fixed vertices of a body on a skeleton
   FullPotentialWorkspace potential;
   Eigen::VectorXd external, moved, rate, acceleration;               ///< f
   Eigen::VectorXd d, gradient, direction, trial, trial_gradient;     ///< fields
   AlignedFloats residual, solved, search, image, sum, coefficients;  ///< of conjugate gradients
   AlignedFloats scaled;                                              ///< residual that the preconditioner takes
+  AlignedFloats turned, turned_image;                                ///< in the axes of bones
   FullContactScratch contact;
   Eigen::VectorXd field;  ///< a field
   TargetTable::Workspace table;
@@ -96,7 +98,7 @@ struct FullContactMemory {
 class FullStep {
  public:
   FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-           const FullContactMemory& contacts = {}) noexcept;
+           const FullContactMemory& contacts = {}, SkeletonMotion* bones = nullptr) noexcept;
 
   /// Obstacles near, and the first iterate: the predictor q_n + dt v_n or q_n, whichever has the lower potential; where
   /// ends of directions are taken unchecked, the predictor unless it moves a vertex by half an edge or the step has no
@@ -157,6 +159,9 @@ class FullStep {
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;
   bool find_contacts() noexcept;
+  void hang(bool second_order) noexcept;
+  void take_along() noexcept;
+  void end_bones() noexcept;
   void gather_external_force() noexcept;
   void choose_first_iterate() noexcept;
   NewtonStatus minimise() noexcept;
@@ -184,6 +189,7 @@ class FullStep {
   Motion& state_;
   FullWorkspace& workspace_;
   FullContactMemory contacts_;
+  SkeletonMotion* bones_;  ///< null: on none
   const FullWorkspace::Linear* linear_ = nullptr;
   FullPotential potential_;
   FullReport report_;
@@ -204,9 +210,11 @@ FullReport step(const FullModel& model, const StepScene& scene, Motion& state, F
 State make_state(const FullModel& model, FullWorkspace& workspace);
 State make_state(const FullModel& model, const Eigen::VectorXd& u, const Eigen::VectorXd& v, FullWorkspace& workspace);
 
-/// Energies of a state, as runtime::energies().
-Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state) noexcept;
+/// Energies of a state, as runtime::energies(); of a body on a skeleton with its bones.
+Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state,
+                     const SkeletonMotion* bones = nullptr) noexcept;
 /// The same, its elastic energy evaluated and set.
-Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace) noexcept;
+Energies energies(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
+                  const SkeletonMotion* bones = nullptr) noexcept;
 
 }  // namespace exmat::runtime

@@ -1,0 +1,110 @@
+#include "precompute/inputs/object_skeleton.h"
+
+#include <Eigen/SparseCholesky>
+#include <algorithm>
+#include <fmt/format.h>
+#include <limits>
+
+#include "common/core/error.h"
+#include "common/core/log.h"
+#include "common/mesh/assembly.h"
+#include "common/mesh/geometry.h"
+
+namespace exmat::precompute {
+namespace {
+
+constexpr double kHold = 1e3;        // of the surface beside the field's own stiffness, over an edge's length
+constexpr Eigen::Index kFewest = 4;  // vertices that hold a bone: three would leave it a turn
+
+Eigen::VectorXd vertex_areas(const SurfaceMesh& surface) {
+  const TriangleSamples samples = triangle_samples(surface.vertices, surface.triangles);
+  Eigen::VectorXd areas = Eigen::VectorXd::Zero(surface.vertices.rows());
+  for (Eigen::Index t = 0; t < surface.triangles.rows(); ++t)
+    for (int corner = 0; corner < 3; ++corner) areas[surface.triangles(t, corner)] += samples.areas[t] / 3;
+  return areas;
+}
+
+double distance_to_segment(const Eigen::Vector3d& point, const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector3d way = to - from;
+  const double share = way.squaredNorm() > 0 ? std::clamp((point - from).dot(way) / way.squaredNorm(), 0.0, 1.0) : 0;
+  return (point - from - share * way).norm();
+}
+
+// Ends of the axes of bones: the joints that hang on them, or as far beyond the middle of what hangs on a last one.
+std::vector<std::vector<Eigen::Vector3d>> axis_ends(const SkeletonData& skeleton, const VertexArray& vertices) {
+  const auto joint = [&](Eigen::Index b) -> Eigen::Vector3d { return skeleton.bind.block<3, 1>(3 * b, 3); };
+  std::vector<std::vector<Eigen::Vector3d>> ends(skeleton.bones.size());
+  for (Eigen::Index b = 0; b < skeleton.parents.size(); ++b)
+    if (skeleton.parents[b] >= 0) ends[static_cast<std::size_t>(skeleton.parents[b])].push_back(joint(b));
+  for (Eigen::Index b = 0; b < skeleton.parents.size(); ++b) {
+    auto& own = ends[static_cast<std::size_t>(b)];
+    const Eigen::VectorXd weights = skeleton.weights.col(b).array().square();
+    if (!own.empty() || weights.sum() == 0) continue;
+    const Eigen::Vector3d middle = vertices.transpose() * weights / weights.sum();
+    own.push_back(joint(b) + 1.5 * (middle - joint(b)));
+  }
+  return ends;
+}
+
+}  // namespace
+
+SkeletonData skeleton_of_cage(const ObjectSurface& surface) {
+  SkeletonData skeleton = *surface.file().skeleton;
+  const TetMesh& cage = surface.cage().mesh;
+  const Eigen::SparseMatrix<double> at = surface.embedding().points.interpolation(cage);
+  const double edge = bounding_box_diagonal(cage.vertices) / std::cbrt(static_cast<double>(cage.vertex_count()));
+  const Eigen::VectorXd hold = kHold / edge * vertex_areas(surface.file().mesh);
+  const Eigen::SparseMatrix<double> matrix = Eigen::SparseMatrix<double>(laplacian_stiffness(cage)) +
+                                             Eigen::SparseMatrix<double>(at.transpose() * hold.asDiagonal() * at);
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> factor(matrix);
+  if (factor.info() != Eigen::Success)
+    throw WorkError(
+        "the weights of bones cannot be carried to the cage: parts of it are near no vertex of the surface");
+  RowMatrix weights = factor.solve(Eigen::MatrixXd(at.transpose() * (hold.asDiagonal() * skeleton.weights)));
+  weights = (weights.array() < kLeastWeight).select(0, weights);
+  for (auto row : weights.rowwise()) row /= row.sum();
+  skeleton.weights = std::move(weights);
+  return skeleton;
+}
+
+FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, std::vector<std::string>& warnings) {
+  const VertexArray& vertices = surface.cage().mesh.vertices;
+  const auto ends = axis_ends(skeleton, vertices);
+  std::vector<std::vector<std::pair<double, Eigen::Index>>> own(skeleton.bones.size());  // depth and vertex
+  for (Eigen::Index v = 0; v < vertices.rows(); ++v) {
+    Eigen::Index bone = 0;
+    if (skeleton.weights.row(v).maxCoeff(&bone) < kOwnWeight) continue;
+    const Eigen::Vector3d point = vertices.row(v);
+    const Eigen::Vector3d joint = skeleton.bind.block<3, 1>(3 * bone, 3);
+    double to_axis = (point - joint).norm();
+    for (const Eigen::Vector3d& end : ends[static_cast<std::size_t>(bone)])
+      to_axis = std::min(to_axis, distance_to_segment(point, joint, end));
+    const double to_surface = (surface.tree().nearest(point).position - point).norm();
+    own[static_cast<std::size_t>(bone)].emplace_back(to_axis / (to_axis + to_surface), v);
+  }
+  FlagVector pinned = FlagVector::Zero(vertices.rows());
+  std::string none;
+  for (std::size_t b = 0; b < own.size(); ++b) {
+    std::ranges::sort(own[b]);
+    for (Eigen::Index k = 0; k < std::ssize(own[b]); ++k) {
+      const auto [depth, vertex] = own[b][static_cast<std::size_t>(k)];
+      if (depth > kDepth && k >= kFewest) break;
+      pinned[vertex] = 1;
+      skeleton.weights.row(vertex).setZero();
+      skeleton.weights(vertex, static_cast<Eigen::Index>(b)) = 1;
+    }
+    if (own[b].empty()) none += fmt::format("{}\"{}\"", none.empty() ? "" : ", ", skeleton.bones[b]);
+  }
+  log::info(fmt::format("skeleton: {} bones hold {} of {} vertices", skeleton.bones.size(), pinned.cast<int>().sum(),
+                        vertices.rows()));
+  if (!none.empty()) {
+    warnings.push_back(
+        fmt::format("no vertex of the cage hangs on one of these bones alone, and they move only the "
+                    "flesh about them by their weights: {}; more cells would find some",
+                    none));
+    log::warning(warnings.back());
+  }
+  return pinned;
+}
+
+}  // namespace exmat::precompute

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/mesh/tet_mesh.h"
+#include "common/model/reduced_model.h"
+#include "precompute/inputs/object_surface.h"
+
+namespace exmat::precompute {
+
+/// The skeleton of the object's surface for the cage about it: weights of its bones at the vertices [n x b], rows of
+/// sum 1. They minimise the Dirichlet energy of each bone's field where the surface holds it, as heat would spread
+/// (Baran and Popovic 2007). Weights below kLeastWeight are left out.
+SkeletonData skeleton_of_cage(const ObjectSurface& surface);
+inline constexpr double kLeastWeight = 0.01;
+
+/// 1 for the vertices that bones hold by themselves: those that hang on one bone with at least kOwnWeight and lie
+/// nearer to its axis than to the surface, in the proportion kDepth; of a bone with fewer than four of these its four
+/// deepest. They get that bone's weight alone. Warns of bones that hold none.
+FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, std::vector<std::string>& warnings);
+inline constexpr double kOwnWeight = 0.95, kDepth = 0.35;
+
+}  // namespace exmat::precompute

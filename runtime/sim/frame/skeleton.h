@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "common/model/reduced_model.h"
+
+namespace exmat::runtime {
+
+/// Where the joint of a bone is, world [m], and how the bone has turned since it was bound.
+struct BonePose {
+  Eigen::Vector3d joint = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+};
+using BonePoses = std::vector<BonePose>;
+
+using BoneMatrix = Eigen::Matrix<double, 3, 4>;  ///< of a bone to the world: axes and joint [m]
+
+/// A motion of all bones of a skeleton through poses at ascending times, the first 0; between them joints go straight
+/// and bones turn at a constant rate.
+class BoneAnimation {
+ public:
+  BoneAnimation(std::string name, std::vector<double> times, std::vector<BonePoses> poses)
+      : name_(std::move(name)), times_(std::move(times)), poses_(std::move(poses)) {}
+
+  const std::string& name() const { return name_; }
+  double duration() const { return times_.back(); }  ///< [s]
+  /// Held at the ends. Poses are sized.
+  void sample(double time, BonePoses& poses) const noexcept;
+
+ private:
+  std::string name_;
+  std::vector<double> times_;
+  std::vector<BonePoses> poses_;
+};
+
+/// The bones that a body hangs on. Immutable.
+class Skeleton {
+ public:
+  explicit Skeleton(const SkeletonData& data);
+
+  std::size_t size() const { return names_.size(); }
+  const std::vector<std::string>& names() const { return names_; }
+  int parent(std::size_t bone) const { return parents_[bone]; }  ///< -1 of a root
+  const BoneMatrix& bind(std::size_t bone) const { return binds_[bone]; }
+  BonePoses bound() const;
+  /// Of a bone whose axes and joint are here; of axes that are stretched the nearest rotation is taken.
+  BonePose pose(std::size_t bone, const BoneMatrix& world) const noexcept;
+  BoneMatrix matrix(std::size_t bone, const BonePose& pose) const noexcept;  ///< where pose() is from, unstretched
+
+  const std::vector<BoneAnimation>& animations() const { return animations_; }
+  const BoneAnimation* find_animation(const std::string& name) const noexcept;  ///< null where none has the name
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<int> parents_;
+  std::vector<BoneMatrix> binds_;
+  std::vector<BoneAnimation> animations_;
+};
+
+/// How a body's bones follow an animation, which outlives it: at `start` [s] of it at time 0, `speed` times as fast.
+struct BonePlay {
+  const BoneAnimation* animation = nullptr;
+  double speed = 1;
+  double start = 0;
+  bool loop = true;
+
+  void sample(double time, BonePoses& poses) const noexcept;
+};
+
+}  // namespace exmat::runtime

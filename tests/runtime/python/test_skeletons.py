@@ -1,0 +1,215 @@
+"""Bodies on the skeleton of a glTF file: a tube on three bones, which curls."""
+import copy
+import json
+import os
+import pathlib
+import pickle
+import struct
+import subprocess
+
+import h5py
+import numpy as np
+import pytest
+
+import exmat
+
+BUILD = pathlib.Path(os.environ.get("EXMAT_BUILD", pathlib.Path(__file__).resolve().parents[3] / "build/release"))
+LENGTH, RINGS, AROUND, BONES = 3.0, 24, 16, 3
+SETTINGS = dict(time_step=0.004, stiffness_damping=0.005, gravity=(0, -9.81, 0))
+
+
+def tube():
+    """Closed and round along x, 1 m thick: points and triangles."""
+    angles = 2 * np.pi * np.arange(AROUND) / AROUND
+    points = np.array([[LENGTH * k / RINGS, 0.5 * np.cos(a), 0.5 * np.sin(a)] for k in range(RINGS + 1) for a in angles]
+                      + [[0, 0, 0], [LENGTH, 0, 0]])
+    start, end = len(points) - 2, len(points) - 1
+    at = lambda ring, k: AROUND * ring + k % AROUND
+    triangles = [t for k in range(AROUND) for t in
+                 [(start, at(0, k + 1), at(0, k)), (end, at(RINGS, k), at(RINGS, k + 1))]
+                 + [t for ring in range(RINGS) for t in ((at(ring, k), at(ring, k + 1), at(ring + 1, k + 1)),
+                                                         (at(ring, k), at(ring + 1, k + 1), at(ring + 1, k)))]]
+    return points, np.array(triangles)
+
+
+def write_skinned(path):
+    """On bones of 1 m in a row, whose weights go over within 0.3 m; an animation turns each by 30 degrees about z, and back."""
+    points, triangles = tube()
+    document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": []}
+    binary = bytearray()
+
+    def accessor(array, kind, code):
+        document["bufferViews"].append({"buffer": 0, "byteOffset": len(binary), "byteLength": array.nbytes})
+        binary.extend(array.tobytes())
+        binary.extend(b"\0" * (-len(binary) % 4))
+        document["accessors"].append({"bufferView": len(document["bufferViews"]) - 1, "componentType": code, "count": len(array),
+                                      "type": kind})
+        return len(document["accessors"]) - 1
+
+    floats = lambda array, kind: accessor(np.ascontiguousarray(array, np.float32), kind, 5126)
+    bone = np.clip(points[:, 0].astype(int), 0, BONES - 1)
+    to_next = np.where(bone < BONES - 1, np.clip((points[:, 0] - bone - 0.7) / 0.3, 0, 1) / 2, 0)
+    to_last = np.where(bone > 0, np.clip((0.3 - (points[:, 0] - bone)) / 0.3, 0, 1) / 2, 0)
+    joints = np.stack([bone, np.minimum(bone + 1, BONES - 1), np.maximum(bone - 1, 0), bone], 1).astype(np.uint8)
+    weights = np.stack([1 - to_next - to_last, to_next, to_last, 0 * to_last], 1)
+    document["meshes"] = [{"primitives": [{
+        "attributes": {"POSITION": floats(points, "VEC3"), "JOINTS_0": accessor(joints, "VEC4", 5121), "WEIGHTS_0": floats(weights, "VEC4")},
+        "indices": accessor(np.ascontiguousarray(triangles.ravel(), np.uint32), "SCALAR", 5125)}]}]
+    inverse = np.tile(np.eye(4), (BONES, 1, 1))
+    inverse[:, 0, 3] = -np.arange(BONES)
+    document["skins"] = [{"joints": [1, 2, 3], "inverseBindMatrices": floats(inverse.transpose(0, 2, 1).reshape(-1, 16), "MAT4")}]
+    document["nodes"] = [{"mesh": 0, "skin": 0}, {"name": "root", "children": [2]},
+                         {"name": "middle", "translation": [1, 0, 0], "children": [3]}, {"name": "tip", "translation": [1, 0, 0]}]
+    document["scenes"] = [{"nodes": [0, 1]}]
+    half = np.radians(30) / 2
+    times = floats(np.array([0, 0.5, 1.0]), "SCALAR")
+    turns = floats(np.array([[0, 0, 0, 1], [0, 0, np.sin(half), np.cos(half)], [0, 0, 0, 1]]), "VEC4")
+    document["animations"] = [{"name": "curl", "samplers": [{"input": times, "output": turns}],
+                               "channels": [{"sampler": 0, "target": {"node": node, "path": "rotation"}} for node in (1, 2, 3)]}]
+    document["buffers"] = [{"byteLength": len(binary)}]
+    text = json.dumps(document).encode()
+    text += b" " * (-len(text) % 4)
+    path.write_bytes(struct.pack("<III", 0x46546C67, 2, 28 + len(text) + len(binary)) + struct.pack("<II", len(text), 0x4E4F534A) + text
+                     + struct.pack("<II", len(binary), 0x004E4942) + bytes(binary))
+
+
+@pytest.fixture(scope="module")
+def skinned(folder):
+    if not (BUILD / "bin/exmat-precompute").exists() and "EXMAT_PRECOMPUTE" not in os.environ:
+        pytest.skip("built without the offline stage")
+    write_skinned(folder / "tube.glb")
+    exmat.precompute.bundle({
+        "name": "tube", "object": {"surface": folder / "tube.glb", "cells": 1500,
+                                   "material": {"youngs_modulus": 3e5, "poisson_ratio": 0.4, "density": 1000}},
+        "basis": {"size": 12, "linear_modes": 8, "training": "none"}, "cubature": {"elements": 30}}, folder / "tube.h5")
+    return folder / "tube.h5"
+
+
+@pytest.fixture(scope="module")
+def model(skinned):
+    return exmat.Model(skinned, **SETTINGS)
+
+
+@pytest.fixture(scope="module")
+def held(skinned):
+    """The vertices that bones hold, at rest, and each one's bone."""
+    with h5py.File(skinned) as file:
+        fixed = np.flatnonzero(file["/object/fixed"][:])
+        return fixed, file["/object/vertices"][:][fixed], file["/skeleton/weights"][:][fixed].argmax(1)
+
+
+def off_bones(body, transforms, held):
+    """Largest distance of the held vertices from where the bones take them [m]."""
+    vertices, rest, bones = held
+    points = exmat.Points(body.model, vertices)
+    found = body.positions(points, np.empty((len(vertices), 3)))
+    bound = body.model.bound_bones
+    local = np.einsum("kji,kj->ki", bound[bones, :, :3], rest - bound[bones, :, 3])
+    return np.abs(found - np.einsum("kij,kj->ki", transforms[bones, :, :3], local) - transforms[bones, :, 3]).max()
+
+
+def turned(transforms, degrees, shift):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    moved = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ transforms
+    moved[:, :, 3] += shift
+    return moved
+
+
+def test_a_model_has_the_bones_of_the_file(model, held):
+    assert model.bones == {"root": None, "middle": "root", "tip": "middle"}
+    assert np.allclose(model.bound_bones[:, :, 3], [[0, 0, 0], [1, 0, 0], [2, 0, 0]])
+    assert model.animations == {"curl": 1.0}
+    tip = model.animated_bones("curl", 0.25)[2]
+    assert np.allclose(tip[:, 0], [np.cos(np.radians(45)), np.sin(np.radians(45)), 0], atol=1e-6)
+    vertices, rest, bones = held
+    assert len(vertices) >= 12 and set(bones) == {0, 1, 2}
+    assert (np.linalg.norm(rest[:, 1:], axis=1) < 0.35).all()
+
+
+def test_held_vertices_are_where_their_bones_are(model, held):
+    body = exmat.Body(model)
+    for k in range(100):
+        bones = turned(model.animated_bones("curl", 0.01 * k), 720 * 0.004 * k, [0, 0, 10 * 0.004 * k])
+        body.set_bones(bones)
+        assert body.step().status == 0
+        assert off_bones(body, bones, held) < 1e-12 * LENGTH
+    assert np.allclose(body.bones, bones, atol=1e-12)
+    elsewhere = turned(model.bound_bones, 40, [50, 3, 0])
+    body.set_bones(elsewhere, teleport=True)
+    assert off_bones(body, elsewhere, held) < 1e-12 * 50
+
+
+def test_the_flesh_follows_and_comes_to_rest_as_it_hangs(model):
+    body, still = exmat.Body(model), exmat.Body(model)
+    body.set_damping(3, 0.02)
+    still.set_damping(3, 0.02)
+    everywhere = exmat.Points.all_vertices(model)
+    for k in range(700):
+        body.set_bones(model.animated_bones("curl", min(0.004 * k, 1.0)))
+        body.step()
+        still.step()
+    xyz, expected = body.positions(everywhere), still.positions(everywhere)
+    assert np.abs(xyz - expected).max() < 1e-3
+    assert np.abs(expected - exmat.Body(model).positions(everywhere)).max() > 0.005  # it sags
+
+
+def test_an_animation_of_the_scene_is_that_of_a_host(skinned, model):
+    scene = {"bundle": str(skinned), "time_step": 0.004, "steps": 200, "gravity": [0, -9.81, 0], "damping": {"stiffness": 0.005},
+             "body": {"animation": {"name": "curl", "speed": 0.5, "start": 0.1}}}
+    played = exmat.Body(exmat.Model.from_scene(scene))
+    body = exmat.Body(model)
+    body.set_bones(model.animated_bones("curl", 0.1))
+    for k in range(200):
+        body.set_bones(model.animated_bones("curl", 0.1 + 0.5 * 0.004 * (k + 1)))
+        body.step()
+    played.step(200)
+    everywhere = exmat.Points.all_vertices(model)
+    assert np.abs(played.positions(exmat.Points.all_vertices(played.model)) - body.positions(everywhere)).max() < 1e-6
+
+
+def test_states_and_copies_go_on_to_the_last_bit(model):
+    body = exmat.Body(model)
+    for k in range(20):
+        body.set_bones(model.animated_bones("curl", 0.004 * k))
+        body.step()
+    twin, other, third = copy.deepcopy(body), pickle.loads(pickle.dumps(body)), exmat.Body(model)
+    third.state = body.state
+    for k in range(20, 40):
+        for one in (body, twin, other, third):
+            one.set_bones(model.animated_bones("curl", 0.004 * k))
+            one.step()
+    assert len({exmat.state_hash([one]) for one in (body, twin, other, third)}) == 1
+
+
+def test_the_program_goes_on_from_a_state_to_the_last_bit(skinned, folder):
+    scene = {"bundle": str(skinned), "time_step": 0.004, "steps": 60, "gravity": [0, -9.81, 0], "body": {"animation": {"name": "curl"}}}
+    path = folder / "curl.json"
+    path.write_text(json.dumps(scene))
+
+    def run(*words):
+        done = subprocess.run([BUILD / "bin/exmat-runtime", "run", path, *map(str, words)], capture_output=True, text=True, check=True)
+        return [line for line in done.stdout.splitlines() if line.startswith("state hash")]
+
+    whole = run()
+    run("--steps", 30, "--dump-state", folder / "half.json")
+    assert run("--from-state", folder / "half.json", "--steps", 30) == whole
+
+
+def test_what_cannot_be_is_refused(model, bundle):
+    body = exmat.Body(model)
+    bones = model.bound_bones
+    with pytest.raises(exmat.InvalidArgument, match="transforms"):
+        body.set_bones(bones[:2])
+    bones[1, 2, 3] = np.nan
+    with pytest.raises(exmat.InvalidArgument, match="finite"):
+        body.set_bones(bones)
+    with pytest.raises(exmat.InvalidArgument, match="skeleton"):
+        body.space = "reduced"
+    with pytest.raises(exmat.InvalidArgument, match="skeleton"):
+        body.set_reduced(np.zeros(model.modes), np.zeros(model.modes))
+    with pytest.raises(exmat.InvalidArgument, match="none that is named run"):
+        model.animated_bones("run", 0)
+    other = exmat.Model(bundle)
+    assert other.bones == {} and other.animations == {}
+    with pytest.raises(exmat.InvalidArgument, match="no bones"):
+        exmat.Body(other).set_bones(np.empty((0, 3, 4)))
