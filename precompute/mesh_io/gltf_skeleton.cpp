@@ -1,12 +1,12 @@
 #include "precompute/mesh_io/gltf_skeleton.h"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <fmt/format.h>
 #include <set>
 
+#include "common/elastic/polar_rotation.h"
 #include "precompute/mesh_io/gltf_nodes.h"
 
 namespace exmat::precompute {
@@ -25,14 +25,9 @@ std::string place_of(const char* list, std::size_t index) { return fmt::format("
 
 // The rotation nearest to the turn of a bone, and how much it is stretched beside that.
 Eigen::Quaterniond turn_of(const Eigen::Matrix3d& stretched, double& stretch) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(stretched, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  stretch = std::max(stretch, (svd.singularValues().array() - 1).abs().maxCoeff());
-  Eigen::Vector3d signs(1, 1, 1);
-  if ((svd.matrixU() * svd.matrixV().transpose()).determinant() < 0) {
-    signs[2] = -1;
-    stretch = std::max(stretch, 2.0);
-  }
-  return Eigen::Quaterniond(Eigen::Matrix3d(svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose()));
+  const Eigen::Matrix3d turn = nearest_rotation(stretched);
+  stretch = std::max(stretch, (turn.transpose() * stretched - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff());
+  return Eigen::Quaterniond(turn);
 }
 
 }  // namespace

@@ -79,6 +79,7 @@ struct exmat_body {
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
   exmat_world* world = nullptr;                                  ///< that it is in, always one
   std::int64_t id = 0;                                           ///< in that
+  std::int64_t next_attachment = 0;                              ///< its id
   std::unique_ptr<exmat_world> own;                              ///< the world, where it is the body's own
   std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< where reports hold lost work
   Eigen::VectorXd load;                                          ///< 3n applied forces, there alone; the body's frame

@@ -1,4 +1,5 @@
 #include <array>
+#include <limits>
 #include <pybind11/stl.h>
 
 #include "runtime/python/objects.h"
@@ -147,6 +148,22 @@ void bind_actions(BodyClass& type) {
           "After an abrupt change of forces: keeps the impulse exact, at the price of one step of first order.");
 }
 
+std::span<const double, 12> frame_of(const Numbers& frame) {
+  require_shape(frame, "frame", {3, 4});
+  return std::span<const double, 12>(read_span(frame).data(), 12);
+}
+
+std::int64_t attach(BodyObject& body, const py::object& vertices, const Numbers& frame, const std::string& kind,
+                    double stiffness, double damping, double break_force) {
+  const Ids ids = whole_numbers(vertices, "vertices");
+  exmat_attachment attachment = default_attachment();
+  attachment.kind = number_of(py::str(kind), "kind", {"fixed", "ball", "spring"});
+  attachment.stiffness = stiffness;
+  attachment.damping = damping;
+  attachment.break_force = break_force;
+  return body.get().attach(read_span(ids), frame_of(frame), attachment);
+}
+
 void bind_settings(BodyClass& type) {
   type.def("set_gravity", &set_gravity, py::arg("gravity"),
            "Gravity of this body alone, three numbers [m/s^2]; after an abrupt change restart_integrator() keeps the "
@@ -183,6 +200,30 @@ void bind_settings(BodyClass& type) {
           "Space of the last step, \"reduced\" or \"full\"; setting it, to \"reduced\", \"full\" or \"auto\", holds "
           "from the "
           "next step on, for a model of space \"full\" or \"auto\".")
+      .def("attach", &attach, py::arg("vertices"), py::arg("frame"), py::arg("kind") = "fixed",
+           py::arg("stiffness") = 1e4, py::arg("damping") = 0.0,
+           py::arg("break_force") = std::numeric_limits<double>::infinity(),
+           "Holds `vertices` of the object by a frame of shape (3, 4), by where they are in it now: \"fixed\", each of "
+           "them; \"ball\", their mean by mass; \"spring\", that by a stiffness [N/m] and a damping [N s/m]. Beyond "
+           "break_force [N] it lets go. For a body of space \"full\" or \"auto\". Returns its id.")
+      .def(
+          "move_attachment",
+          [](BodyObject& body, std::int64_t id, const Numbers& frame) {
+            body.get().move_attachment(id, frame_of(frame));
+          },
+          py::arg("id"), py::arg("frame"), "Where its frame is at the end of the next step: shape (3, 4).")
+      .def(
+          "detach", [](BodyObject& body, std::int64_t id) { body.get().detach(id); }, py::arg("id"), "Lets it go.")
+      .def(
+          "attachment_load",
+          [](BodyObject& body, std::int64_t id) {
+            const AttachmentLoad load = body.get().attachment_load(id);
+            return py::make_tuple(array_of(load.force.data(), 3), array_of(load.torque.data(), 3), load.broken);
+          },
+          py::arg("id"),
+          "What the body exerts on the frame in the last step: force [N], torque about its origin [N m], and whether "
+          "it "
+          "broke.")
       .def(
           "set_bones",
           [](BodyObject& body, const Numbers& transforms, bool teleport) {

@@ -345,6 +345,42 @@ EXMAT_API exmat_status exmat_body_set_bones(exmat_body* body, const double* tran
 /* Transforms of all bones at the end of the last step. */
 EXMAT_API exmat_status exmat_body_read_bones(const exmat_body* body, double* transforms, int64_t count) EXMAT_NOEXCEPT;
 
+/* Attachments: a frame of the host, such as a rigid body, a bone or a hand, holds a patch of a body. The body steps in
+   all vertices of its mesh for as long as something holds it: its model has to be of space _FULL or _AUTO. What is held
+   is exactly where the frame is at the end of each step; the frame's transform [12] is as a bone's. */
+enum {
+  EXMAT_ATTACHMENT_FIXED = 0, /* each vertex of the patch stays where it is in the frame */
+  EXMAT_ATTACHMENT_BALL = 1,  /* their mean does, by their masses; the patch turns about it */
+  EXMAT_ATTACHMENT_SPRING = 2 /* a spring and a damper pull that mean to where it is in the frame */
+};
+typedef struct exmat_attachment {
+  size_t size;        /* sizeof(exmat_attachment), set by the caller */
+  int32_t kind;       /* EXMAT_ATTACHMENT_FIXED */
+  double stiffness;   /* of a spring, > 0 [N/m]; 1e4 */
+  double damping;     /* likewise, >= 0 [N s/m]; 0 */
+  double break_force; /* beyond which it holds no longer, > 0 [N]; infinity */
+} exmat_attachment;
+
+/* Sets all members to their defaults; `size` is sizeof(exmat_attachment). */
+EXMAT_API exmat_status exmat_attachment_default(exmat_attachment* attachment, size_t size) EXMAT_NOEXCEPT;
+
+/* From the next step on, by where `vertices` [count] of the object are now in the frame. None of them may be fixed, or
+   held already. `id` of the attachment is the body's own. */
+EXMAT_API exmat_status exmat_body_attach(exmat_body* body, const int64_t* vertices, int64_t count,
+                                         const exmat_attachment* attachment, const double* frame,
+                                         int64_t* id) EXMAT_NOEXCEPT;
+
+/* Where the frame is at the end of the next step, and of those after it until the next call. */
+EXMAT_API exmat_status exmat_body_move_attachment(exmat_body* body, int64_t id, const double* frame) EXMAT_NOEXCEPT;
+
+/* Lets the patch go. */
+EXMAT_API exmat_status exmat_body_detach(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
+
+/* What the body exerts on the frame in the last step: `force` [3] [N] and `torque` [3] about the frame's origin [N m].
+   `broken`: 1 where that was more than the attachment bears. Each may be NULL. */
+EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, int64_t id, double* force, double* torque,
+                                                       int32_t* broken) EXMAT_NOEXCEPT;
+
 /* Settings of the example force. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model
    has to have that example force: use_examples, or the scene. */
 

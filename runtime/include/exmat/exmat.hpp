@@ -59,6 +59,18 @@ inline exmat_settings default_settings() {
   return settings;
 }
 
+inline exmat_attachment default_attachment() {
+  exmat_attachment attachment;
+  check(exmat_attachment_default(&attachment, sizeof attachment));
+  return attachment;
+}
+
+/// On the frame of an attachment [N], about its origin [N m].
+struct AttachmentLoad {
+  std::array<double, 3> force{}, torque{};
+  bool broken = false;
+};
+
 inline exmat_obstacle default_obstacle() {
   exmat_obstacle obstacle;
   check(exmat_obstacle_default(&obstacle, sizeof obstacle));
@@ -376,6 +388,25 @@ class BodyRef {
   /// EXMAT_SPACE_...; and which of the two the last step was in.
   void set_space(std::int32_t space) { check(exmat_body_set_space(get(), space)); }
   std::int32_t space() const { return exmat_body_space(get()); }
+  /// Holds vertices by a frame [12]; its id.
+  std::int64_t attach(std::span<const std::int64_t> vertices, std::span<const double, 12> frame,
+                      const exmat_attachment& attachment = default_attachment()) {
+    std::int64_t id = 0;
+    check(exmat_body_attach(get(), vertices.data(), static_cast<std::int64_t>(vertices.size()), &attachment,
+                            frame.data(), &id));
+    return id;
+  }
+  void move_attachment(std::int64_t id, std::span<const double, 12> frame) {
+    check(exmat_body_move_attachment(get(), id, frame.data()));
+  }
+  void detach(std::int64_t id) { check(exmat_body_detach(get(), id)); }
+  AttachmentLoad attachment_load(std::int64_t id) const {
+    AttachmentLoad load;
+    std::int32_t broken = 0;
+    check(exmat_body_read_attachment_load(get(), id, load.force.data(), load.torque.data(), &broken));
+    load.broken = broken != 0;
+    return load;
+  }
   /// [12 bones] of the model's bones, at the end of the next step; `teleport`: at once. And those of the last step.
   void set_bones(std::span<const double> transforms, bool teleport = false) {
     check(exmat_body_set_bones(get(), transforms.data(), static_cast<std::int64_t>(transforms.size() / 12),

@@ -1,9 +1,11 @@
 #include "runtime/sim/frame/skeleton.h"
 
-#include <Eigen/SVD>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <utility>
+
+#include "common/elastic/polar_rotation.h"
 
 namespace exmat::runtime {
 
@@ -49,11 +51,7 @@ BonePoses Skeleton::bound() const {
 
 BonePose Skeleton::pose(std::size_t bone, const BoneMatrix& world) const noexcept {
   const Eigen::Matrix3d stretched = world.leftCols<3>() * binds_[bone].leftCols<3>().inverse();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(stretched, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  Eigen::Vector3d signs(1, 1, 1);
-  signs[2] = (svd.matrixU() * svd.matrixV().transpose()).determinant() < 0 ? -1 : 1;
-  const Eigen::Matrix3d turn = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
-  return {world.col(3), Eigen::Quaterniond(turn)};
+  return {world.col(3), Eigen::Quaterniond(nearest_rotation(stretched))};
 }
 
 BoneMatrix Skeleton::matrix(std::size_t bone, const BonePose& pose) const noexcept {

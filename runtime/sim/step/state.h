@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "runtime/sim/frame/skeleton.h"
+#include "runtime/sim/step/attachment.h"
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
@@ -68,6 +69,7 @@ struct State : Motion {
   FrameState frame;                    ///< of the model's frame; nothing of a clamped body
   std::optional<FullMotion> full;      ///< in full space
   Eigen::VectorXd vertex_force;        ///< [f] of the caller, world [N], of a body that may step in full space
+  std::vector<Attachment> attachments;  ///< of its host, likewise
 };
 
 /// Those of a free body.

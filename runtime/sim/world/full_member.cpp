@@ -72,7 +72,7 @@ const StepReport& FullMember::finish(NewtonStatus status, const Eigen::VectorXd&
 }
 
 std::optional<FrameMomenta> FullMember::expected_momenta() noexcept {
-  if (!full_.rigid) return std::nullopt;
+  if (!full_.rigid || is_driven()) return std::nullopt;
   return step_->step().expected_momenta();
 }
 

@@ -82,7 +82,8 @@ class FullMember {
   /// Momenta that external forces alone make, or nothing of a body that is not free.
   std::optional<FrameMomenta> expected_momenta() noexcept;
   Eigen::Matrix3d inertia() const noexcept { return own_.potential.rigid.inertia; }  ///< after finish() [kg m^2]
-  bool is_driven() const noexcept { return full_.is_driven(); }
+  /// Whether something outside moves parts of it.
+  bool is_driven() const noexcept { return full_.is_driven() || !state_.attachments.empty(); }
   Energies energies() const noexcept { return runtime::energies(&full_, model_, scene_, state_); }
 
  private:

@@ -34,6 +34,16 @@ void set_full(const FullModel& full, const Model& model, const State& state, Ful
   motion.begins_anew = true;
 }
 
+FullMemory full_memory(const FullModel& full, const StepScene& scene, State& state, Workspace& workspace) noexcept {
+  FullMemory memory{.attachments = state.attachments};
+  if (full.contacts && !scene.obstacles.empty()) {
+    memory.held = &state.contacts;
+    memory.found = &workspace.near->contact;
+  }
+  if (full.skin) memory.bones = &*state.full->skeleton;
+  return memory;
+}
+
 /// Weights at the first iterate, into the workspace, and the target of the step.
 void find_target(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
                  Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
@@ -108,10 +118,10 @@ bool asks_for_full_space(const StepScene& scene, const StepReport& last, State& 
   if (settings.space != Space::kAuto) return settings.space == Space::kFull;
   const double midpoint = state.time + 0.5 * scene.time_step;
   // That of the caller has a part in the modes, which are far fewer than the vertices.
-  const bool acts = !state.applied_force.isZero(0) || (settings.contact && last.contacts > 0) ||
-                    (settings.forces && std::ranges::any_of(scene.forces, [&](const ScriptedForce& force) {
-                       return force.acts_at(midpoint);
-                     }));
+  const bool acts =
+      !state.applied_force.isZero(0) || !state.attachments.empty() || (settings.contact && last.contacts > 0) ||
+      (settings.forces &&
+       std::ranges::any_of(scene.forces, [&](const ScriptedForce& force) { return force.acts_at(midpoint); }));
   if (acts || !state.full) {
     if (state.full) state.full->alone = 0;
     return acts;
@@ -146,10 +156,7 @@ FullBodyStep::FullBodyStep(const FullModel& full, const Model& model, const Step
       state_(state),
       workspace_(workspace),
       own_(own),
-      step_(full, scene, *state.full, own,
-            full.contacts && !scene.obstacles.empty() ? FullContactMemory{&state.contacts, &workspace.near->contact}
-                                                      : FullContactMemory{},
-            full.skin ? &*state.full->skeleton : nullptr) {}
+      step_(full, scene, *state.full, own, full_memory(full, scene, state, workspace)) {}
 
 bool FullBodyStep::begin(bool touches_others) noexcept {
   FullMotion& motion = *state_.full;
@@ -262,7 +269,7 @@ StepReport step_in_full_space(const FullModel& full, const Model& model, const S
   if (!step.begin()) return step.report();
   step.step().solve();
   const StepReport report = step.finish();
-  if ((report.status & kStepNonFinite) == 0 && !full.skin && rests(model, scene, report, state))
+  if ((report.status & kStepNonFinite) == 0 && rests(model, scene, report, state))
     put_full_to_sleep(model, state, workspace);
   return report;
 }

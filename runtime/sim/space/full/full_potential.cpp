@@ -1,5 +1,7 @@
 #include "runtime/sim/space/full/full_potential.h"
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <limits>
 
 namespace exmat::runtime {
@@ -84,6 +86,29 @@ void FullPotential::hang(const SkeletonMotion& bones, const StepForm& fixed, con
   }
 }
 
+void FullPotential::set_attachments(std::span<Attachment> attachments) noexcept {
+  attachments_ = attachments;
+  const auto holds = [](const Attachment& attachment) { return !attachment.broken; };
+  const auto first = std::ranges::find_if(attachments, holds);
+  host_ = first == attachments.end() ? nullptr : &*first;
+}
+
+// Of a free body that a host holds damping acts beside what the host does: the motion of its frame where that holds the
+// patch's vertices, else its anchor's with the turn that the body has at the first iterate.
+void FullPotential::remove_host_motion(bool freeze) noexcept {
+  const RigidWorkspace& rigid = workspace_.rigid;
+  const double per_rate = 1 / (scene_.time_step * form_.velocity_factor);
+  if (freeze && host_->kind == AttachmentKind::kFixed) {
+    const Eigen::AngleAxisd turn(host_->rotation * host_->rotation_before.transpose());
+    host_turn_ = per_rate * turn.angle() * turn.axis();
+  } else if (freeze) {
+    host_turn_ = model_.rigid->spin(workspace_.w.data(), rigid);
+  }
+  const Eigen::Vector3d way = per_rate * (host_->anchor() - host_->anchor_before());
+  const Eigen::Vector3d at_centre = way + host_turn_.cross(rigid.centre - host_->anchor());
+  RigidPart::add_motion({-at_centre, -host_turn_}, rigid, workspace_.w.data());
+}
+
 double FullPotential::undamped_at(const Eigen::VectorXd& d, double elastic_energy) noexcept {
   const Eigen::Index size = space_.field_size();
   Field(workspace_.a.data(), size) = workspace_.offset + d;
@@ -100,7 +125,8 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   Field(work.w.data(), size) = work.rate + d;
   if (model_.rigid) {
     if (freeze) model_.rigid->place(work.x.data(), work.rigid);
-    if (damps()) model_.rigid->remove_motion(work.rigid, work.w.data());
+    if (damps() && host_ == nullptr) model_.rigid->remove_motion(work.rigid, work.w.data());
+    if (damps() && host_ != nullptr) remove_host_motion(freeze);
   }
   if (model_.carried && damps()) {
     if (freeze) model_.carried->frame_velocity(frame_, work.x.data(), 1 / form_.velocity_factor, work.frame_rate);
@@ -148,6 +174,7 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   gradient.tail(4 * space_.driven()).setZero();
   if (filters()) add_filter_force(total, gradient);
   if (contact_ != nullptr) add_contacts(evaluation, gradient);
+  if (!attachments_.empty()) add_attachments(evaluation, gradient);
   return evaluation;
 }
 
@@ -187,6 +214,59 @@ void FullPotential::add_contacts(PotentialEvaluation& evaluation, Eigen::VectorX
   evaluation.potential.value += contact_->potential;
   evaluation.potential.magnitude += contact_->potential;
   evaluation.force_scale += kPlaceRounding * reach_ * contact_->stiffness / scene_.space.newton.tolerance;
+}
+
+// The spring of a mean m is k/2 |m - a|^2, its damper c c_v/2 |m - m_v - (a - a_before)/(dt c_v)|^2, dt c_v that of
+// backward Euler for the frame's part.
+void FullPotential::add_attachments(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept {
+  const double c_v = form_.velocity_factor;
+  for (Attachment& attachment : attachments_) {
+    attachment.force.setZero();
+    attachment.torque.setZero();
+    if (attachment.broken || attachment.kind != AttachmentKind::kSpring) continue;
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero(), rate = Eigen::Vector3d::Zero();
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
+      const Eigen::Index vertex = attachment.vertices[k], place = 4 * space_.place(vertex);
+      const double share = attachment.shares[static_cast<Eigen::Index>(k)];
+      const Eigen::Vector3d x = Eigen::Map<const Eigen::Vector3d>(workspace_.x.data() + place);
+      mean += share * (model_.rest.row(vertex).transpose() + x);
+      rate += share * (workspace_.rate.segment<3>(place) + x - workspace_.start.segment<3>(place));
+    }
+    const Eigen::Vector3d stretch = mean - attachment.anchor();
+    rate -= (attachment.anchor() - attachment.anchor_before()) / (scene_.time_step * c_v);
+    const Eigen::Vector3d pull = attachment.stiffness * stretch + attachment.damping * c_v * rate;
+    const double energy =
+        0.5 * (attachment.stiffness * stretch.squaredNorm() + attachment.damping * c_v * rate.squaredNorm());
+    evaluation.potential.value += energy;
+    evaluation.potential.magnitude += energy;
+    evaluation.force_scale += pull.norm();
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k)
+      gradient.segment<3>(4 * space_.place(attachment.vertices[k])) +=
+          attachment.shares[static_cast<Eigen::Index>(k)] * pull;
+    attachment.force = pull;
+    attachment.torque = (attachment.anchor() - attachment.position).cross(pull);
+  }
+  project_held(space_, attachments_, gradient.data(),
+               [](Attachment& attachment, Eigen::Index k, const Eigen::Vector3d& held) {
+                 const bool fixed = attachment.kind == AttachmentKind::kFixed;
+                 const Eigen::Vector3d at = fixed ? attachment.target(k) : attachment.anchor();
+                 attachment.force -= held;
+                 attachment.torque -= (at - attachment.position).cross(held);
+               });
+}
+
+void FullPotential::add_springs(const float* field, float* image) const noexcept {
+  for (const Attachment& attachment : attachments_) {
+    if (attachment.broken || attachment.kind != AttachmentKind::kSpring) continue;
+    const auto stiffness = static_cast<float>(attachment.stiffness + attachment.damping * form_.velocity_factor);
+    Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k)
+      mean += static_cast<float>(attachment.shares[static_cast<Eigen::Index>(k)]) *
+              Eigen::Map<const Eigen::Vector3f>(field + 4 * space_.place(attachment.vertices[k]));
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k)
+      Eigen::Map<Eigen::Vector3f>(image + 4 * space_.place(attachment.vertices[k])) +=
+          stiffness * static_cast<float>(attachment.shares[static_cast<Eigen::Index>(k)]) * mean;
+  }
 }
 
 }  // namespace exmat::runtime

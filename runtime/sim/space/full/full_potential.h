@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <limits>
+#include <span>
 
 #include "runtime/sim/solver/line_search.h"
 #include "runtime/sim/space/full/full_model.h"
@@ -31,6 +32,30 @@ struct FullPotentialWorkspace {
   RigidWorkspace rigid;                                  ///< of a free body, where freeze() was last called
 };
 
+/// Takes off a field [places x 4] what would move what attachments hold, and calls use(attachment, k, taken) with that
+/// of each vertex k of a fixed one and, once, of the mean of a ball.
+template <typename Attachments, typename Number, typename Use>
+void project_held(const FullSpace& space, const Attachments& attachments, Number* field, const Use& use) noexcept {
+  using Vector = Eigen::Matrix<Number, 3, 1>;
+  for (auto& attachment : attachments) {
+    if (attachment.broken || attachment.kind == AttachmentKind::kSpring) continue;
+    const auto at = [&](std::size_t k) { return Eigen::Map<Vector>(field + 4 * space.place(attachment.vertices[k])); };
+    if (attachment.kind == AttachmentKind::kFixed) {
+      for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
+        use(attachment, static_cast<Eigen::Index>(k), Vector(at(k)));
+        at(k).setZero();
+      }
+      continue;
+    }
+    const auto shares = attachment.shares.template cast<Number>().eval();
+    Vector mean = Vector::Zero();
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k) mean += shares[static_cast<Eigen::Index>(k)] * at(k);
+    mean /= shares.squaredNorm();
+    use(attachment, 0, mean);
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k) at(k) -= shares[static_cast<Eigen::Index>(k)] * mean;
+  }
+}
+
 /// What a step in full space minimises, a function of the field d = q - q_n:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + c_v/2 (q - q_v)^T D (q - q_v)
 ///     + kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2,
@@ -47,6 +72,11 @@ class FullPotential {
 
   /// Fields at d = 0 of the form's centres; q_n [f] and f_ext [f].
   void begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept;
+
+  /// After begin(): what a host holds. Gradients are then those of what it leaves free, and evaluations set the loads.
+  void set_attachments(std::span<Attachment> attachments) noexcept;
+  /// Their springs: `image` += K `field`.
+  void add_springs(const float* field, float* image) const noexcept;
 
   /// After begin(), of a carried body: where its frame was and is to be.
   void drive(const MotionSample& from, const MotionSample& to) noexcept;
@@ -86,6 +116,8 @@ class FullPotential {
 
   void add_filter_force(PotentialValue& total, Eigen::VectorXd& gradient) noexcept;
   void add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
+  void remove_host_motion(bool freeze) noexcept;
+  void add_attachments(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
   bool damps() const noexcept {
     return scene_.mass_damping > 0 || scene_.stiffness_damping > 0 || filter_damping() > 0;
   }
@@ -96,7 +128,10 @@ class FullPotential {
   const StepForm& form_;
   FullPotentialWorkspace& workspace_;
   ContactWorkspace* contact_ = nullptr;
-  MotionSample frame_;  ///< at the end of the step, of a carried body
+  std::span<Attachment> attachments_;
+  const Attachment* host_ = nullptr;                     ///< the first that holds
+  Eigen::Vector3d host_turn_ = Eigen::Vector3d::Zero();  ///< in q - q_v
+  MotionSample frame_;                                   ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;
 };

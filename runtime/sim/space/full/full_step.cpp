@@ -121,14 +121,13 @@ double compliance(const FullModel& model, std::span<const std::int32_t> vertices
 }
 
 FullStep::FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-                   const FullContactMemory& contacts, SkeletonMotion* bones) noexcept
+                   const FullMemory& memory) noexcept
     : model_(model),
       space_(model.space),
       scene_(scene),
       state_(state),
       workspace_(workspace),
-      contacts_(contacts),
-      bones_(bones),
+      memory_(memory),
       potential_(model, scene, workspace.form, workspace.potential) {}
 
 void FullStep::gather_external_force() noexcept {
@@ -142,15 +141,15 @@ void FullStep::gather_external_force() noexcept {
 
 // Takes u and v, fields in the workspace's `trial` and `field`.
 bool FullStep::find_contacts() noexcept {
-  if (!model_.contacts || contacts_.found == nullptr) return false;
+  if (!model_.contacts || memory_.found == nullptr) return false;
   const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
   return model_.contacts->begin(scene_.obstacles, end, scene_.time_step, scene_.gravity, workspace_.trial.data(),
-                                workspace_.field.data(), *contacts_.held, *contacts_.found);
+                                workspace_.field.data(), *memory_.held, *memory_.found);
 }
 
 void FullStep::begin(bool touches_others) noexcept {
   among_others_ = touches_others;
-  anew_ = jumps(scene_, state_) || (bones_ != nullptr && bones_->anew);
+  anew_ = jumps(scene_, state_) || (memory_.bones != nullptr && memory_.bones->anew);
   gather_external_force();
   if (model_.skin) take_along();
   if (model_.rigid || model_.contacts) {
@@ -158,7 +157,7 @@ void FullStep::begin(bool touches_others) noexcept {
     space_.to_field(state_.v, workspace_.field);
   }
   near_ = find_contacts();
-  potential_.set_contact(near_ ? contacts_.found : nullptr);
+  potential_.set_contact(near_ ? memory_.found : nullptr);
   if (model_.rigid) {
     model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
     expected_momenta_ = model_.rigid->momenta(workspace_.field.data(), workspace_.potential.rigid);
@@ -171,6 +170,7 @@ void FullStep::begin(bool touches_others) noexcept {
     backward_euler_form(history, scene_.time_step, workspace_.form);
   linear_ = second_order ? &workspace_.second : &workspace_.first;
   potential_.begin(state_.q, workspace_.external);
+  potential_.set_attachments(memory_.attachments);
   if (model_.carried) {
     const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
     from_ = frame_at(scene_, state_.time);
@@ -185,7 +185,7 @@ void FullStep::begin(bool touches_others) noexcept {
 // Where the bones are at the end of the step. A body that was put on them has the velocity that they then make.
 void FullStep::take_along() noexcept {
   const SkinnedPart& skin = *model_.skin;
-  SkeletonMotion& bones = *bones_;
+  SkeletonMotion& bones = *memory_.bones;
   FullPotentialWorkspace& work = workspace_.potential;
   const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
   if (scene_.animation) scene_.animation->sample(end, bones.next);
@@ -203,7 +203,7 @@ void FullStep::take_along() noexcept {
 }
 
 void FullStep::hang(bool second_order) noexcept {
-  SkeletonMotion& bones = *bones_;
+  SkeletonMotion& bones = *memory_.bones;
   const StepHistory history{bones.q, bones.v, bones.q_previous, bones.v, bones.v_previous};
   if (second_order)
     bdf2_form(history, scene_.time_step, workspace_.fixed_form);
@@ -218,7 +218,7 @@ void FullStep::hang(bool second_order) noexcept {
 
 // After the state of the end was set.
 void FullStep::end_bones() noexcept {
-  SkeletonMotion& bones = *bones_;
+  SkeletonMotion& bones = *memory_.bones;
   FullPotentialWorkspace& work = workspace_.potential;
   const StepForm& form = workspace_.fixed_form;
   bones.q_previous = bones.q;
@@ -242,7 +242,7 @@ void FullStep::own_velocity(double time, const Eigen::VectorXd& q, const Eigen::
   else if (model_.skin)
     for (Eigen::Index place = 0; place < space_.places(); ++place) {
       const Eigen::Index at = place < space_.vertices() ? 3 * space_.number_at(place) : 0;
-      own.segment<3>(4 * place) = (bones_->own - bones_->own_previous).segment<3>(at) / scene_.time_step;
+      own.segment<3>(4 * place) = (memory_.bones->own - memory_.bones->own_previous).segment<3>(at) / scene_.time_step;
       if (place >= space_.vertices()) own.segment<3>(4 * place).setZero();
     }
   else
@@ -252,11 +252,13 @@ void FullStep::own_velocity(double time, const Eigen::VectorXd& q, const Eigen::
 /// From such a way to that in the world.
 void FullStep::carry(Eigen::VectorXd& d) const noexcept {
   if (model_.carried) model_.carried->carry(from_, to_, workspace_.potential.start, d);
-  if (!model_.skin) return;
-  space_.to_field(bones_->own, workspace_.field);
-  workspace_.field += d;
-  model_.skin->to_world(workspace_.potential.skin, workspace_.field.data(), d.data());
-  d -= workspace_.potential.start;
+  if (model_.skin) {
+    space_.to_field(memory_.bones->own, workspace_.field);
+    workspace_.field += d;
+    model_.skin->to_world(workspace_.potential.skin, workspace_.field.data(), d.data());
+    d -= workspace_.potential.start;
+  }
+  hold(d);
 }
 
 void FullStep::stay(Eigen::VectorXd& d) const noexcept {
@@ -320,6 +322,11 @@ void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
 // Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a
 // single one.
 void FullStep::precondition() noexcept {
+  precondition_freely();
+  if (is_attached()) project(workspace_.solved);
+}
+
+void FullStep::precondition_freely() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
   const bool turns = model_.skin && linear_->filter_stiffness > 0;
@@ -339,6 +346,32 @@ void FullStep::precondition() noexcept {
     auto own = work.solved.vector().segment<3>(4 * block.place);
     own = (block.scale * own).eval();
   }
+}
+
+/// What is held goes where it is held.
+void FullStep::hold(Eigen::VectorXd& d) const noexcept {
+  const Eigen::VectorXd& start = workspace_.potential.start;
+  for (const Attachment& attachment : memory_.attachments) {
+    if (attachment.broken || attachment.kind == AttachmentKind::kSpring) continue;
+    Eigen::Vector3d lacking = attachment.anchor();
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
+      const Eigen::Index vertex = attachment.vertices[k], place = 4 * space_.place(vertex);
+      const auto at = static_cast<Eigen::Index>(k);
+      const Eigen::Vector3d here = model_.rest.row(vertex).transpose() + start.segment<3>(place);
+      if (attachment.kind == AttachmentKind::kFixed) d.segment<3>(place) = attachment.target(at) - here;
+      lacking -= attachment.shares[at] * (here + d.segment<3>(place));
+    }
+    if (attachment.kind == AttachmentKind::kFixed) continue;
+    lacking /= attachment.shares.squaredNorm();
+    for (std::size_t k = 0; k < attachment.vertices.size(); ++k)
+      d.segment<3>(4 * space_.place(attachment.vertices[k])) +=
+          attachment.shares[static_cast<Eigen::Index>(k)] * lacking;
+  }
+}
+
+/// Takes off a field what would move what is held.
+void FullStep::project(AlignedFloats& field) const noexcept {
+  project_held(space_, memory_.attachments, field.data(), [](const Attachment&, Eigen::Index, const auto&) {});
 }
 
 // Sets image = A search.
@@ -368,11 +401,14 @@ void FullStep::multiply() noexcept {
   for (const auto& block : std::span(work.contact.blocks).first(work.contact.block_count))
     work.image.vector().segment<3>(4 * block.place) +=
         block.stiffness * work.search.vector().segment<3>(4 * block.place);
+  if (!is_attached()) return;
+  potential_.add_springs(work.search.data(), work.image.data());
+  project(work.image);
 }
 
 void FullStep::begin_blocks() noexcept {
   workspace_.contact.clear();
-  if (near_) model_.contacts->add_blocks(*contacts_.found, workspace_.contact);
+  if (near_) model_.contacts->add_blocks(*memory_.found, workspace_.contact);
 }
 
 void FullStep::set_scales() noexcept { workspace_.contact.set_scales(linear_->preconditioner.inverse_diagonal()); }
@@ -412,6 +448,8 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
     square = next;
   }
   work.direction = sum.cast<double>() * size;
+  // What single precision leaves of what is held.
+  project_held(space_, memory_.attachments, work.direction.data(), [](const auto&, Eigen::Index, const auto&) {});
   return Outcome::kFound;
 }
 
@@ -469,7 +507,8 @@ NewtonStatus FullStep::minimise() noexcept {
   for (;;) {
     newton.residual = report_.residual;
     newton.iterations = report_.newton_iterations;
-    const NewtonSettings& settings = is_checked() || !at_first_iterate_ ? scene_.space.newton : at_least_one;
+    const bool may_stay = (is_checked() && !is_attached()) || !at_first_iterate_;
+    const NewtonSettings& settings = may_stay ? scene_.space.newton : at_least_one;
     if (const auto reason = reason_to_end(newton, settings, here_, unchecked_from_)) return *reason;
     const double left = settings.tolerance * here_.force_scale / report_.residual;
     if (find_direction(std::max(direction_tolerance(), kForcing * left)) == Outcome::kIndefinite) {
@@ -505,7 +544,7 @@ NewtonStatus FullStep::minimise_with_friction() noexcept {
   for (int round = 1;; ++round) {
     const NewtonStatus status = minimise();
     FrictionChange friction;
-    contacts_.found->refresh_friction(friction);
+    memory_.found->refresh_friction(friction);
     if (status == NewtonStatus::kNonFinite || round == kFrictionRounds || friction.relative() <= kSameFriction)
       return status;
     tangents_are_current_ = false;
@@ -545,8 +584,8 @@ void FullStep::correct_momenta(const FrameMomenta& others) noexcept {
   lacking.linear += dt * others.linear;
   lacking.angular += dt * others.angular;
   if (near_) {
-    lacking.linear += dt * contacts_.found->force;
-    lacking.angular += dt * (contacts_.found->torque - rigid.centre.cross(contacts_.found->force));
+    lacking.linear += dt * memory_.found->force;
+    lacking.angular += dt * (memory_.found->torque - rigid.centre.cross(memory_.found->force));
   }
   const FrameMomenta own = model_.rigid->momenta(work.field.data(), rigid);
   lacking.linear -= own.linear;
@@ -576,6 +615,14 @@ void FullStep::limit_energy(double allowed) noexcept {
   space_.to_field(state_.v, workspace_.field);
 }
 
+void FullStep::end_attachments() noexcept {
+  for (Attachment& attachment : memory_.attachments) {
+    attachment.rotation_before = attachment.rotation;
+    attachment.position_before = attachment.position;
+    if (attachment.force.norm() > attachment.break_force) attachment.broken = true;
+  }
+}
+
 void FullStep::add_motion(double share, const FrameVelocity& added) noexcept {
   space_.to_field(state_.v, workspace_.field);
   workspace_.field *= share;
@@ -595,14 +642,14 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   workspace_.acceleration = form.acceleration_factor * (d + (state_.q - form.acceleration_centre));
   // Squares leave room for what is made of these numbers.
   double size = workspace_.rate.squaredNorm() + others.linear.squaredNorm() + others.angular.squaredNorm();
-  if (near_) size += contacts_.found->force.squaredNorm() + contacts_.found->torque.squaredNorm();
+  if (near_) size += memory_.found->force.squaredNorm() + memory_.found->torque.squaredNorm();
   if (status_ == NewtonStatus::kNonFinite || !d.allFinite() || !std::isfinite(size + potential_.elastic_energy())) {
     report_.status |= kStepNonFinite;
     return report_;
   }
   const bool unbalanced = (near_ || among_others_) && status_ != NewtonStatus::kConverged;
   const double elastic = potential_.elastic_energy();
-  if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_, bones_).total();
+  if (unbalanced && !among_others_) energy = energies(model_, scene_, state_, workspace_, memory_.bones).total();
   state_.q_previous = state_.q;
   state_.v_previous = state_.v;
   state_.v = workspace_.rate;
@@ -610,21 +657,24 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   state_.q += d;
   state_.elastic_energy = elastic;
   if (near_) {
-    report_.contacts = contacts_.found->touching;
-    report_.contact_force = contacts_.found->force;
+    report_.contacts = memory_.found->touching;
+    report_.contact_force = memory_.found->force;
   }
   if (model_.rigid || near_ || among_others_) {
     space_.to_field(state_.q, workspace_.trial);
     space_.to_field(state_.v, workspace_.field);
   }
-  if (near_) model_.contacts->commit(workspace_.trial.data(), *contacts_.found, *contacts_.held);
+  if (near_) model_.contacts->commit(workspace_.trial.data(), *memory_.found, *memory_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
-  if (unbalanced && !among_others_ && !model_.is_driven())
+  if (is_attached()) end_attachments();
+  if (is_attached()) {
+    // Momenta and energy are its host's, too.
+  } else if (unbalanced && !among_others_ && !model_.is_driven())
     limit_energy(energy);
   else if (model_.rigid && !unbalanced)
     correct_momenta(others);
   if (model_.skin) end_bones();
-  if (!near_ && contacts_.held != nullptr) contacts_.held->count = 0;
+  if (!near_ && memory_.held != nullptr) memory_.held->count = 0;
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
   state_.begins_anew = near_ || among_others_;
@@ -632,8 +682,8 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
 }
 
 FullReport step(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-                const FullContactMemory& contacts) noexcept {
-  FullStep one(model, scene, state, workspace, contacts);
+                const FullMemory& memory) noexcept {
+  FullStep one(model, scene, state, workspace, memory);
   one.begin();
   one.solve();
   return one.finish();

@@ -83,9 +83,11 @@ struct FullReport : StepReport {
 };
 
 /// What a step in full space reads and changes beside its motion; null where there is none.
-struct FullContactMemory {
+struct FullMemory {
   ContactState* held = nullptr;
-  ContactWorkspace* found = nullptr;  ///< scratch, which then holds the contacts of the step
+  ContactWorkspace* found = nullptr;    ///< scratch, which then holds the contacts of the step
+  SkeletonMotion* bones = nullptr;      ///< of a body on a skeleton
+  std::span<Attachment> attachments{};  ///< which then have their loads
 };
 
 /// One step of a body in full space from its beginning to its end: begin(), set_target() where there is an example
@@ -98,7 +100,7 @@ struct FullContactMemory {
 class FullStep {
  public:
   FullStep(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-           const FullContactMemory& contacts = {}, SkeletonMotion* bones = nullptr) noexcept;
+           const FullMemory& memory = {}) noexcept;
 
   /// Obstacles near, and the first iterate: the predictor q_n + dt v_n or q_n, whichever has the lower potential; where
   /// ends of directions are taken unchecked, the predictor unless it moves a vertex by half an edge or the step has no
@@ -159,6 +161,11 @@ class FullStep {
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;
   bool find_contacts() noexcept;
+  void precondition_freely() noexcept;
+  void hold(Eigen::VectorXd& d) const noexcept;
+  void project(AlignedFloats& field) const noexcept;
+  void end_attachments() noexcept;
+  bool is_attached() const noexcept { return !memory_.attachments.empty(); }
   void hang(bool second_order) noexcept;
   void take_along() noexcept;
   void end_bones() noexcept;
@@ -168,10 +175,10 @@ class FullStep {
   NewtonStatus minimise_with_friction() noexcept;
   Outcome find_direction(double tolerance) noexcept;
   void project() noexcept;
-  /// Near obstacles or bodies, where the caller asks for it, and where waves go so far in a step that the predictor
-  /// leads away from the solution: what an unchecked direction leaves then would grow.
+  /// Near obstacles or bodies, where a host holds it or the caller asks for it, and where waves go so far in a step
+  /// that the predictor leads away from the solution: what an unchecked direction leaves then would grow.
   bool is_checked() const noexcept {
-    return near_ || among_others_ || workspace_.accuracy.unchecked_move == 0 ||
+    return near_ || among_others_ || is_attached() || workspace_.accuracy.unchecked_move == 0 ||
            space_.wave_rate() * scene_.time_step > kStiffStep;
   }
   double direction_tolerance() const noexcept;
@@ -188,8 +195,7 @@ class FullStep {
   const StepScene& scene_;
   Motion& state_;
   FullWorkspace& workspace_;
-  FullContactMemory contacts_;
-  SkeletonMotion* bones_;  ///< null: on none
+  FullMemory memory_;
   const FullWorkspace::Linear* linear_ = nullptr;
   FullPotential potential_;
   FullReport report_;
@@ -204,7 +210,7 @@ class FullStep {
 
 /// begin(), solve(), finish() of a body without example force.
 FullReport step(const FullModel& model, const StepScene& scene, Motion& state, FullWorkspace& workspace,
-                const FullContactMemory& contacts = {}) noexcept;
+                const FullMemory& memory = {}) noexcept;
 
 /// At rest, or with displacement and velocity [f], at time 0.
 State make_state(const FullModel& model, FullWorkspace& workspace);

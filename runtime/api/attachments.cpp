@@ -1,0 +1,153 @@
+#include <algorithm>
+#include <cinttypes>
+#include <cmath>
+
+#include "common/elastic/polar_rotation.h"
+#include "exmat/exmat.h"
+#include "runtime/api/arguments.h"
+#include "runtime/api/handles.h"
+#include "runtime/api/world_handle.h"
+#include "runtime/sim/space/full/full_body.h"
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+constexpr std::int64_t kFrameNumbers = 12;
+constexpr double kLargest = 1e30;
+
+bool is_frame(const double* numbers) noexcept {
+  return std::all_of(numbers, numbers + kFrameNumbers, [](double number) { return std::abs(number) <= kLargest; });
+}
+
+void set_frame(const double* numbers, Attachment& attachment) {
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers);
+  attachment.rotation = nearest_rotation(matrix.leftCols<3>());
+  attachment.position = matrix.col(3);
+}
+
+/// Null where there is none.
+Attachment* find(State& state, std::int64_t id) noexcept {
+  const auto found = std::ranges::find(state.attachments, id, &Attachment::id);
+  return found == state.attachments.end() ? nullptr : &*found;
+}
+
+/// Null, or why the vertex cannot be held.
+const char* fault_of(const exmat_body& body, std::int64_t vertex) {
+  const FullModel& full = *body.full();
+  if (vertex < 0 || vertex >= full.rest.rows()) return "there is no such vertex";
+  if (full.space.number(vertex) < 0) return "it is fixed";
+  for (const Attachment& other : body.state.attachments)
+    if (std::ranges::count(other.vertices, vertex) > 0) return "it is held already";
+  return nullptr;
+}
+
+void attach(std::span<const std::int64_t> vertices, const exmat_attachment& settings, const double* frame,
+            exmat_body& body, std::int64_t& id) {
+  const FullModel& full = *body.full();
+  Attachment attachment;
+  attachment.kind = static_cast<AttachmentKind>(settings.kind);
+  attachment.stiffness = settings.stiffness;
+  attachment.damping = settings.damping;
+  attachment.break_force = settings.break_force;
+  set_frame(frame, attachment);
+  for (const std::int64_t vertex : vertices) {
+    if (const char* fault = fault_of(body, vertex))
+      throw InvalidArgument("vertices: " + std::to_string(vertex) + ": " + fault);
+    if (std::ranges::count(attachment.vertices, vertex) > 0)
+      throw InvalidArgument("vertices: " + std::to_string(vertex) + " is there twice");
+    attachment.vertices.push_back(static_cast<std::int32_t>(vertex));
+  }
+  enter_full_space(full, body.model(), body.state);
+  const Placement placement = body.model().frame->placement(body.state.frame);
+  const Eigen::VectorXd masses = full.space.masses();
+  attachment.shares.resize(std::ssize(vertices));
+  attachment.places.resize(3, std::ssize(vertices));
+  for (Eigen::Index k = 0; k < attachment.shares.size(); ++k) {
+    const Eigen::Index vertex = vertices[static_cast<std::size_t>(k)];
+    const Eigen::Vector3d here =
+        full.rest.row(vertex).transpose() + full_displacement(full, placement, *body.state.full, vertex);
+    attachment.shares[k] = masses[full.space.place(vertex)];
+    attachment.places.col(k) = attachment.rotation.transpose() * (here - attachment.position);
+  }
+  attachment.shares /= attachment.shares.sum();
+  attachment.rotation_before = attachment.rotation;
+  attachment.position_before = attachment.position;
+  attachment.id = id = body.next_attachment++;
+  body.state.attachments.push_back(std::move(attachment));
+  body.state.begins_anew = true;
+  was_put(body);
+}
+
+}  // namespace
+
+exmat_status exmat_attachment_default(exmat_attachment* attachment, std::size_t size) noexcept {
+  EXMAT_REQUIRE(attachment);
+  if (size != sizeof(exmat_attachment))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected %zu", __func__, size, sizeof(exmat_attachment));
+  *attachment = {sizeof(exmat_attachment), EXMAT_ATTACHMENT_FIXED, 1e4, 0, std::numeric_limits<double>::infinity()};
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_attach(exmat_body* body, const std::int64_t* vertices, std::int64_t count,
+                               const exmat_attachment* attachment, const double* frame, std::int64_t* id) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(vertices);
+  EXMAT_REQUIRE(attachment);
+  EXMAT_REQUIRE(frame);
+  EXMAT_REQUIRE(id);
+  if (count < 1) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 1", __func__, count);
+  if (attachment->size != sizeof(exmat_attachment))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: attachment->size = %zu: expected %zu", __func__, attachment->size,
+                sizeof(exmat_attachment));
+  if (attachment->kind < EXMAT_ATTACHMENT_FIXED || attachment->kind > EXMAT_ATTACHMENT_SPRING)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: kind = %" PRId32 ": expected 0 to 2", __func__, attachment->kind);
+  const bool is_spring = attachment->kind == EXMAT_ATTACHMENT_SPRING;
+  if (is_spring && !(attachment->stiffness > 0 && attachment->stiffness <= kLargest && attachment->damping >= 0 &&
+                     attachment->damping <= kLargest))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: stiffness = %g, damping = %g: expected > 0 and >= 0, up to %g", __func__,
+                attachment->stiffness, attachment->damping, kLargest);
+  if (!(attachment->break_force > 0))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: break_force = %g: expected > 0", __func__, attachment->break_force);
+  if (!is_frame(frame))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: frame: expected finite numbers up to %g", __func__, kLargest);
+  if (body->full() == nullptr || body->scene.space.space == Space::kReduced)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the body steps in its modes alone: its space has to be full or auto",
+                __func__);
+  return guarded(__func__, [&] {
+    attach({vertices, static_cast<std::size_t>(count)}, *attachment, frame, *body, *id);
+  });
+}
+
+exmat_status exmat_body_move_attachment(exmat_body* body, std::int64_t id, const double* frame) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(frame);
+  if (!is_frame(frame))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: frame: expected finite numbers up to %g", __func__, kLargest);
+  Attachment* const attachment = find(body->state, id);
+  if (attachment == nullptr)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", __func__, id);
+  set_frame(frame, *attachment);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_detach(exmat_body* body, std::int64_t id) noexcept {
+  EXMAT_REQUIRE(body);
+  if (std::erase_if(body->state.attachments, [id](const Attachment& one) { return one.id == id; }) == 0)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", __func__, id);
+  body->state.begins_anew = true;
+  return EXMAT_OK;
+}
+
+exmat_status exmat_body_read_attachment_load(const exmat_body* body, std::int64_t id, double* force, double* torque,
+                                             std::int32_t* broken) noexcept {
+  EXMAT_REQUIRE(body);
+  const auto found = std::ranges::find(body->state.attachments, id, &Attachment::id);
+  if (found == body->state.attachments.end())
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", __func__, id);
+  if (force != nullptr) std::ranges::copy(found->force, force);
+  if (torque != nullptr) std::ranges::copy(found->torque, torque);
+  if (broken != nullptr) *broken = found->broken ? 1 : 0;
+  return EXMAT_OK;
+}

@@ -1,0 +1,86 @@
+"""Bodies that frames of their host hold."""
+import numpy as np
+import pytest
+
+import exmat
+
+MASS = 1000 * 4  # of the bar of conftest.py [kg]
+
+
+@pytest.fixture(scope="module")
+def hung(free_bundle):
+    return exmat.Model(free_bundle, space="auto", time_step=0.004, mass_damping=4, stiffness_damping=0.02, gravity=(0, 0, -10))
+
+
+def end_of(model):
+    """Vertices of the bar's first end, and where they are."""
+    everything = exmat.Points(model, np.arange(model.vertices))
+    xyz = exmat.Body(model).positions(everything, np.empty((model.vertices, 3)))
+    found = np.flatnonzero(xyz[:, 0] < xyz[:, 0].min() + 1e-6)
+    return found, xyz[found]
+
+
+def frame_at(position, degrees=0):
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    return np.column_stack([[[c, -s, 0], [s, c, 0], [0, 0, 1]], position])
+
+
+@pytest.mark.parametrize("kind", ["fixed", "ball", "spring"])
+def test_what_hangs_weighs_on_its_frames(hung, kind):
+    vertices, xyz = end_of(hung)
+    body = exmat.Body(hung)
+    held = [body.attach(vertices, frame_at(xyz.mean(0)), kind=kind, stiffness=1e6, damping=1e4)]
+    if kind != "fixed":  # which would swing
+        everything = exmat.Points(hung, np.arange(hung.vertices))
+        places = body.positions(everything, np.empty((hung.vertices, 3)))
+        other = np.flatnonzero(places[:, 0] > places[:, 0].max() - 1e-6)
+        held.append(body.attach(other, frame_at(places[other].mean(0)), kind=kind, stiffness=1e6, damping=1e4))
+    body.step(4000)
+    loads = [body.attachment_load(one) for one in held]
+    force = sum(load[0] for load in loads)
+    assert not any(load[2] for load in loads)
+    assert abs(force[2] + 10 * MASS) < 3e-3 * 10 * MASS
+    if kind == "fixed":
+        assert loads[0][1][1] > 10 * MASS  # it sticks out by more than 1 m
+
+
+def test_what_is_held_goes_with_its_frame_and_is_let_go(hung):
+    vertices, xyz = end_of(hung)
+    body = exmat.Body(hung)
+    body.step(3)
+    assert body.space == "reduced"
+    here = body.positions(exmat.Points(hung, vertices), np.empty((len(vertices), 3)))
+    held = body.attach(vertices, frame_at([0, 0, 0]))
+    for k in range(1, 60):
+        body.move_attachment(held, frame_at([0, 0.04 * k, 0], 2 * k))
+        body.step()
+        assert body.space == "full"
+        now = body.positions(exmat.Points(hung, vertices), np.empty((len(vertices), 3)))
+        turn = frame_at([0, 0, 0], 2 * k)[:, :3]
+        assert np.abs(now - here @ turn.T - [0, 0.04 * k, 0]).max() < 1e-11
+    body.detach(held)
+    body.step(400)
+    assert body.space == "reduced"
+
+
+def test_what_cannot_be_is_refused(hung, bundle):
+    vertices, _ = end_of(hung)
+    body = exmat.Body(hung)
+    frame = frame_at([0, 0, 0])
+    body.attach(vertices[:4], frame)
+    for given, words in (([vertices[0]], "held already"), ([10**6], "no such vertex"), ([vertices[5]] * 2, "twice"), ([], "count")):
+        with pytest.raises(exmat.InvalidArgument, match=words):
+            body.attach(given, frame)
+    with pytest.raises(exmat.InvalidArgument, match="kind"):
+        body.attach(vertices[5:6], frame, kind="glue")
+    with pytest.raises(exmat.InvalidArgument, match="stiffness"):
+        body.attach(vertices[5:6], frame, kind="spring", stiffness=-1)
+    with pytest.raises(exmat.InvalidArgument, match="no such attachment"):
+        body.detach(7)
+    with pytest.raises(exmat.InvalidArgument, match="frame"):
+        body.move_attachment(0, frame * np.nan)
+    with pytest.raises(exmat.InvalidArgument, match="its space has to be"):
+        exmat.Body(exmat.Model(bundle)).attach([60], frame)
+    clamped = exmat.Model(bundle, space="full")
+    with pytest.raises(exmat.InvalidArgument, match="fixed"):
+        exmat.Body(clamped).attach(end_of(clamped)[0][:1], frame)
