@@ -66,6 +66,8 @@ struct BundleRequest {
   bool step_only = false;   ///< only datasets whose schema `use` is "step": what stepping needs
   bool positions = false;   ///< with step_only: also those with `use` "positions": what writing positions needs
   bool full_space = false;  ///< with step_only: also those with `use` "positions" or "full_space"
+  bool look = false;        ///< with step_only: also those with `use` "look"
+  bool places = false;      ///< with step_only: also those with `use` "places"
 };
 
 /// Reads and validates: magic, version, types, sizes, ranges, finiteness, checksums, cross-references. Throws

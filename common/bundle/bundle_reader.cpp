@@ -203,6 +203,8 @@ const DatasetSchema& BundleReader::schema_of(std::string_view name) const {
 bool BundleReader::is_wanted(const DatasetSchema& schema) const {
   if (!request_.step_only || schema.use == Use::kStep) return true;
   if (schema.use == Use::kPositions) return request_.positions || request_.full_space;
+  if (schema.use == Use::kLook) return request_.look;
+  if (schema.use == Use::kPlaces) return request_.places;
   return request_.full_space && schema.use == Use::kFullSpace;
 }
 
@@ -235,6 +237,7 @@ void BundleReader::read_checked(const Hdf5Dataset& dataset, const DatasetSchema&
 void BundleReader::check_model(const ReducedModel& model) {
   if (model.examples) attempt([&] { check_example_indices("/examples", *model.examples); });
   attempt([&] { check_fixed_vertices(model); });
+  if (model.object) attempt([&] { check_marks(*model.object); });
   if (model.targets) check_targets("/targets", *model.targets);
   if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
   if (model.skeleton) attempt([&] { check_skeleton(*model.skeleton); });
@@ -280,6 +283,19 @@ void BundleReader::check_fixed_vertices(const ReducedModel& model) const {
   for (Eigen::Index v = 0; v < fixed.size(); ++v)
     if (fixed[v] != 0 && !model.modal->basis.middleRows(3 * v, 3).isZero(0))
       refuse("/modal/basis", fmt::format("zeros on vertex {}, fixed by /object/fixed", v), "other numbers");
+}
+
+void BundleReader::check_marks(const ObjectData& object) const {
+  const auto check_rows = [&](const char* path, Eigen::Index rows) {
+    if (is_sound(path) && is_sound("/object/vertices") && rows != 0 && rows != object.mesh.vertex_count())
+      refuse(path, fmt::format("{} rows, or none", object.mesh.vertex_count()), fmt::format("{}", rows));
+  };
+  check_rows("/object/vertex_parts", object.vertex_parts.size());
+  check_rows("/object/colours", object.colours.rows());
+  const auto names = (object.part_names.array() == 0).count();
+  if (is_sound("/object/part_names") && is_sound("/object/part_sets") && names != object.part_sets.cols())
+    refuse("/object/part_names", fmt::format("{} names, as /object/part_sets has columns", object.part_sets.cols()),
+           fmt::format("{}", names));
 }
 
 void BundleReader::check_exponents(const std::string& folder, const TargetTableData& targets) const {

@@ -84,6 +84,7 @@ class BundleReader {
   void add_regions(ReducedModel& model) const;
   void check_example_indices(const std::string& folder, const ExampleSet& set) const;
   void check_fixed_vertices(const ReducedModel& model) const;
+  void check_marks(const ObjectData& object) const;
   void check_targets(const std::string& folder, const TargetTableData& targets);
   void check_exponents(const std::string& folder, const TargetTableData& targets) const;
   void check_target_knots(const std::string& folder, const TargetTableData& targets) const;

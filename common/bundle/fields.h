@@ -44,6 +44,10 @@ void visit_object(Object& object, Visitor& visit) {
   visit.dataset("tets", object.mesh.tets);
   visit.dataset("surface", object.surface);
   visit.dataset("fixed", object.fixed);
+  visit.dataset("part_names", object.part_names);
+  visit.dataset("part_sets", object.part_sets);
+  visit.dataset("vertex_parts", object.vertex_parts);
+  visit.dataset("colours", object.colours);
   visit.dataset("density", object.materials.density);
   visit.dataset("youngs_modulus", object.materials.youngs_modulus);
   visit.dataset("poisson_ratio", object.materials.poisson_ratio);
@@ -263,6 +267,9 @@ void visit_render(Render& render, Visitor& visit) {
   visit.dataset("tets", render.tets);
   visit.dataset("barycentric", render.barycentric);
   visit.dataset("triangles", render.triangles);
+  visit.dataset("look", render.look);
+  visit.dataset("look_vertices", render.look_vertices);
+  visit.dataset("look_frames", render.look_frames);
 }
 
 template <typename Skeleton, typename Visitor>

@@ -49,9 +49,11 @@ struct DerivedSymbol {
 constexpr std::array kDerivedSymbols = {DerivedSymbol{"R", "r", pair_count}, DerivedSymbol{"Q", "R", pair_count},
                                         DerivedSymbol{"P+1", "P", one_more}};
 
-constexpr std::array<std::pair<Use, std::string_view>, 4> kUses = {{{Use::kStep, "step"},
+constexpr std::array<std::pair<Use, std::string_view>, 6> kUses = {{{Use::kStep, "step"},
                                                                     {Use::kPositions, "positions"},
                                                                     {Use::kFullSpace, "full_space"},
+                                                                    {Use::kLook, "look"},
+                                                                    {Use::kPlaces, "places"},
                                                                     {Use::kInspect, "inspect"}}};
 
 constexpr std::array<std::pair<Constraint::Kind, std::string_view>, 11> kConstraints = {

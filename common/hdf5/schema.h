@@ -67,6 +67,8 @@ enum class Use {
   kStep,       ///< to step
   kPositions,  ///< to write positions
   kFullSpace,  ///< to step in all vertices
+  kLook,       ///< to export what is drawn
+  kPlaces,     ///< to find the vertices that a scene names
   kInspect,    ///< never
 };
 std::string_view name_of(Use use);

@@ -23,6 +23,13 @@ struct ObjectData {
   double stiffness_ratio = 0;  ///< of the elements over quadratic tets on the same mesh; 0 where not compared
   double worst_stiffness = 0;  ///< largest of its parts
   double thin_share = 0;       ///< of the volume: where the mesh is one tet thick
+  /// Parts and colours of the surface that the mesh was made about, packed (common/model/vertex_marks.h); empty
+  /// without one.
+  FlagVector part_names;  ///< UTF-8, a zero byte after each of the p names
+  Eigen::Matrix<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>
+      part_sets;             ///< g x p, 1 where the vertices of a set are of the part
+  IndexVector vertex_parts;  ///< n, the set of each vertex
+  VertexArray colours;       ///< n x 3, red, green and blue of the surface there, 0 to 1
 };
 
 /// Group /shape_space: Laplace-Beltrami eigenpairs of the object at centroid 0 and volume 1, the constant one dropped.
@@ -237,6 +244,12 @@ struct RenderData {
   TriangleArray triangles;   ///< f x 3, of the vertices
   std::int64_t outside = 0;  ///< vertices that are not on the body
   double farthest = 0;       ///< distance of the farthest vertex from the body [m]
+  /// The look of a surface that came from glTF, in metres: a .glb by itself, its nodes each with a mesh of its own, its
+  /// meshes of p primitives together. Empty where there is none to keep.
+  FlagVector look;
+  IndexVector look_vertices;  ///< p, which vertex is the first of each primitive; the others follow it
+  /// 3p x 3 (dataset p 3 3), from displacements in the primitive's mesh to those here.
+  RowMatrix look_frames = RowMatrix(0, 3);
 };
 
 /// Group /skeleton: the bones that a body hangs on. docs/characters.md.

@@ -5,6 +5,7 @@
 #include <map>
 
 #include "common/core/error.h"
+#include "common/core/input_file.h"
 #include "common/core/log.h"
 #include "common/mesh/checks.h"
 #include "common/mesh/geometry.h"
@@ -14,6 +15,7 @@
 #include "precompute/inputs/object_size.h"
 #include "precompute/inputs/object_skeleton.h"
 #include "precompute/inputs/object_surface.h"
+#include "precompute/mesh_io/gltf_look.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/surface_file.h"
 #include "precompute/mesh_io/vertex_selection.h"
@@ -127,6 +129,23 @@ struct FileNumbers {
 
 FileNumbers numbers_of(const CheckedMesh& checked) {
   return {checked.report.kept_vertices, checked.file_vertices.rows()};
+}
+
+// What a glTF file says of the looks of a render mesh.
+void add_look(const AssetConfig& asset, InputFiles& files, std::vector<std::string>& warnings, RenderData& render) {
+  const std::string extension = lower_extension(*asset.render_mesh);
+  if (extension != ".glb" && extension != ".gltf") return;
+  std::optional<SurfaceLook> look = read_gltf_look(*asset.render_mesh, asset.length_unit);
+  if (!look) return;
+  files.insert(files.end(), look->images.begin(), look->images.end());
+  for (const std::string& remark : look->remarks) {
+    warnings.push_back(fmt::format("{}: {}", asset.render_mesh->string(), remark));
+    log::warning(warnings.back());
+  }
+  render.look =
+      Eigen::Map<const FlagVector>(reinterpret_cast<const std::uint8_t*>(look->glb.data()), std::ssize(look->glb));
+  render.look_vertices = std::move(look->vertices);
+  render.look_frames = std::move(look->frames);
 }
 
 // The examples as they are read, with what finds vertices of their files in their meshes.
@@ -446,8 +465,15 @@ RenderData read_render_mesh(const AssetConfig& asset, const ObjectInput& object,
     log::warning(warnings.back());
   }
   const auto& [tets, weights, distances] = embedding.points;
-  return {std::move(surface.vertices), tets, weights, std::move(surface.triangles), embedding.outside,
-          embedding.farthest};
+  RenderData render;
+  render.vertices = std::move(surface.vertices);
+  render.tets = tets;
+  render.barycentric = weights;
+  render.triangles = std::move(surface.triangles);
+  render.outside = embedding.outside;
+  render.farthest = embedding.farthest;
+  add_look(asset, files, warnings, render);
+  return render;
 }
 
 std::string hash_inputs(const InputFiles& files, const std::string& salt) {

@@ -154,6 +154,15 @@ void GltfAccessors::read_sparse(const tinygltf::Accessor& accessor, bool normali
   }
 }
 
+void GltfAccessors::check(int accessor, std::size_t count) const {
+  const tinygltf::Accessor& source = at(accessor);
+  if (source.count != count)
+    fail(place_of_accessor(accessor) + "/count", std::to_string(count), std::to_string(source.count));
+  if (tinygltf::GetNumComponentsInType(static_cast<std::uint32_t>(source.type)) <= 0)
+    fail(place_of_accessor(accessor) + "/type", "a type of glTF", "another");
+  read(accessor, false);
+}
+
 VertexArray GltfAccessors::read_positions(int accessor) const {
   const tinygltf::Accessor& source = at(accessor);
   if (source.type != TINYGLTF_TYPE_VEC3)

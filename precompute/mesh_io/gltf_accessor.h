@@ -30,6 +30,8 @@ class GltfAccessors {
   RowMatrix read_rows(int accessor, int type, const char* name) const;
   /// Of a SCALAR of unsigned integers; each is below `end`.
   std::vector<std::uint32_t> read_indices(int accessor, std::size_t end) const;
+  /// Throws InputError unless it has so many rows, each of its numbers in a buffer.
+  void check(int accessor, std::size_t count) const;
   /// True if it has no numbers of its own.
   bool is_zeros(int accessor) const { return at(accessor).bufferView < 0 && !at(accessor).sparse.isSparse; }
   /// True if it has one number a row.

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <tiny_gltf.h>
 #include <vector>
@@ -11,6 +12,7 @@ namespace exmat::precompute {
 /// bits, and nothing is compressed. Indices and sizes are still those of the file.
 struct GltfDocument {
   tinygltf::Model model;
+  nlohmann::json json;                       ///< of the file, with all that has not been checked
   std::vector<std::filesystem::path> files;  ///< every file that was read, the named one first
   std::size_t bytes = 0;                     ///< of the file and its buffers
 };

@@ -346,18 +346,20 @@ Json parse_with_cut_names(const std::string& file, std::string_view text) {
 
 }  // namespace
 
-Json shapes_of_gltf(const std::string& file, std::string_view text, bool is_binary) {
+Json parse_gltf(const std::string& file, std::string_view text) {
   if (is_too_deep(text)) throw InputError({file, "", fmt::format("JSON of at most {} levels", kDeepest), "more", ""});
-  Json root;
   try {
-    root = Json::parse(text);
+    return Json::parse(text);
   } catch (const Json::exception& error) {
     try {
-      root = parse_with_cut_names(file, text);
+      return parse_with_cut_names(file, text);
     } catch (const Json::exception&) {
       throw InputError({file, "", "JSON", error.what(), "is this a whole glTF file?"});
     }
   }
+}
+
+Json shapes_of_gltf(const std::string& file, const Json& root, bool is_binary) {
   return ShapeReader(file, is_binary).read(root);
 }
 

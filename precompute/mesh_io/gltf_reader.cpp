@@ -47,7 +47,7 @@ class GltfReader {
         accessors_(file_, document_),
         skeleton_(file_, document_, accessors_) {}
 
-  SurfaceFile read();
+  GltfShapes read();
 
  private:
   // Positions of a target, where they are not those of the mesh.
@@ -61,6 +61,7 @@ class GltfReader {
     const tinygltf::Mesh& mesh;
     std::string place;
     const Eigen::Affine3d& to_scene;
+    int node = 0;
     int skin;                           // -1: all hangs on `bone`
     std::size_t bone;                   // of the node
     std::vector<std::size_t> morphs{};  // of its targets
@@ -71,7 +72,7 @@ class GltfReader {
   void begin_node(int node, const Eigen::Affine3d& to_scene);
   void end_node(int node);
   void name_targets(Instance& instance);
-  void add_primitive(Instance& instance, const tinygltf::Primitive& primitive, const std::string& place);
+  void add_primitive(Instance& instance, std::size_t index, const std::string& place);
   std::size_t add_vertices(Instance& instance, const tinygltf::Primitive& primitive, const std::string& place);
   void add_bones(const Instance& instance, const tinygltf::Primitive& primitive, std::size_t count,
                  const std::string& place);
@@ -86,7 +87,7 @@ class GltfReader {
   void add_remarks(SurfaceFile& surface) const;
 
   const std::string file_;
-  const GltfDocument document_;
+  GltfDocument document_;
   const GltfAccessors accessors_;
   const GltfSkeleton skeleton_;
   std::vector<std::array<double, 3>> vertices_, colours_;
@@ -97,20 +98,22 @@ class GltfReader {
   std::map<std::string, std::size_t> morph_of_name_;
   std::vector<Block> blocks_;
   SurfaceParts parts_;
+  std::vector<DrawnPrimitive> primitives_;
   std::vector<std::size_t> first_of_node_;
   std::set<int> meshes_;
   std::set<std::string> no_scalars_;
   std::size_t nodes_with_meshes_ = 0, left_out_ = 0, rows_ = 0;
 };
 
-SurfaceFile GltfReader::read() {
+GltfShapes GltfReader::read() {
   first_of_node_.resize(document_.model.nodes.size());
   visit_nodes(file_, document_.model,
               {[&](int node, const Eigen::Affine3d& to_scene) { begin_node(node, to_scene); },
                [&](int node) { end_node(node); }});
   if (triangles_.empty())
     fail_in_gltf(file_, "", "triangles in the nodes of the scene", left_out_ > 0 ? "points or lines alone" : "none");
-  return finish();
+  SurfaceFile surface = finish();
+  return {std::move(surface), std::move(document_), std::move(primitives_)};
 }
 
 void GltfReader::begin_node(int index, const Eigen::Affine3d& to_scene) {
@@ -125,13 +128,14 @@ void GltfReader::begin_node(int index, const Eigen::Affine3d& to_scene) {
     fail_in_gltf(file_, place + "/mesh", fmt::format("a mesh below {}", document_.model.meshes.size()),
                  std::to_string(node.mesh));
   Instance instance{document_.model.meshes[static_cast<std::size_t>(node.mesh)], fmt::format("/meshes/{}", node.mesh),
-                    node.skin >= 0 ? skeleton_.to_scene(node.skin) : to_scene, node.skin, skeleton_.bone_above(index)};
+                    node.skin >= 0 ? skeleton_.to_scene(node.skin) : to_scene, index, node.skin,
+                    skeleton_.bone_above(index)};
   ++nodes_with_meshes_;
   meshes_.insert(node.mesh);
   name_targets(instance);
   const std::size_t first = triangles_.size();
   for (std::size_t k = 0; k < instance.mesh.primitives.size(); ++k)
-    add_primitive(instance, instance.mesh.primitives[k], fmt::format("{}/primitives/{}", instance.place, k));
+    add_primitive(instance, k, fmt::format("{}/primitives/{}", instance.place, k));
   parts_.add_triangles(instance.mesh.name, first, triangles_.size());
 }
 
@@ -158,7 +162,8 @@ void GltfReader::name_targets(Instance& instance) {
   }
 }
 
-void GltfReader::add_primitive(Instance& instance, const tinygltf::Primitive& primitive, const std::string& place) {
+void GltfReader::add_primitive(Instance& instance, std::size_t index, const std::string& place) {
+  const tinygltf::Primitive& primitive = instance.mesh.primitives[index];
   spend(1 + primitive.attributes.size() + primitive.targets.size(), 1, place);
   const int mode = primitive.mode < 0 ? TINYGLTF_MODE_TRIANGLES : primitive.mode;
   if (mode > TINYGLTF_MODE_TRIANGLE_FAN)
@@ -172,6 +177,7 @@ void GltfReader::add_primitive(Instance& instance, const tinygltf::Primitive& pr
                  fmt::format("{} targets, as the first primitive of the mesh has", instance.morphs.size()),
                  std::to_string(primitive.targets.size()));
   const std::size_t first = add_vertices(instance, primitive, place);
+  primitives_.push_back({instance.node, index, static_cast<Eigen::Index>(first), instance.to_scene.linear()});
   const std::size_t count = accessors_.count(primitive.attributes.at("POSITION"));
   std::vector<std::uint32_t> corners;
   spend(primitive.indices >= 0 ? accessors_.count(primitive.indices) : count, 1, place);
@@ -362,6 +368,8 @@ void GltfReader::add_remarks(SurfaceFile& surface) const {
 
 }  // namespace
 
-SurfaceFile read_gltf(const std::filesystem::path& file) { return GltfReader(file).read(); }
+SurfaceFile read_gltf(const std::filesystem::path& file) { return read_gltf_shapes(file).surface; }
+
+GltfShapes read_gltf_shapes(const std::filesystem::path& file) { return GltfReader(file).read(); }
 
 }  // namespace exmat::precompute

@@ -1,5 +1,9 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <vector>
+
+#include "precompute/mesh_io/gltf_document.h"
 #include "precompute/mesh_io/surface_file.h"
 
 namespace exmat::precompute {
@@ -17,5 +21,21 @@ namespace exmat::precompute {
 /// Throws InputError (see read_gltf_document), also for nodes that are no tree and for shapes that repeat
 /// what is in the file so often that they are out of proportion to its bytes.
 SurfaceFile read_gltf(const std::filesystem::path& file);
+
+/// Place of a primitive's vertices among those of a surface.
+struct DrawnPrimitive {
+  int node = 0;
+  std::size_t primitive = 0;  ///< of the node's mesh
+  Eigen::Index first = 0;     ///< vertex; the others follow in the order of the primitive's accessors
+  Eigen::Matrix3d to_scene;   ///< linear part of the node's transform
+};
+
+/// The same with what it was read from. Primitives of triangles alone, in the order of the nodes.
+struct GltfShapes {
+  SurfaceFile surface;
+  GltfDocument document;
+  std::vector<DrawnPrimitive> primitives;
+};
+GltfShapes read_gltf_shapes(const std::filesystem::path& file);
 
 }  // namespace exmat::precompute

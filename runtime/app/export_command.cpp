@@ -11,6 +11,7 @@
 #include "runtime/app/commands.h"
 #include "runtime/app/print.h"
 #include "runtime/export/point_cache.h"
+#include "runtime/export/surface_look.h"
 #include "runtime/export/usd_file.h"
 
 namespace exmat::runtime {
@@ -54,6 +55,10 @@ void export_usd(const ExportOptions& options) {
   print("size", fmt::format("{:.3g} MB", static_cast<double>(summary.bytes) / kMegabyte));
 }
 
+VertexNormals normals_of(const DrawnSurface& surface) {
+  return {surface.vertices, surface.triangles, surface.look ? surface.look->normals : VertexArray()};
+}
+
 /// The bundle that a trajectory is of: as the user says, or as it says itself.
 std::filesystem::path bundle_of(const ExportOptions& options, const TrajectoryReader& trajectory) {
   const std::string own = trajectory.text("bundle");
@@ -75,6 +80,11 @@ void print_targets(const MorphTargets& targets, const DrawnSurface& surface) {
   print("surface", fmt::format("{} vertices, {} triangles of {}", surface.vertex_count(), surface.triangles.rows(),
                                surface.source));
   print("morph targets", fmt::format("{}, {}", targets.displacements.cols(), kind));
+  if (!surface.look) return;
+  const auto count = [&](const char* name) {
+    return surface.look->document.value(name, nlohmann::json::array()).size();
+  };
+  print("look", fmt::format("{} materials and {} images, as its file has them", count("materials"), count("images")));
 }
 
 void print_error(const MorphError& error, const DrawnSurface& surface) {
@@ -136,7 +146,7 @@ void find_targets(const ExportOptions& options, Drawing& drawing) {
   for (std::size_t i = 0; i < drawing.kinds.size(); ++i) {
     DrawnKind& kind = drawing.kinds[i];
     drawing.reduced.push_back(reduced_of(drawing, i));
-    const VertexNormals normals(kind.surface.vertices, kind.surface.triangles);
+    const VertexNormals normals = normals_of(kind.surface);
     kind.normals = normals.at(kind.surface.vertices);
     kind.targets = drawing.bodies.front().motion
                        ? targets_of_motion(kind.surface, normals, drawing.reduced[i], options.targets)
@@ -187,7 +197,7 @@ void export_gltf(const ExportOptions& options) {
     const DrawnKind& kind = drawing.kinds[i];
     print_targets(kind.targets, kind.surface);
     if (cached == 0) continue;
-    const VertexNormals normals(kind.surface.vertices, kind.surface.triangles);
+    const VertexNormals normals = normals_of(kind.surface);
     print_error(error_of(kind.targets, kind.surface, normals, drawing.reduced[i]), kind.surface);
   }
   const auto megabytes = static_cast<double>(bytes) / kMegabyte;

@@ -4,13 +4,14 @@
 
 #include "common/bundle/bundle.h"
 #include "common/mesh/geometry.h"
+#include "runtime/export/surface_look.h"
 
 namespace exmat::runtime {
 namespace {
 
 /// Of these groups those that the bundle has.
 BundleRequest request_of(const BundleSummary& summary) {
-  BundleRequest request{.groups = {}, .step_only = true, .positions = true};
+  BundleRequest request{.groups = {}, .step_only = true, .positions = true, .look = true};
   for (const char* group : {"object", "modal", "rigid", "render"}) {
     const bool included = std::ranges::find(summary.groups, group) != summary.groups.end();
     request.groups.push_back({group, included, 0, "it is drawn"});
@@ -60,10 +61,13 @@ DrawnSurface read_drawn_surface(const std::filesystem::path& bundle, bool mesh) 
   const ReducedModel model = read_bundle(bundle, request_of(summary));
   DrawnSurface surface;
   surface.name = summary.asset_name;
-  if (model.render && !mesh)
+  if (model.render && !mesh) {
     add_render_mesh(model, surface);
-  else
+    if (model.render->look.size() > 0)
+      surface.look = std::make_shared<const SurfaceLook>(read_look(bundle.string(), *model.render));
+  } else {
     add_surface_of_mesh(model, surface);
+  }
   surface.free = !summary.constrained && model.rigid;
   surface.origin = surface.free ? model.rigid->centre_of_mass : origin_near(surface.vertices);
   surface.vertices.rowwise() -= surface.origin.transpose();

@@ -2,11 +2,14 @@
 
 #include <Eigen/Core>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "common/core/arrays.h"
 
 namespace exmat::runtime {
+
+struct SurfaceLook;
 
 /// What is drawn of a reduced body: v vertices, f triangles, r modes. A body with reduced coordinates q stands at
 /// vertices + modes q in its own frame, the origin of which is at `origin` in the world at rest.
@@ -17,6 +20,7 @@ struct DrawnSurface {
   TriangleArray triangles;                           ///< f x 3
   RowMatrix modes;                                   ///< 3v x r [kg^(-1/2)], row 3k + axis
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of a free body the centre of mass, else origin_near() [m]
+  std::shared_ptr<const SurfaceLook> look;           ///< of the file that it came from, or none
   bool free = false;                                 ///< it turns about its origin, else about 0
 
   Eigen::Index vertex_count() const { return vertices.rows(); }

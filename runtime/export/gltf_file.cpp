@@ -1,15 +1,18 @@
 #include "runtime/export/gltf_file.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
 #include <bit>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <fmt/format.h>
 #include <fstream>
 #include <limits>
-#include <map>
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <system_error>
 #include <utility>
 #include <vector>
@@ -18,12 +21,13 @@
 #include "common/core/error.h"
 #include "common/core/version.h"
 #include "common/mesh/geometry.h"
-
-#define TINYGLTF_IMPLEMENTATION
-#include <tiny_gltf.h>
+#include "common/surface_io/glb.h"
+#include "runtime/export/surface_look.h"
 
 namespace exmat::runtime {
 namespace {
+
+using Json = nlohmann::json;
 
 static_assert(std::endian::native == std::endian::little, "a buffer of glTF is little-endian");
 
@@ -31,6 +35,7 @@ using FloatMatrix = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::
 
 constexpr Eigen::Index kShortIndices = 65535;  // vertices that 16 bits count, the last number being reserved
 constexpr std::size_t kMostBytes = std::numeric_limits<std::int32_t>::max();
+constexpr const char* kVariants = "KHR_materials_variants";
 
 /// Column k of a matrix, [3v x N], as v rows.
 FloatMatrix vectors_of(const RowMatrix& matrix, Eigen::Index column) {
@@ -51,113 +56,279 @@ RowMatrix places_of(const DrawnSurface& surface, const BodyMotion& motion) {
   return places;
 }
 
+/// Numbers of glTF for the types of accessors and the use of views.
+enum ComponentType { kUnsignedShort = 5123, kUnsignedInt = 5125, kFloat = 5126 };
+enum ViewUse { kOther = 0, kVertices = 34962, kIndices = 34963 };
+constexpr int kTriangles = 4;
+
+Json json_of(const Eigen::VectorXd& vector) { return std::vector<double>(vector.begin(), vector.end()); }
+
+/// Adds a number to an index of a document, where it has one.
+void shift(Json& object, const char* member, std::size_t by) {
+  if (const auto found = object.find(member); found != object.end()) *found = found->get<std::size_t>() + by;
+}
+
+/// Adds a number to the indices of textures in a material or an extension of one: members whose names end so.
+void shift_textures(Json& value, std::size_t by) {
+  if (!value.is_structured()) return;
+  for (auto member = value.begin(); member != value.end(); ++member) {
+    if (value.is_object() && std::string_view(member.key()).ends_with("Texture") && member->is_object())
+      shift(*member, "index", by);
+    shift_textures(*member, by);
+  }
+}
+
 class GltfWriter {
  public:
   explicit GltfWriter(std::string file) : file_(std::move(file)) {
-    model_.asset.version = "2.0";
-    model_.asset.generator = fmt::format("exmat-runtime {}", version());
-    model_.buffers.emplace_back();
-    model_.scenes.emplace_back();
-    model_.defaultScene = 0;
-    tinygltf::Material material;
-    material.name = "material";
-    material.doubleSided = true;
-    material.pbrMetallicRoughness.metallicFactor = 0;
-    material.pbrMetallicRoughness.roughnessFactor = 0.6;
-    model_.materials.push_back(material);
+    root_ = {{"asset", {{"version", "2.0"}, {"generator", fmt::format("exmat-runtime {}", version())}}}, {"scene", 0}};
+    for (const char* list : {"accessors", "bufferViews", "meshes", "nodes"}) root_[list] = Json::array();
   }
 
   /// `has_weights`: the mesh, not its nodes.
   void add_mesh(const DrawnKind& kind, bool has_weights) {
-    const auto& [surface, normals, targets] = kind;
-    tinygltf::Primitive primitive;
-    primitive.mode = TINYGLTF_MODE_TRIANGLES;
-    primitive.material = 0;
-    primitive.indices = add_indices(surface.triangles, surface.vertex_count());
-    primitive.attributes["POSITION"] = add_floats(surface.vertices.cast<float>(), TINYGLTF_TYPE_VEC3, kVertices, true);
-    primitive.attributes["NORMAL"] = add_floats(normals.cast<float>(), TINYGLTF_TYPE_VEC3, kVertices);
-    std::vector<tinygltf::Value> names;
-    for (Eigen::Index k = 0; k < targets.displacements.cols(); ++k) {
-      primitive.targets.push_back(
-          {{"POSITION", add_floats(vectors_of(targets.displacements, k), TINYGLTF_TYPE_VEC3, kVertices, true)},
-           {"NORMAL", add_floats(vectors_of(targets.normals, k), TINYGLTF_TYPE_VEC3, kVertices)}});
-      names.emplace_back(targets.names[static_cast<std::size_t>(k)]);
+    Kind& added = kinds_.emplace_back();
+    if (!kind.surface.look) return add_plain_mesh(kind, has_weights, added);
+    try {
+      add_look(*kind.surface.look, added);
+      move_look(kind, has_weights, added);
+    } catch (const Json::exception& error) {
+      throw InputError({file_, "", fmt::format("a sound look of {}", kind.surface.name), error.what(),
+                        "precompute the bundle again"});
     }
-    tinygltf::Mesh& mesh = model_.meshes.emplace_back();
-    mesh.name = surface.name;
-    mesh.primitives.push_back(std::move(primitive));
-    if (has_weights) {
-      mesh.weights.assign(static_cast<std::size_t>(targets.displacements.cols()), 0.0);
-      set_first(targets.weights, mesh.weights);
-    }
-    mesh.extras = tinygltf::Value(std::map<std::string, tinygltf::Value>{{"targetNames", tinygltf::Value(names)}});
   }
 
   void add_nodes(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies, UpAxis up) {
-    if (up == UpAxis::kZ) {
-      tinygltf::Node& upright = model_.nodes.emplace_back();
-      upright.name = "y up";
-      upright.rotation = {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)};
-    }
+    Json& nodes = root_["nodes"];
+    if (up == UpAxis::kZ) nodes.push_back({{"name", "y up"}, {"rotation", {-std::sqrt(0.5), 0, 0, std::sqrt(0.5)}}});
     origin_ = origin_of(kinds, bodies);
-    const int above = static_cast<int>(model_.nodes.size());
-    if (!origin_.isZero(0)) {
-      tinygltf::Node& placed = model_.nodes.emplace_back();
-      placed.name = "origin";
-      placed.translation = {origin_.x(), origin_.y(), origin_.z()};
-    }
-    first_body_ = static_cast<int>(model_.nodes.size());
-    std::vector<int> nodes;
+    const std::size_t above = nodes.size();
+    if (!origin_.isZero(0)) nodes.push_back({{"name", "origin"}, {"translation", json_of(origin_)}});
+    Json list = Json::array();
     for (const DrawnBody& drawn : bodies) {
-      const Eigen::Vector3d origin = kinds[drawn.kind].surface.origin - origin_;
-      nodes.push_back(static_cast<int>(model_.nodes.size()));
-      tinygltf::Node& body = model_.nodes.emplace_back();
-      body.name = drawn.name;
-      body.mesh = static_cast<int>(drawn.kind);
-      body.translation = {origin.x(), origin.y(), origin.z()};
+      const DrawnSurface& surface = kinds[drawn.kind].surface;
+      Body& body = bodies_.emplace_back();
+      body.node = nodes.size();
+      list.push_back(body.node);
+      nodes.push_back({{"name", drawn.name}, {"translation", json_of(surface.origin - origin_)}});
+      add_drawn_nodes(kinds_[drawn.kind], surface.origin, body);
       if (bodies.size() == 1 || drawn.weights.rows() == 0) continue;
-      body.weights.resize(static_cast<std::size_t>(drawn.weights.cols()));
-      set_first(drawn.weights, body.weights);
+      for (const std::size_t node : body.meshes) nodes[node]["weights"] = first_of(drawn.weights);
     }
-    if (!origin_.isZero(0))
-      model_.nodes[static_cast<std::size_t>(above)].children = std::exchange(nodes, std::vector{above});
-    if (up == UpAxis::kZ) model_.nodes.front().children = std::exchange(nodes, {0});
-    model_.scenes.front().nodes = nodes;
+    if (!origin_.isZero(0)) nodes[above]["children"] = std::exchange(list, Json::array({above}));
+    if (up == UpAxis::kZ) nodes.front()["children"] = std::exchange(list, Json::array({0}));
+    root_["scenes"] = {{{"nodes", list}}};
   }
 
   void add_animations(const std::vector<DrawnKind>& kinds, const std::vector<DrawnBody>& bodies) {
     const Eigen::VectorXd& times = bodies.front().motion->times;
     add_times(times);
-    tinygltf::Animation& animation = model_.animations.emplace_back();
-    animation.name = "motion";
+    Json animation = {{"name", "motion"}, {"samplers", Json::array()}, {"channels", Json::array()}};
     for (std::size_t i = 0; i < bodies.size(); ++i) {
       if (bodies[i].motion->times != times)
         throw InputError({file_, "", "frames of all bodies at the same times",
                           fmt::format("others of {}", bodies[i].name), "is this a trajectory of one run?"});
-      add_channels(kinds[bodies[i].kind].surface, bodies[i], first_body_ + static_cast<int>(i), animation);
+      add_channels(kinds[bodies[i].kind].surface, bodies[i], bodies_[i], animation);
     }
+    root_["animations"] = {std::move(animation)};
   }
 
   std::int64_t write(const std::filesystem::path& target) {
+    root_["buffers"] = {{{"byteLength", buffer_.size()}}};
+    const std::string glb = to_glb(root_.dump(-1, ' ', false, Json::error_handler_t::replace), buffer_);
     AtomicFile output(target);
     std::ofstream stream(output.temporary(), std::ios::binary | std::ios::trunc);
-    const bool written = tinygltf::TinyGLTF().WriteGltfSceneToStream(&model_, stream, /*prettyPrint=*/false, true);
+    stream.write(glb.data(), static_cast<std::streamsize>(glb.size()));
     stream.close();
-    if (!written || !stream)
-      throw WorkError("cannot write " + target.string() + ": " + std::generic_category().message(errno));
-    const auto bytes = static_cast<std::int64_t>(std::filesystem::file_size(output.temporary()));
+    if (!stream) throw WorkError("cannot write " + target.string() + ": " + std::generic_category().message(errno));
     output.commit();
-    return bytes;
+    return std::ssize(glb);
   }
 
  private:
-  static constexpr int kOther = 0, kVertices = TINYGLTF_TARGET_ARRAY_BUFFER,
-                       kIndices = TINYGLTF_TARGET_ELEMENT_ARRAY_BUFFER;
+  /// Nodes of a kind of body: those of its look, their meshes and children as numbered here and there; or one mesh.
+  struct Kind {
+    Json nodes = Json::array(), roots = Json::array();
+    std::size_t first_mesh = 0;
+  };
+  struct Body {
+    std::size_t node = 0;
+    std::vector<std::size_t> meshes;  ///< nodes with one
+  };
 
-  /// Those of the first frame, where there is one.
-  static void set_first(const RowMatrix& weights, std::vector<double>& first) {
-    for (Eigen::Index k = 0; weights.rows() > 0 && k < weights.cols(); ++k)
-      first[static_cast<std::size_t>(k)] = weights(0, k);
+  std::size_t size_of(const char* list) const { return root_.contains(list) ? root_[list].size() : 0; }
+
+  /// Of the first frame.
+  static Json first_of(const RowMatrix& weights) { return json_of(weights.row(0).transpose()); }
+
+  static Json names_of(const MorphTargets& targets) { return {{"targetNames", targets.names}}; }
+
+  /// Weights that a mesh has by itself: those of the first frame, where there is one.
+  static Json weights_of(const MorphTargets& targets) {
+    if (targets.weights.rows() > 0) return first_of(targets.weights);
+    return std::vector<double>(static_cast<std::size_t>(targets.displacements.cols()), 0.0);
+  }
+
+  void add_plain_mesh(const DrawnKind& kind, bool has_weights, Kind& added) {
+    const auto& [surface, normals, targets] = kind;
+    Json primitive = {{"mode", kTriangles}, {"material", plain_material()}};
+    primitive["indices"] = add_indices(surface.triangles, surface.vertex_count());
+    primitive["attributes"]["POSITION"] = add_floats(surface.vertices.cast<float>(), "VEC3", kVertices, true);
+    primitive["attributes"]["NORMAL"] = add_floats(normals.cast<float>(), "VEC3", kVertices);
+    for (Eigen::Index k = 0; k < targets.displacements.cols(); ++k)
+      primitive["targets"].push_back(
+          {{"POSITION", add_floats(vectors_of(targets.displacements, k), "VEC3", kVertices, true)},
+           {"NORMAL", add_floats(vectors_of(targets.normals, k), "VEC3", kVertices)}});
+    Json mesh = {{"name", surface.name}, {"primitives", {std::move(primitive)}}, {"extras", names_of(targets)}};
+    if (has_weights) mesh["weights"] = weights_of(targets);
+    added.first_mesh = size_of("meshes");
+    root_["meshes"].push_back(std::move(mesh));
+  }
+
+  /// The material of surfaces without a look.
+  std::size_t plain_material() {
+    if (!plain_material_) {
+      plain_material_ = size_of("materials");
+      root_["materials"].push_back({{"name", "material"},
+                                    {"doubleSided", true},
+                                    {"pbrMetallicRoughness", {{"metallicFactor", 0}, {"roughnessFactor", 0.6}}}});
+    }
+    return *plain_material_;
+  }
+
+  /// A document becomes part of this one: its indices go on from those that are there.
+  void add_look(const SurfaceLook& look, Kind& added) {
+    Json document = look.document;
+    buffer_.append((4 - buffer_.size() % 4) % 4, '\0');
+    const std::size_t views = size_of("bufferViews"), accessors = size_of("accessors"), images = size_of("images"),
+                      samplers = size_of("samplers"), textures = size_of("textures"), materials = size_of("materials");
+    require_room(look.buffer.size());
+    for (Json& view : list(document, "bufferViews")) {
+      view["buffer"] = 0;
+      view["byteOffset"] = view.value("byteOffset", std::size_t{0}) + buffer_.size();
+    }
+    buffer_ += look.buffer;
+    for (Json& accessor : list(document, "accessors")) {
+      shift(accessor, "bufferView", views);
+      if (!accessor.contains("sparse")) continue;
+      shift(accessor["sparse"]["indices"], "bufferView", views);
+      shift(accessor["sparse"]["values"], "bufferView", views);
+    }
+    for (Json& image : list(document, "images")) shift(image, "bufferView", views);
+    for (Json& texture : list(document, "textures")) {
+      shift(texture, "sampler", samplers);
+      shift(texture, "source", images);
+      for (Json& extension : list(texture, "extensions"))
+        if (extension.is_object()) shift(extension, "source", images);
+    }
+    for (Json& material : list(document, "materials")) shift_textures(material, textures);
+    for (Json& mesh : document.at("meshes"))
+      for (Json& primitive : mesh.at("primitives")) {
+        for (Json& attribute : primitive.at("attributes")) attribute = attribute.get<std::size_t>() + accessors;
+        shift(primitive, "indices", accessors);
+        shift(primitive, "material", materials);
+        shift_variants(primitive, materials);
+      }
+    append_variants(document);
+    added.first_mesh = size_of("meshes");
+    added.nodes = document.at("nodes");
+    added.roots = document.at("scenes").at(0).at("nodes");
+    for (const char* name : {"accessors", "bufferViews", "images", "samplers", "textures", "materials", "meshes"})
+      for (Json& element : list(document, name)) root_[name].push_back(std::move(element));
+    for (const char* name : {"extensionsUsed", "extensionsRequired"})
+      for (const Json& extension : list(document, name))
+        if (std::ranges::find(list(root_, name), extension) == list(root_, name).end())
+          root_[name].push_back(extension);
+    add_copyright(document.at("asset"));
+  }
+
+  /// The member; an empty list where there is none.
+  static Json& list(Json& object, const char* name) {
+    static thread_local Json none;
+    none = Json::array();
+    return object.contains(name) ? object[name] : none;
+  }
+
+  void shift_variants(Json& primitive, std::size_t materials) const {
+    if (!primitive.contains("extensions") || !primitive["extensions"].contains(kVariants)) return;
+    for (Json& mapping : primitive["extensions"][kVariants].at("mappings")) {
+      shift(mapping, "material", materials);
+      for (Json& variant : mapping.at("variants")) variant = variant.get<std::size_t>() + variants_;
+    }
+  }
+
+  void append_variants(const Json& document) {
+    if (!document.contains("extensions") || !document["extensions"].contains(kVariants)) return;
+    for (const Json& variant : document["extensions"][kVariants].at("variants"))
+      root_["extensions"][kVariants]["variants"].push_back(variant);
+    variants_ = root_["extensions"][kVariants]["variants"].size();
+  }
+
+  void add_copyright(const Json& asset) {
+    if (!asset.contains("copyright")) return;
+    const auto added = asset["copyright"].get<std::string>();
+    std::string known = root_["asset"].value("copyright", "");
+    if (known.find(added) != std::string::npos) return;
+    root_["asset"]["copyright"] = known.empty() ? added : known + "; " + added;
+  }
+
+  /// Morph targets of the meshes of a look, which was added last, and normals where they have none.
+  void move_look(const DrawnKind& kind, bool has_weights, const Kind& added) {
+    const MorphTargets& targets = kind.targets;
+    std::size_t index = 0;
+    for (std::size_t m = added.first_mesh; m < size_of("meshes"); ++m) {
+      Json mesh = std::move(root_["meshes"][m]);
+      for (Json& primitive : mesh.at("primitives"))
+        move_primitive(kind, kind.surface.look->primitives.at(index++), primitive);
+      mesh["extras"].update(names_of(targets));
+      if (has_weights) mesh["weights"] = weights_of(targets);
+      root_["meshes"][m] = std::move(mesh);
+    }
+  }
+
+  void move_primitive(const DrawnKind& kind, const LookPrimitive& place, Json& primitive) {
+    const auto& [surface, normals, targets] = kind;
+    const Eigen::Matrix3d to_mesh = place.frame.inverse(), turn = place.frame.transpose();
+    const RowMatrix rest = normals.middleRows(place.first, place.count) * turn.transpose();
+    const Eigen::VectorXd scale = rest.rowwise().norm().cwiseInverse();
+    const auto in_mesh = [&](const RowMatrix& columns, Eigen::Index k, const Eigen::Matrix3d& matrix) {
+      const RowMatrix vectors =
+          columns.col(k).segment(3 * place.first, 3 * place.count).reshaped<Eigen::RowMajor>(place.count, 3);
+      return RowMatrix(vectors * matrix.transpose());
+    };
+    if (!primitive["attributes"].contains("NORMAL"))
+      primitive["attributes"]["NORMAL"] = add_floats((scale.asDiagonal() * rest).cast<float>(), "VEC3", kVertices);
+    primitive["targets"] = Json::array();
+    for (Eigen::Index k = 0; k < targets.displacements.cols(); ++k) {
+      const FloatMatrix moved = in_mesh(targets.displacements, k, to_mesh).cast<float>();
+      const FloatMatrix turned = (scale.asDiagonal() * in_mesh(targets.normals, k, turn)).cast<float>();
+      primitive["targets"].push_back({{"POSITION", add_floats(moved, "VEC3", kVertices, true)},
+                                      {"NORMAL", add_floats(turned, "VEC3", kVertices)}});
+    }
+  }
+
+  /// What hangs below a body's node: a mesh, or the nodes of its look, which stand where the surface is at rest.
+  void add_drawn_nodes(const Kind& kind, const Eigen::Vector3d& origin, Body& body) {
+    Json& nodes = root_["nodes"];
+    if (kind.nodes.empty()) {
+      nodes[body.node]["mesh"] = kind.first_mesh;
+      body.meshes = {body.node};
+      return;
+    }
+    std::size_t above = body.node;
+    if (!origin.isZero(0)) {
+      above = nodes.size();
+      nodes[body.node]["children"] = {above};
+      nodes.push_back({{"name", "rest"}, {"translation", json_of(-origin)}});
+    }
+    const std::size_t first = nodes.size();
+    for (Json node : kind.nodes) {
+      for (Json& child : list(node, "children")) child = child.get<std::size_t>() + first;
+      shift(node, "mesh", kind.first_mesh);
+      if (node.contains("mesh")) body.meshes.push_back(nodes.size());
+      nodes.push_back(std::move(node));
+    }
+    for (const Json& root : kind.roots) nodes[above]["children"].push_back(root.get<std::size_t>() + first);
   }
 
   void add_times(const Eigen::VectorXd& seconds) {
@@ -167,88 +338,85 @@ class GltfWriter {
         throw InputError({file_, "", "frames at different times in single precision, as glTF has them",
                           fmt::format("frames {} and {} at {:.9g} s", frame - 1, frame, seconds[frame]),
                           "write fewer frames (output.every of the scene)"});
-    input_ = add_floats(times, TINYGLTF_TYPE_SCALAR, kOther, true);
+    input_ = add_floats(times, "SCALAR", kOther, true);
   }
 
-  void add_channels(const DrawnSurface& surface, const DrawnBody& drawn, int node, tinygltf::Animation& animation) {
+  void add_channels(const DrawnSurface& surface, const DrawnBody& drawn, const Body& body, Json& animation) {
     const BodyMotion& motion = *drawn.motion;
     const RowMatrix places = places_of(surface, motion).rowwise() - origin_.transpose();
     const RowMatrix& turns = motion.orientations;
     if (!(places.rowwise() - places.row(0)).isZero(0) || !motion.positions.row(0).isZero(0))
-      add_channel(animation, node, "translation", add_floats(places.cast<float>(), TINYGLTF_TYPE_VEC3, kOther));
+      add_channels(animation, {body.node}, "translation", add_floats(places.cast<float>(), "VEC3", kOther));
     if (!turns.rightCols(3).isZero(0)) {
       FloatMatrix quaternions(turns.rows(), 4);
       quaternions << turns.rightCols(3).cast<float>(), turns.leftCols(1).cast<float>();
-      add_channel(animation, node, "rotation", add_floats(quaternions, TINYGLTF_TYPE_VEC4, kOther));
+      add_channels(animation, {body.node}, "rotation", add_floats(quaternions, "VEC4", kOther));
     }
     const FloatMatrix weights = drawn.weights.cast<float>().reshaped<Eigen::RowMajor>();
-    add_channel(animation, node, "weights", add_floats(weights, TINYGLTF_TYPE_SCALAR, kOther));
+    add_channels(animation, body.meshes, "weights", add_floats(weights, "SCALAR", kOther));
   }
 
-  void add_channel(tinygltf::Animation& animation, int node, const char* path, int output) {
-    tinygltf::AnimationSampler sampler;
-    sampler.input = input_;
-    sampler.output = output;
-    tinygltf::AnimationChannel channel;
-    channel.sampler = static_cast<int>(animation.samplers.size());
-    channel.target_node = node;
-    channel.target_path = path;
-    animation.samplers.push_back(sampler);
-    animation.channels.push_back(channel);
+  /// One sampler, and a channel for each of the nodes.
+  void add_channels(Json& animation, const std::vector<std::size_t>& nodes, const char* path,
+                    std::size_t output) const {
+    for (const std::size_t node : nodes)
+      animation["channels"].push_back(
+          {{"sampler", animation["samplers"].size()}, {"target", {{"node", node}, {"path", path}}}});
+    animation["samplers"].push_back({{"input", input_}, {"output", output}, {"interpolation", "LINEAR"}});
+  }
+
+  void require_room(std::size_t bytes) const {
+    if (buffer_.size() + bytes > kMostBytes)
+      throw InputError({file_, "", "at most 2 GiB", "more",
+                        "take fewer morph targets (--targets) or write fewer frames (output.every of the scene)"});
   }
 
   template <typename Array>
-  tinygltf::Accessor& add_array(const Array& array, int use) {
-    std::vector<unsigned char>& data = model_.buffers.front().data;
-    const std::size_t first = data.size(), bytes = static_cast<std::size_t>(array.size()) * sizeof(array(0));
-    const std::size_t end = (first + bytes + 3) / 4 * 4;
-    if (end > kMostBytes)
-      throw InputError({file_, "", "at most 2 GiB", "more",
-                        "take fewer morph targets (--targets) or write fewer frames (output.every of the scene)"});
-    data.resize(end);
-    std::memcpy(data.data() + first, array.data(), bytes);
-    tinygltf::BufferView& view = model_.bufferViews.emplace_back();
-    view.buffer = 0;
-    view.byteOffset = first;
-    view.byteLength = bytes;
-    view.target = use;
-    tinygltf::Accessor& accessor = model_.accessors.emplace_back();
-    accessor.bufferView = static_cast<int>(model_.bufferViews.size()) - 1;
-    return accessor;
+  Json& add_array(const Array& array, ViewUse use, ComponentType component, const char* type) {
+    const std::size_t bytes = static_cast<std::size_t>(array.size()) * sizeof(array(0));
+    require_room(bytes + 3);
+    Json view = {{"buffer", 0}, {"byteOffset", buffer_.size()}, {"byteLength", bytes}};
+    if (use != kOther) view["target"] = use;
+    buffer_.append(reinterpret_cast<const char*>(array.data()), bytes);
+    buffer_.append((4 - buffer_.size() % 4) % 4, '\0');
+    root_["bufferViews"].push_back(std::move(view));
+    root_["accessors"].push_back(
+        {{"bufferView", size_of("bufferViews") - 1}, {"componentType", component}, {"type", type}});
+    return root_["accessors"].back();
   }
 
-  int add_floats(const FloatMatrix& rows, int type, int use, bool bounded = false) {
+  std::size_t add_floats(const FloatMatrix& rows, const char* type, ViewUse use, bool bounded = false) {
     if (!rows.allFinite())
       throw InputError({file_, "", "positions that single precision holds, as glTF has them", "larger ones",
                         "the motion has left every scale; look at its energies"});
-    tinygltf::Accessor& accessor = add_array(rows, use);
-    accessor.componentType = TINYGLTF_COMPONENT_TYPE_FLOAT;
-    accessor.type = type;
-    accessor.count = static_cast<std::size_t>(rows.rows());
+    Json& accessor = add_array(rows, use, kFloat, type);
+    accessor["count"] = rows.rows();
     if (bounded)
       for (const auto column : rows.colwise()) {
-        accessor.minValues.push_back(column.minCoeff());
-        accessor.maxValues.push_back(column.maxCoeff());
+        accessor["min"].push_back(column.minCoeff());
+        accessor["max"].push_back(column.maxCoeff());
       }
-    return static_cast<int>(model_.accessors.size()) - 1;
+    return size_of("accessors") - 1;
   }
 
-  int add_indices(const TriangleArray& triangles, Eigen::Index vertices) {
+  std::size_t add_indices(const TriangleArray& triangles, Eigen::Index vertices) {
     const bool is_short = vertices < kShortIndices;
     using Short = Eigen::Matrix<std::uint16_t, Eigen::Dynamic, 3, Eigen::RowMajor>;
-    tinygltf::Accessor& accessor =
-        is_short ? add_array(Short(triangles.cast<std::uint16_t>()), kIndices) : add_array(triangles, kIndices);
-    accessor.componentType = is_short ? TINYGLTF_COMPONENT_TYPE_UNSIGNED_SHORT : TINYGLTF_COMPONENT_TYPE_UNSIGNED_INT;
-    accessor.type = TINYGLTF_TYPE_SCALAR;
-    accessor.count = static_cast<std::size_t>(triangles.size());
-    return static_cast<int>(model_.accessors.size()) - 1;
+    Json& accessor = is_short ? add_array(Short(triangles.cast<std::uint16_t>()), kIndices, kUnsignedShort, "SCALAR")
+                              : add_array(triangles, kIndices, kUnsignedInt, "SCALAR");
+    accessor["count"] = triangles.size();
+    return size_of("accessors") - 1;
   }
 
   std::string file_;
-  tinygltf::Model model_;
+  Json root_;
+  std::string buffer_;
+  std::vector<Kind> kinds_;
+  std::vector<Body> bodies_;
+  std::optional<std::size_t> plain_material_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  int first_body_ = 0;  // node
-  int input_ = 0;       // accessor of the times
+  std::size_t input_ = 0;     // accessor of the times
+  std::size_t variants_ = 0;  // of materials, of the looks so far
 };
 
 }  // namespace

@@ -9,7 +9,8 @@
 namespace exmat::runtime {
 namespace {
 
-constexpr double kHardEdge = 0.5;  // cosine of the angle from which on an edge is one
+constexpr double kHardEdge = 0.5;       // cosine of the angle from which on an edge is one
+constexpr double kSameNormal = 0.9998;  // cosine of the angle below which normals that are given are one
 
 Eigen::RowVector3d unit(const Eigen::RowVector3d& vector) {
   const double length = vector.norm();
@@ -33,7 +34,8 @@ std::vector<std::vector<Eigen::Index>> coincident(const VertexArray& vertices) {
 
 }  // namespace
 
-VertexNormals::VertexNormals(const VertexArray& vertices, TriangleArray triangles) : triangles_(std::move(triangles)) {
+VertexNormals::VertexNormals(const VertexArray& vertices, TriangleArray triangles, const VertexArray& given)
+    : triangles_(std::move(triangles)) {
   const VertexArray sums = area_sums(vertices);
   const auto has_area = [&](Eigen::Index vertex) { return !sums.row(vertex).isZero(0); };
   for (std::vector<Eigen::Index>& set : coincident(vertices)) {
@@ -41,6 +43,8 @@ VertexNormals::VertexNormals(const VertexArray& vertices, TriangleArray triangle
     std::vector<std::vector<Eigen::Index>> groups;
     for (const Eigen::Index vertex : set) {
       const auto smooth = [&](const auto& group) {
+        if (given.rows() > 0 && !given.row(vertex).isZero(0) && !given.row(group.front()).isZero(0))
+          return given.row(vertex).dot(given.row(group.front())) > kSameNormal;
         return !has_area(vertex) || unit(sums.row(group.front())).dot(unit(sums.row(vertex))) > kHardEdge;
       };
       const auto group = std::ranges::find_if(groups, smooth);

@@ -1,12 +1,15 @@
 // Any bytes in a file of the extension EXMAT_FUZZ_EXTENSION are a mesh or refused. A TetGen pair is one input, split by
 // the first zero byte, and so are a .veg file and input.inc, which it may include, and a .gltf file and input.bin. Of a
-// .pc2 file the first and the last frame are read.
+// .pc2 file the first and the last frame are read, of a glTF file its look, too.
 #include <algorithm>
 #include <array>
 #include <cstring>
+#include <nlohmann/json.hpp>
 
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/surface_io/glb.h"
+#include "precompute/mesh_io/gltf_look.h"
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/surface_file.h"
 #include "tests/fuzz/fuzz_target.h"
@@ -37,6 +40,11 @@ void check(const SurfaceFile& surface) {
   require(surface.colours.rows() == 0 || surface.colours.rows() == count);
   require((surface.colours.array() >= 0).all() && (surface.colours.array() <= 1).all());
   require(!surface.files.empty());
+}
+
+void check(const precompute::SurfaceLook& look) {
+  require(look.vertices.size() > 0 && look.frames.rows() == 3 * look.vertices.size() && look.frames.allFinite());
+  require(nlohmann::json::parse(parts_of_glb("look", look.glb).json).at("meshes").size() > 0);
 }
 
 bool is_surface(std::string_view extension) {
@@ -76,9 +84,11 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
     bytes = fuzz::split_off(bytes, extension == ".node" ? ".ele" : extension == ".veg" ? ".inc" : ".bin");
   const auto file = fuzz::input_file(EXMAT_FUZZ_EXTENSION, bytes);
   try {
-    if (is_surface(extension))
+    if (is_surface(extension)) {
       check(precompute::read_surface_file(file));
-    else if (extension == ".pc2")
+      if (extension.starts_with(".gl"))
+        if (const auto look = precompute::read_gltf_look(file, 1)) check(*look);
+    } else if (extension == ".pc2")
       read_frames(file, bytes);
     else
       check(precompute::read_mesh(file));

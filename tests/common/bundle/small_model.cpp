@@ -26,6 +26,11 @@ ObjectData small_object(bool constrained) {
   object.surface.resize(6, 3);
   object.surface << 0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 4, 3, 1, 2, 4, 2, 3, 4;
   object.fixed = FlagVector::Zero(kVertices);
+  object.part_names = FlagVector{{97, 0, 98, 99, 0}};
+  object.part_sets.resize(3, 2);
+  object.part_sets << 0, 1, 1, 1, 1, 0;
+  object.vertex_parts = IndexVector::LinSpaced(kVertices, 0, kVertices - 1).unaryExpr([](int v) { return v % 3; });
+  object.colours = VertexArray::Constant(kVertices, 3, 0.25);
   if (constrained) object.fixed[0] = 1;
   object.materials.density = numbers(kTets, 1, 1000);
   object.materials.youngs_modulus = numbers(kTets, 1, 1e5);
@@ -210,6 +215,9 @@ RenderData small_render() {
   render.triangles << 0, 2, 1;
   render.outside = 1;
   render.farthest = 1;
+  render.look = FlagVector{{103, 108, 84, 70}};
+  render.look_vertices = IndexVector{{1, 0}};
+  render.look_frames = RowMatrix::Identity(6, 3);
   return render;
 }
 
