@@ -91,23 +91,7 @@ class AssetReader {
   }
 
   VertexSelection read_selection(const Json& json, const std::string& place) const {
-    if (json.contains("box")) return read_box(json["box"], place + "/box");
-    if (json.contains("sphere"))
-      return SphereSelection{json["sphere"]["center"].get<std::array<double, 3>>(), json["sphere"]["radius"]};
-    if (json.contains("file")) return FileSelection{resolve_path(file_, json["file"])};
-    if (json.contains("part")) return PartSelection{json["part"]};
-    if (json.contains("color"))
-      return ColourSelection{json["color"]["rgb"].get<std::array<double, 3>>(), json["color"].value("within", 0.1)};
-    return IdSelection{read_ids(json["ids"], file_, place + "/ids")};
-  }
-
-  BoxSelection read_box(const Json& json, const std::string& place) const {
-    const BoxSelection box{json["min"].get<std::array<double, 3>>(), json["max"].get<std::array<double, 3>>()};
-    for (std::size_t axis = 0; axis < 3; ++axis)
-      if (box.min[axis] > box.max[axis])
-        refuse(fmt::format("{}/max/{}", place, axis), fmt::format("a number >= {} (min)", box.min[axis]),
-               fmt::format("{}", box.max[axis]));
-    return box;
+    return exmat::read_selection(json, file_, place);
   }
 
   static DropConfig read_drop(const Json& json) {

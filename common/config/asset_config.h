@@ -9,40 +9,12 @@
 #include <variant>
 #include <vector>
 
+#include "common/config/vertex_selection.h"
 #include "common/elastic/material_model.h"
 #include "common/mesh/tet_mesh.h"
 #include "common/model/choices.h"
 
 namespace exmat {
-
-/// Vertices inside an axis-aligned box, bounds included [m].
-struct BoxSelection {
-  std::array<double, 3> min{}, max{};
-};
-/// Vertices inside a ball, its surface included [m].
-struct SphereSelection {
-  std::array<double, 3> centre{};
-  double radius = 0;
-};
-/// Vertex ids in a text file, 1-based as in .bou files: separated by commas, blanks or lines; '#' starts a comment.
-struct FileSelection {
-  std::filesystem::path file;
-};
-/// 0-based vertex ids.
-struct IdSelection {
-  std::vector<std::int64_t> ids;
-};
-/// Vertices nearest to a part of the object's surface, by its name in the file.
-struct PartSelection {
-  std::string name;
-};
-/// Vertices nearest to a part of the object's surface that has a colour.
-struct ColourSelection {
-  std::array<double, 3> colour{};  ///< red, green, blue, 0 to 1
-  double within = 0.1;             ///< largest difference of each
-};
-using VertexSelection =
-    std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, PartSelection, ColourSelection>;
 
 /// A set of tets that the mesh file names.
 struct SetSelection {
@@ -51,7 +23,7 @@ struct SetSelection {
 
 /// Tets by their centroids, by their ids in the mesh file, or by a set of it.
 using TetSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, PartSelection,
-                                  ColourSelection, SetSelection>;
+                                  ColourSelection, PointSelection, SetSelection>;
 
 struct MaterialConfig {
   MaterialModel model = MaterialModel::kStVenantKirchhoff;

@@ -49,9 +49,13 @@ std::vector<RegionForceConfig> read_region_forces(const Json& json, const std::f
 
 VertexForceConfig read_vertex_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
   VertexForceConfig config;
-  const Json& vertices = json["vertices"];
-  config.vertices = vertices.contains("file") ? read_vertex_ids(resolve_path(file, vertices["file"]))
-                                              : read_ids(vertices["ids"], file, place + "/vertices/ids");
+  VertexSelection places = read_selection(json["vertices"], file, place + "/vertices");
+  if (const auto* from = std::get_if<FileSelection>(&places))
+    config.vertices = read_vertex_ids(from->file);
+  else if (auto* ids = std::get_if<IdSelection>(&places))
+    config.vertices = std::move(ids->ids);
+  else
+    config.places = std::move(places);
   config.force = read_vector(json["force"]);
   config.start = json.value("start", config.start);
   config.end = json.value("end", config.end);
@@ -284,6 +288,19 @@ Needs needs_of(const SceneConfig& scene) {
                        .energy_reference = force.energy_reference,
                        .target_elasticity = force.law == ExampleForceLaw::kElastic});
   return needs;
+}
+
+std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config, SelectablePoints points) {
+  std::vector<VertexForceConfig> forces = config.forces;
+  points.file = config.file.string();
+  for (std::size_t i = 0; i < forces.size(); ++i) {
+    if (!forces[i].places) continue;
+    points.place = fmt::format("{}/forces/{}/vertices", config.place, i);
+    const auto vertices = select_points(points, *forces[i].places);
+    forces[i].vertices.assign(vertices.begin(), vertices.end());
+    forces[i].places.reset();
+  }
+  return forces;
 }
 
 }  // namespace exmat

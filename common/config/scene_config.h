@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "common/config/vertex_selection.h"
 #include "common/model/choices.h"
 #include "common/model/meeting_group.h"
 
@@ -21,6 +22,7 @@ struct VertexForceConfig {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();       ///< on each vertex [N]
   double start = 0;                                      ///< [s]
   double end = std::numeric_limits<double>::infinity();  ///< [s]
+  std::optional<VertexSelection> places{};               ///< that give the vertices, which are not known yet
 };
 
 /// Keys of a setting that changes in time; none of one that does not. Before the first and after the last it has their
@@ -219,5 +221,9 @@ struct WorldConfig {
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;
 };
+
+/// The forces of a scene with their vertices, those that it names by place chosen from the points of its body. Throws
+/// InputError (see select_points) with the place in the scene.
+std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config, SelectablePoints points);
 
 }  // namespace exmat

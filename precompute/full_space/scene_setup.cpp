@@ -3,12 +3,14 @@
 #include <string>
 #include <utility>
 
+#include "common/bundle/scene_places.h"
 #include "common/core/error.h"
 
 namespace exmat::precompute {
 namespace {
 
-void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
+void require_supported(const SceneConfig& config, const std::vector<VertexForceConfig>& forces,
+                       const FullSpaceModel& model) {
   const std::string file = config.file.string();
   if (const std::string keys = place_of_keys(config); !keys.empty())
     throw InputError({file, keys, "a value: the full-space reference takes no keys", "keys",
@@ -34,8 +36,8 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
   const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
   require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
-  for (std::size_t i = 0; i < config.forces.size(); ++i)
-    for (const std::int64_t vertex : config.forces[i].vertices)
+  for (std::size_t i = 0; i < forces.size(); ++i)
+    for (const std::int64_t vertex : forces[i].vertices)
       if (vertex < 0 || vertex >= model.rest.rows())
         throw InputError({file, "/forces/" + std::to_string(i) + "/vertices",
                           "vertices of the object, 0 to " + std::to_string(model.rest.rows() - 1),
@@ -45,14 +47,14 @@ void require_supported(const SceneConfig& config, const FullSpaceModel& model) {
 }  // namespace
 
 FullSpaceScene full_space_scene(const SceneConfig& config, runtime::Obstacles obstacles, const FullSpaceModel& model) {
-  require_supported(config, model);
   FullSpaceScene scene;
+  scene.forces = forces_on_vertices(config);
+  require_supported(config, scene.forces, model);
   scene.time_step = config.time_step;
   scene.integrator = config.integrator;
   scene.mass_damping = config.mass_damping;
   scene.stiffness_damping = config.stiffness_damping;
   scene.gravity = config.gravity;
-  scene.forces = config.forces;
   scene.obstacles = std::move(obstacles);
   const auto add = [&](const ExampleForceConfig& force) {
     scene.examples.push_back({.stiffness = force.stiffness,

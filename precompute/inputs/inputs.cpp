@@ -422,6 +422,7 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
       object_materials(object.surface ? with_tets_of_surface(asset, *object.surface, file_mesh) : asset, file_mesh,
                        checked.file.tet_sets, checked.file.materials, checked.report.kept_tets, files);
   require_numbers(object.mesh, object.materials, asset.file.string());
+  if (object.surface) object.marks = object.surface->marks_at(object.mesh.vertices);
   object.fixed = flag(asset.fixed, 0);
   if (object.surface && object.surface->file().skeleton) {
     object.skeleton = skeleton_of_cage(*object.surface);

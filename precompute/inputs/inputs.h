@@ -8,6 +8,7 @@
 #include "common/config/asset_config.h"
 #include "common/mesh/tet_mesh.h"
 #include "common/model/reduced_model.h"
+#include "common/model/vertex_marks.h"
 
 namespace exmat::precompute {
 
@@ -28,6 +29,7 @@ struct ObjectInput {
   std::optional<SkeletonData> skeleton{};              ///< of a surface with bones, for the vertices of the mesh
   std::vector<std::string> warnings{};                 ///< of its bones
   std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh encloses; none where tets were given
+  VertexMarks marks{};                                 ///< of that surface at the vertices
 };
 
 /// What a pose by the object's surface misses of it.

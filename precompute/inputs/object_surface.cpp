@@ -49,37 +49,33 @@ ObjectSurface::ObjectSurface(const AssetConfig& asset, InputFiles& files, StageC
       embedding_(embed_points(cage_.mesh, file_.mesh.vertices, asset.object_surface->string())),
       tree_(file_.mesh.vertices, file_.mesh.triangles) {}
 
-Eigen::VectorXd ObjectSurface::marks(const PartSelection& part) const {
-  const auto found = file_.parts.find(part.name);
-  if (found == file_.parts.end())
-    throw InputError({asset_.file.string(), "part", "a part of " + asset_.object_surface->string(),
-                      fmt::format("\"{}\"", part.name), list_of(file_.parts, "it has none")});
-  return found->second.cast<double>();
-}
-
-Eigen::VectorXd ObjectSurface::marks(const ColourSelection& colour) const {
-  if (file_.colours.rows() == 0)
-    throw InputError({asset_.file.string(), "color", "colors of the vertices of " + asset_.object_surface->string(),
-                      "none", "export them, or name a part"});
-  const Eigen::RowVector3d wanted(colour.colour.data());
-  return ((file_.colours.rowwise() - wanted).cwiseAbs().rowwise().maxCoeff().array() <= colour.within).cast<double>();
-}
-
-IdSelection ObjectSurface::nearest_to(const Eigen::VectorXd& marks, const VertexArray& points,
-                                      const std::string& what) const {
-  IdSelection selection;
+VertexMarks ObjectSurface::marks_at(const VertexArray& points) const {
+  VertexMarks marks;
+  for (const auto& [name, flags] : file_.parts)
+    if (name.find('\0') == std::string::npos) marks.parts[name] = FlagVector::Zero(points.rows());
+  if (file_.colours.rows() > 0) marks.colours.resize(points.rows(), 3);
   for (Eigen::Index k = 0; k < points.rows(); ++k) {
     const SurfacePoint point = tree_.nearest(points.row(k).transpose());
-    double mark = 0;
-    for (int corner = 0; corner < 3; ++corner)
-      mark += point.weights[corner] * marks[file_.mesh.triangles(point.triangle, corner)];
-    if (mark >= 0.5) selection.ids.push_back(k);
+    const auto corners = file_.mesh.triangles.row(point.triangle);
+    for (auto& [name, flags] : marks.parts) {
+      const FlagVector& of_surface = file_.parts.at(name);
+      double weight = 0;
+      for (int corner = 0; corner < 3; ++corner) weight += point.weights[corner] * of_surface[corners[corner]];
+      flags[k] = weight >= 0.5 ? 1 : 0;
+    }
+    Eigen::Index nearest = 0;
+    point.weights.maxCoeff(&nearest);
+    if (marks.colours.rows() > 0) marks.colours.row(k) = file_.colours.row(corners[nearest]);
   }
-  if (selection.ids.empty())
-    throw InputError({asset_.file.string(), what, "a part of the surface that some of the cage is nearest to",
-                      fmt::format("{} vertices, nearest to none", static_cast<int>(marks.sum())),
-                      "choose a larger part, or more cells"});
-  return selection;
+  return marks;
+}
+
+IdSelection ObjectSurface::ids_of(const VertexSelection& selection, const VertexArray& points) const {
+  const VertexMarks marks = marks_at(points);
+  const auto numbers = select_points(
+      {.points = points, .marks = &marks, .file = asset_.file.string(), .surface = asset_.object_surface->string()},
+      selection);
+  return {{numbers.begin(), numbers.end()}};
 }
 
 std::optional<VertexArray> ObjectSurface::posed(const ExampleConfig& example, InputFiles& files) const {

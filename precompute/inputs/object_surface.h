@@ -27,14 +27,16 @@ class ObjectSurface {
   const SurfaceTree& tree() const { return tree_; }
 
   /// The ids of the points [k x 3] that a part or a colour of the surface is nearest to; other selections as they are.
-  /// `place` in the asset is for messages.
   template <typename Selection>
   Selection resolved(const Selection& selection, const VertexArray& points) const {
-    if (const auto* part = std::get_if<PartSelection>(&selection)) return nearest_to(marks(*part), points, part->name);
-    if (const auto* colour = std::get_if<ColourSelection>(&selection))
-      return nearest_to(marks(*colour), points, "color");
+    if (const auto* part = std::get_if<PartSelection>(&selection)) return ids_of(*part, points);
+    if (const auto* colour = std::get_if<ColourSelection>(&selection)) return ids_of(*colour, points);
     return selection;
   }
+
+  /// Parts and colours of the place of the surface that each of the points [k x 3] is nearest to: of the corners of its
+  /// triangle those of at least half of the weight, and the nearest one's.
+  VertexMarks marks_at(const VertexArray& points) const;
 
   /// The surface's vertices in the pose that an example names, or nothing where that has other vertices.
   std::optional<VertexArray> posed(const ExampleConfig& example, InputFiles& files) const;
@@ -43,9 +45,7 @@ class ObjectSurface {
   SurfacePose pose(const VertexArray& posed, const std::string& name, StageCache& cache) const;
 
  private:
-  Eigen::VectorXd marks(const PartSelection& part) const;
-  Eigen::VectorXd marks(const ColourSelection& colour) const;
-  IdSelection nearest_to(const Eigen::VectorXd& marks, const VertexArray& points, const std::string& what) const;
+  IdSelection ids_of(const VertexSelection& selection, const VertexArray& points) const;
 
   AssetConfig asset_;
   SurfaceFile file_;

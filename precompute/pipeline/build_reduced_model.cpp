@@ -129,6 +129,8 @@ class Pipeline {
   const Needs& needs_;
   BuildReport& report_;
   const BuildOptions& options_;
+  std::optional<SceneConfig> own_scene_;  // that of the options, the vertices of its forces known
+  const SceneConfig* scene_ = nullptr;
   StageCache cache_;
   ObjectInput object_;
   std::optional<MeshStiffness> stiffness_;
@@ -137,12 +139,17 @@ class Pipeline {
 };
 
 ObjectData Pipeline::object_data() const {
-  ObjectData data{object_.mesh, surface_triangles(object_.mesh.tets), object_.fixed, object_.materials};
+  ObjectData data;
+  data.mesh = object_.mesh;
+  data.surface = surface_triangles(object_.mesh.tets);
+  data.fixed = object_.fixed;
+  data.materials = object_.materials;
   if (stiffness_) {
     data.stiffness_ratio = stiffness_->vibration;
     data.worst_stiffness = stiffness_->worst;
     data.thin_share = stiffness_->thin;
   }
+  pack_marks(object_.marks, data);
   return data;
 }
 
@@ -257,18 +264,18 @@ void Pipeline::add_target_elasticity(const BodyStages& stages, const PoseSource&
 
 // The scene's loads are an input: bodies are trained on them and settled under them.
 std::string Pipeline::loads_text() const {
-  if (options_.scene == nullptr) return "";
+  if (scene_ == nullptr) return "";
   TrainingBody body{.free = !object_.fixed.any(), .size = 1, .angular_frequency = 1, .groups = {""}};
   for (const RegionConfig& region : asset_.regions) body.groups.push_back(region.name);
-  const bool compensate = options_.scene->examples && options_.scene->examples->compensate;
-  return text_of(scene_loads(*options_.scene, body)) + (compensate ? "compensated\n" : "");
+  const bool compensate = scene_->examples && scene_->examples->compensate;
+  return text_of(scene_loads(*scene_, body)) + (compensate ? "compensated\n" : "");
 }
 
 void Pipeline::require_vertices(const TrainingLoads& loads) const {
   for (std::size_t i = 0; i < loads.forces.size(); ++i)
     for (const std::int64_t vertex : loads.forces[i].vertices)
       if (vertex < 0 || vertex >= object_.mesh.vertex_count())
-        throw InputError({options_.scene->file.string(), fmt::format("/forces/{}/vertices", i),
+        throw InputError({scene_->file.string(), fmt::format("/forces/{}/vertices", i),
                           fmt::format("vertices of the object, 0 to {}", object_.mesh.vertex_count() - 1),
                           std::to_string(vertex), ""});
 }
@@ -276,9 +283,8 @@ void Pipeline::require_vertices(const TrainingLoads& loads) const {
 // While there is a solver, since what comes next takes the memory of its factors.
 std::optional<PlannedTraining> Pipeline::plan(const TrainingInput& input, const SemidefiniteSolver& solver,
                                               ReducedModel& body) {
-  std::optional<PlannedTraining> planned(
-      {plan_training(asset_.training, options_.scene, object_.pushed, training_body(input)),
-       asset_.training.seed.value_or(asset_.seed)});
+  std::optional<PlannedTraining> planned({plan_training(asset_.training, scene_, object_.pushed, training_body(input)),
+                                          asset_.training.seed.value_or(asset_.seed)});
   const TrainingLoads& loads = planned->plan.loads;
   log::info(fmt::format("training: {}", planned->plan.reason));
   if (!loads.deforms(!input.system.constrained())) return std::nullopt;
@@ -393,13 +399,12 @@ void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
     return;
   }
   std::optional<SettlingLoad> load;
-  if (options_.scene != nullptr) {
+  if (scene_ != nullptr) {
     TrainingBody body{.free = !stages.system.constrained(), .size = 1, .angular_frequency = 1};
     for (Eigen::Index group = 0; group < stages.fitter->groups(); ++group)
       body.groups.push_back(stages.fitter->region(group));
-    const TrainingLoads loads = scene_loads(*options_.scene, body);
-    load = {options_.scene->file.string(), loads.examples, loads.gravity,
-            options_.scene->examples && options_.scene->examples->compensate};
+    const TrainingLoads loads = scene_loads(*scene_, body);
+    load = {scene_->file.string(), loads.examples, loads.gravity, scene_->examples && scene_->examples->compensate};
   }
   const auto found = timed("settled poses", [&] { return precompute::settle_examples(stages, load, model); });
   for (const SettledPose& pose : found) {
@@ -416,9 +421,9 @@ void Pipeline::refuse_full_space() {
   if (object_.skeleton)
     throw InputError({asset_.file.string(), "/object/material", "one density of all parts of a body on bones",
                       "several", "a body on bones steps in all vertices, where examples ask for that"});
-  if (options_.scene != nullptr && options_.scene->space.space != Space::kReduced)
-    throw InputError({options_.scene->file.string(), options_.scene->place + "/space", "\"reduced\", since " + reason,
-                      fmt::format("\"{}\"", name_of(options_.scene->space.space)),
+  if (scene_ != nullptr && scene_->space.space != Space::kReduced)
+    throw InputError({scene_->file.string(), scene_->place + "/space", "\"reduced\", since " + reason,
+                      fmt::format("\"{}\"", name_of(scene_->space.space)),
                       "give all parts of the asset one density, or take space \"reduced\""});
   leave_out("full_space", reason);
 }
@@ -428,6 +433,13 @@ std::string generator() { return fmt::format("exmat-precompute {}", version()); 
 void Pipeline::read() {
   if (needs_.internal_force == ForceMethod::kPolynomial) require_polynomial(asset_.material.model, asset_.basis_size);
   object_ = timed("reading the object", [&] { return read_object(asset_, report_.inputs, cache_); });
+  if (options_.scene != nullptr) {
+    own_scene_ = *options_.scene;
+    own_scene_->forces = forces_on_vertices(*own_scene_, {.points = object_.mesh.vertices,
+                                                          .marks = object_.surface ? &object_.marks : nullptr,
+                                                          .surface = asset_.object_mesh.string()});
+    scene_ = &*own_scene_;
+  }
   warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
   std::ranges::copy(object_.warnings, std::back_inserter(report_.warnings));
   require_regions(asset_, needs_);

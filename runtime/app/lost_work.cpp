@@ -18,13 +18,12 @@ struct NamedLoad {
   Eigen::VectorXd load;  ///< [3n]
 };
 
-std::vector<NamedLoad> scripted_loads(const SceneConfig& config, Eigen::Index vertices) {
+std::vector<NamedLoad> scripted_loads(const std::vector<VertexForceConfig>& forces, Eigen::Index vertices) {
   std::vector<NamedLoad> loads;
-  for (std::size_t i = 0; i < config.forces.size(); ++i) {
+  for (std::size_t i = 0; i < forces.size(); ++i) {
     NamedLoad& load = loads.emplace_back(NamedLoad{fmt::format("force {}", i), "", {}});
     load.load.setZero(3 * vertices);
-    for (const std::int64_t vertex : config.forces[i].vertices)
-      load.load.segment<3>(3 * vertex) += config.forces[i].force;
+    for (const std::int64_t vertex : forces[i].vertices) load.load.segment<3>(3 * vertex) += forces[i].force;
   }
   return loads;
 }
@@ -50,7 +49,7 @@ void print_lost_work(const RunSummary& summary, const LoadedWorld& loaded, const
   for (std::size_t kind = 0; kind < loaded.kinds.size(); ++kind) {
     const BodiesConfig& bodies = config.bodies[kind];
     const Eigen::Index vertices = loaded.kinds[kind].loaded.summary.vertices;
-    std::vector<NamedLoad> loads = scripted_loads(bodies.scene, vertices);
+    std::vector<NamedLoad> loads = scripted_loads(loaded.kinds[kind].loaded.forces, vertices);
     if (config.is_list)
       for (NamedLoad& load : loads) load.name = bodies.name + " " + load.name;
     if (const HardestContact& hardest = summary.hardest_contacts[kind]; hardest.body >= 0) {

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "common/bundle/scene_places.h"
 #include "common/config/config.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
@@ -75,9 +76,10 @@ void check_render(const SceneConfig& config, const BundleSummary& summary) {
                         config.file.string()});
 }
 
-void check_force_vertices(const SceneConfig& config, const BundleSummary& summary) {
-  for (std::size_t i = 0; i < config.forces.size(); ++i)
-    for (const std::int64_t vertex : config.forces[i].vertices)
+void check_force_vertices(const SceneConfig& config, const std::vector<VertexForceConfig>& forces,
+                          const BundleSummary& summary) {
+  for (std::size_t i = 0; i < forces.size(); ++i)
+    for (const std::int64_t vertex : forces[i].vertices)
       if (vertex < 0 || vertex >= summary.vertices)
         throw InputError({config.file.string(), fmt::format("{}/forces/{}/vertices", config.place, i),
                           fmt::format("vertices of the object, 0 to {} (0-based)", summary.vertices - 1),
@@ -154,7 +156,7 @@ StepScene step_scene(const SceneConfig& config, const Obstacles* obstacles, Load
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
-  for (const VertexForceConfig& force : config.forces) scene.forces.push_back(scripted_force_of(config, force, loaded));
+  for (const VertexForceConfig& force : loaded.forces) scene.forces.push_back(scripted_force_of(config, force, loaded));
   if (config.examples) scene.examples.push_back(example_settings(*config.examples));
   for (const RegionForceConfig& region : config.regions) scene.examples.push_back(example_settings(region.force));
   return scene;
@@ -297,7 +299,8 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   check_examples(config, loaded.summary);
   check_regions(config, loaded.summary);
   check_methods(config, loaded.summary);
-  check_force_vertices(config, loaded.summary);
+  loaded.forces = forces_on_vertices(config);
+  check_force_vertices(config, loaded.forces, loaded.summary);
   check_render(config, loaded.summary);
   Needs needs = fit_needs(needs_of(config), loaded.summary);
   needs.render = needs.render && config.trajectory;

@@ -26,6 +26,7 @@ struct LoadedScene {
   StepScene scene;                        ///< settings with keys as strong as they ever are
   SceneKeys keys;  ///< of what changes in time: to be applied to a copy of the scene before each step
   State start;     ///< where every body begins
+  std::vector<VertexForceConfig> forces;  ///< of the scene's file, their vertices known
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;            ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;            ///< datasets that were read, in order

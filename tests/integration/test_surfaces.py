@@ -258,6 +258,50 @@ class Surfaces(unittest.TestCase):
             self.assertGreater(middles[soft].min(), 1.5 - 0.3)
             self.assertLess(middles[~soft].max(), 1.5 + 0.3)
 
+    def test_a_scene_names_places_as_an_asset_does(self):
+        write_glb(self.folder / "tube.glb", self.points, self.triangles, attributes={"_FIXED": self.clamp, "_TIP": self.points[:, 0] > LENGTH - 0.3},
+                  colours=np.where(self.points[:, :1] > LENGTH / 2, [[0.9, 0, 0]], [[0, 0, 0.9]]))
+        # What the asset's own clamp takes of each is the reference.
+        places = {"tip": {"part": "_TIP"}, "red": {"color": {"rgb": [0.9, 0, 0]}}, "box": {"box": {"min": [1, -1, -1], "max": [2, 1, 1]}},
+                  "ball": {"sphere": {"center": [LENGTH, 0, 0], "radius": 0.4}}}
+        selected = {}
+        for name, place in places.items():
+            with self.bundle(object={"fixed": place})[0] as f:
+                selected[name] = np.flatnonzero(f["object/fixed"][:])
+                rest = f["object/vertices"][:]
+        self.assertGreater(len(selected["tip"]), 3)
+        places["point"], selected["point"] = {"point": [LENGTH, 0, 0.1]}, np.array([np.linalg.norm(rest - [LENGTH, 0, 0.1], axis=1).argmin()])
+        self.bundle()[0].close()
+
+        def run(vertices, status=0):
+            scene = {"bundle": "tube.h5", "time_step": 0.01, "steps": 10, "forces": [{"vertices": vertices, "force": [0, 0, 0.5]}],
+                     "output": {"trajectory": "run.h5", "every": 10}}
+            (self.folder / "scene.json").write_text(json.dumps(scene))
+            printed = self.run_program("run", "scene.json", program=PROGRAMS / "exmat-runtime", status=status)
+            if status:
+                return printed
+            with h5py.File(self.folder / "run.h5") as f:
+                return f["reduced"][:]
+
+        for name, place in places.items():
+            with self.subTest(name):
+                by_ids = run({"ids": selected[name].tolist()})
+                self.assertGreater(np.abs(by_ids[-1]).max(), 0)
+                np.testing.assert_array_equal(run(place), by_ids)
+        self.assertIn('/forces/0/vertices/part: expected a part of the surface of', run({"part": "_TPI"}, 2))
+        self.assertIn('did you mean "_TIP"?', run({"part": "_TPI"}, 2))
+        self.assertIn("m off; the mesh lies in", run({"point": [100, 0, 0]}, 2))
+        # Training by a scene takes them, too, before there is a bundle.
+        scene = json.loads((self.folder / "scene.json").read_text())
+        digests = {}
+        for name, vertices in (("place", places["tip"]), ("ids", {"ids": selected["tip"].tolist()})):
+            scene["forces"][0]["vertices"] = vertices
+            (self.folder / "scene.json").write_text(json.dumps(scene))
+            self.run_program("bundle", self.asset(), "--scene", "scene.json", "-o", f"{name}.h5")
+            with h5py.File(self.folder / f"{name}.h5") as f:
+                digests[name] = f.attrs["input_sha256"], f["modal/basis"][:].tobytes()
+        self.assertEqual(digests["place"], digests["ids"])
+
     def test_what_is_wrong_is_said(self):
         self.assertIn('"bend", "twist"', self.refused(examples=[{"name": "wave", "morph": "wave"}]))
         self.assertIn("_FIXED", self.refused(object={"fixed": {"part": "feet"}}))

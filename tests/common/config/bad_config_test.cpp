@@ -133,7 +133,8 @@ const BadConfig kBadAssets[] = {
     {"NotInTheList", asset(R"("shape_space": {"weighting": "area"})"),
      "a.json: /shape_space/weighting: expected \"eigenvalue\" or \"none\", found \"area\""},
     {"Null", object(R"("fixed": null)"),
-     "a.json: /object/fixed: expected exactly one of \"box\", \"color\", \"file\", \"ids\", \"part\" and \"sphere\", "
+     "a.json: /object/fixed: expected exactly one of \"box\", \"color\", \"file\", \"ids\", \"part\", \"point\" and "
+     "\"sphere\", "
      "found null"},
     {"Incompressible", object(R"("material": {"poisson_ratio": 0.5})"),
      "a.json: /object/material/poisson_ratio: expected a number > -1 and < 0.5, found 0.5"},
@@ -264,7 +265,7 @@ const BadConfig kBadScenes[] = {
     {"EndBeforeStart", force(R"({"ids": [1]})", R"(, "start": 2, "end": 1)"),
      "a.json: /forces/0/end: expected a number > 2 (start), found 1"},
     {"ForceWithoutVertices", scene(R"("forces": [{"force": [0, 0, 1]}])"),
-     "a.json: /forces/0/vertices: expected exactly one of \"file\" and \"ids\""},
+     "a.json: /forces/0/vertices: expected exactly one of \"box\", \"color\", \"file\", \"ids\""},
     {"ForceOnNoIds", force(R"({"ids": []})"),
      "a.json: /forces/0/vertices/ids: expected an array of at least 1 elements, found []"},
     {"ForceIdTwice", force(R"({"ids": [1, 1]})"),
@@ -338,8 +339,10 @@ const BadConfig kBadScenes[] = {
      "a.json: /examples/target_iterations: expected an integer >= 1 and <= 1000, found 0"},
     {"UnknownForce", scene(R"("examples": {"stiffness": 1, "force": "plastic"})"),
      "a.json: /examples/force: expected \"linear\" or \"elastic\", found \"plastic\""},
-    {"LaterBox", force(R"({"box": {}})"),
-     "a.json: /forces/0/vertices/box: found \"box\"; this version does not support it yet"},
+    {"BoxInsideOut", force(R"({"box": {"min": [0, 2, 0], "max": [1, 1, 1]}})"),
+     "a.json: /forces/0/vertices/box/max/1: expected a number >= 2 (min), found 1"},
+    {"FlatPoint", force(R"({"point": [1, 2]})"),
+     "a.json: /forces/0/vertices/point: expected an array of 3 elements, found [1,2]"},
 };
 INSTANTIATE_TEST_SUITE_P(Each, BadScene, ::testing::ValuesIn(kBadScenes),
                          [](const auto& test) { return std::string(test.param.name); });

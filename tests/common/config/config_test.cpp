@@ -188,7 +188,8 @@ TEST(LoadScene, ReadsEveryMember) {
     "examples": {"stiffness": 400, "damping": 2, "bias": 0.6, "target": "table", "target_iterations": 7,
                  "force": "linear", "energy_reference": "rest", "compensate": true},
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
-               {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]}],
+               {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]},
+               {"vertices": {"part": "hand"}, "force": [1, 0, 0]}, {"vertices": {"point": [1, 2, 3]}, "force": [1, 0, 0]}],
     "output": {"trajectory": "run.h5", "every": 2, "render": true}})");
   EXPECT_EQ(scene.time_step, 0.01);
   EXPECT_EQ(scene.steps, 20);
@@ -210,7 +211,10 @@ TEST(LoadScene, ReadsEveryMember) {
   EXPECT_EQ(scene.examples->energy_reference, EnergyReference::kRest);
   EXPECT_EQ(scene.internal_force, ForceMethod::kPolynomial);
   EXPECT_EQ(scene.instances, 1000);
-  ASSERT_EQ(scene.forces.size(), 2u);
+  ASSERT_EQ(scene.forces.size(), 4u);
+  EXPECT_FALSE(scene.forces[0].places || scene.forces[1].places);
+  EXPECT_EQ(std::get<PartSelection>(scene.forces[2].places.value()).name, "hand");
+  EXPECT_EQ(std::get<PointSelection>(scene.forces[3].places.value()).point, (std::array<double, 3>{1, 2, 3}));
   EXPECT_THAT(scene.forces[0].vertices, ElementsAre(10, 11));
   EXPECT_EQ(scene.forces[0].force, Eigen::Vector3d(0, 0, 50));
   EXPECT_EQ(scene.forces[0].start, 0.25);
