@@ -51,6 +51,32 @@ TEST(VertexNormals, OfASphereAreItsRadii) {
   }
 }
 
+/// Two squares that meet in an edge of 45 degrees, which each of them has for itself.
+Mesh roof() {
+  Mesh mesh{VertexArray(8, 3), TriangleArray(4, 3)};
+  mesh.vertices << 0, 0, 0, 1, 0, 0, 1, 1, 0, 0, 1, 0, 1, 0, 0, 2, 0, -1, 2, 1, -1, 1, 1, 0;
+  mesh.triangles << 0, 1, 2, 0, 2, 3, 4, 5, 6, 4, 6, 7;
+  return mesh;
+}
+
+TEST(VertexNormals, AreThoseOfASmoothEdgeUnlessAnArtistsDiffer) {
+  const Mesh mesh = roof();
+  const Eigen::RowVector3d flat(0, 0, 1), slope = Eigen::RowVector3d(1, 0, 1).normalized();
+  const VertexArray shared = VertexNormals(mesh.vertices, mesh.triangles).at(mesh.vertices);
+  EXPECT_LT((shared.row(1) - shared.row(4)).norm(), 1e-15);
+  VertexArray given(8, 3);
+  given << flat, flat, flat, flat, slope, slope, slope, slope;
+  const VertexArray own = VertexNormals(mesh.vertices, mesh.triangles, given).at(mesh.vertices);
+  EXPECT_LT((own - given).norm(), 1e-14);
+  // Those that an artist made equal are shared across any edge.
+  given.rowwise() = slope;
+  VertexArray folded = mesh.vertices;
+  folded(5, 2) = folded(6, 2) = -9;
+  folded(5, 0) = folded(6, 0) = 1;
+  const VertexArray smooth = VertexNormals(folded, mesh.triangles, given).at(folded);
+  EXPECT_LT((smooth.row(1) - smooth.row(4)).norm(), 1e-15);
+}
+
 TEST(VertexNormals, AreEqualAlongASeam) {
   const Mesh mesh = sphere(12, 20);
   const VertexNormals normals(mesh.vertices, mesh.triangles);
