@@ -36,14 +36,15 @@ bool serves(bool has_targets, EnergyReference table, EnergyReference wanted) { r
 
 }  // namespace
 
-BundleSummary summarise_bundle(const std::filesystem::path& path) {
-  BundleReader reader(path);
+BundleSummary summarise_bundle(const BundleInput& input) {
+  BundleReader reader(input);
   const auto groups = reader.listed_groups();
   open_listed(reader, groups);
   BundleSummary summary;
   summary.asset_name = reader.text_attribute("asset_name");
   summary.generator = reader.text_attribute("generator");
   summary.input_sha256 = reader.text_attribute("input_sha256");
+  summary.is_pack = !reader.file().describes_itself();
   summary.constrained = reader.constrained();
   for (const LedgerEntry& entry : groups)
     if (entry.included) summary.groups.push_back(entry.group);
@@ -88,31 +89,30 @@ Needs fit_needs(Needs needs, const BundleSummary& summary) {
   return needs;
 }
 
-ReducedModel read_bundle(const std::filesystem::path& path, const BundleRequest& request,
-                         std::vector<ReadRecord>* record) {
-  return BundleReader(path, record).read(request);
+ReducedModel read_bundle(const BundleInput& input, const BundleRequest& request, std::vector<ReadRecord>* record) {
+  return BundleReader(input, record).read(request);
 }
 
-ReducedModel read_bundle(const std::filesystem::path& path) {
-  BundleReader reader(path);
+ReducedModel read_bundle(const BundleInput& input) {
+  BundleReader reader(input);
   return reader.read({.groups = reader.listed_groups()});
 }
 
-RowMatrix read_basis_rows(const std::filesystem::path& path, std::span<const std::int64_t> vertices,
+RowMatrix read_basis_rows(const BundleInput& input, std::span<const std::int64_t> vertices,
                           std::vector<ReadRecord>* record) {
-  BundleReader reader(path, record);
+  BundleReader reader(input, record);
   const DatasetSchema& schema = bundle_schema().dataset("/modal/basis");
-  const Hdf5Dataset basis = reader.open_checked(schema, schema.path);
-  const std::int64_t count = basis.sizes()[0], modes = basis.sizes()[2];
+  const auto basis = reader.open_checked(schema, schema.path);
+  const std::int64_t count = basis->sizes()[0], modes = basis->sizes()[2];
   RowMatrix rows(3 * std::ssize(vertices), modes);
   for (std::size_t i = 0; i < vertices.size(); ++i) {
     const std::int64_t vertex = vertices[i];
     if (vertex < 0 || vertex >= count)
-      throw InputError({path.string(), schema.path, fmt::format("vertex ids from 0 to {}", count - 1),
+      throw InputError({input.file().string(), schema.path, fmt::format("vertex ids from 0 to {}", count - 1),
                         fmt::format("{}", vertex), ""});
-    basis.read_rows(vertex, 1, rows.row(3 * static_cast<Eigen::Index>(i)).data(), schema.type);
+    basis->read_rows(vertex, 1, rows.row(3 * static_cast<Eigen::Index>(i)).data(), schema.type);
   }
-  if (!rows.allFinite()) throw InputError({path.string(), schema.path, "finite numbers", "others", ""});
+  if (!rows.allFinite()) throw InputError({input.file().string(), schema.path, "finite numbers", "others", ""});
   reader.note(schema.path, static_cast<std::size_t>(rows.size()) * sizeof(double));
   return rows;
 }

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "common/bundle/bundle_input.h"
 #include "common/model/needs.h"
 #include "common/model/reduced_model.h"
 
@@ -15,6 +16,10 @@ namespace exmat {
 /// Writes the groups that the model holds to a temporary file beside `path`, then renames it over `path`. The same
 /// model gives the same bytes. Throws WorkError (message names the file); `path` is then as it was.
 void write_bundle(const ReducedModel& model, const std::filesystem::path& path);
+
+/// Writes the groups that the model holds as a pack, likewise: all arrays but those that no run reads. Throws
+/// WorkError.
+void write_pack(const ReducedModel& model, const std::filesystem::path& path);
 
 /// Sets the bytes of each included group's datasets as write_bundle would write them.
 void fill_bytes(const ReducedModel& model, std::vector<LedgerEntry>& ledger);
@@ -31,6 +36,7 @@ struct RegionSummary {
 /// Summary of a bundle, read from its attributes and table of contents alone.
 struct BundleSummary {
   std::string asset_name, generator, input_sha256;
+  bool is_pack = false;
   std::vector<std::string> groups;  ///< present, in bundle order
   bool constrained = false;         ///< root attribute of that name (int64, 0 or 1)
   std::int64_t vertices = 0, tets = 0, modes = 0, cubature_elements = 0, eigenfunctions = 0, examples = 0;
@@ -44,7 +50,7 @@ struct BundleSummary {
   std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
   std::int64_t bones = 0;            ///< of /skeleton, likewise
 };
-BundleSummary summarise_bundle(const std::filesystem::path& path);
+BundleSummary summarise_bundle(const BundleInput& input);
 
 /// The part of these needs that the bundle serves: internal_force `auto` becomes its choice, targets are not needed
 /// where it has none of that energy_reference, and the space of targets where it has none or the targets serve. Of the
@@ -72,19 +78,19 @@ struct BundleRequest {
 
 /// Reads and validates: magic, version, types, sizes, ranges, finiteness, checksums, cross-references. Throws
 /// InputError that names the file and the dataset. `record`, if given, receives every dataset that was read.
-ReducedModel read_bundle(const std::filesystem::path& path, const BundleRequest& request,
+ReducedModel read_bundle(const BundleInput& input, const BundleRequest& request,
                          std::vector<ReadRecord>* record = nullptr);
 
 /// Reads all of it.
-ReducedModel read_bundle(const std::filesystem::path& path);
+ReducedModel read_bundle(const BundleInput& input);
 
 /// [3k x r] rows of /modal/basis for k vertices; ids out of range are an InputError.
-RowMatrix read_basis_rows(const std::filesystem::path& path, std::span<const std::int64_t> vertices,
+RowMatrix read_basis_rows(const BundleInput& input, std::span<const std::int64_t> vertices,
                           std::vector<ReadRecord>* record = nullptr);
 
 /// All that is wrong with a bundle, one message each; empty if it is sound. Beyond what read_bundle checks: the
 /// attributes of every dataset, the list of features, and entries that the format does not have (which read_bundle
 /// ignores).
-std::vector<std::string> validate_bundle(const std::filesystem::path& path);
+std::vector<std::string> validate_bundle(const BundleInput& input);
 
 }  // namespace exmat

@@ -7,6 +7,7 @@
 
 #include "common/bundle/file_schemas.h"
 #include "common/bundle/table_checks.h"
+#include "common/core/crc32.h"
 #include "common/core/error.h"
 #include "common/hdf5/value_checks.h"
 #include "common/mesh/elements.h"
@@ -35,9 +36,9 @@ std::string size_text(std::span<const std::int64_t> sizes) {
 
 }  // namespace
 
-BundleReader::BundleReader(const std::filesystem::path& path, std::vector<ReadRecord>* record,
+BundleReader::BundleReader(const BundleInput& input, std::vector<ReadRecord>* record,
                            std::vector<std::string>* problems)
-    : file_(Hdf5File::open(path)), record_(record), problems_(problems) {
+    : file_(open_bundle(input)), record_(record), problems_(problems) {
   read_header();
 }
 
@@ -54,7 +55,7 @@ void BundleReader::read_header() {
 
 AttributeValue BundleReader::header_value(std::string_view name) const {
   const AttributeSchema& schema = find_attribute(bundle_schema().attributes, name);
-  AttributeValue value = file_.read_attribute("/", schema.name);
+  AttributeValue value = file_->read_attribute("/", schema.name);
   if (const auto fault = check_value(schema, value, sizes_)) refuse("/@" + schema.name, fault->expected, fault->found);
   return value;
 }
@@ -74,21 +75,22 @@ std::vector<LedgerEntry> BundleReader::listed_groups() const {
 
 std::vector<std::string> BundleReader::example_names(const std::string& folder) const {
   std::vector<std::string> names;
-  for (std::string& name : file_.list(folder))
-    if (std::ranges::find(kExampleDatasets, name) == std::end(kExampleDatasets) && file_.has_group(folder + "/" + name))
+  for (std::string& name : file_->list(folder))
+    if (std::ranges::find(kExampleDatasets, name) == std::end(kExampleDatasets) &&
+        file_->has_group(folder + "/" + name))
       names.push_back(std::move(name));
   return names;
 }
 
 std::vector<std::string> BundleReader::region_names() const {
   std::vector<std::string> names;
-  for (std::string& name : file_.list("/regions"))
-    if (file_.has_group("/regions/" + name)) names.push_back(std::move(name));
+  for (std::string& name : file_->list("/regions"))
+    if (file_->has_group("/regions/" + name)) names.push_back(std::move(name));
   return names;
 }
 
 void BundleReader::add_examples(const std::string& folder, ExampleSet& set) const {
-  if (!file_.has_group(folder)) refuse(folder, "the group", "none");
+  if (!file_->has_group(folder)) refuse(folder, "the group", "none");
   for (const std::string& name : example_names(folder)) set.examples.emplace_back().name = name;
 }
 
@@ -102,9 +104,9 @@ void BundleReader::add_regions(ReducedModel& model) const {
     RegionData region;
     region.name = needs.name;
     add_examples(path + "/examples", region.examples);
-    if (needs.targets && file_.has_group(path + "/targets")) region.targets.emplace();
-    if (needs.target_space && file_.has_group(path + "/target_space")) region.target_space.emplace();
-    if (needs.target_elasticity && file_.has_group(path + "/target_elasticity")) region.target_elasticity.emplace();
+    if (needs.targets && file_->has_group(path + "/targets")) region.targets.emplace();
+    if (needs.target_space && file_->has_group(path + "/target_space")) region.target_space.emplace();
+    if (needs.target_elasticity && file_->has_group(path + "/target_elasticity")) region.target_elasticity.emplace();
     model.regions.push_back(std::move(region));
   };
   if (request_.regions)
@@ -125,7 +127,7 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
   }
   if (model.examples) attempt([&] { add_examples("/examples", *model.examples); });
   attempt([&] {
-    if (includes(request.groups, "regions") && file_.has_group("/regions")) add_regions(model);
+    if (includes(request.groups, "regions") && file_->has_group("/regions")) add_regions(model);
   });
   visit_fields(model, *this);
   check_model(model);
@@ -137,14 +139,15 @@ ReducedModel BundleReader::read(const BundleRequest& request) {
 
 void BundleReader::require_group(const LedgerEntry& entry) const {
   const std::string path = "/" + entry.group;
-  if (file_.has_group(path)) return;
+  if (file_->has_group(path)) return;
   refuse(path, fmt::format("the group ({})", entry.reason), "none",
          fmt::format("precompute the bundle again, with --scene SCENE.json or with {} of the asset",
                      asset_member(entry.group)));
 }
 
-Hdf5Dataset BundleReader::open_checked(const DatasetSchema& schema, const std::string& path) {
-  Hdf5Dataset dataset = file_.open_dataset(path);
+std::unique_ptr<StoredArray> BundleReader::open_checked(const DatasetSchema& schema, const std::string& path) {
+  auto opened = file_->open_dataset(path);
+  const StoredArray& dataset = *opened;
   if (dataset.type() != schema.type) refuse(path, std::string(name_of(schema.type)), dataset.type_name());
   dataset.check_storage();
   if (const auto expected = sizes_.bind(schema.dims, dataset.sizes(), path))
@@ -152,12 +155,19 @@ Hdf5Dataset BundleReader::open_checked(const DatasetSchema& schema, const std::s
   const bool may_be_empty = std::ranges::find(schema.constraints, Constraint::Kind::kMayBeEmpty, &Constraint::kind) !=
                             schema.constraints.end();
   if (dataset.element_count() == 0 && !may_be_empty) refuse(path, "some elements", size_text(dataset.sizes()));
+  if (!dataset.is_held()) return opened;
   // Links of several names to the same data take no place in the file.
   bytes_opened_ += dataset.element_count() * size_of(schema.type);
-  if (bytes_opened_ > file_.capacity())
-    refuse(path, fmt::format("{} bytes in all datasets at most, for the size of the file", file_.capacity()),
+  if (bytes_opened_ > file_->capacity())
+    refuse(path, fmt::format("{} bytes in all datasets at most, for the size of the file", file_->capacity()),
            fmt::format("{}", bytes_opened_));
-  return dataset;
+  return opened;
+}
+
+bool BundleReader::is_left_out(const StoredArray& dataset, const DatasetSchema& schema) const {
+  if (dataset.is_held()) return false;
+  if (schema.use == Use::kInspect) return true;
+  refuse(dataset.path(), "an array, which runs need", "its sizes alone", "make the pack again with exmat-runtime pack");
 }
 
 void BundleReader::note(const std::string& dataset, std::size_t bytes) {
@@ -189,7 +199,7 @@ const AttributeSchema& BundleReader::attribute_schema(std::string_view name) con
 }
 
 AttributeValue BundleReader::read_value(const AttributeSchema& schema) {
-  AttributeValue value = file_.read_attribute(path_, schema.name);
+  AttributeValue value = file_->read_attribute(path_, schema.name);
   const std::string place = path_ + "@" + schema.name;
   if (const auto fault = check_value(schema, value, sizes_)) refuse(place, fault->expected, fault->found);
   sound_.insert(place);
@@ -208,7 +218,7 @@ bool BundleReader::is_wanted(const DatasetSchema& schema) const {
   return request_.full_space && schema.use == Use::kFullSpace;
 }
 
-std::pair<std::int64_t, std::int64_t> BundleReader::matrix_sizes(const Hdf5Dataset& dataset) {
+std::pair<std::int64_t, std::int64_t> BundleReader::matrix_sizes(const StoredArray& dataset) {
   const auto& sizes = dataset.sizes();
   if (sizes.size() == 1) return {sizes.front(), 1};
   std::int64_t rows = 1;
@@ -216,20 +226,19 @@ std::pair<std::int64_t, std::int64_t> BundleReader::matrix_sizes(const Hdf5Datas
   return {rows, sizes.back()};
 }
 
-void BundleReader::read_checked(const Hdf5Dataset& dataset, const DatasetSchema& schema, void* memory) {
+void BundleReader::read_checked(const StoredArray& dataset, const DatasetSchema& schema, void* memory) {
   const std::size_t bytes = dataset.element_count() * size_of(schema.type);
   dataset.read(memory, schema.type);
   note(dataset.path(), bytes);
   const std::int64_t crc = crc32_of({static_cast<const std::byte*>(memory), bytes});
-  const AttributeValue stored = file_.read_attribute(dataset.path(), "crc32");
-  const auto* stored_crc = std::get_if<std::int64_t>(&stored);
-  const bool intact = stored_crc != nullptr && *stored_crc == crc;
+  const std::optional<std::int64_t> stored_crc = file_->checksum(dataset.path());
+  const bool intact = stored_crc == crc;
   constexpr const char* kChanged = "the data are damaged or were changed after the bundle was written";
   // The value comes first: it says more.
   if (const auto fault = check_values(schema, dataset.sizes(), memory, sizes_))
     refuse(dataset.path(), fault->expected, fault->found, intact ? "" : kChanged);
   if (!intact)
-    refuse(dataset.path(), stored_crc == nullptr ? "a checksum" : fmt::format("checksum {:08x}", *stored_crc),
+    refuse(dataset.path(), !stored_crc ? "a checksum" : fmt::format("checksum {:08x}", *stored_crc),
            fmt::format("{:08x}", crc), kChanged);
   sound_.insert(dataset.path());
 }
@@ -355,7 +364,7 @@ void BundleReader::check_skeleton(const SkeletonData& skeleton) const {
 
 void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,
                           const std::string& advice) const {
-  throw InputError({file_.name(), place, expected, found, advice});
+  throw InputError({file_->name(), place, expected, found, advice});
 }
 
 }  // namespace exmat

@@ -1,16 +1,16 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <functional>
+#include <memory>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "common/bundle/bundle.h"
+#include "common/bundle/bundle_store.h"
 #include "common/bundle/fields.h"
-#include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/schema.h"
 #include "common/model/reduced_model.h"
 
@@ -20,10 +20,10 @@ namespace exmat {
 /// and the dataset, or, with `problems`, one more message there. Also the visitor of the field list (fields.h).
 class BundleReader {
  public:
-  BundleReader(const std::filesystem::path& path, std::vector<ReadRecord>* record = nullptr,
+  BundleReader(const BundleInput& input, std::vector<ReadRecord>* record = nullptr,
                std::vector<std::string>* problems = nullptr);
 
-  const Hdf5File& file() const { return file_; }
+  const BundleStore& file() const { return *file_; }
   const std::vector<std::string>& features() const { return features_; }
   bool constrained() const { return constrained_; }
   const SymbolSizes& sizes() const { return sizes_; }
@@ -44,7 +44,7 @@ class BundleReader {
     attribute(name, member);
   }
   /// Opens a dataset and checks its type and sizes, which binds its symbols; reads no data.
-  Hdf5Dataset open_checked(const DatasetSchema& schema, const std::string& path);
+  std::unique_ptr<StoredArray> open_checked(const DatasetSchema& schema, const std::string& path);
   void note(const std::string& dataset, std::size_t bytes);
   /// Runs `check`; with `problems`, an InputError of it is noted there.
   void attempt(const std::function<void()>& check);
@@ -63,9 +63,10 @@ class BundleReader {
     if (!is_wanted(schema)) return;
     attempt([&] {
       const std::string path = path_ + "/" + std::string(name);
-      const Hdf5Dataset dataset = open_checked(schema, path);
-      const auto [rows, cols] = matrix_sizes(dataset);
-      read_checked(dataset, schema, resized(member, rows, cols));
+      const auto dataset = open_checked(schema, path);
+      if (is_left_out(*dataset, schema)) return;
+      const auto [rows, cols] = matrix_sizes(*dataset);
+      read_checked(*dataset, schema, resized(member, rows, cols));
     });
   }
 
@@ -77,8 +78,9 @@ class BundleReader {
   void require_group(const LedgerEntry& entry) const;
   const DatasetSchema& schema_of(std::string_view name) const;
   bool is_wanted(const DatasetSchema& schema) const;
-  static std::pair<std::int64_t, std::int64_t> matrix_sizes(const Hdf5Dataset& dataset);
-  void read_checked(const Hdf5Dataset& dataset, const DatasetSchema& schema, void* memory);
+  static std::pair<std::int64_t, std::int64_t> matrix_sizes(const StoredArray& dataset);
+  bool is_left_out(const StoredArray& dataset, const DatasetSchema& schema) const;
+  void read_checked(const StoredArray& dataset, const DatasetSchema& schema, void* memory);
   void check_model(const ReducedModel& model);
   void add_examples(const std::string& folder, ExampleSet& set) const;
   void add_regions(ReducedModel& model) const;
@@ -95,7 +97,7 @@ class BundleReader {
   [[noreturn]] void refuse(const std::string& place, const std::string& expected, const std::string& found,
                            const std::string& advice = "") const;
 
-  Hdf5File file_;
+  std::unique_ptr<BundleStore> file_;
   std::vector<ReadRecord>* record_;
   std::vector<std::string>* problems_;
   std::vector<std::string> features_;

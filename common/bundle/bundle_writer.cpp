@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "common/bundle/bundle.h"
+#include "common/bundle/bundle_sink.h"
 #include "common/bundle/fields.h"
 #include "common/bundle/file_schemas.h"
 #include "common/core/atomic_file.h"
@@ -42,7 +43,7 @@ std::vector<std::int64_t> solve_sizes(std::span<const Extent> dims, const ArrayV
 
 class BundleWriter {
  public:
-  BundleWriter(Hdf5File& file) : file_(file) {}
+  explicit BundleWriter(BundleSink& sink) : sink_(sink) {}
 
   void group(std::string_view schema_path, std::string_view path) {
     schema_path_ = schema_path;
@@ -50,7 +51,7 @@ class BundleWriter {
     if (schema_path_ == "/") return;
     const GroupSchema& schema = bundle_schema().group(schema_path_);
     sizes_.forget(schema.symbols);
-    write_group(file_, schema, path_);
+    sink_.group(schema, path_);
   }
 
   template <typename T>
@@ -71,7 +72,7 @@ class BundleWriter {
     if (schema == attributes.end())
       throw std::logic_error(fmt::format("{}@{} is not in the schema", schema_path_, name));
     if (const auto fault = check_value(*schema, value, sizes_)) refuse(fmt::format("{}@{}", path_, name), *fault);
-    file_.write_attribute(path_, schema->name, value);
+    sink_.attribute(path_, schema->name, value);
   }
 
   void write_array(std::string_view name, const ArrayView& view) {
@@ -84,14 +85,14 @@ class BundleWriter {
       refuse(path, {expected.value_or(fmt::format("{}", fmt::join(sizes, " x "))),
                     fmt::format("a matrix of {} x {}", view.rows, view.cols)});
     if (const auto fault = check_values(schema, sizes, view.data, sizes_)) refuse(path, *fault);
-    write_dataset(file_, schema, path, sizes, view.data);
+    sink_.dataset(schema, path, sizes, view.data);
   }
 
   [[noreturn]] void refuse(const std::string& path, const ValueFault& fault) const {
-    throw WorkError("cannot write " + to_string({file_.name(), path, fault.expected, fault.found, ""}));
+    throw WorkError("cannot write " + to_string({sink_.name(), path, fault.expected, fault.found, ""}));
   }
 
-  Hdf5File& file_;
+  BundleSink& sink_;
   SymbolSizes sizes_;
   std::string schema_path_;
   std::string path_;
@@ -131,19 +132,41 @@ std::vector<std::string> features_of(const ReducedModel& model, bool constrained
   return features;
 }
 
+class Hdf5Sink : public BundleSink {
+ public:
+  explicit Hdf5Sink(Hdf5File& file) : file_(file) {}
+
+  const std::string& name() const override { return file_.name(); }
+  void group(const GroupSchema& schema, const std::string& path) override { write_group(file_, schema, path); }
+  void attribute(const std::string& object, const std::string& name, const AttributeValue& value) override {
+    file_.write_attribute(object, name, value);
+  }
+  void dataset(const DatasetSchema& schema, const std::string& path, std::span<const std::int64_t> sizes,
+               const void* data) override {
+    write_dataset(file_, schema, path, sizes, data);
+  }
+
+ private:
+  Hdf5File& file_;
+};
+
 }  // namespace
+
+void write_fields(const ReducedModel& model, BundleSink& sink) {
+  const bool constrained = model.object && (model.object->fixed.array() != 0).any();
+  sink.attribute("/", "format", bundle_schema().format);
+  sink.attribute("/", "format_version", bundle_schema().format_version);
+  sink.attribute("/", "features", features_of(model, constrained));
+  sink.attribute("/", "constrained", std::int64_t{constrained ? 1 : 0});
+  BundleWriter writer(sink);
+  visit_fields(model, writer);
+}
 
 void write_bundle(const ReducedModel& model, const std::filesystem::path& path) {
   AtomicFile output(path);
   auto file = Hdf5File::create(output.temporary(), path.string());
-  const bool constrained = model.object && (model.object->fixed.array() != 0).any();
-  file.write_attribute("/", "format", bundle_schema().format);
-  file.write_attribute("/", "format_version", bundle_schema().format_version);
-  file.write_attribute("/", "features", features_of(model, constrained));
-  file.write_attribute("/", "constrained", std::int64_t{constrained ? 1 : 0});
-
-  BundleWriter writer(file);
-  visit_fields(model, writer);
+  Hdf5Sink sink(file);
+  write_fields(model, sink);
   file.close();
   output.commit();
 }

@@ -29,7 +29,8 @@ A reader refuses files of another format version.
 constexpr std::string_view kUseOfBundle = R"(
 `use` says when the run time reads a dataset of a group that its scene needs: `step`, to step; `positions`, to write
 positions; `full_space`, to step in all vertices; `look`, to export what is drawn; `places`, to find the vertices that
-the scene names; `inspect`, never. Groups that no scene needs are left out.
+the scene names; `draw`, to draw the body or its elements; `inspect`, never, so that packs (docs/packs.md) leave it out.
+Groups that no scene needs are left out.
 )";
 
 constexpr std::size_t kColumns = 120;

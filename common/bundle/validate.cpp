@@ -13,7 +13,7 @@ namespace {
 
 class Validator {
  public:
-  explicit Validator(const std::filesystem::path& path) : reader_(path, nullptr, &problems_) {}
+  explicit Validator(const BundleInput& input) : reader_(input, nullptr, &problems_) {}
 
   std::vector<std::string> run() {
     reader_.attempt([&] { check(); });
@@ -25,7 +25,8 @@ class Validator {
     const ReducedModel model = reader_.read({.groups = reader_.listed_groups()});
     reader_.attempt([&] { collect_known(model); });
     for (const auto& [path, schema] : datasets_)
-      reader_.attempt([&, &path = path, schema = schema] { check_labels(path, *schema); });
+      if (reader_.file().describes_itself())
+        reader_.attempt([&, &path = path, schema = schema] { check_labels(path, *schema); });
     reader_.attempt([&] { check_features(); });
     reader_.attempt([&] { check_extras("/"); });
   }
@@ -107,9 +108,9 @@ class Validator {
 
 }  // namespace
 
-std::vector<std::string> validate_bundle(const std::filesystem::path& path) {
+std::vector<std::string> validate_bundle(const BundleInput& input) {
   try {
-    return Validator(path).run();
+    return Validator(input).run();
   } catch (const InputError& error) {
     return {error.what()};
   }

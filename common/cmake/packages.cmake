@@ -1,7 +1,7 @@
 # Debian packages of what is installed, one for each stage and one of the pages, schemas and examples:
 # cpack --config build/release/CPackConfig.cmake
 include(common/cmake/man_pages.cmake)
-exmat_man_pages(exmat-runtime runtime run bench export info validate)
+exmat_man_pages(exmat-runtime runtime run bench export pack info validate)
 if(EXMAT_BUILD_PRECOMPUTE)
   exmat_man_pages(exmat-precompute precompute new bundle check mesh study full-space)
 endif()

@@ -1,12 +1,11 @@
 #pragma once
 
 #include <filesystem>
-#include <optional>
 
 #include "common/config/asset_config.h"
 #include "common/config/json_values.h"
 #include "common/config/scene_config.h"
-#include "common/model/needs.h"
+#include "common/config/scene_needs.h"
 
 namespace exmat {
 
@@ -25,17 +24,5 @@ AssetConfig asset_of(const Json& json, const std::filesystem::path& file);
 SceneConfig scene_of(const Json& json, const std::filesystem::path& file);
 /// Likewise, as load_world().
 WorldConfig world_of(const Json& json, const std::filesystem::path& file);
-
-/// A scene of that body alone, in `instances` places.
-WorldConfig world_of(SceneConfig scene);
-
-/// The file that a run writes in place of the scene's, or none.
-void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world);
-
-/// Throws InputError that names the scene's member where the bundle is not there.
-void require_bundle(const SceneConfig& scene);
-
-/// Needs of a scene from its bundle.
-Needs needs_of(const SceneConfig& scene);
 
 }  // namespace exmat

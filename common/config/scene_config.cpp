@@ -209,19 +209,6 @@ SceneConfig load_scene(const std::filesystem::path& file) { return scene_of(read
 
 WorldConfig load_world(const std::filesystem::path& file) { return world_of(read_json(file), file); }
 
-WorldConfig world_of(SceneConfig scene) {
-  WorldConfig world;
-  world.file = scene.file;
-  world.is_list = false;
-  world.time_step = scene.time_step;
-  world.steps = scene.steps;
-  world.trajectory = scene.trajectory;
-  world.every = scene.every;
-  std::vector<BodyPlace> places(static_cast<std::size_t>(scene.instances));
-  world.bodies.push_back({"", std::move(scene), std::move(places)});
-  return world;
-}
-
 WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   check_scene(json, file);
   if (!json.contains("bodies")) {
@@ -260,34 +247,10 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
   return world;
 }
 
-void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world) {
-  world.trajectory = file;
-  for (BodiesConfig& bodies : world.bodies) bodies.scene.trajectory = file;
-}
-
 void require_bundle(const SceneConfig& scene) {
-  if (std::filesystem::exists(scene.bundle)) return;
+  if (scene.pack || std::filesystem::exists(scene.bundle)) return;
   throw InputError({scene.file.string(), scene.place + "/bundle", "a bundle", "no such file: " + scene.bundle.string(),
                     "make it with exmat-precompute bundle ASSET.json -o " + scene.bundle.filename().string()});
-}
-
-Needs needs_of(const SceneConfig& scene) {
-  Needs needs{.examples = scene.examples || scene.body.pose,
-              .carried = !scene.body.motion.empty(),
-              .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
-              .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
-              .full_space = scene.space.space != Space::kReduced || scene.body.animation,
-              .contact = scene.meets_others || scene.meets_bodies || !scene.obstacles.empty(),
-              .render = scene.render,
-              .internal_force = scene.internal_force};
-  if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
-  std::vector<RegionNeeds>& regions = needs.regions.emplace();
-  for (const auto& [name, force] : scene.regions)
-    regions.push_back({.name = name,
-                       .targets = force.target != TargetSource::kSolve,
-                       .energy_reference = force.energy_reference,
-                       .target_elasticity = force.law == ExampleForceLaw::kElastic});
-  return needs;
 }
 
 std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config, SelectablePoints points) {

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
@@ -156,7 +157,8 @@ struct BodyConfig {
 struct SceneConfig {
   std::filesystem::path file;
   std::filesystem::path bundle;
-  double time_step = 0.001;  ///< [s]
+  std::shared_ptr<const std::string> pack;  ///< in memory, in place of the file `bundle`; no file sets it
+  double time_step = 0.001;                 ///< [s]
   std::int64_t steps = 1000;
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; with keys the largest
   KeysConfig gravity_keys;

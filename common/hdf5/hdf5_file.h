@@ -7,9 +7,9 @@
 #include <span>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
+#include "common/core/crc32.h"
 #include "common/hdf5/schema.h"
 
 namespace exmat {
@@ -51,10 +51,6 @@ class Hdf5Handle {
   Id id_ = -1;
   Closer closer_ = nullptr;
 };
-
-/// Value of an attribute: a scalar or a flat array (sizes are the schema's business).
-using AttributeValue = std::variant<std::int64_t, double, std::string, std::vector<std::int64_t>, std::vector<double>,
-                                    std::vector<std::string>>;
 
 /// An open dataset of a file that is being read or written.
 class Hdf5Dataset {
@@ -137,9 +133,6 @@ class Hdf5File {
 
 /// Program and version: "exmat 1.2.3".
 std::string generator_name();
-
-/// zlib's CRC-32 of `bytes`, continued from `crc` (0 to begin).
-std::uint32_t crc32_of(std::span<const std::byte> bytes, std::uint32_t crc = 0);
 
 /// Root attributes that every file has: format, format_version, generator.
 void write_header(Hdf5File& file, const FileSchema& schema, const std::string& generator);

@@ -7,14 +7,13 @@
 #include <fmt/ranges.h>
 #include <iterator>
 #include <limits>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "common/core/plain_json.h"
+
 namespace exmat {
 namespace {
-
-using Json = nlohmann::json;
 
 constexpr std::string_view kAnySize = "*";
 
@@ -49,11 +48,12 @@ struct DerivedSymbol {
 constexpr std::array kDerivedSymbols = {DerivedSymbol{"R", "r", pair_count}, DerivedSymbol{"Q", "R", pair_count},
                                         DerivedSymbol{"P+1", "P", one_more}};
 
-constexpr std::array<std::pair<Use, std::string_view>, 6> kUses = {{{Use::kStep, "step"},
+constexpr std::array<std::pair<Use, std::string_view>, 7> kUses = {{{Use::kStep, "step"},
                                                                     {Use::kPositions, "positions"},
                                                                     {Use::kFullSpace, "full_space"},
                                                                     {Use::kLook, "look"},
                                                                     {Use::kPlaces, "places"},
+                                                                    {Use::kDraw, "draw"},
                                                                     {Use::kInspect, "inspect"}}};
 
 constexpr std::array<std::pair<Constraint::Kind, std::string_view>, 11> kConstraints = {
@@ -70,14 +70,14 @@ constexpr std::array<std::pair<Constraint::Kind, std::string_view>, 11> kConstra
      {Constraint::Kind::kMayBeEmpty, "may_be_empty"}}};
 
 ElementType parse_type(const std::string& name) {
-  const auto* found =
+  const auto found =
       std::find_if(kTypes.begin(), kTypes.end(), [&](const TypeInfo& info) { return info.name == name; });
   if (found == kTypes.end()) throw std::logic_error("unknown type " + name);
   return found->type;
 }
 
 Use parse_use(const std::string& name) {
-  const auto* found = std::find_if(kUses.begin(), kUses.end(), [&](const auto& use) { return use.second == name; });
+  const auto found = std::find_if(kUses.begin(), kUses.end(), [&](const auto& use) { return use.second == name; });
   if (found == kUses.end()) throw std::logic_error("unknown use " + name);
   return found->first;
 }
@@ -85,8 +85,8 @@ Use parse_use(const std::string& name) {
 Constraint parse_constraint(const std::string& text) {
   const auto colon = text.find(':');
   const std::string name = text.substr(0, colon);
-  const auto* found = std::find_if(kConstraints.begin(), kConstraints.end(),
-                                   [&](const auto& constraint) { return constraint.second == name; });
+  const auto found = std::find_if(kConstraints.begin(), kConstraints.end(),
+                                  [&](const auto& constraint) { return constraint.second == name; });
   if (found == kConstraints.end()) throw std::logic_error("unknown constraint " + text);
   return {found->first, colon == std::string::npos ? "" : text.substr(colon + 1), text};
 }
@@ -111,52 +111,52 @@ std::vector<Extent> parse_dims(const std::string& text) {
 
 // Members that attributes and datasets have in common.
 template <typename Entry>
-void parse_value(const Json& json, Entry& entry) {
-  entry.type = parse_type(json.at("type"));
-  entry.dims_text = json.at("dims");
+void parse_value(const PlainJson& json, Entry& entry) {
+  entry.type = parse_type(json.at("type").text());
+  entry.dims_text = json.at("dims").text();
   entry.dims = parse_dims(entry.dims_text);
-  entry.units = json.at("units");
-  entry.description = json.at("description");
-  for (const std::string text : json.at("constraints")) entry.constraints.push_back(parse_constraint(text));
+  entry.units = json.at("units").text();
+  entry.description = json.at("description").text();
+  for (const std::string& text : json.at("constraints").texts()) entry.constraints.push_back(parse_constraint(text));
 }
 
-AttributeSchema parse_attribute(const Json& json) {
+AttributeSchema parse_attribute(const PlainJson& json) {
   AttributeSchema attribute;
-  attribute.name = json.at("name");
+  attribute.name = json.at("name").text();
   parse_value(json, attribute);
   return attribute;
 }
 
-GroupSchema parse_group(const Json& json) {
+GroupSchema parse_group(const PlainJson& json) {
   GroupSchema group;
-  group.path = json.at("path");
-  group.group = json.at("group");
-  group.description = json.at("description");
-  for (const Json& attribute : json.at("attributes")) group.attributes.push_back(parse_attribute(attribute));
-  group.symbols = json.value("symbols", group.symbols);
-  group.holds = json.value("holds", group.holds);
+  group.path = json.at("path").text();
+  group.group = json.at("group").text();
+  group.description = json.at("description").text();
+  for (const PlainJson& attribute : json.at("attributes").items())
+    group.attributes.push_back(parse_attribute(attribute));
+  if (const PlainJson* const symbols = json.find("symbols")) group.symbols = symbols->texts();
+  if (const PlainJson* const holds = json.find("holds")) group.holds = holds->texts();
   return group;
 }
 
-DatasetSchema parse_dataset(const Json& json) {
+DatasetSchema parse_dataset(const PlainJson& json) {
   DatasetSchema dataset;
-  dataset.path = json.at("path");
-  dataset.group = json.at("group");
-  dataset.use = parse_use(json.at("use"));
+  dataset.path = json.at("path").text();
+  dataset.group = json.at("group").text();
+  dataset.use = parse_use(json.at("use").text());
   parse_value(json, dataset);
   return dataset;
 }
 
 // "/datasets/7 (/modal/basis)" in front of what is wrong there.
 template <typename Entry, typename Parse>
-std::vector<Entry> parse_list(const Json& json, const char* member, Parse parse) {
+std::vector<Entry> parse_list(const PlainJson& json, const char* member, Parse parse) {
   std::vector<Entry> entries;
-  for (const Json& entry : json.at(member)) {
+  for (const PlainJson& entry : json.at(member).items()) {
     try {
       entries.push_back(parse(entry));
     } catch (const std::exception& error) {
-      throw std::logic_error(
-          fmt::format("schema /{}/{}: {} in {}", member, entries.size(), error.what(), entry.dump()));
+      throw std::logic_error(fmt::format("schema /{}/{}: {}", member, entries.size(), error.what()));
     }
   }
   return entries;
@@ -211,14 +211,12 @@ const DatasetSchema& FileSchema::dataset(std::string_view path) const { return f
 const GroupSchema& FileSchema::group(std::string_view path) const { return find_by_path(groups, path); }
 
 FileSchema parse_file_schema(std::string_view text) {
-  // Ordered, for the symbols; lists keep their order in any case.
-  const auto ordered = nlohmann::ordered_json::parse(text);
-  const Json json = Json::parse(text);
+  const PlainJson json = PlainJson::parse(text);
   FileSchema schema;
-  schema.format = json.at("format");
-  schema.format_version = json.at("format_version");
-  schema.description = json.at("description");
-  for (const auto& [name, meaning] : ordered.at("symbols").items()) schema.symbols.emplace_back(name, meaning);
+  schema.format = json.at("format").text();
+  schema.format_version = static_cast<std::int64_t>(json.at("format_version").number());
+  schema.description = json.at("description").text();
+  for (const auto& [name, meaning] : json.at("symbols").members()) schema.symbols.emplace_back(name, meaning.text());
   schema.attributes = parse_list<AttributeSchema>(json, "attributes", parse_attribute);
   schema.groups = parse_list<GroupSchema>(json, "groups", parse_group);
   schema.datasets = parse_list<DatasetSchema>(json, "datasets", parse_dataset);

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <variant>
 #include <vector>
 
 namespace exmat {
@@ -35,6 +36,10 @@ template <>
 inline constexpr ElementType kElementType<std::uint32_t> = ElementType::kUint32;
 template <>
 inline constexpr ElementType kElementType<std::uint8_t> = ElementType::kUint8;
+
+/// Value of an attribute: a scalar or a flat array (sizes are the schema's business).
+using AttributeValue = std::variant<std::int64_t, double, std::string, std::vector<std::int64_t>, std::vector<double>,
+                                    std::vector<std::string>>;
 
 /// One size of an array: factor times the value of a symbol ("3m"), or the factor alone ("9").
 struct Extent {
@@ -69,6 +74,7 @@ enum class Use {
   kFullSpace,  ///< to step in all vertices
   kLook,       ///< to export what is drawn
   kPlaces,     ///< to find the vertices that a scene names
+  kDraw,       ///< to draw the body or its elements
   kInspect,    ///< never
 };
 std::string_view name_of(Use use);

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 #include <stdexcept>
-#include <zlib.h>
 
 #include "common/core/version.h"
 #include "common/hdf5/hdf5_file.h"
@@ -19,10 +18,6 @@ void write_labels(Hdf5File& file, const DatasetSchema& schema, const std::string
 }  // namespace
 
 std::string generator_name() { return fmt::format("exmat {}", version()); }
-
-std::uint32_t crc32_of(std::span<const std::byte> bytes, std::uint32_t crc) {
-  return static_cast<std::uint32_t>(::crc32_z(crc, reinterpret_cast<const Bytef*>(bytes.data()), bytes.size()));
-}
 
 void write_header(Hdf5File& file, const FileSchema& schema, const std::string& generator) {
   file.write_attribute("/", "format", schema.format);

@@ -4,7 +4,6 @@
 #include <span>
 #include <string>
 
-#include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/schema.h"
 
 namespace exmat {

@@ -8,7 +8,7 @@
 #include "runtime/api/failures.h"
 #include "runtime/api/state_numbers.h"
 #include "runtime/api/world_handle.h"
-#include "runtime/scene/bodies.h"
+#include "runtime/scene/state_hash.h"
 
 namespace exmat::runtime {
 namespace {

@@ -5,11 +5,10 @@
 #include <cmath>
 #include <string>
 
-#include "common/config/config.h"
-#include "common/config/json_file.h"
 #include "common/core/version.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/handles.h"
+#include "runtime/api/loading.h"
 #include "runtime/api/reading.h"
 #include "runtime/api/settings.h"
 
@@ -18,17 +17,21 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-exmat_model* load_model(SceneConfig config) {
-  config.trajectory.reset();  // positions are read when they are asked for
-  auto source = std::make_shared<Source>(Source{config.bundle, load_run(config)});
-  return new exmat_model{std::move(source)};
-}
-
 exmat_points* new_points(const exmat_model& model, PointSet set) {
   return new exmat_points{model.source, std::move(set)};
 }
 
 }  // namespace
+
+namespace exmat::runtime {
+
+exmat_model* load_model(SceneConfig config) {
+  config.trajectory.reset();  // positions are read when they are asked for
+  auto source = std::make_shared<Source>(Source{bundle_of(config), load_run(config)});
+  return new exmat_model{std::move(source)};
+}
+
+}  // namespace exmat::runtime
 
 const char* exmat_last_error(void) noexcept { return last_failure(); }
 
@@ -53,28 +56,14 @@ exmat_status exmat_model_create(const char* bundle_path, const exmat_settings* s
   });
 }
 
-exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) noexcept {
+exmat_status exmat_model_create_from_memory(const void* data, std::size_t size, const exmat_settings* settings,
+                                            exmat_model** model) noexcept {
   EXMAT_REQUIRE(model);
   *model = nullptr;
-  EXMAT_REQUIRE(scene_path);
+  EXMAT_REQUIRE(data);
   return guarded(__func__, [&] {
-    const std::lock_guard lock(reading());
-    *model = load_model(load_scene(scene_path));
-  });
-}
-
-exmat_status exmat_model_create_from_text(const char* scene, const char* path, std::int32_t use_contact,
-                                          exmat_model** model) noexcept {
-  EXMAT_REQUIRE(model);
-  *model = nullptr;
-  EXMAT_REQUIRE(scene);
-  EXMAT_REQUIRE(path);
-  if (use_contact != 0 && use_contact != 1)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", __func__, use_contact);
-  return guarded(__func__, [&] {
-    const std::lock_guard lock(reading());
-    SceneConfig config = exmat::scene_of(parse_json(scene, path), path);
-    config.meets_others = use_contact == 1;
+    SceneConfig config = scene_of("the pack in memory", settings);
+    config.pack = std::make_shared<const std::string>(static_cast<const char*>(data), size);
     *model = load_model(std::move(config));
   });
 }

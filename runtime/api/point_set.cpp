@@ -43,7 +43,7 @@ exmat_status require_rows(const char* function, const PointSet& points) noexcept
 void require_same_bundle(const Source& source, const ReducedModel& data) {
   const BundleSummary& summary = source.loaded.summary;
   if (data.input_sha256 != summary.input_sha256 || data.object->mesh.vertex_count() != summary.vertices)
-    throw InputError({source.bundle.string(), "/", "the bundle that the model was created from", "another one",
+    throw InputError({source.bundle.file().string(), "/", "the bundle that the model was created from", "another one",
                       "create the model again"});
 }
 

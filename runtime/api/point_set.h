@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
 #include <span>
 #include <string>
 #include <vector>
@@ -14,7 +13,7 @@ namespace exmat::runtime {
 
 /// A loaded scene and the bundle that more can be read of.
 struct Source {
-  std::filesystem::path bundle;
+  BundleInput bundle;
   LoadedScene loaded;
 };
 

@@ -1,10 +1,9 @@
 #include <algorithm>
 #include <fmt/format.h>
 
-#include "common/config/config.h"
-#include "common/config/json_file.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
+#include "runtime/api/loading.h"
 #include "runtime/api/reading.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/scene/world_loader.h"
@@ -156,7 +155,11 @@ void check_joins(const exmat_world& world, const exmat_body& body) {
         fmt::format("the body's time step is {:g} s: expected that of the world, {:g} s", body.scene.time_step, step));
 }
 
-std::unique_ptr<exmat_world> load(const WorldConfig& config) {
+}  // namespace
+
+namespace exmat::runtime {
+
+std::unique_ptr<exmat_world> load_world(const WorldConfig& config) {
   LoadedWorld loaded = load_world_run(config);
   const BodyContactConfig& contact = config.contact;
   auto world = std::make_unique<exmat_world>(exmat_contact_law{sizeof(exmat_contact_law), contact.stiffness,
@@ -168,7 +171,7 @@ std::unique_ptr<exmat_world> load(const WorldConfig& config) {
   for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
     LoadedKind& kind = loaded.kinds[i];
     kind.loaded.data = {};
-    sources.push_back(std::make_shared<Source>(Source{config.bodies[i].scene.bundle, std::move(kind.loaded)}));
+    sources.push_back(std::make_shared<Source>(Source{bundle_of(config.bodies[i].scene), std::move(kind.loaded)}));
     if (kind.surface) world->surfaces[sources.back()] = kind.surface;
   }
   for (LoadedBody& body : loaded.bodies) {
@@ -180,10 +183,6 @@ std::unique_ptr<exmat_world> load(const WorldConfig& config) {
   }
   return world;
 }
-
-}  // namespace
-
-namespace exmat::runtime {
 
 void join_own(exmat_body& body) {
   auto world = std::make_unique<exmat_world>(own_law());
@@ -211,35 +210,6 @@ exmat_status exmat_world_create(const exmat_contact_law* law, exmat_world** worl
     const exmat_contact_law given = law != nullptr ? completed(*law, default_law()) : default_law();
     require_law(given);
     *world = new exmat_world(given);
-  });
-}
-
-exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world** world) noexcept {
-  EXMAT_REQUIRE(world);
-  *world = nullptr;
-  EXMAT_REQUIRE(scene_path);
-  return guarded(__func__, [&] {
-    const std::lock_guard lock(reading());
-    WorldConfig config = load_world(scene_path);
-    set_trajectory(std::nullopt, config);  // positions are read when they are asked for
-    *world = load(config).release();
-  });
-}
-
-exmat_status exmat_world_create_from_text(const char* scene, const char* path, std::int32_t use_contact,
-                                          exmat_world** world) noexcept {
-  EXMAT_REQUIRE(world);
-  *world = nullptr;
-  EXMAT_REQUIRE(scene);
-  EXMAT_REQUIRE(path);
-  if (use_contact != 0 && use_contact != 1)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", __func__, use_contact);
-  return guarded(__func__, [&] {
-    const std::lock_guard lock(reading());
-    WorldConfig config = world_of(parse_json(scene, path), path);
-    for (BodiesConfig& bodies : config.bodies) bodies.scene.meets_others = use_contact == 1;
-    set_trajectory(std::nullopt, config);
-    *world = load(config).release();
   });
 }
 

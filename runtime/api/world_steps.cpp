@@ -9,7 +9,7 @@
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_steps.h"
 #include "runtime/api/world_handle.h"
-#include "runtime/scene/bodies.h"
+#include "runtime/scene/state_hash.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)

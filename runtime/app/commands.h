@@ -23,6 +23,11 @@ struct BenchCommandOptions {
   bool json = false;
 };
 
+struct PackOptions {
+  std::filesystem::path bundle, output;
+  std::optional<std::filesystem::path> scene;  ///< the pack holds the groups that it needs, no more
+};
+
 struct ExportOptions {
   std::filesystem::path trajectory;  ///< empty: a bundle without motion
   std::filesystem::path output;
@@ -38,6 +43,7 @@ struct ExportOptions {
 void run_command(const RunCommandOptions& options);
 void bench_command(const BenchCommandOptions& options);
 void export_command(const ExportOptions& options);
+void pack_command(const PackOptions& options);
 void info_command(const std::filesystem::path& bundle);
 void validate_command(const std::filesystem::path& bundle);
 

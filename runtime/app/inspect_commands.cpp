@@ -76,7 +76,7 @@ void validate_command(const std::filesystem::path& bundle) {
   for (const std::string& problem : problems) fmt::print("{}\n", problem);
   if (!problems.empty())
     throw InputError({bundle.string(), "", "a sound bundle", fmt::format("{} problem(s)", problems.size()),
-                      "compute it again with exmat-precompute"});
+                      "compute it again with exmat-precompute, or make the pack of it again"});
   fmt::print("{}: sound\n", bundle.string());
 }
 

@@ -60,16 +60,24 @@ int main(int argc, char** argv) {
   export_command.add_option("--up", export_options.up, "Axis of the object that points up, y (default) or z")
       ->transform(CLI::CheckedTransformer(axes, CLI::ignore_case));
 
+  runtime::PackOptions pack_options;
+  CLI::App& pack = *app.add_subcommand("pack", "Write what runs need of a bundle as one block of memory, without HDF5");
+  pack.add_option("bundle", pack_options.bundle, "BUNDLE.h5")->required();
+  pack.add_option("-o,--output", pack_options.output, "Pack to write (.exmat)")->required();
+  pack.add_option("--scene", pack_options.scene, "SCENE.json: keep the groups that this scene needs, no others");
+
   std::filesystem::path bundle;
   CLI::App& info = *app.add_subcommand("info", "Say what a bundle holds");
   CLI::App& validate = *app.add_subcommand("validate", "Say whether every dataset of a bundle is sound");
-  for (CLI::App* command : {&info, &validate}) command->add_option("bundle", bundle, "BUNDLE.h5")->required();
+  for (CLI::App* command : {&info, &validate})
+    command->add_option("bundle", bundle, "BUNDLE.h5, or a pack of one")->required();
 
   return run_program(app, argc, argv, [&] {
     apply(common);
     if (run.parsed()) runtime::run_command(options);
     if (bench.parsed()) runtime::bench_command(bench_options);
     if (export_command.parsed()) runtime::export_command(export_options);
+    if (pack.parsed()) runtime::pack_command(pack_options);
     if (info.parsed()) runtime::info_command(bundle);
     if (validate.parsed()) runtime::validate_command(bundle);
   });

@@ -72,6 +72,13 @@ std::shared_ptr<ModelObject> load(const std::string& path, const py::object& set
   return std::make_shared<ModelObject>(Model(path, members));
 }
 
+std::shared_ptr<ModelObject> of_pack(const py::bytes& pack, const py::dict& settings) {
+  const std::string_view bytes = pack;
+  const exmat_settings members = settings_of(settings);
+  const py::gil_scoped_release unlocked;
+  return std::make_shared<ModelObject>(Model::from_memory(std::as_bytes(std::span(bytes)), members));
+}
+
 std::shared_ptr<ModelObject> of_text(const std::string& scene, const std::string& path, bool use_contact) {
   const py::gil_scoped_release unlocked;
   return std::make_shared<ModelObject>(Model::from_text(scene, path, use_contact));
@@ -194,6 +201,7 @@ std::int64_t region_of(const Model& model, const py::object& name) {
 
 void bind_model(py::module_& module) {
   py::class_<ModelObject, std::shared_ptr<ModelObject>>(module, "Model", "What exmat.Model stands on.")
+      .def(py::init(&of_pack), py::arg("pack"), py::arg("settings"))  // first: bytes would be a path, too
       .def(py::init(&load), py::arg("path"), py::arg("settings"))
       .def(py::init(&of_text), py::arg("scene"), py::arg("path"), py::arg("use_contact"))
       .def_readonly("modes", &ModelObject::modes, "r, the number of modes.")

@@ -23,16 +23,6 @@ bool is_bad(const World& world, int body) { return (world.report(body).status & 
 
 }  // namespace
 
-void add_to_hash(const Model& model, const State& state, FnvHash& hash) {
-  hash.add_all(state.q);
-  hash.add_all(state.v);
-  if (state.full) {
-    hash.add_all(state.full->q);
-    hash.add_all(state.full->v);
-  }
-  hash.add_all(model.frame->coordinates(state.frame));
-}
-
 Bodies::Bodies(const LoadedWorld& loaded, const WorldConfig& config)
     : loaded_(loaded),
       config_(config),

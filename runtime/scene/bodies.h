@@ -3,14 +3,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "common/core/fnv_hash.h"
+#include "runtime/scene/state_hash.h"
 #include "runtime/scene/world_loader.h"
 #include "runtime/sim/world/world.h"
 
 namespace exmat::runtime {
-
-/// Adds the bits of q and v of a body, of a free one also where it is and its momenta.
-void add_to_hash(const Model& model, const State& state, FnvHash& hash);
 
 /// All that the bodies of a scene carry from step to step.
 struct BodiesMemory {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "common/bundle/scene_places.h"
-#include "common/config/config.h"
+#include "common/config/scene_needs.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
 #include "runtime/scene/keyed_settings.h"
@@ -99,7 +99,7 @@ void count_bytes(const std::vector<ReadRecord>& records, std::vector<LedgerEntry
 
 RowMatrix basis_rows(const SceneConfig& config, const VertexForceConfig& force, LoadedScene& loaded) {
   const RowMatrix& basis = loaded.data.modal->basis;
-  if (basis.rows() == 0) return read_basis_rows(config.bundle, force.vertices, &loaded.records);
+  if (basis.rows() == 0) return read_basis_rows(bundle_of(config), force.vertices, &loaded.records);
   RowMatrix rows(3 * force.vertices.size(), basis.cols());
   for (std::size_t i = 0; i < force.vertices.size(); ++i)
     rows.middleRows<3>(3 * static_cast<Eigen::Index>(i)) = basis.middleRows<3>(3 * force.vertices[i]);
@@ -291,10 +291,12 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
 
 }  // namespace
 
+BundleInput bundle_of(const SceneConfig& config) { return {config.bundle, config.pack}; }
+
 LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   require_bundle(config);
   LoadedScene loaded;
-  loaded.summary = summarise_bundle(config.bundle);
+  loaded.summary = summarise_bundle(bundle_of(config));
   check_body(config, loaded.summary.constrained);
   check_examples(config, loaded.summary);
   check_regions(config, loaded.summary);
@@ -313,7 +315,7 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   const bool steps_in_full = on_bones || config.space.space != Space::kReduced;
   const bool positions = config.trajectory || config.meets_bodies || (moves && !config.forces.empty());
   const BundleRequest request{loaded.ledger, needs.regions, /*step_only=*/true, positions, steps_in_full};
-  loaded.data = read_bundle(config.bundle, request, &loaded.records);
+  loaded.data = read_bundle(bundle_of(config), request, &loaded.records);
   check_compensation(config, loaded.data);
   loaded.model = prepare(config, loaded.data);
   if (steps_in_full) loaded.full = prepare_full_space(config, loaded);

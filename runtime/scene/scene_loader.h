@@ -35,6 +35,9 @@ struct LoadedScene {
   ReducedModel data;  ///< /object and /modal, complete only if the scene writes positions, and /render
 };
 
+/// The bundle of a scene: a file, or a pack in memory.
+BundleInput bundle_of(const SceneConfig& config);
+
 /// Reads of the bundle what the scene needs, no more: positions only if it writes a trajectory. Throws InputError: a
 /// group that the scene needs and the bundle lacks, a vertex out of range, an example that inverts an
 /// element.

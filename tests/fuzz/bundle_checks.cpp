@@ -28,7 +28,7 @@ void require(bool condition) {
 
 }  // namespace
 
-void check_bundle(const std::filesystem::path& file) {
+void check_bundle(const BundleInput& file) {
   constexpr std::array<std::int64_t, 2> kVertices = {0, 4};
   const bool is_read = is_taken([&] { read_bundle(file); });
   if (validate_bundle(file).empty()) require(is_read);

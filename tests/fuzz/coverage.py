@@ -37,6 +37,7 @@ SOURCES = {
     "json": ["common/config/"],
     "bundle": BUNDLE,
     "bundle_edits": BUNDLE,
+    "pack": ["common/bundle/"],
 }
 SHARED = [MESH_IO + "mesh_tables.cpp"] + [SURFACE_IO + name for name in ("commented_lines.cpp", "surface_parts.cpp",
                                                                          "text_input.cpp", "value_cursor.cpp")]

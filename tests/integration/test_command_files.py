@@ -4,6 +4,7 @@ full standard output, and nothing taken from the folder that a user happens to s
 
 Usage: test_command_files.py FOLDER_OF_PROGRAMS
 """
+import json
 import os
 import resource
 import shutil
@@ -49,7 +50,7 @@ class Commands(unittest.TestCase):
         shutil.copytree(self.made, self.folder, dirs_exist_ok=True)
 
     def command(self, name, *words, folder=None, status=0, **options):
-        program = RUNTIME if name in ("run", "bench", "export", "info", "validate") else PRECOMPUTE
+        program = RUNTIME if name in ("run", "bench", "export", "info", "validate", "pack") else PRECOMPUTE
         done = subprocess.run([program, name, *map(str, words)], cwd=folder or self.folder, text=True, timeout=120,
                               **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, **options})
         assert done.returncode == status, f"{name} {words}: status {done.returncode}, expected {status}\n{done.stdout}{done.stderr}"
@@ -77,10 +78,12 @@ class Commands(unittest.TestCase):
             self.refused("run", "scene.json", "-o", name, said=["does not read", "-o"])
             self.refused("run", "scene.json", "--dump-state", name, said=["--dump-state"])
             self.refused("full-space", "scene.json", "-o", name, said=["-o"])
+            self.refused("pack", "bar.h5", "-o", name, said=["does not read", "-o"])
         for option in ("-o", "--dump-state"):
             self.refused("run", "scene.json", option, "scene.json", said=["scene.json", option])
             self.refused("run", "contact.json", option, "ground.obj", said=["ground.obj", option])
         self.refused("full-space", "scene.json", "-o", "scene.json")
+        self.refused("pack", "bar.h5", "-o", "scene.json", "--scene", "scene.json", said=["scene.json", "-o"])
         for words in (["-o", "bar.veg"], ["-o", "asset.json"], ["-o", "new.h5", "--report", "bar.veg"],
                       ["-o", "new.h5", "--report", "asset.json"], ["-o", "new.h5", "--depfile", "bar.veg"],
                       ["-o", "new.h5", "--scene", "contact.json", "--depfile", "contact.json"],
@@ -94,6 +97,24 @@ class Commands(unittest.TestCase):
         self.refused("export", "t.glb", "-o", "t.glb", said=["-o"])
         (self.folder / "bar.glb").symlink_to("bar.h5")
         self.refused("export", "t.h5", "-o", "bar.glb", said=["-o"])
+
+    def test_a_pack_steps_as_its_bundle(self):
+        self.command("pack", "bar.h5", "-o", "whole.exmat")
+        self.command("pack", "bar.h5", "-o", "least.exmat", "--scene", "scene.json")
+        whole, least = ((self.folder / name).stat().st_size for name in ("whole.exmat", "least.exmat"))
+        self.assertLess(least, whole)
+        scene = json.loads((self.folder / "scene.json").read_text())
+        states = []
+        for name in ("bar.h5", "whole.exmat", "least.exmat"):
+            write_json(self.folder / "packed.json", {**scene, "bundle": name})
+            self.command("run", "packed.json", "--dump-state", "state.json")
+            states.append(json.loads((self.folder / "state.json").read_text())["bodies"])
+            self.command("validate", name)
+            self.command("info", name)
+        self.assertEqual(states[1:], states[:1] * 2)
+        self.refused("pack", "whole.exmat", "-o", "again.exmat", said=["found a pack"])
+        (self.folder / "cut.exmat").write_bytes((self.folder / "whole.exmat").read_bytes()[:-1])
+        self.refused("info", "cut.exmat", said=["cut short by 1 bytes"])
 
     def test_a_study_keeps_its_inputs(self):
         study = {"name": "small", "asset": "recommended_asset.json", "scene": "scene.json", "sweeps": [{"basis_size": [3]}]}

@@ -97,9 +97,14 @@ typedef struct exmat_settings {
 /* Sets all members to their defaults; `size` is sizeof(exmat_settings). */
 EXMAT_API exmat_status exmat_settings_default(exmat_settings* settings, size_t size) EXMAT_NOEXCEPT;
 
-/* Loads a bundle, as far as the settings need it; `settings` NULL: the defaults. */
+/* Loads a bundle or a pack of one, as far as the settings need it; `settings` NULL: the defaults. */
 EXMAT_API exmat_status exmat_model_create(const char* bundle_path, const exmat_settings* settings,
                                           exmat_model** model) EXMAT_NOEXCEPT;
+
+/* Loads a pack of a bundle, which `exmat-runtime pack` writes, from `size` bytes of memory, with no file. The library
+   keeps a copy, of which points are made later: `data` may be freed on return. It need not be aligned. */
+EXMAT_API exmat_status exmat_model_create_from_memory(const void* data, size_t size, const exmat_settings* settings,
+                                                      exmat_model** model) EXMAT_NOEXCEPT;
 
 /* Loads a scene file and its bundle, scripted forces included; its steps, instances and output are ignored. */
 EXMAT_API exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) EXMAT_NOEXCEPT;

@@ -98,6 +98,12 @@ class Model {
     check(exmat_model_create(bundle.c_str(), &settings, &model));
     handle_.reset(model);
   }
+  /// Loads a pack of a bundle; the library keeps a copy of it.
+  static Model from_memory(std::span<const std::byte> pack, const exmat_settings& settings = default_settings()) {
+    exmat_model* model = nullptr;
+    check(exmat_model_create_from_memory(pack.data(), pack.size(), &settings, &model));
+    return Model(model);
+  }
   static Model from_scene(const std::string& scene) {
     exmat_model* model = nullptr;
     check(exmat_model_create_from_scene(scene.c_str(), &model));

@@ -13,6 +13,8 @@ from .inputs import json_text, plain_members
 class Model(_exmat.Model):
     """A bundle prepared for stepping, and what acts on its bodies. It never changes; any number of threads may use it.
 
+    `bundle` is a path, of a bundle or a pack of one, or the bytes of a pack.
+
     Settings are the members of a scene file that belong to a model, with the same defaults and ranges:
 
     time_step            > 0 [s]; 0.001
@@ -43,7 +45,7 @@ class Model(_exmat.Model):
 
     def __init__(
         self,
-        bundle: StrPath,
+        bundle: Union[StrPath, bytes],
         *,
         time_step: Optional[float] = None,
         gravity: Optional[Sequence[float]] = None,
@@ -96,9 +98,13 @@ class Model(_exmat.Model):
             model._load(scene, None)
         return model
 
-    def _load(self, path: StrPath, settings: Optional[Dict[str, Any]]) -> None:
+    def _load(self, path: Union[StrPath, bytes], settings: Optional[Dict[str, Any]]) -> None:
+        if isinstance(path, bytes):
+            _exmat.Model.__init__(self, path, settings or {})
+            self._recipe: Tuple[str, Any, Optional[Dict[str, Any]]] = ("file", path, settings)
+            return
         _exmat.Model.__init__(self, os.fspath(path), settings)
-        self._recipe: Tuple[str, Any, Optional[Dict[str, Any]]] = ("file", os.path.abspath(path), settings)
+        self._recipe = ("file", os.path.abspath(path), settings)
 
     def _load_text(self, scene: bytes, path: str) -> None:
         _exmat.Model.__init__(self, scene, path, True)
@@ -159,6 +165,8 @@ def _name(recipe: Tuple[str, Any, Optional[Dict[str, Any]]]) -> str:
     kind, what, _ = recipe
     if kind == "world":
         return f"{world_name(what[0])}[{what[1]}]"
+    if isinstance(what, bytes):
+        return "pack in memory"
     return pathlib.Path(what["bundle"] if kind == "members" else what[1] if kind == "text" else what).name
 
 

@@ -6,6 +6,7 @@
 
 #include "common/bundle/fields.h"
 #include "common/core/error.h"
+#include "tests/common/bundle/field_text.h"
 #include "tests/common/bundle/small_model.h"
 
 namespace exmat {
@@ -19,31 +20,9 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::UnorderedElementsAre;
 
-// Every field as text, by path: compares models whatever their types.
-class FieldText {
- public:
-  explicit FieldText(const ReducedModel& model) { visit_fields(model, *this); }
-
-  void group(std::string_view, std::string_view path) { group_ = path; }
-  template <typename T>
-  void attribute(std::string_view name, const T& member) {
-    fields[group_ + "@" + std::string(name)] = ::testing::PrintToString(to_attribute(member));
-  }
-  template <typename T>
-  void dataset(std::string_view name, const T& member) {
-    const ArrayView view = view_of(member);
-    const auto bytes = static_cast<std::size_t>(view.rows * view.cols) * size_of(view.type);
-    fields[group_ + "/" + std::string(name)] = std::to_string(view.rows) + " x " + std::to_string(view.cols) + ": " +
-                                               std::string(static_cast<const char*>(view.data), bytes);
-  }
-
-  std::map<std::string, std::string> fields;
-
- private:
-  std::string group_;
-};
-
-void expect_equal(const ReducedModel& a, const ReducedModel& b) { EXPECT_EQ(FieldText(a).fields, FieldText(b).fields); }
+void expect_equal(const ReducedModel& a, const ReducedModel& b) {
+  EXPECT_EQ(test::FieldText(a).fields, test::FieldText(b).fields);
+}
 
 std::vector<std::string> datasets_of(const std::vector<ReadRecord>& record) {
   std::vector<std::string> names;

@@ -1,0 +1,42 @@
+#include "common/config/scene_needs.h"
+
+namespace exmat {
+
+WorldConfig world_of(SceneConfig scene) {
+  WorldConfig world;
+  world.file = scene.file;
+  world.is_list = false;
+  world.time_step = scene.time_step;
+  world.steps = scene.steps;
+  world.trajectory = scene.trajectory;
+  world.every = scene.every;
+  std::vector<BodyPlace> places(static_cast<std::size_t>(scene.instances));
+  world.bodies.push_back({"", std::move(scene), std::move(places)});
+  return world;
+}
+
+void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world) {
+  world.trajectory = file;
+  for (BodiesConfig& bodies : world.bodies) bodies.scene.trajectory = file;
+}
+
+Needs needs_of(const SceneConfig& scene) {
+  Needs needs{.examples = scene.examples || scene.body.pose,
+              .carried = !scene.body.motion.empty(),
+              .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
+              .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
+              .full_space = scene.space.space != Space::kReduced || scene.body.animation,
+              .contact = scene.meets_others || scene.meets_bodies || !scene.obstacles.empty(),
+              .render = scene.render,
+              .internal_force = scene.internal_force};
+  if (scene.examples) needs.energy_reference = scene.examples->energy_reference;
+  std::vector<RegionNeeds>& regions = needs.regions.emplace();
+  for (const auto& [name, force] : scene.regions)
+    regions.push_back({.name = name,
+                       .targets = force.target != TargetSource::kSolve,
+                       .energy_reference = force.energy_reference,
+                       .target_elasticity = force.law == ExampleForceLaw::kElastic});
+  return needs;
+}
+
+}  // namespace exmat
