@@ -7,7 +7,6 @@
 #include <type_traits>
 #include <vector>
 
-#include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/schema.h"
 #include "common/model/reduced_model.h"
 

@@ -16,7 +16,7 @@ TOP_LEVEL = {"CMakeLists.txt", "precompute", "runtime", "common", "schemas", "te
 # What may include what: from top to bottom, a folder sees itself and those below it.
 LAYERS = {
     "common": "bundle hdf5 console config surface_io model mesh elastic core",
-    "runtime": "viewer/app viewer/panels viewer/script viewer/studio viewer/recording viewer/drawing viewer/simulation viewer/scene viewer/view"
+    "runtime": "ports viewer/app viewer/panels viewer/script viewer/studio viewer/recording viewer/drawing viewer/simulation viewer/scene viewer/view"
                " app export api capacity bench scene output sim/world sim/lanes sim/space/full sim/step sim/contact sim/examples sim/frame sim/solver sim/elasticity kernels",
     "precompute": "app study/worlds study/sweep study/sources study/stability study/measure pipeline training examples inputs posing meshing/mesher meshing cache"
                   " full_space alignment render shape_space targets polynomial cubature modes contact mesh_io solvers fem drawing",

@@ -1,5 +1,6 @@
 """Bundles and trajectories by name, the offline stage, arrays in place of files."""
 import pathlib
+import pickle
 import threading
 
 import h5py
@@ -139,3 +140,16 @@ def test_a_study_is_an_object(bundle, tmp_path):
     result = exmat.precompute.study(study, tmp_path / "study")
     assert result.name == "bar" and len(result.points) == 1 and (result.folder / "report.html").exists()
     assert pathlib.Path(result.folder, "results.json").exists()
+
+
+def test_a_pack_is_a_model_from_its_file_and_from_bytes(bundle, runtime, tmp_path):
+    runtime("pack", bundle, "-o", tmp_path / "bar.exmat")
+    pack = (tmp_path / "bar.exmat").read_bytes()
+    settings = dict(gravity=(0, 0, -1), example_stiffness=4000, example_bias=0.2)
+    bodies = [exmat.Body(exmat.Model(source, **settings)) for source in (bundle, tmp_path / "bar.exmat", pack)]
+    bodies.append(exmat.Body(pickle.loads(pickle.dumps(bodies[-1].model))))
+    for body in bodies:
+        body.step(50)
+        assert np.array_equal(body.q, bodies[0].q)
+    with pytest.raises(exmat.BadInput, match="the pack in memory: .*cut short by 1 bytes"):
+        exmat.Model(pack[:-1])

@@ -1,0 +1,80 @@
+#!/usr/bin/python3
+"""The library without HDF5 (EXMAT_WITH_HDF5=OFF) is made of C++20 and Eigen alone: its configuration looks for no other
+library, and no source of it includes a header of one, by whatever way.
+
+Usage: test_packs_only.py SOURCE_FOLDER
+"""
+import functools
+import json
+import re
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+SOURCES = Path(sys.argv.pop(1)).resolve()
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]', re.M)
+# The standard libraries of C++ and C, the system's where it has no other, Eigen.
+ALLOWED = re.compile(r"[a-z_0-9]+|(std(def|int)|inttypes|immintrin|pthread|sched|unistd|fcntl|sys/stat)\.h|(unsupported/)?Eigen/\w+")
+LIBRARIES = ("HDF5", "fmt", "spdlog", "CLI11", "nlohmann_json", "ZLIB", "OpenMP", "PkgConfig")
+
+
+@functools.lru_cache(maxsize=None)
+def includes(file):
+    return [name for _, name in INCLUDE.findall(file.read_text())]
+
+
+@functools.lru_cache(maxsize=None)
+def is_file(path):
+    return path.is_file()
+
+
+def foreign_headers(source, folders):
+    """What a source includes, itself or by headers of the project, and is in none of these folders."""
+    foreign, seen, left = set(), set(), [Path(source)]
+    while left:
+        file = left.pop()
+        if file in seen:
+            continue
+        seen.add(file)
+        for name in includes(file):
+            own = next((path for path in (file.parent / name, *(folder / name for folder in folders)) if is_file(path)), None)
+            if own is not None:
+                left.append(own.resolve())
+            elif not ALLOWED.fullmatch(name):
+                foreign.add(f"{file.name} includes {name}")
+    return foreign, seen
+
+
+class PacksOnly(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        holder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(holder.cleanup)
+        cls.build = Path(holder.name)
+        without = [f"-DCMAKE_DISABLE_FIND_PACKAGE_{name}=ON" for name in LIBRARIES]
+        subprocess.run(["cmake", "-S", SOURCES, "-B", cls.build, "-G", "Ninja", "-DEXMAT_WITH_HDF5=OFF", *without], check=True,
+                       capture_output=True)
+        subprocess.run(["ninja", "-C", cls.build, "runtime/ports/embedded_schemas.cpp"], check=True, capture_output=True)
+        cls.commands = json.loads((cls.build / "compile_commands.json").read_text())
+
+    def test_no_source_includes_another_library(self):
+        seen = set()
+        for command in self.commands:
+            folders = [Path(folder) for folder in re.findall(r"-I(\S+)", command["command"]) if folder.startswith(str(SOURCES))]
+            foreign, headers = foreign_headers(command["file"], folders)
+            self.assertEqual(foreign, set(), command["file"])
+            seen |= headers
+        names = {file.relative_to(SOURCES).as_posix() for file in seen if file.is_relative_to(SOURCES)}
+        self.assertTrue({"common/bundle/pack_store.h", "runtime/sim/world/world.h", "runtime/ports/fmt/format.h"} <= names)
+        self.assertEqual([name for name in names if name.startswith("common/hdf5/hdf5")], [])
+
+    def test_a_planted_include_is_found(self):
+        source = self.build / "planted.cpp"
+        source.write_text("#include <vector>\n#include <hdf5.h>\n#include <CLI/CLI.hpp>\n")
+        self.assertEqual(len(foreign_headers(source, [SOURCES])[0]), 2)
+
+
+if __name__ == "__main__":
+    unittest.main()
