@@ -4,7 +4,6 @@ library, and no source of it includes a header of one, by whatever way.
 
 Usage: test_packs_only.py SOURCE_FOLDER
 """
-import functools
 import json
 import re
 import subprocess
@@ -20,26 +19,16 @@ ALLOWED = re.compile(r"[a-z_0-9]+|(std(def|int)|inttypes|immintrin|pthread|sched
 LIBRARIES = ("HDF5", "fmt", "spdlog", "CLI11", "nlohmann_json", "ZLIB", "OpenMP", "PkgConfig")
 
 
-@functools.lru_cache(maxsize=None)
-def includes(file):
-    return [name for _, name in INCLUDE.findall(file.read_text())]
-
-
-@functools.lru_cache(maxsize=None)
-def is_file(path):
-    return path.is_file()
-
-
-def foreign_headers(source, folders):
-    """What a source includes, itself or by headers of the project, and is in none of these folders."""
-    foreign, seen, left = set(), set(), [Path(source)]
+def foreign_headers(sources, folders):
+    """What sources include, themselves or by headers of the project, and is in none of these folders."""
+    foreign, seen, left = set(), set(), [Path(source) for source in sources]
     while left:
         file = left.pop()
         if file in seen:
             continue
         seen.add(file)
-        for name in includes(file):
-            own = next((path for path in (file.parent / name, *(folder / name for folder in folders)) if is_file(path)), None)
+        for _, name in INCLUDE.findall(file.read_text()):
+            own = next((path for path in (file.parent / name, *(folder / name for folder in folders)) if path.is_file()), None)
             if own is not None:
                 left.append(own.resolve())
             elif not ALLOWED.fullmatch(name):
@@ -60,12 +49,9 @@ class PacksOnly(unittest.TestCase):
         cls.commands = json.loads((cls.build / "compile_commands.json").read_text())
 
     def test_no_source_includes_another_library(self):
-        seen = set()
-        for command in self.commands:
-            folders = [Path(folder) for folder in re.findall(r"-I(\S+)", command["command"]) if folder.startswith(str(SOURCES))]
-            foreign, headers = foreign_headers(command["file"], folders)
-            self.assertEqual(foreign, set(), command["file"])
-            seen |= headers
+        folders = {Path(folder) for command in self.commands for folder in re.findall(r"-I(\S+)", command["command"])}
+        foreign, seen = foreign_headers([command["file"] for command in self.commands], sorted(folders))
+        self.assertEqual(foreign, set())
         names = {file.relative_to(SOURCES).as_posix() for file in seen if file.is_relative_to(SOURCES)}
         self.assertTrue({"common/bundle/pack_store.h", "runtime/sim/world/world.h", "runtime/ports/fmt/format.h"} <= names)
         self.assertEqual([name for name in names if name.startswith("common/hdf5/hdf5")], [])
@@ -73,7 +59,7 @@ class PacksOnly(unittest.TestCase):
     def test_a_planted_include_is_found(self):
         source = self.build / "planted.cpp"
         source.write_text("#include <vector>\n#include <hdf5.h>\n#include <CLI/CLI.hpp>\n")
-        self.assertEqual(len(foreign_headers(source, [SOURCES])[0]), 2)
+        self.assertEqual(len(foreign_headers([source], [SOURCES])[0]), 2)
 
 
 if __name__ == "__main__":

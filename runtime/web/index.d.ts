@@ -1,0 +1,200 @@
+/** Base of all errors of the library. */
+export class ExmatError extends Error {}
+/** An argument that the caller got wrong. */
+export class InvalidArgument extends ExmatError {}
+/** A pack that is damaged, or lacks what the settings ask for. */
+export class BadInput extends ExmatError {}
+/** A step that met NaN or infinity: the bodies are as they were before it. */
+export class NonFinite extends ExmatError {}
+
+/** Numbers, as an array of any kind. */
+export type Numbers = ArrayLike<number>;
+
+/** Members of a scene that belong to a model, with the same defaults and ranges. */
+export interface Settings {
+  /** > 0 [s]; 0.001 */
+  timeStep?: number;
+  /** [m/s^2]; 0 0 0 */
+  gravity?: Numbers;
+  /** alpha >= 0 [1/s]; 0 */
+  massDamping?: number;
+  /** beta >= 0 [s]; 0 */
+  stiffnessDamping?: number;
+  newtonTolerance?: number;
+  newtonIterations?: number;
+  integrator?: "bdf2" | "backward_euler" | "newmark";
+  internalForce?: "auto" | "cubature" | "polynomial";
+  /** True: the example force acts; false. */
+  useExamples?: boolean | number;
+  /** kappa >= 0 [1/s^2]; 0 */
+  exampleStiffness?: number;
+  /** c_kappa >= 0 [1/s]; 0 */
+  exampleDamping?: number;
+  /** Factor in [0, 1] on the weight of the rest pose; 1 */
+  exampleBias?: number;
+  exampleTarget?: "auto" | "table" | "solve";
+  targetIterations?: number;
+  energyReference?: "example" | "rest";
+  /** True: bodies can touch obstacles and each other; false. */
+  useContact?: boolean | number;
+  sleepEnergy?: number;
+  sleepTime?: number;
+  precision?: "double" | "mixed";
+  space?: "reduced" | "full" | "auto";
+  spaceRelease?: number;
+}
+
+export interface Obstacle {
+  shape?: "plane" | "sphere" | "box" | "capsule";
+  /** Of the plane; centre of sphere and box; where the capsule's axis begins [m] */
+  point?: Numbers;
+  /** Away from the solid of a plane; along the capsule's axis [m] */
+  direction?: Numbers;
+  halfExtents?: Numbers;
+  /** Quaternion, w first */
+  orientation?: Numbers;
+  radius?: number;
+  /** Pressure per depth [N/m^3] */
+  stiffness?: number;
+  damping?: number;
+  /** Coulomb's coefficient */
+  friction?: number;
+  group?: number;
+  mask?: number;
+}
+
+/** Law of contact between bodies. */
+export interface ContactLaw {
+  stiffness?: number;
+  damping?: number;
+  friction?: number;
+  /** True: a body also touches itself. */
+  self?: boolean | number;
+  /** True: bodies touch obstacles alone. */
+  apart?: boolean | number;
+  release?: number;
+}
+
+/** Rigid motion of a free body; what is left out stays. */
+export interface Motion {
+  /** [m] */
+  position: Numbers;
+  /** Quaternion, w first */
+  orientation: Numbers;
+  /** [m/s] */
+  linearVelocity: Numbers;
+  /** [rad/s] */
+  angularVelocity: Numbers;
+}
+
+/** [J] */
+export interface Energies {
+  kinetic: number;
+  elastic: number;
+  potential: number;
+  contact: number;
+}
+
+/** Memory of the module, which free() gives back; `using` calls it where the host has Symbol.dispose. */
+interface Owner {
+  free(): void;
+}
+
+/** k material points of a model's bodies. */
+export class Points implements Owner {
+  private constructor();
+  /** k */
+  readonly length: number;
+  free(): void;
+}
+
+export class Body implements Owner {
+  constructor(model: Model);
+  readonly model: Model;
+  /** The world that it was added to. */
+  readonly world: World | null;
+  step(count?: number): this;
+  reset(): void;
+  /** [s] */
+  readonly time: number;
+  space: "reduced" | "full" | "auto";
+  /** q [r], a view: read it anew after calls that allocate. */
+  readonly displacement: Float64Array;
+  /** v [r], a view */
+  readonly velocity: Float64Array;
+  /** w [K], a view; empty without an example force */
+  readonly weights: Float64Array;
+  readonly energies: Energies;
+  get motion(): Motion;
+  set motion(motion: Partial<Motion>);
+  /** World positions [3k] [m], written to `xyz`. */
+  readPositions(points: Points, xyz?: Float32Array): Float32Array;
+  /** Adds forces [3k] [N] that stay until they are cleared. */
+  applyForces(points: Points, forces: Numbers): void;
+  clearForces(): void;
+  restartIntegrator(): void;
+  setGravity(gravity: Numbers): void;
+  setDamping(mass: number, stiffness: number): void;
+  setExampleStiffness(kappa: number, region?: number): void;
+  setExampleBias(bias: number, region?: number): void;
+  /** Weights [K], none negative, of sum 1; null: those of the shape again. */
+  setExampleWeights(weights: Numbers | null, region?: number): void;
+  /** All that the body carries from step to step: a snapshot. */
+  state: Float64Array;
+  /** Hash of the bits of its state, 16 hexadecimal digits. */
+  readonly hash: string;
+  /** Adds an obstacle to the body's own world; its id. */
+  addObstacle(obstacle: Obstacle): number;
+  free(): void;
+}
+
+/** Bodies that may touch each other, and obstacles. */
+export class World implements Owner {
+  constructor(law?: ContactLaw);
+  readonly bodies: readonly Body[];
+  add<T extends Body>(body: T): T;
+  addObstacle(obstacle: Obstacle): number;
+  removeObstacle(id: number): void;
+  step(count?: number): this;
+  reset(): void;
+  readonly time: number;
+  readonly energies: Energies;
+  state: Float64Array;
+  readonly hash: string;
+  /** Frees its bodies, too. */
+  free(): void;
+}
+
+/** Bodies of one model that touch obstacles alone, stepped side by side. */
+export class Batch extends World {
+  constructor(model: Model, count: number);
+  readonly length: number;
+  /** [length x r], a copy */
+  readonly displacements: Float64Array;
+}
+
+/** A pack prepared for stepping. */
+export interface Model extends Owner {
+  /** r */
+  readonly modes: number;
+  /** n */
+  readonly vertices: number;
+  /** K; 0 without an example force */
+  readonly examples: number;
+  /** [s] */
+  readonly timeStep: number;
+  readonly Body: new () => Body;
+  readonly Batch: new (count: number) => Batch;
+  allVertices(): Points;
+  points(ids: Numbers): Points;
+  /** Points of the rest shape [3k] [m]. */
+  pointsAt(xyz: Numbers): Points;
+  exampleName(example: number, region?: number): string;
+  /** Corners [3f] of the triangles of the object's boundary, numbers of vertices. */
+  triangles(): Uint32Array;
+}
+
+/** Loads a pack: a URL, in Node also a path, or its bytes. */
+export function load(source: string | URL | ArrayBuffer | Uint8Array | Response, settings?: Settings): Promise<Model>;
+/** Starts the module, which load() does by itself. */
+export function init(): Promise<void>;

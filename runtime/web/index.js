@@ -1,0 +1,11 @@
+import { hasSimd, packageOf } from "./runtime.js";
+
+export { Batch, BadInput, Body, ExmatError, InvalidArgument, NonFinite, Points } from "./runtime.js";
+
+async function moduleBytes() {
+  const url = hasSimd() ? new URL("./exmat.wasm", import.meta.url) : new URL("./exmat_plain.wasm", import.meta.url);
+  if (url.protocol === "file:") return (await import("node:fs/promises")).readFile(url);
+  return (await fetch(url)).arrayBuffer();
+}
+
+export const { init, load, World } = packageOf(moduleBytes);
