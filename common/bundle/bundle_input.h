@@ -11,6 +11,7 @@ namespace exmat {
 /// A bundle to be read: a file, HDF5 or a pack, or a pack in memory.
 class BundleInput {
  public:
+  BundleInput() = default;
   template <typename File>
   requires(std::convertible_to<const File&, std::filesystem::path> && !std::same_as<File, BundleInput>)
       BundleInput(const File& file)

@@ -11,7 +11,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-struct Case {
+struct PackCase {
   const char* name;
   test::BarOptions bar;
   bool contact;
@@ -19,7 +19,7 @@ struct Case {
 };
 
 /// A model of a pack in memory beside one of the bundle that the pack was made of.
-class PackModel : public ::testing::TestWithParam<Case> {
+class PackModel : public ::testing::TestWithParam<PackCase> {
  protected:
   void SetUp() override {
     test::Bar bar = test::make_bar(GetParam().bar);
@@ -66,11 +66,12 @@ class PackModel : public ::testing::TestWithParam<Case> {
   std::string pack_;
   exmat_settings settings_ = exmat::default_settings();
 };
-INSTANTIATE_TEST_SUITE_P(Bodies, PackModel,
-                         ::testing::Values(Case{"clamped_with_examples", {.examples = 3}, false, EXMAT_SPACE_REDUCED},
-                                           Case{"free_in_contact", {.free = true}, true, EXMAT_SPACE_REDUCED},
-                                           Case{"full_space", {}, false, EXMAT_SPACE_FULL}),
-                         [](const auto& test) { return std::string(test.param.name); });
+INSTANTIATE_TEST_SUITE_P(
+    Bodies, PackModel,
+    ::testing::Values(PackCase{"clamped_with_examples", {.examples = 3}, false, EXMAT_SPACE_REDUCED},
+                      PackCase{"free_in_contact", {.free = true}, true, EXMAT_SPACE_REDUCED},
+                      PackCase{"full_space", {}, false, EXMAT_SPACE_FULL}),
+    [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(PackModel, StepsAsThatOfItsBundleToTheLastBit) {
   EXPECT_EQ(hash_after_steps(of_pack()), hash_after_steps(of_bundle()));
