@@ -8,6 +8,7 @@
 #include "common/bundle/fields.h"
 #include "common/bundle/file_schemas.h"
 #include "common/config/embedded_schema.h"
+#include "common/hdf5/hdf5_file.h"
 #include "common/hdf5/schema.h"
 #include "tests/common/bundle/small_model.h"
 
