@@ -233,8 +233,14 @@ void LookWriter::add_nodes() {
                },
                [&](int) { above.pop_back(); }});
   std::set<int> kept;
-  for (const auto& [node, mesh] : mesh_of_node_)
+  // The node of a mesh with a skin counts for nothing: it becomes a root where the bones were bound.
+  std::map<int, Eigen::Matrix4d> bound;
+  for (const DrawnPrimitive& drawn : shapes_.primitives)
+    if (drawn.bound) bound[drawn.node] = drawn.bound->matrix();
+  for (const auto& [node, mesh] : mesh_of_node_) {
+    if (bound.contains(node)) parents[static_cast<std::size_t>(node)] = -1;
     for (int at = node; at >= 0 && kept.insert(at).second;) at = parents[static_cast<std::size_t>(at)];
+  }
   int next = 0;
   for (const int node : kept) place[static_cast<std::size_t>(node)] = next++;
   Json roots = Json::array();
@@ -244,9 +250,13 @@ void LookWriter::add_nodes() {
     Json& to = list.emplace_back(Json::object());
     keep(from, to, {"name"}, Json::value_t::string);
     keep(from, to, {"extras"}, Json::value_t::object);
-    keep(from, to, {"matrix", "translation", "rotation", "scale"}, Json::value_t::array);
+    if (const auto matrix = bound.find(node); matrix != bound.end())
+      to["matrix"] = std::vector<double>(matrix->second.data(), matrix->second.data() + matrix->second.size());
+    else
+      keep(from, to, {"matrix", "translation", "rotation", "scale"}, Json::value_t::array);
     for (const int child : shapes_.document.model.nodes[static_cast<std::size_t>(node)].children)
-      if (kept.contains(child)) to["children"].push_back(place[static_cast<std::size_t>(child)]);
+      if (kept.contains(child) && parents[static_cast<std::size_t>(child)] == node)
+        to["children"].push_back(place[static_cast<std::size_t>(child)]);
     if (const auto mesh = mesh_of_node_.find(node); mesh != mesh_of_node_.end()) to["mesh"] = mesh->second;
     if (parents[static_cast<std::size_t>(node)] < 0) roots.push_back(place[static_cast<std::size_t>(node)]);
   }

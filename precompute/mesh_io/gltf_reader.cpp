@@ -127,8 +127,11 @@ void GltfReader::begin_node(int index, const Eigen::Affine3d& to_scene) {
   if (static_cast<std::size_t>(node.mesh) >= document_.model.meshes.size())
     fail_in_gltf(file_, place + "/mesh", fmt::format("a mesh below {}", document_.model.meshes.size()),
                  std::to_string(node.mesh));
-  Instance instance{document_.model.meshes[static_cast<std::size_t>(node.mesh)], fmt::format("/meshes/{}", node.mesh),
-                    node.skin >= 0 ? skeleton_.to_scene(node.skin) : to_scene, index, node.skin,
+  Instance instance{document_.model.meshes[static_cast<std::size_t>(node.mesh)],
+                    fmt::format("/meshes/{}", node.mesh),
+                    node.skin >= 0 ? skeleton_.to_scene(node.skin) : to_scene,
+                    index,
+                    node.skin,
                     skeleton_.bone_above(index)};
   ++nodes_with_meshes_;
   meshes_.insert(node.mesh);
@@ -177,7 +180,8 @@ void GltfReader::add_primitive(Instance& instance, std::size_t index, const std:
                  fmt::format("{} targets, as the first primitive of the mesh has", instance.morphs.size()),
                  std::to_string(primitive.targets.size()));
   const std::size_t first = add_vertices(instance, primitive, place);
-  primitives_.push_back({instance.node, index, static_cast<Eigen::Index>(first), instance.to_scene.linear()});
+  primitives_.push_back({instance.node, index, static_cast<Eigen::Index>(first), instance.to_scene.linear(),
+                         instance.skin >= 0 ? std::optional(instance.to_scene) : std::nullopt});
   const std::size_t count = accessors_.count(primitive.attributes.at("POSITION"));
   std::vector<std::uint32_t> corners;
   spend(primitive.indices >= 0 ? accessors_.count(primitive.indices) : count, 1, place);

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "precompute/mesh_io/gltf_document.h"
@@ -25,9 +27,10 @@ SurfaceFile read_gltf(const std::filesystem::path& file);
 /// Place of a primitive's vertices among those of a surface.
 struct DrawnPrimitive {
   int node = 0;
-  std::size_t primitive = 0;  ///< of the node's mesh
-  Eigen::Index first = 0;     ///< vertex; the others follow in the order of the primitive's accessors
-  Eigen::Matrix3d to_scene;   ///< linear part of the node's transform
+  std::size_t primitive = 0;               ///< of the node's mesh
+  Eigen::Index first = 0;                  ///< vertex; the others follow in the order of the primitive's accessors
+  Eigen::Matrix3d to_scene;                ///< linear part of the node's transform, of a mesh with a skin of `bound`
+  std::optional<Eigen::Affine3d> bound{};  ///< from a mesh with a skin to the scene
 };
 
 /// The same with what it was read from. Primitives of triangles alone, in the order of the nodes.
