@@ -10,6 +10,7 @@
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/config/json_values.h"
+#include "common/config/selection_reader.h"
 #include "common/core/error.h"
 #include "common/core/input_file.h"
 

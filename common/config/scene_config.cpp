@@ -12,6 +12,7 @@
 #include "common/config/motion_reader.h"
 #include "common/config/obstacle_reader.h"
 #include "common/config/pose_file.h"
+#include "common/config/selection_reader.h"
 #include "common/config/vertex_ids.h"
 #include "common/core/error.h"
 

@@ -8,7 +8,6 @@
 #include <variant>
 #include <vector>
 
-#include "common/config/json_values.h"
 #include "common/core/arrays.h"
 #include "common/model/vertex_marks.h"
 
@@ -46,10 +45,6 @@ struct PointSelection {
 };
 using VertexSelection = std::variant<BoxSelection, SphereSelection, FileSelection, IdSelection, PartSelection,
                                      ColourSelection, PointSelection>;
-
-/// Reads a selection that check_against_schema has passed. Throws InputError where a box is turned inside out or an id
-/// is repeated.
-VertexSelection read_selection(const Json& json, const std::filesystem::path& file, const std::string& place);
 
 /// True if the selection asks for the marks of a surface.
 bool needs_marks(const VertexSelection& selection);

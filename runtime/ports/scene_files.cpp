@@ -1,3 +1,4 @@
+#include "common/bundle/scene_places.h"
 #include "common/core/error.h"
 #include "common/surface_io/height_reader.h"
 #include "common/surface_io/plain_surface.h"
@@ -21,6 +22,9 @@ namespace {
 SurfaceFile read_plain_surface(const std::filesystem::path& file) { refuse_file(file); }
 
 RowMatrix read_heights(const std::filesystem::path& file) { refuse_file(file); }
+
+// Settings name no forces.
+std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config) { return config.forces; }
 
 }  // namespace exmat
 

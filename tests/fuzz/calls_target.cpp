@@ -434,7 +434,7 @@ class Calls {
   void set() {
     exmat_body* const one = body();
     const std::int64_t modes = exmat_body_state_size(one) < 0 ? 1 : modes_of(one);
-    switch (choices_.below(16)) {
+    switch (choices_.below(18)) {
       case 0: {
         const std::vector<double> q = choices_.numbers(modes), v = choices_.numbers(modes);
         checked(
@@ -491,6 +491,31 @@ class Calls {
       case 14: {
         Padded<exmat_contact_law> padded;
         checked(exmat_world_set_contact_law(world(), &law(padded)));
+        return;
+      }
+      case 15: {
+        exmat_attachment attachment;
+        checked(exmat_attachment_default(&attachment, sizeof attachment));
+        attachment.kind = choices_.one_in(2) ? 0 : choices_.small();
+        if (choices_.one_in(2)) attachment.stiffness = choices_.number();
+        if (choices_.one_in(2)) attachment.damping = choices_.number();
+        if (choices_.one_in(4)) attachment.break_force = choices_.number();
+        choices_.size(attachment);
+        std::vector<std::int64_t> vertices(choices_.below(4) + 1);
+        for (std::int64_t& vertex : vertices) vertex = choices_.one_in(2) ? choices_.whole() : 7 + choices_.whole();
+        const auto right = static_cast<std::int64_t>(vertices.size());
+        std::int64_t id = -1;
+        checked(exmat_body_attach(one, vertices.data(), choices_.one_in(8) ? -right : right, &attachment,
+                                  choices_.numbers(12).data(), choices_.one_in(12) ? nullptr : &id));
+        return;
+      }
+      case 16: {
+        const std::int64_t id = choices_.whole();
+        std::array<double, 3> force{};
+        checked(choices_.one_in(2)   ? exmat_body_move_attachment(one, id, choices_.numbers(12).data())
+                : choices_.one_in(2) ? exmat_body_detach(one, id)
+                                     : exmat_body_read_attachment_load(one, id, force.data(), nullptr, nullptr));
+        checked(exmat_body_set_bones(one, choices_.numbers(12).data(), choices_.whole(), choices_.small()));
         return;
       }
       default:

@@ -80,8 +80,8 @@ class LeavingOut : public testing::Test {
       if (entry.included) included.push_back(entry.group);
     }
     EXPECT_EQ(included, groups);
-    EXPECT_EQ(built.report.ledger.size(),
-              kAll.size() + 4);  // and fidelity, regions and render, which there is nothing for, and target_elasticity
+    // And fidelity, regions, render and skeleton, which there is nothing for, and target_elasticity.
+    EXPECT_EQ(built.report.ledger.size(), kAll.size() + 5);
   }
 
   /// What the run time reads of bundle.h5 for a scene.

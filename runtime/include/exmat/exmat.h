@@ -383,8 +383,8 @@ EXMAT_API exmat_status exmat_body_detach(exmat_body* body, int64_t id) EXMAT_NOE
 
 /* What the body exerts on the frame in the last step: `force` [3] [N] and `torque` [3] about the frame's origin [N m].
    `broken`: 1 where that was more than the attachment bears. Each may be NULL. */
-EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, int64_t id, double* force, double* torque,
-                                                       int32_t* broken) EXMAT_NOEXCEPT;
+EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, int64_t id, double* force,
+                                                       double* torque, int32_t* broken) EXMAT_NOEXCEPT;
 
 /* Settings of the example force. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model
    has to have that example force: use_examples, or the scene. */

@@ -63,12 +63,12 @@ struct FullMotion : Motion {
 /// All that a body carries from step to step. r modes. Of a body in full space the reduced coordinates are those of the
 /// modes nearest to it, and steps change them with it.
 struct State : Motion {
-  std::vector<ExampleState> examples;  ///< one for each of the model's example forces
-  ContactState contacts;               ///< what touches; sized for its scene by prepare_contacts()
-  SleepState sleep;                    ///< where the scene lets bodies sleep
-  FrameState frame;                    ///< of the model's frame; nothing of a clamped body
-  std::optional<FullMotion> full;      ///< in full space
-  Eigen::VectorXd vertex_force;        ///< [f] of the caller, world [N], of a body that may step in full space
+  std::vector<ExampleState> examples;   ///< one for each of the model's example forces
+  ContactState contacts;                ///< what touches; sized for its scene by prepare_contacts()
+  SleepState sleep;                     ///< where the scene lets bodies sleep
+  FrameState frame;                     ///< of the model's frame; nothing of a clamped body
+  std::optional<FullMotion> full;       ///< in full space
+  Eigen::VectorXd vertex_force;         ///< [f] of the caller, world [N], of a body that may step in full space
   std::vector<Attachment> attachments;  ///< of its host, likewise
 };
 

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/config/selection_reader.h"
 #include "common/core/error.h"
 
 namespace exmat {

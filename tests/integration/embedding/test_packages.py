@@ -57,7 +57,7 @@ class Packages(unittest.TestCase):
     def test_man_pages_say_what_help_says(self):
         pages = self.unpacked("exmat-runtime") / "usr/share/man/man1"
         self.assertEqual({f"usr/share/man/man1/{page.name}" for page in pages.iterdir()},
-                         self.man_pages("exmat-runtime", "run", "bench", "export", "info", "validate"))
+                         self.man_pages("exmat-runtime", "run", "bench", "export", "info", "pack", "validate"))
         text = output_of("man", "-l", str(pages / "exmat-runtime-run.1.gz"))
         for option in re.findall(r"--[a-z-]+", output_of(str(BUILD / "bin/exmat-runtime"), "run", "--help")):
             self.assertIn(option, text)
