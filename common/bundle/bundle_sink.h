@@ -9,7 +9,7 @@
 
 namespace exmat {
 
-/// What a bundle is written to. A group comes before what is in it.
+/// Receives all that a bundle holds, a group before what is in it.
 class BundleSink {
  public:
   virtual ~BundleSink() = default;

@@ -9,6 +9,7 @@
 
 #include "common/core/crc32.h"
 #include "common/core/error.h"
+#include "common/core/saturating_product.h"
 
 namespace exmat {
 namespace {
@@ -36,7 +37,7 @@ class PackArray : public StoredArray {
   std::optional<ElementType> type() const override { return array_.type; }
   std::string type_name() const override { return std::string(name_of(array_.type)); }
   std::size_t element_count() const override {
-    return array_.is_held ? array_.data.size() / size_of(array_.type) : count_of_sizes();
+    return array_.is_held ? array_.data.size() / size_of(array_.type) : saturating_product(array_.sizes, 1);
   }
   bool is_held() const override { return array_.is_held; }
   void check_storage() const override {}  // when the pack was opened
@@ -50,15 +51,6 @@ class PackArray : public StoredArray {
   }
 
  private:
-  std::size_t count_of_sizes() const {
-    std::size_t count = 1;
-    for (const std::int64_t size : array_.sizes)
-      count = size != 0 && count > std::numeric_limits<std::size_t>::max() / static_cast<std::size_t>(size)
-                  ? std::numeric_limits<std::size_t>::max()
-                  : count * static_cast<std::size_t>(size);
-    return count;
-  }
-
   const PackStore::Array& array_;
   std::string path_;
 };

@@ -16,7 +16,7 @@ std::optional<ValueFault> check_exponent_rows(std::int64_t degree, const IndexMa
 /// Fault unless they begin at 0 and end at 1, with others between for two examples only.
 std::optional<ValueFault> check_knots(const Eigen::VectorXd& knots, Eigen::Index examples);
 
-/// What is wrong with a skeleton whose arrays fit each other in size, or nothing.
+/// The first fault of a skeleton whose arrays fit each other in size, or nothing.
 struct PlacedFault {
   std::string place, expected, found;
 };

@@ -28,6 +28,17 @@ function(exmat_unity name)
   set_target_properties(${name} PROPERTIES UNITY_BUILD_MODE GROUP)
 endfunction()
 
+# exmat_embed_schemas(SOURCE SCHEMA...): sets SOURCE to a source that holds these as exmat::embedded_schema("NAME").
+function(exmat_embed_schemas source)
+  set(embedded ${CMAKE_CURRENT_BINARY_DIR}/embedded_schemas.cpp)
+  add_custom_command(
+    OUTPUT ${embedded}
+    COMMAND ${CMAKE_COMMAND} -DOUTPUT=${embedded} "-DSCHEMAS=${ARGN}" -P ${exmat_SOURCE_DIR}/schemas/embed.cmake
+    DEPENDS ${ARGN} ${exmat_SOURCE_DIR}/schemas/embed.cmake
+    VERBATIM)
+  set(${source} ${embedded} PARENT_SCOPE)
+endfunction()
+
 # exmat_target(NAME): what all targets have in common. Without the extensions of GNU products are not contracted.
 function(exmat_target name)
   target_compile_features(${name} PRIVATE cxx_std_20)

@@ -49,7 +49,7 @@ using VertexSelection = std::variant<BoxSelection, SphereSelection, FileSelectio
 /// True if the selection asks for the marks of a surface.
 bool needs_marks(const VertexSelection& selection);
 
-/// What a selection chooses from, and what messages call it.
+/// Points to choose from, and what messages call them.
 struct SelectablePoints {
   const VertexArray& points;           ///< at rest [m]
   const VertexMarks* marks = nullptr;  ///< of the points; none where the object was not made about a surface

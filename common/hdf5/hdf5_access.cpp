@@ -113,16 +113,6 @@ std::vector<std::int64_t> sizes_of(hid_t space) {
   return sizes;
 }
 
-std::size_t saturating_product(std::size_t a, std::size_t b) {
-  constexpr std::size_t kMax = std::numeric_limits<std::size_t>::max();
-  return a != 0 && b > kMax / a ? kMax : a * b;
-}
-
-std::size_t saturating_product(std::span<const std::int64_t> sizes, std::size_t bytes) {
-  for (const std::int64_t size : sizes) bytes = saturating_product(bytes, static_cast<std::size_t>(size));
-  return bytes;
-}
-
 Hdf5Handle make_space(std::span<const std::int64_t> sizes) {
   if (sizes.empty()) return make_handle(H5Screate(H5S_SCALAR), H5Sclose);
   const auto raw = to_hsize(sizes);

@@ -43,9 +43,6 @@ std::string describe_type(hid_t type);
 std::vector<hsize_t> to_hsize(std::span<const std::int64_t> sizes);
 /// Sizes beyond int64 are cut to its maximum, which Hdf5Dataset::check_storage() refuses.
 std::vector<std::int64_t> sizes_of(hid_t space);
-/// The largest number where the product overflows.
-std::size_t saturating_product(std::size_t a, std::size_t b);
-std::size_t saturating_product(std::span<const std::int64_t> sizes, std::size_t bytes);
 
 /// A dataspace of these sizes; none: a scalar.
 Hdf5Handle make_space(std::span<const std::int64_t> sizes);

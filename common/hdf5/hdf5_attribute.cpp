@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/core/error.h"
+#include "common/core/saturating_product.h"
 #include "common/hdf5/hdf5_access.h"
 #include "common/hdf5/hdf5_file.h"
 

@@ -11,6 +11,7 @@
 
 #include "common/core/command_files.h"
 #include "common/core/error.h"
+#include "common/core/saturating_product.h"
 #include "common/hdf5/hdf5_access.h"
 
 namespace exmat {

@@ -131,7 +131,7 @@ FileNumbers numbers_of(const CheckedMesh& checked) {
   return {checked.report.kept_vertices, checked.file_vertices.rows()};
 }
 
-// What a glTF file says of the looks of a render mesh.
+// Adds the look of a render mesh that comes from glTF.
 void add_look(const AssetConfig& asset, InputFiles& files, std::vector<std::string>& warnings, RenderData& render) {
   const std::string extension = lower_extension(*asset.render_mesh);
   if (extension != ".glb" && extension != ".gltf") return;

@@ -225,13 +225,7 @@ Json LookWriter::variants_of(const Json& from) const {
 /// The nodes that have primitives or are above such, in the order of the file.
 void LookWriter::add_nodes() {
   const Json& nodes = source_["nodes"];
-  std::vector<int> parents(nodes.size(), -1), place(nodes.size(), -1), above;
-  visit_nodes(file_, shapes_.document.model,
-              {[&](int node, const Eigen::Affine3d&) {
-                 parents[static_cast<std::size_t>(node)] = above.empty() ? -1 : above.back();
-                 above.push_back(node);
-               },
-               [&](int) { above.pop_back(); }});
+  std::vector<int> parents = node_tree(file_, shapes_.document.model).parents, place(nodes.size(), -1);
   std::set<int> kept;
   // The node of a mesh with a skin counts for nothing: it becomes a root where the bones were bound.
   std::map<int, Eigen::Matrix4d> bound;

@@ -19,7 +19,7 @@ struct SurfaceLook {
   std::vector<std::string> remarks;           ///< what a user should know, a sentence each
 };
 
-/// What a glTF file says about how its surface looks, lengths times `unit`. The attributes NORMAL, TEXCOORD_n, COLOR_n
+/// Reads how the surface of a glTF file looks, lengths times `unit`. The attributes NORMAL, TEXCOORD_n, COLOR_n
 /// and custom ones stay as they are, as do names, extras, materials and textures. Each node has a mesh of its own.
 /// Images of files and of data URIs become part of it; one that is not in the file's folder or below keeps its URI.
 /// Left out are tangents, which would have to move, morph targets, animations, cameras and lights, and attributes that

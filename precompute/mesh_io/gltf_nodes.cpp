@@ -101,14 +101,31 @@ Eigen::Affine3d own_transform(const std::string& file, const tinygltf::Node& nod
   return transform;
 }
 
-std::string unique_name(const std::string& name, const std::set<std::string>& taken) {
+std::string unique_name(const std::string& name, std::set<std::string>& taken) {
   std::string unique = name;
-  for (int number = 2; taken.contains(unique); ++number) unique = fmt::format("{} {}", name, number);
+  for (int number = 2; !taken.insert(unique).second; ++number) unique = fmt::format("{} {}", name, number);
   return unique;
 }
 
 void visit_nodes(const std::string& file, const tinygltf::Model& model, const NodeVisitor& visitor) {
   Walk(file, model, visitor).run();
+}
+
+NodeTree node_tree(const std::string& file, const tinygltf::Model& model) {
+  NodeTree tree{{},
+                std::vector<int>(model.nodes.size(), -1),
+                std::vector<Eigen::Affine3d>(model.nodes.size(), Eigen::Affine3d::Identity())};
+  std::vector<int> above;
+  visit_nodes(file, model,
+              {[&](int node, const Eigen::Affine3d& to_scene) {
+                 const auto index = static_cast<std::size_t>(node);
+                 tree.order.push_back(node);
+                 tree.to_scene[index] = to_scene;
+                 if (!above.empty()) tree.parents[index] = above.back();
+                 above.push_back(node);
+               },
+               [&](int) { above.pop_back(); }});
+  return tree;
 }
 
 }  // namespace exmat::precompute

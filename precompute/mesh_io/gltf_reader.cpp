@@ -158,7 +158,6 @@ void GltfReader::name_targets(Instance& instance) {
     std::string name = k < names.ArrayLen() ? names.Get(static_cast<int>(k)).Get<std::string>() : "";
     if (name.empty()) name = fmt::format("target {}", k);
     name = unique_name(name, own);
-    own.insert(name);
     const auto [known, is_new] = morph_of_name_.try_emplace(name, morph_names_.size());
     instance.morphs.push_back(known->second);
     if (is_new) morph_names_.push_back(std::move(name));

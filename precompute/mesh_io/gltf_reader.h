@@ -17,7 +17,7 @@ namespace exmat::precompute {
 /// triangles' vertices of materials, meshes and nodes (with what hangs below them), and vertices whose custom scalar
 /// attribute is above 0.5, by its name with the underscore. Vertices without colours are white where others have some.
 ///
-/// Of a file with skins the mesh is where its bones were bound, on a skeleton; what has no skin hangs on the
+/// The mesh of a file with skins is where its bones were bound, on a skeleton; what has no skin hangs on the
 /// bone above it.
 ///
 /// Throws InputError (see read_gltf_document), also for nodes that are no tree and for shapes that repeat

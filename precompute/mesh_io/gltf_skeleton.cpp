@@ -51,24 +51,16 @@ Eigen::VectorXd GltfSkeleton::Channel::at(double time) const {
 }
 
 GltfSkeleton::GltfSkeleton(const std::string& file, const GltfDocument& document, const GltfAccessors& accessors)
-    : file_(file), model_(document.model), accessors_(accessors), parents_(document.model.nodes.size(), -1) {
+    : file_(file), model_(document.model), accessors_(accessors) {
   if (model_.skins.empty()) return;
-  std::vector<int> above;
-  visit_nodes(file_, model_,
-              {[&](int node, const Eigen::Affine3d&) {
-                 order_.push_back(node);
-                 parents_[static_cast<std::size_t>(node)] = above.empty() ? -1 : above.back();
-                 above.push_back(node);
-               },
-               [&](int) { above.pop_back(); }});
-  rest_ = transforms(model_.nodes);
+  tree_ = node_tree(file_, model_);
   std::set<int> used;
-  for (const int node : order_) used.insert(model_.nodes[static_cast<std::size_t>(node)].skin);
+  for (const int node : tree_.order) used.insert(model_.nodes[static_cast<std::size_t>(node)].skin);
   // Bones are numbered as the scene has them: parents come first.
   std::set<int> joints;
   for (std::size_t s = 0; s < model_.skins.size(); ++s)
     if (used.contains(static_cast<int>(s))) joints.insert(model_.skins[s].joints.begin(), model_.skins[s].joints.end());
-  for (const int node : order_)
+  for (const int node : tree_.order)
     if (joints.contains(node)) {
       bone_of_[node] = joints_.size();
       joints_.push_back(node);
@@ -76,8 +68,6 @@ GltfSkeleton::GltfSkeleton(const std::string& file, const GltfDocument& document
   binds_.resize(joints_.size(), Eigen::Affine3d(Eigen::Matrix4d::Zero()));
   for (std::size_t s = 0; s < model_.skins.size(); ++s)
     skins_.push_back(used.contains(static_cast<int>(s)) ? read_skin(static_cast<int>(s)) : Skin{});
-  for (std::size_t b = 0; b < binds_.size(); ++b)
-    if (binds_[b].linear().isZero(0)) binds_[b] = rest_[static_cast<std::size_t>(joints_[b])];
 }
 
 GltfSkeleton::Skin GltfSkeleton::read_skin(int index) {
@@ -108,7 +98,7 @@ GltfSkeleton::Skin GltfSkeleton::read_skin(int index) {
     skin.bones.push_back(bone->second);
     if (bone->second < skin.bones[root]) root = j;
   }
-  skin.to_scene = rest_[static_cast<std::size_t>(source.joints[root])] * inverses[root];
+  skin.to_scene = tree_.to_scene[static_cast<std::size_t>(source.joints[root])] * inverses[root];
   for (std::size_t j = 0; j < inverses.size(); ++j)
     bind(skin.bones[j], skin.to_scene * inverses[j].inverse(), fmt::format("{}/inverseBindMatrices", place));
   return skin;
@@ -130,17 +120,18 @@ void GltfSkeleton::bind(std::size_t bone, const Eigen::Affine3d& to_scene, const
                  "apply the pose of each armature as its rest pose, or export the skins as one");
 }
 
-std::size_t GltfSkeleton::bone_above(int node) const {
-  for (; node >= 0; node = parents_[static_cast<std::size_t>(node)])
+std::optional<std::size_t> GltfSkeleton::bone_at_or_above(int node) const {
+  if (empty()) return std::nullopt;
+  for (; node >= 0; node = tree_.parents[static_cast<std::size_t>(node)])
     if (const auto found = bone_of_.find(node); found != bone_of_.end()) return found->second;
-  return 0;
+  return std::nullopt;
 }
 
-GltfSkeleton::Transforms GltfSkeleton::transforms(const std::vector<tinygltf::Node>& nodes) const {
-  Transforms result(nodes.size(), Eigen::Affine3d::Identity());
-  for (const int node : order_) {
+std::vector<Eigen::Affine3d> GltfSkeleton::transforms(const std::vector<tinygltf::Node>& nodes) const {
+  std::vector<Eigen::Affine3d> result(nodes.size(), Eigen::Affine3d::Identity());
+  for (const int node : tree_.order) {
     const auto index = static_cast<std::size_t>(node);
-    const int parent = parents_[index];
+    const int parent = tree_.parents[index];
     const Eigen::Affine3d own = own_transform(file_, nodes[index], place_of("nodes", index));
     result[index] = parent < 0 ? own : result[static_cast<std::size_t>(parent)] * own;
   }
@@ -157,14 +148,9 @@ SkeletonData GltfSkeleton::data(std::vector<std::string>& remarks) const {
     const int node = joints_[static_cast<std::size_t>(b)];
     std::string name = model_.nodes[static_cast<std::size_t>(node)].name;
     if (name.empty()) name = fmt::format("bone {}", b);
-    name = unique_name(name, taken);
-    taken.insert(name);
-    data.bones.push_back(std::move(name));
-    const int parent = parents_[static_cast<std::size_t>(node)];
-    data.parents[b] = -1;
-    for (int above = parent; above >= 0 && data.parents[b] < 0; above = parents_[static_cast<std::size_t>(above)])
-      if (const auto found = bone_of_.find(above); found != bone_of_.end())
-        data.parents[b] = static_cast<std::int32_t>(found->second);
+    data.bones.push_back(unique_name(name, taken));
+    const auto parent = bone_at_or_above(tree_.parents[static_cast<std::size_t>(node)]);
+    data.parents[b] = parent ? static_cast<std::int32_t>(*parent) : -1;
     const Eigen::Affine3d& bind = binds_[static_cast<std::size_t>(b)];
     data.bind.middleRows(3 * b, 3) << bind.linear(), bind.translation();
   }
@@ -222,9 +208,9 @@ std::vector<double> GltfSkeleton::frame_times(const std::vector<Channel>& channe
 }
 
 void GltfSkeleton::add_animations(SkeletonData& data, std::vector<std::string>& remarks) const {
-  std::vector<double> times;
+  std::vector<double> times, poses;
   std::vector<std::int32_t> first_frames{0};
-  std::vector<std::vector<Eigen::Affine3d>> frames;
+  double stretch = 0;
   std::set<std::string> taken;
   for (std::size_t a = 0; a < model_.animations.size(); ++a) {
     const tinygltf::Animation& animation = model_.animations[a];
@@ -244,26 +230,22 @@ void GltfSkeleton::add_animations(SkeletonData& data, std::vector<std::string>& 
         const Eigen::VectorXd value = channel.at(time);
         moved.assign(value.begin(), value.end());
       }
-      frames.push_back(transforms(nodes));
       times.push_back(time);
+      const std::vector<Eigen::Affine3d> to_scene = transforms(nodes);
+      for (std::size_t b = 0; b < size(); ++b) {
+        const Eigen::Affine3d& now = to_scene[static_cast<std::size_t>(joints_[b])];
+        const Eigen::Vector3d joint = now.translation();
+        const Eigen::Quaterniond turn = turn_of((now * binds_[b].inverse()).linear(), stretch);
+        poses.insert(poses.end(), {joint.x(), joint.y(), joint.z(), turn.w(), turn.x(), turn.y(), turn.z()});
+      }
     }
     first_frames.push_back(static_cast<std::int32_t>(times.size()));
-    const std::string name =
-        unique_name(animation.name.empty() ? fmt::format("animation {}", a) : animation.name, taken);
-    taken.insert(name);
-    data.animations.push_back(name);
+    data.animations.push_back(
+        unique_name(animation.name.empty() ? fmt::format("animation {}", a) : animation.name, taken));
   }
   data.first_frames = Eigen::Map<const IndexVector>(first_frames.data(), std::ssize(first_frames));
   data.times = Eigen::Map<const Eigen::VectorXd>(times.data(), std::ssize(times));
-  data.poses.resize(std::ssize(times) * static_cast<Eigen::Index>(size()), 7);
-  double stretch = 0;
-  for (std::size_t f = 0; f < frames.size(); ++f)
-    for (std::size_t b = 0; b < size(); ++b) {
-      const Eigen::Affine3d& now = frames[f][static_cast<std::size_t>(joints_[b])];
-      const Eigen::Quaterniond turn = turn_of((now * binds_[b].inverse()).linear(), stretch);
-      data.poses.row(static_cast<Eigen::Index>(f * size() + b)) << now.translation().transpose(), turn.w(), turn.x(),
-          turn.y(), turn.z();
-    }
+  data.poses = Eigen::Map<const RowMatrix>(poses.data(), std::ssize(poses) / 7, 7);
   if (stretch > kStretch)
     remarks.push_back(fmt::format("animations stretch bones by up to {:.0f} %, which is left out: bones turn and move",
                                   100 * stretch));

@@ -65,4 +65,12 @@ void give_entry(const Struct& from, std::size_t size, void* to) noexcept {
   std::memcpy(to, &from, std::min(size, sizeof from));
 }
 
+/// What the caller's version knows of a struct, the rest as it is in `known`.
+template <typename Struct>
+Struct completed(const Struct& given, Struct known) noexcept {
+  std::memcpy(static_cast<void*>(&known), &given, std::min(given.size, sizeof known));
+  known.size = sizeof known;
+  return known;
+}
+
 }  // namespace exmat::runtime

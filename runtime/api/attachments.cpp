@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cinttypes>
-#include <cmath>
+#include <limits>
 
 #include "common/elastic/polar_rotation.h"
 #include "exmat/exmat.h"
-#include "runtime/api/arguments.h"
+#include "runtime/api/frames.h"
 #include "runtime/api/handles.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/sim/space/full/full_body.h"
@@ -14,23 +14,22 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-constexpr std::int64_t kFrameNumbers = 12;
-constexpr double kLargest = 1e30;
-
-bool is_frame(const double* numbers) noexcept {
-  return std::all_of(numbers, numbers + kFrameNumbers, [](double number) { return std::abs(number) <= kLargest; });
-}
-
 void set_frame(const double* numbers, Attachment& attachment) {
-  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(numbers);
-  attachment.rotation = nearest_rotation(matrix.leftCols<3>());
-  attachment.position = matrix.col(3);
+  attachment.rotation = nearest_rotation(frame_at(numbers).leftCols<3>());
+  attachment.position = frame_at(numbers).col(3);
 }
 
-/// Null where there is none.
-Attachment* find(State& state, std::int64_t id) noexcept {
-  const auto found = std::ranges::find(state.attachments, id, &Attachment::id);
-  return found == state.attachments.end() ? nullptr : &*found;
+/// Null where there is none, which is the error then.
+template <typename Body>
+auto* find(const char* function, Body& body, std::int64_t id) noexcept {
+  const auto found = std::ranges::find(body.state.attachments, id, &Attachment::id);
+  if (found != body.state.attachments.end()) return &*found;
+  fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", function, id);
+  return static_cast<decltype(&*found)>(nullptr);
+}
+
+exmat_attachment default_attachment() noexcept {
+  return {sizeof(exmat_attachment), EXMAT_ATTACHMENT_FIXED, 1e4, 0, std::numeric_limits<double>::infinity()};
 }
 
 /// Null, or why the vertex cannot be held.
@@ -39,7 +38,7 @@ const char* fault_of(const exmat_body& body, std::int64_t vertex) {
   if (vertex < 0 || vertex >= full.rest.rows()) return "there is no such vertex";
   if (full.space.number(vertex) < 0) return "it is fixed";
   for (const Attachment& other : body.state.attachments)
-    if (std::ranges::count(other.vertices, vertex) > 0) return "it is held already";
+    if (other.holds() && std::ranges::count(other.vertices, vertex) > 0) return "it is held already";
   return nullptr;
 }
 
@@ -84,9 +83,8 @@ void attach(std::span<const std::int64_t> vertices, const exmat_attachment& sett
 
 exmat_status exmat_attachment_default(exmat_attachment* attachment, std::size_t size) noexcept {
   EXMAT_REQUIRE(attachment);
-  if (size != sizeof(exmat_attachment))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected %zu", __func__, size, sizeof(exmat_attachment));
-  *attachment = {sizeof(exmat_attachment), EXMAT_ATTACHMENT_FIXED, 1e4, 0, std::numeric_limits<double>::infinity()};
+  if (const exmat_status status = check_size(__func__, size, kAttachmentSizes)) return status;
+  give(default_attachment(), size, attachment);
   return EXMAT_OK;
 }
 
@@ -98,44 +96,39 @@ exmat_status exmat_body_attach(exmat_body* body, const std::int64_t* vertices, s
   EXMAT_REQUIRE(frame);
   EXMAT_REQUIRE(id);
   if (count < 1) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 1", __func__, count);
-  if (attachment->size != sizeof(exmat_attachment))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: attachment->size = %zu: expected %zu", __func__, attachment->size,
-                sizeof(exmat_attachment));
-  if (attachment->kind < EXMAT_ATTACHMENT_FIXED || attachment->kind > EXMAT_ATTACHMENT_SPRING)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: kind = %" PRId32 ": expected 0 to 2", __func__, attachment->kind);
-  const bool is_spring = attachment->kind == EXMAT_ATTACHMENT_SPRING;
-  if (is_spring && !(attachment->stiffness > 0 && attachment->stiffness <= kLargest && attachment->damping >= 0 &&
-                     attachment->damping <= kLargest))
+  if (const exmat_status status = check_size(__func__, attachment->size, kAttachmentSizes)) return status;
+  const exmat_attachment given = completed(*attachment, default_attachment());
+  if (given.kind < EXMAT_ATTACHMENT_FIXED || given.kind > EXMAT_ATTACHMENT_SPRING)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: kind = %" PRId32 ": expected 0 to 2", __func__, given.kind);
+  const bool is_far = given.stiffness > kFarthest || given.damping > kFarthest;
+  if (given.kind == EXMAT_ATTACHMENT_SPRING && !(given.stiffness > 0 && given.damping >= 0 && !is_far))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: stiffness = %g, damping = %g: expected > 0 and >= 0, up to %g", __func__,
-                attachment->stiffness, attachment->damping, kLargest);
-  if (!(attachment->break_force > 0))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: break_force = %g: expected > 0", __func__, attachment->break_force);
-  if (!is_frame(frame))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: frame: expected finite numbers up to %g", __func__, kLargest);
+                given.stiffness, given.damping, kFarthest);
+  if (!(given.break_force > 0))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: break_force = %g: expected > 0", __func__, given.break_force);
+  if (const exmat_status status = check_frames(__func__, "frame", frame, 1)) return status;
   if (body->full() == nullptr || body->scene.space.space == Space::kReduced)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the body steps in its modes alone: its space has to be full or auto",
                 __func__);
-  return guarded(__func__, [&] {
-    attach({vertices, static_cast<std::size_t>(count)}, *attachment, frame, *body, *id);
-  });
+  return guarded(__func__, [&] { attach({vertices, static_cast<std::size_t>(count)}, given, frame, *body, *id); });
 }
 
 exmat_status exmat_body_move_attachment(exmat_body* body, std::int64_t id, const double* frame) noexcept {
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(frame);
-  if (!is_frame(frame))
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: frame: expected finite numbers up to %g", __func__, kLargest);
-  Attachment* const attachment = find(body->state, id);
-  if (attachment == nullptr)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", __func__, id);
+  if (const exmat_status status = check_frames(__func__, "frame", frame, 1)) return status;
+  Attachment* const attachment = find(__func__, *body, id);
+  if (attachment == nullptr) return EXMAT_INVALID_ARGUMENT;
   set_frame(frame, *attachment);
   return EXMAT_OK;
 }
 
 exmat_status exmat_body_detach(exmat_body* body, std::int64_t id) noexcept {
   EXMAT_REQUIRE(body);
-  if (std::erase_if(body->state.attachments, [id](const Attachment& one) { return one.id == id; }) == 0)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", __func__, id);
+  Attachment* const attachment = find(__func__, *body, id);
+  if (attachment == nullptr) return EXMAT_INVALID_ARGUMENT;
+  auto& all = body->state.attachments;
+  all.erase(all.begin() + (attachment - all.data()));
   body->state.begins_anew = true;
   return EXMAT_OK;
 }
@@ -143,9 +136,8 @@ exmat_status exmat_body_detach(exmat_body* body, std::int64_t id) noexcept {
 exmat_status exmat_body_read_attachment_load(const exmat_body* body, std::int64_t id, double* force, double* torque,
                                              std::int32_t* broken) noexcept {
   EXMAT_REQUIRE(body);
-  const auto found = std::ranges::find(body->state.attachments, id, &Attachment::id);
-  if (found == body->state.attachments.end())
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: id = %" PRId64 ": the body has no such attachment", __func__, id);
+  const Attachment* const found = find(__func__, *body, id);
+  if (found == nullptr) return EXMAT_INVALID_ARGUMENT;
   if (force != nullptr) std::ranges::copy(found->force, force);
   if (torque != nullptr) std::ranges::copy(found->torque, torque);
   if (broken != nullptr) *broken = found->broken ? 1 : 0;

@@ -12,6 +12,30 @@
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
+namespace {
+
+/// Makes a model or a world of a scene's text, under the lock of all reading.
+template <typename Handle, typename Load>
+exmat_status create_from_text(const char* function, const char* scene, const char* path, std::int32_t use_contact,
+                              Handle** made, const Load& load) {
+  if (scene == nullptr) return null_argument(function, "scene");
+  if (path == nullptr) return null_argument(function, "path");
+  if (use_contact != 0 && use_contact != 1)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", function, use_contact);
+  return guarded(function, [&] {
+    const std::lock_guard lock(reading());
+    *made = load(parse_json(scene, path));
+  });
+}
+
+/// Positions are read when they are asked for.
+exmat_world* load_without_trajectory(WorldConfig config) {
+  set_trajectory(std::nullopt, config);
+  return exmat::runtime::load_world(config).release();
+}
+
+}  // namespace
+
 exmat_status exmat_model_create_from_scene(const char* scene_path, exmat_model** model) noexcept {
   EXMAT_REQUIRE(model);
   *model = nullptr;
@@ -26,15 +50,10 @@ exmat_status exmat_model_create_from_text(const char* scene, const char* path, s
                                           exmat_model** model) noexcept {
   EXMAT_REQUIRE(model);
   *model = nullptr;
-  EXMAT_REQUIRE(scene);
-  EXMAT_REQUIRE(path);
-  if (use_contact != 0 && use_contact != 1)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", __func__, use_contact);
-  return guarded(__func__, [&] {
-    const std::lock_guard lock(reading());
-    SceneConfig config = exmat::scene_of(parse_json(scene, path), path);
+  return create_from_text(__func__, scene, path, use_contact, model, [&](const nlohmann::json& json) {
+    SceneConfig config = exmat::scene_of(json, path);
     config.meets_others = use_contact == 1;
-    *model = load_model(std::move(config));
+    return load_model(std::move(config));
   });
 }
 
@@ -44,9 +63,7 @@ exmat_status exmat_world_create_from_scene(const char* scene_path, exmat_world**
   EXMAT_REQUIRE(scene_path);
   return guarded(__func__, [&] {
     const std::lock_guard lock(reading());
-    WorldConfig config = exmat::load_world(scene_path);
-    set_trajectory(std::nullopt, config);  // positions are read when they are asked for
-    *world = exmat::runtime::load_world(config).release();
+    *world = load_without_trajectory(exmat::load_world(scene_path));
   });
 }
 
@@ -54,15 +71,9 @@ exmat_status exmat_world_create_from_text(const char* scene, const char* path, s
                                           exmat_world** world) noexcept {
   EXMAT_REQUIRE(world);
   *world = nullptr;
-  EXMAT_REQUIRE(scene);
-  EXMAT_REQUIRE(path);
-  if (use_contact != 0 && use_contact != 1)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: use_contact = %" PRId32 ": expected 0 or 1", __func__, use_contact);
-  return guarded(__func__, [&] {
-    const std::lock_guard lock(reading());
-    WorldConfig config = world_of(parse_json(scene, path), path);
+  return create_from_text(__func__, scene, path, use_contact, world, [&](const nlohmann::json& json) {
+    WorldConfig config = world_of(json, path);
     for (BodiesConfig& bodies : config.bodies) bodies.scene.meets_others = use_contact == 1;
-    set_trajectory(std::nullopt, config);
-    *world = exmat::runtime::load_world(config).release();
+    return load_without_trajectory(std::move(config));
   });
 }

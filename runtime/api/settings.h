@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 
 #include "common/config/scene_config.h"
@@ -22,6 +23,8 @@ inline constexpr StructSizes kWorldReportSizes{72, sizeof(exmat_world_report)};
 inline constexpr StructSizes kBodyContactSizes{104, sizeof(exmat_body_contact)};
 inline constexpr StructSizes kBundleInfoSizes{72, sizeof(exmat_bundle_info)};
 inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
+inline constexpr StructSizes kAttachmentSizes{offsetof(exmat_attachment, break_force) + sizeof(double),
+                                              sizeof(exmat_attachment)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
 
 /// The defaults of a scene file.

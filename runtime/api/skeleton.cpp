@@ -1,10 +1,10 @@
 #include "runtime/sim/frame/skeleton.h"
 
 #include <cinttypes>
+#include <cmath>
 
 #include "exmat/exmat.h"
-#include "runtime/api/arguments.h"
-#include "runtime/api/body_steps.h"
+#include "runtime/api/frames.h"
 #include "runtime/api/handles.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/sim/space/full/full_body.h"
@@ -13,9 +13,6 @@ using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
-
-constexpr std::int64_t kBoneNumbers = 12;
-using Matrices = Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>;
 
 const Skeleton* skeleton_of(const exmat_model* model) noexcept {
   return model != nullptr ? model->model().skeleton.get() : nullptr;
@@ -34,7 +31,7 @@ const BoneAnimation* animation_of(const exmat_model* model, std::int64_t animati
 
 void write_matrices(const Skeleton& skeleton, const BonePoses& poses, double* transforms) {
   for (std::size_t bone = 0; bone < skeleton.size(); ++bone)
-    Matrices(transforms + kBoneNumbers * bone) = skeleton.matrix(bone, poses[bone]);
+    Eigen::Map<FrameMatrix>(transforms + kFrameNumbers * bone) = skeleton.matrix(bone, poses[bone]);
 }
 
 exmat_status no_skeleton(const char* function) noexcept {
@@ -62,7 +59,7 @@ exmat_status exmat_model_read_bones(const exmat_model* model, double* transforms
   EXMAT_REQUIRE(transforms);
   const Skeleton* skeleton = skeleton_of(model);
   if (skeleton == nullptr) return no_skeleton(__func__);
-  EXMAT_REQUIRE_LENGTH(count, kBoneNumbers * std::ssize(skeleton->names()));
+  EXMAT_REQUIRE_LENGTH(count, kFrameNumbers * std::ssize(skeleton->names()));
   write_matrices(*skeleton, skeleton->bound(), transforms);
   return EXMAT_OK;
 }
@@ -94,7 +91,7 @@ exmat_status exmat_model_read_animation(const exmat_model* model, std::int64_t a
     return fail(EXMAT_INVALID_ARGUMENT, "%s: animation = %" PRId64 ": expected 0 to %zu", __func__, animation,
                 skeleton->animations().size() - 1);
   if (!std::isfinite(time)) return fail(EXMAT_INVALID_ARGUMENT, "%s: time: expected a finite number", __func__);
-  EXMAT_REQUIRE_LENGTH(count, kBoneNumbers * std::ssize(skeleton->names()));
+  EXMAT_REQUIRE_LENGTH(count, kFrameNumbers * std::ssize(skeleton->names()));
   return guarded(__func__, [&] {
     BonePoses poses = skeleton->bound();
     found->sample(time, poses);
@@ -109,17 +106,12 @@ exmat_status exmat_body_set_bones(exmat_body* body, const double* transforms, st
   const Skeleton* skeleton = body->model().skeleton.get();
   if (skeleton == nullptr) return no_skeleton(__func__);
   EXMAT_REQUIRE_LENGTH(bones, std::ssize(skeleton->names()));
-  constexpr double kLargest = 1e30;
-  for (std::int64_t k = 0; k < kBoneNumbers * bones; ++k)
-    if (!(std::abs(transforms[k]) <= kLargest))
-      return fail(EXMAT_INVALID_ARGUMENT, "%s: transforms[%" PRId64 "] = %g: expected finite numbers up to %g",
-                  __func__, k, transforms[k], kLargest);
+  if (const exmat_status status = check_frames(__func__, "transforms", transforms, bones)) return status;
   return guarded(__func__, [&] {
     SkeletonMotion& motion = *body->state.full->skeleton;
     body->scene.animation.reset();
     for (std::size_t bone = 0; bone < skeleton->size(); ++bone)
-      motion.next[bone] = skeleton->pose(
-          bone, Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(transforms + kBoneNumbers * bone));
+      motion.next[bone] = skeleton->pose(bone, frame_at(transforms + kFrameNumbers * bone));
     if (teleport == 0 && !motion.bound) return;
     motion.bound = false;
     put_on_bones(*body->full(), motion.next, body->state);
@@ -132,7 +124,7 @@ exmat_status exmat_body_read_bones(const exmat_body* body, double* transforms, s
   EXMAT_REQUIRE(transforms);
   const Skeleton* skeleton = body->model().skeleton.get();
   if (skeleton == nullptr) return no_skeleton(__func__);
-  EXMAT_REQUIRE_LENGTH(count, kBoneNumbers * std::ssize(skeleton->names()));
+  EXMAT_REQUIRE_LENGTH(count, kFrameNumbers * std::ssize(skeleton->names()));
   write_matrices(*skeleton, body->state.full->skeleton->bones, transforms);
   return EXMAT_OK;
 }

@@ -30,13 +30,6 @@ exmat_contact_law default_law() noexcept {
           defaults.self ? 1 : 0,     /*apart=*/0,        defaults.release};
 }
 
-/// What the caller's version knows of it, the rest of `law`.
-exmat_contact_law completed(const exmat_contact_law& given, exmat_contact_law law) noexcept {
-  std::memcpy(static_cast<void*>(&law), &given, std::min(given.size, sizeof law));
-  law.size = sizeof law;
-  return law;
-}
-
 exmat_contact_law own_law() noexcept {
   exmat_contact_law law = default_law();
   law.apart = 1;

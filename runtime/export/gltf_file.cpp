@@ -78,6 +78,13 @@ void shift_textures(Json& value, std::size_t by) {
   }
 }
 
+/// Calls use(element) of a member's elements, of none where there is no such member.
+template <typename Object, typename Use>
+void for_each(Object& object, const char* member, const Use& use) {
+  if (const auto found = object.find(member); found != object.end())
+    for (auto& element : *found) use(element);
+}
+
 class GltfWriter {
  public:
   explicit GltfWriter(std::string file) : file_(std::move(file)) {
@@ -203,25 +210,26 @@ class GltfWriter {
     const std::size_t views = size_of("bufferViews"), accessors = size_of("accessors"), images = size_of("images"),
                       samplers = size_of("samplers"), textures = size_of("textures"), materials = size_of("materials");
     require_room(look.buffer.size());
-    for (Json& view : list(document, "bufferViews")) {
+    for_each(document, "bufferViews", [&](Json& view) {
       view["buffer"] = 0;
       view["byteOffset"] = view.value("byteOffset", std::size_t{0}) + buffer_.size();
-    }
+    });
     buffer_ += look.buffer;
-    for (Json& accessor : list(document, "accessors")) {
+    for_each(document, "accessors", [&](Json& accessor) {
       shift(accessor, "bufferView", views);
-      if (!accessor.contains("sparse")) continue;
+      if (!accessor.contains("sparse")) return;
       shift(accessor["sparse"]["indices"], "bufferView", views);
       shift(accessor["sparse"]["values"], "bufferView", views);
-    }
-    for (Json& image : list(document, "images")) shift(image, "bufferView", views);
-    for (Json& texture : list(document, "textures")) {
+    });
+    for_each(document, "images", [&](Json& image) { shift(image, "bufferView", views); });
+    for_each(document, "textures", [&](Json& texture) {
       shift(texture, "sampler", samplers);
       shift(texture, "source", images);
-      for (Json& extension : list(texture, "extensions"))
+      for_each(texture, "extensions", [&](Json& extension) {
         if (extension.is_object()) shift(extension, "source", images);
-    }
-    for (Json& material : list(document, "materials")) shift_textures(material, textures);
+      });
+    });
+    for_each(document, "materials", [&](Json& material) { shift_textures(material, textures); });
     for (Json& mesh : document.at("meshes"))
       for (Json& primitive : mesh.at("primitives")) {
         for (Json& attribute : primitive.at("attributes")) attribute = attribute.get<std::size_t>() + accessors;
@@ -234,19 +242,13 @@ class GltfWriter {
     added.nodes = document.at("nodes");
     added.roots = document.at("scenes").at(0).at("nodes");
     for (const char* name : {"accessors", "bufferViews", "images", "samplers", "textures", "materials", "meshes"})
-      for (Json& element : list(document, name)) root_[name].push_back(std::move(element));
+      for_each(document, name, [&](Json& element) { root_[name].push_back(std::move(element)); });
     for (const char* name : {"extensionsUsed", "extensionsRequired"})
-      for (const Json& extension : list(document, name))
-        if (std::ranges::find(list(root_, name), extension) == list(root_, name).end())
-          root_[name].push_back(extension);
+      for_each(document, name, [&](const Json& extension) {
+        Json& known = root_[name];
+        if (std::ranges::find(known, extension) == known.end()) known.push_back(extension);
+      });
     add_copyright(document.at("asset"));
-  }
-
-  /// The member; an empty list where there is none.
-  static Json& list(Json& object, const char* name) {
-    static thread_local Json none;
-    none = Json::array();
-    return object.contains(name) ? object[name] : none;
   }
 
   void shift_variants(Json& primitive, std::size_t materials) const {
@@ -323,7 +325,7 @@ class GltfWriter {
     }
     const std::size_t first = nodes.size();
     for (Json node : kind.nodes) {
-      for (Json& child : list(node, "children")) child = child.get<std::size_t>() + first;
+      for_each(node, "children", [&](Json& child) { child = child.get<std::size_t>() + first; });
       shift(node, "mesh", kind.first_mesh);
       if (node.contains("mesh")) body.meshes.push_back(nodes.size());
       nodes.push_back(std::move(node));

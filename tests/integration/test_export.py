@@ -20,7 +20,7 @@ import numpy as np
 import vtk
 from vtk.util.numpy_support import vtk_to_numpy
 
-from programs import bar, call, write_json
+from programs import bar, call, write_bar, write_json
 
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 KEPT = Path(sys.argv.pop()) if "--keep" in sys.argv else None
@@ -69,10 +69,8 @@ class Export(unittest.TestCase):
         holder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(holder.cleanup)
         cls.folder = Path(holder.name)
-        mesh, clamp = bar()
-        (cls.folder / "bar.veg").write_text(mesh)
+        write_bar(cls.folder)
         (cls.folder / "tube.obj").write_text(tube())
-        (cls.folder / "end.txt").write_text("\n".join(str(k + 1) for k in clamp))
         for name, more in (("free", {}), ("clamped", {"fixed": {"file": "end.txt"}})):
             asset = {"name": name, "object": {"mesh": "bar.veg", "render_mesh": "tube.obj", **more,
                                               "material": {"youngs_modulus": 2e5, "poisson_ratio": 0.4, "density": 1000}},

@@ -18,7 +18,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from programs import bar, call, write_json
+from programs import call, write_bar, write_json
 
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 KEPT = Path(sys.argv.pop()) if "--keep" in sys.argv else None
@@ -194,9 +194,7 @@ class Looks(unittest.TestCase):
         holder = tempfile.TemporaryDirectory()
         cls.addClassCleanup(holder.cleanup)
         cls.folder = Path(holder.name)
-        mesh, clamp = bar()
-        (cls.folder / "bar.veg").write_text(mesh)
-        (cls.folder / "end.txt").write_text("\n".join(str(k + 1) for k in clamp))
+        write_bar(cls.folder)
         artists_glb(cls.folder / "artist.glb")
         artists_glb(cls.folder / "other.glb", (7, 77, 7))
         cls.bundle("clamped", "artist.glb", fixed={"file": "end.txt"})

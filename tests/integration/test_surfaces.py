@@ -16,23 +16,11 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from programs import tube
+
 PROGRAMS = Path(sys.argv.pop(1)).resolve()
 PRECOMPUTE = PROGRAMS / "exmat-precompute"
-LENGTH, STEPS, AROUND = 3.0, 24, 16
-
-
-def tube():
-    """A closed round tube along x, 3 m long and 1 m thick."""
-    rings = [(0.0, 0.0)] + [(LENGTH * k / STEPS, 0.5) for k in range(STEPS + 1)] + [(LENGTH, 0.0)]
-    angles = 2 * np.pi * np.arange(AROUND) / AROUND
-    points = np.array([[x, r * np.cos(a), r * np.sin(a)] for x, r in rings[1:-1] for a in angles] + [[0, 0, 0], [LENGTH, 0, 0]])
-    start, end = len(points) - 2, len(points) - 1
-    at = lambda ring, k: AROUND * ring + k % AROUND
-    triangles = [t for k in range(AROUND) for t in
-                 ([(start, at(0, k + 1), at(0, k)), (end, at(STEPS, k), at(STEPS, k + 1))]
-                  + [t for ring in range(STEPS) for t in ((at(ring, k), at(ring, k + 1), at(ring + 1, k + 1)),
-                                                          (at(ring, k), at(ring + 1, k + 1), at(ring + 1, k)))])]
-    return points, np.array(triangles)
+LENGTH = 3.0  # of the tube [m]
 
 
 def bent(points, degrees):

@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <vector>
 
 namespace exmat::runtime {
@@ -30,10 +32,16 @@ struct Attachment {
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< about its origin [N m]
   bool broken = false;                               ///< the force was larger than it bears: it holds no longer
 
+  bool holds() const noexcept { return !broken; }
   Eigen::Vector3d target(Eigen::Index k) const noexcept { return position + rotation * places.col(k); }
   /// Where the mean is held.
   Eigen::Vector3d anchor() const noexcept { return position + rotation * (places * shares); }
   Eigen::Vector3d anchor_before() const noexcept { return position_before + rotation_before * (places * shares); }
 };
+
+/// Whether one of them holds.
+inline bool is_held(std::span<const Attachment> attachments) noexcept {
+  return std::ranges::any_of(attachments, &Attachment::holds);
+}
 
 }  // namespace exmat::runtime

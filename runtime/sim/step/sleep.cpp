@@ -79,7 +79,7 @@ StepReport sleep_through(const StepScene& scene, State& state) noexcept {
 }
 
 bool rests(const Model& model, const StepScene& scene, const StepReport& report, State& state) noexcept {
-  if (model.skeleton || !state.attachments.empty()) return false;  // its host may move it in any step
+  if (model.skeleton || is_held(state.attachments)) return false;  // its host may move it in any step
   if (scene.sleep.energy == 0 || model.frame->is_driven()) return false;
   const bool is_solved = (report.status & (kStepNonFinite | kStepUnconverged)) == 0;
   const std::uint64_t loads = hash_of_loads(scene, state);

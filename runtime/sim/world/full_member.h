@@ -83,7 +83,7 @@ class FullMember {
   std::optional<FrameMomenta> expected_momenta() noexcept;
   Eigen::Matrix3d inertia() const noexcept { return own_.potential.rigid.inertia; }  ///< after finish() [kg m^2]
   /// Whether something outside moves parts of it.
-  bool is_driven() const noexcept { return full_.is_driven() || !state_.attachments.empty(); }
+  bool is_driven() const noexcept { return full_.is_driven() || is_held(state_.attachments); }
   Energies energies() const noexcept { return runtime::energies(&full_, model_, scene_, state_); }
 
  private:

@@ -168,5 +168,24 @@ TEST(Attachment, BearsTheWeightOfWhatHangs) {
   }
 }
 
+// What broke holds nothing: the body falls freely, its momentum changes by its weight alone, and in space `auto` it
+// leaves the full space.
+TEST(Attachment, ThatBrokeLetsTheBodyFly) {
+  AttachedBar body(true);
+  body.scene.mass_damping = 3;
+  body.attach(runtime::AttachmentKind::kFixed).break_force = 1e-6;
+  for (int i = 0; i < 3; ++i) body.step();
+  ASSERT_TRUE(body.state.attachments[0].broken);
+  const auto linear = [&] { return body.model->frame->momenta(body.state.frame)->linear; };
+  const Eigen::Vector3d before = linear();
+  for (int i = 0; i < 50; ++i) body.step();
+  const Eigen::Vector3d expected = 50 * body.scene.time_step * body.weight();
+  EXPECT_LE((linear() - before - expected).norm(), 1e-12 * expected.norm());
+  runtime::StepScene scene = body.scene;
+  scene.space.space = Space::kAuto;
+  scene.space.release = scene.time_step;
+  EXPECT_FALSE(runtime::asks_for_full_space(scene, {}, body.state));
+}
+
 }  // namespace attachment_test
 }  // namespace exmat::precompute

@@ -6,6 +6,7 @@ import pathlib
 import pickle
 import struct
 import subprocess
+import sys
 
 import h5py
 import numpy as np
@@ -13,28 +14,18 @@ import pytest
 
 import exmat
 
-BUILD = pathlib.Path(os.environ.get("EXMAT_BUILD", pathlib.Path(__file__).resolve().parents[3] / "build/release"))
-LENGTH, RINGS, AROUND, BONES = 3.0, 24, 16, 3
+TESTS = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(TESTS / "integration"))
+from programs import tube  # noqa: E402
+
+BUILD = pathlib.Path(os.environ.get("EXMAT_BUILD", TESTS.parent / "build/release"))
+LENGTH, BONES = 3.0, 3
 SETTINGS = dict(time_step=0.004, stiffness_damping=0.005, gravity=(0, -9.81, 0))
-
-
-def tube():
-    """Closed and round along x, 1 m thick: points and triangles."""
-    angles = 2 * np.pi * np.arange(AROUND) / AROUND
-    points = np.array([[LENGTH * k / RINGS, 0.5 * np.cos(a), 0.5 * np.sin(a)] for k in range(RINGS + 1) for a in angles]
-                      + [[0, 0, 0], [LENGTH, 0, 0]])
-    start, end = len(points) - 2, len(points) - 1
-    at = lambda ring, k: AROUND * ring + k % AROUND
-    triangles = [t for k in range(AROUND) for t in
-                 [(start, at(0, k + 1), at(0, k)), (end, at(RINGS, k), at(RINGS, k + 1))]
-                 + [t for ring in range(RINGS) for t in ((at(ring, k), at(ring, k + 1), at(ring + 1, k + 1)),
-                                                         (at(ring, k), at(ring + 1, k + 1), at(ring + 1, k)))]]
-    return points, np.array(triangles)
 
 
 def write_skinned(path):
     """On bones of 1 m in a row, whose weights go over within 0.3 m; an animation turns each by 30 degrees about z, and back."""
-    points, triangles = tube()
+    points, triangles = tube(LENGTH)
     document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": []}
     binary = bytearray()
 

@@ -119,7 +119,7 @@ bool asks_for_full_space(const StepScene& scene, const StepReport& last, State& 
   const double midpoint = state.time + 0.5 * scene.time_step;
   // That of the caller has a part in the modes, which are far fewer than the vertices.
   const bool acts =
-      !state.applied_force.isZero(0) || !state.attachments.empty() || (settings.contact && last.contacts > 0) ||
+      !state.applied_force.isZero(0) || is_held(state.attachments) || (settings.contact && last.contacts > 0) ||
       (settings.forces &&
        std::ranges::any_of(scene.forces, [&](const ScriptedForce& force) { return force.acts_at(midpoint); }));
   if (acts || !state.full) {

@@ -79,7 +79,6 @@ void FullPotential::hang(const SkeletonMotion& bones, const StepForm& fixed, con
   }
   for (Eigen::Index place = space_.vertices(), at = 0; place < space_.places(); ++place, at += 3) {
     const Eigen::Vector3d here = bones.q.segment<3>(at);
-    work.start.segment<3>(4 * place) = here;
     work.offset.segment<3>(4 * place) = here - fixed.acceleration_centre.segment<3>(at);
     work.rate.segment<3>(4 * place) = here - fixed.velocity_centre.segment<3>(at);
     work.frame_rate.segment<3>(4 * place) = work.rate.segment<3>(4 * place) + way.segment<3>(4 * place);
@@ -88,8 +87,7 @@ void FullPotential::hang(const SkeletonMotion& bones, const StepForm& fixed, con
 
 void FullPotential::set_attachments(std::span<Attachment> attachments) noexcept {
   attachments_ = attachments;
-  const auto holds = [](const Attachment& attachment) { return !attachment.broken; };
-  const auto first = std::ranges::find_if(attachments, holds);
+  const auto first = std::ranges::find_if(attachments, &Attachment::holds);
   host_ = first == attachments.end() ? nullptr : &*first;
 }
 
@@ -125,8 +123,7 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   Field(work.w.data(), size) = work.rate + d;
   if (model_.rigid) {
     if (freeze) model_.rigid->place(work.x.data(), work.rigid);
-    if (damps() && host_ == nullptr) model_.rigid->remove_motion(work.rigid, work.w.data());
-    if (damps() && host_ != nullptr) remove_host_motion(freeze);
+    if (damps()) host_ == nullptr ? model_.rigid->remove_motion(work.rigid, work.w.data()) : remove_host_motion(freeze);
   }
   if (model_.carried && damps()) {
     if (freeze) model_.carried->frame_velocity(frame_, work.x.data(), 1 / form_.velocity_factor, work.frame_rate);
@@ -223,7 +220,7 @@ void FullPotential::add_attachments(PotentialEvaluation& evaluation, Eigen::Vect
   for (Attachment& attachment : attachments_) {
     attachment.force.setZero();
     attachment.torque.setZero();
-    if (attachment.broken || attachment.kind != AttachmentKind::kSpring) continue;
+    if (!attachment.holds() || attachment.kind != AttachmentKind::kSpring) continue;
     Eigen::Vector3d mean = Eigen::Vector3d::Zero(), rate = Eigen::Vector3d::Zero();
     for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
       const Eigen::Index vertex = attachment.vertices[k], place = 4 * space_.place(vertex);
@@ -257,7 +254,7 @@ void FullPotential::add_attachments(PotentialEvaluation& evaluation, Eigen::Vect
 
 void FullPotential::add_springs(const float* field, float* image) const noexcept {
   for (const Attachment& attachment : attachments_) {
-    if (attachment.broken || attachment.kind != AttachmentKind::kSpring) continue;
+    if (!attachment.holds() || attachment.kind != AttachmentKind::kSpring) continue;
     const auto stiffness = static_cast<float>(attachment.stiffness + attachment.damping * form_.velocity_factor);
     Eigen::Vector3f mean = Eigen::Vector3f::Zero();
     for (std::size_t k = 0; k < attachment.vertices.size(); ++k)

@@ -34,11 +34,11 @@ struct FullPotentialWorkspace {
 
 /// Takes off a field [places x 4] what would move what attachments hold, and calls use(attachment, k, taken) with that
 /// of each vertex k of a fixed one and, once, of the mean of a ball.
-template <typename Attachments, typename Number, typename Use>
-void project_held(const FullSpace& space, const Attachments& attachments, Number* field, const Use& use) noexcept {
+template <typename Number, typename Use>
+void project_held(const FullSpace& space, std::span<Attachment> attachments, Number* field, const Use& use) noexcept {
   using Vector = Eigen::Matrix<Number, 3, 1>;
-  for (auto& attachment : attachments) {
-    if (attachment.broken || attachment.kind == AttachmentKind::kSpring) continue;
+  for (Attachment& attachment : attachments) {
+    if (!attachment.holds() || attachment.kind == AttachmentKind::kSpring) continue;
     const auto at = [&](std::size_t k) { return Eigen::Map<Vector>(field + 4 * space.place(attachment.vertices[k])); };
     if (attachment.kind == AttachmentKind::kFixed) {
       for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
@@ -47,13 +47,18 @@ void project_held(const FullSpace& space, const Attachments& attachments, Number
       }
       continue;
     }
-    const auto shares = attachment.shares.template cast<Number>().eval();
+    const auto shares = attachment.shares.cast<Number>().eval();
     Vector mean = Vector::Zero();
     for (std::size_t k = 0; k < attachment.vertices.size(); ++k) mean += shares[static_cast<Eigen::Index>(k)] * at(k);
     mean /= shares.squaredNorm();
     use(attachment, 0, mean);
     for (std::size_t k = 0; k < attachment.vertices.size(); ++k) at(k) -= shares[static_cast<Eigen::Index>(k)] * mean;
   }
+}
+
+template <typename Number>
+void project_held(const FullSpace& space, std::span<Attachment> attachments, Number* field) noexcept {
+  project_held(space, attachments, field, [](const Attachment&, Eigen::Index, const auto&) {});
 }
 
 /// What a step in full space minimises, a function of the field d = q - q_n:
@@ -81,9 +86,9 @@ class FullPotential {
   /// After begin(), of a carried body: where its frame was and is to be.
   void drive(const MotionSample& from, const MotionSample& to) noexcept;
 
-  /// After begin(), of a body on a skeleton, the workspace's skin at the end of the step: the fixed vertices have a
-  /// form of their own, and the bones alone make this way [field] in the step, and made `way_previous` [f] in the one
-  /// before, which counts where the form is of second order.
+  /// After begin(), of a body on a skeleton, the workspace's skin at the end of the step and its fixed vertices where
+  /// they are in `start`: these have a form of their own, and the bones alone make this way [field] in the step, and
+  /// made `way_previous` [f] in the one before, which counts where the form is of second order.
   void hang(const SkeletonMotion& bones, const StepForm& fixed, const Eigen::VectorXd& way, bool second_order) noexcept;
 
   /// Inertia, elasticity and external force alone: at `d`, of the elastic energy there, and at the last d.

@@ -89,8 +89,7 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
       sum(residual),
       coefficients(3 * model.space.filter().stride),
       scaled(residual),
-      turned(residual),
-      turned_image(residual),
+      turned(model.skin ? residual.size() : 0),
       field(d) {
   fit(model, scene);
   if (!model.examples) return;
@@ -209,8 +208,7 @@ void FullStep::hang(bool second_order) noexcept {
     bdf2_form(history, scene_.time_step, workspace_.fixed_form);
   else
     backward_euler_form(history, scene_.time_step, workspace_.fixed_form);
-  for (Eigen::Index place = space_.vertices(), at = 0; place < space_.places(); ++place, at += 3)
-    workspace_.potential.start.segment<3>(4 * place) = bones.q.segment<3>(at);
+  SkinnedPart::place_fixed(bones.q, workspace_.potential.start);
   stay(workspace_.trial);
   potential_.hang(bones, workspace_.fixed_form, workspace_.trial, second_order);
   space_.from_field(workspace_.trial, bones.way_previous);
@@ -237,16 +235,15 @@ void FullStep::end_bones() noexcept {
 /// Beside that of the frame of a carried body, in the frame; a field.
 void FullStep::own_velocity(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                             Eigen::VectorXd& own) const noexcept {
-  if (model_.carried)
+  if (model_.carried) {
     model_.carried->own_velocity(frame_at(scene_, time), q, v, own);
-  else if (model_.skin)
-    for (Eigen::Index place = 0; place < space_.places(); ++place) {
-      const Eigen::Index at = place < space_.vertices() ? 3 * space_.number_at(place) : 0;
-      own.segment<3>(4 * place) = (memory_.bones->own - memory_.bones->own_previous).segment<3>(at) / scene_.time_step;
-      if (place >= space_.vertices()) own.segment<3>(4 * place).setZero();
-    }
-  else
+  } else if (model_.skin) {
+    workspace_.rate = (memory_.bones->own - memory_.bones->own_previous) / scene_.time_step;
+    space_.to_field(workspace_.rate, own);
+    own.tail(4 * space_.driven()).setZero();
+  } else {
     space_.to_field(v, own);
+  }
 }
 
 /// From such a way to that in the world.
@@ -323,7 +320,7 @@ void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
 // single one.
 void FullStep::precondition() noexcept {
   precondition_freely();
-  if (is_attached()) project(workspace_.solved);
+  project_held(space_, memory_.attachments, workspace_.solved.data());
 }
 
 void FullStep::precondition_freely() noexcept {
@@ -352,7 +349,7 @@ void FullStep::precondition_freely() noexcept {
 void FullStep::hold(Eigen::VectorXd& d) const noexcept {
   const Eigen::VectorXd& start = workspace_.potential.start;
   for (const Attachment& attachment : memory_.attachments) {
-    if (attachment.broken || attachment.kind == AttachmentKind::kSpring) continue;
+    if (!attachment.holds() || attachment.kind == AttachmentKind::kSpring) continue;
     Eigen::Vector3d lacking = attachment.anchor();
     for (std::size_t k = 0; k < attachment.vertices.size(); ++k) {
       const Eigen::Index vertex = attachment.vertices[k], place = 4 * space_.place(vertex);
@@ -369,11 +366,6 @@ void FullStep::hold(Eigen::VectorXd& d) const noexcept {
   }
 }
 
-/// Takes off a field what would move what is held.
-void FullStep::project(AlignedFloats& field) const noexcept {
-  project_held(space_, memory_.attachments, field.data(), [](const Attachment&, Eigen::Index, const auto&) {});
-}
-
 // Sets image = A search.
 void FullStep::multiply() noexcept {
   const Kernels& run = kernels();
@@ -382,28 +374,23 @@ void FullStep::multiply() noexcept {
                    work.image.data());
   if (linear_->filter_stiffness > 0) {
     const MeshFilter<float> filter = space_.rounded_filter();
-    const float* search = work.search.data();
     if (model_.skin) {
-      model_.skin->turn_back(work.potential.skin, search, work.turned.data());
-      search = work.turned.data();
-    }
-    run.mesh_rounded_coefficients(filter, search, work.coefficients.data());
-    if (model_.skin) {
-      work.turned_image.vector().setZero();
-      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(),
-                                     work.turned_image.data());
-      model_.skin->turn(work.potential.skin, work.turned_image.data(), work.turned_image.data());
-      work.image.vector() += work.turned_image.vector();
+      model_.skin->turn_back(work.potential.skin, work.search.data(), work.turned.data());
+      run.mesh_rounded_coefficients(filter, work.turned.data(), work.coefficients.data());
+      work.turned.vector().setZero();
+      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.turned.data());
+      model_.skin->turn(work.potential.skin, work.turned.data(), work.turned.data());
+      work.image.vector() += work.turned.vector();
     } else {
+      run.mesh_rounded_coefficients(filter, work.search.data(), work.coefficients.data());
       run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
     }
   }
   for (const auto& block : std::span(work.contact.blocks).first(work.contact.block_count))
     work.image.vector().segment<3>(4 * block.place) +=
         block.stiffness * work.search.vector().segment<3>(4 * block.place);
-  if (!is_attached()) return;
   potential_.add_springs(work.search.data(), work.image.data());
-  project(work.image);
+  project_held(space_, memory_.attachments, work.image.data());
 }
 
 void FullStep::begin_blocks() noexcept {
@@ -449,7 +436,7 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
   }
   work.direction = sum.cast<double>() * size;
   // What single precision leaves of what is held.
-  project_held(space_, memory_.attachments, work.direction.data(), [](const auto&, Eigen::Index, const auto&) {});
+  project_held(space_, memory_.attachments, work.direction.data());
   return Outcome::kFound;
 }
 
@@ -666,13 +653,14 @@ const FullReport& FullStep::finish(const FrameMomenta& others) noexcept {
   }
   if (near_) model_.contacts->commit(workspace_.trial.data(), *memory_.found, *memory_.held);
   if (model_.rigid) model_.rigid->place(workspace_.trial.data(), workspace_.potential.rigid);
-  if (is_attached()) end_attachments();
-  if (is_attached()) {
-    // Momenta and energy are its host's, too.
-  } else if (unbalanced && !among_others_ && !model_.is_driven())
-    limit_energy(energy);
-  else if (model_.rigid && !unbalanced)
-    correct_momenta(others);
+  // Momenta and energy of a body that something holds are its host's, too.
+  if (!is_attached()) {
+    if (unbalanced && !among_others_ && !model_.is_driven())
+      limit_energy(energy);
+    else if (model_.rigid && !unbalanced)
+      correct_momenta(others);
+  }
+  end_attachments();
   if (model_.skin) end_bones();
   if (!near_ && memory_.held != nullptr) memory_.held->count = 0;
   ++state_.step;
@@ -706,16 +694,14 @@ State make_state(const FullModel& model, FullWorkspace& workspace) {
 Energies energies_of(const FullModel& model, const StepScene& scene, const Motion& state,
                      const SkeletonMotion* bones) noexcept {
   const Eigen::Vector3d weight = model.space.gravity_load().transpose() * state.q;
-  if (model.skin) {
-    const auto own = [&](Eigen::Index place) -> Eigen::Vector3d {
-      return bones->v.segment<3>(3 * (place - model.space.vertices()));
-    };
-    return {model.space.kinetic_energy(state.v, own), state.elastic_energy,
-            model.skin->fixed_potential(bones->q, scene.gravity) - weight.dot(scene.gravity)};
-  }
   const MotionSample frame = frame_at(scene, state.time);
-  const auto driven = [&](Eigen::Index place) { return model.carried->velocity(frame, place); };
-  const double fixed = model.carried ? model.carried->fixed_potential(frame, scene.gravity) : 0;
+  const auto driven = [&](Eigen::Index place) -> Eigen::Vector3d {
+    if (model.carried) return model.carried->velocity(frame, place);
+    return bones->v.segment<3>(3 * (place - model.space.vertices()));
+  };
+  const double fixed = model.carried ? model.carried->fixed_potential(frame, scene.gravity)
+                       : model.skin  ? model.skin->fixed_potential(bones->q, scene.gravity)
+                                     : 0;
   return {model.space.kinetic_energy(state.v, driven), state.elastic_energy, fixed - weight.dot(scene.gravity)};
 }
 
@@ -729,9 +715,7 @@ Energies energies(const FullModel& model, const StepScene& scene, Motion& state,
   workspace.external.setZero();
   potential.begin(state.q, workspace.external);
   if (model.carried) model.carried->place_fixed(frame_at(scene, state.time), workspace.potential.start);
-  if (model.skin)
-    for (Eigen::Index place = model.space.vertices(), at = 0; place < model.space.places(); ++place, at += 3)
-      workspace.potential.start.segment<3>(4 * place) = bones->q.segment<3>(at);
+  if (model.skin) SkinnedPart::place_fixed(bones->q, workspace.potential.start);
   workspace.d.setZero();
   potential.evaluate_elements(workspace.d, FullPotential::Tangents::kNone, false);
   state.elastic_energy = potential.elastic_energy();

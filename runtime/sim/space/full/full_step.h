@@ -66,7 +66,7 @@ struct FullWorkspace {
   Eigen::VectorXd d, gradient, direction, trial, trial_gradient;     ///< fields
   AlignedFloats residual, solved, search, image, sum, coefficients;  ///< of conjugate gradients
   AlignedFloats scaled;                                              ///< residual that the preconditioner takes
-  AlignedFloats turned, turned_image;                                ///< in the axes of bones
+  AlignedFloats turned;                                              ///< in the axes of bones, where there are some
   FullContactScratch contact;
   Eigen::VectorXd field;  ///< a field
   TargetTable::Workspace table;
@@ -163,9 +163,8 @@ class FullStep {
   bool find_contacts() noexcept;
   void precondition_freely() noexcept;
   void hold(Eigen::VectorXd& d) const noexcept;
-  void project(AlignedFloats& field) const noexcept;
   void end_attachments() noexcept;
-  bool is_attached() const noexcept { return !memory_.attachments.empty(); }
+  bool is_attached() const noexcept { return is_held(memory_.attachments); }
   void hang(bool second_order) noexcept;
   void take_along() noexcept;
   void end_bones() noexcept;

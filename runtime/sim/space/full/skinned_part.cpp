@@ -74,6 +74,11 @@ void SkinnedPart::to_world(const SkinPose& pose, const double* own, double* worl
   }
 }
 
+void SkinnedPart::place_fixed(const Eigen::VectorXd& q, Eigen::VectorXd& u) noexcept {
+  const Eigen::Index fixed = q.size() / 3;
+  for (Eigen::Index k = 0; k < fixed; ++k) u.tail(4 * fixed).segment<3>(4 * k) = q.segment<3>(3 * k);
+}
+
 double SkinnedPart::fixed_potential(const Eigen::VectorXd& q, const Eigen::Vector3d& gravity) const noexcept {
   double sum = 0;
   for (Eigen::Index k = 0; k < masses_.size(); ++k) sum -= masses_[k] * gravity.dot(q.segment<3>(3 * k));

@@ -43,6 +43,9 @@ class SkinnedPart {
   void to_own(const SkinPose& pose, const double* world, double* own) const noexcept;
   void to_world(const SkinPose& pose, const double* own, double* world) const noexcept;
 
+  /// Sets the fixed vertices of the displacement field `u` by theirs [3p], the last of its places.
+  static void place_fixed(const Eigen::VectorXd& q, Eigen::VectorXd& u) noexcept;
+
   /// Fields: R v and R^T v of the places that move; v may be the same.
   template <typename Number>
   void turn(const SkinPose& pose, const Number* v, Number* turned) const noexcept;
