@@ -71,6 +71,7 @@ void visit_example(const FieldPlace& place, Example& example, Visitor& visit) {
   visit.attribute("is_rest", example.is_rest);
   visit.attribute("rotation", example.rotation);
   visit.attribute("scale", example.scale);
+  visit.attribute("source", example.source);
   visit.attribute("method", example.method);
   visit.attribute("alignment_residual", example.alignment_residual);
   visit.attribute("doubt", example.doubt);

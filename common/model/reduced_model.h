@@ -50,6 +50,7 @@ struct ExampleData {
   bool is_rest = false;
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< from the example's frame to the object's
   double scale = 1;                 ///< object's length unit over the example's: (V_object / V_example)^(1/3)
+  std::string source;               ///< the morph target that it is of, as the asset names it, or its file's name
   std::string method;               ///< how it was mapped to the object
   double alignment_residual = 0;    ///< relative
   double doubt = 0;                 ///< J of docs/alignment.md; 0 is certain, above 1.2 refused

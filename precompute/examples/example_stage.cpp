@@ -28,6 +28,13 @@ constexpr double kMovedClamp = 0.005;
 // A turn that is worth words [rad].
 constexpr double kTurned = 0.02;
 
+// Of ExampleData::source.
+std::string source_of(const AssetConfig& asset, const std::string& name) {
+  const auto example = std::ranges::find(asset.examples, name, &ExampleConfig::name);
+  if (example == asset.examples.end()) return "";
+  return example->morph ? *example->morph : example->file({}).filename().string();
+}
+
 // "the rest pose", and how it is turned.
 std::string rest_pose_text(const RowMatrix3& to_object) {
   const Eigen::Matrix3d rotation = to_object;
@@ -120,6 +127,7 @@ ExampleData ShapeStageBuilder::example_data(const AlignmentOutcome& outcome, dou
   example.name = outcome.name;
   example.index = std::ssize(group.examples.examples);
   example.scale = scale;
+  example.source = source_of(asset_, outcome.name);
   example.method = outcome.method;
   example.alignment_residual = outcome.residual;
   example.doubt = outcome.doubt;

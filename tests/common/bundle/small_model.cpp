@@ -59,6 +59,7 @@ ExampleData small_example(const std::string& name, std::int64_t index) {
   example.is_rest = index == 0;
   example.rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
   example.scale = 1.5;
+  example.source = "fr\xc3\xb6hlich/";
   example.method = "spectral";
   example.alignment_residual = 0.01;
   example.inverted_fraction = 0.02;
