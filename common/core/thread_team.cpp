@@ -41,6 +41,16 @@ void wait_for_change(const std::atomic<std::uint32_t>& value, std::uint32_t old)
   value.wait(old, std::memory_order_acquire);
 }
 
+/// Does what is left of a loop of which `next` is not begun.
+void take_shares(const SharedLoop& loop, std::atomic<std::size_t>& next, std::size_t thread) noexcept {
+  for (;;) {
+    const std::size_t begin = next.fetch_add(loop.share, std::memory_order_relaxed);
+    if (begin >= loop.count) return;
+    const std::size_t end = std::min(begin + loop.share, loop.count);
+    for (std::size_t i = begin; i < end; ++i) loop.call(loop.work, i, thread);
+  }
+}
+
 /// Threads that wait for loops. The gate counts who is inside the present loop, and has a bit that says whether more
 /// may enter; it is closed once the caller finds nothing left to do.
 class Team {
@@ -90,14 +100,7 @@ class Team {
     return false;
   }
 
-  void work(std::size_t thread) noexcept {
-    for (;;) {
-      const std::size_t begin = next_.fetch_add(loop_.share, std::memory_order_relaxed);
-      if (begin >= loop_.count) return;
-      const std::size_t end = std::min(begin + loop_.share, loop_.count);
-      for (std::size_t i = begin; i < end; ++i) loop_.call(loop_.work, i, thread);
-    }
-  }
+  void work(std::size_t thread) noexcept { take_shares(loop_, next_, thread); }
 
   SharedLoop loop_{};
   std::vector<std::thread> threads_;
@@ -153,9 +156,26 @@ class Teams {
   std::size_t made_ = 0;
 };
 
+Scheduler host;
+
+void run_on_host(const SharedLoop& loop) noexcept {
+  struct Shared {
+    const SharedLoop& loop;
+    std::atomic<std::size_t> next{0};
+  } shared{loop};
+  const auto task = [](void* data, std::int32_t thread) {
+    auto& [own, next] = *static_cast<Shared*>(data);
+    take_shares(own, next, static_cast<std::size_t>(thread));
+  };
+  host.run(host.user, task, &shared, static_cast<std::int32_t>(loop.threads));
+}
+
 }  // namespace
 
+void set_scheduler(const Scheduler& scheduler) noexcept { host = scheduler; }
+
 void run_shared(const SharedLoop& loop) noexcept {
+  if (host.run != nullptr) return run_on_host(loop);
   Team* const team = Teams::all().take();
   if (team == nullptr) {
     for (std::size_t i = 0; i < loop.count; ++i) loop.call(loop.work, i, 0);

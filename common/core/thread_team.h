@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 
 namespace exmat {
 
@@ -11,6 +12,16 @@ struct SharedLoop {
   std::size_t count, share;
   std::size_t threads;  ///< at most, the caller among them; numbered from 0, the caller's number
 };
+
+/// A host's threads, in place of those of the process: run() calls task(data, i) once for each i < count, at the same
+/// time where it can, and returns when all have returned.
+struct Scheduler {
+  void (*run)(void* user, void (*task)(void* data, std::int32_t i), void* data, std::int32_t count) = nullptr;
+  void* user = nullptr;
+};
+
+/// Serves all loops from then on; without run() the process's own threads do. Not while a loop runs.
+void set_scheduler(const Scheduler& scheduler) noexcept;
 
 /// Returns when all are done. Threads that cannot be started, or come too late because the machine is busy, are done
 /// without: the caller waits for those alone that have begun. Threads that wait spin for 20 us, then they sleep. A

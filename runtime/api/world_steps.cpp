@@ -140,6 +140,8 @@ exmat_status exmat_world_read_profile(const exmat_world* world, exmat_profile* p
   return EXMAT_OK;
 }
 
+void exmat_set_scheduler(exmat_run_tasks run, void* user) noexcept { set_scheduler({run, user}); }
+
 exmat_status exmat_world_step(exmat_world* world, std::int64_t steps, std::int32_t threads,
                               exmat_world_report* report) noexcept {
   EXMAT_REQUIRE(world);

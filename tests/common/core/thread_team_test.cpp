@@ -28,6 +28,34 @@ TEST(ThreadTeam, CallsEachOnce) {
           ASSERT_EQ(calls(count, threads, share), std::vector<int>(count, 1)) << count << ' ' << threads;
 }
 
+/// Tasks one after another, the last one first; or each on a thread of its own.
+void run_backwards(void* user, void (*task)(void*, std::int32_t), void* data, std::int32_t count) {
+  ++*static_cast<int*>(user);
+  for (std::int32_t i = count; i-- > 0;) task(data, i);
+}
+void run_on_new_threads(void* user, void (*task)(void*, std::int32_t), void* data, std::int32_t count) {
+  ++*static_cast<int*>(user);
+  std::vector<std::thread> threads;
+  for (std::int32_t i = 0; i < count; ++i) threads.emplace_back(task, data, i);
+  for (std::thread& thread : threads) thread.join();
+}
+
+TEST(ThreadTeam, RunsOnThreadsOfAHost) {
+  for (const auto run : {run_backwards, run_on_new_threads}) {
+    int runs = 0;
+    set_scheduler({run, &runs});
+    for (const std::size_t count : {2, 7, 1000})
+      for (const std::size_t share : {1, 4, 5000})
+        EXPECT_EQ(calls(count, 3, share), std::vector<int>(count, 1)) << count;
+    EXPECT_EQ(runs, 9);
+    EXPECT_EQ(calls(1000, 1, 4), std::vector<int>(1000, 1));
+    EXPECT_EQ(runs, 9) << "one thread alone asks nobody";
+    set_scheduler({});
+    EXPECT_EQ(calls(1000, 3, 4), std::vector<int>(1000, 1));
+    EXPECT_EQ(runs, 9);
+  }
+}
+
 TEST(ThreadTeam, ThreadsTakePart) {
   std::atomic<int> inside = 0;
   // Each call waits for the other.

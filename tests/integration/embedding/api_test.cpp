@@ -7,8 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <span>
+#include <thread>
 
 #include "common/config/config.h"
+#include "common/core/thread_team.h"
 #include "common/mesh/geometry.h"
 #include "runtime/scene/scene_loader.h"
 #include "runtime/sim/step/stepper.h"
@@ -29,7 +31,6 @@ using ::testing::HasSubstr;
 
 constexpr std::array kIntegratorNames{"bdf2", "backward_euler", "newmark"};
 
-/// The library's own stepping of a scene.
 /// A world whose bodies do not touch each other.
 World apart() {
   exmat_contact_law law = default_contact_law();
@@ -37,6 +38,7 @@ World apart() {
   return World(law);
 }
 
+/// The library's own stepping of a scene.
 struct Reference {
   explicit Reference(const std::string& scene) : loaded(runtime::load_run(load_scene(scene))) {
     refresh_weights(*loaded.model, loaded.scene, state, workspace);
@@ -392,6 +394,28 @@ TEST_F(ApiTest, ANonFiniteStepLeavesItsBodyAndEndsTheCall) {
   bodies.step(5);
   EXPECT_EQ(bodies.body(1).report().steps, 5);
   EXPECT_EQ(bodies.body(0).report().steps, 5);
+}
+
+TEST_F(ApiTest, WorldsStepOnThreadsOfTheHost) {
+  const Model model = this->model();
+  std::array<World, 2> worlds{apart(), apart()};
+  for (World& world : worlds)
+    for (int i = 0; i < 5; ++i) world.add(Body(model));
+  int runs = 0;
+  const auto on_the_host = [](void* user, void (*task)(void*, std::int32_t), void* data, std::int32_t count) {
+    ++*static_cast<int*>(user);
+    std::vector<std::thread> threads;
+    for (std::int32_t i = 0; i < count; ++i) threads.emplace_back(task, data, i);
+    for (std::thread& thread : threads) thread.join();
+  };
+  exmat_set_scheduler(on_the_host, &runs);
+  const exmat_status status = exmat_world_step(worlds[0].get(), 5, 2, nullptr);
+  exmat_set_scheduler(nullptr, nullptr);
+  ASSERT_EQ(status, EXMAT_OK);
+  if (processor_count() > 1) EXPECT_GE(runs, 5);
+  ASSERT_EQ(exmat_world_step(worlds[1].get(), 5, 1, nullptr), EXMAT_OK);
+  for (int i = 0; i < 5; ++i)
+    EXPECT_EQ(displacement(worlds[0].body(i), model.modes()), displacement(worlds[1].body(i), model.modes())) << i;
 }
 
 TEST_F(ApiTest, StepsForcesAndReadsDoNotAllocate) {
