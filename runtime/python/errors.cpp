@@ -26,7 +26,45 @@ std::string text_of(const Error& error) {
   return text.starts_with("exmat_") && end != std::string::npos ? text.substr(end + 2) : text;
 }
 
+/// Calls a function as pybind11 does, and says in Python's words where it has no such arguments.
+PyCFunctionWithKeywords call = nullptr;
+PyObject* call_in_words(PyObject* self, PyObject* arguments, PyObject* named) {
+  PyObject* const result = call(self, arguments, named);
+  if (result != nullptr || PyErr_ExceptionMatches(PyExc_TypeError) == 0) return result;
+  try {
+    const py::error_already_set thrown;
+    const py::object words = py::module_::import("exmat.errors").attr("in_words")(py::str(thrown.value()));
+    PyErr_SetObject(PyExc_TypeError, words.ptr());
+  } catch (py::error_already_set& other) {
+    other.restore();
+  }
+  return nullptr;
+}
+
+/// `value` may be a function of pybind11, which is alone in having a capsule for its self, or hold one.
+void speak(const py::object& value) {
+  const py::object function = py::getattr(value, "__func__", value);
+  if (PyCFunction_Check(function.ptr()) == 0) return;
+  PyMethodDef* const method = reinterpret_cast<PyCFunctionObject*>(function.ptr())->m_ml;
+  const auto present = reinterpret_cast<PyCFunctionWithKeywords>(reinterpret_cast<void (*)()>(method->ml_meth));
+  if (PyCapsule_CheckExact(PyCFunction_GET_SELF(function.ptr())) == 0 || present == call_in_words) return;
+  call = present;
+  method->ml_meth = reinterpret_cast<PyCFunction>(reinterpret_cast<void (*)()>(call_in_words));
+}
+
 }  // namespace
+
+void speak_in_words(const py::handle& scope) {
+  for (const auto& [name, value] : py::dict(scope.attr("__dict__"))) {
+    if (PyObject_IsInstance(value.ptr(), reinterpret_cast<PyObject*>(&PyProperty_Type)) == 1) {
+      for (const char* part : {"fget", "fset"}) speak(value.attr(part));
+    } else if (PyType_Check(value.ptr()) != 0 && scope.ptr() != value.ptr()) {
+      speak_in_words(value);
+    } else {
+      speak(py::reinterpret_borrow<py::object>(value));
+    }
+  }
+}
 
 void bind_errors() {
   py::register_exception_translator([](std::exception_ptr thrown) {

@@ -15,4 +15,5 @@ PYBIND11_MODULE(_exmat, module) {
   BatchClass batch = bind_batch(module);
   bind_obstacles(module, body, world, batch);
   bind_drawing(module, body, world, batch);
+  speak_in_words(module);
 }

@@ -361,6 +361,8 @@ using WorldClass = py::class_<WorldObject, std::shared_ptr<WorldObject>>;
 using BatchClass = py::class_<BatchObject, std::shared_ptr<BatchObject>>;
 
 void bind_errors();
+/// Functions below a module or class say in Python's words what they take where they are given something else.
+void speak_in_words(const py::handle& scope);
 void bind_model(py::module_& module);
 void bind_reports(py::module_& module);
 void bind_states(py::module_& module);

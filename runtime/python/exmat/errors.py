@@ -1,6 +1,26 @@
 """Exceptions of exmat. All are of Error; each also is the built-in one that it is a kind of."""
 
 
+import re
+
+
+def in_words(text):
+    """The text of a TypeError of pybind11 as a message: what the function takes, and what it was given."""
+    name, separator, rest = text.partition("(): incompatible ")
+    if not separator:
+        return text
+    found = rest.partition("Invoked with: ")[2].partition("\n\nDid you forget")[0].strip()
+    takes = []
+    for scope, arguments in re.findall(r"^ +\d+\. ([\w.]*)\((.*?)\)(?: -> .*)?$", rest, re.M):
+        if name == "__init__" and scope:
+            name = scope.rpartition(".")[2]
+        own, comma, others = arguments.partition(", ")
+        if own.startswith("self: "):
+            arguments, found = others, re.sub(r"^<[^<>]*>(, )?", "", found)
+        takes.append(f"({arguments.replace('_exmat.', '')})")
+    return f"{name}: expected {' or '.join(takes)}, found {f'({found})' if found else 'nothing'}"
+
+
 class Error(Exception):
     """Something that exmat says; its text is the library's or the program's message."""
 
