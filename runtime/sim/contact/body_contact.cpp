@@ -15,6 +15,10 @@ namespace {
 // and was not inside before has not come in: surfaces that fold, or cross themselves, do not tell inside from outside.
 constexpr double kEntryShare = 0.01;
 
+// Bodies begin deep in each other where they overlap by this share of a thickness, with so many of their vertices.
+constexpr double kDeepStart = 0.25, kDeepShare = 0.1;
+constexpr double kOnSurface = 1e-9;  // of a radius
+
 constexpr double kSearchedMargins = 1;   // beyond what a step needs: some steps of what it moves by,
 constexpr double kSearchedShare = 2e-3;  // and of the surface's radius: many steps of bodies that hardly move
 constexpr double kFastMargins = 10;      // of a way: below it what velocities exclude costs more than it saves
@@ -50,6 +54,20 @@ std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen
     facing->normal = -facing->normal;
   }
   return facing;
+}
+
+/// The same of a vertex that is to come out by the part of the surface that looks `out`.
+std::optional<SurfaceHit> nearest_on_way_out(const BodySurface& surface, const Eigen::Vector3d& point,
+                                             const Eigen::Vector3d& out, double radius, SurfaceShape& shape) {
+  auto hit = surface.nearest(point, radius, shape);
+  if (!hit || hit->distance > kOnSurface * radius) return hit;
+  auto side = surface.nearest_looking(point, radius, shape, out);
+  if (!side) return hit;
+  if (side->distance > 0) {  // told by a part of the surface alone; it is inside
+    side->distance = -side->distance;
+    side->normal = -side->normal;
+  }
+  return side;
 }
 
 /// The same of a vertex that was inside, and came in by a side that looked the way `side`: where the nearest looks the
@@ -117,6 +135,10 @@ struct Gathering {
     const BodySurface& surface = b.touching.surface;
     const Eigen::Vector3d looks =
         b.pose.rotation.transpose() * (a.pose.rotation * a.touching.normals.row(vertex).transpose());
+    if (way_out || (before != nullptr && before->overlap > 0)) {
+      const Eigen::Vector3d out = way_out ? *way_out : before->normal;
+      return take(at, before, nearest_on_way_out(surface, at.point, out, margin + depth, shape));
+    }
     if (before != nullptr)
       return take(at, before, nearest_by_side(surface, at.point, looks, before->normal, margin + depth, shape));
     const Eigen::Vector3d apart = a.set.world_velocity(vertex, at.arm, a.pose, a.velocity) - b.velocity.at(at.offset);
@@ -192,6 +214,7 @@ struct Gathering {
   const TouchingBody &a, &b;
   double time_step, margin;
   bool anew, own;
+  std::optional<Eigen::Vector3d> way_out;  ///< in the frame of b
   const std::vector<HeldBodyContact>& held;
   SurfaceShape& shape;
   BodyCandidates& candidates;
@@ -272,12 +295,53 @@ Eigen::Vector3d place_of(const BodyPose& a, const BodyPose& b, const BodyCandida
 
 }  // namespace
 
+namespace {
+
+/// Share of the vertices of `a` that are inside or on the surface of `b`.
+double share_inside(const TouchingBody& a, const TouchingBody& b, SurfaceShape& shape) {
+  const BodySurface& surface = b.touching.surface;
+  const double radius = surface.bound(b.pose.q).radius;
+  int inside = 0;
+  for (int vertex = 0; vertex < a.set.vertices(); ++vertex) {
+    const Eigen::Vector3d offset = a.pose.position + a.set.world_arm(vertex, a.pose) - b.pose.position;
+    const auto hit = surface.nearest(b.pose.rotation.transpose() * offset, 2 * radius, shape);
+    inside += hit && hit->distance <= kOnSurface * radius ? 1 : 0;
+  }
+  return static_cast<double>(inside) / static_cast<double>(a.set.vertices());
+}
+
+}  // namespace
+
+std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b) {
+  struct Extent {
+    Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), most = -least;
+  };
+  const auto extent_of = [&](const TouchingBody& body) {  // along the axes of a
+    Extent extent;
+    for (int vertex = 0; vertex < body.set.vertices(); ++vertex) {
+      const Eigen::Vector3d place = body.pose.position + body.set.world_arm(vertex, body.pose) - a.pose.position;
+      const Eigen::Array3d own = (a.pose.rotation.transpose() * place).array();
+      extent.least = extent.least.min(own);
+      extent.most = extent.most.max(own);
+    }
+    return extent;
+  };
+  const Extent own = extent_of(a), other = extent_of(b);
+  const Eigen::Array3d up = other.most - own.least, down = own.most - other.least;  // ways out along each axis
+  Eigen::Index axis = 0;
+  const double shortest = up.min(down).minCoeff(&axis);
+  if (!(shortest > kDeepStart * (own.most - own.least).min(other.most - other.least)[axis])) return std::nullopt;
+  return (up[axis] <= down[axis] ? 1 : -1) * a.pose.rotation.col(axis);
+}
+
 void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, const CandidateSearch& search,
                          BodyCandidates& candidates) const {
   const double time_step = search.time_step, margin = search.margin;
   SurfaceShape& shape = search.shape;
   NearVertices& near = search.near;
   Gathering gathering{law_, a, b, time_step, margin, search.anew, /*own=*/false, search.held, shape, candidates};
+  if (search.way_out && share_inside(a, b, shape) >= kDeepShare)
+    gathering.way_out = b.pose.rotation.transpose() * *search.way_out;
   const auto test_all = [&](double radius) {
     for_near(a, b, radius, shape, [&](int vertex) { gathering.test_other(vertex); });
   };

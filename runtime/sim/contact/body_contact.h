@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <optional>
 #include <vector>
 
 #include "runtime/sim/contact/contact.h"
@@ -130,7 +131,13 @@ struct CandidateSearch {
   const std::vector<HeldBodyContact>& held;  ///< vertices that were inside in the last step
   SurfaceShape& shape;                       ///< that of b, placed
   NearVertices& near;                        ///< found by earlier searches; the candidates are the same without
+  std::optional<Eigen::Vector3d> way_out{};  ///< way_out_of(a, b) where there is no last step
 };
+
+/// The unit vector, world, along which `a` comes out of `b` soonest, axes of the bounding box of `a` taken; none where
+/// it is less than a quarter of its own thickness inside. Nearest points of the surface push vertices of bodies that
+/// lie deep in each other to all sides, and part nothing. way_out_of(b, a) may be another one.
+std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b);
 
 /// Contact of the vertices of one body, `a`, with the surface of another, `b`, which may be the same kind of body.
 /// Forces are equal and opposite, at the vertex and at y. docs/step_in_detail.md, "Bodies that touch".

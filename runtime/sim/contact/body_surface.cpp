@@ -346,6 +346,12 @@ std::optional<SurfaceHit> BodySurface::nearest(const Eigen::Vector3d& point, dou
                 [&](int triangle, const TrianglePoint&) { return !looks_along(triangle, *facing, shape); }, {});
 }
 
+std::optional<SurfaceHit> BodySurface::nearest_looking(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
+                                                       const Eigen::Vector3d& way) const noexcept {
+  return search(point, radius, shape,
+                [&](int triangle, const TrianglePoint&) { return looks_along(triangle, way, shape); }, {});
+}
+
 /// A search for what is nearer than half of its distance at rest, or may be once it has moved by `way` [m].
 template <class Accepts>
 auto BodySurface::approach_filter(const Eigen::Vector3d& point, const Eigen::Vector3d& rest, const SurfaceHit& place,

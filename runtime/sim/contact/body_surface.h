@@ -119,9 +119,13 @@ class BodySurface {
   std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                     const Eigen::Vector3d* facing = nullptr) const noexcept;
 
-  /// The same for a point of the body itself, at rest at `rest`: of the surface that has come nearer to it than half of
-  /// how far away it is at rest, and does not look the same way as the surface at `place`, its own. No neighbour is, as
-  /// long as nothing is compressed to half its length. With `closing`, of a shape that moves, what is not far by it.
+  /// That of the surface that does look the same way as a unit vector, within 60 degrees.
+  std::optional<SurfaceHit> nearest_looking(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
+                                            const Eigen::Vector3d& way) const noexcept;
+
+  /// nearest() for a point of the body itself, at rest at `rest`: of the surface that has come nearer to it than half
+  /// of how far away it is at rest, and does not look the same way as the surface at `place`, its own. No neighbour is,
+  /// as long as nothing is compressed to half its length. With `closing`, of a shape that moves, what is not far by it.
   std::optional<SurfaceHit> nearest_approached(const Eigen::Vector3d& point, const Eigen::Vector3d& rest,
                                                const SurfaceHit& place, double radius, SurfaceShape& shape,
                                                const ClosingPoint* closing = nullptr,

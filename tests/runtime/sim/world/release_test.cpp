@@ -56,6 +56,22 @@ TEST(Release, BodiesThatBeginInEachOtherPartSlowly) {
     }
 }
 
+// Nearest points of the surface would push deep vertices to all sides, and those of bodies in one place nowhere.
+TEST(Release, BodiesThatBeginDeepInEachOtherPart) {
+  for (const Eigen::Vector3d& apart :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1e-7, 0, 0), Eigen::Vector3d(1e-4, 2e-4, 0),
+        Eigen::Vector3d(0.01, -0.02, 0.015), Eigen::Vector3d(0.1, 0.03, 0.05)})
+    for (const double friction : {0.0, 0.5}) {
+      SCOPED_TRACE(testing::Message() << apart.transpose() << ", friction " << friction);
+      const Blocks blocks(1e-3);
+      World world({blocks.body({0, 0, 0}), blocks.body(apart)}, {1e8, 0, friction});
+      EXPECT_LE(fastest_of(blocks, world), 2 * kRelease);
+      fastest_of(blocks, world);  // another second
+      EXPECT_TRUE(world.held().empty());
+      EXPECT_GE((blocks.centre(world.state(0)) - blocks.centre(world.state(1))).norm(), 0.2);
+    }
+}
+
 TEST(Release, GoesOnFromItsMemoryToTheLastBit) {
   Blocks blocks(1e-3);
   blocks.add_floor(1e8, 0.3, 0);
