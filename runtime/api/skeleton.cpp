@@ -56,9 +56,9 @@ std::int64_t exmat_model_bone_parent(const exmat_model* model, std::int64_t bone
 
 exmat_status exmat_model_read_bones(const exmat_model* model, double* transforms, std::int64_t count) noexcept {
   EXMAT_REQUIRE(model);
-  EXMAT_REQUIRE(transforms);
   const Skeleton* skeleton = skeleton_of(model);
   if (skeleton == nullptr) return no_skeleton(__func__);
+  EXMAT_REQUIRE(transforms);
   EXMAT_REQUIRE_LENGTH(count, kFrameNumbers * std::ssize(skeleton->names()));
   write_matrices(*skeleton, skeleton->bound(), transforms);
   return EXMAT_OK;
@@ -83,9 +83,9 @@ double exmat_model_animation_duration(const exmat_model* model, std::int64_t ani
 exmat_status exmat_model_read_animation(const exmat_model* model, std::int64_t animation, double time,
                                         double* transforms, std::int64_t count) noexcept {
   EXMAT_REQUIRE(model);
-  EXMAT_REQUIRE(transforms);
   const Skeleton* skeleton = skeleton_of(model);
   if (skeleton == nullptr) return no_skeleton(__func__);
+  EXMAT_REQUIRE(transforms);
   const BoneAnimation* found = animation_of(model, animation);
   if (found == nullptr)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: animation = %" PRId64 ": expected 0 to %zu", __func__, animation,
@@ -102,9 +102,9 @@ exmat_status exmat_model_read_animation(const exmat_model* model, std::int64_t a
 exmat_status exmat_body_set_bones(exmat_body* body, const double* transforms, std::int64_t bones,
                                   std::int32_t teleport) noexcept {
   EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE(transforms);
   const Skeleton* skeleton = body->model().skeleton.get();
   if (skeleton == nullptr) return no_skeleton(__func__);
+  EXMAT_REQUIRE(transforms);
   EXMAT_REQUIRE_LENGTH(bones, std::ssize(skeleton->names()));
   if (const exmat_status status = check_frames(__func__, "transforms", transforms, bones)) return status;
   return guarded(__func__, [&] {
@@ -121,9 +121,9 @@ exmat_status exmat_body_set_bones(exmat_body* body, const double* transforms, st
 
 exmat_status exmat_body_read_bones(const exmat_body* body, double* transforms, std::int64_t count) noexcept {
   EXMAT_REQUIRE(body);
-  EXMAT_REQUIRE(transforms);
   const Skeleton* skeleton = body->model().skeleton.get();
   if (skeleton == nullptr) return no_skeleton(__func__);
+  EXMAT_REQUIRE(transforms);
   EXMAT_REQUIRE_LENGTH(count, kFrameNumbers * std::ssize(skeleton->names()));
   write_matrices(*skeleton, body->state.full->skeleton->bones, transforms);
   return EXMAT_OK;

@@ -239,9 +239,9 @@ void bind_settings(BodyClass& type) {
           "bones",
           [](BodyObject& body) {
             const std::size_t bones = body.model->model.bones();
-            return array_of(body.get().bones(bones), {bones, 3, 4});
+            return array_of(bones > 0 ? body.get().bones(bones) : std::vector<double>(), {bones, 3, 4});
           },
-          "The bones at the end of the last step: shape (b, 3, 4). A copy.")
+          "The bones at the end of the last step: shape (b, 3, 4), none of a body without a skeleton. A copy.")
       .def(
           "set_example_damping",
           [](BodyObject& body, double c_kappa, const py::object& region) {
