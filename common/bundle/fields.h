@@ -195,6 +195,7 @@ void visit_full_space(FullSpace& full, Visitor& visit) {
   visit.dataset("slopes", full.slopes);
   visit.dataset("control_points", full.control_points);
   visit.dataset("from_target", full.from_target);
+  visit.dataset("shapes", full.shapes);
 }
 
 template <typename Fidelity, typename Visitor>

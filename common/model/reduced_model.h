@@ -189,6 +189,7 @@ struct FullSpaceData {
   RowMatrix slopes;          ///< K x 3m: h = h0 + slopes W^T u of the weights problem
   RowMatrix control_points;  ///< P c x 3m, W^T of those of /targets; without a table of the examples
   RowMatrix from_target;     ///< d x 3m, W^T Y, Y [3n x d] the displacements of /target_space
+  RowMatrix shapes;          ///< 3n x d (dataset n 3 d), Y, which an elastic example force takes; else empty
 };
 
 /// FidelityData::loads of a bundle whose basis has learned from a scene.

@@ -9,7 +9,7 @@ Eigen::MatrixXd filter_coefficients(const FullSpaceData& data, const Eigen::Vect
 }
 
 std::optional<FullSpaceData> full_space_data(const ReducedModel& model, const ElasticSystem& system,
-                                             const TargetSpace& targets) {
+                                             const TargetSpace& targets, bool elastic) {
   const ObjectData& body = *model.object;
   const LaplaceBasis object = laplace_basis_of(model);
   const FilterFunctions filter(object, body.mesh, body.materials.density);
@@ -26,6 +26,7 @@ std::optional<FullSpaceData> full_space_data(const ReducedModel& model, const El
   for (Eigen::Index i = 0; i < fields.cols(); ++i)
     data.from_target.row(i) =
         filter_coefficients(data, system.extend(fields.col(i))).reshaped<Eigen::RowMajor>().transpose();
+  if (elastic) data.shapes = system.extend(fields);
   data.control_points =
       (targets.table ? targets.table->control_points : RowMatrix(targets.coordinates.poses.transpose())) *
       data.from_target;

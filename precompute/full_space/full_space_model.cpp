@@ -43,6 +43,12 @@ void add_space(const ObjectData& object, FullSpaceModel& full) {
       filter.row(full.system.free_dofs[static_cast<std::size_t>(3 * i)] / 3) = full.space_root.row(i);
   }
   full.matrix_free = runtime::FullModel(runtime::FullSpace(object.mesh, object.materials, object.fixed, filter));
+  full.matrix_free.is_elastic = filter.size() > 0;
+  if (full.system.constrained()) return;
+  full.matrix_free.rigid.emplace(full.matrix_free.space, full.rest);
+  if (filter.size() == 0) return;
+  full.matrix_free.examples.emplace();
+  full.matrix_free.set_frame_of_examples();
 }
 
 }  // namespace

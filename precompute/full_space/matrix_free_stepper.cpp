@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "common/core/timer.h"
+#include "precompute/full_space/step_potential.h"
 #include "precompute/full_space/target_update.h"
 
 namespace exmat::precompute {
@@ -21,7 +22,6 @@ runtime::ScriptedForce scripted(const FullSpaceModel& model, const VertexForceCo
 }  // namespace
 
 bool MatrixFreeStepper::set(const FullSpaceScene& scene) {
-  if (model_.frame) return false;
   runtime::StepScene next;
   next.time_step = scene.time_step;
   next.integrator = scene.integrator;
@@ -49,15 +49,18 @@ FullSpaceReport MatrixFreeStepper::step(FullSpaceState& state) {
   one.begin();
   std::optional<runtime::ExampleState> examples;
   if (!scene_.examples.empty()) {
-    Eigen::VectorXd u(model_.size());
-    one.first_iterate(u);
-    if (u.allFinite())
-      examples = next_target(model_, 0, scene_.examples.front(), state.examples.front(), u, target_, report);
+    Eigen::VectorXd q(model_.size());
+    one.first_iterate(q);
+    if (q.allFinite())
+      examples = next_target(model_, 0, scene_.examples.front(), state.examples.front(), Deformation(model_, q).u(),
+                             target_, report);
     if (examples && (report.status & runtime::kStepNonFinite) == 0) {
       const Eigen::VectorXd target = target_displacement(model_, 0, *examples);
-      const Eigen::MatrixXd coefficients =
-          model_.space_root.transpose() * target.reshaped<Eigen::RowMajor>(model_.size() / 3, 3);
-      one.set_target(coefficients);
+      if (scene_.examples.front().elastic)
+        one.set_elastic_target(target);
+      else
+        one.set_target(
+            Eigen::MatrixXd(model_.space_root.transpose() * target.reshaped<Eigen::RowMajor>(model_.size() / 3, 3)));
     }
     report.target_seconds = timer.seconds();
   }

@@ -544,7 +544,7 @@ ReducedModel Pipeline::run() {
   add_contact(model);
   if (motions) add_fidelity(stages, *motions, choice, model);
   if (includes(report_.ledger, "full_space")) {
-    model.full_space = full_space_data(model, system, targets.front());
+    model.full_space = full_space_data(model, system, targets.front(), includes(report_.ledger, "target_elasticity"));
     if (!model.full_space) refuse_full_space();
   }
   if (fitter) settle_examples(stages, model);

@@ -221,8 +221,8 @@ struct MeshInertia {
   double mass_damping = 0;         ///< alpha c_v
   double stiffness_damping = 0;    ///< beta c_v
 };
-/// Inertia 1/2 c_a a M a, damping 1/2 c_v w D w, elastic energy [J].
-inline constexpr std::ptrdiff_t kMeshSums = 3;
+/// Inertia 1/2 c_a a M a, damping 1/2 c_v w D w, elastic energy, that of an elastic example force [J].
+inline constexpr std::ptrdiff_t kMeshSums = 4;
 
 inline constexpr std::ptrdiff_t kFactorMultiple = 4;
 /// L L^T of a scalar matrix [n x n], L below its diagonal by rows and by columns, each padded with zeros to a multiple
@@ -411,14 +411,15 @@ struct Kernels {
 
   /// inertia = c_a M a, force = c_v (alpha M + beta V) w + V x, V the variance matrix; sums [kMeshSums] of these terms.
   void (*mesh_inertia)(const MeshArrays&, const MeshInertia&, double* inertia, double* force, double* sums);
-  /// Adds those of the elements to force and sums. frozen: padded elements x 45 in panels of kLanes, their tangents
-  /// that damping has; not read where there is no such damping.
-  void (*mesh_force)(const MeshArrays&, const ElementLaw&, const MeshInertia&, const double* frozen, double* force,
-                     double* sums);
+  /// Adds those of the elements to force and sums. `example`: null, or the law of an elastic example force, of the same
+  /// kind with one shift and its inverse. frozen: padded elements x 45 in panels of kLanes, their tangents that damping
+  /// has, without those of the example; not read where there is no such damping.
+  void (*mesh_force)(const MeshArrays&, const ElementLaw&, const ElementLaw* example, const MeshInertia&,
+                     const double* frozen, double* force, double* sums);
   /// The same, and tangents: panels x 45 x kMeshLanes, those at x and beta c_v times the frozen ones. `freeze`: sets
   /// the frozen ones to those at x first.
-  void (*mesh_force_and_tangents)(const MeshArrays&, const ElementLaw&, const MeshInertia&, bool freeze, double* frozen,
-                                  float* tangents, double* force, double* sums);
+  void (*mesh_force_and_tangents)(const MeshArrays&, const ElementLaw&, const ElementLaw* example, const MeshInertia&,
+                                  bool freeze, double* frozen, float* tangents, double* force, double* sums);
   /// product = matrix x + sum over the elements of B^T T B x; the matrix on the pattern of the mass.
   void (*mesh_product)(const MeshArrays&, const float* matrix, const float* tangents, const float* x, float* product);
   /// x = (L L^T)^-1 right.

@@ -127,15 +127,18 @@ void mesh_inertia(const MeshArrays& mesh, const MeshInertia& terms, double* iner
   sums[0] = 0.5 * add_up(inertia);
   sums[1] = 0.5 * add_up(damping);
   sums[2] = 0.5 * add_up(spread);
+  sums[3] = 0;
 }
 
 /// As mesh_force() and mesh_force_and_tangents().
 template <Want want, class Law>
-inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const MeshInertia& terms, bool freeze,
-                          double* frozen, float* tangents, double* force, double* sums) {
+inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const ElementLaw* example,
+                          const MeshInertia& terms, bool freeze, double* frozen, float* tangents, double* force,
+                          double* sums) {
   alignas(kAlignment) double H[9 * kLanes], rates[9 * kLanes], P[9 * kLanes], tangent[kTangentNumbers * kLanes];
+  alignas(kAlignment) double example_tangent[want == Want::kStiffness ? kTangentNumbers * kLanes : kLanes];
   const bool damped = terms.stiffness_damping > 0;
-  Vec elastic = zero(), damping = zero();
+  Vec elastic = zero(), damping = zero(), pulled = zero();
   for (Index first = 0; first < mesh.panels * kMeshLanes; first += kLanes) {
     double* const own_frozen = damped ? frozen + first * kTangentNumbers : nullptr;
     gather_gradients<kLanes>(mesh, first, terms.displacement, H);
@@ -163,6 +166,14 @@ inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const M
         }
         damping += dot(w, image, 9);
       }
+      if (example != nullptr) {
+        Vec pull[9];
+        pulled += evaluate_law<want, Law>(*example, first + lane, h, pull, example_tangent + lane);
+        for (Index i = 0; i < 9; ++i) p[i] += pull[i];
+        if constexpr (want == Want::kStiffness)
+          for (Index k = 0; k < kTangentNumbers; ++k)
+            add_to(tangent + k * kLanes + lane, load(example_tangent + k * kLanes + lane));
+      }
       for (Index i = 0; i < 9; ++i) store(P + i * kLanes + lane, p[i]);
     }
     scatter_stresses<kLanes>(mesh, first, P, force);
@@ -178,19 +189,22 @@ inline void evaluate_mesh(const MeshArrays& mesh, const ElementLaw& law, const M
   }
   sums[1] += 0.5 * sum(damping);
   sums[2] += sum(elastic);
+  sums[3] += sum(pulled);
 }
 
-void mesh_force(const MeshArrays& mesh, const ElementLaw& law, const MeshInertia& terms, const double* frozen,
-                double* force, double* sums) {
+void mesh_force(const MeshArrays& mesh, const ElementLaw& law, const ElementLaw* example, const MeshInertia& terms,
+                const double* frozen, double* force, double* sums) {
   with_law(law, [&]<class Law>() {
-    evaluate_mesh<Want::kForce, Law>(mesh, law, terms, false, const_cast<double*>(frozen), nullptr, force, sums);
+    evaluate_mesh<Want::kForce, Law>(mesh, law, example, terms, false, const_cast<double*>(frozen), nullptr, force,
+                                     sums);
   });
 }
 
-void mesh_force_and_tangents(const MeshArrays& mesh, const ElementLaw& law, const MeshInertia& terms, bool freeze,
-                             double* frozen, float* tangents, double* force, double* sums) {
+void mesh_force_and_tangents(const MeshArrays& mesh, const ElementLaw& law, const ElementLaw* example,
+                             const MeshInertia& terms, bool freeze, double* frozen, float* tangents, double* force,
+                             double* sums) {
   with_law(law, [&]<class Law>() {
-    evaluate_mesh<Want::kStiffness, Law>(mesh, law, terms, freeze, frozen, tangents, force, sums);
+    evaluate_mesh<Want::kStiffness, Law>(mesh, law, example, terms, freeze, frozen, tangents, force, sums);
   });
 }
 

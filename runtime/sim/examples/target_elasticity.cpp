@@ -14,9 +14,9 @@ std::vector<LameParameters> lame_of(const TargetElasticityData& data) {
   return lame;
 }
 
-/// The inverse of I + H and its determinant, 9 + 1 numbers kLanes apart; the identity and 0 where it is turned inside
-/// out.
-void invert(const double* H, double* inverse) noexcept {
+}  // namespace
+
+void invert_target(const double* H, double* inverse) noexcept {
   double F[9], cofactors[9];
   for (int i = 0; i < 9; ++i) F[i] = H[i * kLanes] + (i % 4 == 0 ? 1 : 0);
   for (int a = 0; a < 3; ++a)
@@ -31,8 +31,6 @@ void invert(const double* H, double* inverse) noexcept {
       inverse[(3 * a + b) * kLanes] = sound ? cofactors[3 * b + a] / determinant : (a == b ? 1 : 0);
   inverse[9 * kLanes] = sound ? determinant : 0;
 }
-
-}  // namespace
 
 TargetElasticity::TargetElasticity(MaterialModel material, const TargetElasticityData& data,
                                    const RowMatrix& coordinates)
@@ -65,8 +63,8 @@ void TargetElasticity::set_target(const Eigen::VectorXd& y, double factor, Works
   kernels().matrix_vector(target_gradient_.data(), rows, dimension_, rows, y.data(), workspace.shifts.data());
   for (Eigen::Index panel = 0; panel < potential_.panels(); ++panel)
     for (Eigen::Index lane = 0; lane < kLanes; ++lane)
-      invert(workspace.shifts.data() + panel * kPanelGradient + lane,
-             workspace.inverses.data() + panel * kInverseNumbers * kLanes + lane);
+      invert_target(workspace.shifts.data() + panel * kPanelGradient + lane,
+                    workspace.inverses.data() + panel * kInverseNumbers * kLanes + lane);
   workspace.factor[0] = factor;
 }
 

@@ -10,6 +10,10 @@
 
 namespace exmat::runtime {
 
+/// The inverse of F* = I + H* and its determinant, 9 + 1 numbers kLanes apart, as ElementLaw takes them; the identity
+/// and 0 where it is turned inside out.
+void invert_target(const double* H, double* inverse) noexcept;
+
 /// The elastic energy of a body whose undeformed shape is a target, W(q) = e sum_j c_j det F*_j Psi(F_j F*_j^-1), with
 /// F_j = I + B_j q of the body and F*_j = I + G_j y of the target at the coordinates y, c_j = w_j V_j. Elements that
 /// the target turns inside out, det F*_j <= 0, take no part. docs/method.md, "Force". s elements, r modes, d

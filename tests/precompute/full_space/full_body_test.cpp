@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <gtest/gtest.h>
+#include <utility>
 
 #include "precompute/shape_space/filter_functions.h"
 #include "runtime/sim/world/world.h"
@@ -36,10 +37,23 @@ FullSpaceData full_space_data_of(const ReducedModel& model) {
   return data;
 }
 
+/// Examples may pull elastically, by all elements.
+void make_elastic(ReducedModel& model) {
+  const CubatureData& all = *model.cubature;
+  model.target_elasticity = {.weights = all.weights,
+                             .volumes = all.volumes,
+                             .gradient = all.gradient,
+                             .target_gradient = all.gradient,
+                             .youngs_modulus = all.youngs_modulus,
+                             .poisson_ratio = all.poisson_ratio};
+  model.full_space->shapes = model.modal->basis;
+}
+
 struct TwinOptions {
   test::BarOptions bar{.cells = {4, 1, 1}};
   Integrator integrator = Integrator::kBdf2;
   int examples = 0;
+  bool elastic = false;  ///< their force
   double damping = 0;
   bool floor = false;
   double friction = 0.4;
@@ -55,7 +69,8 @@ class Twin {
     FullSpaceOptions reference;
     reference.whole_body = options.examples > 0;
     reference_ = build_full_space_model(data, reference);
-    model_ = std::move(runtime::build_model(data, {.examples = options.examples > 0}).model);
+    model_ =
+        std::move(runtime::build_model(data, {.examples = options.examples > 0, .elastic = options.elastic}).model);
     full_ = std::move(runtime::build_full_model(data, *model_).model);
     set_scene();
     state_ = runtime::make_state(*model_);
@@ -104,6 +119,7 @@ class Twin {
     of.examples = options.examples;
     test::Bar bar = complete_bar(of);
     if (options.examples > 0) bar.model.full_space = full_space_data_of(bar.model);
+    if (options.elastic) make_elastic(bar.model);
     if (options.floor) bar.model.contact = movable(bar.model);
     return bar;
   }
@@ -126,8 +142,11 @@ class Twin {
     reference_scene_.stiffness_damping = scene_.stiffness_damping = 0.01 * options_.damping;
     reference_scene_.newton = scene_.space.newton = {100, kTight};
     if (options_.examples > 0)
-      reference_scene_.examples =
-          scene_.examples = {{.stiffness = 300, .damping = 2, .bias = 0.4, .target_iterations = 50}};
+      reference_scene_.examples = scene_.examples = {{.stiffness = options_.elastic ? 2.0 : 300.0,
+                                                      .damping = 2,
+                                                      .bias = 0.4,
+                                                      .target_iterations = 50,
+                                                      .elastic = options_.elastic}};
     if (options_.floor)
       reference_scene_.obstacles = scene_.obstacles = {
           runtime::Obstacle{runtime::Plane{{0, -0.05, 0}, {0, 1, 0}}, {}, 1e6, 1e3, options_.friction}};
@@ -173,6 +192,16 @@ TEST(FullBody, IsTheReferenceWithExamples) {
   EXPECT_LE(twin.difference(60), kSame);
   EXPECT_LE(twin.weights_off(), kSame);
   EXPECT_GE(twin.size(), 0.1);
+}
+
+TEST(FullBody, IsTheReferenceWithElasticExamples) {
+  for (const MaterialModel material :
+       {MaterialModel::kStVenantKirchhoff, MaterialModel::kStableNeoHookean, MaterialModel::kCorotational}) {
+    Twin twin({.bar = {.cells = {4, 1, 1}, .material = material}, .examples = 3, .elastic = true, .damping = 0.5});
+    EXPECT_LE(twin.difference(60), kSame);
+    EXPECT_LE(twin.weights_off(), kSame);
+    EXPECT_GE(twin.size(), 0.1);
+  }
 }
 
 // Backward Euler throughout: with another integrator the two may come near, and change to it, in different steps. The
@@ -267,10 +296,14 @@ TEST(FullBody, EntersAndLeavesWhereItIs) {
 /// A carried bar under a push in the space of all its vertices and in that of all its modes, whose equations are those
 /// of the frame: fictitious forces in place of inertia in the world.
 struct CarriedTwin {
-  explicit CarriedTwin(int examples)
-      : bar(complete_bar({.cells = {4, 1, 1}, .carried = true, .examples = examples})), has_examples(examples > 0) {
+  explicit CarriedTwin(int examples, bool elastic = false)
+      : bar(complete_bar({.cells = {4, 1, 1}, .carried = true, .examples = examples})),
+        has_examples(examples > 0),
+        is_elastic(elastic) {
     if (has_examples) bar.model.full_space = full_space_data_of(bar.model);
-    model = std::move(runtime::build_model(bar.model, {.examples = has_examples, .carried = true}).model);
+    if (elastic) make_elastic(bar.model);
+    model = std::move(
+        runtime::build_model(bar.model, {.examples = has_examples, .elastic = elastic, .carried = true}).model);
     full = std::move(runtime::build_full_model(bar.model, *model).model);
   }
 
@@ -287,7 +320,9 @@ struct CarriedTwin {
     scene.gravity_force = runtime::gravity_force(*model, scene.gravity);
     scene.carrier = runtime::RigidMotion(std::vector<runtime::Keyframe>{
         {0, {0, 0, 0}, turned(0)}, {0.16, {0.1, 0.2, -0.1}, turned(0.9)}, {0.32, {-0.1, 0.3, 0.2}, turned(1.6)}});
-    if (has_examples) scene.examples = {{.stiffness = 300, .damping = 2, .bias = 0.4, .target_iterations = 50}};
+    if (has_examples)
+      scene.examples = {
+          {.stiffness = is_elastic ? 2.0 : 300.0, .damping = 2, .bias = 0.4, .target_iterations = 50, .elastic = is_elastic}};
     return scene;
   }
 
@@ -331,7 +366,7 @@ struct CarriedTwin {
   }
 
   test::Bar bar;
-  bool has_examples;
+  bool has_examples, is_elastic;
   std::unique_ptr<const runtime::Model> model;
   std::unique_ptr<const runtime::FullModel> full;
   mutable double energies_off = 0, coordinates_off = 0, fixed_off = 0;
@@ -340,14 +375,15 @@ struct CarriedTwin {
 // Both are of second order, of errors of their own: a quarter as far apart at half the time step, a little less where
 // weights change.
 TEST(FullBody, IsTheReducedBodyOfAllModesWhereItIsCarried) {
-  for (const int examples : {0, 3}) {
-    const CarriedTwin twin(examples);
+  for (const auto& [examples, elastic] : {std::pair(0, false), std::pair(3, false), std::pair(3, true)}) {
+    SCOPED_TRACE(testing::Message() << examples << " examples, elastic " << elastic);
+    const CarriedTwin twin(examples, elastic);
     const double coarse = twin.difference(0.002), fine = twin.difference(0.001);
-    EXPECT_GE(coarse / fine, 3.4) << examples;
-    EXPECT_LE(fine, 5e-3) << examples;
-    EXPECT_LE(twin.energies_off, 1e-2) << examples;
-    EXPECT_LE(twin.coordinates_off, 1e-2) << examples;
-    EXPECT_LE(twin.fixed_off, 1e-15) << examples;
+    EXPECT_GE(coarse / fine, 3.4);
+    EXPECT_LE(fine, 5e-3);
+    EXPECT_LE(twin.energies_off, 1e-2);
+    EXPECT_LE(twin.coordinates_off, 1e-2);
+    EXPECT_LE(twin.fixed_off, 1e-15);
   }
 }
 

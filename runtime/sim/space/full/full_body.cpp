@@ -53,12 +53,19 @@ void find_target(const FullModel& full, const Model& model, const StepScene& sce
   ExampleWorkspace& scratch = workspace.examples.front();
   if (settings.given_weights.size() == 0) step.first_coefficients(own.coefficients_there);
   set_weights(examples.weights, settings, own.coefficients_there, scratch);
-  if (examples.table) {
-    examples.table->evaluate(scratch.weights, own.table, own.target);
-  } else {
-    solve_target(model.examples.front(), settings.target_iterations, state.examples.front(), scratch, report);
-    own.target.noalias() = examples.from_target * scratch.solved_target;
+  const ExampleModel& reduced = model.examples.front();
+  if (!reduced.table)
+    solve_target(reduced, settings.target_iterations, state.examples.front(), scratch, report);
+  else if (settings.elastic)
+    reduced.table->evaluate(scratch.weights, scratch.target_table, scratch.solved_target);
+  if (settings.elastic) {
+    own.moved.noalias() = examples.shapes * scratch.solved_target;
+    return step.set_elastic_target(own.moved);
   }
+  if (examples.table)
+    examples.table->evaluate(scratch.weights, own.table, own.target);
+  else
+    own.target.noalias() = examples.from_target * scratch.solved_target;
   step.set_target(Eigen::Map<const VertexArray>(own.target.data(), full.space.functions(), 3));
 }
 

@@ -1,12 +1,12 @@
 #include "runtime/sim/space/full/full_model.h"
 
+#include <string>
 #include <utility>
 
 namespace exmat::runtime {
 namespace {
 
-FullExamples full_examples(const FullSpaceData& data, const ReducedModel& reduced, const ExampleModel& examples,
-                           const FullModel& full) {
+FullExamples full_examples(const FullSpaceData& data, const ReducedModel& reduced, const ExampleModel& examples) {
   FullExamples made;
   made.weights = ExampleWeights(reduced.examples->gram, reduced.examples->h0, data.slopes);
   if (examples.table) {
@@ -16,17 +16,29 @@ FullExamples full_examples(const FullSpaceData& data, const ReducedModel& reduce
   } else {
     made.from_target = data.from_target.transpose() * examples.target->basis();
   }
-  if (!full.rigid && !full.carried) return made;
-  const MeshFilter<double> filter = full.space.filter();
-  const Eigen::Map<const RowMatrix> all(filter.functions, filter.vertices, filter.stride);
-  const auto W = all.leftCols(full.space.functions());
-  const Eigen::Matrix4Xd& rest = full.rigid ? full.rigid->rest() : full.carried->rest();
-  made.rest = W.transpose() * rest.topLeftCorner(3, filter.vertices).transpose();
-  made.ones = W.colwise().sum();
   return made;
 }
 
 }  // namespace
+
+void FullModel::set_frame_of_examples() {
+  if (!rigid && !carried) return;
+  const MeshFilter<double> filter = space.filter();
+  const Eigen::Map<const RowMatrix> all(filter.functions, filter.vertices, filter.stride);
+  const auto W = all.leftCols(space.functions());
+  const Eigen::Matrix4Xd& from_origin = rigid ? rigid->rest() : carried->rest();
+  examples->rest = W.transpose() * from_origin.topLeftCorner(3, filter.vertices).transpose();
+  examples->ones = W.colwise().sum();
+}
+
+void FullModel::set_shapes(const RowMatrix& all, const ExampleModel& reduced) {
+  RowMatrix own(space.size(), all.cols());
+  for (Eigen::Index v = 0; v < space.mesh_vertices(); ++v)
+    if (const std::int32_t number = space.number(v); number >= 0)
+      own.middleRows<3>(3 * number) = all.middleRows<3>(3 * v);
+  examples->shapes = reduced.table ? Eigen::MatrixXd(own) : Eigen::MatrixXd(own * reduced.target->basis());
+  is_elastic = true;
+}
 
 FullModelResult build_full_model(const ReducedModel& reduced, const Model& model) {
   if (model.region_count() > 0)
@@ -48,7 +60,17 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
   if (reduced.skeleton) full->skin.emplace(full->space, object.mesh.vertices, *reduced.skeleton);
   if (!full->space.is_clamped()) full->rigid.emplace(full->space, object.mesh.vertices);
   if (model.contact) full->contacts.emplace(*model.contact, full->space, model.frame->origin());
-  if (forced) full->examples = full_examples(*reduced.full_space, reduced, model.examples.front(), *full);
+  if (forced) {
+    full->examples = full_examples(*reduced.full_space, reduced, model.examples.front());
+    full->set_frame_of_examples();
+    if (const RowMatrix& shapes = reduced.full_space->shapes; model.examples.front().elasticity && shapes.size() > 0) {
+      if (shapes.rows() != 3 * object.mesh.vertex_count())
+        return {nullptr,
+                {"", "/full_space/shapes", "the vertices of the object", std::to_string(shapes.rows() / 3),
+                 "precompute the bundle again"}};
+      full->set_shapes(shapes, model.examples.front());
+    }
+  }
   full->basis.resize(full->space.size(), model.modes());
   for (Eigen::Index v = 0; v < object.mesh.vertex_count(); ++v)
     if (const std::int32_t number = full->space.number(v); number >= 0)

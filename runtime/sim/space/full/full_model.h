@@ -22,6 +22,7 @@ struct FullExamples {
   ExampleWeights weights;
   std::optional<TargetTable> table;  ///< of c*; else `from_target`
   Eigen::MatrixXd from_target;       ///< 3m x d: c* of the coordinates that the model's TargetSolver has
+  Eigen::MatrixXd shapes;            ///< f x d, u* of those that it or the model's table has; of an elastic force
   Eigen::MatrixX3d rest;             ///< m x 3, W^T X of a body whose frame moves, X about the frame's origin
   Eigen::VectorXd ones;              ///< [m] W^T 1 of such a body; 0 of a free one
 
@@ -52,8 +53,14 @@ struct FullModel {
   std::optional<SkinnedPart> skin;       ///< of a body on a skeleton
   std::optional<FullContacts> contacts;  ///< where the model has contact
   std::optional<FullExamples> examples;
+  bool is_elastic = false;  ///< whether the example force may be elastic
   /// Whether the fixed vertices go where something takes them.
   bool is_driven() const { return carried || skin; }
+
+  /// Of a body whose frame moves, how its coefficients go with that, into its examples.
+  void set_frame_of_examples();
+  /// The shapes [3n x d] that an elastic force of the reduced body's examples takes.
+  void set_shapes(const RowMatrix& all, const ExampleModel& reduced);
 
   VertexArray rest;      ///< n x 3, X of all vertices of the mesh, world [m]
   RowMatrix basis;       ///< f x r, U of the vertices that move

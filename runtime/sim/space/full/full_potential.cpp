@@ -28,10 +28,10 @@ FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
       coefficients(3 * model.space.filter().stride),
       target(coefficients),
       rate_coefficients(coefficients) {
+  if (model.is_elastic) elastic_target = model.space.make_target();
   if (model.rigid) rigid = RigidWorkspace(model.space);
-  if (!model.skin) return;
-  skin = model.skin->make_pose();
-  turned = start;
+  if (model.skin) skin = model.skin->make_pose();
+  if (model.skin || model.rigid) turned = start;
 }
 
 void FullPotential::begin(const Eigen::VectorXd& q, const Eigen::VectorXd& external) noexcept {
@@ -131,19 +131,26 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   }
   if (model_.skin && damps()) Field(work.w.data(), size) -= work.frame_rate;
   const MeshArrays mesh = space_.arrays();
-  const ElementLaw law = space_.law();
+  const ElementLaw law = space_.law(), pulled = has_elastic_target_ ? space_.law(work.elastic_target) : law;
+  const ElementLaw* const example = has_elastic_target_ ? &pulled : nullptr;
   const MeshInertia own = terms();
   const Kernels& run = kernels();
   run.mesh_inertia(mesh, own, work.inertia.data(), work.force.data(), sums_.data());
   if (tangents == Tangents::kExact) {
-    run.mesh_force_and_tangents(mesh, law, own, freeze, work.frozen.data(), work.tangents.data(), work.force.data(),
-                                sums_.data());
+    run.mesh_force_and_tangents(mesh, law, example, own, freeze, work.frozen.data(), work.tangents.data(),
+                                work.force.data(), sums_.data());
   } else {
     if (tangents == Tangents::kProjected)
-      space_.projected_tangents(work.x.data(), own.stiffness_damping, freeze, work.frozen.data(), work.tangents.data());
-    run.mesh_force(mesh, law, own, work.frozen.data(), work.force.data(), sums_.data());
+      space_.projected_tangents(work.x.data(), has_elastic_target_ ? &work.elastic_target : nullptr,
+                                own.stiffness_damping, freeze, work.frozen.data(), work.tangents.data());
+    run.mesh_force(mesh, law, example, own, work.frozen.data(), work.force.data(), sums_.data());
   }
   work_ = work.external.dot(d);
+}
+
+void FullPotential::set_elastic_target(const Eigen::VectorXd& shape) noexcept {
+  space_.set_target(shape.data(), elastic_factor(scene_.examples.front()), workspace_.elastic_target);
+  has_elastic_target_ = true;
 }
 
 void FullPotential::set_coefficients() noexcept {
@@ -161,21 +168,31 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   const Field inertia(work.inertia.data(), size), force(work.force.data(), size);
   PotentialEvaluation evaluation;
   // A vertex is known to rounding: no residual comes below what that makes of its force.
+  const double times = has_elastic_target_ ? 1 + elastic_factor(scene_.examples.front()) : 1;
   evaluation.force_scale = external_norm_ + inertia.norm() + force.norm() +
-                           kPlaceRounding * reach_ * space_.stiffness() / scene_.space.newton.tolerance;
+                           times * kPlaceRounding * reach_ * space_.stiffness() / scene_.space.newton.tolerance;
   PotentialValue& total = evaluation.potential;
-  total.value = sums_[0] + sums_[1] + sums_[2];
+  total.value = sums_[0] + sums_[1] + sums_[2] + sums_[3];
   total.magnitude = total.value + work.external.cwiseAbs().dot(d.cwiseAbs()) + reach_ * force.lpNorm<1>();
   total.value -= work_;
-  gradient = inertia + force - work.external;
+  gradient = force;
+  if (filters()) set_filter_coefficients(total);
+  if (model_.rigid && damps() && host_ == nullptr) {
+    // Damping sees velocities without the rigid motion of the body; all else here has no torque.
+    if (filter_damping() > 0)
+      kernels().mesh_add_functions(space_.filter(), 1, work.rate_coefficients.data(), gradient.data());
+    model_.rigid->remove_rigid_force(work.x.data(), work.rigid, gradient.data());
+  }
+  gradient += inertia - work.external;
   gradient.tail(4 * space_.driven()).setZero();
-  if (filters()) add_filter_force(total, gradient);
+  if (filters()) add_filter_force(gradient);
   if (contact_ != nullptr) add_contacts(evaluation, gradient);
   if (!attachments_.empty()) add_attachments(evaluation, gradient);
   return evaluation;
 }
 
-void FullPotential::add_filter_force(PotentialValue& total, Eigen::VectorXd& gradient) noexcept {
+// Forces on coefficients, in `coefficients`; of the damper of a free body in `rate_coefficients`.
+void FullPotential::set_filter_coefficients(PotentialValue& total) noexcept {
   FullPotentialWorkspace& work = workspace_;
   set_coefficients();
   const double kappa = filter_stiffness(), damping = filter_damping();
@@ -187,23 +204,51 @@ void FullPotential::add_filter_force(PotentialValue& total, Eigen::VectorXd& gra
     }
     kernels().mesh_coefficients(space_.filter(), rate, work.rate_coefficients.data());
   }
+  if (model_.rigid) turn_ = model_.rigid->turn(work.x.data());
+  const Eigen::Index stride = space_.filter().stride;
   double energy = 0;
-  for (Eigen::Index i = 0; i < work.coefficients.size(); ++i) {
-    const double from_target = work.coefficients[i] - work.target[i];
-    const double rate = damping > 0 ? work.rate_coefficients[i] : 0;
-    energy += 0.5 * (kappa * from_target * from_target + damping * rate * rate);
-    work.coefficients[i] = kappa * from_target + damping * rate;
-  }
-  if (model_.skin) {
-    work.turned.setZero();
-    kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), work.turned.data());
-    model_.skin->turn(work.skin, work.turned.data(), work.turned.data());
-    gradient += work.turned;
-  } else {
-    kernels().mesh_add_functions(space_.filter(), 1, work.coefficients.data(), gradient.data());
+  for (Eigen::Index k = 0; k < space_.functions(); ++k) {
+    const auto at = [&](AlignedArray& all) {
+      return Eigen::Map<Eigen::Vector3d, 0, Eigen::InnerStride<>>(all.data() + k, Eigen::InnerStride<>(stride));
+    };
+    auto spring = at(work.coefficients), damper = at(work.rate_coefficients);
+    // The deformation of a free body is that in the frame which fits it.
+    if (model_.rigid) {
+      const Eigen::Vector3d rest = model_.examples->rest.row(k);
+      spring = (turn_.rotation.transpose() * (rest + spring) - rest).eval();
+    }
+    spring -= at(work.target);
+    energy += 0.5 * (kappa * spring.squaredNorm() + damping * damper.squaredNorm());
+    spring *= kappa;
+    damper *= damping;
+    if (model_.rigid)
+      spring = (turn_.rotation * spring).eval();
+    else
+      spring += damper;
   }
   total.value += energy;
   total.magnitude += energy;
+}
+
+void FullPotential::add_filter_force(Eigen::VectorXd& gradient) noexcept {
+  FullPotentialWorkspace& work = workspace_;
+  const auto add = [&](const AlignedArray& coefficients, Eigen::VectorXd& field) {
+    kernels().mesh_add_functions(space_.filter(), 1, coefficients.data(), field.data());
+  };
+  if (model_.skin) {
+    work.turned.setZero();
+    add(work.coefficients, work.turned);
+    model_.skin->turn(work.skin, work.turned.data(), work.turned.data());
+    gradient += work.turned;
+  } else if (model_.rigid) {
+    work.turned.setZero();
+    add(work.coefficients, work.turned);
+    model_.rigid->remove_torque(turn_, work.x.data(), work.turned.data());
+    gradient += work.turned;
+    if (host_ != nullptr) add(work.rate_coefficients, gradient);
+  } else {
+    add(work.coefficients, gradient);
+  }
 }
 
 void FullPotential::add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept {

@@ -23,12 +23,13 @@ struct FullPotentialWorkspace {
   Eigen::VectorXd start, offset, rate, external;  ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
   Eigen::VectorXd frame_rate;            ///< of q - q_v, what the frame of a carried body makes, or the bones alone
   SkinPose skin;                         ///< of a body on a skeleton: at the end of the step
-  Eigen::VectorXd turned;                ///< a field in its bones' axes
+  Eigen::VectorXd turned;                ///< a field in its bones' axes, or of a free body a force
   Eigen::VectorXd unused;                ///< a gradient that nobody asked for
   AlignedArray x, a, w, inertia, force;  ///< fields at the last d
   AlignedArray frozen;                   ///< tangents of damping, see Kernels::mesh_force()
   AlignedFloats tangents;                ///< of the Hessian
   AlignedArray coefficients, target, rate_coefficients;  ///< 3 x stride: W^T q at the last d, c*, W^T (q - q_v)
+  FullTarget elastic_target;                             ///< of an elastic example force
   RigidWorkspace rigid;                                  ///< of a free body, where freeze() was last called
 };
 
@@ -64,9 +65,11 @@ void project_held(const FullSpace& space, std::span<Attachment> attachments, Num
 /// What a step in full space minimises, a function of the field d = q - q_n:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + c_v/2 (q - q_v)^T D (q - q_v)
 ///     + kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2,
+/// of an elastic example force its energy, once there is a target, in place of the term with kappa;
 /// D = alpha M + beta K, K of the iterate that was last frozen, and with obstacles near their potential. Of a free body
 /// q - q_v is that without the rigid motion that has its momenta, of a carried one without that of its frame, as the
-/// body stands at that iterate. Problem of search_line(). No call allocates.
+/// body stands at that iterate; and W^T q - c* of a free body is that of its deformation in the frame that fits it at
+/// d. Problem of search_line(). No call allocates.
 class FullPotential {
  public:
   FullPotential(const FullModel& model, const StepScene& scene, const StepForm& form, FullPotentialWorkspace& workspace)
@@ -110,16 +113,21 @@ class FullPotential {
 
   /// W^T q at the last d into the workspace's coefficients.
   void set_coefficients() noexcept;
+  /// The shape [field] of no energy of an elastic example force; before the next evaluate_elements().
+  void set_elastic_target(const Eigen::VectorXd& shape) noexcept;
 
  private:
   bool filters() const noexcept { return filter_stiffness() + filter_damping() > 0; }
-  double filter_stiffness() const noexcept { return scene_.examples.empty() ? 0 : scene_.examples.front().stiffness; }
+  double filter_stiffness() const noexcept {
+    return scene_.examples.empty() ? 0 : linear_stiffness(scene_.examples.front());
+  }
   double filter_damping() const noexcept {
     return scene_.examples.empty() ? 0 : scene_.examples.front().damping * form_.velocity_factor;
   }
   MeshInertia terms() const noexcept;
 
-  void add_filter_force(PotentialValue& total, Eigen::VectorXd& gradient) noexcept;
+  void set_filter_coefficients(PotentialValue& total) noexcept;
+  void add_filter_force(Eigen::VectorXd& gradient) noexcept;
   void add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
   void remove_host_motion(bool freeze) noexcept;
   void add_attachments(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
@@ -136,9 +144,11 @@ class FullPotential {
   std::span<Attachment> attachments_;
   const Attachment* host_ = nullptr;                     ///< the first that holds
   Eigen::Vector3d host_turn_ = Eigen::Vector3d::Zero();  ///< in q - q_v
+  RigidPart::Turn turn_;                                 ///< of a free body with a filter, at the last evaluation
   MotionSample frame_;                                   ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;
+  bool has_elastic_target_ = false;
 };
 
 }  // namespace exmat::runtime

@@ -14,6 +14,7 @@
 #include "common/elastic/materials.h"
 #include "common/mesh/geometry.h"
 #include "runtime/sim/elasticity/element_potential.h"
+#include "runtime/sim/examples/target_elasticity.h"
 
 namespace exmat::runtime {
 namespace {
@@ -297,17 +298,60 @@ ElementLaw FullSpace::law() const noexcept {
   return law;
 }
 
-void FullSpace::projected_tangents(const double* field, double stiffness_damping, bool freeze, double* frozen,
-                                   float* tangents) const noexcept {
+FullTarget FullSpace::make_target() const {
+  return {AlignedArray(padded_elements() * 9), AlignedArray(padded_elements() * kInverseNumbers), AlignedArray(1)};
+}
+
+void FullSpace::set_target(const double* field, double factor, FullTarget& target) const noexcept {
+  for (Eigen::Index e = 0; e < padded_elements(); ++e) {
+    const Eigen::Matrix3d H = displacement_gradient(field, e);
+    double* const shift = target.shifts.data() + e / kLanes * 9 * kLanes + e % kLanes;
+    for (Eigen::Index i = 0; i < 9; ++i) shift[i * kLanes] = H(i / 3, i % 3);
+    invert_target(shift, target.inverses.data() + e / kLanes * kInverseNumbers * kLanes + e % kLanes);
+  }
+  target.factor[0] = factor;
+}
+
+ElementLaw FullSpace::law(const FullTarget& target) const noexcept {
+  ElementLaw own = law();
+  own.shift_count = 1;
+  own.shifts = target.shifts.data();
+  own.inverses = target.inverses.data();
+  own.shift_weights = target.factor.data();
+  return own;
+}
+
+Eigen::Matrix3d FullSpace::displacement_gradient(const double* field, Eigen::Index element) const noexcept {
+  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
+  for (auto k = static_cast<std::size_t>(starts_[static_cast<std::size_t>(element)]);
+       k < static_cast<std::size_t>(starts_[static_cast<std::size_t>(element) + 1]); ++k)
+    H += Eigen::Map<const Eigen::Vector3d>(field + 4 * corners_[k]) *
+         Eigen::Map<const Eigen::RowVector3d>(&gradients_[3 * k]);
+  return H;
+}
+
+void FullSpace::projected_tangents(const double* field, const FullTarget* example, double stiffness_damping,
+                                   bool freeze, double* frozen, float* tangents) const noexcept {
   with_material(model_, [&](auto material) {
+    using Own = decltype(material);
+    // Of e v Psi((I + H) A): A times each block of rows and columns of an axis, times A^T.
+    const auto example_tangent = [&](Eigen::Index e, const Eigen::Matrix3d& H) -> Matrix9 {
+      const double* const numbers = example->inverses.data() + e / kLanes * kInverseNumbers * kLanes + e % kLanes;
+      Eigen::Matrix3d A;
+      for (Eigen::Index i = 0; i < 9; ++i) A(i / 3, i % 3) = numbers[i * kLanes];
+      const double weight = example->factor[0] * numbers[9 * kLanes];
+      const Eigen::Matrix3d own = (Eigen::Matrix3d::Identity() + H) * A - Eigen::Matrix3d::Identity();
+      Matrix9 D = projected_tangent<Own>(own, {weight * mu_[e], weight * lambda_[e]});
+      for (Eigen::Index a = 0; a < 9; a += 3)
+        for (Eigen::Index b = 0; b < 9; b += 3) D.block<3, 3>(a, b) = (A * D.block<3, 3>(a, b) * A.transpose()).eval();
+      return D;
+    };
     for (Eigen::Index e = 0; e < padded_elements(); ++e) {
-      Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-      for (auto k = static_cast<std::size_t>(starts_[static_cast<std::size_t>(e)]);
-           k < static_cast<std::size_t>(starts_[static_cast<std::size_t>(e) + 1]); ++k)
-        H += Eigen::Map<const Eigen::Vector3d>(field + 4 * corners_[k]) *
-             Eigen::Map<const Eigen::RowVector3d>(&gradients_[3 * k]);
-      Matrix9 D = projected_tangent<decltype(material)>(H, {mu_[e], lambda_[e]});
+      const Eigen::Matrix3d H = displacement_gradient(field, e);
+      Matrix9 D = projected_tangent<Own>(H, {mu_[e], lambda_[e]});
       D.diagonal().array() -= variance_[e];
+      Matrix9 pulled = Matrix9::Zero();
+      if (example != nullptr) pulled = example_tangent(e, H);
       double* const own_frozen = frozen + e / kLanes * kLanes * kTangentNumbers + e % kLanes;
       float* const own = tangents + e / kMeshLanes * kMeshLanes * kTangentNumbers + e % kMeshLanes;
       for (Eigen::Index i = 0, entry = 0; i < 9; ++i)
@@ -317,7 +361,7 @@ void FullSpace::projected_tangents(const double* field, double stiffness_damping
             if (freeze) own_frozen[entry * kLanes] = value;
             value += stiffness_damping * own_frozen[entry * kLanes];
           }
-          own[entry * kMeshLanes] = static_cast<float>(value);
+          own[entry * kMeshLanes] = static_cast<float>(value + pulled(i, j));
         }
     }
   });

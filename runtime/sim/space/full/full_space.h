@@ -29,6 +29,13 @@ class AlignedFloats {
   Eigen::Index size_ = 0;
 };
 
+/// The target of an elastic example force in the elements, as its law takes it; sized once.
+struct FullTarget {
+  AlignedArray shifts;    ///< F* - I, panels x 9 x kLanes
+  AlignedArray inverses;  ///< F*^-1 and det F*, 0 where that turns an element inside out, panels x 10 x kLanes
+  AlignedArray factor;    ///< e
+};
+
 /// Whether the fixed vertices of a body stay where they were meshed, or go where something else takes them.
 enum class FixedVertices { kStay, kDriven };
 
@@ -86,16 +93,21 @@ class FullSpace {
 
   MeshArrays arrays() const noexcept;
   ElementLaw law() const noexcept;
+  FullTarget make_target() const;
+  /// `field`: displacements u* of the target from rest, in any frame.
+  void set_target(const double* field, double factor, FullTarget& target) const noexcept;
+  ElementLaw law(const FullTarget& target) const noexcept;
   MeshFilter<double> filter() const noexcept { return {vertices(), stride_, filter_.data()}; }
   MeshFilter<float> rounded_filter() const noexcept { return {vertices(), stride_, rounded_filter_.data()}; }
   Eigen::Index padded_elements() const { return std::ssize(starts_) - 1; }
 
   /// [panels x 45 x kMeshLanes] tangents at x as those of Kernels::mesh_force_and_tangents(), their negative
-  /// eigenvalues set to zero before the variance is taken off.
-  void projected_tangents(const double* field, double stiffness_damping, bool freeze, double* frozen,
-                          float* tangents) const noexcept;
+  /// eigenvalues set to zero before the variance is taken off. `example`: null, or the target of an elastic force.
+  void projected_tangents(const double* field, const FullTarget* example, double stiffness_damping, bool freeze,
+                          double* frozen, float* tangents) const noexcept;
 
  private:
+  Eigen::Matrix3d displacement_gradient(const double* field, Eigen::Index element) const noexcept;
   /// Calls `use(place, (M v)_place)` of all places; `velocity(place)`.
   template <typename Velocity, typename Use>
   void for_momenta(const Velocity& velocity, const Use& use) const {

@@ -16,23 +16,25 @@ constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and wi
 constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
 
 FullWorkspace::Key key_of(const StepScene& scene) {
-  const bool has_examples = !scene.examples.empty();
+  const ExampleSettings examples = scene.examples.empty() ? ExampleSettings{.stiffness = 0} : scene.examples.front();
   return {scene.time_step,
           scene.mass_damping,
           scene.stiffness_damping,
-          has_examples ? scene.examples.front().stiffness : 0,
-          has_examples ? scene.examples.front().damping : 0,
+          linear_stiffness(examples),
+          elastic_factor(examples),
+          examples.damping,
           scene.integrator == Integrator::kBdf2};
 }
 
-FullWorkspace::Linear make_linear(const FullModel& model, const StepScene& scene, double time_scale, bool touches) {
+FullWorkspace::Linear make_linear(const FullModel& model, const FullWorkspace::Key& key, double time_scale,
+                                  bool touches) {
   const FullSpace& space = model.space;
   const double c_v = 1 / time_scale;
-  const double mass = c_v * c_v + scene.mass_damping * c_v, stiffness = 1 + scene.stiffness_damping * c_v;
-  double filter = 0;
-  if (!scene.examples.empty()) filter = scene.examples.front().stiffness + scene.examples.front().damping * c_v;
-  FullWorkspace::Linear linear{
-      FullPreconditioner(space, mass, stiffness, filter, touches), {}, static_cast<float>(filter)};
+  const double mass = c_v * c_v + key.mass_damping * c_v, stiffness = 1 + key.stiffness_damping * c_v;
+  const double filter = key.example_stiffness + key.example_damping * c_v;
+  FullWorkspace::Linear linear{FullPreconditioner(space, mass, stiffness + key.example_elasticity, filter, touches),
+                               {},
+                               static_cast<float>(filter)};
   for (Eigen::Index k = 0; k < space.entries(); ++k)
     linear.matrix.push_back(static_cast<float>(mass * space.mass_value(k) + stiffness * space.variance_value(k)));
   return linear;
@@ -59,7 +61,9 @@ const char* unsupported(const FullModel& model, const StepScene& scene) noexcept
   if (scene.animation && !model.skin) return "an animation of bones";
   if (scene.examples.size() > 1) return "more than one example force";
   const bool acts_example = std::ranges::any_of(scene.examples, acts);
-  if (acts_example && scene.examples.front().elastic) return "an elastic example force";
+  const bool is_elastic = acts_example && scene.examples.front().elastic;
+  if (is_elastic && !model.is_elastic) return "an elastic example force, since the bundle was made for a linear one";
+  if (is_elastic && (model.skin || model.rigid)) return "an elastic example force of a free body or one on a skeleton";
   if (acts_example && model.space.functions() == 0) return "an example force, since the space has no filter";
   const bool damped = scene.mass_damping > 0 || scene.stiffness_damping > 0;
   if (!model.space.is_clamped() && !model.rigid && (damped || acts_example))
@@ -103,8 +107,8 @@ void FullWorkspace::fit(const FullModel& model, const StepScene& scene) {
   const bool touches = model.contacts.has_value();
   if (touches && contact.blocks.empty()) contact = FullContactScratch(model.space.vertices());
   if (key == wanted) return;
-  first = make_linear(model, scene, scene.time_step, touches);
-  second = scene.integrator == Integrator::kBdf2 ? make_linear(model, scene, 2 * scene.time_step / 3, false) : first;
+  first = make_linear(model, wanted, scene.time_step, touches);
+  second = wanted.bdf2 ? make_linear(model, wanted, 2 * scene.time_step / 3, false) : first;
   key = wanted;
 }
 
@@ -536,6 +540,14 @@ NewtonStatus FullStep::minimise_with_friction() noexcept {
       return status;
     tangents_are_current_ = false;
   }
+}
+
+void FullStep::set_elastic_target(const Eigen::VectorXd& shape) noexcept {
+  Eigen::VectorXd& field = workspace_.trial;
+  field.setZero();
+  space_.to_field(shape, field);
+  potential_.set_elastic_target(field);
+  potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kExact, false);
 }
 
 void FullStep::solve() noexcept { status_ = near_ ? minimise_with_friction() : minimise(); }

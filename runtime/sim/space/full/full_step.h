@@ -51,7 +51,8 @@ struct FullWorkspace {
   };
   /// The settings of a scene that factors are made of.
   struct Key {
-    double time_step = 0, mass_damping = 0, stiffness_damping = 0, example_stiffness = 0, example_damping = 0;
+    double time_step = 0, mass_damping = 0, stiffness_damping = 0;
+    double example_stiffness = 0, example_elasticity = 0, example_damping = 0;
     bool bdf2 = false;
     bool operator==(const Key&) const = default;
   };
@@ -117,10 +118,13 @@ class FullStep {
     const FullExamples::Frame frame = frame_of_examples();
     for (Eigen::Index k = 0; k < space_.functions(); ++k) {
       Eigen::Vector3d own(target(k, 0), target(k, 1), target(k, 2));
-      if (moves()) own = model_.examples->to_world(k, frame, own);
+      if (model_.carried) own = model_.examples->to_world(k, frame, own);
       for (int a = 0; a < 3; ++a) workspace_.potential.target[a * space_.filter().stride + k] = own[a];
     }
   }
+
+  /// u* [f] of an elastic example force, in any frame, in place of set_target().
+  void set_elastic_target(const Eigen::VectorXd& shape) noexcept;
 
   void solve() noexcept;
 

@@ -45,6 +45,16 @@ class RigidPart {
   /// Adds a rigid motion to `v`; takes off the one that has its momenta.
   static void add_motion(const FrameVelocity& motion, const RigidWorkspace& workspace, double* v) noexcept;
   void remove_motion(const RigidWorkspace& workspace, double* v) const noexcept;
+  /// Where the frame of the body displaced by `u` is turned to, and A^-1 of spin(), world.
+  struct Turn {
+    Eigen::Matrix3d rotation, inverse;
+  };
+  Turn turn(const double* u) const noexcept;
+  /// Of forces that see the deformation in that frame: takes off what turns it along, so that they have no torque.
+  void remove_torque(const Turn& turn, const double* u, double* forces) const noexcept;
+  /// Of forces that see what remove_motion() leaves of velocities, where place() was called; the body is at `u`.
+  void remove_rigid_force(const double* u, const RigidWorkspace& workspace, double* forces) const noexcept;
+
   /// How fast the fitted frame turns while the vertices move by `v`, world [rad/s].
   Eigen::Vector3d spin(const double* v, const RigidWorkspace& workspace) const noexcept;
 
