@@ -30,7 +30,7 @@ struct RegionSummary {
   std::int64_t examples = 0;                                     ///< K
   bool has_targets = false;                                      ///< /regions/NAME/targets is there
   bool has_target_space = false;                                 ///< /regions/NAME/target_space is there
-  EnergyReference energy_reference = EnergyReference::kExample;  ///< of its targets, where they are there
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< reference of its targets, if any
 };
 
 /// Summary of a bundle, read from its attributes and table of contents alone.
@@ -40,15 +40,15 @@ struct BundleSummary {
   std::vector<std::string> groups;  ///< present, in bundle order
   bool constrained = false;         ///< root attribute of that name (int64, 0 or 1)
   std::int64_t vertices = 0, tets = 0, modes = 0, cubature_elements = 0, eigenfunctions = 0, examples = 0;
-  ForceMethod internal_force = ForceMethod::kCubature;           ///< what `auto` takes, one of the two others
-  EnergyReference energy_reference = EnergyReference::kExample;  ///< of /targets, where they are there
+  ForceMethod internal_force = ForceMethod::kCubature;           ///< choice for `auto`, never `auto` itself
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< reference of /targets, if any
   bool has_polynomial = false;                                   ///< /polynomial is there
   bool has_targets = false;                                      ///< /targets is there
   bool has_target_space = false;                                 ///< /target_space is there
   bool knows_scene = false;                                      ///< its basis has learned from the loads of a scene
   std::vector<RegionSummary> regions;
-  std::int64_t render_vertices = 0;  ///< of /render; 0 where it is not there
-  std::int64_t bones = 0;            ///< of /skeleton, likewise
+  std::int64_t render_vertices = 0;  ///< vertices of /render; 0 without it
+  std::int64_t bones = 0;            ///< bones of /skeleton; 0 without it
 };
 BundleSummary summarise_bundle(const BundleInput& input);
 

@@ -21,8 +21,8 @@ namespace exmat {
 
 inline constexpr std::string_view kPackMagic = "exmatpk\n";
 inline constexpr std::uint32_t kPackVersion = 1;
-inline constexpr std::size_t kPackAlignment = 64;  ///< of arrays; the header is as long
-inline constexpr std::size_t kMostPackSizes = 8;   ///< of one array
+inline constexpr std::size_t kPackAlignment = 64;  ///< offset of each array is a multiple of it; the header is as long
+inline constexpr std::size_t kMostPackSizes = 8;   ///< dimensions of one array at most
 
 /// Places in the header: magic 0, version 8, bytes of the pack 16, bytes of the table 24, CRC-32 of the table 32,
 /// CRC-32 of the header before it 60; zeros elsewhere.

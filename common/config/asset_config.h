@@ -50,8 +50,8 @@ struct ExampleConfig {
   bool rest = false;
   DropConfig drop;
   std::optional<std::filesystem::path> surface{};
-  std::optional<std::string> morph{};   ///< of `surface`, else of the object's
-  std::optional<std::int64_t> frame{};  ///< of a point cache
+  std::optional<std::string> morph{};   ///< name in `surface`, else in the object's
+  std::optional<std::int64_t> frame{};  ///< number in a point cache
 
   /// The file that its messages name: the one that it is read from.
   const std::filesystem::path& file(const std::filesystem::path& object_surface) const {
@@ -88,7 +88,7 @@ struct AlignmentConfig {
 struct RegionConfig {
   std::string name;
   VertexSelection vertices;
-  std::optional<VertexSelection> example_vertices;  ///< of the rest example; absent: all
+  std::optional<VertexSelection> example_vertices;  ///< vertices of the rest example; absent: all
   std::vector<std::string> examples;                ///< names, not the rest pose's
 };
 
@@ -111,7 +111,7 @@ struct TrainingConfig {
   Training from = Training::kAuto;
   TrainingSpace space = TrainingSpace::kAuto;
   int segments = 8;
-  std::optional<double> seconds;      ///< of one segment, about; absent: 0.8 periods of the lowest mode
+  std::optional<double> seconds;      ///< length of one segment, about; absent: 0.8 periods of the lowest mode
   std::optional<std::uint64_t> seed;  ///< absent: the asset's
   std::optional<LoadsConfig> loads;
 };
@@ -122,7 +122,7 @@ struct AssetConfig {
   std::string name;
   std::filesystem::path object_mesh;  ///< tets, or, where object_surface is there, that
   std::optional<std::filesystem::path> object_surface;
-  std::optional<int> cells;         ///< of the tets that enclose it; both absent: the default
+  std::optional<int> cells;         ///< number of enclosing tets, about; both absent: the default
   std::optional<double> cell_size;  ///< [m]
   MaterialConfig material;
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
@@ -139,7 +139,7 @@ struct AssetConfig {
   AlignmentConfig alignment;
 
   int basis_size = 30;                    ///< r
-  std::optional<double> basis_tolerance;  ///< of the error in held-out runs, instead of a size
+  std::optional<double> basis_tolerance;  ///< limit of the error in held-out runs, instead of a size
   int linear_modes = 15;
   bool example_fields = true;
   TrainingConfig training;
@@ -159,7 +159,7 @@ struct AssetConfig {
   std::optional<std::vector<std::string>> needs;  ///< optional parts to write ("examples", "targets", "rigid",
                                                   ///< "contact", "regions", "render"); absent: all that apply
   std::uint64_t seed = 1;
-  double length_unit = 1;  ///< of the numbers of all meshes [m]
+  double length_unit = 1;  ///< unit of the numbers of all meshes [m]
 };
 
 }  // namespace exmat

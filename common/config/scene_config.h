@@ -30,7 +30,7 @@ struct VertexForceConfig {
 /// values.
 struct KeysConfig {
   std::vector<double> times;            ///< ascending [s]
-  std::vector<Eigen::VectorXd> values;  ///< of one size, that of the setting
+  std::vector<Eigen::VectorXd> values;  ///< one for each key, of the setting's size
   Interpolation interpolation = Interpolation::kLinear;
 
   bool empty() const { return times.empty(); }
@@ -73,7 +73,7 @@ struct NewtonConfig {
 struct SpaceConfig {
   Space space = Space::kReduced;
   double release = 0.5;           ///< [s]
-  NewtonConfig newton{20, 0.01};  ///< of steps in all vertices
+  NewtonConfig newton{20, 0.01};  ///< limits of steps in all vertices
 };
 
 struct SleepConfig {
@@ -112,7 +112,7 @@ struct MeshConfig {
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< unit
 };
 struct HeightFieldConfig {
-  std::optional<std::filesystem::path> file;  ///< of the heights, else `heights`
+  std::optional<std::filesystem::path> file;  ///< grid of heights, else `heights`
   Eigen::MatrixXd heights;
   Eigen::Vector2d spacing = Eigen::Vector2d::Ones();  ///< along x and y
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
@@ -125,7 +125,7 @@ struct ObstacleConfig {
   double stiffness = 1e6;              ///< pressure per depth [N/m^3]
   double damping = 0;                  ///< pressure per approach velocity [N s/m^3]
   double friction = 0;                 ///< Coulomb's coefficient
-  std::vector<KeyframeConfig> motion;  ///< of the shape's frame; empty: the world
+  std::vector<KeyframeConfig> motion;  ///< moves the shape's frame; empty: the world
   MeetingGroup meeting{};
 };
 
@@ -149,8 +149,8 @@ struct BodyConfig {
   std::optional<Eigen::Vector3d> linear_velocity, angular_velocity;  ///< world [m/s], [rad/s]
   std::optional<Eigen::VectorXd> reduced;                            ///< q; this or pose, or neither
   std::optional<PoseConfig> pose;
-  std::vector<KeyframeConfig> motion;        ///< of the fixed vertices: x = position + orientation X, X the rest mesh
-  std::optional<AnimationConfig> animation;  ///< of the bones of a body on a skeleton
+  std::vector<KeyframeConfig> motion;  ///< moves the fixed vertices: x = position + orientation X, X the rest mesh
+  std::optional<AnimationConfig> animation;  ///< moves the bones of a body on a skeleton
 };
 
 /// SCENE.json after validation, paths resolved against its folder. schemas/scene.json.
@@ -170,7 +170,7 @@ struct SceneConfig {
   NewtonConfig newton;
   SpaceConfig space;
   SleepConfig sleep;
-  std::optional<ExampleForceConfig> examples;  ///< of the whole body
+  std::optional<ExampleForceConfig> examples;  ///< force on the whole body
   std::vector<RegionForceConfig> regions;
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
@@ -194,7 +194,7 @@ struct BodyContactConfig {
   double damping = 0;      ///< pressure per approach velocity [N s/m^3]
   double friction = 0;     ///< Coulomb's coefficient
   bool self = false;       ///< parts of one body, too
-  double release = 1;      ///< how fast what overlaps at the start is let out, obstacles included [m/s]
+  double release = 1;      ///< speed at which overlap at the start is let out, obstacles included [m/s]
 };
 
 /// Place of a body beyond what its BodyConfig says.
@@ -219,7 +219,7 @@ struct WorldConfig {
   std::int64_t steps = 1000;
   std::vector<BodiesConfig> bodies;
   BodyContactConfig contact;
-  int full_bodies = 1000000;  ///< of space `auto`, that step in all vertices at once
+  int full_bodies = 1000000;  ///< most bodies of space `auto` that step in all vertices at once
   std::optional<std::filesystem::path> trajectory;
   std::int64_t every = 10;
 };

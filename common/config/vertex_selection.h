@@ -52,9 +52,9 @@ bool needs_marks(const VertexSelection& selection);
 /// Points to choose from, and what messages call them.
 struct SelectablePoints {
   const VertexArray& points;           ///< at rest [m]
-  const VertexMarks* marks = nullptr;  ///< of the points; none where the object was not made about a surface
+  const VertexMarks* marks = nullptr;  ///< marks of each point; none where the object was not made about a surface
   std::string_view noun = "vertex";    ///< one of them
-  std::string file{}, place{};         ///< of the selection
+  std::string file{}, place{};         ///< source of the selection
   std::string surface{};               ///< that the marks are of
 };
 

@@ -8,13 +8,13 @@ namespace exmat {
 /// Exit statuses of both programs.
 enum class ExitStatus { kDone = 0, kFailure = 1, kBadInput = 2 };
 
-/// What is wrong with an input, in the parts that its author needs to mend it. Empty parts are left out of the message.
+/// A fault of an input, in the parts that its author needs to mend it. Empty parts are left out of the message.
 struct Complaint {
   std::string file;      ///< path as the user gave it
   std::string place;     ///< line, JSON pointer, dataset path or element within the file
-  std::string expected;  ///< what a sound file has there
-  std::string found;     ///< what this one has
-  std::string advice;    ///< what to do, a sentence without the full stop
+  std::string expected;  ///< content of a sound file there
+  std::string found;     ///< content of this one
+  std::string advice;    ///< remedy, a sentence without the full stop
 };
 
 /// One message of the form "FILE: PLACE: expected ..., found ...; ADVICE".

@@ -89,7 +89,7 @@ struct AttributeSchema {
 
 struct GroupSchema {
   std::string path;   ///< "/examples/{example}": one for each example; "/regions/{region}/examples", ... likewise
-  std::string group;  ///< of the ledger, e.g. "examples"
+  std::string group;  ///< name in the ledger, e.g. "examples"
   std::string description;
   std::vector<AttributeSchema> attributes;
   std::vector<std::string> symbols;  ///< sizes that each group of this path has of its own
@@ -99,7 +99,7 @@ struct GroupSchema {
 
 struct DatasetSchema {
   std::string path;   ///< "/examples/{example}/reduced": one for each example
-  std::string group;  ///< of the ledger
+  std::string group;  ///< name in the ledger
   ElementType type;
   std::vector<Extent> dims;
   std::string dims_text, units, description;

@@ -12,7 +12,7 @@ namespace exmat {
 /// A point of a tet mesh in barycentric coordinates.
 struct NearestPoint {
   Eigen::Index tet = 0;
-  Eigen::Vector4d weights = Eigen::Vector4d::Zero();  ///< of the tet's corners, >= 0, sum 1
+  Eigen::Vector4d weights = Eigen::Vector4d::Zero();  ///< one for each corner of the tet, >= 0, sum 1
   double distance = 0;                                ///< from the point that was asked for; 0 inside [m]
 };
 

@@ -18,8 +18,8 @@ struct RegionNeeds {
   std::string name;
   bool targets = true;  ///< its table of targets
   EnergyReference energy_reference = EnergyReference::kExample;
-  bool target_space = true;        ///< what targets are solved for in
-  bool target_elasticity = false;  ///< what an elastic example force takes
+  bool target_space = true;        ///< space that targets are solved for in
+  bool target_elasticity = false;  ///< elements for an elastic example force
 };
 
 /// Needs of a scene (or an asset's `needs`) from a bundle beyond the object, its modes and its cubature.
@@ -36,14 +36,14 @@ struct Needs {
   bool render = true;                                 ///< /render, of an asset that names a render mesh
   std::optional<std::vector<RegionNeeds>> regions{};  ///< /regions, those named; absent: all, with tables as `targets`
   ForceMethod internal_force = ForceMethod::kAuto;    ///< any but cubature: /polynomial
-  EnergyReference energy_reference = EnergyReference::kExample;  ///< of the targets
+  EnergyReference energy_reference = EnergyReference::kExample;  ///< reference of the targets
 };
 
 /// One line of the ledger: a bundle group, whether it is in, and why.
 struct LedgerEntry {
   std::string group;
   bool included = false;
-  std::size_t bytes = 0;  ///< of its datasets
+  std::size_t bytes = 0;  ///< size of its datasets
   std::string reason;
 };
 

@@ -20,9 +20,9 @@ struct ObjectData {
   TriangleArray surface;       ///< n_f x 3, outward
   FlagVector fixed;            ///< n, 1 where the vertex is clamped
   TetMaterials materials;      ///< n_t each
-  double stiffness_ratio = 0;  ///< of the elements over quadratic tets on the same mesh; 0 where not compared
+  double stiffness_ratio = 0;  ///< stiffness of the elements over quadratic tets on the same mesh; 0 where not compared
   double worst_stiffness = 0;  ///< largest of its parts
-  double thin_share = 0;       ///< of the volume: where the mesh is one tet thick
+  double thin_share = 0;       ///< share of the volume where the mesh is one tet thick
   /// Parts and colours of the surface that the mesh was made about, packed (common/model/vertex_marks.h); empty
   /// without one.
   FlagVector part_names;  ///< UTF-8, a zero byte after each of the p names
@@ -37,8 +37,8 @@ struct ShapeSpaceData {
   Eigen::VectorXd eigenvalues;                         ///< m, ascending, > 0
   RowMatrix eigenfunctions;                            ///< n x m, phi^T (M_s/V) phi = I
   RowMatrix rest_descriptor;                           ///< m x 3
-  double volume = 0;                                   ///< of the object [m^3]
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< of the object [m]
+  double volume = 0;                                   ///< volume of the object [m^3]
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< centroid of the object [m]
   Weighting weighting = Weighting::kEigenvalue;
   std::int64_t splits_cluster = 0;  ///< 1 where the m-th and the next eigenvalue are (nearly) equal
 };
@@ -51,17 +51,17 @@ struct ExampleData {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< from the example's frame to the object's
   double scale = 1;                 ///< object's length unit over the example's: (V_object / V_example)^(1/3)
   std::string source;               ///< the morph target that it is of, as the asset names it, or its file's name
-  std::string method;               ///< how it was mapped to the object
+  std::string method;               ///< method that mapped it to the object
   double alignment_residual = 0;    ///< relative
   double doubt = 0;                 ///< J of docs/alignment.md; 0 is certain, above 1.2 refused
   double inverted_fraction = 0;     ///< share of the volume that the pose turns inside out
   std::int64_t competing_maps = 0;  ///< other poses that fit the example about as well
-  double surface_rms = 0, surface_farthest = 0;  ///< what a pose by a surface misses of it, over its diagonal
+  double surface_rms = 0, surface_farthest = 0;  ///< distances of a pose by a surface from it, over its diagonal
   std::int64_t surface_iterations = 0;           ///< that this pose took
   double shape_space_error = 0;  ///< share of its displacement that the m functions lose, relative M-norm
   double basis_error = 0;        ///< share of its transferred displacement that U loses, relative M-norm
-  double best_error = 0;         ///< of the body settled under an example force of any strength, relative M-norm
-  double settled_error = 0;      ///< of the body settled under the scene's, where the bundle is of one; else best_error
+  double best_error = 0;         ///< error of the body settled under an example force of any strength, relative M-norm
+  double settled_error = 0;      ///< likewise under the force of the scene that the bundle is of; else best_error
   double settled_distance = 0;   ///< largest of a vertex then [m]
   std::int64_t settled_vertex = 0;  ///< which
   RowMatrix descriptor;             ///< m x 3
@@ -81,7 +81,7 @@ struct ExampleSet {
 /// Group /modal.
 struct ModalData {
   RowMatrix basis;              ///< 3n x r (dataset n 3 r), mass-orthonormal, zero on fixed vertices
-  Eigen::VectorXd frequencies;  ///< of the linear modes, ascending [Hz]
+  Eigen::VectorXd frequencies;  ///< frequencies of the linear modes, ascending [Hz]
   RowMatrix gravity_load;       ///< 3 x r, row a = U^T M 1_a: generalised force per unit acceleration along axis a
 };
 
@@ -95,7 +95,7 @@ struct CubatureData {
   Eigen::VectorXd poisson_ratio;   ///< s
   RowMatrix variance;              ///< r x r, the constant part of the stiffness, of all elements; none: zero
   RowMatrix heldout_poses;         ///< N x r reduced poses that the held-out errors are measured on
-  ForceMethod internal_force = ForceMethod::kCubature;  ///< what `auto` takes, one of the two others
+  ForceMethod internal_force = ForceMethod::kCubature;  ///< choice for `auto`, never `auto` itself
   std::string internal_force_reason;                    ///< why
   CubatureMethod method = CubatureMethod::kGreedySwap;
   double training_error = 0;           ///< relative, force, as heldout_error
@@ -200,16 +200,16 @@ inline constexpr const char* kLoadsOfScene = "the loads of the scene";
 /// Errors are relative, docs/error_metrics.md. Of no use to a step.
 struct FidelityData {
   std::string loads;               ///< whose loads the runs are of
-  std::string reference;           ///< what ran them: "full_space", "modes"
+  std::string reference;           ///< space that ran them: "full_space", "modes"
   std::string basis;               ///< "trained", "modal": which of the two was better and is taken
   std::string advice;              ///< one sentence
   std::int64_t training_runs = 0;  ///< that the basis has learned from
   std::int64_t heldout_runs = 0;   ///< that these errors are of
   double position_error = 0;       ///< mean
   double shape_error = 0;          ///< mean, without the rigid motion; of a clamped body as the position
-  double end_error = 0;            ///< of the position (a free body: of the shape) in the last frame of each run
+  double end_error = 0;            ///< position (a free body: shape) in the last frame of each run
   double settled_error = 0;        ///< likewise, over the last tenth of each run
-  double all_elements_error = 0;   ///< of the shape, of the basis with all elements: what cubature has no share in
+  double all_elements_error = 0;   ///< shape, with the basis and all elements: no share of cubature
   double modal_error = 0;          ///< likewise, of the basis of modes and their derivatives alone
   double captured_energy = 0;      ///< share of |u|_M^2 of the full motion that the basis can hold
   double target_error = 0;         ///< largest of a table or space of targets
@@ -261,7 +261,7 @@ struct SkeletonData {
   IndexVector parents;                  ///< b, -1 of a root
   RowMatrix bind;                       ///< 3b x 4 (dataset b 3 4), bone to world where the mesh is at rest [1], [m]
   RowMatrix weights;                    ///< n x b, >= 0, rows add up to 1
-  IndexVector first_frames;             ///< of each animation, and the end of the last
+  IndexVector first_frames;             ///< start of each animation, then the end of the last
   Eigen::VectorXd times;                ///< F, of the frames, ascending from 0 in each animation [s]
   RowMatrix poses;  ///< F b x 7 (dataset F b 7), joint [m] and turn from the bind pose, a quaternion, w first
 };

@@ -28,10 +28,10 @@ struct SurfaceFile {
   SurfaceMesh mesh;                          ///< all primitives, meshes and nodes as one, the nodes' transforms applied
   std::vector<MorphTarget> morphs;           ///< in the file's order; those of a name that several meshes have are one
   std::map<std::string, FlagVector> parts;   ///< n flags each: the vertices of what the file names
-  std::optional<SkeletonData> skeleton;      ///< of a skin, with weights of the vertices where it is bound
+  std::optional<SkeletonData> skeleton;      ///< bones of a skin, with weights of the vertices where it is bound
   VertexArray colours;                       ///< n x 3 in 0 to 1: red, green, blue; no rows where there are none
   std::vector<std::filesystem::path> files;  ///< every file that was read, the named one first
-  std::vector<std::string> remarks;          ///< what a user should know of how the file was read, a sentence each
+  std::vector<std::string> remarks;          ///< notes to a user on how the file was read, a sentence each
 };
 
 }  // namespace exmat

@@ -10,7 +10,7 @@ namespace exmat {
 struct NumberType {
   enum class Kind { kSigned, kUnsigned, kReal, kBits };
   Kind kind;
-  std::size_t bytes;  ///< of a binary value; of bits, eight share one
+  std::size_t bytes;  ///< size of a binary value; eight bits share one byte
 };
 
 /// Reads the values of a mesh file, held in memory, in either encoding: text until set_binary, which words and lines
