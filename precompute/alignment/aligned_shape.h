@@ -17,10 +17,10 @@ struct AlignedShape {
 /// Number of eigenpairs that alignment works with; fewer where the mesh has fewer.
 constexpr Eigen::Index kAlignmentFunctions = 60;
 
-/// How a mesh is brought to its rest example.
+/// Scale and rotation that bring a mesh to its rest example.
 struct Placing {
   double size = 1;                                         ///< length over that of a body of volume 1
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of its positions
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< applied to its positions
 };
 
 /// [n x 3] vertices about their centroid, of a body of this size, rotated.

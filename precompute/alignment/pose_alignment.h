@@ -17,12 +17,12 @@ struct Correspondences {
   Eigen::Index count() const { return on_rest.rows(); }
 };
 
-/// What is known about a pose beforehand.
+/// Knowledge about a pose beforehand.
 struct AlignmentHints {
   bool free_frame = false;          ///< the pose may be rotated in space
   Correspondences correspondences;  ///< landmarks, or a dense map
   bool landmarks_alone = false;     ///< no starts but from the correspondences
-  bool frame_unsaid = false;        ///< of free_frame: nobody says so, and of poses that fit the least moved is meant
+  bool frame_unsaid = false;        ///< free_frame is a guess: of poses that fit, the least moved is meant
 };
 
 /// A landmark that contradicts the others.
@@ -34,17 +34,17 @@ struct LeftOutLandmark {
 /// A posed example registered from the rest example: the positions of the rest example's vertices in the pose.
 struct PoseAlignment {
   VertexArray positions;            ///< n_0 x 3, normalised, in the frame of the pose
-  std::string start;                ///< what the registration began with
+  std::string start;                ///< start of the registration, in words
   double residual = 0;              ///< RMS distance of the two surfaces, over the RMS radius of the rest example
   double missed_landmarks = 0;      ///< RMS distance of the landmarks from where they belong, over the RMS radius
   double doubt = 0;                 ///< docs/alignment.md, "What the user is told"; 0 is certain
-  double inverted_fraction = 0;     ///< of the rest example's volume
+  double inverted_fraction = 0;     ///< share of the rest example's volume
   std::int64_t competing_maps = 0;  ///< other poses that fit within 1.4 times the best
   bool ambiguous = false;           ///< one of them is as near the rest pose, or nothing can tell which is
   bool mirrored = false;            ///< the mirror image of the rest example fits, and this does not
-  double mirror_residual = 0;       ///< of that mirror image, where it does
-  double squeezed_fraction = 0;     ///< of the volume, in tets that shrink to half beside the whole, or grow to twice
-  double uncovered = 0;             ///< of the area of either surface, the larger: far from the other
+  double mirror_residual = 0;       ///< residual of that mirror image, where it fits
+  double squeezed_fraction = 0;     ///< share of the volume in tets that shrink to half beside the whole, or double
+  double uncovered = 0;             ///< share of the area of either surface, the larger, that is far from the other
   bool hides_twist = false;         ///< a body of revolution: a turn about its axis leaves no trace
   double displacement = 0;          ///< RMS from rest, over the RMS radius
   std::vector<LeftOutLandmark> left_out;  ///< landmarks that were not used

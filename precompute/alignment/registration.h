@@ -24,7 +24,7 @@ struct Registered {
   double inverted = 0;      ///< share of the volume with det F < 0
   double landmark_rms = 0;  ///< distance of the pairs
 
-  /// How well the shapes fit: E_ARAP + 20 Chamfer^2 + 2 inverted.
+  /// Misfit of the shapes: E_ARAP + 20 Chamfer^2 + 2 inverted.
   double misfit() const { return distortion + 20 * chamfer + 2 * inverted; }
   /// F of docs/alignment.md: that and 2 landmark RMS.
   double objective() const { return misfit() + 2 * landmark_rms; }
@@ -51,7 +51,7 @@ class Registration {
   /// From a start that is nearly there, at the last weight.
   Registered refine(const VertexArray& start) const;
 
-  /// Of a body that is registered: as near to the surface as the two surfaces agree, and no nearer, the weight let down
+  /// Brings a registered body as near to the surface as the two surfaces agree, and no nearer, by lowering the weight
   /// to 1e-3 / Chamfer^2 while that grows fivefold at most. What tessellations have wrong is followed before; here the
   /// body's stiffness evens it out.
   VertexArray relaxed(const Registered& registered) const;

@@ -20,7 +20,7 @@ BodySurface body_surface(const LaplaceBasis& basis, const TetArray& tets);
 
 /// One body turned, and perhaps mirrored, over another.
 struct RigidFit {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of determinant -1 for a mirror image
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< determinant -1 for a mirror image
   double gap = 0;  ///< RMS distance of the surfaces, both ways, over the RMS radius of the fixed body
 };
 

@@ -8,7 +8,7 @@ namespace exmat {
 struct StudyCommandOptions {
   std::string study, folder;
   std::string scene;                ///< whose stability is studied, in place of `study`
-  std::optional<double> budget_us;  ///< of a step
+  std::optional<double> budget_us;  ///< most time of a step
   std::optional<double> max_error;  ///< [%]
   int jobs = 1;                     ///< processes that run points, or threads that run a scene's variants
 };

@@ -30,7 +30,7 @@ class Sha256 {
   std::unique_ptr<void, Closer> context_;
 };
 
-/// Of the contents of one file, as sha256sum prints it.
+/// Hash of the contents of one file, as sha256sum prints it.
 std::string sha256_of_file(const std::filesystem::path& file);
 
 }  // namespace exmat::precompute

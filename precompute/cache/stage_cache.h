@@ -26,7 +26,7 @@ class StageCache {
   /// Makes the folder where it is missing; WorkError where it cannot.
   explicit StageCache(std::filesystem::path folder);
 
-  /// What `compute` returns, from the folder where it was computed of the same inputs. What it logs and warns of is
+  /// The result of `compute`, from the folder where it was computed of the same inputs. What it logs and warns of is
   /// then not said again.
   template <typename Compute, typename... Inputs>
   auto get(const std::string& stage, Compute compute, const Inputs&... inputs) {
@@ -43,7 +43,7 @@ class StageCache {
     return result;
   }
 
-  /// What was asked for so far.
+  /// All results that were asked for so far.
   const std::vector<CacheUse>& uses() const { return uses_; }
 
  private:

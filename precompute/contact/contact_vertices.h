@@ -19,7 +19,7 @@ inline constexpr int kContactVertices = 1000;
 ContactData contact_data(const ObjectData& object, const RowMatrix& basis, const FlagVector& may_touch,
                          std::optional<int> count);
 
-/// How many of how many vertices there are, and how to have all, for the log.
+/// Numbers of contact vertices and of all that might be, and the way to have all, for the log.
 std::string contact_summary(const ObjectData& object, const FlagVector& may_touch, const ContactData& contact);
 
 }  // namespace exmat::precompute

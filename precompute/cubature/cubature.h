@@ -21,7 +21,7 @@ struct CubatureOptions {
       true;  ///< on held-out poses, which takes as long as the rest where elements are many; else errors of 0
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, CubatureOptions& value) {
   pass_all(archive, value.elements, value.tolerance, value.method, value.training_poses, value.seed,
@@ -50,7 +50,7 @@ CubatureData with_basis(const CubatureData& other, const TetMesh& mesh, const Te
 CubatureData build_cubature(const TetMesh& mesh, const TetMaterials& materials, const PoseSource& source,
                             const CubatureOptions& options);
 
-/// What was built of the same, though not measured, with its errors on held-out poses.
+/// `data`, built of the same but not measured, with its errors on held-out poses.
 CubatureData measured_cubature(const CubatureData& data, const TetMesh& mesh, const TetMaterials& materials,
                                const PoseSource& source, const CubatureOptions& options);
 

@@ -7,7 +7,7 @@
 
 namespace exmat::precompute {
 
-/// What reduced poses are drawn from.
+/// Data that reduced poses are drawn from.
 struct PoseSource {
   Eigen::VectorXd eigenvalues;          ///< k, of the modes in use
   Eigen::MatrixXd reduced_modes;        ///< r x k, U^T M Psi
@@ -17,11 +17,11 @@ struct PoseSource {
   double body_size = 0;                 ///< L [m]
   Eigen::MatrixXd examples;             ///< r x (K-1) reduced poses of the examples but the rest one, or no columns
   Eigen::MatrixXd motions;              ///< r x N, reduced, of runs, or no columns
-  Eigen::Index own_motions = 0;         ///< of the columns of `motions`, that come first and count for half
+  Eigen::Index own_motions = 0;         ///< number of columns of `motions` that come first and count for half
   Eigen::MatrixXd other_motions;        ///< r x N, of other runs, for held-out poses
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, PoseSource& value) {
   pass_all(archive, value.eigenvalues, value.reduced_modes, value.reduced_derivatives, value.basis,

@@ -14,7 +14,7 @@ struct PlotPoint {
 struct PlotSeries {
   std::string name;  ///< in the legend; empty: not there
   std::vector<PlotPoint> points;
-  int colour = -1;  ///< of the palette, which repeats
+  int colour = -1;  ///< index into the palette, which repeats
   int shape = -1;   ///< likewise; negative: no marks
   bool joined = false, dashed = false;
 };

@@ -13,7 +13,7 @@ enum class AlignmentVerdict { kGood, kDoubtful, kRefused };
 /// "good", "doubtful" or "refused".
 const char* name_of(AlignmentVerdict verdict);
 
-/// What came of an example's alignment, for the bundle and the user. docs/alignment.md, "What the user is told".
+/// Outcome of an example's alignment, for the bundle and the user. docs/alignment.md, "What the user is told".
 struct AlignmentOutcome {
   std::string name;
   std::string method;
@@ -24,7 +24,7 @@ struct AlignmentOutcome {
   std::string message{};  ///< why it is not good, and what input would help
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, AlignmentOutcome& value) {
   pass_all(archive, value.name, value.method, value.residual, value.doubt, value.inverted_fraction,

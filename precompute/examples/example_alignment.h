@@ -18,7 +18,7 @@ class StageCache;
 
 /// The rest example in the object's frame.
 struct AlignedRest {
-  LaplaceBasis basis;  ///< of the rest example; its vertices turned into the object's frame
+  LaplaceBasis basis;  ///< basis of the rest example; its vertices turned into the object's frame
   RestMap map;
   CarriedShape carried;                                    ///< the rest example by the map
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< from the rest example's frame to the object's
@@ -26,7 +26,7 @@ struct AlignedRest {
   AlignmentOutcome outcome;
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, AlignedRest& value) {
   pass_all(archive, value.basis, value.map, value.carried, value.rotation, value.free_poses, value.outcome);
@@ -35,12 +35,12 @@ void pass_members(Archive& archive, AlignedRest& value) {
 /// A pose as the rest example's vertices show it, or, of coupled bases, as it comes over to the object.
 struct AlignedPose {
   VertexArray positions;                ///< n_0 x 3, placed beside the rest example, turned as that was
-  std::optional<CarriedShape> carried;  ///< of coupled bases, likewise
+  std::optional<CarriedShape> carried;  ///< shape on the object by coupled bases, likewise
   PoseScale scale;
   AlignmentOutcome outcome;
 };
 
-/// What the stage cache keeps of it: all but the scale.
+/// Members that the stage cache keeps: all but the scale.
 template <typename Archive>
 void pass_members(Archive& archive, AlignedPose& value) {
   pass_all(archive, value.positions, value.carried, value.outcome);

@@ -6,9 +6,9 @@ namespace exmat::precompute {
 
 /// In which unit of length a pose is read, and how large it is. docs/alignment.md, "Scale".
 struct PoseScale {
-  double unit = 1;     ///< lengths of the pose's file for one of the rest example's
-  double size = 1;     ///< of the pose over the rest example in the same unit: (V_pose / V_rest)^(1/3), its own change
-  std::string note{};  ///< worth a line of the log
+  double unit = 1;          ///< lengths of the pose's file for one of the rest example's
+  double size = 1;          ///< pose over rest example in the same unit: (V_pose / V_rest)^(1/3), its own change
+  std::string note{};       ///< worth a line of the log
   std::string warning{};    ///< worth a warning
   std::string objection{};  ///< worth a refusal
 };

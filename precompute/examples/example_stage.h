@@ -17,7 +17,7 @@ namespace exmat::precompute {
 /// Examples that act together: on the whole body, or on a region alone.
 struct ExampleGroup {
   std::string region;                ///< empty: the whole body
-  std::optional<RegionView> view{};  ///< of a region
+  std::optional<RegionView> view{};  ///< present for a region
   ExampleSet examples{};             ///< the rest pose first; reduced coordinates and basis errors are not filled in
   Eigen::MatrixXd fields{};          ///< 3n x (K-1) displacement of the object to each pose, as the view sees it [m]
 };
@@ -35,7 +35,7 @@ struct ShapeStage {
   Eigen::MatrixXd rest_coefficients;  ///< m x 3, of the object
   Eigen::VectorXd weights;            ///< Lambda, m
   ShapeSpaceData data;
-  std::vector<AlignmentOutcome> alignments;  ///< of the examples, in their order
+  std::vector<AlignmentOutcome> alignments;  ///< one for each example, in their order
   std::vector<StagedPose> poses;             ///< as ExampleInput::poses
   std::vector<ExampleGroup> groups;          ///< the whole body's, if any, then those of the regions
 

@@ -15,7 +15,8 @@ struct RestTurn {
   std::int64_t competing = 0;
 };
 
-/// Whether a rest example lies on the object by its surface, and how it would. docs/alignment.md, "The rest example".
+/// Test whether a rest example lies on the object by its surface, and the turn that lays it there. docs/alignment.md,
+/// "The rest example".
 class RestPlacing {
  public:
   /// Both at centroid 0 and volume 1, as they stand.

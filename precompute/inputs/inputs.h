@@ -24,18 +24,18 @@ struct ObjectInput {
   std::vector<std::int32_t>
       file_tets;  ///< corner indices as in the file, 4 n_t of it: what "same connectivity" compares
   std::vector<std::int32_t> kept_vertices, kept_tets;  ///< new index -> index in the file
-  VertexArray file_positions;                          ///< of all vertices in the file
+  VertexArray file_positions;                          ///< positions of all vertices in the file
   std::vector<std::vector<std::int64_t>> pushed;       ///< vertices of each of the forces of basis.loads
-  std::optional<SkeletonData> skeleton{};              ///< of a surface with bones, for the vertices of the mesh
-  std::vector<std::string> warnings{};                 ///< of its bones
+  std::optional<SkeletonData> skeleton{};              ///< bones that a surface has, for the vertices of the mesh
+  std::vector<std::string> warnings{};                 ///< warnings of its bones
   std::shared_ptr<const ObjectSurface> surface{};      ///< that the mesh encloses; none where tets were given
-  VertexMarks marks{};                                 ///< of that surface at the vertices
+  VertexMarks marks{};                                 ///< marks of that surface at the vertices
 };
 
-/// What a pose by the object's surface misses of it.
+/// Misfit of a pose by the object's surface.
 struct SurfaceMiss {
   double rms = 0, farthest = 0;  ///< over the diagonal of the surface's bounding box
-  int iterations = 0;            ///< of Newton's method
+  int iterations = 0;            ///< iterations of Newton's method
 };
 
 /// One posed example, on the mesh of the rest example or another.
@@ -50,14 +50,14 @@ struct PoseInput {
   bool in_whole_body = true;         ///< no region has it
   Eigen::Index column = 0;           ///< in ExampleInput::landmarks
   std::vector<IndexVector> parts{};  ///< for each of ExampleInput::parts its vertices of `mesh`; none where not given
-  std::optional<SurfaceMiss> surface{};  ///< of a pose of the object's surface
+  std::optional<SurfaceMiss> surface{};  ///< present for a pose of the object's surface
 };
 
 /// A region of the asset, and the poses that act there.
 struct RegionInput {
   std::string name;
   FlagVector inside;          ///< n, of the object
-  FlagVector inside_example;  ///< of the rest example's vertices; empty: all
+  FlagVector inside_example;  ///< flags of the rest example's vertices; empty: all
   std::vector<std::string> examples;
 };
 

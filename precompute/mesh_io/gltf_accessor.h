@@ -24,11 +24,11 @@ class GltfAccessors {
   VertexArray read_positions(int accessor) const;
   /// `count` x 3 of a VEC3 or VEC4: reals or parts of the largest integer, cut off at 0 and 1.
   VertexArray read_colours(int accessor) const;
-  /// Of a SCALAR of any type.
+  /// Values of a SCALAR of any type.
   Eigen::VectorXd read_scalars(int accessor) const;
   /// Rows of the type that `name` says, in parts of the largest where they are normalised.
   RowMatrix read_rows(int accessor, int type, const char* name) const;
-  /// Of a SCALAR of unsigned integers; each is below `end`.
+  /// Values of a SCALAR of unsigned integers; each is below `end`.
   std::vector<std::uint32_t> read_indices(int accessor, std::size_t end) const;
   /// Throws InputError unless it has so many rows, each of its numbers in a buffer.
   void check(int accessor, std::size_t count) const;

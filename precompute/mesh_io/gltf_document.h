@@ -8,13 +8,13 @@
 
 namespace exmat::precompute {
 
-/// What a glTF file holds that shapes are made of. Its JSON has been checked: integers are not negative and fit into 31
-/// bits, and nothing is compressed. Indices and sizes are still those of the file.
+/// The parts of a glTF file that shapes are made of. Its JSON has been checked: integers are not negative and fit into
+/// 31 bits, and nothing is compressed. Indices and sizes are still those of the file.
 struct GltfDocument {
   tinygltf::Model model;
-  nlohmann::json json;                       ///< of the file, with all that has not been checked
+  nlohmann::json json;                       ///< content of the file, with all that has not been checked
   std::vector<std::filesystem::path> files;  ///< every file that was read, the named one first
-  std::size_t bytes = 0;                     ///< of the file and its buffers
+  std::size_t bytes = 0;                     ///< size of the file and its buffers
 };
 
 /// Reads a .glb or .gltf file (glTF 2.0) with its buffers, from the folder of the file or below it, each once. Looks,

@@ -16,7 +16,7 @@ struct SurfaceLook {
   IndexVector vertices;  ///< p, the first vertex of each primitive of each of its meshes, in their order
   RowMatrix frames;      ///< 3p x 3, linear part of the transform from the primitive's mesh to the surface
   std::vector<std::filesystem::path> images;  ///< files that were read besides those of the surface
-  std::vector<std::string> remarks;           ///< what a user should know, a sentence each
+  std::vector<std::string> remarks;           ///< notes to the user, a sentence each
 };
 
 /// Reads how the surface of a glTF file looks, lengths times `unit`. The attributes NORMAL, TEXCOORD_n, COLOR_n

@@ -16,7 +16,7 @@ Eigen::Affine3d own_transform(const std::string& file, const tinygltf::Node& nod
 /// The name, or with the first number from 2 on that makes it another than those taken. Then it is taken.
 std::string unique_name(const std::string& name, std::set<std::string>& taken);
 
-/// What a walk over nodes calls: each node with its transform to the scene, then its children, then its end.
+/// Callbacks of a walk over nodes: each node with its transform to the scene, then its children, then its end.
 struct NodeVisitor {
   std::function<void(int node, const Eigen::Affine3d& to_scene)> begin;
   std::function<void(int node)> end;
@@ -29,8 +29,8 @@ void visit_nodes(const std::string& file, const tinygltf::Model& model, const No
 /// The same nodes as a tree.
 struct NodeTree {
   std::vector<int> order;                 ///< parents before their children
-  std::vector<int> parents;               ///< of each node of the file, -1 of roots and of those left out
-  std::vector<Eigen::Affine3d> to_scene;  ///< of each node of the file, the identity of those left out
+  std::vector<int> parents;               ///< parent of each node of the file, -1 for roots and those left out
+  std::vector<Eigen::Affine3d> to_scene;  ///< transform of each node of the file, the identity for those left out
 };
 NodeTree node_tree(const std::string& file, const tinygltf::Model& model);
 

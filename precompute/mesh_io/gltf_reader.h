@@ -27,7 +27,7 @@ SurfaceFile read_gltf(const std::filesystem::path& file);
 /// Place of a primitive's vertices among those of a surface.
 struct DrawnPrimitive {
   int node = 0;
-  std::size_t primitive = 0;               ///< of the node's mesh
+  std::size_t primitive = 0;               ///< index in the node's mesh
   Eigen::Index first = 0;                  ///< vertex; the others follow in the order of the primitive's accessors
   Eigen::Matrix3d to_scene;                ///< linear part of the node's transform, of a mesh with a skin of `bound`
   std::optional<Eigen::Affine3d> bound{};  ///< from a mesh with a skin to the scene

@@ -10,7 +10,7 @@
 
 namespace exmat::precompute {
 
-/// What a mesh file holds, unchecked (see common/mesh/checks.h), indices 0-based.
+/// Contents of a mesh file, unchecked (see common/mesh/checks.h), indices 0-based.
 struct MeshFile {
   TetMesh mesh;
   std::optional<TetMaterials> materials;  ///< per tet, where the file gives every tet a material

@@ -41,7 +41,7 @@ class MshNodes {
   std::vector<std::array<double, 3>> positions_;
 };
 
-/// What both versions of .msh are read into.
+/// Contents of a .msh file of either version.
 struct MshContents {
   MshNodes nodes;
   std::vector<std::array<std::int32_t, 4>> tets;

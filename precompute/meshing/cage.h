@@ -8,7 +8,7 @@
 
 namespace exmat::precompute {
 
-/// How fine a cage is to be: by one of the two, else kDefaultCells.
+/// Fineness of a cage: by one of the two, else kDefaultCells.
 struct CageSettings {
   std::optional<int> cells;         ///< about so many tets
   std::optional<double> cell_size;  ///< radius of the sphere about a tet, at most [m]
@@ -28,7 +28,7 @@ struct Cage {
   std::string mesher;   ///< "CGAL 5.5.1"
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, Cage& cage) {
   pass_all(archive, cage.mesh.vertices, cage.mesh.tets, cage.cell_size, cage.least_angle, cage.largest_angle,

@@ -6,14 +6,14 @@
 
 namespace exmat::precompute {
 
-/// What the mesher is asked for. Lengths in the unit of the vertices.
+/// Request to the mesher. Lengths in the unit of the vertices.
 struct MesherRequest {
   VertexArray vertices;     ///< n x 3, of any triangles: with holes, crossing each other, in any orientation
   TriangleArray triangles;  ///< n_f x 3
   double alpha = 0;         ///< gaps and hollows narrower than this are bridged
-  double offset = 0;        ///< of the tets' surface from the triangles, about
+  double offset = 0;        ///< distance of the tets' surface from the triangles, about
   double cell_size = 0;     ///< radius of the sphere about a tet, at most
-  unsigned seed = 0;        ///< of what is drawn at random
+  unsigned seed = 0;        ///< seed of all random numbers
   bool improve = true;      ///< moves vertices and flips tets until none is flat; else a first mesh, which counts tets
 };
 

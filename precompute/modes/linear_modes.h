@@ -12,7 +12,7 @@ struct LinearModes {
   Eigen::MatrixXd modes;        ///< f x k, mass-orthonormal
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, LinearModes& value) {
   pass_all(archive, value.eigenvalues, value.modes);

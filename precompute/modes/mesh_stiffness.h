@@ -9,7 +9,7 @@
 
 namespace exmat::precompute {
 
-/// How much too stiff the elements of a mesh are, beside quadratic tets on the same mesh (quadratic_tets).
+/// Stiffness of the elements of a mesh over quadratic tets on the same mesh (quadratic_tets).
 /// docs/method.md, "Elements".
 struct MeshStiffness {
   double vibration = 0;        ///< geometric mean over the lowest modes, six of them at most, of squared frequencies
@@ -18,7 +18,7 @@ struct MeshStiffness {
   double variance_factor = 0;  ///< beta by which the geometric mean is 1, of smoothed elements
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, MeshStiffness& value) {
   pass_all(archive, value.vibration, value.worst, value.thin, value.variance_factor);

@@ -21,7 +21,7 @@ struct BodyStages {
   const Eigen::MatrixXd& derivatives;
   const PoseFitter* fitter;  ///< null without examples
   const std::vector<TargetSpace>& targets;
-  std::vector<bool> elastic;  ///< of the targets: whether the force may be elastic
+  std::vector<bool> elastic;  ///< for each of the targets: the force may be elastic
 };
 
 /// The energy reference of all targets.
@@ -34,7 +34,7 @@ struct Motions {
   TrainingLoads loads;
   bool general = false;                  ///< the basis is to serve other loads, too
   std::string reason;                    ///< whose loads they are
-  std::optional<CubatureData> elements;  ///< of the body of many modes that ran them in place of the full space
+  std::optional<CubatureData> elements;  ///< those of a body of many modes that ran them in place of the full space
 
   /// Number of snapshots of the run of the very loads, which comes first.
   Eigen::Index own_columns() const { return loads.duration > 0 ? set.runs.chain_ends.front() : 0; }

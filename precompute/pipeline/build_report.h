@@ -26,7 +26,7 @@ struct BuildReport {
   std::vector<StageTime> stages;    ///< that ended, in order
   std::vector<LedgerEntry> ledger;  ///< groups in and out, and why; bytes are the writer's to fill in
   InputFiles inputs;
-  std::string input_sha256;           ///< of all that the bundle is computed from; empty until it is read
+  std::string input_sha256;           ///< hash of all that the bundle is computed from; empty until it is read
   std::vector<CacheUse> cache;        ///< in order; none without a cache
   std::vector<std::string> warnings;  ///< also in the log
 };

@@ -12,7 +12,7 @@ bool trains_in_modes(TrainingSpace space, const ElasticSystem& system);
 /// A body of many modes and elements, in place of the full space.
 struct ManyModes {
   ReducedModel model;
-  EnergyReference reference = EnergyReference::kExample;  ///< of its targets
+  EnergyReference reference = EnergyReference::kExample;  ///< reference of its targets
 };
 
 /// [f x k] what a body of `size` [m] looks like at rest under the loads of the chains, as far as that is linear;

@@ -14,10 +14,10 @@ namespace exmat::precompute {
 struct RunReport {
   std::string asset, bundle;
   std::string status = "failed";  ///< "done", "unchanged" (--if-changed) or "failed"
-  std::string message{};          ///< what failed; empty where nothing did
+  std::string message{};          ///< the failure; empty where nothing failed
   int exit_status = 0;
   BuildReport build{};
-  std::vector<std::string> warnings{};  ///< of the log
+  std::vector<std::string> warnings{};  ///< warnings in the log
 };
 
 /// By schemas/report.json, which says what each member is. Hashes the inputs and, where the run is not failed, the

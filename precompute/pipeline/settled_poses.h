@@ -13,7 +13,7 @@ namespace exmat::precompute {
 /// Forces and gravity that hold a settled body while an example has all of the weight.
 struct SettlingLoad {
   std::string file;                                   ///< whose load it is, for messages
-  std::vector<runtime::ExampleSettings> examples;     ///< of the groups, in their order
+  std::vector<runtime::ExampleSettings> examples;     ///< one for each group, in their order
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; a body that is not clamped only falls by it
   bool compensate = false;                            ///< shift targets so that the body settles as it would at best
 };
@@ -26,7 +26,7 @@ struct SettledPose {
   double best = 0;               ///< least error under an example force of any strength, without gravity
   std::optional<double> loaded;  ///< error under the load, where its force acts on these examples
   double distance = 0;           ///< largest of a vertex [m], of `loaded` or else of `best`
-  Eigen::Index vertex = 0;       ///< where that is
+  Eigen::Index vertex = 0;       ///< vertex at that distance
   /// Parts: from the pose to what of it the basis can hold, from there to where the body settles at best, since
   /// elasticity decides what eigenfunctions do not see, and from there to where it settles. They add up to no less than
   /// the error.

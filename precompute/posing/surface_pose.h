@@ -15,13 +15,13 @@ struct SurfacePose {
                           ///< the bounding box of the surface at rest: root of the mean square over its area
   double farthest = 0;    ///< largest over its vertices, likewise
   double energy = 0;      ///< elastic, of a material with Young's modulus 1 and Poisson ratio kPosePoisson [m^3]
-  double stiffness = 0;   ///< of the last springs over Young's modulus, at diagonal 1
-  int iterations = 0;     ///< of Newton's method, all stages
+  double stiffness = 0;   ///< stiffness of the last springs over Young's modulus, at diagonal 1
+  int iterations = 0;     ///< iterations of Newton's method, all stages
   int stages = 0;         ///< stiffnesses of the springs that were gone through
   int inverted = 0;       ///< tets turned inside out
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, SurfacePose& pose) {
   pass_all(archive, pose.positions, pose.rms, pose.farthest, pose.energy, pose.stiffness, pose.iterations, pose.stages,

@@ -36,7 +36,7 @@ class SurfaceSprings {
   Eigen::SparseMatrix<double, Eigen::RowMajor> hessian_;
 };
 
-/// Where each vertex of a cage goes with the rigid motion of the surface about it (moving least squares, Schaefer et
+/// Places of a cage's vertices, each moved rigidly with the surface about it (moving least squares, Schaefer et
 /// al. 2006): [n x 3]. Surfaces of thousands of vertices by some of them.
 VertexArray rigid_start(const TetMesh& cage, const SurfaceMesh& surface, const VertexArray& posed);
 

@@ -19,7 +19,7 @@ struct LaplaceBasis {
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();  ///< [m]
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, LaplaceBasis& value) {
   pass_all(archive, value.eigenvalues, value.eigenfunctions, value.mass, value.vertices, value.volume, value.centroid);

@@ -21,7 +21,8 @@ RowMatrix range_basis(const RowMatrix& matrix);
 Eigen::VectorXd reconstruct_displacement(const LaplaceBasis& object, const Eigen::VectorXd& weights,
                                          const Eigen::MatrixXd& descriptor_change);
 
-/// What of the weights problem does not depend on a basis: Gram matrix and constant terms, from the descriptors.
+/// Fills in the part of the weights problem that does not depend on a basis: Gram matrix and constant terms, from the
+/// descriptors.
 void fill_gram(const Eigen::MatrixXd& rest_descriptor, ExampleSet& set);
 
 /// [3m x d] changes of descriptor T B that displacements B [3n x d] make; of a region, those that it sees of them.

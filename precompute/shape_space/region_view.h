@@ -7,7 +7,7 @@
 
 namespace exmat::precompute {
 
-/// What an example force sees of a region, linear in displacements: D'' u = D (u - R u_b), D the region's window, which
+/// A region as an example force sees it, linear in displacements: D'' u = D (u - R u_b), D the region's window, which
 /// rises smoothly from 0 at its border, and R u_b the rigid motion that the band along the border makes. So it acts
 /// inside alone, and without net force or torque: all that the rest of the body feels is that the region bends. A
 /// region that holds fixed vertices, or all there are, is seen as it moves, D u.

@@ -10,7 +10,7 @@ namespace exmat::precompute {
 /// Width of a region's band, over the mean distance of the region's points from its border.
 inline constexpr double kBandShare = 0.5;
 
-/// Where a region acts: 0 at its border, 1 beyond a band along it, a smooth step of the distance between. The border is
+/// Window of a region: 0 at its border, 1 beyond a band along it, a smooth step of the distance between. The border is
 /// the region's vertices beside others and the faces that they span. The band's width is a length that the region's
 /// shape gives, not a number of layers: docs/method.md, "Regions".
 struct RegionWindow {

@@ -8,7 +8,7 @@
 
 namespace exmat::precompute {
 
-/// Where an example file's body stands to the object: docs/alignment.md.
+/// Map from an example file's body to the object: docs/alignment.md.
 struct RestMap {
   Eigen::MatrixXd functional_map;  ///< C_0, m x K_e, orthonormal rows
   SparseMatrix pull_back;          ///< n x n_e, values at the nearest point of the rest example for each object vertex
@@ -21,7 +21,7 @@ struct RestMap {
   Eigen::MatrixXd carried(const LaplaceBasis& object, const LaplaceBasis& rest_basis, const VertexArray& field) const;
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, RestMap& value) {
   pass_all(archive, value.functional_map, value.pull_back, value.residual, value.doubt, value.same_frame,
@@ -51,7 +51,7 @@ struct TransferredPose {
       0;  ///< |d - d_m|_M / |d|_M on the object: d the example's displacement, d_m what came over
 };
 
-/// What a pose is brought into once it is transferred. docs/method.md, "Shape space".
+/// Frame that a pose is brought into once it is transferred. docs/method.md, "Shape space".
 struct PoseFrame {
   bool free_example = false;  ///< rotate the example to the rest example first (alignment.frame: free)
   /// n x n weights of the fit of the posed to the rest object: the mass of a free body; ones at the fixed vertices of a
@@ -73,7 +73,7 @@ struct CarriedShape {
   VertexArray points;            ///< n x 3, positions on the example at the object's vertices, found in another way
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, CarriedShape& value) {
   pass_all(archive, value.coefficients, value.points);

@@ -14,7 +14,7 @@ namespace exmat::precompute {
 /// Starts PETSc, once per program.
 void start_solvers();
 
-/// What PETSc said of its last error.
+/// PETSc's message on its last error.
 std::string& last_petsc_message();
 
 inline void check_petsc(PetscErrorCode code, const char* what) {

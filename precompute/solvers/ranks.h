@@ -33,7 +33,7 @@ struct SolverSettings {
   Eigensolver eigensolver = Eigensolver::kAuto;
   /// Names and values for PETSc's options database, "eps_ncv" and "60"; the value may be empty.
   std::vector<std::pair<std::string, std::string>> options{};
-  // Of kAuto.
+  // Limits for kAuto.
   std::int64_t large = 60'000;  ///< rows from which on factors in single precision are worth their iterations
   std::int64_t memory = 0;      ///< bytes that factors may take; 0: what the system has to give
 

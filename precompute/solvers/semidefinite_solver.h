@@ -12,7 +12,7 @@ namespace exmat::precompute {
 /// "PETSc 3.18.5, SLEPc 3.18.2".
 std::string solver_versions();
 
-/// What a matrix is to blame for: that of a mesh with flat tets, with hinges, or of a very slender body.
+/// A failure that a matrix is to blame for: that of a mesh with flat tets, with hinges, or of a very slender body.
 class IllConditioned : public WorkError {
  public:
   using WorkError::WorkError;

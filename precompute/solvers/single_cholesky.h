@@ -27,8 +27,8 @@ class SingleCholesky {
   /// Bytes of L for such a plan, and of what a factorisation needs beside it with `threads` threads, about.
   static std::int64_t bytes(const Elimination& plan, int block, int threads);
 
-  /// Of `matrix` without the rows and columns of `left_out`, ascending. False where it is not positive definite as far
-  /// as single precision sees; then there are no factors.
+  /// Factorises `matrix` without the rows and columns of `left_out`, ascending. False where it is not positive definite
+  /// as far as single precision sees; then there are no factors.
   bool factorise(const SparseMatrix& matrix, const std::vector<Eigen::Index>& left_out);
 
   /// X [n x k] so that A X = B, about; zeros in the rows that are left out, whatever B has there. B may be X.
@@ -39,7 +39,7 @@ class SingleCholesky {
   /// The nodes below each node and itself, which end with it.
   struct Subtree {
     std::size_t first = 0;
-    double operations = 0, entries = 0;  ///< of a factorisation and of L, without block^3 and block^2
+    double operations = 0, entries = 0;  ///< cost of a factorisation and size of L, without block^3 and block^2
     bool has_parent = false;
   };
   enum class Order { kChildrenFirst, kParentsFirst };

@@ -33,8 +33,8 @@ struct SolverShare : Share {
   Eigen::Index border = 0, soft = 0;  ///< columns of R, of the soft fields
   Means means = Means::kMumps;
   std::unique_ptr<MixedSolver> mixed;
-  MatHandle matrix;     ///< of multigrid alone
-  MatHandle factor;     ///< of the bordered matrix, by MUMPS
+  MatHandle matrix;     ///< matrix for multigrid alone
+  MatHandle factor;     ///< factor of the bordered matrix, by MUMPS
   KspHandle iteration;  ///< conjugate gradients
   MatHandle shifted;    ///< without null vectors, for multigrid
   NullSpaceHandle soft_space;

@@ -10,9 +10,9 @@ namespace exmat::precompute {
 
 /// Elements near each other.
 struct ElementPart {
-  std::vector<Eigen::Index> elements;  ///< of the mesh, ascending
-  std::vector<std::int32_t> vertices;  ///< of these, ascending
-  IndexLists places;                   ///< of each element's vertices among these
+  std::vector<Eigen::Index> elements;  ///< elements of the mesh, ascending
+  std::vector<std::int32_t> vertices;  ///< vertices of these, ascending
+  IndexLists places;                   ///< places of each element's vertices among these
 };
 
 /// `chosen` elements of a mesh in parts of at most `most`, by halving along the longest side of the box of their

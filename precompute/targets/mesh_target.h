@@ -16,7 +16,7 @@ struct PoseCoordinates {
   Eigen::MatrixXd poses;  ///< d x K, y_k: the rest pose first
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, PoseCoordinates& value) {
   pass_all(archive, value.basis, value.poses);
@@ -36,7 +36,7 @@ struct MeshTarget {
   runtime::TargetSolver solver;  ///< in coordinates of unit stiffness at rest, `solver.basis()` [d x d] away from y
   std::vector<Eigen::Index> elements;  ///< that take part, ascending
   Eigen::Index left_out = 0;  ///< elements that an example turns inside out, where the energies start from examples
-  std::shared_ptr<const ElementForces> all;  ///< where the solver has a sample of the elements alone: the forces of all
+  std::shared_ptr<const ElementForces> all;  ///< forces of all, where the solver has a sample of the elements alone
 };
 
 /// Throws InputError where no element is left.

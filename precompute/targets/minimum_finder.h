@@ -26,7 +26,7 @@ class MinimumFinder {
   /// Starts are near minima of all tets: the target of some would lead away from them.
   void starts_are_near() { near_ = true; }
 
-  /// What is added to each answer.
+  /// A vector that is added to each answer.
   using Correction = std::function<Eigen::VectorXd(const Eigen::VectorXd& weights)>;
   void correct_by(Correction correction) { correction_ = std::move(correction); }
 
@@ -38,7 +38,7 @@ class MinimumFinder {
 
  private:
   struct Candidate {
-    Eigen::Index row = 0;  ///< of its weights
+    Eigen::Index row = 0;  ///< row of its weights
     Eigen::VectorXd y;
     bool found = true;
   };

@@ -9,7 +9,7 @@
 
 namespace exmat::precompute {
 
-/// What an elastic example force is made of: the energy of a body whose undeformed shape is the target.
+/// Parts of an elastic example force: the energy of a body whose undeformed shape is the target.
 /// docs/method.md, "Force".
 struct TargetElasticityInput {
   const TetMesh& mesh;

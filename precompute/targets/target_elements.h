@@ -10,7 +10,7 @@ namespace exmat::precompute {
 
 struct TargetElementOptions {
   EnergyReference energy_reference = EnergyReference::kExample;
-  double tolerance = 1e-3;  ///< of a target, in the energy norm at rest, relative to the largest example
+  double tolerance = 1e-3;  ///< error of a target, in the energy norm at rest, relative to the largest example
   std::uint64_t seed = 1;
 };
 

@@ -11,16 +11,16 @@
 
 namespace exmat::precompute {
 
-inline constexpr int kPieceDegree = 7;  ///< of every piece: about the fewest control points for errors of 1e-3 to 1e-6
+inline constexpr int kPieceDegree = 7;  ///< for each piece: about the fewest control points for errors of 1e-3 to 1e-6
 
 struct PieceOptions {
-  double tolerance = 0;  ///< of the error, as TargetTableData has it, at all samples
+  double tolerance = 0;  ///< largest error, as TargetTableData has it, at all samples
   Eigen::Index most_pieces = 0;
 };
 
 struct PieceReport {
-  Eigen::Index pieces = 0;  ///< of the last table
-  double error = 0;         ///< of the last table
+  Eigen::Index pieces = 0;  ///< number in the last table
+  double error = 0;         ///< error of the last table
   bool lost = false;        ///< p*(w) or its derivative was not found at some weights
 };
 

@@ -12,17 +12,17 @@ namespace exmat::precompute {
 
 struct TargetSpaceOptions {
   EnergyReference energy_reference = EnergyReference::kExample;
-  double tolerance = 1e-4;          ///< of what the space and the table lose of the targets, as TargetTableData has it
-  double element_tolerance = 1e-3;  ///< of what the elements lose of them, beside that
+  double tolerance = 1e-4;          ///< loss of the targets by the space and the table, as TargetTableData has it
+  double element_tolerance = 1e-3;  ///< loss by the elements, beside that
   bool table = true;                ///< make one, where 2 <= K <= kMostTableExamples
-  std::uint64_t seed = 1;           ///< of the poses that the elements are chosen by
+  std::uint64_t seed = 1;           ///< seed of the poses that the elements are chosen by
   /// That energies are summed over at every step. Targets of more begin with a sample of their elements, and a table of
   /// them with the elements.
   Eigen::Index most_elements = 20'000;
   Eigen::Index sample = 8192;
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpaceOptions& value) {
   pass_all(archive, value.energy_reference, value.tolerance, value.element_tolerance, value.table, value.seed,
@@ -38,10 +38,10 @@ struct TargetSpace {
   std::int64_t left_out = 0;             ///< elements that an example turns inside out
   std::optional<TargetTableData> table;  ///< control points [P c x d]
   EnergyReference energy_reference = EnergyReference::kExample;
-  std::string table_message;  ///< what was made, or why nothing was
+  std::string table_message;  ///< result in words, or why there is none
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, TargetSpace& value) {
   pass_all(archive, value.coordinates, value.elements, value.error, value.left_out, value.table, value.energy_reference,

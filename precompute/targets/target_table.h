@@ -12,13 +12,13 @@
 namespace exmat::precompute {
 
 struct TargetTableOptions {
-  double tolerance = 1e-4;  ///< of the error as TargetTableData has it [Limit: > 0]
+  double tolerance = 1e-4;  ///< largest error, as TargetTableData has it [Limit: > 0]
   EnergyReference energy_reference = EnergyReference::kExample;
   int first_degree = 4;                    ///< to be tried
-  int most_degree = 0;                     ///< of one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
+  int most_degree = 0;                     ///< limit for one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
   std::int64_t most_pieces = 256;          ///< for K = 2
-  const ElementForces* all = nullptr;      ///< where the solver's elements stand for all: targets are those of all
-  MinimumFinder::Correction correction{};  ///< of the solver's targets; for one polynomial alone
+  const ElementForces* all = nullptr;      ///< forces of all where the solver's elements stand for all: targets of all
+  MinimumFinder::Correction correction{};  ///< correction of the solver's targets; for one polynomial alone
 };
 
 /// One table that was tried, and its largest error at the weights of the check.
@@ -29,12 +29,12 @@ struct TargetFit {
 };
 
 struct TargetTableReport {
-  std::string message;          ///< what was made, or why nothing was and what to do
-  int degree = 0;               ///< of the last fit
-  std::int64_t pieces = 1;      ///< of the last fit
-  double error = 0;             ///< of the last fit
+  std::string message;          ///< result in words, or why there is none and what to do
+  int degree = 0;               ///< degree of the last fit
+  std::int64_t pieces = 1;      ///< pieces of the last fit
+  double error = 0;             ///< error of the last fit
   std::vector<TargetFit> fits;  ///< in order
-  int solves = 0;               ///< of p*(w)
+  int solves = 0;               ///< number of times that p*(w) was solved for
   double seconds = 0;
 };
 

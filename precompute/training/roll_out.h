@@ -8,7 +8,7 @@
 
 namespace exmat::precompute {
 
-/// How far a reduced body is from the full space in the same runs: distances in the norm |x|_M over the root mean
+/// Distances of a reduced body from the full space in the same runs: in the norm |x|_M over the root mean
 /// square of the size, as docs/error_metrics.md has them. Infinite where the reduced run does not stay finite.
 struct RollOut {
   double position = 0;  ///< root mean square of world positions, over displacements from rest
@@ -16,7 +16,7 @@ struct RollOut {
   double end = 0;       ///< likewise in the last frame of each run
   double settled = 0;   ///< likewise over the last tenth of each run
   std::int64_t worst_vertex = 0;
-  double worst_distance = 0;  ///< of deformations [m]
+  double worst_distance = 0;  ///< its distance, of deformations [m]
 };
 
 /// Runs the chains of `full`, which kept its positions, with the reduced body; `reference` is that of all targets.

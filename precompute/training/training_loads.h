@@ -12,23 +12,23 @@
 
 namespace exmat::precompute {
 
-/// What a body is thrown at: a plane of this law. Per area, as runtime::Obstacle.
+/// Law of the plane that a body is thrown at. Per area, as runtime::Obstacle.
 struct TrainingObstacle {
   double stiffness = 0, damping = 0, friction = 0;
 };
 
-/// What acts on a body in the runs that its basis and cubature learn from: of a scene, of the asset, or of neither.
+/// Loads on a body in the runs that its basis and cubature learn from: of a scene, of the asset, or of neither.
 /// Runs vary all of it (training_segments.h).
 struct TrainingLoads {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();   ///< [m/s^2]
   bool any_gravity = false;                            ///< it may point anywhere
-  std::vector<VertexForceConfig> forces;               ///< of vertices of the object; those with an end may cease
+  std::vector<VertexForceConfig> forces;               ///< act on vertices of the object; those with an end may cease
   bool any_direction = false;                          ///< forces may point anywhere
   bool patches = false;                                ///< forces on patches of the surface chosen at random, too
-  std::vector<runtime::ExampleSettings> examples;      ///< of the model's example forces
+  std::vector<runtime::ExampleSettings> examples;      ///< settings of the model's example forces
   bool any_stiffness = false;                          ///< examples may be much weaker or stronger than these
   std::optional<TrainingObstacle> obstacle;            ///< a free body is thrown at it
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the throw; its speed may come of a fall
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< velocity of the throw; its speed may come of a fall
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();      ///< [rad/s]
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
   std::optional<double> mass_damping, stiffness_damping;  ///< alpha [1/s], beta [s], where they are known
@@ -43,7 +43,7 @@ struct TrainingBody {
   bool free = false;
   double size = 0;                  ///< L [m]
   double angular_frequency = 0;     ///< omega_1, of the lowest linear mode [rad/s]
-  std::vector<std::string> groups;  ///< of its example forces: names of regions, empty the whole body
+  std::vector<std::string> groups;  ///< regions of its example forces by name; empty: the whole body
 };
 
 /// The loads of a scene. A body that a motion carries feels gravity that points anywhere, for its inertia.
@@ -57,7 +57,7 @@ TrainingLoads declared_loads(const LoadsConfig& loads, const std::vector<std::ve
 /// Examples of all strengths, gravity and patches of the surface: what is taken where nothing is known.
 TrainingLoads unknown_loads(const TrainingBody& body);
 
-/// What a build learns from, and why.
+/// Loads that a build learns from, and why.
 struct TrainingPlan {
   TrainingLoads loads;
   bool general = false;  ///< the basis is to serve other loads, too

@@ -17,7 +17,7 @@ struct TrainingRunOptions {
   bool positions = false;  ///< keep deformations and positions of all vertices, to compare with
 };
 
-/// How the body deforms in runs with all its degrees of freedom.
+/// Deformations of the body in runs with all its degrees of freedom.
 struct TrainingRuns {
   Eigen::MatrixXd snapshots;  ///< f x N, of a free body in the frame that fits it best
   std::int64_t segments = 0;  ///< that were run
@@ -28,7 +28,7 @@ struct TrainingRuns {
   Eigen::MatrixXd displacements;         ///< 3n x N, likewise: from rest, world
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, TrainingRuns& value) {
   pass_all(archive, value.snapshots, value.segments, value.skipped, value.steps, value.chain_ends, value.deformations,
@@ -40,7 +40,7 @@ constexpr int kStepsPerSnapshot = 2;
 double time_step_of(const TrainingRunOptions& options);          ///< [s]
 double stiffness_damping_of(const TrainingRunOptions& options);  ///< beta [s]
 std::int64_t steps_of(const Segment& segment, const TrainingRunOptions& options);
-std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptions& options);  ///< of all segments
+std::int64_t step_count(const std::vector<Chain>& chains, const TrainingRunOptions& options);  ///< total
 
 /// Runs chains of segments side by side. Without a budget the same in every run and for every number of threads.
 TrainingRuns run_segments(const FullSpaceModel& model, const std::vector<Chain>& chains,

@@ -27,15 +27,15 @@ using Chain = std::vector<Segment>;
 
 struct SegmentOptions {
   int segments = 8;
-  double duration = 0;  ///< of one, about [s]
+  double duration = 0;  ///< length of one segment, about [s]
   std::uint64_t seed = 1;
   bool own_loads = true;  ///< begin with a chain of the very loads
 };
 
-/// What forces on patches act on: all that is drawn of a body.
+/// A body as far as forces on patches are drawn for it.
 struct SegmentBody {
   const VertexArray& vertices;        ///< n x 3, at rest
-  Eigen::RowVector3d centre;          ///< of mass
+  Eigen::RowVector3d centre;          ///< centre of mass
   std::vector<Eigen::Index> surface;  ///< vertices of it that may be pushed
   double size = 0;                    ///< L [m]
   double patch_force = 0;             ///< [N] that moves a patch by a share of L

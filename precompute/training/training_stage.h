@@ -23,7 +23,7 @@ struct TrainingChains {
   TrainingRunOptions options;
 };
 
-/// What the stage cache keeps of it.
+/// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, TrainingSet& value) {
   pass_all(archive, value.runs, value.heldout);

@@ -20,10 +20,10 @@ struct TrajectoryErrors {
   RelativeError position;  ///< over the displacement from rest, world
   RelativeError velocity;  ///< over the velocity, world
   double energy = 0;       ///< largest difference of the total energy over the largest kinetic + elastic one
-  std::optional<RelativeError> shape;  ///< of a free body: both without their rigid motion, over the deformation
-  RelativeError nearest_phase;         ///< of the headline, by nearest_distances(): without what is a little late
-  std::optional<double> rebound;       ///< of the velocity of the centre of mass after contact, where both had one
-  std::size_t worst_frame = 0;         ///< where the distances of the headline are largest
+  std::optional<RelativeError> shape;  ///< free body: both without their rigid motion, over the deformation
+  RelativeError nearest_phase;         ///< headline by nearest_distances(): without what is a little late
+  std::optional<double> rebound;       ///< error of the centre of mass's velocity after contact, where both had one
+  std::size_t worst_frame = 0;         ///< frame where the distances of the headline are largest
 
   /// Error that points are chosen by: shape, where it is there, else position.
   const RelativeError& headline() const { return shape ? *shape : position; }

@@ -21,7 +21,7 @@ struct BodyFrames {
   double newton_iterations = 0;             ///< mean of a step
   double factorisations = 0;                ///< likewise
   double step_seconds = 0;                  ///< median; of one run, whatever else the machine did
-  std::optional<Rebound> rebound;           ///< of a free body with obstacles
+  std::optional<Rebound> rebound;           ///< present for a free body with obstacles
 };
 
 /// At most so many times that all time steps hit, evenly spaced but for the last, which is the largest possible up to

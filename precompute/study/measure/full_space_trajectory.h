@@ -54,7 +54,7 @@ struct FullSpaceSummary {
   std::int64_t steps = 0, frames = 0, unconverged = 0;
   double step_seconds = 0, newton_iterations = 0;  ///< median, mean
   runtime::Energies energies;                      ///< at the end
-  InvertedTets inverted;                           ///< of the frames
+  InvertedTets inverted;                           ///< inverted tets of the frames
 };
 
 /// Steps a scene in full space, config.steps of them, and writes every config.every-th

@@ -13,7 +13,7 @@ namespace exmat::precompute {
 /// docs/error_metrics.md, "Errors by source".
 enum class ErrorSource { kTimeStep, kEigenfunctions, kAlignment, kTargets, kBasis, kCubature, kTable };
 
-/// Whether a part is known.
+/// Availability of a part.
 enum class PartStatus {
   kMeasured,
   kNone,      ///< there is no such approximation
@@ -25,7 +25,7 @@ enum class PartStatus {
 struct ErrorPart {
   ErrorSource source = ErrorSource::kTimeStep;
   PartStatus status = PartStatus::kNone;
-  std::string note;                     ///< what is compared, or why nothing is
+  std::string note;                     ///< comparison in words, or why there is none
   std::optional<RelativeError> added;   ///< from the motion before to the one with this approximation as well
   std::optional<RelativeError> so_far;  ///< from the full problem to the latter
 };
@@ -35,7 +35,7 @@ struct ErrorPart {
 struct ErrorSplit {
   std::size_t point = 0;
   std::string failure;           ///< empty: none, and the rest is there
-  std::string full_problem;      ///< what the parts are measured from
+  std::string full_problem;      ///< motion that the parts are measured from, in words
   std::vector<ErrorPart> parts;  ///< one for each source, in order
   RelativeError total, sum;
   bool no_truth = false;  ///< the full problem has inverted tets
@@ -44,8 +44,8 @@ struct ErrorSplit {
 
 /// One motion of the chain from the full problem to the reduced one.
 struct ChainMotion {
-  std::optional<ErrorSource> source;  ///< what it has and the motion before has not; the first: none
-  std::string note;                   ///< what is compared
+  std::optional<ErrorSource> source;  ///< source that it has and the motion before has not; the first: none
+  std::string note;                   ///< comparison in words
   BodyFrames frames;
 };
 

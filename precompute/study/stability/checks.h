@@ -38,9 +38,9 @@ struct StepFacts {
   int non_finite = 0;       ///< bodies whose state is not finite
   int unsolved = 0;         ///< status bits that say that the search for the minimum ended early
   double displacement = 0;  ///< the largest of a vertex, without the rigid motion of a free body, over the body's size
-  double kinetic = 0;       ///< of what is to come to rest [J]
+  double kinetic = 0;       ///< kinetic energy that is to come to rest [J]
   runtime::Energies energies{};
-  double work = 0;            ///< of loads since the start [J]
+  double work = 0;            ///< work of loads since the start [J]
   double momentum_error = 0;  ///< relative to the start's momentum
 };
 

@@ -10,7 +10,7 @@ namespace exmat::precompute {
 /// A scene with one thing changed.
 struct SceneVariant {
   std::string name;   ///< "16 x", "flat"
-  double factor = 0;  ///< of an ordered dimension; the scene itself has 1
+  double factor = 0;  ///< place along an ordered dimension; the scene itself has 1
   WorldConfig scene;
 };
 

@@ -9,7 +9,7 @@ namespace exmat::precompute {
 /// Time and error that a choice weighs: both >= 0, smaller is better. One that is not finite is never chosen.
 struct Outcome {
   double error = 0;    ///< relative
-  double seconds = 0;  ///< of a step
+  double seconds = 0;  ///< time of a step
 };
 
 /// Limits of a choice; absent: none.

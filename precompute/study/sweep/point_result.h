@@ -21,15 +21,15 @@ struct PointResult {
   TrajectoryErrors errors;
   double worst_time = 0;                             ///< [s]
   std::optional<RelativeError> from_all_elements;    ///< headline against the same point with all elements
-  std::optional<RelativeError> from_double;          ///< of mixed precision, against the same point in double
+  std::optional<RelativeError> from_double;          ///< headline of mixed precision against the same point in double
   std::size_t modes = 0, elements = 0;               ///< r, s
   std::string internal_force, target;                ///< as the run took them
-  double heldout_error = 0;                          ///< of cubature, force
-  double precompute_seconds = 0;                     ///< of its bundle, all stages
+  double heldout_error = 0;                          ///< force error of cubature
+  double precompute_seconds = 0;                     ///< time of its bundle, all stages
   double newton_iterations = 0, factorisations = 0;  ///< mean of a step
   std::int64_t steps = 0, unconverged_steps = 0;
-  std::vector<std::string> warnings;  ///< of its bundle
-  std::optional<StepTimes> times;     ///< of the study's own measurement; not in the point's file
+  std::vector<std::string> warnings;  ///< warnings of its bundle
+  std::optional<StepTimes> times;     ///< measured by the study itself; not in the point's file
 };
 
 /// Numbers that are not finite are null.

@@ -22,12 +22,12 @@ struct StudyOptions {
 /// One full-space run that points are measured against.
 struct ReferenceResult {
   std::string key;
-  int eigenfunctions = 0;  ///< of its examples; 0: none
+  int eigenfunctions = 0;  ///< number for its examples; 0: none
   double time_step = 0;    ///< [s]
   std::string integrator, material, failure;
   std::int64_t steps = 0, unconverged_steps = 0;
   double newton_iterations = 0, factorisations = 0, step_seconds = 0;  ///< means; median, of one run
-  InvertedTets inverted;  ///< of its frames: where there are any, its errors are of no true motion
+  InvertedTets inverted;  ///< tets inverted in its frames: where there are any, its errors are of no true motion
 };
 
 /// A point's worst frame: positions [n x 3], reduced (of a free body turned and shifted onto the other) and in full
@@ -42,17 +42,17 @@ struct StudyResult {
   std::string asset_name;
   std::int64_t vertices = 0, tets = 0;
   bool free_body = false;
-  bool has_examples = false;         ///< of the whole body or of regions
+  bool has_examples = false;         ///< true for examples of the whole body or of regions
   std::vector<std::string> regions;  ///< that the scene names
-  std::vector<double> times;         ///< of the frames [s]
+  std::vector<double> times;         ///< times of the frames [s]
   std::vector<PointResult> points;
   std::vector<ReferenceResult> references;
-  std::vector<std::size_t> front;  ///< of `points`, ascending in time
+  std::vector<std::size_t> front;  ///< indices into `points`, ascending in time
   std::size_t own = 0;             ///< the point of the files' own settings, else the first
   Budget budget;
   std::optional<std::size_t> recommended, nearest;
-  std::optional<ErrorSplit> sources;     ///< of the recommended point, else of `own`
-  std::vector<WorstFrame> worst_frames;  ///< of the least accurate point, the files' own and the recommended one
+  std::optional<ErrorSplit> sources;     ///< split for the recommended point, else for `own`
+  std::vector<WorstFrame> worst_frames;  ///< the least accurate point's, the files' own and the recommended one's
   TriangleArray surface;                 ///< n_f x 3
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  ///< against gravity
   std::string processor, instruction_set;

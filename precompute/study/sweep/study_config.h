@@ -36,7 +36,7 @@ struct ReferenceConfig {
 /// Settings of the split of one point's error by its sources.
 struct SourcesConfig {
   std::optional<int> eigenfunctions;  ///< m of the full problem; absent: twice the point's, or the largest of the study
-  int time_steps = 2;                 ///< of the full problem, for one of the point's; 1: that source is left out
+  int time_steps = 2;                 ///< steps of the full problem for one of the point's; 1: that source is left out
   std::optional<std::filesystem::path> exact_examples;  ///< asset file whose poses correspond exactly to the object
 };
 
@@ -50,7 +50,7 @@ struct BodyAsset {
 struct StudyConfig {
   std::filesystem::path file;
   std::filesystem::path asset;    ///< empty: there are `assets`
-  std::vector<BodyAsset> assets;  ///< of a scene of several bodies
+  std::vector<BodyAsset> assets;  ///< assets of a scene of several bodies
   std::filesystem::path scene;
   std::string name;
   std::optional<std::int64_t> steps;

@@ -43,7 +43,7 @@ struct PointPlan {
 /// Bundles, references and runs that the points of a study need, each once. Keys name the files of its folder.
 struct StudyPlan {
   std::string inputs;  ///< hash of all files and of what is the same for all points
-  TetMesh mesh;        ///< of the object
+  TetMesh mesh;        ///< the object's
   std::vector<BundlePlan> bundles;
   std::vector<ReferencePlan> references;
   std::vector<PointPlan> points;

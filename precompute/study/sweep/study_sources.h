@@ -17,7 +17,7 @@ struct SourcesInput {
   const AssetConfig& asset;
   const SceneConfig& scene;
   const StudyPlan& plan;
-  const StudyResult& result;  ///< of all points
+  const StudyResult& result;  ///< results of all points
   std::filesystem::path folder;
   int jobs = 1;  ///< processes
 };

@@ -12,9 +12,9 @@ namespace exmat::precompute {
 
 /// Results of a run of a scene of several bodies.
 struct WorldRun {
-  std::vector<std::string> names;            ///< of the bodies
-  std::vector<std::size_t> kinds;            ///< of each, its place among the scene's "bodies"
-  std::vector<BodyFrames> bodies;            ///< what is counted is the same in all: of steps of all bodies
+  std::vector<std::string> names;            ///< one for each body
+  std::vector<std::size_t> kinds;            ///< place of each body's kind among the scene's "bodies"
+  std::vector<BodyFrames> bodies;            ///< counts are the same in all: steps of all bodies
   std::vector<std::size_t> modes, elements;  ///< r and s of each kind; none in full space
 };
 

@@ -15,22 +15,22 @@ namespace exmat::precompute {
 
 /// Errors of the motion of one body, or of all.
 struct WorldError {
-  std::string name;  ///< of the body; "all": of all together
+  std::string name;  ///< the body's; "all": all together
   RelativeError position, velocity;
-  std::optional<RelativeError> shape;  ///< of a free body
+  std::optional<RelativeError> shape;  ///< present for a free body
   double energy = 0;
 };
 
 /// Results of one point of a study of several bodies.
 struct WorldPointResult {
-  std::vector<PointSettings> settings;       ///< of each entry of the scene's bodies
+  std::vector<PointSettings> settings;       ///< one for each entry of the scene's bodies
   std::string key, failure;                  ///< empty: none, and the rest is there
-  std::vector<WorldError> errors;            ///< of all, then of each body
-  std::vector<std::size_t> modes, elements;  ///< of each entry
+  std::vector<WorldError> errors;            ///< all together, then each body
+  std::vector<std::size_t> modes, elements;  ///< one for each entry
   double newton_iterations = 0;              ///< mean of a step
   std::int64_t steps = 0, unconverged_steps = 0;
-  double precompute_seconds = 0;   ///< of its bundles
-  std::optional<StepTimes> times;  ///< of a step over the number of bodies
+  double precompute_seconds = 0;   ///< time of its bundles
+  std::optional<StepTimes> times;  ///< time of a step over the number of bodies
 };
 
 /// One full-space run that points are measured against.
@@ -46,10 +46,10 @@ struct WorldStudyResult {
   std::string name;
   std::vector<std::string> kinds;   ///< entries of the scene's bodies
   std::vector<std::string> bodies;  ///< all of them
-  std::vector<double> times;        ///< of the frames [s]
+  std::vector<double> times;        ///< times of the frames [s]
   std::vector<WorldPointResult> points;
   std::vector<WorldReferenceResult> references;
-  std::vector<std::size_t> front;  ///< of `points`, by the error of position of all and the time, ascending in time
+  std::vector<std::size_t> front;  ///< places in `points`, by error of position of all and time, ascending in time
   std::optional<std::size_t> recommended;
 
   std::size_t failures() const;
