@@ -8,7 +8,7 @@ namespace {
 
 constexpr std::size_t kLeafSize = 12;
 
-// What nanoflann reads points through.
+// Adaptor that nanoflann reads points through.
 struct PointCloud {
   RowMatrix points;
 

@@ -14,7 +14,7 @@ constexpr std::size_t kFewest = 6;     // landmarks that can contradict one of t
 constexpr double kContradicts = 0.15;  // median difference of ways, over the body's longest
 constexpr double kStandsOut = 2.5;     // times the median of all
 
-// Of an even number the lower one: half of the others must differ, whichever end of the body has one more.
+// The lower one of an even number: half of the others must differ, whichever end of the body has one more.
 double median(std::vector<double> values) {
   const auto middle = values.begin() + (std::ssize(values) - 1) / 2;
   std::ranges::nth_element(values, middle);

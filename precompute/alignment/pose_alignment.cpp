@@ -41,7 +41,7 @@ constexpr double kMirrorResidual = 0.05;    // of a mirror image that fits
 constexpr double kSqueezed = 2;             // factor of a tet's volume that no pose has
 constexpr double kUncovered = 0.15;         // distance from the other surface, over the body's size
 
-// Where a registration begins.
+// Start of a registration.
 struct Start {
   std::string name;
   VertexArray positions;
@@ -112,7 +112,7 @@ class PoseAligner {
   double size_;
   Registration registration_;
   ZoomOut zoom_out_;
-  // Of the starts that turn the body inside out, the best as a map: what a mirror image would begin with.
+  // The best map of the starts that turn the body inside out: a mirror image would begin with it.
   VertexArray reflected_start_;
   double reflected_score_ = std::numeric_limits<double>::infinity();
 };
@@ -430,7 +430,7 @@ std::vector<std::int32_t> vertices_of(const SparseMatrix& points) {
   return vertices;
 }
 
-// Of landmarks, not of a dense map.
+// Landmarks that contradict the others; none of a dense map.
 std::vector<std::size_t> wrong_landmarks(const AlignedShape& rest, const AlignedShape& pose,
                                          const Correspondences& landmarks) {
   if (landmarks.count() > kFewLandmarks) return {};

@@ -18,7 +18,7 @@ namespace {
 constexpr int kSettlingRounds = 10;
 constexpr Eigen::Index kSettlingSamples = 100, kSamples = 200;
 constexpr std::size_t kSettled = 8;  // of each kind of first guesses, the best
-// What iterating must gain on a turn by right angles: it follows the tessellation, too.
+// Limits for an iterated fit in place of a turn by right angles: iterating follows the tessellation, too.
 constexpr double kWorthIterating = 0.7, kWorthwhileGap = 0.01;
 // An axis this near to one of space is named by its letter [rad].
 constexpr double kNearAxis = 0.05;
@@ -82,7 +82,7 @@ std::vector<RigidFit> RigidFitter::fits(bool mirrored) const {
   }
   std::ranges::stable_sort(plain, {}, &RigidFit::gap);
   std::ranges::stable_sort(by_axes, {}, &RigidFit::gap);
-  // What iterating makes of a guess, or the nearest turn by right angles where that is hardly worse.
+  // Adds what iterating makes of a guess, or the nearest turn by right angles where that is hardly worse.
   const auto offer = [&](const RigidFit& guess) {
     const RigidFit fit = sampled_fit(settle(guess.rotation));
     const RigidFit& straight = *std::ranges::min_element(

@@ -21,7 +21,7 @@ constexpr double kStaircase = 0.15;                         // of it, inward
 constexpr double kShrink = 0.5, kGrow = -0.53;              // Taubin's two steps
 constexpr int kSmoothings = 8;
 
-// Where two triangles meet.
+// An edge at which two triangles meet.
 struct Edge {
   std::array<std::int32_t, 2> triangles{-1, -1};
 };

@@ -29,7 +29,7 @@ RowMatrix with_normals(const TriangleSamples& samples) {
   return points;
 }
 
-// Of the centres of the triangles of one surface from another.
+// Squared distances from the triangles' centres of one surface to another.
 Eigen::VectorXd squared_distances(const SurfaceTree& from, const SurfaceTree& to) {
   const TriangleSamples& samples = from.samples();
   Eigen::VectorXd squared(samples.areas.size());

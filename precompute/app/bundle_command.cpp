@@ -85,7 +85,7 @@ void print_model(const std::string& bundle, const ReducedModel& model) {
   for (const RegionData& region : model.regions) print_examples("region " + region.name, region.examples);
 }
 
-// What the scene asks of the bundle; nothing without a scene.
+// The scene's needs of the bundle; nothing without a scene.
 std::optional<Needs> scene_needs(const BundleOptions& options, const std::optional<SceneConfig>& scene,
                                  const AssetConfig& asset) {
   if (!scene) return std::nullopt;

@@ -159,7 +159,7 @@ double root_mean_square(const Eigen::VectorXd& values) {
   return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
 }
 
-// What the subset gives in place of all elements.
+// Responses of the subset in place of all elements.
 Responses weighted_response(const ElementSamples& samples, const std::vector<Eigen::Index>& elements,
                             const Eigen::VectorXd& weights, const PoseLanes& poses) {
   const std::vector<Part> parts = parts_of(std::ssize(elements));

@@ -108,7 +108,7 @@ void ElementSamples::respond(Eigen::Index element, const PoseLanes& poses, Respo
   }
 }
 
-// Of kLanes poses, in the layout of the kernels.
+// Adds the stiffness in kLanes poses, in the layout of the kernels.
 void ElementSamples::add_stiffness(const std::vector<Eigen::Index>& elements, const Eigen::VectorXd& weights, Part part,
                                    const PoseLanes& poses, std::vector<AlignedArray>& sums) const {
   const Eigen::Index r = modes(), stride = runtime::padded(r);

@@ -192,7 +192,7 @@ Eigen::MatrixXd inverse_of(const Support& support) {
   return support.gram.ldlt().solve(Eigen::MatrixXd::Identity(size, size));
 }
 
-// What the squared residual rises by where a member is removed: w_i^2 / (G^-1)_ii.
+// Rise of the squared residual where a member is removed: w_i^2 / (G^-1)_ii.
 Eigen::VectorXd costs_of_removal(const Support& support, const Eigen::MatrixXd& inverse) {
   return support.weights.cwiseAbs2().cwiseQuotient(inverse.diagonal().cwiseMax(1e-300));
 }

@@ -23,7 +23,7 @@ class PoseGenerator {
   PoseGenerator(const PoseSource& source, std::uint64_t seed)
       : source_(source), generator_(seed), stiffness_factor_(source.rest_stiffness) {}
 
-  // What is left to do of a pose once its random numbers are drawn.
+  // The work left on a pose once its random numbers are drawn.
   using Rest = std::function<Eigen::VectorXd()>;
 
   Rest on_manifold() {

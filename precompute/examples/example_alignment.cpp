@@ -257,7 +257,7 @@ Eigen::MatrixXd ExampleAligner::coupled_map(const PoseInput& example, const Lapl
       .functional_map();
 }
 
-// How far the displacement carried to the object [n x 3] misses that of the example's landmarks, RMS, over the size of
+// RMS by which the displacement carried to the object [n x 3] misses the example's landmarks' own, over the size of
 // theirs; 0 without landmarks. `posed` are the pose's vertices in the rest example's frame.
 double ExampleAligner::missed_landmarks(const AlignedRest& rest, const PoseInput& pose, const VertexArray& posed,
                                         const VertexArray& displacement) const {

@@ -154,7 +154,7 @@ TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const Align
   return transferred;
 }
 
-// What is worth saying of its scale, and where it is hardly a pose.
+// Logs notes on its scale, and warns where it is hardly a pose.
 void ShapeStageBuilder::report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred) {
   if (!pose.scale.note.empty()) log::info(fmt::format("example {}: {}", name, pose.scale.note));
   if (!pose.scale.warning.empty()) warn(warnings_, fmt::format("example {}: {}", name, pose.scale.warning));

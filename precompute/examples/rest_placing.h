@@ -15,8 +15,7 @@ struct RestTurn {
   std::int64_t competing = 0;
 };
 
-/// Test whether a rest example lies on the object by its surface, and the turn that lays it there. docs/alignment.md,
-/// "The rest example".
+/// Placing of a rest example on the object by its surface: gap and turn. docs/alignment.md, "The rest example".
 class RestPlacing {
  public:
   /// Both at centroid 0 and volume 1, as they stand.

@@ -25,7 +25,7 @@ namespace exmat::precompute {
 namespace {
 
 constexpr double kInvertedLimit = 0.05;
-// What a cage misses of a pose, RMS over the diagonal. The poses of docs/surfaces.md are missed by 0.15 % at most.
+// RMS misfit of a pose by a cage, over the diagonal. The poses of docs/surfaces.md are missed by 0.15 % at most.
 constexpr double kMissWarned = 0.02, kMissRefused = 0.1;
 
 // A checked mesh with what its file said.
@@ -114,7 +114,7 @@ std::vector<std::int64_t> ids_of(const FlagVector& flags) {
   return ids;
 }
 
-// How the vertices of a mesh are numbered in its file.
+// Numbering of a mesh's vertices in its file.
 struct FileNumbers {
   std::vector<std::int32_t> kept;  // new index -> index in the file
   Eigen::Index count = 0;          // in the file
@@ -237,7 +237,7 @@ MeshFile ExampleReader::read_tets(const ExampleConfig& example) {
   return file;
 }
 
-// What a cage misses of a pose by more than its cells explain: the pose is no pose of this surface.
+// Warns of a misfit beyond what the cage's cells explain, or refuses it: the pose is no pose of this surface.
 void ExampleReader::judge_miss(const SurfacePose& fitted, const ExampleConfig& example) const {
   if (fitted.rms <= kMissWarned) return;
   const std::string found = fmt::format("{:.1f} % (RMS), {:.1f} % at most", 100 * fitted.rms, 100 * fitted.farthest);

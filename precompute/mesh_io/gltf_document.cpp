@@ -18,7 +18,7 @@ namespace {
 
 constexpr std::size_t kLargestFile = 2147483647;
 
-// What tinygltf may see of the file system: the folder of the file and those below it.
+// The part of the file system that tinygltf may see: the folder of the file and those below it.
 struct Folder {
   std::filesystem::path path;
   std::vector<std::filesystem::path> files;

@@ -23,7 +23,7 @@ class Walk {
   }
 
  private:
-  // Of a node: its begin, or its end after all that is below it.
+  // A visit of a node: its begin, or its end after all that is below it.
   struct Step {
     int node;
     std::optional<Eigen::Affine3d> to_scene;

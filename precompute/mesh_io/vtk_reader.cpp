@@ -70,7 +70,7 @@ class VtkReader {
   std::vector<std::size_t> ends_;  // of each cell, in corners_
   std::vector<std::int32_t> corners_;
   std::vector<std::int64_t> types_;
-  // Of the section of attributes: for each point or cell how many there are, and whether of cells.
+  // The section of attributes: number of points or cells, and whether it is of cells.
   std::uint64_t attribute_count_ = 0;
   bool of_cells_ = false;
   std::map<std::string, std::vector<std::int64_t>> cell_numbers_;
@@ -164,7 +164,7 @@ void VtkReader::read_rows(std::uint64_t cells, std::uint64_t size) {
     cursor_.fail(fmt::format("{} values of CELLS", size), fmt::format("{}", corners_.size() + ends_.size()));
 }
 
-// Where the corners of each cell begin, and after them where the last one ends; then the corners.
+// Reads the offsets, the begin of each cell's corners and after them the end of the last; then the corners.
 void VtkReader::read_offsets(std::uint64_t offsets, std::uint64_t size) {
   Words words = cursor_.read_keywords();
   if (words[0] != "OFFSETS") cursor_.fail("OFFSETS after CELLS", quote(words[0]));

@@ -25,7 +25,7 @@ namespace {
 constexpr double kAlpha = 1, kOffset = 0.2;
 // Trials: to find the cell size of a number of tets; to get all of the surface inside and no flat tet.
 constexpr int kSizeTrials = 6, kShapeTrials = 8;
-// What the cage stands off more at each trial.
+// Factor by which the cage stands off more at each trial.
 constexpr double kFartherOff = 1.3;
 // Rounds of drawing the cage out over vertices that stick out of it, and how much farther than they stick out.
 constexpr int kDrawingRounds = 30;
@@ -137,7 +137,7 @@ TetMesh CageMaker::tets(double size, double offset, unsigned seed, bool improve)
   return mesh;
 }
 
-// Of few digits: the last ones of roots and powers are not the same everywhere, and a mesh follows from every bit.
+// Keeps few digits: the last ones of roots and powers differ between machines, and a mesh follows from every bit.
 double tried_size(double size) { return std::round(std::clamp(size, kSmallestSize, kLargestSize) * 1e5) / 1e5; }
 
 // The number of tets grows as a power of the cell size between 2 (sheets) and 3 (solids), and more where fine cells

@@ -14,7 +14,7 @@ namespace {
 constexpr double kSnapshotAmplitude = 0.25;
 // Principal components below this, relative to the largest singular value, are rounding.
 constexpr double kRankTolerance = 1e-9;
-// Of modes beside the motions of a scene, in norm.
+// Share of modes beside the motions of a scene, in norm.
 constexpr double kUnseenShare = 0.03;
 
 Eigen::MatrixXd scaled_snapshots(const BasisInput& input) {

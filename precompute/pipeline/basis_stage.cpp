@@ -57,7 +57,7 @@ class BasisChooser {
   Eigen::MatrixXd fields_;
 };
 
-// Of a body with all elements that the motions had.
+// Runs a body with all elements that the motions had.
 RollOut BasisChooser::run(const Eigen::MatrixXd& basis) const {
   ReducedModel model;
   model.asset_name = body_.asset_name;

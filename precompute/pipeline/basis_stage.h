@@ -21,7 +21,7 @@ struct BodyStages {
   const Eigen::MatrixXd& derivatives;
   const PoseFitter* fitter;  ///< null without examples
   const std::vector<TargetSpace>& targets;
-  std::vector<bool> elastic;  ///< for each of the targets: the force may be elastic
+  std::vector<bool> elastic;  ///< true for each target whose force may be elastic
 };
 
 /// The energy reference of all targets.

@@ -51,7 +51,7 @@ std::int64_t example_count(const AssetConfig& asset) {
   return 1 + poses;
 }
 
-// Of the whole body, then of the regions.
+// The set of the whole body, then the sets of the regions.
 std::vector<const ExampleSet*> example_sets(const ReducedModel& model) {
   std::vector<const ExampleSet*> sets;
   if (model.examples) sets.push_back(&*model.examples);
@@ -315,7 +315,7 @@ std::optional<Motions> Pipeline::train(const BodyStages& stages, const PlannedTr
     motions.reason = plan.reason;
     motions.chains.options.budget = options_.training_budget;
     const auto cached = [&](const char* stage, const auto& work) {
-      // What a budget cuts short is not what another run would find.
+      // A budget cuts each run elsewhere: results within one are not kept.
       if (options_.training_budget > 0) return work();
       return cache_.get(stage, work, object_.mesh, object_.materials, system.free_dofs, stages.targets,
                         copies_of(example_sets(body)), object_.contact, asset_.contact_count, text_of(plan.loads),
@@ -551,7 +551,7 @@ ReducedModel Pipeline::run() {
   return model;
 }
 
-// What the numerical stages refuse is a member of the asset; they do not know its file.
+// Names the asset's file in errors of the numerical stages: they refuse a member of it and do not know the file.
 template <typename Work>
 auto with_file_named(const AssetConfig& asset, Work work) {
   try {

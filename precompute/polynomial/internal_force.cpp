@@ -28,8 +28,8 @@ constexpr std::size_t kRounds = 41, kFewestRounds = 9;
 constexpr int kStepsPerRound = 4;  // so that each finds its data in the caches as in a run
 constexpr double kMostSeconds = 0.05;
 
-// Of one thread, with AVX-512: the polynomial is bound by its memory, cubature by its arithmetic. This predicts the
-// ratio to 20 percent from r = 20 to 30, and flatters the polynomial beyond.
+// Rates of one thread, with AVX-512: the polynomial is bound by its memory, cubature by its arithmetic. This predicts
+// the ratio to 20 percent from r = 20 to 30, and flatters the polynomial beyond.
 constexpr double kBytesPerSecond = 30e9, kFlopsPerSecond = 20e9;
 
 // Evaluates one body again and again.

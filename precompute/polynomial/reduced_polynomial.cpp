@@ -37,7 +37,7 @@ struct StrainScale {
   StrainScale(double volume, const LameParameters& lame)
       : deviatoric(std::sqrt(2 * lame.mu * volume)), spherical(std::sqrt((3 * lame.lambda + 2 * lame.mu) * volume)) {}
 
-  // Of 1/2 (M + M^T).
+  // Scaled strain 1/2 (M + M^T).
   Strain operator()(const Eigen::Matrix3d& M) const {
     const double shift = (spherical - deviatoric) * M.trace() / 3;
     const double shear = deviatoric * std::numbers::sqrt2 / 2;

@@ -139,7 +139,7 @@ SurfacePose PoseSolver::solve(VertexArray x, double first) {
     minimise(x, stiffness, kBetween, pose);
     ++pose.stages;
     const bool here_sound = inverted(x) == 0;
-    // What inverts tets asks for more than the cage can hold, but for the first stages, which come from a guess.
+    // Springs that invert tets ask for more than the cage can hold, but for the first stages, which come from a guess.
     if (sound && !here_sound) break;
     const double rms = springs_.rms(x);
     log::debug(fmt::format("springs of {:.0e}: missed by {:.3g} of the diagonal, energy {:.4g}, {} inverted", stiffness,

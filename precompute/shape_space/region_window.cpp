@@ -75,7 +75,7 @@ class WayFromBorder {
 // [n] of the region's vertices from its border; zero elsewhere.
 Eigen::VectorXd border_distances(const Cut& cut, const FlagVector& border, const std::vector<Eigen::Index>& beyond) {
   Eigen::VectorXd straight = Eigen::VectorXd::Zero(border.size()), distances = straight;
-  // What is nearest of the tets across is, seen from inside, one of the border's faces.
+  // The nearest point of the tets across is, seen from inside, on one of the border's faces.
   straight(beyond) = nearest_points(cut.across, cut.body.vertices(beyond, Eigen::all)).distances;
   const Eigen::VectorXd way = WayFromBorder(cut.body).farthest(straight, border);
   distances(beyond) = way.array().isFinite().select(way, straight)(beyond);  // no way leads to another body's vertices

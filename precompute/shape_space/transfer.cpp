@@ -43,7 +43,7 @@ TransferredPose place_pose(const LaplaceBasis& object, const Eigen::MatrixXd& re
   for (int round = 0; round < kMostFits; ++round) {
     pose.coefficients = (pose.coefficients * fit.transpose()).eval();
     pose.rotation = fit * pose.rotation;
-    // What the functions lose of the rest pose is not turned with the rest of it, so a little of a turn is left.
+    // The rest pose's part that the functions lose is not turned with the rest of it, so a little of a turn is left.
     if (frame.fit_whole || Eigen::AngleAxisd(fit).angle() < kNoTurn) break;
     const VertexArray left = object.eigenfunctions * (pose.coefficients - rest_coefficients);
     fit = fit_rotation(object.vertices + left, object.vertices, frame.fit_weights);

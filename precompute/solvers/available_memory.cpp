@@ -12,7 +12,7 @@ namespace {
 
 constexpr std::int64_t kMost = std::numeric_limits<std::int64_t>::max();
 
-// Of the whole system, "MemAvailable:  123456 kB"; all it has where that is not told.
+// Memory of the whole system, "MemAvailable:  123456 kB"; all it has where that is not told.
 std::int64_t of_system() {
   std::ifstream file("/proc/meminfo");
   for (std::string name; file >> name;) {
@@ -24,7 +24,7 @@ std::int64_t of_system() {
   return sysconf(_SC_PHYS_PAGES) * sysconf(_SC_PAGESIZE);
 }
 
-// What is left of the limit of the address space.
+// Rest of the limit of the address space.
 std::int64_t of_limit() {
   rlimit limit{};
   if (getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return kMost;

@@ -14,7 +14,7 @@
 namespace exmat::precompute {
 namespace {
 
-// Of |K^-1 (K x - lambda M x)| in the norm of M, where |x| is 1.
+// Limit of |K^-1 (K x - lambda M x)| in the norm of M, where |x| is 1.
 constexpr double kTolerable = 1e-6;  // where rounding stops it; refinement in long double has the rest
 constexpr int kPatience = 4;         // steps that bring the worst pair no nearer by half
 constexpr int kMostExpansions = 300;

@@ -21,14 +21,14 @@ namespace exmat::precompute {
 namespace {
 
 constexpr double kConvergence = 1e-12;  // of Krylov-Schur, relative to the eigenvalue
-// Of eigenvectors by Davidson's method, and of those that would show that one was missed: their values are off by the
-// square of it.
+// Accuracy of eigenvectors by Davidson's method, and of those that would show that one was missed: their values are off
+// by the square of it.
 constexpr double kDavidsonAccuracy = 1e-10, kMissedAccuracy = 1e-5;
 constexpr double kLobpcgConvergence = 1e-9;  // |K x - lambda M x| / |lambda M x|, about
-// Of |K x - lambda M x| / |lambda M x|. Rounding alone leaves eps |K| |x| / |lambda M x|, which is more for slender
-// bodies and those with flat tets: their pairs are refined.
+// Limit of |K x - lambda M x| / |lambda M x|. Rounding alone leaves eps |K| |x| / |lambda M x|, which is more for
+// slender bodies and those with flat tets: their pairs are refined.
 constexpr double kCoarse = 1e-9;
-// Of the returned pairs: |lambda K^-1 M x - x| of those that were refined, what rounding of K makes of their
+// Limits for the returned pairs: |lambda K^-1 M x - x| of those that were refined, what rounding of K makes of their
 // eigenvalues, and the backward error of all.
 constexpr double kChangeLimit = 1e-6, kRoundingLimit = 1e-3, kBackwardLimit = 1e-11;
 constexpr int kMostPolishes = 4;        // one does after Krylov-Schur
@@ -171,7 +171,7 @@ Eigen::MatrixXd solve_eigenproblem(const EigenShare& problem, const Eigen::Matri
   check_petsc(EPSSetOperators(eps.get(), problem.stiffness.get(), problem.mass.get()), "operators");
   check_petsc(EPSSetProblemType(eps.get(), EPS_GHEP), "problem type");
   check_petsc(EPSSetDimensions(eps.get(), static_cast<PetscInt>(count), PETSC_DEFAULT, PETSC_DEFAULT), "dimensions");
-  // Of the two with multigrid the one with less work, where it is left to us.
+  // LOBPCG has less work than the other with multigrid; it is taken where the choice is ours.
   const bool lobpcg = problem.solver.means == Means::kMultigrid && solver_settings().eigensolver != Eigensolver::kGamg;
   lobpcg ? set_lobpcg(eps.get(), problem.mass.get(), problem.solver) : set_krylov_schur(eps.get(), problem.solver);
 

@@ -10,7 +10,7 @@ namespace {
 using Index = std::int32_t;
 using Node = Elimination::Node;
 
-// Of a part of L of so many columns, the share of zeros up to which a node joins its parent.
+// Share of zeros up to which a node joins its parent, for a part of L of so many columns.
 double most_zeros(Index columns) { return columns <= 4 ? 1 : columns <= 16 ? 0.5 : columns <= 48 ? 0.1 : 0.05; }
 
 std::size_t at(Index i) { return static_cast<std::size_t>(i); }

@@ -12,12 +12,12 @@
 namespace exmat::precompute {
 namespace {
 
-// Of a solution, in the norm of K.
+// Accuracy of a solution, in the norm of K.
 constexpr double kTolerance = 1e-12;
 // Steps of conjugate gradients: a good body takes 3 to 6. Where the first solution takes more than the first of these,
 // factors in double are cheaper.
 constexpr int kWorthwhile = 40, kMostIterations = 200;
-// Of |B - K X| / |B|, of the first solution. What a null vector that is not R's would leave is a thousand times as
+// Limit of |B - K X| / |B| for the first solution. A null vector that is not R's would leave a thousand times as
 // much.
 constexpr double kSolved = 1e-6;
 

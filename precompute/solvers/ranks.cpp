@@ -128,7 +128,7 @@ void do_share(const Call& call, Shares& shares) {
   }
 }
 
-// What a rank other than the leader does. Returns the exit status of the program.
+// Work of a rank other than the leader. Returns the exit status of the program.
 int serve() {
   Shares shares;
   for (;;) {

@@ -8,7 +8,7 @@
 namespace exmat::precompute {
 namespace {
 
-// Of a solution's change by one more step of iterative refinement, relative: nothing is left to gain.
+// Change of a solution by one more step of iterative refinement, relative: nothing is left to gain.
 constexpr double kSettled = 8 * std::numeric_limits<double>::epsilon();
 constexpr int kMostRefinements = 10;  // two do, unless the factors have hardly a digit
 constexpr int kMostSteps = 4;         // of inverse iteration; one and a second that sees no change do
@@ -24,7 +24,7 @@ double largest_row_sum(const SparseMatrix& matrix) {
   return largest;
 }
 
-// Of columns, in the norm of M.
+// Sizes of columns in the norm of M.
 Eigen::VectorXd sizes(const SparseMatrix& mass, const Eigen::MatrixXd& columns) {
   return columns.cwiseProduct(mass * columns).colwise().sum().cwiseMax(0).cwiseSqrt().transpose();
 }

@@ -18,9 +18,9 @@
 namespace exmat::precompute {
 namespace {
 
-// Of conjugate gradients: |b - K x| / |b|.
+// Accuracy of conjugate gradients: |b - K x| / |b|.
 constexpr double kIterationTolerance = 1e-12;
-// Of the right-hand side as given: what is left of one along the null space is rounding.
+// Share of the right-hand side as given: what is left of one along the null space is rounding.
 constexpr double kRounding = 1e-14;
 constexpr PetscInt kMostKrylovIterations = 2000;
 // Share of the mean of the diagonal that the matrix which multigrid is made for is shifted by, where K has null
@@ -44,7 +44,7 @@ void remove(const Eigen::MatrixXd& along, const Eigen::MatrixXd& onto, Eigen::Ma
   columns -= along * products;
 }
 
-// Of all ranks' rows.
+// Norms over all ranks' rows.
 Eigen::VectorXd norms(const Eigen::MatrixXd& columns) {
   Eigen::MatrixXd squares = columns.colwise().squaredNorm();
   add_up(squares);

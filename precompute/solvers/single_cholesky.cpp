@@ -132,7 +132,7 @@ std::shared_ptr<const Elimination> dissected_elimination(const Graph& graph, int
   return last.plan;
 }
 
-// Of one thread.
+// Workspace of one thread.
 struct SingleCholesky::Scratch {
   std::vector<Index> position;  // of each vertex of L in a front
 };

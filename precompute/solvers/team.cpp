@@ -14,7 +14,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long a rank that failed waits for the others before it ends them all.
+// Time that a rank that failed waits for the others before it ends them all.
 constexpr std::chrono::seconds kTeamPatience{10};
 constexpr std::chrono::milliseconds kTeamNap{1};
 constexpr int kLeader = 0, kRowsTag = 1, kMatrixTag = 2;
@@ -193,7 +193,7 @@ MatHandle to_petsc(const Layout& layout, const SparseMatrix& matrix, const Eigen
   if (c == 0) check_petsc(MatSetBlockSize(result.get(), static_cast<PetscInt>(layout.block)), "matrix");
   check_petsc(MatSetType(result.get(), MATAIJ), "matrix");
   const auto *starts = rows.starts.data(), *columns = rows.columns.data();
-  // Of these the one for the other type does nothing.
+  // One of these does nothing: it is for the other type.
   check_petsc(MatSeqAIJSetPreallocationCSR(result.get(), starts, columns, rows.values.data()), "matrix rows");
   check_petsc(MatMPIAIJSetPreallocationCSR(result.get(), starts, columns, rows.values.data()), "matrix rows");
   check_petsc(MatSetOption(result.get(), MAT_SYMMETRIC, PETSC_TRUE), "matrix symmetry");

@@ -107,8 +107,8 @@ ElementForces::ElementForces(const ObjectData& object, const ElasticSystem& syst
   parts_ = element_parts(object.mesh.vertices, elements_, members_, kTogether);
 }
 
-// Of the elements of a part, by the material's lanes: one element is all of the body, the entries of its displacement
-// gradient from the example's are its modes.
+// Adds the forces of a part's elements, by the material's lanes: one element is all of the body, the entries of its
+// displacement gradient from the example's are its modes.
 void ElementForces::add_forces(std::size_t index, Batch& batch) const {
   constexpr Eigen::Index kStride = runtime::padded(kEntries);
   alignas(runtime::kAlignment) double gradient[9 * kStride] = {}, entries[kEntries * kLanes],

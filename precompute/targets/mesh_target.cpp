@@ -29,7 +29,7 @@ void require_some(const std::vector<Eigen::Index>& elements) {
                     "poses that turn each of them inside out", "use milder poses"});
 }
 
-// Of these elements, each `weight` times.
+// Builds the solver from these elements, each `weight` times.
 void build_solver(const ObjectData& object, const ElementSamples& samples, const PoseCoordinates& coordinates,
                   EnergyReference reference, const std::vector<Eigen::Index>& elements, double weight,
                   runtime::TargetSolver& solver) {

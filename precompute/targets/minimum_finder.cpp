@@ -60,7 +60,7 @@ void MinimumFinder::add(const RowMatrix& weights, std::vector<Candidate> candida
   }
 }
 
-// Of some weights, from their starts; where none leads to a minimum, from the blend.
+// Lowest minima for some weights, from their starts; where none leads to a minimum, from the blend.
 std::vector<MinimumFinder::Minimum> MinimumFinder::lowest(
     const RowMatrix& weights, const std::vector<std::vector<Eigen::VectorXd>>& starts) const {
   const Eigen::VectorXd none = Eigen::VectorXd::Constant(target_.dimension(), std::numeric_limits<double>::quiet_NaN());

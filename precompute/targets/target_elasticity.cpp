@@ -102,7 +102,7 @@ class ForceSamples {
 
   const std::vector<Eigen::Index>& members() const { return members_; }  // that have a share
 
-  /// Of one element with its share.
+  /// Response of one element with its share.
   Response response(Eigen::Index element) const;
 
   /// Rows of the selection problem.

@@ -72,7 +72,7 @@ class PieceBuilder {
   TargetSamples samples_;   ///< all weights that were solved
   RowMatrix points_;        ///< [kNodes + kChecks x 2] in a piece: the nodes, then the checks
   Eigen::MatrixXd values_;  ///< kNodes x N
-  Eigen::HouseholderQR<Eigen::MatrixXd> inner_values_;  ///< of the control points that the ends leave free
+  Eigen::HouseholderQR<Eigen::MatrixXd> inner_values_;  ///< values for the control points that the ends leave free
 };
 
 PieceBuilder::PieceBuilder(const TargetSolver& target, const Eigen::MatrixXd& poses, const TargetSamples& checks,

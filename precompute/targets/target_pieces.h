@@ -11,7 +11,7 @@
 
 namespace exmat::precompute {
 
-inline constexpr int kPieceDegree = 7;  ///< for each piece: about the fewest control points for errors of 1e-3 to 1e-6
+inline constexpr int kPieceDegree = 7;  ///< needs about the fewest control points for errors of 1e-3 to 1e-6
 
 struct PieceOptions {
   double tolerance = 0;  ///< largest error, as TargetTableData has it, at all samples

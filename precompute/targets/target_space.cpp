@@ -47,7 +47,7 @@ RowMatrix equal_shares(Eigen::Index examples) {
   return weights;
 }
 
-// Where targets are solved first: corners, edges, faces and the inside of the simplex.
+// Weights that targets are solved for first: corners, edges, faces and the inside of the simplex.
 RowMatrix first_weights(Eigen::Index examples) {
   if (examples > kMostTableExamples) return equal_shares(examples);
   const int degree = examples == 2 ? 8 : examples == 3 ? 5 : 4;
@@ -234,7 +234,7 @@ void SpaceBuilder::add_table_of_many(TargetSpace& space, TargetTableReport& repo
   if (!space.table) space.table = build_target_table(accurate ? elements : small_.solver, poses, options, report);
 }
 
-// What the elements are off by changes slowly with the weights: few targets of all tets correct theirs, and others say
+// The elements' error changes slowly with the weights: few targets of all tets correct theirs, and others say
 // how far the table is from all tets. None where that is too far.
 std::optional<TargetTableData> SpaceBuilder::corrected_table(const TargetSolver& elements, const Eigen::MatrixXd& poses,
                                                              TargetTableOptions options,

@@ -60,7 +60,7 @@ class TableBuilder {
   Eigen::Index examples_;  ///< K
   TableError error_;
   MinimumFinder finder_;
-  std::optional<TargetTable> former_;  ///< of the degree before
+  std::optional<TargetTable> former_;  ///< table of the degree before
   bool lost_ = false;                  ///< p*(w) was not found at some weights
   bool lost_between_ = false;          ///< only in or between pieces
 };

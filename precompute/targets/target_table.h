@@ -17,7 +17,7 @@ struct TargetTableOptions {
   int first_degree = 4;                    ///< to be tried
   int most_degree = 0;                     ///< limit for one polynomial; 0: 40 for K = 2, 24 for K = 3, 14 for K = 4
   std::int64_t most_pieces = 256;          ///< for K = 2
-  const ElementForces* all = nullptr;      ///< forces of all where the solver's elements stand for all: targets of all
+  const ElementForces* all = nullptr;      ///< forces of all elements, where the solver has a few: targets are of all
   MinimumFinder::Correction correction{};  ///< correction of the solver's targets; for one polynomial alone
 };
 

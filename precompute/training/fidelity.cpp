@@ -46,7 +46,7 @@ double largest_target_error(const ReducedModel& model) {
   return largest;
 }
 
-// Of the squared norms of all of the training that the basis does not hold.
+// Share of the squared norms of all of the training that the basis does not hold.
 double lost_of_training(const FidelityInput& input, const SparseMatrix& mass) {
   const RowMatrix& basis = input.model.modal->basis;
   if (input.training.snapshots.rows() != basis.rows()) return 0;

@@ -27,7 +27,8 @@ using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 using exmat::precompute::MesherRequest;
 
-// Of the surface's triangles from the wrap, over the offset: less than 1, so that tets enclose what the wrap encloses.
+// Distance of the surface's triangles from the wrap, over the offset: less than 1, so that tets enclose what the wrap
+// encloses.
 constexpr double kSurfaceDistance = 0.5;
 // Smallest angle of a triangle on the surface [degree]; Mesh_3 ends for those below 30.
 constexpr double kFacetAngle = 25;

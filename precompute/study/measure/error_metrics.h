@@ -20,8 +20,8 @@ struct TrajectoryErrors {
   RelativeError position;  ///< over the displacement from rest, world
   RelativeError velocity;  ///< over the velocity, world
   double energy = 0;       ///< largest difference of the total energy over the largest kinetic + elastic one
-  std::optional<RelativeError> shape;  ///< free body: both without their rigid motion, over the deformation
-  RelativeError nearest_phase;         ///< headline by nearest_distances(): without what is a little late
+  std::optional<RelativeError> shape;  ///< free bodies: both without their rigid motion, over the deformation
+  RelativeError nearest_phase;         ///< headline by nearest_distances(): a small delay does not count
   std::optional<double> rebound;       ///< error of the centre of mass's velocity after contact, where both had one
   std::size_t worst_frame = 0;         ///< frame where the distances of the headline are largest
 

@@ -72,7 +72,7 @@ std::optional<Rebound> from_numbers(const ReboundNumbers& numbers) {
   return Rebound{numbers[1], {numbers[2], numbers[3], numbers[4]}};
 }
 
-// What `sizes` = F, n asks for, in bytes.
+// Size that `sizes` = F, n asks for, in bytes.
 double expected_size(const std::array<std::uint64_t, 2>& sizes) {
   const auto F = static_cast<double>(sizes[0]), n = static_cast<double>(sizes[1]);
   return 8 * (kCounts.size() + kMeans.size() + ReboundNumbers().size() + F * (kSeries.size() + 3 * n * kFields.size()));

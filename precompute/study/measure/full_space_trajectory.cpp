@@ -87,7 +87,7 @@ void FullSpaceTrajectory::append(double step_seconds) {
   inverted_.most = std::max(inverted_.most, inverted_.last);
 }
 
-// Of a free body the frame that fits it best; momenta by the consistent mass.
+// A free body's frame is the one that fits it best; momenta are by the consistent mass.
 void FullSpaceTrajectory::append_motion(const VertexArray& positions) {
   const VertexArray momentum = mass_ * world_velocities(body_.model, body_.state);
   const Eigen::VectorXd weights = mass_ * Eigen::VectorXd::Ones(mass_.cols());

@@ -37,7 +37,7 @@ class Motion {
     for (std::size_t j = 0; j + 1 < fields_.size(); ++j) prepare_way(j);
   }
 
-  // Of the positions of one frame, which are to be at `time`.
+  // Least distance of the positions of one frame, which are to be at `time`.
   double nearest(const VertexArray& positions, double time, double reach) const;
 
  private:
@@ -51,7 +51,7 @@ class Motion {
     double square = 0;
   };
 
-  // What is compared: without the centre of mass where the body may turn, else near zero, where squares are exact.
+  // Positions to compare: without the centre of mass where the body may turn, else near zero, where squares are exact.
   VertexArray prepared(const VertexArray& positions) const {
     if (!turned_) return positions - origin_;
     const Eigen::RowVector3d centre = weights_.transpose() * positions / weights_.sum();

@@ -32,7 +32,7 @@ constexpr double kReboundPause = 0.05;  // of the duration
       fmt::format("step {} (time {:g} s): a number that is not finite; try a smaller time step", step, time));
 }
 
-// What a run counts on its way.
+// Counts and times of a run on its way.
 class Meter {
  public:
   /// `pause`: how long no contact may come back for a rebound [s].

@@ -23,7 +23,7 @@ double of_stage(const runtime::Profile& profile, runtime::Stage stage) {
   return profile.seconds[static_cast<std::size_t>(stage)];
 }
 
-// Of whole steps, and of weights and targets within.
+// Times of whole steps, and of weights and targets within.
 class StepSamples {
  public:
   void add_step(double seconds) {

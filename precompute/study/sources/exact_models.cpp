@@ -65,7 +65,7 @@ std::vector<PoseCoordinates> ranges(const ReducedModel& model, const ElasticSyst
   return found;
 }
 
-// Of the examples' group of a model, and what it makes of targets.
+// Projection of a group of examples, and its space and table of targets.
 struct TargetParts {
   const ProjectionData& projection;
   std::optional<TargetSpaceData>& space;

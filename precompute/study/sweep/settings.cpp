@@ -40,7 +40,7 @@ bool learns_from_scene(const PointSettings& point) {
   return point.training == name_of(Training::kAuto) || point.training == name_of(Training::kScene);
 }
 
-// What has no effect is left as it is in the files, so that equal points are seen to be equal.
+// Settings without effect are left as they are in the files, so that equal points are seen to be equal.
 PointSettings normalised(PointSettings point, const PointSettings& own, const AssetConfig& asset, bool examples) {
   if (point.internal_force == kAllElements)
     point.cubature_elements.reset();

@@ -40,7 +40,7 @@ AssetConfig exact_asset(const std::filesystem::path& file) {
   return asset;
 }
 
-// Of an asset that is read anyway.
+// Doubt of the correspondence of an asset that is read anyway.
 std::string doubt_of(const AssetConfig& asset, InputFiles& files) {
   const ObjectInput object = read_object(asset, files);
   return doubt_of_correspondence(object, read_examples(asset, object, files));
@@ -193,7 +193,7 @@ void Split::add_full_space(std::optional<ErrorSource> source, const std::string&
   }
   if (!source) full_problem_ = name;
   add(source, std::move(name), note, identity, [=, this] { return run_full(sight, time_step, all_poses); });
-  // What the point was measured against may be this very motion.
+  // The point may have been measured against this very motion.
   const ReferencePlan& reference = input_.plan.references[plan_.reference];
   const bool same = all_poses && !sight.exact && sight.eigenfunctions == settings_.eigenfunctions &&
                     reference.scene.time_step == time_step && reference.scene.integrator == scene_.integrator;
@@ -228,7 +228,7 @@ void Split::plan_sight() {
   const bool exact = exact_.has_value();
   const Sight truth{examples() && more > m ? more : m, exact};
   const bool has_more = truth.eigenfunctions > m;
-  // Where there are no more functions, the full problem has the point's own, and all poses.
+  // The full problem has the point's own functions, and all poses, where there are no more functions.
   const bool all_poses = examples() && !has_more;
 
   add_full_space(std::nullopt, "", truth, sources_.time_steps > 1 ? fine : time_step, all_poses);

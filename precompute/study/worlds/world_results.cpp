@@ -6,7 +6,7 @@
 #include "precompute/study/measure/error_json.h"
 #include "precompute/study/worlds/world_study.h"
 
-// What a study of several bodies writes.
+// Files and texts of a study of several bodies.
 
 namespace exmat::precompute {
 namespace {

@@ -35,7 +35,7 @@ void add_energies(const runtime::Energies& now, BodyFrames& frames) {
   frames.potential.push_back(now.potential);
 }
 
-/// What one step did.
+/// Outcome of one step.
 struct StepCount {
   bool unconverged = false, non_finite = false;
   int newton_iterations = 0, factorisations = 0;

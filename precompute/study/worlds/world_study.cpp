@@ -142,7 +142,7 @@ void WorldStudy::read_assets() {
              '"' + config_.assets[i].body + '"', "");
 }
 
-// What makes the files of the folder: those of the assets, the scene, and all that is the same for all points.
+// Reads all that the folder's files are made from: the assets, the scene, and all that is the same for all points.
 void WorldStudy::read_inputs() {
   InputFiles files{world_.file};
   std::string salt = fmt::format("{}\nworld\n{}\n{}\n", version(), world_.steps, config_.frames);
