@@ -39,7 +39,7 @@ class Bodies {
   void restart();
 
   void remember(BodiesMemory& memory) const;
-  /// Of the same bodies.
+  /// Takes up the memory of the same bodies.
   void take_up(BodiesMemory memory);
 
   bool is_finite() const;

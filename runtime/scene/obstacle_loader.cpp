@@ -47,7 +47,7 @@ Shape make_shape(const HeightFieldConfig& field) {
                           field.orientation.toRotationMatrix()};
 }
 
-/// Of the whole body first, then of regions.
+/// The examples of the whole body first, then those of regions.
 std::vector<const ExampleData*> examples_of(const ReducedModel& data) {
   std::vector<const ExampleData*> examples;
   const auto add = [&](const ExampleSet& set) {

@@ -22,15 +22,15 @@ struct NamedPose {
 /// A scene ready to step, and how it came to be.
 struct LoadedScene {
   std::unique_ptr<const Model> model;
-  std::unique_ptr<const FullModel> full;  ///< where the scene, or a host, may have steps in full space
+  std::unique_ptr<const FullModel> full;  ///< present where the scene, or a host, may have steps in full space
   StepScene scene;                        ///< settings with keys as strong as they ever are
-  SceneKeys keys;  ///< of what changes in time: to be applied to a copy of the scene before each step
-  State start;     ///< where every body begins
-  std::vector<VertexForceConfig> forces;  ///< of the scene's file, their vertices known
+  SceneKeys keys;  ///< settings that change in time: to be applied to a copy of the scene before each step
+  State start;     ///< start of every body
+  std::vector<VertexForceConfig> forces;  ///< forces of the scene's file, their vertices known
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;            ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;            ///< datasets that were read, in order
-  std::vector<std::vector<NamedPose>> poses;  ///< of each example force of the model
+  std::vector<std::vector<NamedPose>> poses;  ///< one list for each example force of the model
   Eigen::VectorXd element_weights;            ///< s, of the cubature
   ReducedModel data;  ///< /object and /modal, complete only if the scene writes positions, and /render
 };

@@ -21,7 +21,7 @@ struct HardestContact {
 
 /// Times of the stages of a step, over the number of bodies.
 struct StageSamples {
-  std::array<Samples, kStageNames.size()> of_bodies;      ///< of bodies that touch no other, by the threads' clocks;
+  std::array<Samples, kStageNames.size()> of_bodies;      ///< bodies that touch no other, by the threads' clocks;
                                                           ///< output per frame
   std::array<Samples, kWorldStageNames.size()> of_world;  ///< on the wall clock
 };
@@ -30,33 +30,33 @@ struct StageSamples {
 struct StartOverlap {
   int body = 0, other = 0;  ///< numbers in the world; `other` of the obstacles that the body meets, if it is one
   bool is_obstacle = false;
-  int vertex = 0;    ///< of the body's object
+  int vertex = 0;    ///< number in the body's object
   double depth = 0;  ///< [m]
 };
 
-/// What a run did.
+/// Results of a run.
 struct RunSummary {
-  std::int64_t steps = 0;  ///< of each body
+  std::int64_t steps = 0;  ///< steps of each body
   int bodies = 1;
   int threads = 1;  ///< that shared the bodies
   double simulated_seconds = 0;
   Samples step_seconds;                ///< wall clock of a step of all bodies over their number, without output
   Samples newton_iterations;           ///< mean of the bodies
   Samples target_iterations;           ///< likewise
-  std::int64_t projections = 0;        ///< of all bodies
+  std::int64_t projections = 0;        ///< sum over all bodies
   std::int64_t unconverged_steps = 0;  ///< residual above the tolerance; of all bodies
   std::int64_t slept_steps = 0;        ///< that bodies slept through; of all bodies
-  Samples touching_pairs;              ///< of bodies near enough to touch
+  Samples touching_pairs;              ///< pairs of bodies near enough to touch
   int most_pairs = 0;
   int largest_island = 0;                            ///< bodies solved together
-  std::int64_t unconverged_islands = 0;              ///< of all steps
+  std::int64_t unconverged_islands = 0;              ///< sum over all steps
   double deepest = 0;                                ///< that a vertex is inside another body at the end [m]
-  Energies start, end;                               ///< of all bodies
+  Energies start, end;                               ///< sums over all bodies
   std::optional<StartOverlap> overlap;               ///< the deepest, where bodies overlap something at the start
-  std::uint64_t state_hash = 0;                      ///< of all bodies, at the end; see Bodies::hash
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the trajectory [m]
+  std::uint64_t state_hash = 0;                      ///< hash of all bodies at the end; see Bodies::hash
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< origin of the trajectory [m]
   std::optional<double> largest_displacement;        ///< over the written frames [m]; only with a trajectory
-  std::vector<HardestContact> hardest_contacts;      ///< of each kind; only if asked for
+  std::vector<HardestContact> hardest_contacts;      ///< one for each kind; only if asked for
   std::optional<StageSamples> stage_seconds;         ///< only if asked for
 };
 

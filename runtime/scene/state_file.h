@@ -12,8 +12,8 @@ namespace exmat::runtime {
 void write_state(const BodiesMemory& memory, const LoadedWorld& loaded, const WorldConfig& config,
                  const std::filesystem::path& file);
 
-/// What bodies of the scene go on from. Throws InputError unless it is of the same bundles, bodies, time step, example
-/// forces and obstacles as the scene.
+/// Memory that bodies of the scene go on from. Throws InputError unless it is of the same bundles, bodies, time step,
+/// example forces and obstacles as the scene.
 BodiesMemory read_state(const std::filesystem::path& file, const LoadedWorld& loaded, const WorldConfig& config);
 
 }  // namespace exmat::runtime

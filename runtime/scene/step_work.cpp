@@ -39,7 +39,7 @@ void add_solver(const TargetSolver& solver, int iterations, StepWork& work) {
   work.bytes += doubles((2 + iterations) * gradient);
 }
 
-/// Of one force.
+/// Adds the work of one example force.
 void add_examples(const ExampleModel& examples, int target_iterations, const StepReport& report, StepWork& work) {
   const Eigen::Index modes = examples.filter.matrix().rows(), count = examples.weights.examples();
   const auto numbers = static_cast<double>(count * (modes + count));  // load, and the slopes of one turn

@@ -4,21 +4,21 @@
 
 namespace exmat::runtime {
 
-/// What a step computes and reads beyond the flops that Profile counts. Lower bounds: a share of a limit that is built
-/// on them is never flattered.
+/// Computations and reads of a step beyond the flops that Profile counts. Lower bounds: a share of a limit that is
+/// built on them is never flattered.
 struct StepWork {
   double weights_flops = 0;
   double target_flops = 0;
   double other_flops = 0;  ///< products with r x r matrices: quadratic form, filter, damping
-  double bytes = 0;        ///< of constant arrays and r x r matrices, each pass over one counted once
+  double bytes = 0;        ///< constant arrays and r x r matrices, each pass over one counted once
 
   StepWork& operator+=(const StepWork& more);
 };
 
-/// Of the step that this report is of.
+/// Work of the step that this report is of.
 StepWork step_work(const Model& model, const StepScene& scene, const StepReport& report);
 
-/// Of a solution for the target that took so many iterations, likewise.
+/// Flops of a solution for the target that took so many iterations, likewise.
 double target_flops(const TargetSolver& solver, int iterations);
 
 }  // namespace exmat::runtime
