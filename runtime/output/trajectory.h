@@ -28,11 +28,11 @@ struct TrajectoryInfo {
 
 /// A body whose frames a trajectory holds.
 struct NamedBody {
-  std::string name;           ///< of its group; empty: it is the only one, at the root
+  std::string name;           ///< name of its group; empty: it is the only one, at the root
   const ReducedModel& model;  ///< holds /object and the basis, perhaps /render
   const BodyFrame& frame;
   TrajectoryInfo info;
-  const FullModel* full = nullptr;  ///< of a body that may step in full space
+  const FullModel* full = nullptr;  ///< present for a body that may step in full space
 };
 
 /// The frames of one body in an open file, below a group: "" for the root, or "/bodies/NAME".
@@ -50,11 +50,11 @@ class BodyFrames {
   /// To be called after the last frame. Throws WorkError.
   void finish();
 
-  /// What an .xdmf shows of it: the tets, or the render mesh.
+  /// Cells that an .xdmf shows of it: the tets, or the render mesh.
   XdmfCells cells() const;
   std::optional<XdmfCells> render_cells() const;
 
-  /// Of the frames so far [s].
+  /// Times of the frames so far [s].
   const std::vector<double>& times() const { return times_; }
   /// Largest displacement of a vertex in the frames so far [m].
   double largest_displacement() const { return largest_displacement_; }
