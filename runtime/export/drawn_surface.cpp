@@ -9,7 +9,7 @@
 namespace exmat::runtime {
 namespace {
 
-/// Of these groups those that the bundle has.
+/// Request for the groups to draw that the bundle has.
 BundleRequest request_of(const BundleSummary& summary) {
   BundleRequest request{.groups = {}, .step_only = true, .positions = true, .look = true};
   for (const char* group : {"object", "modal", "rigid", "render"}) {

@@ -165,7 +165,7 @@ class GltfWriter {
 
   std::size_t size_of(const char* list) const { return root_.contains(list) ? root_[list].size() : 0; }
 
-  /// Of the first frame.
+  /// Weights in the first frame.
   static Json first_of(const RowMatrix& weights) { return json_of(weights.row(0).transpose()); }
 
   static Json names_of(const MorphTargets& targets) { return {{"targetNames", targets.names}}; }
@@ -309,7 +309,7 @@ class GltfWriter {
     }
   }
 
-  /// What hangs below a body's node: a mesh, or the nodes of its look, which stand where the surface is at rest.
+  /// Adds the nodes below a body's node: a mesh, or the nodes of its look, which stand where the surface is at rest.
   void add_drawn_nodes(const Kind& kind, const Eigen::Vector3d& origin, Body& body) {
     Json& nodes = root_["nodes"];
     if (kind.nodes.empty()) {

@@ -15,7 +15,7 @@ namespace exmat::runtime {
 /// Which axis of the object points up.
 enum class UpAxis { kY, kZ };
 
-/// What is drawn of all bodies of one bundle: one mesh.
+/// Drawing of all bodies of one bundle: one mesh.
 struct DrawnKind {
   DrawnSurface surface;
   VertexArray normals;   ///< v x 3, at rest

@@ -20,10 +20,10 @@ struct MorphTargets {
   RowMatrix weights;               ///< F x N, of each frame; none without a motion
 };
 
-/// What morph targets in single precision miss of a motion, over all frames and vertices.
+/// Error of morph targets in single precision against a motion, over all frames and vertices.
 struct MorphError {
-  double largest = 0, rms = 0;  ///< of the positions in the body's frame [m]
-  double normal_rms = 0;        ///< of the angle of the normals [rad], over at most kNormalFrames frames
+  double largest = 0, rms = 0;  ///< error of the positions in the body's frame [m]
+  double normal_rms = 0;        ///< angle between the normals [rad], over at most kNormalFrames frames
 };
 
 /// Frames that normals are fitted to and judged by, spread over the motion.

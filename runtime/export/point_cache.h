@@ -9,16 +9,16 @@ namespace exmat::runtime {
 
 struct PointCacheOptions {
   bool mesh = false;                   ///< the tet mesh's vertices also where the trajectory holds a render mesh
-  std::optional<double> frame_rate{};  ///< of the animation [1/s], > 0; absent: one sample a frame
-  std::optional<std::string> body{};   ///< of a trajectory of several
+  std::optional<double> frame_rate{};  ///< rate of the animation [1/s], > 0; absent: one sample a frame
+  std::optional<std::string> body{};   ///< name in a trajectory of several
 };
 
-/// What was written.
+/// Summary of a written cache.
 struct PointCacheSummary {
   std::string dataset;  ///< that the points are of
   std::int64_t points = 0, samples = 0;
   double sample_rate = 1;                            ///< frames from sample to sample
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the trajectory, which the points are measured from [m]
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< origin of the trajectory, which the points are about [m]
 };
 
 /// Writes the positions of a trajectory as a point cache that Blender's and 3ds Max's mesh caches read (.pc2): of the

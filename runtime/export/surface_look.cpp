@@ -22,7 +22,7 @@ static_assert(std::endian::native == std::endian::little, "a buffer of glTF is l
 /// Rows of three numbers in the buffer of a look.
 class Rows {
  public:
-  /// Of an accessor; none where it is sparse, or of numbers that normals are not made of.
+  /// Rows of an accessor; none where it is sparse, or of numbers that normals are not made of.
   Rows(const SurfaceLook& look, const Json& accessor, Eigen::Index count) {
     const int type = accessor.at("componentType").get<int>();
     bytes_ = type == kByte ? 1 : type == kShort ? 2 : type == kFloat ? 4 : 0;
@@ -94,7 +94,7 @@ SurfaceLook parsed(const std::string& bundle, const RenderData& render) {
   return look;
 }
 
-/// Of an accessor of the wrong kind there are none.
+/// Normals of the vertices; none from an accessor of the wrong kind.
 VertexArray normals_of(const SurfaceLook& look, Eigen::Index vertices) {
   VertexArray normals = VertexArray::Zero(vertices, 3);
   visit_primitives(look.document, [&](const Json& primitive, std::size_t index) {

@@ -21,7 +21,7 @@ struct LookPrimitive {
 struct SurfaceLook {
   nlohmann::json document;
   std::string buffer;                     ///< the one that its views are of
-  std::vector<LookPrimitive> primitives;  ///< of all its meshes, in their order
+  std::vector<LookPrimitive> primitives;  ///< primitives of all its meshes, in their order
   VertexArray normals;                    ///< v x 3, unit ones of the surface, 0 where it has none
 };
 

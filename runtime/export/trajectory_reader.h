@@ -19,7 +19,7 @@ class TrajectoryReader {
 
   /// Names of the bodies of a scene of several, in ascending order; none of a scene of one body.
   std::vector<std::string> bodies() const;
-  /// What follows is read of this body of several.
+  /// Selects one body of several, which is read from here on.
   void select(const std::string& body);
 
   const std::string& name() const { return file_.name(); }
@@ -30,7 +30,7 @@ class TrajectoryReader {
   Eigen::Vector3d origin() const;
   /// All rows of a dataset of numbers, F x columns.
   RowMatrix read(const std::string& dataset);
-  /// Of the render mesh, or the boundary of the tets.
+  /// Triangles of the render mesh, or of the boundary of the tets.
   TriangleArray triangles(bool mesh);
 
   /// The dataset below the body's group that positions are read from: of the render mesh where there is one, of the
@@ -53,12 +53,12 @@ class TrajectoryReader {
   void read_all(const std::string& path, Array& array);
 
   Hdf5File file_;
-  std::string group_;  ///< of the body; empty: the root
+  std::string group_;  ///< group of the body; empty: the root
   SymbolSizes sizes_;
   std::vector<Hdf5Dataset> positions_;  ///< the open one
   std::string positions_path_;          ///< its path below the group
   std::int64_t next_ = 0;               ///< frame
-  std::uint32_t crc_ = 0;               ///< of the frames before it
+  std::uint32_t crc_ = 0;               ///< checksum of the frames before it
 };
 
 }  // namespace exmat::runtime

@@ -55,7 +55,7 @@ class TextWriter {
 /// A body of the file.
 struct Prim {
   std::string name;  ///< an identifier, each once
-  std::string body;  ///< of the trajectory; empty: the only one
+  std::string body;  ///< name in the trajectory; empty: the only one
   int shared = -1;   ///< class that holds its triangles; -1: it does itself
 };
 

@@ -16,11 +16,11 @@ struct UsdOptions {
   std::optional<std::string> body{};  ///< alone, of a trajectory of several
 };
 
-/// What was written.
+/// Summary of a written file.
 struct UsdSummary {
   std::string dataset;  ///< that the points are of
   std::int64_t bodies = 1, points = 0, samples = 0, bytes = 0;
-  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< of the trajectory: the translation of each Mesh [m]
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< origin of the trajectory: the translation of each Mesh [m]
 };
 
 /// Writes the positions of a trajectory as Universal Scene Description in text (.usda): a Mesh with points at each

@@ -25,7 +25,7 @@ class VertexNormals {
   void share(VertexArray& sums) const;
 
   TriangleArray triangles_;
-  std::vector<std::vector<Eigen::Index>> groups_;  ///< of vertices that share their sums, two at least in each
+  std::vector<std::vector<Eigen::Index>> groups_;  ///< vertices that share their sums, two at least in each
 };
 
 }  // namespace exmat::runtime
