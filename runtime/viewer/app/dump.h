@@ -6,7 +6,7 @@
 
 namespace exmat::viewer {
 
-/// What a picture shows, in numbers: where the camera is, the states of the bodies, the hands. Throws WorkError.
+/// Writes what a picture shows in numbers: where the camera is, the states of the bodies, the hands. Throws WorkError.
 void dump(const Snapshot& snapshot, const Studio& studio, const PictureSize& picture,
           const std::filesystem::path& file);
 

@@ -8,11 +8,11 @@
 
 namespace exmat::viewer {
 
-/// What the command line asks for.
+/// Requests of the command line.
 struct Options {
   std::vector<std::filesystem::path> files;  ///< SCENE.json or BUNDLE.h5, then more bundles
   PictureSize size;
-  std::optional<double> scale;  ///< of the interface; absent: the screen's
+  std::optional<double> scale;  ///< scale of the interface; absent: the screen's
   bool hide_interface = false;
   bool object_surface = false;  ///< the tets' boundary, also where there is a render mesh
 

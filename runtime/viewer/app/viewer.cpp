@@ -64,7 +64,7 @@ class Show {
 
   void begin(double seconds) { interface_.begin(canvas_->size(), seconds); }
 
-  /// What plots show, of a picture that need not be drawn.
+  /// Notes for the plots a picture that need not be drawn.
   std::shared_ptr<const Snapshot> note() {
     if (studio_.look().request() != request_) {
       request_ = studio_.look().request();

@@ -15,7 +15,7 @@ std::string& last_complaint() {
   return text;
 }
 
-/// Of a window without wishes; empty where there is none.
+/// OpenGL's version in a window without wishes; empty where there is none.
 std::string version_found() {
   glfwDefaultWindowHints();
   glfwWindowHint(GLFW_VISIBLE, GLFW_FALSE);

@@ -29,7 +29,7 @@ class Window {
   /// GLFW's numbers of the keys that went down since the last call, however soon they came up again.
   std::vector<int> take_keys() { return std::exchange(keys_, {}); }
 
-  /// What draws, in words; whether that is the processor.
+  /// The renderer, in words; whether that is the processor.
   std::string renderer() const;
   bool is_software() const;
 

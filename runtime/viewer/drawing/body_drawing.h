@@ -28,7 +28,7 @@ class PosedBody {
   Framebuffer position_target_, normal_target_;
 };
 
-/// What the GPU holds of bodies of one kind: rest positions, modes, triangles.
+/// Bodies of one kind as the GPU holds them: rest positions, modes, triangles.
 class BodyDrawing {
  public:
   /// Throws WorkError where the GPU does not take so many modes or points.

@@ -14,7 +14,7 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
-/// What is drawn into, whether a window shows it or not: several samples a pixel, then one.
+/// The surface that is drawn into, whether a window shows it or not: several samples a pixel, then one.
 class Canvas {
  public:
   Canvas(const PictureSize& size, int samples);

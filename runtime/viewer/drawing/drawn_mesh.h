@@ -15,7 +15,7 @@ struct DrawnMesh {
   std::vector<std::uint32_t> around;   ///< the triangles that a corner's normal is the mean of
 };
 
-/// Of triangles [3f] of points at `rest` [3k]; edges sharper than `crease` [rad] are.
+/// Mesh of triangles [3f] of points at `rest` [3k]; edges sharper than `crease` [rad] stay sharp.
 DrawnMesh make_drawn_mesh(std::span<const double> rest, std::span<const std::int32_t> triangles, double crease = 0.75);
 
 }  // namespace exmat::viewer

@@ -6,7 +6,7 @@
 
 namespace exmat::viewer {
 
-/// What is shown of a scene.
+/// Choice of what is shown of a scene.
 struct Look {
   Colouring colouring = Colouring::kPlain;
   bool surface = true, wireframe = false, elements = false, examples = false, targets = false;
@@ -26,7 +26,7 @@ inline constexpr std::array<Colour, 7> kPalette{{{0.902F, 0.624F, 0.000F},
                                                  {0.800F, 0.475F, 0.655F},
                                                  {0.941F, 0.894F, 0.259F}}};
 
-/// Of a body by its number: clay, then the palette, lighter.
+/// Colour of a body by its number: clay, then the palette, lighter.
 Colour body_colour(std::size_t body);
 
 /// The scale of fields at 0 to 1, as the shader has it.

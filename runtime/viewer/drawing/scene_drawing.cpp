@@ -36,7 +36,7 @@ float largest_displacement(const BodyShape& shape, const std::vector<float>& q) 
   return largest;
 }
 
-/// Of energies all but a hundredth: a corner or two would leave the rest dark.
+/// Largest value of a field; energies leave out a hundredth: a corner or two would leave the rest dark.
 float largest_of(std::vector<float> field, Colouring colouring) {
   if (colouring != Colouring::kStrainEnergy) return *std::ranges::max_element(field);
   const auto at = field.begin() + static_cast<std::ptrdiff_t>(field.size() * 99 / 100);

@@ -33,7 +33,7 @@ class SceneDrawing {
 
   void draw(const Snapshot& snapshot, const Camera& camera, const Look& look, Canvas& canvas);
 
-  /// Of bodies, ghosts and obstacles as last drawn.
+  /// Bounds of bodies, ghosts and obstacles as last drawn.
   const Bounds& bounds() const { return bounds_; }
   /// Ghosts of the last picture.
   const std::vector<ShownGhost>& ghosts() const { return shown_ghosts_; }
@@ -100,7 +100,7 @@ class SceneDrawing {
   Eigen::Vector3d floor_point_ = Eigen::Vector3d::Zero(), up_ = Eigen::Vector3d::UnitZ(),
                   light_ = Eigen::Vector3d::UnitZ();
   Bounds bounds_, lit_bounds_;
-  double size_ = 1;  ///< of the bodies at rest [m]
+  double size_ = 1;  ///< size of the bodies at rest [m]
   float most_ = 1;
   int shadow_size_ = 2048, shadow_samples_ = 24;
 };

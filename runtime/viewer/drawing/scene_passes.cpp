@@ -1,4 +1,4 @@
-// How the parts of a picture are drawn.
+// Drawing of the parts of a picture.
 #include <Eigen/Geometry>
 #include <cmath>
 

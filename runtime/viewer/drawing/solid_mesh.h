@@ -21,7 +21,7 @@ SolidMesh make_capsule(const Eigen::Vector3d& start, const Eigen::Vector3d& axis
 /// A piece of a plane of so many metres in each direction.
 SolidMesh make_sheet(const Eigen::Vector3d& point, const Eigen::Vector3d& normal, double half);
 
-/// Of three corners of each triangle [9f], flat.
+/// Flat triangles by three corners each [9f].
 SolidMesh make_triangles(std::span<const double> corners);
 
 /// In the obstacle's frame; a sheet of the given size of a plane, `corners` [9f] of a mesh or of ground.

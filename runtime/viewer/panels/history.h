@@ -36,13 +36,13 @@ struct StageTimes {
   float newton_iterations = 0;
 };
 
-/// What plots show of the body that was looked at.
+/// Curves and numbers that plots show of the body that was looked at.
 class History {
  public:
-  /// Of a picture; `times` are those of all steps since the one before.
+  /// Adds a picture; `times` are those of all steps since the one before.
   void add(const Snapshot& snapshot, const StepTimes& times);
 
-  std::vector<Series> weights;  ///< of each example force of the first body
+  std::vector<Series> weights;  ///< one for each example force of the first body
   Series energies;              ///< kinetic, elastic, of gravity [J]
   StageTimes stages;
   std::uint32_t status = 0;  ///< bits of the last steps
@@ -51,7 +51,7 @@ class History {
   double time_ = -1;
 };
 
-/// What status bits say.
+/// Meanings of status bits.
 std::vector<std::string> status_words(std::uint32_t status);
 
 }  // namespace exmat::viewer

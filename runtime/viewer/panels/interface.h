@@ -22,7 +22,7 @@ class Interface {
 
   /// Asks for mouse and keys.
   void begin(const PictureSize& picture, double seconds);
-  /// What plots are to show; `times` are those of the steps since the call before.
+  /// Notes a picture for the plots; `times` are those of the steps since the call before.
   void note(const Snapshot& snapshot, const StepTimes& times) { history_.add(snapshot, times); }
   /// Onto the picture that is bound.
   void draw(const Snapshot& snapshot, const SceneDrawing& drawing, Studio& studio, const PictureSize& picture,

@@ -6,7 +6,7 @@
 
 namespace exmat::viewer {
 
-// What is drawn over the scene itself.
+// Drawings over the scene itself.
 
 /// Hands and what they hold, names of examples, the scale of colours.
 void draw_overlay(const Style& style, const Snapshot& snapshot, const SceneDrawing& drawing, Studio& studio,

@@ -12,7 +12,7 @@ namespace exmat::viewer {
 /// Appears whole or not at all. Throws WorkError.
 void write_png(const Picture& picture, const std::filesystem::path& file);
 
-/// Where pictures go one after another: a folder of PNG, or a movie by ffmpeg (.mp4, .gif).
+/// Recorder of pictures one after another: into a folder of PNG, or a movie by ffmpeg (.mp4, .gif).
 class Recording {
  public:
   /// Throws InputError: an extension that is none of these; WorkError: there is no ffmpeg, no such folder.

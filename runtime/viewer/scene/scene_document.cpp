@@ -113,7 +113,7 @@ void make_relative(Json& json, const char* member, const std::filesystem::path& 
   json[member] = std::filesystem::proximate(whole, std::filesystem::absolute(to).parent_path()).generic_string();
 }
 
-/// Of a scene of one body, or of an entry of "bodies".
+/// Makes file names relative in a scene of one body, or in an entry of "bodies".
 void make_body_relative(Json& json, const std::filesystem::path& from, const std::filesystem::path& to) {
   make_relative(json, "bundle", from, to);
   make_relative(json, "poses", from, to);

@@ -31,14 +31,14 @@ class SceneDocument {
   /// is a scene of several kinds of bodies, which touch each other.
   SceneDocument with_bundle(const std::filesystem::path& bundle) const;
 
-  /// What names in it are relative to.
+  /// The file that names in it are relative to.
   const std::filesystem::path& path() const { return path_; }
   bool is_scene_file() const { return is_scene_; }
-  /// Of bodies that touch each other.
+  /// True for bodies that touch each other.
   bool is_world() const { return json_.contains("bodies"); }
   /// Kinds of bodies; 1 where it is no world.
   std::size_t kinds() const { return is_world() ? json_["bodies"].size() : 1; }
-  /// Of its bodies, or of its bundle.
+  /// Name of a kind of its bodies, or of its bundle.
   std::string kind_name(std::size_t kind) const;
   std::filesystem::path bundle(std::size_t kind = 0) const;
   const Json& json() const { return json_; }
@@ -50,7 +50,7 @@ class SceneDocument {
 
   Settings settings(std::size_t kind = 0) const;
   void set(const Settings& settings, std::size_t kind = 0);
-  /// Of bodies of which the scene does not say in which space they step.
+  /// Sets the space of steps for bodies of which the scene does not say it.
   void prefer_space(const char* space);
 
   /// With this many steps and with the obstacles as they stand, to be run from `file`: names are relative to it. Throws
@@ -60,7 +60,7 @@ class SceneDocument {
  private:
   SceneDocument(std::filesystem::path path, Json json, bool is_scene)
       : path_(std::move(path)), json_(std::move(json)), is_scene_(is_scene) {}
-  /// What the settings of a kind stand in.
+  /// The object that the settings of a kind stand in.
   const Json& of_kind(std::size_t kind) const { return is_world() ? json_["bodies"][kind] : json_; }
   Json& of_kind(std::size_t kind) { return is_world() ? json_["bodies"][kind] : json_; }
 

@@ -21,7 +21,7 @@ struct ForceSettings {
   bool operator==(const ForceSettings&) const = default;
 };
 
-/// What is turned while a scene runs.
+/// Settings that may change while a scene runs.
 struct Settings {
   double time_step = 0.001;  ///< [s]
   std::array<double, 3> gravity{};

@@ -19,7 +19,7 @@ Eigen::Vector3d vector_of(const Json& json) {
   return {json[0].get<double>(), json[1].get<double>(), json[2].get<double>()};
 }
 
-// What goes on for a while, and for how long [s] where the script does not say.
+// Actions that go on for a while, and for how long [s] where the script does not say.
 constexpr std::array<std::pair<const char*, double>, 3> kGoingOn{
     {{"move", 0.5}, {"move_obstacle", 0.5}, {"camera", 0}}};
 

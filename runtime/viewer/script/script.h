@@ -33,7 +33,7 @@ class ScriptPlayer {
   /// Throws InputError where it names bodies, obstacles, regions or hands that are not there.
   ScriptPlayer(Script script, Studio& studio);
 
-  /// What is to be done up to this time [s], before the picture of it is drawn. Never backwards.
+  /// Does all that is due up to this time [s], before the picture of it is drawn. Never backwards.
   void play(double time);
 
  private:

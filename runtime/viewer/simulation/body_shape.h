@@ -16,7 +16,7 @@ struct ShownExample {
   std::vector<float> pose;  ///< r
 };
 
-/// What is drawn of bodies of one kind, whatever they do. k points, f triangles, r modes, s elements.
+/// Drawn shape of bodies of one kind, whatever they do. k points, f triangles, r modes, s elements.
 struct BodyShape {
   std::size_t modes = 0;
   std::vector<double> rest;             ///< 3k
@@ -27,10 +27,10 @@ struct BodyShape {
   std::vector<float> element_sizes;  ///< s, of the cubature: cube roots of weights, the largest 1
   std::vector<ShownExample> examples;
   Bounds bounds;    ///< at rest
-  double mass = 0;  ///< of a free body [kg]; 0 of one with fixed vertices
+  double mass = 0;  ///< mass of a free body [kg]; 0 with fixed vertices
 };
 
-/// Of a model and its surface.
+/// Shape of a model's bodies, from its surface.
 BodyShape make_shape(const Model& model, const Surface& surface);
 
 }  // namespace exmat::viewer

@@ -27,7 +27,7 @@ class Grip {
   const Eigen::Vector3d& target() const { return target_; }
   const Eigen::Vector3d& force() const { return force_; }
 
-  /// Where the hand is, world [m].
+  /// Sets where the hand is, world [m].
   void set_target(const Eigen::Vector3d& target) { target_ = target; }
 
   /// After the body was put elsewhere: where it is held stays, and the hand goes there.
@@ -36,7 +36,7 @@ class Grip {
   /// Pulls at the body for one step; `strength` scales the spring.
   void pull(double time_step, double strength, BodyRef& held);
 
-  /// Of the work of its force, by what the body cannot answer.
+  /// Share of its force's work that the body cannot answer.
   double lost(const Capacity& capacity, const BodyRef& held) const;
 
  private:
@@ -46,8 +46,8 @@ class Grip {
   int id_;
   std::size_t body_;
   SurfaceHit place_;
-  Points points_, patch_;                  ///< where it was taken, and what the hand covers there
-  double effective_mass_;                  ///< of the patch alone, by the modes [kg]
+  Points points_, patch_;                  ///< points where it was taken, and those that the hand covers there
+  double effective_mass_;                  ///< mass of the patch alone, by the modes [kg]
   double longest_;                         ///< that the spring gets [m]
   Eigen::Vector3d point_, target_, hand_;  ///< hand: the target, smoothed
   Eigen::Vector3d force_ = Eigen::Vector3d::Zero();

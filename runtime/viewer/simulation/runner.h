@@ -37,7 +37,7 @@ class Runner {
 
   /// Never null.
   std::shared_ptr<const Snapshot> latest();
-  /// Of all steps since the last call.
+  /// Times of all steps since the last call.
   StepTimes take_times();
 
   /// Runs action(simulation) between two steps.

@@ -25,7 +25,7 @@ class Simulation {
   std::size_t kinds() const { return kinds_.size(); }
   std::size_t bodies() const { return slots_.size(); }
   std::size_t kind_of(std::size_t body) const { return slots_[body].kind; }
-  /// How far from its place a body is drawn, so that bodies of one place stand side by side.
+  /// Shift of a drawn body from its place, so that bodies of one place stand side by side.
   const Eigen::Vector3d& offset(std::size_t body) const { return slots_[body].offset; }
   std::shared_ptr<const BodyShape> shape(std::size_t kind) const { return kinds_[kind].shape; }
   const std::string& kind_name(std::size_t kind) const { return kinds_[kind].name; }
@@ -56,7 +56,7 @@ class Simulation {
   void release(int id);
   void set_strength(double strength) { strength_ = strength; }
   double strength() const { return strength_; }
-  /// Of a free body; false where it is none.
+  /// Throws a free body; false where it is none.
   bool throw_body(std::size_t body, const Eigen::Vector3d& velocity, const Eigen::Vector3d& spin);
 
   // Obstacles, by their place in the list.
@@ -72,7 +72,7 @@ class Simulation {
 
   Snapshot snapshot(const SnapshotRequest& request);
 
-  /// Of what holds and touches bodies now. Makes what that takes when it is first asked for.
+  /// Lost work of all that holds and touches bodies now. Makes what that takes when it is first asked for.
   LostWork lost_work();
 
   /// Writes what would be run again by exmat-runtime. Throws WorkError.

@@ -12,10 +12,10 @@
 
 namespace exmat::viewer {
 
-/// What the surface is coloured by.
+/// Field that the surface is coloured by.
 enum class Colouring { kPlain, kDisplacement, kStrainEnergy, kContactForce };
 
-/// What a snapshot is to hold beyond the motion.
+/// Contents of a snapshot beyond the motion.
 struct SnapshotRequest {
   Colouring colouring = Colouring::kPlain;
   bool elements = false, targets = false;
@@ -30,7 +30,7 @@ struct BodySnapshot {
   std::vector<float> positions;              ///< 3k, world, without the offset [m]; of a body in full space, else empty
   std::vector<float> field;                  ///< k, of strain energy [J/m^3] or contact force [N]; else empty
   std::vector<float> elements;               ///< 3s, world [m]; where asked for
-  std::vector<std::vector<double>> weights;  ///< of each example force
+  std::vector<std::vector<double>> weights;  ///< one list for each example force
   std::vector<std::vector<float>> targets;   ///< likewise, r; where asked for
   std::vector<exmat_contact> contacts;       ///< also with other bodies: of obstacle -1
   exmat_energies energies{};
@@ -54,7 +54,7 @@ struct ObstacleSnapshot {
 
 /// Time of steps since the last snapshot.
 struct StepTimes {
-  std::int64_t steps = 0;  ///< of all bodies
+  std::int64_t steps = 0;  ///< sum over all bodies
   double seconds = 0;      ///< wall clock
   exmat_profile stages{};  ///< sums
   std::int64_t newton_iterations = 0;
@@ -63,7 +63,7 @@ struct StepTimes {
   StepTimes& operator+=(const StepTimes& more);
 };
 
-/// What the basis loses of the work of forces, in [0, 1].
+/// Share of the work of forces that the basis loses, in [0, 1].
 struct LostWork {
   std::optional<double> hand, contact;  ///< the most of any body; none where there is no such force
   bool measured = true;                 ///< false: the mesh is too large to be measured while it moves

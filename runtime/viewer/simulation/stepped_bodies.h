@@ -22,7 +22,7 @@ class SteppedBodies {
   /// All of them. Throws exmat::Error where a number is not finite.
   void step(std::int64_t steps);
 
-  /// Of each body at the end of the last step: with obstacles, and with other bodies as with obstacle -1.
+  /// Contacts of each body at the end of the last step: with obstacles, and with other bodies as with obstacle -1.
   std::vector<std::vector<exmat_contact>> contacts() const;
 
  private:

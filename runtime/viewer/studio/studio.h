@@ -11,11 +11,11 @@
 
 namespace exmat::viewer {
 
-/// What the mouse is on.
+/// The thing that the mouse is on.
 struct Pick {
   enum class What { kBody, kObstacle } what = What::kBody;
-  std::size_t number = 0;                           ///< of the body or the obstacle
-  SurfaceHit place;                                 ///< of a body
+  std::size_t number = 0;                           ///< number of the body or the obstacle
+  SurfaceHit place;                                 ///< place on a body
   Eigen::Vector3d point = Eigen::Vector3d::Zero();  ///< in the picture [m]
 };
 
@@ -79,8 +79,8 @@ class Studio {
   struct Drag {
     Pick pick;
     int grip = 0;
-    Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< where the plane is that the mouse moves in
-    Eigen::Vector3d from = Eigen::Vector3d::Zero();    ///< of an obstacle
+    Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< point of the plane that the mouse moves in
+    Eigen::Vector3d from = Eigen::Vector3d::Zero();    ///< start of an obstacle
   };
 
   Runner runner_;

@@ -6,7 +6,7 @@
 
 namespace exmat::viewer {
 
-/// Of points, world [m].
+/// Bounds of points, world [m].
 struct Bounds {
   Eigen::Vector3d least = Eigen::Vector3d::Constant(1e300), most = Eigen::Vector3d::Constant(-1e300);
 
@@ -39,7 +39,7 @@ struct PictureSize {
 /// A camera that looks at a point and goes around it. Angles in radians.
 class Camera {
  public:
-  static constexpr double kFieldOfView = 0.56;  ///< of the picture's height
+  static constexpr double kFieldOfView = 0.56;  ///< angle over the picture's height
 
   /// Which way is up, unit.
   void set_up(const Eigen::Vector3d& up);
@@ -68,10 +68,10 @@ class Camera {
 
   /// Through the middle of a pixel, from the top left.
   Ray ray(const Eigen::Vector2d& pixel, const PictureSize& picture) const;
-  /// Where a point is in the picture, from the top left; none where it is behind the camera.
+  /// Place of a point in the picture, from the top left; none where it is behind the camera.
   std::optional<Eigen::Vector2d> pixel(const Eigen::Vector3d& point, const PictureSize& picture) const;
 
-  /// Where the ray of a pixel meets the plane through `point` that faces the camera.
+  /// The point where the ray of a pixel meets the plane through `point` that faces the camera.
   Eigen::Vector3d on_plane_of(const Eigen::Vector3d& point, const Eigen::Vector2d& pixel,
                               const PictureSize& picture) const;
 

@@ -13,7 +13,7 @@ namespace exmat::viewer {
 /// A point of a triangle that a ray meets.
 struct SurfaceHit {
   std::int64_t triangle = 0;
-  Eigen::Vector3d shares = Eigen::Vector3d::Zero();  ///< of its corners, sum 1
+  Eigen::Vector3d shares = Eigen::Vector3d::Zero();  ///< shares of its corners, sum 1
   double distance = 0;                               ///< along the ray [m]
 };
 
@@ -25,7 +25,7 @@ std::optional<SurfaceHit> first_hit(const Ray& ray, std::span<const float> point
 SurfaceHit nearest_place(const Eigen::Vector3d& point, std::span<const double> points,
                          std::span<const std::int32_t> triangles);
 
-/// Where the ray enters an obstacle, in the world at `motion`; none of planes. `corners` [9f] of a mesh or of ground.
+/// Distance to where the ray enters an obstacle at `motion`, world; none of planes. `corners` [9f] of a mesh or ground.
 std::optional<double> obstacle_hit(const Ray& ray, const exmat_obstacle& obstacle, std::span<const double> corners,
                                    const exmat_motion& motion);
 
