@@ -19,7 +19,7 @@ struct RunCommandOptions {
 
 struct BenchCommandOptions {
   std::filesystem::path scene;
-  std::optional<std::int64_t> steps;  ///< of one round, instead of the scene's
+  std::optional<std::int64_t> steps;  ///< steps of one round, instead of the scene's
   bool json = false;
 };
 

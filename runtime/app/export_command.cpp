@@ -94,10 +94,10 @@ void print_error(const MorphError& error, const DrawnSurface& surface) {
   print("error of normals", fmt::format("RMS {:.2g} degrees", error.normal_rms / kDegree));
 }
 
-/// What a .glb holds: bodies, and what those of one bundle share.
+/// Contents of a .glb: bodies, and what those of one bundle share.
 struct Drawing {
   std::vector<DrawnKind> kinds;
-  std::vector<RowMatrix> reduced;  ///< of each kind: q of all frames of its bodies, one body after the other
+  std::vector<RowMatrix> reduced;  ///< one for each kind: q of all frames of its bodies, one body after the other
   std::vector<DrawnBody> bodies;
 };
 

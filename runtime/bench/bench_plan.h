@@ -7,9 +7,9 @@
 
 namespace exmat::runtime {
 
-inline constexpr double kWarmUpShare = 0.1;  ///< of the time to measure
+inline constexpr double kWarmUpShare = 0.1;  ///< share of the time to measure
 
-/// How often which steps of a scene are measured.
+/// Numbers of steps and rounds of a scene that are measured.
 struct BenchPlan {
   std::int64_t steps = 1, rounds = 1;
 

@@ -6,7 +6,7 @@
 
 namespace exmat::runtime {
 
-/// What this machine can reach at most in one thread: the rate of a product of two dense matrices by Kernels::gemm,
+/// The most that this machine can reach in one thread: the rate of a product of two dense matrices by Kernels::gemm,
 /// 240 x 240 in double precision, packed beforehand and at home in the second-level cache.
 class DgemmRate {
  public:
