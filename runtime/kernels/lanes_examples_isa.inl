@@ -86,7 +86,7 @@ inline void lanes_expand(const BernsteinArrays& basis, Index k, Index left, Vec 
   for (Index b = 0; b <= left; ++b, next += kLanes) store(next, product * load(own + b * kLanes));
 }
 
-/// Of the last two weights: C(m, b) w^(m - b) w'^b, m (m + 1) / 2 + b-th for each m from `first` to the degree.
+/// Products of the last two weights: C(m, b) w^(m - b) w'^b, m (m + 1) / 2 + b-th for each m from `first` to degree.
 inline void lanes_pairs(const BernsteinArrays& basis, Index first, const double* powers, double* pairs) {
   const Index numbers = (basis.degree + 1) * kLanes;
   const double* const one = powers + (basis.weights - 2) * numbers;

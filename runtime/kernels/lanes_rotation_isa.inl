@@ -217,7 +217,7 @@ inline void set_rotation_factors(const LaneRotationArrays& own, Index at, IntVec
   }
 }
 
-/// What the rotation adds to `rows` rows of the Hessian from row i on, up to the diagonal. `soft`: slopes of the six
+/// Adds the rotation's part to `rows` rows of the Hessian from row i on, up to the diagonal. `soft`: slopes of the six
 /// pairs, null: none.
 template <Index rows>
 inline void add_rotation_rows(const LaneRotationArrays& own, Index at, Index i, Vec inertia, const Vec* soft,

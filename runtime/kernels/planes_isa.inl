@@ -26,7 +26,7 @@ inline void store3(const Vec* v, Index at, double (*numbers)[kLanes]) {
   for (Index i = 0; i < 3; ++i) store(numbers[i] + at, v[i]);
 }
 
-/// Of vectors by vertices, from `vectors` on.
+/// Gathers vectors that lie vertex by vertex, from `vectors` on.
 inline void gather3(const double* vectors, Vec* v) {
   for (Index i = 0; i < 3; ++i) {
     v[i] = zero();
@@ -39,7 +39,7 @@ inline void scatter3(const Vec* v, double* vectors) {
     for (Index lane = 0; lane < kWidth; ++lane) vectors[3 * lane + i] = v[i][lane];
 }
 
-/// Where the vertices of one register are, and what they feel of their planes.
+/// Places of the vertices of one register, and what they feel of their planes.
 struct PlaneLanes {
   PlaneLanes(const PlaneContactPanel& panel, Index at, const double* pose, const double* products) {
     Vec rest[3], moved[3], start[3];
@@ -141,7 +141,7 @@ Index plane_factors(const PlaneContactPanel& panel, const double* pose, double* 
     write(0, touches, stiffness * damped, normal);
     if (bits(rubs) == 0) continue;
     const SlipLanes law(select(rubs, limit, zero() + 1.0), stiffness, slip);
-    // Where nothing slips any direction along the plane does: of the axis that is farthest from the normal, that part.
+    // Any direction along the plane does where nothing slips: the projection of the axis farthest from the normal.
     const IntVec moves = law.length > 0.0;
     const Vec x = normal[0] * normal[0], y = normal[1] * normal[1], z = normal[2] * normal[2];
     const IntVec by_x = (x <= y) & (x <= z), by_y = ~by_x & (y <= z);

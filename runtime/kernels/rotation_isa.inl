@@ -50,7 +50,7 @@ inline void dots(Index rows, const double* x, Column column, double* sums) {
   for (Index k = 0; k < count; ++k) sums[k] = found[k];
 }
 
-/// Of so many panels and vectors x, two sums for each register of a product.
+/// Products of so many panels and vectors x, two sums for each register of a product.
 template <Index panels, Index vectors>
 inline void panels_at_once(const double* A, Index columns, const double* const* x, double* const* y) {
   constexpr Index kRegisters = panels * kParts;

@@ -9,10 +9,10 @@ constexpr Index kBlockColumns = kWidth == 8 ? kBlock : 2;  // what the registers
 inline Index block_start(Index row, Index column) { return (row * (row + 1) / 2 + column) * kBlockNumbers; }
 inline Index in_block(Index m, Index n) { return (m * kBlock + n) * kLanes; }
 
-// How it is summed up: the numbers, the registers of them, how far the numbers of one lane are from each other in sums
+// Layouts of the sums: the numbers, the registers of them, how far the numbers of one lane are from each other in sums
 // and products (kSpread) and in tangents, and B, whose rows `stride` are apart.
 
-/// Of bodies, in doubles: an element at a time, B the same for all.
+/// Bodies in doubles: an element at a time, B the same for all.
 struct InDoubles {
   using Number = double;
   using Lanes = Vec;
@@ -22,7 +22,7 @@ struct InDoubles {
   static const double* rows_from(const double* B, Index stride, Index row) { return B + row * stride; }
 };
 
-/// Of bodies, in floats: two elements at a time, the even and the odd lanes of a register, which holds as many bodies
+/// Bodies in floats: two elements at a time, the even and the odd lanes of a register, which holds as many bodies
 /// as one of doubles; B's numbers in pairs of these elements.
 struct InPairsOfFloats {
   using Number = float;
@@ -38,7 +38,7 @@ struct InPairsOfFloats {
   static const float* rows_from(const float* B, Index stride, Index row) { return B + 2 * row * stride; }
 };
 
-/// Of elements of one body, the nine rows of B of each: ElementArrays::by_mode.
+/// Elements of one body, with the nine rows of B of each: ElementArrays::by_mode.
 struct InElements {
   using Number = double;
   using Lanes = Vec;
@@ -216,7 +216,7 @@ inline void add_element_block(const double* B, const double* product, double* bl
   if constexpr (kElementRows < count) add_element_rows<diagonal, count, kBlock - kElementRows>(B, product, block);
 }
 
-/// Of the last row of blocks, which has fewer rows than a block.
+/// Adds the last row of blocks, which has fewer rows than a block.
 template <bool diagonal>
 inline void add_last_element_block(Index count, const double* B, const double* product, double* block) {
   if (count == 1) add_element_block<diagonal, 1>(B, product, block);

@@ -1,6 +1,6 @@
 // Part of kernels_isa.inl, which includes this file: kLanes triangles, or leaves of them, at once.
 
-/// What the squared terms of a distance may be wrong by, of the square of the way to the first corner.
+/// Error that the squared terms of a distance may have, over the square of the way to the first corner.
 constexpr double kTriangleRounding = 1e-14;
 constexpr double kNoLength = 1e-300;  // an edge without length is its corner
 
