@@ -33,7 +33,7 @@ void project(Eigen::Index panels, AlignedArray& tangents) {
   }
 }
 
-/// Of a law that is one material at F itself, whose eigensystem is known.
+/// The material of a law that is one at F itself, whose eigensystem is known.
 std::optional<MaterialModel> material_of(const ElementLaw& law) {
   if (law.shift_count > 0) return std::nullopt;
   switch (law.kind) {

@@ -91,7 +91,7 @@ class ElementPotential {
 
   Eigen::Index elements_ = 0, modes_ = 0;
   AlignedArray by_mode_, by_element_;
-  AlignedArray by_pair_;  ///< of floats
+  AlignedArray by_pair_;  ///< holds floats
 };
 
 }  // namespace exmat::runtime

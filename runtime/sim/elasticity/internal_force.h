@@ -37,7 +37,7 @@ class InternalForce {
   /// Floating-point operations and bytes of constant arrays of one evaluation.
   double force_flops() const;
   double stiffness_flops() const;  ///< in addition to force_flops()
-  double bytes() const;            ///< of force and stiffness
+  double bytes() const;            ///< force and stiffness together
 
  private:
   ReducedElasticity cubature_;

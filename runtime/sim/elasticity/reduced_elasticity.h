@@ -98,7 +98,7 @@ class ReducedElasticity {
   ElementPotential potential_;
   WeightedLame lame_;
   ConstantStiffness variance_;
-  std::shared_ptr<LazyStiffnessPolynomial> polynomial_;  ///< where it takes less than the elements do; shared by copies
+  std::shared_ptr<LazyStiffnessPolynomial> polynomial_;  ///< null where the elements take less; shared by copies
 };
 
 }  // namespace exmat::runtime

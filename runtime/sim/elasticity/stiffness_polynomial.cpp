@@ -22,7 +22,7 @@ Eigen::Matrix<double, kStrains, 1> strain_of(const Eigen::Matrix3d& M) {
       M(0, 0), M(1, 1), M(2, 2), root * (M(1, 2) + M(2, 1)), root * (M(0, 2) + M(2, 0)), root * (M(0, 1) + M(1, 0))};
 }
 
-/// Of all elements: the derivatives of the Green strain by q_i at rest, and those by q_i and q_j, which are constant.
+/// Derivatives of the Green strain of all elements: by q_i at rest, and by q_i and q_j, which are constant.
 struct StrainDerivatives {
   Eigen::MatrixXd first, second;  ///< 6 s x r, 6 s x pairs
 

@@ -30,7 +30,7 @@ class StiffnessPolynomial {
  private:
   Eigen::Index modes_ = 0;
   AlignedArray constant_, numbers_;
-  AlignedArray rounded_;  ///< of floats
+  AlignedArray rounded_;  ///< holds floats
 };
 
 /// One that is made when it is first asked for.

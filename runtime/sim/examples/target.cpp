@@ -67,7 +67,7 @@ std::optional<Complaint> inverted_element(const ExampleData& example, const Eige
   return std::nullopt;
 }
 
-// Of whole meshes, where a Hessian costs many gradients.
+// Limits for whole meshes, where a Hessian costs many gradients.
 constexpr Eigen::Index kManyElements = 500;
 constexpr double kManyChordRate = 0.6, kManyChordSteps = 16;
 

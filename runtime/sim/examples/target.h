@@ -28,7 +28,7 @@ class TargetSolver {
   struct Workspace {
     NewtonWorkspace newton;
     ElementPotential::Workspace elements;
-    AlignedArray quadratic;      ///< of the blended examples
+    AlignedArray quadratic;      ///< quadratic form of the blended examples
     AlignedArray shift_weights;  ///< K
   };
 

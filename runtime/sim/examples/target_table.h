@@ -14,7 +14,7 @@ namespace exmat::runtime {
 class TargetTable {
  public:
   struct Workspace {
-    BernsteinBasis::Workspace basis, lower_basis;  ///< of degree D and D - 1
+    BernsteinBasis::Workspace basis, lower_basis;  ///< degree D and D - 1
     Eigen::VectorXd values;                        ///< N, coefficients of the control points
     Eigen::VectorXd lower_values;                  ///< as many as polynomials of degree D - 1
     AlignedArray sum;                              ///< r, padded
@@ -52,7 +52,7 @@ class TargetTable {
   Eigen::Index locate(const Eigen::VectorXd& weights, Eigen::VectorXd& local) const noexcept;
   void combine(Eigen::Index piece, Workspace& workspace) const noexcept;
 
-  BernsteinBasis basis_, lower_basis_;  ///< of degree D and D - 1
+  BernsteinBasis basis_, lower_basis_;  ///< degree D and D - 1
   Eigen::Index modes_ = 0;              ///< r
   Eigen::VectorXd knots_;               ///< P + 1
   AlignedArray control_points_;         ///< P N x padded(r)

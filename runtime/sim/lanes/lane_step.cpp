@@ -82,7 +82,7 @@ class LaneStep {
 
   LaneVectors vectors(AlignedArray& array) const { return {array.data(), kLanes, model_.modes()}; }
 
-  // Of all that still run: lanes that do not are no work that anybody wants.
+  // Flops of all that still run: lanes that do not are no work that anybody wants.
   double flops(double of_one) const noexcept {
     int running = 0;
     for (std::size_t l = 0; l < bodies_.size(); ++l) running += runs(l);
@@ -181,7 +181,7 @@ class LaneStep {
                                         energy.data(), internal_.data(), workspace_.stiffness_.data());
   }
 
-  /// Of lanes whose numbers are finite; the others are left to step().
+  /// Finds the targets of lanes whose numbers are finite; the others are left to step().
   void find_targets() noexcept {
     each([&](std::size_t l, Eigen::Index lane) { alone_[l] = !std::isfinite(energy_[lane]); });
     fetch_next();
@@ -198,7 +198,7 @@ class LaneStep {
     });
   }
 
-  /// Of the i-th example force.
+  /// Finds the targets of the i-th example force.
   void find_targets_side_by_side(std::size_t i) noexcept {
     if (!any([&](std::size_t l) { return acts(bodies_[l].scene->examples[i]); })) return;
     LaneExamples& examples = workspace_.examples_[i];
@@ -295,7 +295,7 @@ class LaneStep {
   void factorise() noexcept {
     const Eigen::Index modes = model_.modes();
     const StageTimer timer(profile(), Stage::kSolve, flops(static_cast<double>(modes * modes * modes) / 3));
-    // Where all need one, none is to be kept.
+    // No factor is to be kept where all need one.
     const bool keeps = any(Hessian::kFactorised);
     fetch_next();
     AlignedArray& factor = keeps ? workspace_.new_factor_ : workspace_.factor_;
