@@ -147,8 +147,8 @@ struct Gathering {
   }
 
   void test_own(const OwnSearch::Found& found) { test_own(found.vertex, found.point, found.velocity, found.leaves); }
-  /// Of a vertex in the frame of its body, which moves with `velocity` there; `leaves` as nearest_approached() has
-  /// them.
+  /// Tests a vertex at `point` in the frame of its body, which moves with `velocity` there; `leaves` as
+  /// nearest_approached() has them.
   void test_own(int vertex, const Eigen::Vector3d& point, const Eigen::Vector3d& velocity, BodySurface::Leaves leaves) {
     const HeldBodyContact* const before = held_of(vertex);
     const double depth = before != nullptr ? -before->gap : 0;
@@ -219,10 +219,10 @@ struct Gathering {
   SurfaceShape& shape;
   BodyCandidates& candidates;
   std::vector<HeldBodyContact>::const_iterator last;
-  bool is_fast = false;       ///< of a body with itself: what is nearer than `near` and by ClosingPoint is looked at
+  bool is_fast = false;       ///< true for a body with itself: looks at what is nearer than `near` and by ClosingPoint
   double near = 0;            ///< [m]
   double deepest = 0;         ///< that a vertex may be inside [m]
-  double surface_radius = 0;  ///< of the ball about the surface of b [m]
+  double surface_radius = 0;  ///< radius of the ball about the surface of b [m]
 };
 
 /// Calls visit(vertex) for every vertex of a that the surface of b may be within `radius` of, in ascending order.

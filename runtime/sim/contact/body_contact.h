@@ -16,8 +16,8 @@ struct HeldBodyContact {
   int vertex = 0;
   double gap = 0;                                     ///< at the end of the last step [m]
   double normal_force = 0;                            ///< likewise [N]
-  Eigen::Vector3d stretch = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the other body [m]
-  Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< of the side that it came in by, frame of the other body
+  Eigen::Vector3d stretch = Eigen::Vector3d::Zero();  ///< stretch of the tangential spring, frame of the other body [m]
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();   ///< side that it came in by, frame of the other body
   double overlap = 0;                                 ///< that is not released yet [m]
 };
 
@@ -25,7 +25,7 @@ struct HeldBodyContact {
 /// place of the vertex from the surface's material point y in place of its place in the world; point and normal are
 /// those of the beginning of the step.
 struct BodyCandidate : ContactCandidate {
-  Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< of y, frame of the other body [m]
+  Eigen::Vector3d rest = Eigen::Vector3d::Zero();         ///< y at rest, frame of the other body [m]
   Eigen::Vector3d surface_arm = Eigen::Vector3d::Zero();  ///< y - position of the other body [m]; last evaluation
 };
 
@@ -38,7 +38,7 @@ struct SurfacePlace {
 /// Candidates of a pair of bodies, one's vertices against the other's surface. Grows where more are met than before.
 struct BodyCandidates {
   std::vector<BodyCandidate> all;
-  std::vector<SurfacePlace> places;  ///< of their y; at least as many
+  std::vector<SurfacePlace> places;  ///< places of their y; at least as many
   RowMatrix basis;                   ///< 3 of `all` x r and more, rows of the basis at each y
   /// The poses of the first evaluation after gather(), a's and b's, which clearances are about.
   bool has_first = false;
@@ -62,7 +62,7 @@ struct NearVertices {
     double distance = 0;  ///< from the surface, inside or outside [m]
   };
   double radius = -1;        ///< all that were nearer than this are known [m]; negative: none is
-  double farther = -1;       ///< what the bodies may have moved by for that to hold [m]
+  double farther = -1;       ///< most that the bodies may have moved by for that to hold [m]
   int served = 0;            ///< steps, by the last search
   int without = 0;           ///< so many more steps look for themselves: the last search did not serve enough
   std::vector<Found> found;  ///< in ascending order
@@ -70,7 +70,7 @@ struct NearVertices {
   Placement a_in_b;  ///< a in the frame of b
   Eigen::VectorXd q_a, q_b;
 
-  OwnSearch own;  ///< of a body with itself: scratch
+  OwnSearch own;  ///< scratch for a body with itself
 };
 
 /// One body of a pair: what it is, where, and how it moves.

@@ -17,7 +17,7 @@ namespace exmat::runtime {
 /// The point of a deformed surface nearest to a given one, frame of the body.
 struct SurfaceHit {
   int triangle = 0;
-  Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();  ///< of the nearest point, >= 0, sum 1
+  Eigen::Vector3d barycentric = Eigen::Vector3d::Zero();  ///< place of the nearest point, >= 0, sum 1
   double distance = 0;                                    ///< negative inside [m]
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();      ///< unit, outward: the gradient of the distance
 };
@@ -25,14 +25,14 @@ struct SurfaceHit {
 /// Motion of a point that parts of the body's own surface may come near to, and its limit: far is what is farther
 /// away than `near` and the way of the two against each other in `time`.
 struct ClosingPoint {
-  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of the point in the frame of the body [m/s]
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< velocity of the point in the frame of the body [m/s]
   double near = 0;                                     ///< [m]
   double time = 0;                                     ///< [s]
 };
 
 /// Below this share of the size of a triangle normals of the surface say which way is out.
 inline constexpr double kOnTriangle = 1e-9;
-inline constexpr double kApproached = 0.5;   ///< of the distance at rest: what is nearer has come near
+inline constexpr double kApproached = 0.5;   ///< share of the distance at rest: what is nearer has come near
 inline constexpr double kSurely = 1 + 1e-9;  ///< times a bound: whatever rounding does
 inline constexpr double kSurelyApproached = kSurely * kApproached;
 
@@ -44,8 +44,8 @@ struct SurfaceShape {
   int placed = 0;                            ///< times that it was placed
   int looks = 0;                             ///< searches since then
   VertexArray positions;                     ///< k x 3, where `position_of` is `placed` [m]
-  std::vector<DeformationTree::Ball> balls;  ///< of branches, from their bounds
-  std::vector<Eigen::AlignedBox3d> boxes;    ///< of branches within a block, from the positions
+  std::vector<DeformationTree::Ball> balls;  ///< balls about branches, from their bounds
+  std::vector<Eigen::AlignedBox3d> boxes;    ///< boxes about branches within a block, from the positions
   std::vector<int> position_of, ball_of, box_of;
 
   // Velocities beside positions and boxes, if it was placed with one.
@@ -79,7 +79,7 @@ class BodySurface {
   void move(const VertexArray& positions, const VertexArray& velocities);
 
   Eigen::Index vertices() const noexcept { return rest_.rows(); }
-  /// Of a vertex: its number in the object.
+  /// Number of a vertex in the object.
   int object_vertex(int vertex) const noexcept { return object_vertices_[static_cast<std::size_t>(vertex)]; }
   int corner(int triangle, int c) const noexcept { return triangles_(triangle, c); }
 
@@ -87,7 +87,7 @@ class BodySurface {
   Eigen::Index triangles() const noexcept { return triangles_.rows(); }
 
   double reach() const noexcept { return reach_; }  ///< largest distance of a vertex at rest from the origin [m]
-  const MovementBound& movement() const noexcept { return tree_.movement(); }  ///< of its vertices
+  const MovementBound& movement() const noexcept { return tree_.movement(); }  ///< bound for its vertices
 
   SurfaceShape make_shape() const;
   void place(const Eigen::VectorXd& q, SurfaceShape& shape) const noexcept;

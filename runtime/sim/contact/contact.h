@@ -37,7 +37,7 @@ struct ContactSums {
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< sum of (x_i - position) x f_i, world [N m]
   Eigen::VectorXd generalised;                       ///< sum of U_i^T rotation^T f_i [r]
   double potential = 0;                              ///< W [J], f = -dW/dx; none of it without candidates
-  double stiffness = 0;                              ///< of the candidates that touch [N/m]
+  double stiffness = 0;                              ///< sum over the candidates that touch [N/m]
   int touching = 0;                                  ///< candidates with a normal force
 
   void set_zero(Eigen::Index modes) {
@@ -67,7 +67,7 @@ struct ContactWorkspace : ContactSums {
   std::vector<ContactCandidate> candidates;  ///< the first candidate_count, in order of vertex and obstacle
   std::size_t candidate_count = 0;
   std::vector<double> clearances;   ///< theirs, which each evaluation looks at
-  std::vector<char> is_left;        ///< of each: the last evaluation did not look at it
+  std::vector<char> is_left;        ///< true for each that the last evaluation did not look at
   std::vector<std::size_t> loaded;  ///< the first loaded_count: those with a normal force or friction in the last one
   std::size_t loaded_count = 0;
   PlaneContacts planes;         ///< the candidates
@@ -169,7 +169,7 @@ class ContactSet {
   Eigen::Vector3d world_velocity(int vertex, const Eigen::Vector3d& arm, const BodyPose& pose,
                                  const BodyVelocity& velocity) const noexcept;
   Eigen::Vector3d rest(int vertex) const noexcept { return rest_.row(vertex); }     ///< frame of the body [m]
-  const VertexArray& rest() const noexcept { return rest_; }                        ///< of all
+  const VertexArray& rest() const noexcept { return rest_; }                        ///< all vertices
   double area(int vertex) const noexcept { return areas_[vertex]; }                 ///< share of the surface [m^2]
   VertexRows::Rows basis_rows(int vertex) const noexcept { return rows_[vertex]; }  ///< 3 x r
 

@@ -28,14 +28,14 @@ namespace exmat::runtime {
 
 inline constexpr int kFrictionRounds = 3;      ///< solutions of one step for the normal forces of friction
 inline constexpr double kSameFriction = 0.05;  ///< relative change of friction that needs no further one
-inline constexpr double kEntrySteps = 2;       ///< of its way: a vertex that is deeper has not come in
+inline constexpr double kEntrySteps = 2;       ///< limit in ways of a vertex: one that is deeper has not come in
 
 /// Stiffness, damping and friction of a pair of surfaces, per area.
 struct ContactLaw {
   double stiffness = 0;       ///< pressure per depth, > 0 [N/m^3]
   double damping = 0;         ///< pressure per approach velocity, >= 0 [N s/m^3]
   double friction = 0;        ///< Coulomb's coefficient, >= 0
-  double release = kRelease;  ///< how fast what overlaps at the start is let out, > 0 [m/s]
+  double release = kRelease;  ///< speed at which overlap at the start is let out, > 0 [m/s]
 
   /// The law of each of two surfaces whose vertices meet the other one.
   ContactLaw half() const noexcept { return {0.5 * stiffness, 0.5 * damping, friction, release}; }
@@ -45,7 +45,7 @@ struct ContactLaw {
 struct HeldContact {
   int vertex = 0, obstacle = 0;
   double normal_force = 0;                           ///< at the end of the last step [N]
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< of the tangential spring, frame of the obstacle [m]
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();  ///< anchor of the tangential spring, frame of the obstacle [m]
   /// To the surface that it came in by, where that is not the nearest; else 0. Frame of the obstacle [m].
   Eigen::Vector3d way_out = Eigen::Vector3d::Zero();
   double overlap = 0;  ///< that is not released yet [m]
@@ -68,28 +68,28 @@ struct ContactCandidate {
   // Frozen for the step.
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  ///< n_0, where the step begins
   Eigen::Vector3d carried = Eigen::Vector3d::Zero();  ///< x_0, where the obstacle would carry the vertex [m]
-  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();   ///< of the tangential spring, world [m]
+  Eigen::Vector3d anchor = Eigen::Vector3d::Zero();   ///< anchor of the tangential spring, world [m]
   double stiffness = 0;                               ///< kappa = area * stiffness [N/m]
   double damping = 0;                                 ///< gamma = damping / (stiffness * time step) if it touches
   double spring_share = 1;                            ///< 1 / (1 + gamma)
   double friction_force = 0;                          ///< mu lambda, lambda the lagged normal force [N]
-  double overlap = 0;                                 ///< of the depth, that pushes nothing yet [m]
-  double released = 0;                                ///< of it where the step begins [m]
-  Passage passage;                                    ///< of obstacles
+  double overlap = 0;                                 ///< part of the depth that pushes nothing yet [m]
+  double released = 0;                                ///< overlap that is released where the step begins [m]
+  Passage passage;                                    ///< set for obstacles
 
   /// Clearance: the way of its vertex from the first evaluation on which nothing touches it [m]; negative: it has to be
   /// looked at.
   double clearance = -1;
 
   // Results of the last evaluation.
-  NearestHint hint;                                     ///< of nearest_surface_point()
+  NearestHint hint;                                     ///< hint for nearest_surface_point()
   bool by_plane = false;                                ///< its surface was the passage's plane
   double gap = 0;                                       ///< [m]; 0 where it was not looked at
   double normal_force = 0;                              ///< [N]
   Eigen::Vector3d arm = Eigen::Vector3d::Zero();        ///< x - position [m]
   Eigen::Vector3d force = Eigen::Vector3d::Zero();      ///< on the vertex [N]
   Eigen::Vector3d slip = Eigen::Vector3d::Zero();       ///< y, tangential [m]
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< of the normal force, where there is one
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< direction of the normal force, where there is one
 
   /// Releases at most `most` [m] of the overlap of a vertex `depth` inside [m], of which `before` had no push so far
   /// [m].
@@ -110,7 +110,7 @@ const HeldContact* find_held(const ContactState& state, std::size_t& next, const
 
 /// Start of a vertex in a step, and the end to which its velocity leads.
 struct VertexMotion {
-  Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< where the step begins, world [m]
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();      ///< place where the step begins, world [m]
   Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< a step on
   Eigen::Vector3d heading = Eigen::Vector3d::Zero();    ///< farther than it may go: two steps on
 };
@@ -159,7 +159,7 @@ double contact_potential(const PlacedObstacle& placed, const ContactCandidate& c
 
 /// Change of the friction forces when lambda is updated.
 struct FrictionChange {
-  double change = 0, largest = 0;  ///< of mu lambda [N]
+  double change = 0, largest = 0;  ///< change and largest value of mu lambda [N]
 
   /// Adds one contact.
   void add(double former, double now) noexcept {

@@ -47,7 +47,7 @@ class DeformationTree {
             branch.radius + spread};
   }
 
-  const MovementBound& movement() const noexcept { return movement_; }  ///< of its points
+  const MovementBound& movement() const noexcept { return movement_; }  ///< bound for its points
 
   /// The same branches about points that stand wherever they do and move at no more than `fastest` [m/s]: from now on
   /// of one mode, the way that they go, at q = 0. `extend(i, box)` extends a box by the i-th item in the order of the

@@ -10,7 +10,7 @@ class MovingSurface {
  public:
   MovingSurface(const ContactSet& set, const TouchingSurface& touching);
 
-  /// Where the body stands: the frame that fits it, and for a vertex of the object `position(vertex)` [m] and
+  /// Places the body by the frame that fits it, and for a vertex of the object `position(vertex)` [m] and
   /// `velocity(vertex)` [m/s], world.
   template <class Position, class Velocity>
   void place(const Placement& placement, const Position& position, const Velocity& velocity) {
@@ -40,7 +40,7 @@ class MovingSurface {
     const DeformationTree::Ball ball = surface().bound(q_);
     return {placement_.position + placement_.rotation * ball.centre, ball.radius};
   }
-  double speed() const noexcept { return surface().movement().norm; }  ///< of its fastest vertex, world [m/s]
+  double speed() const noexcept { return surface().movement().norm; }  ///< speed of its fastest vertex, world [m/s]
 
  private:
   Placement placement_;

@@ -15,7 +15,7 @@
 namespace exmat::runtime {
 
 inline constexpr double kContactMarginSteps = 2;  ///< way of a vertex that candidates are looked for in
-inline constexpr double kSweep = 0.5;             ///< of the thickness: an obstacle that goes farther in a step sweeps
+inline constexpr double kSweep = 0.5;             ///< share of the thickness: an obstacle that goes farther sweeps
 
 // Shapes in the frame of their obstacle [m].
 
@@ -32,16 +32,16 @@ struct Sphere {
 struct Box {
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
   Eigen::Vector3d half_extents = Eigen::Vector3d::Ones();  ///< > 0
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of its axes
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< rotation of its axes
 };
 struct Capsule {
-  Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::UnitZ();  ///< of its axis
+  Eigen::Vector3d start = Eigen::Vector3d::Zero(), end = Eigen::Vector3d::UnitZ();  ///< ends of its axis
   double radius = 1;                                                                ///< > 0
 };
 struct MeshShape {
   std::shared_ptr<const RigidMesh> mesh;                   ///< in axes of its own; any number of obstacles share it
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< of these axes' origin
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of these axes
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< origin of these axes
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< rotation of these axes
 };
 struct HeightFieldShape {
   std::shared_ptr<const HeightField> field;
@@ -71,12 +71,12 @@ inline constexpr double kRelease = 1;  ///< [m/s] of overlaps at the start, wher
 /// Obstacle that bodies may touch. Its law is per area of a body's surface, so that results do not depend on the mesh.
 struct Obstacle {
   Shape shape;
-  RigidMotion motion;    ///< of the shape's frame
+  RigidMotion motion;    ///< motion of the shape's frame
   double stiffness = 0;  ///< pressure per depth, > 0 [N/m^3]
   double damping = 0;    ///< pressure per approach velocity, >= 0 [N s/m^3]
   double friction = 0;   ///< Coulomb's coefficient, >= 0
   MeetingGroup meeting{};
-  double release = kRelease;  ///< how fast a body that overlaps it at the start is let out, > 0 [m/s]
+  double release = kRelease;  ///< speed at which a body that overlaps it at the start is let out, > 0 [m/s]
 };
 
 /// An obstacle that any number of bodies may touch. Whoever made it may change it between steps.

@@ -17,7 +17,7 @@ class OwnSearch {
   struct Found {
     int vertex = 0;
     Eigen::Vector3d point = Eigen::Vector3d::Zero();     ///< [m]
-    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< of a shape that moves [m/s]
+    Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< velocity of a shape that moves [m/s]
     std::span<const LeafPanel> leaves;
   };
 
@@ -43,7 +43,7 @@ class OwnSearch {
   std::ptrdiff_t keep(const BodySurface& surface, const SurfaceShape& shape, const LeafQuery& query,
                       std::ptrdiff_t first, std::ptrdiff_t count);
 
-  /// Of a branch of the vertices' tree, with the `count` panels from `first` on that are left for what it is of.
+  /// Searches a branch of the vertices' tree; the `count` panels from `first` on are left for the branch that it is of.
   template <class Visit>
   void descend(const ContactSet& set, const BodySurface& surface, const SurfaceShape& shape, int node,
                std::ptrdiff_t first, std::ptrdiff_t count, const Visit& visit) {
@@ -70,7 +70,7 @@ class OwnSearch {
   VertexArray points_, velocities_;  // of the vertices, frame of the body [m], [m/s]
   std::vector<char> chosen_;         // vertices
   LeafQuery reach_;                  // but for boxes
-  // Of the branches of the vertices' tree.
+  // One for each branch of the vertices' tree.
   std::vector<LeafQuery> queries_;
   std::vector<char> has_chosen_;
   std::vector<LeafPanel> panels_;  // all, then those that are left on the way from the root to a branch

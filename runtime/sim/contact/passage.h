@@ -9,7 +9,7 @@ namespace exmat::runtime {
 
 // Continuous collision detection of vertices: docs/step_in_detail.md, "Fast bodies".
 
-inline constexpr double kFast = 0.125;  ///< of the shortest passage, or of a body's radius: shorter ways pass nothing
+inline constexpr double kFast = 0.125;  ///< share of the shortest passage, or of a body's radius: less passes nothing
 inline constexpr double kOtherSide = -0.1;  ///< cosine of normals that look apart by more than those beside an edge
 
 /// A plane in place of an obstacle's surface, world.
@@ -24,8 +24,8 @@ struct SidePlane {
 
 /// Way of a vertex in a step, as the obstacle sees it at the end of the step; world.
 struct VertexWay {
-  Eigen::Vector3d carried = Eigen::Vector3d::Zero();    ///< where the obstacle would carry it from where it is [m]
-  Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< where it goes by its velocity
+  Eigen::Vector3d carried = Eigen::Vector3d::Zero();    ///< place that the obstacle would carry it to from its own [m]
+  Eigen::Vector3d predicted = Eigen::Vector3d::Zero();  ///< place that its velocity leads to
   Eigen::Vector3d heading = Eigen::Vector3d::Zero();    ///< farther than it may go
 };
 

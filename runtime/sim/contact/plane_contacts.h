@@ -39,9 +39,9 @@ class PlaneContacts {
         coefficients_(panels_.size() * kLanes),
         vertices_(panels_.size() * kLanes) {}
 
-  /// What a step keeps of a candidate `distance` away from its plane where the step begins; its vertex is at `rest`,
-  /// frame of the body, and has `friction`, Coulomb's coefficient. One after the other; then end() says how many they
-  /// are.
+  /// Sets what a step keeps of a candidate `distance` away from its plane where the step begins; its vertex is at
+  /// `rest`, frame of the body, and has `friction`, Coulomb's coefficient. One after the other; then end() says how
+  /// many they are.
   void set(std::size_t number, const Eigen::Vector3d& rest, double distance, double friction,
            const ContactCandidate& candidate) noexcept;
   void end(std::size_t candidates) noexcept;
@@ -76,8 +76,8 @@ class PlaneContacts {
 
   std::vector<PlaneContactPanel> panels_;
   std::vector<double> clearances_;    ///< the least of each panel's, see ContactCandidate
-  std::vector<std::uint8_t> loaded_;  ///< of each panel a bit for each candidate with a normal force or friction
-  std::vector<double> coefficients_;  ///< of friction
+  std::vector<std::uint8_t> loaded_;  ///< one for each panel: a bit for each candidate with a normal force or friction
+  std::vector<double> coefficients_;  ///< coefficients of friction
   std::vector<int> vertices_;
   std::size_t count_ = 0;  ///< panels in use
 };

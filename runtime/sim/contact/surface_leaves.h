@@ -12,9 +12,9 @@ namespace exmat::runtime {
 
 /// The leaves of a surface as they are.
 struct PlacedLeaves {
-  AlignedArray corners;             ///< of the triangles of each leaf, as Kernels::triangle_distances() has them
+  AlignedArray corners;             ///< corners of each leaf's triangles, as Kernels::triangle_distances() has them
   AlignedArray places, velocities;  ///< boxes of all leaves, as LeafBoxes has them
-  AlignedArray scratch;             ///< of one leaf
+  AlignedArray scratch;             ///< space for one leaf
 };
 
 /// The leaves of a surface's tree, kLanes triangles each, one by one or all side by side: for many looks at the whole
@@ -23,7 +23,7 @@ struct PlacedLeaves {
 class SurfaceLeaves {
  public:
   SurfaceLeaves() = default;
-  /// Of `tree`, whose items are the `triangles`, in full leaves of kLanes; vertices at `rest` [k x 3, m].
+  /// Leaves of `tree`, whose items are the `triangles`, full ones of kLanes; vertices at `rest` [k x 3, m].
   SurfaceLeaves(const VertexArray& rest, const TriangleArray& triangles, const DeformationTree& tree);
 
   PlacedLeaves make_placed() const;

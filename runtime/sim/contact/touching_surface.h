@@ -17,10 +17,10 @@ struct TouchingSurface {
   bool may_meet_itself(const Eigen::VectorXd& q, const Eigen::VectorXd& v, double time_step) const noexcept;
 
   BodySurface surface;
-  VertexArray normals;  ///< of the vertices of the set at rest, unit, outward
+  VertexArray normals;  ///< normals of the vertices of the set at rest, unit, outward
 
   // Empty where it does not meet itself.
-  std::vector<SurfaceHit> places;   ///< of the vertices of the set on the surface
+  std::vector<SurfaceHit> places;   ///< places of the vertices of the set on the surface
   RowMatrix vertex_bounds;          ///< [vertices x r] BodySurface::approach_bounds() of them
   Eigen::VectorXd approach_bounds;  ///< [r] the largest of each mode
 };

@@ -31,7 +31,7 @@ class VertexRows {
       }
   }
 
-  /// Of one mode, by which each vertex moves as its row of `velocities` says.
+  /// Sets one mode, by which each vertex moves as its row of `velocities` says.
   void set_one_mode(const VertexArray& velocities) {
     if (modes_ != 1) {
       modes_ = 1;
