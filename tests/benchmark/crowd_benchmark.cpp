@@ -24,7 +24,7 @@ void start_apart(const runtime::Model& model, ManyBodies& bodies) {
   }
 }
 
-/// Of a body's step, the mean of a few bodies.
+/// Flops of a body's step, the mean of a few bodies.
 double flops_of_a_step(const runtime::Model& model, const runtime::StepScene& scene, int count) {
   ManyBodies bodies(model, scene, make_state(model), count);
   start_apart(model, bodies);

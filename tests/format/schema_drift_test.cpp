@@ -98,7 +98,7 @@ TEST(WrittenBundle, HoldsExactlyTheSchemasDatasets) {
     EXPECT_TRUE(file.has_attribute("/", attribute.name));
 }
 
-// What the schemas list for a choice is what the programs know of it.
+// Expects the schema to list for a choice what the programs know of it.
 template <typename Choice>
 void expect_names(const char* schema, const char* pointer) {
   const Json listed = Json::parse(embedded_schema(schema)).at(Json::json_pointer(pointer));

@@ -116,7 +116,7 @@ struct Base {
   Contents contents;
 };
 
-// Of one region: what there is takes time.
+// A bundle of one region: all that is in it takes time.
 Base make_base(bool constrained) {
   const auto file = input_file("_base.h5", "");
   ReducedModel model = test::small_model(constrained);
@@ -322,7 +322,7 @@ class Editor {
     }
   }
 
-  // Of the type that it has, mostly.
+  // Sets an attribute, mostly of the type that it has.
   void set_attribute() {
     const auto& [object, name] = any_attribute();
     const Hdf5Handle old(H5Aopen_by_name(file_.get(), object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT),

@@ -1,4 +1,4 @@
-// Where there is no libFuzzer: runs a target on a corpus and on simple mutations of it, always the same ones.
+// Stands in for libFuzzer: runs a target on a corpus and on simple mutations of it, always the same ones.
 //   exmat_fuzz_NAME CORPUS_FOLDER MUTATIONS
 // What the target lets escape ends the program, as does asking for more than kMostMemory.
 #include <algorithm>
@@ -14,7 +14,7 @@
 #include "tests/fuzz/fuzz_target.h"
 
 #ifdef __SANITIZE_ADDRESS__
-// Of sanitizer/allocator_interface.h, which not every GCC has beside it.
+// Functions of sanitizer/allocator_interface.h, which not every GCC has beside it.
 extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
 extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*allocated)(const volatile void*, std::size_t),
                                                          void (*freed)(const volatile void*));

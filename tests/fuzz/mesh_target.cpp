@@ -21,7 +21,7 @@ void require(bool condition) {
   if (!condition) __builtin_trap();
 }
 
-// What is read is what readers promise: numbers are finite, indices those of something.
+// Requires what readers promise: numbers are finite, indices those of something.
 template <typename Indices>
 void require_indices(const Indices& indices, Eigen::Index count) {
   require(indices.size() > 0 && indices.minCoeff() >= 0 && indices.maxCoeff() < count);

@@ -3,7 +3,7 @@
 
 #include "tests/integration/support.h"
 
-// Where the acceptance check and the paper's car lie; the environment variable of this name goes first.
+// Folder of the acceptance check and the paper's car; the environment variable of this name goes first.
 #ifndef EXMAT_SHARED_DIR
 #define EXMAT_SHARED_DIR EXMAT_SOURCE_DIR "/../shared"
 #endif

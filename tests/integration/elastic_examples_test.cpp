@@ -31,7 +31,7 @@ class ElasticExamples : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// Of 144 degrees of freedom 40 are left, which have learned from the scene: with all tets, then with the elements
+// The basis has 40 of 144 degrees of freedom, which have learned from the scene: with all tets, then with the elements
 // chosen. The twist of so coarse a mesh is 0.5 % short of volume, which these forces are stiff against: 30 hold it
 // badly.
 TEST_F(ElasticExamples, ReducedMotionIsNearTheFullSpace) {
@@ -73,7 +73,7 @@ TEST_F(ElasticExamples, OfARegionAreNearTheFullSpace) {
   EXPECT_GT(found.size, 0.01) << "it does not move";
 }
 
-// What of a bundle a scene does not ask for is not there, and a scene that asks for it says what to do.
+// A bundle leaves out what a scene does not ask for, and a scene that asks for it says what to do.
 TEST_F(ElasticExamples, ABundleHoldsThemWhereTheyAreAskedFor) {
   Json linear = kElastic;
   linear["examples"]["force"] = "linear";

@@ -99,7 +99,7 @@ TEST_F(ExampleTopology, RegionsCoupleBases) {
   }
   const ShapeStage coupled = align({{"method", "coupled"}, {"regions", regions}});
   EXPECT_EQ(coupled.groups.front().examples.examples[1].method, "coupled");
-  // What came over against the pose itself, as the rest example's own mesh brings it.
+  // The pose that came over against the pose itself, as the rest example's own mesh brings it.
   const Eigen::MatrixXd change =
       coupled.weights.cwiseInverse().asDiagonal() *
       (coupled.groups.front().examples.examples[1].descriptor - coupled.data.rest_descriptor);

@@ -84,7 +84,7 @@ class LeavingOut : public testing::Test {
     EXPECT_EQ(built.report.ledger.size(), kAll.size() + 5);
   }
 
-  /// What the run time reads of bundle.h5 for a scene.
+  /// Datasets of bundle.h5 that the run time reads for a scene.
   std::vector<std::string> datasets_read(const char* members) {
     const auto loaded = runtime::load_run(load_scene(write_scene(folder_, Json::parse(members))));
     std::vector<std::string> datasets;

@@ -18,7 +18,7 @@ namespace parallel_test {
 using ::testing::HasSubstr;
 
 constexpr int kDone = 0, kFailure = 1, kBadInput = 2;
-// What bundles may differ by, relative: eigenpairs have residuals below 1e-9 whatever they are found with.
+// Relative difference that bundles may have: eigenpairs have residuals below 1e-9 whatever they are found with.
 constexpr double kTolerance = 1e-8;
 
 const std::string kProgram = EXMAT_BINARY_DIR "/bin/exmat-precompute";

@@ -26,7 +26,7 @@ double mass_norm(const ObjectData& object, const Eigen::VectorXd& field) {
   return std::sqrt(mass_product(object.mesh, object.materials.density, field, field));
 }
 
-/// What the descriptor of an example means on the object, from the bundle alone: u = Phi Lambda^-1 (e - e_rest)
+/// Displacement that an example's descriptor stands for, from the bundle alone: u = Phi Lambda^-1 (e - e_rest)
 /// V^(1/3).
 Eigen::VectorXd field_of(const ReducedModel& model, const ExampleData& example) {
   const ShapeSpaceData& space = *model.shape_space;
@@ -183,7 +183,7 @@ TEST_F(Pipeline, ABentExampleMovesTheBarAsAWhole) {
   const double lost = example.shape_space_error + example.basis_error;
   fmt::print("tip {:.3f} m of {:.3f}, recorded as lost {:.1f} %\n", tip_height(example.pose), expected, 100 * lost);
   EXPECT_LE(lost, 0.15);
-  // What is lost is a mean over the bar; at its ends the low-pass pose is off by more. Measured 5.6 %.
+  // The loss is a mean over the bar; at its ends the low-pass pose is off by more. Measured 5.6 %.
   EXPECT_NEAR(tip_height(example.pose), expected, 2 * lost * expected);
 
   const runtime::ModelResult prepared = runtime::build_model(model, {});
@@ -321,7 +321,7 @@ TEST_F(Pipeline, FreeBodyHasRigidMomentsAndABasisWithoutRigidMotion) {
   const Eigen::Vector3d moments = mass / 12 * (squares.sum() - squares.array());
   EXPECT_LE((rigid.inertia - Eigen::Matrix3d(moments.asDiagonal())).norm(), 1e-12 * moments.norm());
 
-  // Of unit modes and rigid motions; 1e-12 is rounding in sums over the tets.
+  // Unit modes and rigid motions: 1e-12 is rounding in sums over the tets.
   for (int axis = 0; axis < 3; ++axis) {
     VertexArray shift = VertexArray::Zero(object.mesh.vertex_count(), 3), turn = shift;
     for (Eigen::Index v = 0; v < shift.rows(); ++v) {

@@ -26,7 +26,7 @@ class ReferenceFiles : public testing::Test {
   TemporaryFolder folder_;
 };
 
-// What the bundle has of an example is its pose in full space, seen from the basis.
+// The bundle has an example's pose in full space, seen from the basis.
 TEST_F(ReferenceFiles, ExamplePosesAreThoseOfTheBundleBeforeTheirReduction) {
   for (const Json& object : {R"({})"_json, R"({"fixed": null})"_json}) {
     const ReducedModel model = built(12, {{"object", object}});

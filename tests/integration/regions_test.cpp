@@ -39,7 +39,7 @@ std::pair<double, double> norms(const Eigen::VectorXd& field, const IndexVector&
   return {std::sqrt(square), outside.norm()};
 }
 
-// What the shape space has of a displacement, with the mean that it drops.
+// The part of a displacement that the shape space has, with the mean that it drops.
 Eigen::VectorXd in_shape_space(const ReducedModel& model, const Eigen::VectorXd& displacement) {
   const ShapeSpaceData& space = *model.shape_space;
   Eigen::VectorXd field = Eigen::VectorXd::Zero(displacement.size());

@@ -8,7 +8,7 @@
 #include "tests/integration/support.h"
 #include "tests/support/box_mesh.h"
 
-// What a bundle says of how its body settles in its examples' poses, beside bodies that are stepped until they rest.
+// A bundle's report on how its body settles in its examples' poses, beside bodies that are stepped until they rest.
 
 namespace exmat::test {
 namespace settled_poses_test {

@@ -66,7 +66,7 @@ class Sources : public testing::Test {
     const Outcome made = exmat_precompute({"bundle", folder_.path("other_asset.json"), "-o", folder_.path(name)});
     ASSERT_EQ(made.status, 0) << made.errors;
   }
-  /// Of the scene with changes on a bundle, by one of the two programs; `every` step is a frame.
+  /// Motion of the scene with changes on a bundle, by one of the two programs; `every` step is a frame.
   Motion motion(bool full_space, const std::string& bundle, const Json& changes = Json::object(),
                 int every = kEvery) const {
     Json scene = kScene;

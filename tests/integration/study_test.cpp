@@ -248,7 +248,7 @@ TEST_F(StudyProgram, SweepsWhatBasesLearnFrom) {
     return read_bundle(folder_.path("out/bundles/" + point["bundle"].get<std::string>() + ".h5")).modal->basis;
   };
   EXPECT_GT((basis(points[0]) - basis(points[1])).norm(), 0.1 * basis(points[0]).norm());
-  // What it does not sweep is the asset's own, which is "none".
+  // The point with "none" has the asset's own basis.
   const ReducedModel alone = build(folder_.path("asset.json"), std::nullopt).model;
   EXPECT_LE((basis(points[0]) - alone.modal->basis).norm(), 1e-9 * alone.modal->basis.norm());
 }

@@ -18,7 +18,7 @@ namespace exmat::test {
 
 using Json = nlohmann::json;
 
-/// What became of a program.
+/// Outcome of a program.
 struct Outcome {
   int status = -1;  ///< exit status, or 128 + signal
   std::string output, errors;
@@ -35,7 +35,7 @@ Outcome exmat_runtime(const std::vector<std::string>& arguments);
 /// twisted about the bar's axis, the angle growing from zero at the clamp.
 struct BarFiles {
   std::array<double, 3> lengths{4.0, 1.0, 0.8};  ///< [m]
-  std::array<int, 3> cells{14, 4, 3};            ///< of six tets: 1,008 tets
+  std::array<int, 3> cells{14, 4, 3};            ///< cubes of six tets: 1,008 tets
   std::array<int, 3> example_cells{11, 3, 3};    ///< 594 tets
   double twist = 1.0;                            ///< at the far end [rad]
   double bend = 0;                               ///< then into an arc of this angle, towards z [rad]
@@ -74,12 +74,12 @@ ReducedModel through_bundle(const ReducedModel& model, const std::filesystem::pa
 /// Writes scene.json on bundle.h5 with the members merged in. Returns the scene file.
 std::filesystem::path write_scene(const TemporaryFolder& folder, const Json& members = Json::object());
 
-/// How far the motion of a scene is from that of the full space, root mean squares over frames and vertices.
+/// Distance of a scene's motion from that of the full space, root mean squares over frames and vertices.
 struct MotionError {
   double error = 0;  ///< distance over the size
-  double size = 0;   ///< of the displacement in full space [m]
+  double size = 0;   ///< displacement in full space [m]
 };
-/// Of `frames` frames, `every` so many steps.
+/// Error over `frames` frames, `every` so many steps.
 MotionError error_against_full_space(const std::filesystem::path& scene, int frames, int every);
 
 /// Inner product of two fields [3n] in the consistent mass of the density [n_t], summed tet by tet.

@@ -21,7 +21,7 @@ using ::testing::Not;
 class Training : public testing::Test {
  protected:
   Outcome bundle(const char* basis, std::vector<std::string> options = {}) {
-    // Of 54 rings the small bar would have too few for what many modes show.
+    // The small bar has 54 rings, too few for what many modes show.
     Json changes{{"basis", Json::parse(basis)}, {"object", {{"formulation", "linear"}}}};
     const auto asset = write_small_bar(folder_, changes);
     options.insert(options.begin(), {"bundle", asset, "-o", bundle_});
@@ -51,7 +51,7 @@ TEST_F(Training, OfASceneIsSaidInLogSummaryBundleAndInfo) {
   EXPECT_THAT(info.output, HasSubstr(model.fidelity->advice));
 }
 
-// Of the selections of elements that the log tells of, the bundle has the one that is nearest in the held-out runs.
+// The bundle has the one of the logged selections of elements that is nearest in the held-out runs.
 TEST_F(Training, JudgesCubatureByRuns) {
   const Outcome made = bundle(R"({ "training": "auto", "training_segments": 3 })",
                               {"--scene", scene(R"({ "gravity": [0, 0, -1], "examples": { "stiffness": 50 },

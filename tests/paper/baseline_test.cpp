@@ -202,7 +202,7 @@ TEST(Baseline, StartsWithTheForceOfTheElasticEnergy) {
   ASSERT_EQ(elasticity.set_undeformed(shape), 0);
   Eigen::VectorXd force;
   elasticity.force(-target, force);
-  // Of first order in the step, over which the stiffest vibrations move on.
+  // The error is of first order in the step, over which the stiffest vibrations move on.
   EXPECT_LE((baseline.model.system.mass * state.a + 0.3 * force).norm(), 1e-3 * 0.3 * force.norm());
 }
 

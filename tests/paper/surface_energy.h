@@ -8,7 +8,7 @@
 
 namespace exmat::precompute {
 
-/// What the terms of SurfaceEnergy count for, without units.
+/// Weights of the terms of SurfaceEnergy, without units.
 struct SurfaceWeights {
   double stretching = 100, bending = 1, volume = 1000;
 };
@@ -25,9 +25,9 @@ class SurfaceEnergy {
 
   Eigen::Index edge_count() const { return std::ssize(edges_); }
 
-  /// What E_k has of shape k; each term with the factor of its square.
+  /// Parts of E_k by shape k; each term with the factor of its square.
   struct Shape {
-    Eigen::VectorXd lengths, length_factors, angles, angle_factors;  ///< of each edge
+    Eigen::VectorXd lengths, length_factors, angles, angle_factors;  ///< one for each edge
     double volume = 0, volume_factor = 0;
   };
   Shape shape(const VertexArray& positions) const;

@@ -290,14 +290,14 @@ void Run::plan_steps(int most_steps) {
   steps_ = needed <= most_steps ? static_cast<std::int64_t>(std::ceil(needed)) : most_steps;
 }
 
-// Of what comes to rest: the deformation, and all of a body that may touch the ground.
+// Kinetic energy of what comes to rest: the deformation, and all of a body that may touch the ground.
 double Run::kinetic() const {
   if (test_.ground != Ground::kNone) return runtime::energies(model_, scene_, state_).kinetic;
   return 0.5 * state_.v.squaredNorm();
 }
 
-/// What the start and the loads can do in linear elasticity: a body of the energy W deflects to |q|_K = sqrt(2 W), a
-/// load that sets in at once to 2 |f|_(K^-1), and |u| <= reach |q|_K.
+/// Displacement by the start and the loads in linear elasticity: a body of the energy W deflects to |q|_K = sqrt(2 W),
+/// a load that sets in at once to 2 |f|_(K^-1), and |u| <= reach |q|_K.
 double Run::linear_displacement() const {
   const runtime::Energies energies = runtime::energies(model_, scene_, state_);
   double energy = energies.elastic + energies.kinetic;
@@ -350,7 +350,7 @@ void Run::watch(const runtime::StepReport& report, const Eigen::VectorXd& before
                .momentum_error = spins ? (angular_momentum() - start_momentum_).norm() / start_momentum_.norm() : 0});
 }
 
-// Of a free body as a rigid one.
+// Energy of a free body's turn as a rigid one.
 double Run::rotation_energy() const {
   const runtime::DeformingInertia inertia(*body_.reduced.rigid);
   auto moments = inertia.make_moments();

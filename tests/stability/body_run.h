@@ -8,12 +8,12 @@
 
 namespace exmat::precompute {
 
-/// What a run did. Energies in J.
+/// Results of a run. Energies in J.
 struct StabilityResult {
   CheckResults checks{};
-  std::array<std::string_view, kCheckNames.size()> limit_ids{};  ///< of the checks that end at a known limit
+  std::array<std::string_view, kCheckNames.size()> limit_ids{};  ///< limits of the checks that end at a known one
   std::int64_t steps = 0;                                        ///< taken
-  double largest_displacement = 0;  ///< of a vertex, without the rigid motion of a free body, over L
+  double largest_displacement = 0;  ///< a vertex's, without the rigid motion of a free body, over L
   double linear_displacement = 0;   ///< bound of linear elasticity for it, over L
   double start_determinant = 1;     ///< least det F of the cubature elements at the start
   double start_inverted = 0;        ///< share of them with det F <= 0

@@ -11,7 +11,7 @@ constexpr double kSixtieth = 1.0 / 60;
 
 bool is_newmark(const StabilityCase& test) { return test.integrator == Integrator::kNewmark; }
 
-/// Of the body with its example force [rad/s].
+/// Highest frequency of the body with its example force [rad/s].
 double highest_frequency(const StabilityCase& test, const StudyBody& body) {
   if (test.examples.elastic) return body.highest_frequency * std::sqrt(1 + test.examples.stiffness);
   return std::max(body.highest_frequency, std::sqrt(test.examples.stiffness));

@@ -17,7 +17,7 @@ struct StabilityRun {
 };
 
 struct StabilityOptions {
-  int most_steps = 600;  ///< of a run
+  int most_steps = 600;  ///< limit for a run
   int jobs = 0;          ///< runs at a time; 0: as many as there are threads
   runtime::NewtonPolicy policy{};
 };
@@ -30,7 +30,7 @@ std::vector<StabilityRun> run_stability(std::vector<StabilityCase> cases, const 
 /// Runs with that verdict.
 std::vector<const StabilityRun*> runs_with(const std::vector<StabilityRun>& runs, Verdict verdict);
 
-/// What failed in a run, and by how much; empty where nothing did.
+/// Failures of a run, and by how much; empty where there are none.
 std::string describe_failures(const StabilityRun& run);
 
 }  // namespace exmat::precompute

@@ -12,7 +12,7 @@
 
 namespace exmat::precompute {
 
-/// What a body of the stability suite has as examples.
+/// Examples of a body of the stability suite.
 enum class BodyExamples {
   kNone,
   kBendAndTwist,    ///< rest, a bend of 69 degrees, a twist of 57 degrees
@@ -34,7 +34,7 @@ struct BodySpec {
   bool polynomial = false;    ///< internal force by the exact polynomial, of stvk alone
   bool carried = false;       ///< clamped, and a motion may carry it
   bool region = false;        ///< the examples are those of its outer half alone
-  bool elastic = false;       ///< what an elastic example force takes
+  bool elastic = false;       ///< data for an elastic example force
   EnergyReference energy_reference = EnergyReference::kExample;
 
   auto operator<=>(const BodySpec&) const = default;
@@ -44,10 +44,10 @@ struct BodySpec {
 struct StudyBody : BodyScale {
   ReducedModel reduced;
   std::unique_ptr<const runtime::Model> model;
-  double least_dihedral = 0;     ///< of all tets [rad]
+  double least_dihedral = 0;     ///< least of all tets [rad]
   double lowest_frequency = 0;   ///< [rad/s]
   double mass_reach = 0;         ///< largest |U_v q| over |q| [kg^-1/2]
-  double highest_frequency = 0;  ///< of rest_stiffness [rad/s]
+  double highest_frequency = 0;  ///< highest by rest_stiffness [rad/s]
 
   const RowMatrix& basis() const { return reduced.modal->basis; }
 };
@@ -70,7 +70,7 @@ class BodyStore {
   /// Builds what is missing. Throws as build_reduced_model.
   const StudyBody& get(const BodySpec& spec);
 
-  /// Of a body that has been built.
+  /// A body that has been built.
   const StudyBody& at(const BodySpec& spec) const { return *bodies_.at(spec); }
 
  private:

@@ -12,7 +12,7 @@
 
 namespace exmat::precompute {
 
-/// Where a run starts. All but the first two are the reduced poses nearest to a field on the vertices.
+/// Start of a run. All but the first two are the reduced poses nearest to a field on the vertices.
 enum class Start {
   kRest,
   kImpulse,    ///< at rest in shape, the free end struck
@@ -22,7 +22,7 @@ enum class Start {
   kTangled,    ///< random reduced coordinates
 };
 
-/// What a body may touch.
+/// Obstacle that a body may touch.
 enum class Ground {
   kNone,
   kPlane,    ///< below it
@@ -34,7 +34,7 @@ enum class Ground {
   kBox,      ///< a box a tenth of L thick below it
 };
 
-/// What else there is, and touches it.
+/// Company of the body, which touches it.
 enum class Company {
   kNone,
   kPile,     ///< two more of its kind, across each other above it
@@ -46,7 +46,7 @@ enum class Company {
 /// One run. L is the diagonal of the body's bounding box, w_1 its lowest frequency.
 struct StabilityCase {
   std::string group{};
-  std::string extreme{};  ///< what is extreme in it
+  std::string extreme{};  ///< the extreme in it, in words
   BodySpec body{};
   Integrator integrator = Integrator::kBdf2;
   Precision precision = Precision::kDouble;  ///< mixed: it steps as instances do, in lanes
@@ -56,14 +56,14 @@ struct StabilityCase {
   Eigen::Vector3d tip_load = Eigen::Vector3d::Zero();
   Start start = Start::kRest;
   Eigen::Vector3d impulse =
-      Eigen::Vector3d::Zero();          ///< of kImpulse; in units of what moves a vertex by L in linear elasticity
-  double reach = 1;                     ///< of kTangled: largest displacement over L
+      Eigen::Vector3d::Zero();          ///< kImpulse's; in units of what moves a vertex by L in linear elasticity
+  double reach = 1;                     ///< kTangled's: largest displacement over L
   bool principal_axis = false;          ///< the spin is about the axis of the largest inertia
-  double spin = 0;                      ///< of a free body, about an axis at 30 degrees to y and z [rad/s]
-  double velocity = 0;                  ///< of a free body, along -z [m/s]
+  double spin = 0;                      ///< a free body's, about an axis at 30 degrees to y and z [rad/s]
+  double velocity = 0;                  ///< a free body's, along -z [m/s]
   double damping = 1;                   ///< alpha over 2 w_1
   double stiffness_damping = 0;         ///< beta w_1
-  runtime::ExampleSettings examples{};  ///< of a body with examples
+  runtime::ExampleSettings examples{};  ///< settings of a body with examples
   Ground ground = Ground::kNone;
   Company company = Company::kNone;
   double contact_stiffness = 1e6;  ///< [N/m^3]
@@ -80,7 +80,7 @@ struct KnownLimit {
   double most;            ///< largest value of the check that it explains
   std::string_view what;  ///< which runs
   std::string_view reason;
-  std::string_view message;  ///< what the user is told
+  std::string_view message;  ///< message to the user
 };
 const std::vector<KnownLimit>& known_limits();
 

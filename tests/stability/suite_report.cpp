@@ -19,7 +19,7 @@ namespace {
 using Row = std::vector<std::string>;
 using Json = nlohmann::ordered_json;
 
-// What the runs of one group and integrator add up to.
+// Sums over the runs of one group and integrator.
 struct Sum {
   int runs = 0, passed = 0, limited = 0, failed = 0;
   std::int64_t steps = 0, newton = 0, search = 0, projections = 0, unsolved = 0, non_finite = 0;

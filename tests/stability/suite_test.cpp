@@ -221,7 +221,7 @@ TEST(Stability, ResultsDoNotDependOnTheNumberOfJobs) {
   EXPECT_EQ(suite_json(one), suite_json(two));
 }
 
-// What the suite is for: without a safeguard of the step it has to fail. Of 132 runs each, 25 and 49 did.
+// The suite has to fail without a safeguard of the step: that is what it is for. Of 132 runs each, 25 and 49 did.
 std::vector<StabilityRun> runs_with_fault(const runtime::NewtonPolicy& policy) {
   auto cases = cases_of({"loads", "starts"});
   std::erase_if(cases, [](const StabilityCase& test) { return test.integrator != Integrator::kBdf2; });

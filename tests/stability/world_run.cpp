@@ -167,7 +167,7 @@ double WorldRun::largest(const runtime::World& world, int body) const {
   return largest_displacement(body_.basis(), world.state(body).q);
 }
 
-/// Of all free bodies, angular about the origin.
+/// Momenta of all free bodies, angular about the origin.
 WorldRun::Momenta WorldRun::momenta(const runtime::World& world) const {
   Momenta sum;
   for (int i = 0; i < world.count(); ++i) {

@@ -10,9 +10,9 @@
 
 namespace exmat::test {
 
-/// What differs between two bodies of one kind.
+/// Differences between two bodies of one kind.
 struct Proportions {
-  double length = 1;  ///< of limbs
+  double length = 1;  ///< length of limbs
   double girth = 1;
 };
 
@@ -27,7 +27,7 @@ struct PosableBody {
   std::function<double(const Eigen::Vector3d&)> distance;  ///< negative inside
   Eigen::AlignedBox3d bounds;
   double cell = 0;              ///< edge of a grid that shows it coarsely
-  std::vector<BodyPose> poses;  ///< what they are does not depend on the proportions
+  std::vector<BodyPose> poses;  ///< the same for all proportions
 };
 
 /// A figure and a four-legged animal, skinned upon the bones of a skeleton; thin letters C and D; a bar with an arm.
@@ -40,12 +40,12 @@ PosableBody armed_bar_body(const Proportions& proportions, double strength);
 
 enum class TetKind { kCubes, kBodyCentred };  ///< six tets a cube; a body-centred lattice
 
-/// How a posed body is cut into tets: by a grid that knows nothing of the body at rest.
+/// Meshing of a posed body into tets: by a grid that knows nothing of the body at rest.
 struct Meshing {
   TetKind kind = TetKind::kCubes;
   double cell = 0;         ///< edge of the grid's cells
   bool staircase = false;  ///< the surface follows the cells instead of the body
-  double noise = 0;        ///< of the surface, over `cell`
+  double noise = 0;        ///< noise of the surface, over `cell`
   int holes = 0;           ///< bites of two cells out of the surface
   std::uint32_t seed = 0;  ///< shifts the grid, shakes the surface, places the holes
 };

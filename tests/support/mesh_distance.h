@@ -22,7 +22,7 @@ inline double winding_number(const VertexArray& x, const TriangleArray& triangle
   return sum / (4 * std::numbers::pi);
 }
 
-/// Of all triangles, how near the nearest is.
+/// Distance of the nearest of all triangles.
 inline double distance_to_all(const VertexArray& x, const TriangleArray& triangles, const Eigen::Vector3d& p) {
   double nearest = std::numeric_limits<double>::infinity();
   for (Eigen::Index t = 0; t < triangles.rows(); ++t)

@@ -12,7 +12,7 @@ namespace exmat::test {
 /// Each tet cut into eight of an eighth of its volume, at the middles of its edges (Bey 1995). The mesh's own vertices
 /// are the first.
 inline TetMesh refined(const TetMesh& mesh) {
-  // Of the corners 0 to 3 and the middles 4 to 9 of the edges 01, 02, 03, 12, 13, 23.
+  // Tets of the corners 0 to 3 and the middles 4 to 9 of the edges 01, 02, 03, 12, 13, 23.
   constexpr std::array<std::array<int, 2>, 6> kEdges{{{0, 1}, {0, 2}, {0, 3}, {1, 2}, {1, 3}, {2, 3}}};
   constexpr std::array<std::array<int, 4>, 8> kTets{
       {{0, 4, 5, 6}, {4, 1, 7, 8}, {5, 7, 2, 9}, {6, 8, 9, 3}, {4, 5, 6, 8}, {4, 5, 8, 7}, {5, 6, 8, 9}, {5, 7, 9, 8}}};

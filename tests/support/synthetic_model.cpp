@@ -68,7 +68,7 @@ std::pair<double, double> lame(double youngs_modulus, double poisson_ratio) {
           youngs_modulus * poisson_ratio / (1 + poisson_ratio) / (1 - 2 * poisson_ratio)};
 }
 
-/// Of the polar decomposition, a proper one also where F is inverted.
+/// Rotation of the polar decomposition, a proper one also where F is inverted.
 Eigen::Matrix3d rotation(const Eigen::Matrix3d& F) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(F, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Vector3d signs(1, 1, F.determinant() < 0 ? -1 : 1);

@@ -47,7 +47,7 @@ class TemporaryFolder {
     return path(name);
   }
 
-  /// Of the entries in it.
+  /// Names of the entries in it.
   std::set<std::string> names() const {
     std::set<std::string> names;
     for (const auto& entry : std::filesystem::directory_iterator(path_)) names.insert(entry.path().filename());

@@ -30,7 +30,7 @@ using test::TetKind;
 constexpr double kWrong = 0.35;  // above the error of the ideal projection: another pose, not a worse one
 constexpr int kFunctions = 20;
 
-// How object, rest example and pose are meshed, and what is told beside them.
+// Meshing of object, rest example and pose, and what is told beside them.
 struct Kind {
   std::string name;
   Meshing object{}, rest{}, pose{};  // cells relative to the body's
@@ -149,7 +149,7 @@ class Case {
     return meshing;
   }
 
-  // Of the object and the pose: points of the object far from each other, and where they are in the pose.
+  // Sets landmarks: points of the object far from each other, and where they are in the pose.
   void set_landmarks(const test::Pose& pose, std::uint32_t seed, const TetMesh& posed) {
     std::vector<std::int32_t> places;
     for (const auto v : farthest_points(object_.mesh.vertices, kind_.landmarks))

@@ -23,9 +23,9 @@ class BulletBodies {
   void add(const Eigen::Vector3d& by, const Eigen::Vector3d& spin);
   void step();
 
-  /// Of the stiffest mode [rad/s]: a step that is explicit holds up to 2 over this.
+  /// Frequency of the stiffest mode [rad/s]: a step that is explicit holds up to 2 over this.
   double highest_frequency() const;
-  /// Of a body: its lowest vertex and its centre of mass [m].
+  /// Lowest vertex of a body, and its centre of mass [m].
   double lowest(int body) const;
   Eigen::Vector3d centre(int body) const;
   /// Vertices of all bodies that touched the floor in the last step.

@@ -27,7 +27,7 @@ struct Case {
   bool floor = true;
 };
 
-/// Of this thread: both take steps in one alone.
+/// Time of this thread: both take steps in one alone.
 double processor_seconds() {
   timespec now{};
   clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);

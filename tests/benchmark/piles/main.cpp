@@ -16,7 +16,7 @@ struct Options {
   int steps = 0, threads = 1, hashed_step = 0;
 };
 
-/// Of all bodies: fastest centre of mass [m/s].
+/// Speed of the fastest centre of mass of all bodies [m/s].
 double fastest(const exmat::World& world) {
   double largest = 0;
   for (const std::int64_t id : world.ids()) {

@@ -1,4 +1,4 @@
-// How soft bodies of linear tets and of smoothed elements are beside quadratic tets of a fine mesh of the same shape.
+// Softness of bodies of linear tets and of smoothed elements beside quadratic tets of a fine mesh of the same shape.
 // Prints the table of docs/studies/stiffness.md, and renews it where the page is named:
 //   exmat-stiffness-benchmark [PAGE.md]
 

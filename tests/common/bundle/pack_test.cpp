@@ -57,7 +57,7 @@ class Pack : public ::testing::Test {
   static void put(std::string& pack, std::size_t place, T value) {
     std::memcpy(pack.data() + place, &value, sizeof value);
   }
-  // Where the first array begins, or the zeros before it.
+  // Begin of the first array, or of the zeros before it.
   static std::size_t end_of_table(const std::string& pack) {
     return PackHeader::kSize + get<std::uint64_t>(pack, PackHeader::kTableBytes);
   }

@@ -46,7 +46,7 @@ class Spoiler {
   void set_number(const char* object, const char* name, double value) {
     set_attribute(object, name, H5T_NATIVE_DOUBLE, &value);
   }
-  // Of variable length, as h5py writes it.
+  // Sets a text of variable length, as h5py writes it.
   void set_text(const char* object, const char* name, const char* value) {
     const hid_t type = H5Tcopy(H5T_C_S1);
     H5Tset_size(type, H5T_VARIABLE);

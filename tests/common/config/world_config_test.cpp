@@ -19,7 +19,7 @@ class WorldConfigTest : public ::testing::Test {
     std::ofstream(file) << text;
     return file;
   }
-  /// What a reader says of a file that it refuses; empty where it does not.
+  /// A reader's message on a file that it refuses; empty where it does not.
   template <class Read>
   std::string refusal_of(const Read& read, const std::string& name, const std::string& text) const {
     try {

@@ -11,7 +11,7 @@
 namespace exmat {
 namespace {
 
-/// How often each i was called by a thread whose number is below `threads`.
+/// Number of calls of each i by a thread whose number is below `threads`.
 std::vector<int> calls(std::size_t count, int threads, std::size_t share) {
   std::vector<int> calls(count);
   by_threads(count, threads, share, [&](std::size_t i, std::size_t thread) {

@@ -36,7 +36,7 @@ std::vector<Eigen::Matrix3d> gradients() {
   return found;
 }
 
-// Of the definitions, term by term, from singular values alone.
+// Energy by the definitions, term by term, from singular values alone.
 template <typename Material>
 double defined_energy(const Eigen::Matrix3d& F, const LameParameters& lame) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(F);

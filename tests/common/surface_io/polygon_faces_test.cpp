@@ -20,7 +20,7 @@ namespace {
 using Point = Eigen::Vector2d;
 using Corners = std::vector<std::array<double, 3>>;
 
-/// Of a polygon in the plane z = 0: half the sum of its edges' cross products (Gauss's area formula).
+/// Area of a polygon in the plane z = 0: half the sum of its edges' cross products (Gauss's area formula).
 double area_of(const std::vector<Point>& points) {
   double twice = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {
@@ -144,7 +144,7 @@ TEST(PolygonFaces, AreReadOfFilesAsSolids) {
     }
     return sum;
   };
-  // Of convex pieces of a concave face a fan has the right signed volume too, so each triangle's side is asked for.
+  // A fan of convex pieces of a concave face has the right signed volume too, so each triangle's side is asked for.
   const auto faces_up = [](const SurfaceMesh& mesh) {
     for (const auto& t : mesh.triangles.rowwise()) {
       const Eigen::Vector3d a = mesh.vertices.row(t[0]), b = mesh.vertices.row(t[1]), c = mesh.vertices.row(t[2]);

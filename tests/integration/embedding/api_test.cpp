@@ -234,7 +234,7 @@ TEST_F(ApiTest, PointsInATetMoveAsItDoes) {
   EXPECT_GT((found.cast<double>() - inside).norm(), 1e-4);
 }
 
-/// Of a point to a box with a corner at the origin.
+/// Distance of a point to a box with a corner at the origin.
 double distance_to_bar(const Eigen::Vector3d& point, const std::array<double, 3>& lengths) {
   const Eigen::Vector3d upper(lengths.data());
   return (point - point.cwiseMax(Eigen::Vector3d::Zero()).cwiseMin(upper)).norm();
@@ -262,7 +262,7 @@ TEST_F(ApiTest, PointsAreInTheNearestTet) {
   // At rest each is where it was given.
   EXPECT_EQ(read, xyz.cast<float>());
 
-  // What was given as the place of a vertex moves as that vertex.
+  // Points given as the places of vertices move as those vertices.
   std::vector<float> all(3 * model.vertices());
   const Points vertices = Points::all_vertices(model);
   body.step(20);

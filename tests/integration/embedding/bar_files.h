@@ -29,7 +29,7 @@ class BarFiles {
   TemporaryFolder folder_;
 };
 
-/// What the settings of the tests are in a scene file.
+/// The settings of the tests as members of a scene file.
 inline const std::string kDampedExamples =
     "\"gravity\": [0, -9.81, 0], \"integrator\": \"newmark\", \"damping\": {\"mass\": 0.1, \"stiffness\": 0.001}, "
     "\"examples\": {\"stiffness\": 100, \"damping\": 1, \"bias\": 0.5}";

@@ -64,7 +64,7 @@ TEST(ZoomOut, RecoversAPermutationFromANoisyStart) {
   EXPECT_LE(orthogonality_defect(map), 1e-9);
 }
 
-// Of the same body, so all eigenvalues agree and the best branch is the map itself, up to signs of no function.
+// The body is the same, so all eigenvalues agree and the best branch is the map itself, up to signs of no function.
 TEST(SpectralMaps, FindTheMapOfABodyWithoutSymmetry) {
   const Pair& pair = pair_of_wedges();
   const auto maps = spectral_maps(pair.a, pair.b, 20, 3);

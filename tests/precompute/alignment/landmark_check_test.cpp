@@ -74,7 +74,7 @@ TEST_F(ContradictingLandmarks, AreLookedForFromSixOn) {
   EXPECT_THAT(contradicting_landmarks(rest_, five, pose, on_pose), IsEmpty());
 }
 
-// Where all are mixed up nobody can say which are wrong; more than a quarter is never left out.
+// Nobody can say which are wrong where all are mixed up; more than a quarter is never left out.
 TEST_F(ContradictingLandmarks, AreAQuarterAtMost) {
   std::mt19937 generator(3);
   for (int k = 0; k < 20; ++k) {

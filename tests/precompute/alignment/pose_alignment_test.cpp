@@ -35,7 +35,7 @@ TetMesh corner_piece(const std::array<int, 3>& cells, bool crooked) {
 
 struct Result {
   PoseAlignment alignment;
-  double error = 0;  ///< of the displacement of the rest example's vertices, relative, in the frame of the pose
+  double error = 0;  ///< relative error of the rest example's displacement, in the frame of the pose
 };
 
 // The pose is that of `posed`; where it is the same body, its truth on the rest example is known.

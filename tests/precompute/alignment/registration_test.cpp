@@ -80,7 +80,7 @@ TEST(RelaxedRegistration, OfStaircasesIsNearerToTheTruth) {
   EXPECT_LT(bar.relaxed_error(), 0.85 * bar.registered_error());
 }
 
-// What is known is kept.
+// Relaxing keeps what is known.
 TEST_F(RelaxedBoxes, OfABendIsWhatWasRegistered) {
   const LaidBar bar(rest_, test::posed(other_, kBend), kBend);
   fmt::print("registered {:.3f}, relaxed {:.3f}\n", bar.registered_error(), bar.relaxed_error());

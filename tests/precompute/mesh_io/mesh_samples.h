@@ -66,7 +66,7 @@ Sets named_sets(const MeshFile& mesh_file);
 struct Flavour {
   std::string name, extension;
   std::string (*write)(const MeshFile&);
-  Sets (*sets)(const MeshFile&) = named_sets;  ///< what the format keeps of them
+  Sets (*sets)(const MeshFile&) = named_sets;  ///< the sets that the format keeps
 };
 /// Every format and encoding.
 const std::vector<Flavour>& flavours();

@@ -124,7 +124,7 @@ TEST_F(ReadVtk, WarnsOfVolumeCellsLeftOut) {
   EXPECT_THAT(warnings, ElementsAre(HasSubstr("1 hexahedra (cell type 12) are left out")));
 }
 
-// Of each type its largest and smallest values, in the file's byte order.
+// Largest and smallest values of each type, in the file's byte order.
 TEST_F(ReadVtk, TakesBinaryNumbersOfEveryType) {
   const bool swap = std::endian::native == std::endian::little;
   const auto bytes = [&](auto value) {

@@ -62,7 +62,7 @@ Eigen::VectorXd each_axis(const Eigen::VectorXd& of_vertices) {
   return of_vertices.replicate(1, 3).transpose().reshaped();
 }
 
-// What a region feels that is cut at its border, and balanced on the one layer of vertices there.
+// Forces on a region that is cut at its border, and balanced on the one layer of vertices there.
 Eigen::MatrixXd cut_sharply(const TetMesh& mesh, const FlagVector& inside, const Eigen::MatrixXd& forces) {
   FlagVector border = FlagVector::Zero(inside.size());
   for (const auto& tet : mesh.tets.rowwise())

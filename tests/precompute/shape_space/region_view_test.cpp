@@ -46,7 +46,7 @@ class Region : public testing::TestWithParam<bool> {
 INSTANTIATE_TEST_SUITE_P(Bodies, Region, testing::Bool(),
                          [](const auto& body) { return body.param ? "clamped" : "free"; });
 
-// Of all displacements that agree on the region the view sees the same: what the window leaves of the motion against
+// The view sees the same of all displacements that agree on the region: what the window leaves of the motion against
 // the rigid one that fits the band best, here found by least squares over its vertices.
 TEST_P(Region, IsSeenFromItsBand) {
   const RegionView view(mesh_, inside_, fixed_);

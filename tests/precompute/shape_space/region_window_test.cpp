@@ -35,7 +35,7 @@ TetMesh shaken_bar(const std::array<int, 3>& cells) {
   return mesh;
 }
 
-// Of a plane border distances are exact and linear, and so is their mean, 1.5: any mesh has the window of the formula.
+// Distances from a plane border are exact and linear, and so is their mean, 1.5: any mesh has the formula's window.
 TEST(RegionWindow, OfABarIsAStepAsLongAsAQuarterOfItOnAnyMesh) {
   const double width = 0.75;
   for (const TetMesh& mesh : {shaken_bar({12, 3, 3}), shaken_bar({16, 5, 4}), test::refined(shaken_bar({12, 3, 3}))}) {

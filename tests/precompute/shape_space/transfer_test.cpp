@@ -76,7 +76,7 @@ TEST(TransferPose, IsCloseToTheIdealProjection) {
   const auto& s = setting();
   const TetMesh posed{twist(s.example_mesh.vertices, 0.8), s.example_mesh.tets};
   const auto pose = s.transfer(posed, false);
-  // Of a free body, so in its mean axes.
+  // The body is free, so its pose is in its mean axes.
   const VertexArray twisted = normalised_positions({twist(s.object_mesh.vertices, 0.8), s.object_mesh.tets});
   const Eigen::Matrix3d axes = procrustes_rotation(s.object.vertices.transpose() * (s.object.mass * twisted));
   const VertexArray exact = twisted * axes.transpose() - s.object.vertices;

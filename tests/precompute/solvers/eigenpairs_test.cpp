@@ -70,7 +70,7 @@ struct Body {
 
 class SlenderBars : public testing::TestWithParam<Body> {};
 
-// Of the 19 digits of long double the solution with the shifted matrix takes up to 8.
+// The solution with the shifted matrix takes up to 8 of the 19 digits of long double.
 TEST_P(SlenderBars, HaveTheEigenvaluesOfLongDouble) {
   const Body& body = GetParam();
   const ElasticSystem system = system_of(test::box_mesh({body.cells, 2, 2}, {0.5 * body.cells, 1, 1}), body.clamped);

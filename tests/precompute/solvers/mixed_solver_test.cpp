@@ -62,7 +62,7 @@ TEST_P(Mixed, FindsTheEigenvectorsOfADenseSolver) {
   const MixedSolver solver = solver_of(system_);
   const Eigen::MatrixXd none(system_.mass.rows(), 0),
       found = davidson_eigenvectors(system_.stiffness, system_.mass, solver, none, kCount, 1e-10);
-  // Of the whole space, whatever multiple values do to single vectors.
+  // The whole space agrees, whatever multiple values do to single vectors.
   const Eigen::MatrixXd space = exact.eigenvectors().middleCols(rigid, kCount);
   const Eigen::MatrixXd outside = found - space * (space.transpose() * (system_.mass * found));
   EXPECT_LE((outside.transpose() * (system_.mass * outside)).diagonal().cwiseMax(0).cwiseSqrt().maxCoeff(), 1e-8);
@@ -130,7 +130,7 @@ TEST_F(SolverChoice, HingesAreRefusedByFactorsInDouble) {
   EXPECT_NE(log_.find("factors in double in their place"), std::string::npos) << log_;
 }
 
-// What auto chooses, and that it says so.
+// Auto chooses by mesh and memory, and says so.
 TEST_F(SolverChoice, AutoGoesByTheMeshAndTheMemory) {
   const ElasticSystem system = system_of(test::box_mesh({9, 5, 4}, {1.0, 0.8, 0.6}), true);
   const Eigen::VectorXd direct = values(system, {.eigensolver = Eigensolver::kDirect}), small = values(system, {});

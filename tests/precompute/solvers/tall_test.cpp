@@ -20,7 +20,7 @@ class Tall : public testing::TestWithParam<Eigen::Index> {
 
 INSTANTIATE_TEST_SUITE_P(Rows, Tall, testing::Values(1, 77, 20'003));
 
-// Of every number of columns that the sums are cut into.
+// Products with every number of columns that the sums are cut into.
 TEST_P(Tall, ProductsAreThoseOfEigen) {
   std::vector<Eigen::Triplet<double>> entries;
   const Eigen::VectorXd values = test::random_vector(5 * rows(), 3);

@@ -110,7 +110,7 @@ TEST_P(ElementForcesOf, AreTheDerivativesOfTheEnergies) {
   expect_derivatives(forces, weights, [&](const Eigen::VectorXd& w, const Eigen::VectorXd& p) { return energy(w, p); });
 }
 
-// Of rings, against the elasticity of the mesh.
+// Forces of rings, against the elasticity of the mesh.
 TEST_P(ElementForcesOf, OfRingsAreTheDerivativesOfTheEnergies) {
   object_.materials.youngs_modulus.setConstant(1e4);
   object_.materials.formulation = Formulation::kSmoothed;

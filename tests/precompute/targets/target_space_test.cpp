@@ -123,7 +123,7 @@ INSTANTIATE_TEST_SUITE_P(
 // of random weights are many more than the checks', so that a little more may turn up between these: a tenth.
 TEST_P(TargetSpaceOf, TableIsNearTheTargetsOfTheWholeMesh) { expect_near(body_.build(kTolerance)); }
 
-// Of half of the tets alone the targets are off by a tenth.
+// Half of the tets alone give targets that are off by a tenth.
 TEST_P(TargetSpaceOf, TableOfASampleIsNearTheTargetsOfTheWholeMesh) {
   const Eigen::Index tets = body_.bar_.model.object->mesh.tet_count();
   const TargetSpace space = body_.build_by_sample(kTolerance, tets / 2);
@@ -196,7 +196,7 @@ TEST_P(TargetSpaceOf, TakesFewDisplacementsThatHoldTheExamples) {
   }
 }
 
-// Of a table in the run time, which holds U^T P Y: the filter of the full space, which knows no modal basis.
+// A table in the run time holds U^T P Y: the filter of the full space, which knows no modal basis.
 TEST_P(TargetSpaceOf, PullIsTheFilteredTarget) {
   Case options = GetParam();
   if (options.free) GTEST_SKIP() << "the synthetic bar's filter is not free of rigid motions";

@@ -37,7 +37,7 @@ TargetSolver solver_of(const ReducedModel& model, EnergyReference reference) {
   return solver;
 }
 
-/// Of targets in the modal basis of a model: the complaint of a pose that inverts an element is the message.
+/// Table of targets in the modal basis of a model: the complaint of a pose that inverts an element is the message.
 std::optional<TargetTableData> table_of(const ReducedModel& model, const TargetTableOptions& options,
                                         TargetTableReport& report) {
   TargetSolver solver;
@@ -81,7 +81,7 @@ std::vector<Eigen::VectorXd> random_weights(int examples, int count) {
   return all;
 }
 
-/// Of the table against the solver, in the energy norm at rest, relative to the largest example.
+/// Largest error of the table against the solver, in the energy norm at rest, relative to the largest example.
 double largest_error(const TargetTableData& data, const TargetSolver& solver, int examples, int count) {
   const TargetTable table(data);
   auto workspace = table.make_workspace();

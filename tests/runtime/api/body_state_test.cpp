@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-/// What a kind of body carries from step to step differs; each of these has something that the others have not.
+/// Kinds of bodies differ in what they carry from step to step; each of these has something that the others have not.
 struct Case {
   const char* name;
   test::BarOptions bar;
@@ -168,7 +168,7 @@ class ExamplesOfABody : public BodyStates {
   }
 };
 
-// Of its own kappa a body moves as one of a model of that kappa.
+// A body with a kappa of its own moves as one of a model of that kappa.
 TEST_F(ExamplesOfABody, StiffnessIsThatOfAModelWithIt) {
   make(cases()[0]);
   const exmat::Model soft = bar(0), stiff = bar(300);

@@ -19,7 +19,7 @@ namespace {
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 
-/// What exmat.hpp has of drawing, beside the bar that the bundle was made of.
+/// Drawing by exmat.hpp, beside the bar that the bundle was made of.
 class Drawing : public ::testing::Test {
  protected:
   Drawing() {

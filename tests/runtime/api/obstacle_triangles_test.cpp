@@ -11,7 +11,7 @@
 namespace exmat::runtime {
 namespace {
 
-/// What obstacles are made of, and what a push costs, as hosts read it.
+/// Triangles of obstacles, and the cost of a push, as hosts read them.
 class ObstacleReading : public ::testing::Test {
  protected:
   ObstacleReading() {

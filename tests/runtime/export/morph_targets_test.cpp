@@ -75,7 +75,7 @@ TEST_F(MorphTargetsTest, MissAsLittleAsSoManyCan) {
     ASSERT_EQ(targets.displacements.cols(), count);
     const double best = svd.singularValues().tail(svd.singularValues().size() - count).norm();
     EXPECT_NEAR((drawn(targets) - truth()).norm(), best, 1e-9 * svd.singularValues()[0]);
-    // What is said of it, in single precision.
+    // The reported error, in single precision.
     const MorphError error = error_of(targets, surface_, normals_, motion_);
     const double points = static_cast<double>(surface_.vertex_count() * kFrames);
     EXPECT_NEAR(error.rms, best / std::sqrt(points), 1e-7);

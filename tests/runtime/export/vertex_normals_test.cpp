@@ -122,7 +122,7 @@ TEST(VertexNormals, HaveTheDerivativesOfCentralDifferences) {
     VertexArray ahead = mesh.vertices, behind = mesh.vertices;
     ahead.reshaped<Eigen::RowMajor>() += kStep * displacements.col(column);
     behind.reshaped<Eigen::RowMajor>() -= kStep * displacements.col(column);
-    // Of vertices at one place the displacements differ, so that triangles open: sums are still shared.
+    // Displacements differ between vertices at one place, so that triangles open: sums are still shared.
     const VertexArray difference = (normals.at(ahead) - normals.at(behind)) / (2 * kStep);
     const double error = (found.col(column) - difference.reshaped<Eigen::RowMajor>()).cwiseAbs().maxCoeff();
     EXPECT_LT(error, 1e-6 * difference.cwiseAbs().maxCoeff());

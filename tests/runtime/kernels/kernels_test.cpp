@@ -305,7 +305,7 @@ TEST(NearestRotationTest, IsThatOfTheSingularVectors) {
     }
 }
 
-// Where two stretches add up to nothing the rotation is not unique: it is one, and of nearly the largest trace.
+// The rotation is not unique where two stretches add up to nothing: it is one, and of nearly the largest trace.
 TEST(NearestRotationTest, IsARotationOfLargestTraceWhereItIsNotUnique) {
   Panel panel;
   const Eigen::Vector3d cases[] = {{1, 1, -1},       {1, 0, 0},   {1, 0.5, -0.5},       {0, 0, 0},

@@ -41,7 +41,7 @@ TEST_P(LaneVectorsTest, SumsAndProductsAreThoseOfEachLane) {
   }
 }
 
-// What is not chosen keeps its bits, whatever stands beside it.
+// Lanes that are not chosen keep their bits, whatever stands beside them.
 TEST_P(LaneVectorsTest, TakesTheChosenAlone) {
   const LaneRows to = random_rows(modes(), 2);
   LaneRows from = random_rows(modes(), 1), chosen(kLanes, 1);

@@ -166,7 +166,7 @@ TEST(TriangleKernels, WhatIsApproachableIsKept) {
   EXPECT_GT(left, 500);
 }
 
-/// Where a triangle and its point have moved as one rigid body, nothing is.
+/// A triangle and its point that have moved as one rigid body are not approachable.
 TEST(TriangleKernels, NothingOfARigidMotionIsApproachable) {
   const Triangles at_rest(7);
   Triangles triangles = at_rest;
@@ -225,7 +225,7 @@ void set_query(const Box& box, double (&numbers)[6]) {
     numbers[3 + axis] = box.max()[axis];
   }
 }
-/// Of any two points of either, by their corners: the distance is convex.
+/// Largest distance of any two points of either, by their corners: the distance is convex.
 double farthest(const Box& a, const Box& b) {
   double most = 0;
   for (int i = 0; i < 8; ++i)

@@ -19,7 +19,7 @@ using Json = nlohmann::json;
 using test::Bar;
 using ::testing::HasSubstr;
 
-/// What a kind of body carries from step to step differs; each of these has something that the others have not.
+/// Kinds of bodies differ in what they carry from step to step; each of these has something that the others have not.
 struct Case {
   const char* name;
   test::BarOptions bar;

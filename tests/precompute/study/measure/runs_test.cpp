@@ -68,7 +68,7 @@ TEST_F(Runs, WithAllModesAreTheFullSpace) {
       << "it does not move";
 }
 
-// Of a free body the two integrate a turn in different ways, to second order in the time step.
+// The two integrate a free body's turn in different ways, to second order in the time step.
 TEST_F(Runs, OfAFreeBodyComeNearerToTheFullSpaceWithTheTimeStep) {
   make({.cells = {2, 1, 1}, .free = true});
   SceneConfig config = scene();
@@ -104,7 +104,7 @@ TEST_F(Runs, OfTheFullSpaceMayTakeOtherSteps) {
     return trajectory_errors(frames, runs.back(), bar_.model.object->mesh.vertices, mass, false).position.mean;
   };
   EXPECT_GT(error(runs[0]), 1e-6) << "nothing to come nearer to";
-  // Of second order (1 - 1/256) / (1/4 - 1/256) = 4.05; steps that are not endlessly small a little less.
+  // Second order makes (1 - 1/256) / (1/4 - 1/256) = 4.05; steps that are not endlessly small a little less.
   EXPECT_GT(error(runs[0]) / error(runs[1]), 3.5);
   EXPECT_LT(error(runs[0]) / error(runs[1]), 4.5);
 }
@@ -134,7 +134,7 @@ TEST_F(Runs, FindTheReboundOfAFreeBody) {
     ASSERT_LT(rebound.time, 0.14) << "frames after it";
     const Eigen::Vector3d way = centre(frames->positions[2]) - centre(frames->positions[1]);
     const Eigen::Vector3d expected = way / 0.02 - config.gravity * (0.15 - rebound.time);
-    // Of one step of gravity, for the steps of backward Euler next to contact.
+    // The tolerance is one step of gravity, for the steps of backward Euler next to contact.
     EXPECT_LE((rebound.velocity - expected).norm(), 10 * config.time_step) << rebound.velocity.transpose();
     EXPECT_GT(rebound.velocity.z(), 0.1) << "it bounces";
   }

@@ -68,7 +68,7 @@ TEST_F(ExactModels, TakeAllElements) {
   EXPECT_LE(apart(reduced(scene_, model), full), 1e-7);
 }
 
-// Where vertices of the pose are those of the object, or are mapped to them.
+// Vertices of the pose are those of the object, or are mapped to them.
 TEST(Correspondence, IsKnownOfTheObjectsOwnMeshAndOfMaps) {
   const auto model = test::make_bar({.cells = {2, 1, 1}}).model;
   ObjectInput object;

@@ -160,7 +160,7 @@ TEST_F(SceneStudyTest, MomentumOfAFreeBodyIsKept) {
   EXPECT_THAT(range(study, "speed").safe, Not(HasSubstr("not tested")));
 }
 
-// Where the scene itself comes to rest every run is asked to, and starts are asked to come back to where it ends.
+// Every run is asked to come to rest where the scene itself does, and starts are asked to come back to where it ends.
 TEST_F(SceneStudyTest, StartsComeBackToWhereTheSceneEnds) {
   make({.cells = {2, 1, 1}, .material = MaterialModel::kStableNeoHookean});
   const json damped{{"damping", {{"mass", 20}, {"stiffness", 0.02}}}, {"steps", 600}};
@@ -175,7 +175,7 @@ TEST_F(SceneStudyTest, StartsComeBackToWhereTheSceneEnds) {
   EXPECT_THAT(still_moving.not_tested, Contains(HasSubstr("rest, return: the scene itself does not come to rest")));
 }
 
-// Of a bar with all its modes, clamped at x = 0, along which it is longest.
+// A bar with all its modes, clamped at x = 0, along which it is longest.
 TEST_F(SceneStudyTest, StartsAreTheBodyFlatAndMirrored) {
   make({.cells = {3, 1, 1}});
   const WorldConfig config = load_world(scene(json::object()));

@@ -180,7 +180,7 @@ TEST(Results, OfAMaterialThatResistsInversionGiveOtherAdvice) {
   EXPECT_THAT(result.truth_warning(), HasSubstr("use smaller loads or a finer mesh"));
 }
 
-// Of the same numbers: a free body by its shape, any other by its position.
+// The same numbers count by the shape for a free body, by the position for any other.
 TEST(Results, AreChosenByTheHeadline) {
   StudyResult result = some_result();
   EXPECT_EQ(outcomes(result.points)[0].error, 0.1);
@@ -283,7 +283,7 @@ TEST(Report, OfPointsThatAllFailedIsThere) {
   EXPECT_THAT(report_html(result), HasSubstr("went &quot;wrong&quot;"));
 }
 
-// Of a large body the picture stays small.
+// The picture of a large body stays small.
 TEST(BodiesPicture, IsSmall) {
   const TetMesh mesh = test::box_mesh({22, 22, 11}, {2, 2, 1});
   const TriangleArray surface = surface_triangles(mesh.tets);

@@ -243,7 +243,7 @@ TEST(BodyContact, WhatEarlierStepsFoundChangesNoCandidate) {
   EXPECT_GT(served, kSteps / 2);
 }
 
-// Of a body that moves fast against itself only what velocities may bring near is looked at. Prongs that have closed to
+// A body that moves fast against itself looks only at what velocities may bring near. Prongs that have closed to
 // less than half of their distance at rest: who is near after the step on its way is a candidate.
 TEST(BodyContact, WhatMovesFastAgainstItselfFindsWhatComesNear) {
   const test::Fork fork(1e-3, /*free=*/false, /*meets_itself=*/true);

@@ -126,7 +126,7 @@ TEST(BodySurface, NothingApproachesItselfWithinTheBounds) {
   std::uniform_real_distribution<double> unit(-1, 1);
   SurfaceShape shape = surface.make_shape();
   double nearest_to_bound = 1;
-  // Of distances to those at rest, of vertices [first, last) to points of triangles.
+  // Smallest ratio of distances to those at rest, of vertices [first, last) to points of triangles.
   const auto smallest_ratio = [&](const Eigen::VectorXd& q, Eigen::Index first, Eigen::Index last) {
     VertexArray x = mesh.vertices;
     x.reshaped<Eigen::RowMajor>() += bar.basis() * q;
@@ -178,7 +178,7 @@ TEST(BodySurface, NothingApproachesItselfWithinTheBounds) {
   EXPECT_GT(farthest, 1.2);
 }
 
-// What parts of a body come near to a vertex of it, by the definition: of all triangles.
+// Parts of a body that come near to a vertex of it, by the definition: of all triangles.
 TEST(BodySurface, WhatApproachesIsTheNearestOfAllTrianglesThatDo) {
   const test::Bar bar = test::make_bar({.cells = {6, 2, 3}, .lengths = {0.6, 0.2, 0.3}, .slot_start = 2});
   const TetMesh& mesh = bar.model.object->mesh;

@@ -67,7 +67,7 @@ TEST_P(EachShape, IsNoNearerToABallThanItsCentreLessTheRadius) {
   }
 }
 
-/// Of a cloud of surface points, how near the nearest is.
+/// Distance of the nearest of a cloud of surface points.
 double sampled_distance(const std::vector<Eigen::Vector3d>& cloud, const Eigen::Vector3d& point) {
   double nearest = 1e9;
   for (const Eigen::Vector3d& sample : cloud) nearest = std::min(nearest, (sample - point).norm());

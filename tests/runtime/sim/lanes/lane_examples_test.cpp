@@ -28,7 +28,7 @@ Problem random_problem(Eigen::Index count, std::uint32_t seed) {
   return {test::random_matrix(9, count, seed), test::random_matrix(9, kModes, seed + 1000)};
 }
 
-/// Of the candidates of every instruction set at the poses in the rows of q: [kLanes x K] each.
+/// Weights by the candidates of every instruction set at the poses in the rows of q: [kLanes x K] each.
 std::vector<test::LaneRows> weights_in_lanes(const ExampleWeights& solver, const test::LaneRows& q) {
   const test::LaneRows load =
       (q * solver.load_slope().topRows(solver.examples()).transpose()).rowwise() + solver.load_at_rest().transpose();

@@ -61,7 +61,7 @@ struct Found {
   LaneNumbers converged;
 };
 
-/// What the difference of a vector is of it.
+/// Difference of a vector, relative to it.
 double relative(const Eigen::VectorXd& found, const Eigen::VectorXd& expected) {
   return (found - expected).norm() / (expected.norm() + 1e-9);
 }

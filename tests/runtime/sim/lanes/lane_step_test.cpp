@@ -210,7 +210,7 @@ TEST(LaneStep, NoResultDependsOnWhatAWorkspaceHasSeen) {
   for (std::size_t i = 0; i < 8; ++i) EXPECT_EQ(difference(*model, unknown.states[i], known.states[i]), 0) << i;
 }
 
-// What Newton's method needs more for: a body pushed flat so that Hessians are indefinite, and one without a number.
+// Newton's method needs more for these: a body pushed flat so that Hessians are indefinite, and one without a number.
 TEST(LaneStep, ABodyThatNeedsMoreStepsByItself) {
   const Kind kind{.tolerance = 1e-9};
   const Bar bar = test::make_bar();

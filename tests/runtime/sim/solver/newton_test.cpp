@@ -11,7 +11,7 @@ struct Function {
   double (*value_of)(double);
   double (*slope_of)(double);
   double (*curvature_of)(double);
-  double magnitude = 1;  ///< of the terms of the value
+  double magnitude = 1;  ///< size of the terms of the value
 
   PotentialValue value(const Eigen::VectorXd& x) { return {value_of(x[0]), magnitude}; }
   PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) {

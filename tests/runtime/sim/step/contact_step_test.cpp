@@ -142,7 +142,7 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
       ++unconverged;
       const FreeState& after = free_state(dropped.state);
       const Eigen::Vector3d of_way = dropped.mass() / dt * (after.position - before.position);
-      // What is left: all of the flight without contacts and a share of what they gave; less of the flight only where
+      // The rest is all of the flight without contacts and a share of what they gave; less of the flight only where
       // that is not enough, since the pose alone has the energy.
       Eigen::Matrix<double, 3, 2> parts;
       parts.col(0) = before.linear_momentum + dt * dropped.mass() * dropped.scene.gravity;
@@ -167,7 +167,7 @@ TEST(ContactStep, AStepThatDoesNotConvergeGivesTheMomentumOfItsWay) {
   EXPECT_GT(given_back, 0);
 }
 
-// What friction holds, it holds where the body is put; left behind, its anchors would draw the body back.
+// Friction holds the body where it is put; left behind, its anchors would draw the body back.
 TEST(ContactStep, FrictionGoesWithABodyThatIsPutElsewhere) {
   Dropped dropped(2e-3, 1e7, 0.5, 2e4);
   dropped.scene.mass_damping = 2;

@@ -147,7 +147,7 @@ TEST(SceneKeys, AreTheSettingsOfTheStepsToTheLastBit) {
   }
 }
 
-// What a growing kappa adds to the energy is the integral of kappa' q^T P q / 2: exact in the limit, of second order.
+// A growing kappa adds to the energy the integral of kappa' q^T P q / 2: exact in the limit, of second order.
 TEST(SceneKeys, TheEnergyOfARampIsItsWork) {
   const HeldBar held;
   const Model& model = *held.model;

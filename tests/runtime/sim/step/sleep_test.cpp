@@ -52,7 +52,7 @@ struct Hanging {
   std::optional<Workspace> workspace;
 };
 
-// What the energy allows is all that sleep changes: beside the body that never sleeps.
+// Sleep changes no more than the energy allows: beside the body that never sleeps.
 TEST(Sleep, ABodyAtRestStaysWhereItIs) {
   for (const int examples : {0, 3}) {
     Hanging body({.examples = examples}), awake({.examples = examples});

@@ -35,7 +35,7 @@ double error_over_bound(const VertexArray& rest, const RowMatrix& basis, const E
   const Eigen::VectorXd moved = basis.cwiseAbs() * q.cwiseAbs();
   double worst = 0;
   for (Eigen::Index i = 0; i < floats; ++i) {
-    // Of the displacement: each term is a product of two rounded numbers and takes part in at most r additions; of the
+    // Rounding of the displacement: each term is a product of two rounded numbers and is in at most r additions; of the
     // sum: the rest position is rounded, and so is the last addition. The factor takes in the terms in u^2.
     const double rest_size = std::abs(rest(i / 3, i % 3));
     const double bound = 1.001 * u * ((r + 3) * moved[i] + rest_size + std::abs(exact[i]));

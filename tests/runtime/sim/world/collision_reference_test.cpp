@@ -89,7 +89,7 @@ TEST_P(CollisionReference, BodiesOfAllModesCollideAsTheFullSpaceDoes) {
     FullCollision::Motion free = motion_of(blocks, start.motions[static_cast<std::size_t>(k)]);
     flown.segment(k * size, size) = free.x + kTime * free.v;
   }
-  // What the collision made of the motion.
+  // Change of the motion by the collision.
   const double made = (expected - flown).norm();
   const auto error = [&](const Eigen::VectorXd& found) { return (found - expected).norm() / made; };
   // Backward Euler is of first order, with a contact that begins and ends in between; the rest is 6,000 steps of the

@@ -33,7 +33,7 @@ struct Hosted {
   void join(World& world) {
     for (const auto& state : states) world.add({&model, &scene, nullptr}, *state);
   }
-  /// Of each body, from a run of one that is by itself [r]; sums are taken in another order: 1e-13 of a step.
+  /// Expects of each body a run of one that is by itself [r]; sums are taken in another order: 1e-13 of a step.
   void expect_alone(int steps) const {
     State alone = make_state(model);
     Workspace workspace(model, scene);

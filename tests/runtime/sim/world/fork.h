@@ -37,7 +37,7 @@ struct Fork {
   double closing(Eigen::Index j) const {
     return blocks.bar.basis()(3 * below.front() + 2, j) - blocks.bar.basis()(3 * above.front() + 2, j);
   }
-  /// Of the ends of the prongs, negative where they overlap [m].
+  /// Gap between the ends of the prongs, negative where they overlap [m].
   double gap(const Eigen::VectorXd& q) const {
     double sum = 0.08;
     for (Eigen::Index j = 0; j < q.size(); ++j) sum -= closing(j) * q[j];

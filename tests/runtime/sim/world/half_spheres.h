@@ -22,9 +22,9 @@ struct HalfSphereOptions {
   double radius = 1;
   double youngs_modulus = 1e6, poisson_ratio = 0.3;
   double finest = 0.01;      ///< edges of the meridian at the pole [m]
-  double fine_until = 0.12;  ///< how far from the pole they are that fine [m]
-  double growth = 1.3;       ///< of an edge over the one before it, beyond
-  int sectors = 24;          ///< of the circle
+  double fine_until = 0.12;  ///< distance from the pole up to which they are that fine [m]
+  double growth = 1.3;       ///< ratio of an edge to the one before it, beyond
+  int sectors = 24;          ///< sectors of the circle
 };
 
 /// Its meridian, in linear elasticity of motions that are the same all around: two coordinates for each node, away from
@@ -110,7 +110,7 @@ class HalfSphere {
     return places;
   }
 
-  /// Of a quarter of a disk between its pole, its centre, the equator and the middle of its arc (Coons patch).
+  /// Nodes of a quarter of a disk between its pole, its centre, the equator and the middle of its arc (Coons patch).
   void make_nodes() {
     const double R = options_.radius, quarter = std::numbers::pi / 4;
     const std::vector<double> along = graded(R * quarter), down = graded(R);

@@ -16,7 +16,7 @@ struct Pressed {
   double contact_radius = 0;  ///< farthest vertex that is pressed [m]
 };
 
-/// What Hertz's theory says of two equal spheres of a radius R, the approach d [m] of whose centres is 2 a^2 / R, a the
+/// Hertz's theory of two equal spheres of a radius R, the approach d [m] of whose centres is 2 a^2 / R, a the
 /// radius of the contact (Johnson, Contact Mechanics, 1985, section 4.2).
 struct Hertz {
   Hertz(const HalfSphereOptions& sphere, double contact_radius)
@@ -93,7 +93,7 @@ TEST(Hertz, TwoSpheresArePressedTogether) {
     RecordProperty("force_" + std::to_string(radius), std::to_string(run.force / hertz.force));
     EXPECT_NEAR(run.force, hertz.force, 0.05 * hertz.force);
     EXPECT_NEAR(run.contact_radius, radius, options.finest);
-    // Of few edges across the contact: the mean over the vertex's share of the surface.
+    // Few edges lie across the contact: the mean over the vertex's share of the surface.
     EXPECT_NEAR(run.middle_force / sphere.pole_area(), hertz.pressure, 0.08 * hertz.pressure);
     approaches.push_back(hertz.approach);
     forces.push_back(run.force);

@@ -14,13 +14,13 @@ namespace exmat::runtime::test {
 /// Two equal bodies that fly at each other.
 struct Meeting {
   double youngs_modulus = 1e4;  ///< [Pa]
-  double speed = 10;            ///< of either [m/s]
+  double speed = 10;            ///< speed of either [m/s]
   double stiffness = 1e7;       ///< [N/m^3]
   double time_step = 1.0 / 60;  ///< [s]
-  bool damped = false;          ///< of the contact, beside friction of 0.4
-  int bodies = 0;               ///< of kMeetingBodies
-  int start = 0;                ///< of kMeetingStarts
-  int full = 0;                 ///< how many of the two step in all vertices
+  bool damped = false;          ///< damping in the contact, beside friction of 0.4
+  int bodies = 0;               ///< index into kMeetingBodies
+  int start = 0;                ///< index into kMeetingStarts
+  int full = 0;                 ///< number of the two that step in all vertices
 };
 
 /// A cube and a bar.
@@ -28,7 +28,7 @@ inline const std::array<exmat::test::BarOptions, 2> kMeetingBodies{
     {{.cells = {3, 3, 3}, .lengths = {1, 1, 1}, .free = true, .linear_modes = 12},
      {.cells = {4, 2, 2}, .lengths = {1, 0.4, 0.4}, .free = true, .linear_modes = 12}}};
 
-/// Where the second begins, and how it is turned about (1, 2, 0.5): flush, beside, turned.
+/// Start of the second: its place, and its turn about (1, 2, 0.5): flush, beside, turned.
 struct MeetingStart {
   Eigen::Vector3d offset;
   double angle = 0;
@@ -36,9 +36,9 @@ struct MeetingStart {
 inline const std::array<MeetingStart, 3> kMeetingStarts{
     {{{1.1, 0, 0}, 0}, {{1.1, 0.13, 0.09}, 0}, {{1.3, -0.07, 0.11}, 0.6}}};
 
-/// What came of it.
+/// Result of a meeting.
 struct MeetingResult {
-  double peak = 0;   ///< of kinetic and elastic energy and that of contacts, over the start
+  double peak = 0;   ///< largest sum of kinetic and elastic energy and that of contacts, over the start
   double drift = 0;  ///< largest change of linear and of angular momentum, over what either body began with
   int steps = 0, touching = 0, non_finite = 0, unconverged = 0;
 };

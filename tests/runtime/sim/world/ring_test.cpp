@@ -61,7 +61,7 @@ struct BendingBar {
   }
   Eigen::VectorXd reduced(const Eigen::VectorXd& field) const { return bar.basis().transpose() * (bar.mass * field); }
 
-  /// How deep the vertices of its second half are in the first [m].
+  /// Depth of the deepest vertex of its second half in the first [m].
   double deepest(const Eigen::VectorXd& q) const {
     const ObjectData& object = *bar.model.object;
     const VertexArray now =
@@ -100,7 +100,7 @@ TEST(Ring, OfABarThatIsBentTouchesItsOwnEnd) {
       State state = make_state(*ring.model, start, Eigen::VectorXd::Zero(kArcs));
       prepare_contacts(*ring.model, 0, state);
       Workspace scratch(*ring.model, ring.scene);
-      // What holds an arc of 1.15 turns.
+      // Force that holds an arc of 1.05 turns.
       const Eigen::VectorXd held = ring.reduced(ring.arc(2.1 * std::numbers::pi));
       state.applied_force = ring.bar.basis().transpose() * full_internal_force(ring.bar, ring.bar.basis() * held);
       World world({{{ring.model.get(), &ring.scene, ring.surface}, std::move(state)}}, {1e8, 1e5, 0.3});

@@ -64,7 +64,7 @@ struct Momenta {
   Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();
 };
 
-/// Of all free bodies, angular about the origin.
+/// Momenta of all free bodies, angular about the origin.
 inline Momenta momenta(const Blocks& blocks, const World& world) {
   Momenta sum;
   for (int i = 0; i < world.count(); ++i) {

@@ -32,7 +32,7 @@ TEST_F(Documents, SayWhatIsSet) {
   EXPECT_EQ(settings.forces[2].weights, (std::vector<double>{0.25, 0.75}));
 }
 
-// What the run time's own reader finds in the file.
+// The run time's own reader finds in the file what was set.
 TEST_F(Documents, AreSavedAsScenesOfTheRunTime) {
   Settings settings = scene_.settings();
   settings.integrator = "newmark";

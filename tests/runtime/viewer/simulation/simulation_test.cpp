@@ -24,7 +24,7 @@ class Simulations : public ::testing::Test {
   Simulation make(const std::string& text = kScene) {
     return {{SceneDocument::open(folder_.write("scene.json", text))}, EXMAT_SURFACE_AUTO};
   }
-  /// Of a world by the library alone.
+  /// Hash of a world by the library alone.
   static std::uint64_t hash_of(const std::filesystem::path& scene, std::size_t bodies, std::int64_t steps) {
     World world = World::from_scene(scene.string());
     EXPECT_EQ(world.size(), bodies);
