@@ -2,7 +2,7 @@
 import { PLAIN, SIMD } from "./bytes.js";
 import { hasSimd, packageOf } from "./runtime.js";
 
-export { Batch, BadInput, Body, ExmatError, InvalidArgument, NonFinite, Points } from "./runtime.js";
+export { Batch, BadInput, Body, ExmatError, Hand, InvalidArgument, NonFinite, Points, Surface } from "./runtime.js";
 
 const moduleBytes = () => Uint8Array.from(atob(hasSimd() ? SIMD : PLAIN), (letter) => letter.charCodeAt(0));
 

@@ -95,6 +95,28 @@ export interface Energies {
   contact: number;
 }
 
+/** How an attachment holds its vertices. */
+export interface Attachment {
+  /** Each vertex, their mean, or their mean by a spring; "fixed" */
+  kind?: "fixed" | "ball" | "spring";
+  /** Of a spring, > 0 [N/m]; 1e4 */
+  stiffness?: number;
+  /** Of a spring, >= 0 [N s/m]; 0 */
+  damping?: number;
+  /** Beyond which it holds no longer, > 0 [N]; Infinity */
+  breakForce?: number;
+}
+
+/** Load of the body on the frame of an attachment. */
+export interface AttachmentLoad {
+  /** [N] */
+  force: number[];
+  /** About the frame's origin [N m] */
+  torque: number[];
+  /** True where that was more than the attachment bears. */
+  broken: boolean;
+}
+
 /** Memory of the module, which free() gives back; `using` calls it where the host has Symbol.dispose. */
 interface Owner {
   free(): void;
@@ -105,6 +127,44 @@ export class Points implements Owner {
   private constructor();
   /** k */
   readonly length: number;
+  /** Places at rest [3k] [m], a copy; not of allVertices(). */
+  readonly rest: Float64Array;
+  free(): void;
+}
+
+/** Triangles to draw, and their points. */
+export class Surface implements Owner {
+  constructor(model: Model, kind?: "auto" | "object" | "render");
+  readonly model: Model;
+  /** The boundary of the object's tets, or the render mesh. */
+  readonly kind: "object" | "render";
+  /** Its points, to be read and pushed; they go with the surface. */
+  readonly points: Points;
+  /** Three of its points of each triangle, outward [3f]. */
+  readonly triangles: Uint32Array;
+  /** The vertex of the object at each point, of a render mesh the nearest one at rest [k], a copy. */
+  readonly vertices: Uint32Array;
+  /** One point on each of `triangles` [k], at the corners' `shares` [3k], which add up to 1. */
+  pointsOn(triangles: Numbers, shares: Numbers): Points;
+  free(): void;
+}
+
+/**
+ * A damped spring from a place of a body's surface to a target: the hand of the viewer. Before each step:
+ * body.clearForces(), then pull().
+ */
+export class Hand implements Owner {
+  /** At the corners' `shares` [3] of a triangle of the surface. */
+  constructor(body: Body, surface: Surface, triangle: number, shares: Numbers);
+  readonly body: Body;
+  /** Where the hand pulls to [3], world [m]. */
+  target: number[];
+  /** Where the held place was before the last step [3] [m]. */
+  readonly point: number[];
+  /** On the body in the last step [3] [N]. */
+  readonly force: number[];
+  pull(): void;
+  /** Lets go: clears the forces on the body. */
   free(): void;
 }
 
@@ -145,6 +205,25 @@ export class Body implements Owner {
   readonly hash: string;
   /** Adds an obstacle to the body's own world; its id. */
   addObstacle(obstacle: Obstacle): number;
+  /** Way of the points' mean by 1 N that they share, in one step [m/N]; 0 unless the last step was in all vertices. */
+  pointCompliance(points: Points): number;
+  /** Bones [12b] at the end of the last step: of each a 3 x 4 matrix by rows, to the world. */
+  readonly bones: Float64Array;
+  /**
+   * Where the bones [12b] are at the end of the next step, and of those after it until the next call. `teleport`: the
+   * body is there at once, without a motion that led there.
+   */
+  setBones(transforms: Numbers, options?: { teleport?: boolean }): void;
+  /**
+   * Holds vertices of the object by a frame [12] of the host from the next step on; the attachment's id. The model's
+   * space is "full" or "auto".
+   */
+  attach(vertices: Numbers, frame: Numbers, attachment?: Attachment): number;
+  /** Where the frame [12] is at the end of the next step, and of those after it until the next call. */
+  moveAttachment(id: number, frame: Numbers): void;
+  detach(id: number): void;
+  /** In the last step. */
+  attachmentLoad(id: number): AttachmentLoad;
   free(): void;
 }
 
@@ -183,12 +262,24 @@ export interface Model extends Owner {
   readonly examples: number;
   /** [s] */
   readonly timeStep: number;
+  /** Of a free body [kg]; 0 of one with fixed vertices. */
+  readonly mass: number;
+  /** b; parents come before their children, -1 is that of a root. */
+  readonly bones: readonly { name: string; parent: number }[];
+  /** Of the bones; duration [s] */
+  readonly animations: readonly { name: string; duration: number }[];
   readonly Body: new () => Body;
   readonly Batch: new (count: number) => Batch;
   allVertices(): Points;
   points(ids: Numbers): Points;
   /** Points of the rest shape [3k] [m]. */
   pointsAt(xyz: Numbers): Points;
+  /** Triangles to draw: "auto" is the render mesh where the pack has one. */
+  surface(kind?: "auto" | "object" | "render"): Surface;
+  /** Bones [12b] where the mesh is at rest, as Body.bones. */
+  boundBones(): Float64Array;
+  /** Bones [12b] at a time [s] of an animation, which is held at its ends. */
+  animatedBones(animation: number, time: number): Float64Array;
   exampleName(example: number, region?: number): string;
   /** Corners [3f] of the triangles of the object's boundary, numbers of vertices. */
   triangles(): Uint32Array;

@@ -1,6 +1,6 @@
 import { hasSimd, packageOf } from "./runtime.js";
 
-export { Batch, BadInput, Body, ExmatError, InvalidArgument, NonFinite, Points } from "./runtime.js";
+export { Batch, BadInput, Body, ExmatError, Hand, InvalidArgument, NonFinite, Points, Surface } from "./runtime.js";
 
 async function moduleBytes() {
   const url = hasSimd() ? new URL("./exmat.wasm", import.meta.url) : new URL("./exmat_plain.wasm", import.meta.url);

@@ -31,6 +31,8 @@ const CHOICES = {
   space: ["reduced", "full", "auto"],
 };
 const SHAPES = ["plane", "sphere", "box", "capsule", "mesh", "heightField"];
+const SURFACES = ["auto", "object", "render"];
+const ATTACHMENTS = ["fixed", "ball", "spring"];
 
 const snakeCase = (name) => name.replace(/[A-Z]/g, (letter) => "_" + letter.toLowerCase());
 
@@ -141,7 +143,7 @@ class Module {
     return this.borrow(bytes, (address) => {
       this.call(`${name}_default`, address, bytes);
       for (const [member, value] of Object.entries(given ?? {})) {
-        const names = member === "shape" ? SHAPES : CHOICES[member];
+        const names = { shape: SHAPES, kind: ATTACHMENTS }[member] ?? CHOICES[member];
         const number = names === undefined ? value : names.indexOf(value);
         if (number === -1 && names !== undefined) throw new InvalidArgument(`${member} = "${value}": expected one of ${names.join(", ")}`);
         this.writeMember(name, address, snakeCase(member), number);
@@ -185,9 +187,44 @@ const whole = (value, name) => {
 const doubles = (values) => (values instanceof Float64Array ? values : Float64Array.from(values));
 
 export class Points extends Owner {
-  constructor(model, name, ...values) {
-    super(model.module, model.module.create(name, model.handle, ...values), (handle) => model.module.exports.exmat_points_destroy(handle));
-    this.length = Number(this.module.exports.exmat_points_count(this.handle));
+  constructor(module, handle, free = (freed) => module.exports.exmat_points_destroy(freed)) {
+    super(module, handle, free);
+    this.length = Number(module.exports.exmat_points_count(handle));
+  }
+  /** Places of the points at rest [3k] [m]. */
+  get rest() {
+    return this.module.fill(new Float64Array(3 * this.length), (address) => this.module.call("points_read_rest", this.handle, address, BigInt(3 * this.length)));
+  }
+}
+
+/** Triangles to draw, and their points. */
+export class Surface extends Owner {
+  constructor(model, kind = "auto") {
+    const { module } = model, number = SURFACES.indexOf(kind);
+    if (number === -1) throw new InvalidArgument(`kind = "${kind}": expected one of ${SURFACES.join(", ")}`);
+    super(module, module.create("surface_create", model.handle, number), (handle) => module.exports.exmat_surface_destroy(handle));
+    this.model = model;
+    this.kind = SURFACES[module.exports.exmat_surface_kind(this.handle)];
+    this.points = new Points(module, module.exports.exmat_surface_points(this.handle), () => {});
+    const count = 3 * Number(module.exports.exmat_surface_triangles(this.handle));
+    this.triangles = module.fill(new Uint32Array(count), (address) => module.call("surface_read_triangles", this.handle, address, BigInt(count)));
+  }
+  /** The vertex of the object at each of the points, of a render mesh the nearest one. */
+  get vertices() {
+    const count = this.points.length;
+    const numbers = this.module.fill(new BigInt64Array(count), (address) => this.module.call("surface_read_vertices", this.handle, address, BigInt(count)));
+    return Uint32Array.from(numbers, Number);
+  }
+  /** One point on each of `triangles` [k], at the corners' `shares` [3k]. */
+  pointsOn(triangles, shares) {
+    const { module } = this, numbers = BigInt64Array.from(triangles, (id) => whole(id, "triangle")), given = doubles(shares);
+    if (given.length !== 3 * numbers.length) throw new InvalidArgument(`shares: expected 3 for each of ${numbers.length} triangles, found ${given.length}`);
+    return new Points(module, module.lend(numbers, (ids) => module.lend(given, (address) =>
+      module.create("points_create_on_surface", this.handle, ids, address, BigInt(numbers.length)))));
+  }
+  free() {
+    super.free();
+    this.points.handle = 0;
   }
 }
 
@@ -251,6 +288,45 @@ export class Body extends Owner {
   /** Hash of the bits of its state, 16 hexadecimal digits: that of `exmat-runtime run`. */
   get hash() { return hashOf(this.module, [this]); }
   addObstacle(obstacle) { return addObstacle(this.module, this.module.exports.exmat_body_world(this.handle), obstacle); }
+  /** Compliance of the points in one step [m/N]; 0 unless the last step was in all vertices. */
+  pointCompliance(points) {
+    return this.module.fill(new Float64Array(1), (address) => this.module.call("body_read_point_compliance", this.handle, points.handle, address))[0];
+  }
+  /** Transforms [12b] of all bones at the end of the last step. */
+  get bones() { return readBones(this.model, "body_read_bones", this.handle); }
+  setBones(transforms, { teleport = false } = {}) {
+    const numbers = ofLength(transforms, 12 * this.model.bones.length, "transforms");
+    this.module.lend(numbers, (address) => this.module.call("body_set_bones", this.handle, address, BigInt(this.model.bones.length), Number(teleport)));
+  }
+  /** Holds vertices by a frame [12] of the host from the next step on; the attachment's id. */
+  attach(vertices, frame, attachment) {
+    const { module } = this, numbers = BigInt64Array.from(vertices, (id) => whole(id, "vertex"));
+    return module.lend(numbers, (ids) => module.struct("attachment", attachment, (given) => module.lend(ofLength(frame, 12, "frame"), (place) =>
+      Number(module.integer64("body_attach", this.handle, ids, BigInt(numbers.length), given, place)))));
+  }
+  moveAttachment(id, frame) {
+    this.module.lend(ofLength(frame, 12, "frame"), (address) => this.module.call("body_move_attachment", this.handle, whole(id, "id"), address));
+  }
+  detach(id) { this.module.call("body_detach", this.handle, whole(id, "id")); }
+  /** Force [3] [N] and torque [3] [N m] of the body on the frame in the last step. */
+  attachmentLoad(id) {
+    return this.module.borrow(56, (address) => {
+      this.module.call("body_read_attachment_load", this.handle, whole(id, "id"), address, address + 24, address + 48);
+      const numbers = Array.from(new Float64Array(this.module.memory.buffer, address, 6));
+      const broken = new DataView(this.module.memory.buffer).getInt32(address + 48, true) === 1;
+      return { force: numbers.slice(0, 3), torque: numbers.slice(3), broken };
+    });
+  }
+}
+
+function ofLength(numbers, count, name) {
+  if (numbers.length !== count) throw new InvalidArgument(`${name}: expected ${count} numbers, found ${numbers.length}`);
+  return doubles(numbers);
+}
+
+function readBones(model, name, ...values) {
+  const count = 12 * model.bones.length;
+  return model.module.fill(new Float64Array(count), (address) => model.module.call(name, ...values, address, BigInt(count)));
 }
 
 function hashOf(module, bodies) {
@@ -329,34 +405,141 @@ class ModelOfModule extends Owner {
     this.timeStep = module.exports.exmat_model_time_step(handle);
     this.Body = class extends Body { constructor() { super(model); } };
     this.Batch = class extends Batch { constructor(count) { super(model, count); } };
+    const text = (name, ...values) => module.text(module.exports["exmat_model_" + name](handle, ...values));
+    const each = (count, make) => Array.from({ length: Number(count) }, (_, i) => make(BigInt(i)));
+    this.bones = each(module.exports.exmat_model_bones(handle), (bone) =>
+      ({ name: text("bone_name", bone), parent: Number(module.exports.exmat_model_bone_parent(handle, bone)) }));
+    this.animations = each(module.exports.exmat_model_animations(handle), (animation) =>
+      ({ name: text("animation_name", animation), duration: module.exports.exmat_model_animation_duration(handle, animation) }));
   }
-  allVertices() { return new Points(this, "points_create_all_vertices"); }
+  /** Mass of a free body [kg]; 0 of one with fixed vertices. By the kinetic energy at 1 m/s. */
+  get mass() {
+    if (this.#mass === null) {
+      const body = new Body(this);
+      try {
+        body.motion = { linearVelocity: [1, 0, 0] };
+        this.#mass = 2 * body.energies.kinetic;
+      } catch (error) {
+        if (!(error instanceof InvalidArgument)) throw error;
+        this.#mass = 0;
+      }
+      body.free();
+    }
+    return this.#mass;
+  }
+  #mass = null;
+  #points(name, ...values) { return new Points(this.module, this.module.create(name, this.handle, ...values)); }
+  allVertices() { return this.#points("points_create_all_vertices"); }
   points(ids) {
     const numbers = BigInt64Array.from(ids, (id) => whole(id, "id"));
-    return this.module.lend(numbers, (address) => new Points(this, "points_create_vertices", address, BigInt(numbers.length)));
+    return this.module.lend(numbers, (address) => this.#points("points_create_vertices", address, BigInt(numbers.length)));
   }
   pointsAt(xyz) {
     const numbers = doubles(xyz);
-    return this.module.lend(numbers, (address) => new Points(this, "points_create_at", address, BigInt(numbers.length)));
+    return this.module.lend(numbers, (address) => this.#points("points_create_at", address, BigInt(numbers.length)));
   }
+  surface(kind) { return new Surface(this, kind); }
+  /** Transforms [12b] of all bones where the mesh is at rest. */
+  boundBones() { return readBones(this, "model_read_bones", this.handle); }
+  /** Transforms [12b] of all bones at a time [s] of an animation, which is held at its ends. */
+  animatedBones(animation, time) { return readBones(this, "model_read_animation", this.handle, whole(animation, "animation"), time); }
   exampleName(example, region = -1) {
     return this.module.text(this.module.exports.exmat_model_example_name(this.handle, BigInt(region), BigInt(example)));
   }
   /** Corners [3 f] of the triangles of the object's boundary, numbers of vertices. */
   triangles() {
-    const { module } = this;
-    const surface = module.create("surface_create", this.handle, 1);
-    try {
-      const vertices = new BigInt64Array(Number(module.exports.exmat_points_count(module.exports.exmat_surface_points(surface))));
-      module.fill(vertices, (address) => module.call("surface_read_vertices", surface, address, BigInt(vertices.length)));
-      const count = 3 * Number(module.exports.exmat_surface_triangles(surface));
-      const corners = module.fill(new Int32Array(count), (address) => module.call("surface_read_triangles", surface, address, BigInt(count)));
-      return Uint32Array.from(corners, (corner) => Number(vertices[corner]));
-    } finally {
-      module.exports.exmat_surface_destroy(surface);
-    }
+    const surface = this.surface("object"), { vertices } = surface;
+    const corners = surface.triangles.map((corner) => vertices[corner]);
+    surface.free();
+    return corners;
   }
 }
+
+// The spring of a hand acts with the force of the step before, which is stable where it is slow against the step and the
+// mass that the patch feels at once.
+const HAND_SIZE = 0.06;           // radius over the diagonal of the body's bounds
+const HAND_DELAY = 0.03;          // [s] of the smoothed target
+const STIFFEST = 1e5;             // k / m [1/s^2]
+const STIFFEST_PER_STEP = 0.1;    // k dt^2 / m
+const HAND_DAMPING_RATIO = 0.6;
+const LONGEST = 0.6;              // of the spring, over the same diagonal
+
+const minus = (a, b) => a.map((x, i) => x - b[i]);
+const plus = (a, b, factor) => a.map((x, i) => x + factor * b[i]);
+
+/** A damped spring from a place of a body's surface to a target: the hand of the viewer. */
+export class Hand {
+  #point;
+  #patch;
+  #mass;
+  #longest;
+  #smoothed;
+  constructor(body, surface, triangle, shares) {
+    this.body = body;
+    this.#point = surface.pointsOn([triangle], shares);
+    const { rest } = surface.points, corners = surface.triangles;
+    const place = (point) => Array.from(rest.subarray(3 * point, 3 * point + 3));
+    const centre = [0, 1, 2].reduce((sum, c) => plus(sum, place(corners[3 * triangle + c]), shares[c]), [0, 0, 0]);
+    const bounds = [0, 1, 2].map((axis) => {
+      let least = Infinity, most = -Infinity;
+      for (let i = axis; i < rest.length; i += 3) [least, most] = [Math.min(least, rest[i]), Math.max(most, rest[i])];
+      return most - least;
+    });
+    const diagonal = Math.hypot(...bounds);
+    this.#longest = LONGEST * diagonal;
+    const covered = new Map();
+    corners.forEach((corner, i) => {
+      if (!covered.has(corner) && Math.hypot(...minus(place(corner), centre)) <= HAND_SIZE * diagonal) covered.set(corner, i);
+    });
+    const patch = [...covered.values()];
+    this.#patch = patch.length === 0 ? this.#point
+      : surface.pointsOn(patch.map((i) => Math.floor(i / 3)), patch.flatMap((i) => [0, 1, 2].map((c) => Number(i % 3 === c))));
+    this.#mass = this.#effectiveMass();
+    this.point = this.#read();
+    this.target = [...this.point];
+    this.#smoothed = [...this.point];
+    this.force = [0, 0, 0];
+  }
+  #read() { return Array.from(this.body.readPositions(this.#point)); }
+  /** Inverse of how far an impulse that the points share moves their mean, by the modes and by rigid motion. */
+  #effectiveMass() {
+    const { module, length } = this.#patch, columns = 3 * this.body.model.modes, mean = new Float64Array(columns);
+    const rows = module.fill(new Float32Array(length * columns), (address) =>
+      module.call("points_read_basis", this.#patch.handle, address, BigInt(length * columns)));
+    rows.forEach((value, i) => { mean[i % columns] += value / length; });
+    const { mass } = this.body.model;
+    const inverse = mean.reduce((sum, value) => sum + value * value, 0) / 3 + (mass > 0 ? 3 / mass : 0);
+    return inverse > 0 ? 1 / inverse : 0;
+  }
+  /** Adds the force of the hand for the next step; the caller clears those of the step before. */
+  pull() {
+    const { body } = this, { timeStep } = body.model, before = this.point, smoothedBefore = this.#smoothed;
+    this.point = this.#read();
+    this.#smoothed = plus(this.#smoothed, minus(this.target, this.#smoothed), 1 - Math.exp(-timeStep / HAND_DELAY));
+    const perMass = Math.min(STIFFEST, STIFFEST_PER_STEP / timeStep ** 2);
+    const compliance = body.pointCompliance(this.#patch);
+    const mass = compliance > 0 ? timeStep ** 2 / compliance : this.#mass;
+    let reach = minus(this.#smoothed, this.point);
+    const length = Math.hypot(...reach);
+    if (length > this.#longest) reach = reach.map((x) => x * this.#longest / length);
+    const velocity = minus(minus(this.#smoothed, smoothedBefore), minus(this.point, before)).map((x) => x / timeStep);
+    this.force = plus(reach.map((x) => x * perMass * mass), velocity, 2 * HAND_DAMPING_RATIO * Math.sqrt(perMass) * mass);
+    const each = this.force.map((x) => x / this.#patch.length);
+    body.applyForces(this.#patch, Float64Array.from({ length: 3 * this.#patch.length }, (_, i) => each[i % 3]));
+  }
+  /** Lets go: clears the forces on the body. */
+  free() {
+    if (this.#point.handle === 0) return;
+    if (this.body.handle !== 0) {
+      this.body.clearForces();
+      this.body.restartIntegrator();
+    }
+    this.#patch.free();
+    this.#point.free();
+  }
+}
+if (Symbol.dispose !== undefined)
+  Object.defineProperty(Hand.prototype, Symbol.dispose, { value() { this.free(); } });
 
 /** What the module asks of its host: nothing but what libc links for files, clocks and the end of a process. */
 function imports(holder) {

@@ -96,3 +96,76 @@ test("many refusals leave the stack as it was", async () => {
   const model = await files.load(pack, settings);
   new model.Body().step(10);
 });
+
+const shifted = (x, y, z) => [1, 0, 0, x, 0, 1, 0, y, 0, 0, 1, z];
+const near = (a, b, tolerance) => a.length === b.length && a.every((x, i) => Math.abs(x - b[i]) <= tolerance);
+
+test("an attachment holds its vertices where the frame is, and bears the weight of a free body", async () => {
+  const model = await files.load(join(process.env.EXMAT_PACKS, "falling.exmat"), { gravity: [0, 0, -9.81], stiffnessDamping: 0.05, massDamping: 2, timeStep: 0.005, space: "auto" });
+  const body = new model.Body(), all = model.surface("object"), rest = all.points.rest;
+  const highest = rest.filter((_, i) => i % 3 === 2).reduce((a, b) => Math.max(a, b));
+  const ids = [...all.vertices].filter((_, i) => rest[3 * i + 2] > highest - 1e-6), held = model.points(ids);
+  const before = body.readPositions(held);
+  const id = body.attach(ids, shifted(0, 0, 0));
+  for (let i = 1; i <= 100; ++i) {
+    body.moveAttachment(id, shifted(0, 0, 0.001 * i));
+    body.step();
+  }
+  assert.ok(near(body.readPositions(held), before.map((x, i) => x + (i % 3 === 2 ? 0.1 : 0)), 1e-6));
+  body.step(2000);
+  const { force, broken } = body.attachmentLoad(id), weight = 9.81 * model.mass;
+  assert.ok(near(force, [0, 0, -weight], 1e-3 * weight), `${force} and ${weight}`);
+  assert.equal(broken, false);
+  body.detach(id);
+  assert.throws(() => body.detach(id), files.InvalidArgument);
+  assert.throws(() => body.attach(ids, [1, 0, 0]), files.InvalidArgument);
+  const weak = body.attach(ids, shifted(0, 0, 0.1), { kind: "ball", breakForce: 0.1 * weight });
+  body.step(20);
+  assert.equal(body.attachmentLoad(weak).broken, true);
+  all.free();
+  model.free();
+});
+
+test("bones carry the body: a translated skeleton translates every vertex", async () => {
+  const model = await files.load(join(process.env.EXMAT_PACKS, "character.exmat"), { timeStep: 0.01, massDamping: 1 });
+  assert.equal(model.bones.filter(({ parent }) => parent === -1).length, 1);
+  assert.deepEqual(model.animations.map(({ name }) => name).sort(), ["walk", "wave"]);
+  const body = new model.Body(), points = model.allVertices(), rest = body.readPositions(points), bound = model.boundBones();
+  body.setBones(bound.map((x, i) => x + (i % 12 === 3 ? 2 : 0)), { teleport: true });
+  body.step();
+  assert.ok(near(body.readPositions(points), rest.map((x, i) => x + (i % 3 === 0 ? 2 : 0)), 1e-4));
+  const { duration } = model.animations[0];
+  assert.deepEqual(model.animatedBones(0, duration), model.animatedBones(0, duration + 1));
+  body.setBones(model.animatedBones(0, 0), { teleport: true });
+  body.step();
+  assert.ok(near(body.bones, model.animatedBones(0, 0), 1e-9));
+  assert.throws(() => body.setBones([1, 2]), files.InvalidArgument);
+  model.free();
+});
+
+test("a hand at rest: its force's work is the elastic energy of a small displacement", async () => {
+  const model = await files.load(pack, { timeStep: 0.005, stiffnessDamping: 0.02, massDamping: 2, space: "auto" });
+  for (const space of ["reduced", "full"]) {
+    const body = new model.Body(), surface = model.surface(), { rest } = surface.points;
+    body.space = space;
+    let far = 0;
+    for (let i = 0; i < surface.points.length; ++i) if (rest[3 * i] > rest[3 * far]) far = i;
+    const corner = surface.triangles.indexOf(far), shares = [0, 1, 2].map((c) => Number(corner % 3 === c));
+    const hand = new files.Hand(body, surface, Math.floor(corner / 3), shares), begun = hand.point;
+    hand.target = [begun[0], begun[1], begun[2] + 0.01];
+    for (let i = 0; i < 3000; ++i) {
+      body.clearForces();
+      hand.pull();
+      body.step();
+    }
+    assert.equal(body.space, space);
+    const work = hand.force.reduce((sum, f, i) => sum + 0.5 * f * (hand.point[i] - begun[i]), 0);
+    assert.ok(work > 0 && Math.abs(body.energies.elastic / work - 1) < 0.05, `${space}: ${body.energies.elastic} and ${work}`);
+    hand.free();
+    body.step(3000);
+    assert.ok(near(body.readPositions(surface.points), Float32Array.from(rest), 1e-4));
+    surface.free();
+    body.free();
+  }
+  model.free();
+});

@@ -28,13 +28,12 @@ exmat_module(exmat_plain)
 
 # The package as npm takes it: build/web/package.
 set(package ${CMAKE_BINARY_DIR}/package)
-set(web ${runtime}/web)
+file(GLOB files CONFIGURE_DEPENDS ${runtime}/web/*.js ${runtime}/web/*.ts ${runtime}/web/package.json ${runtime}/web/README.md)
+list(APPEND files ${exmat_SOURCE_DIR}/LICENSE)
 add_custom_command(OUTPUT ${package}/bytes.js
   COMMAND ${CMAKE_COMMAND} -E make_directory ${package}
-  COMMAND ${CMAKE_COMMAND} -E copy ${web}/package.json ${web}/index.js ${web}/compat.js ${web}/runtime.js ${web}/index.d.ts
-          ${web}/README.md ${exmat_SOURCE_DIR}/LICENSE $<TARGET_FILE:exmat> $<TARGET_FILE:exmat_plain> ${package}
-  COMMAND node ${web}/make_bytes.mjs ${package}
-  DEPENDS exmat exmat_plain ${web}/package.json ${web}/index.js ${web}/compat.js ${web}/runtime.js ${web}/index.d.ts
-          ${web}/README.md ${web}/make_bytes.mjs
+  COMMAND ${CMAKE_COMMAND} -E copy ${files} $<TARGET_FILE:exmat> $<TARGET_FILE:exmat_plain> ${package}
+  COMMAND node ${runtime}/web/make_bytes.mjs ${package}
+  DEPENDS exmat exmat_plain ${files} ${runtime}/web/make_bytes.mjs
   VERBATIM)
 add_custom_target(package ALL DEPENDS ${package}/bytes.js)
