@@ -13,7 +13,7 @@ const element = (id) => document.getElementById(id);
 const view = element("view");
 const renderer = new THREE.WebGLRenderer({ canvas: view, antialias: true });
 const picture = new THREE.Scene(), camera = new THREE.PerspectiveCamera(35, 1, 0.01, 1000);
-const sky = new THREE.HemisphereLight(0xffffff, 0x888888, 1.6), sun = new THREE.DirectionalLight(0xffffff, 1.8);
+const sky = new THREE.HemisphereLight(0xffffff, 0x888888, 1.9), sun = new THREE.DirectionalLight(0xffffff, 2.2);
 picture.add(sky, camera);
 camera.add(sun);
 sun.position.set(-0.4, 0.6, 1);
@@ -92,7 +92,7 @@ function begin() {
   for (const mesh of dragger.meshes) box.union(new THREE.Box3().setFromBufferAttribute(mesh.geometry.attributes.position));
   const size = box.getSize(new THREE.Vector3()).length();
   for (const obstacle of obstacles) picture.add(obstacleMesh(obstacle, size));
-  frame(box, size, gravity);
+  frame(box, gravity);
   showControls();
 }
 
@@ -109,21 +109,24 @@ function obstacleMesh({ shape, point = [0, 0, 0], direction = [0, 0, 1], halfExt
   return mesh;
 }
 
-/** Looks at what there is; up is against gravity. */
-function frame(box, size, gravity) {
+/** Looks at what there is, of a high stack at its foot; up is against gravity. */
+function frame(box, gravity) {
   const up = new THREE.Vector3(...gravity).negate();
   if (up.length() === 0) up.set(0, 1, 0);
   camera.up.copy(up.normalize());
-  const front = Math.abs(up.y) > 0.5 ? new THREE.Vector3(0.5, 0.25, 1) : new THREE.Vector3(0.5, -1, 0.35);
-  const centre = box.getCenter(new THREE.Vector3());
+  const axis = Math.abs(up.y) > 0.5 ? "y" : "z", extent = box.getSize(new THREE.Vector3());
+  const width = Math.max(extent.x, axis === "y" ? extent.z : extent.y);
+  if (extent[axis] > 4 * width) box.max[axis] = box.min[axis] + 4 * width;
+  const size = state.size = box.getSize(new THREE.Vector3()).length(), centre = box.getCenter(new THREE.Vector3());
+  const front = axis === "y" ? new THREE.Vector3(0.5, 0.3, 1) : new THREE.Vector3(0.5, -1, 0.45);
   camera.position.copy(centre).addScaledVector(front.normalize(), 1.9 * size / Math.min(1, view.clientWidth / view.clientHeight) ** 0.6);
   camera.near = size / 100;
   camera.far = 100 * size;
+  camera.updateProjectionMatrix();
   state.orbit?.dispose();
   state.orbit = new OrbitControls(camera, view);  // it takes camera.up when it is made
   state.orbit.target.copy(centre);
   state.orbit.update();
-  state.size = size;
 }
 
 // ---- controls ----
@@ -148,6 +151,7 @@ function slider(name, { min = 0, max = 1, step = 0.01, value, format = (x) => x.
   const label = document.createElement("label"), input = document.createElement("input"), output = document.createElement("output");
   label.className = "slider";
   Object.assign(input, { type: "range", min, max, step, value, name });
+  input.setAttribute("aria-label", name);
   const tell = () => {
     output.textContent = format(Number(input.value));
     input.setAttribute("aria-valuetext", output.textContent);
@@ -185,6 +189,7 @@ function showControls() {
   plots.energies.begin(["kinetic", "elastic", "potential", ...(world.bodies.length > 1 ? ["contact"] : [])]);
 }
 
+const posedKind = () => state.current.models.find(({ model }) => model.examples > 0);
 const bodiesOf = (model) => state.current.world.bodies.filter((body) => body.model === model);
 
 /** Weights sum to 1: the others share what one leaves. */
@@ -192,12 +197,16 @@ function setWeight(changed, value) {
   const others = state.weights.reduce((sum, weight, i) => sum + (i === changed ? 0 : weight), 0), count = state.weights.length - 1;
   state.weights = state.weights.map((weight, i) => (i === changed ? value : others > 0 ? weight * (1 - value) / others : (1 - value) / count));
   if (count === 0) state.weights = [1];
-  [...element("weights").children].forEach((label, i) => label.set(state.weights[i]));
   element("given").checked = true;
   giveWeights();
 }
+function showWeights(weights) {
+  state.weights = Array.from(weights);
+  [...element("weights").children].forEach((label, i) => label.set(state.weights[i]));
+}
 function giveWeights() {
-  const { models } = state.current, { model } = models.find((kind) => kind.model.examples > 0);
+  const { model } = posedKind();
+  showWeights(state.weights);
   const sum = state.weights.reduce((a, b) => a + b, 0), given = element("given").checked ? state.weights.map((weight) => weight / sum) : null;
   for (const body of bodiesOf(model)) body.setExampleWeights(given);
 }
@@ -309,7 +318,7 @@ function advance(elapsed) {
   if (state.owed >= length) state.owed = 0;
   state.stepTime += 0.1 * (spent / steps - state.stepTime);
   state.speed += 0.1 * (steps * length / Math.max(elapsed, length) - state.speed);
-  const { world, models } = current, posed = models.find(({ model }) => model.examples > 0);
+  const { world } = current, posed = posedKind();
   if (posed) plots.weights.add(world.time, bodiesOf(posed.model)[0].weights);
   const { kinetic, elastic, potential, contact } = world.energies;
   plots.energies.add(world.time, [kinetic, elastic, potential, contact]);
@@ -320,6 +329,7 @@ function tell() {
   element("space").textContent = spaces.length === 1 ? spaces[0] : `full ${full}, reduced ${spaces.length - full}`;
   element("time").textContent = state.stepTime < 1 ? `${Math.round(1000 * state.stepTime)} µs` : `${state.stepTime.toFixed(1)} ms`;
   element("speed").textContent = state.paused ? "paused" : `${Math.min(100, Math.round(100 * state.speed))} %`;
+  if (state.weights.length > 0 && !element("given").checked) showWeights(bodiesOf(posedKind().model)[0].weights);
   for (const plot of Object.values(plots)) plot.draw();
 }
 

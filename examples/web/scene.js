@@ -59,7 +59,7 @@ export async function worldOf(scene, read) {
   const obstacles = (scene.obstacles ?? []).filter((obstacle) => !obstacle.mesh && !obstacle.height_field);
   if (obstacles.length < (scene.obstacles ?? []).length) ignored.push("obstacles of files");
   const touches = obstacles.length > 0 || !alone;
-  const world = new World(renamed(scene.contact ?? {}));
+  const world = new World(touches ? renamed(scene.contact ?? {}) : { apart: true });
   const models = [];
   try {
     for (const obstacle of obstacles) world.addObstacle(obstacleOf(obstacle));
