@@ -2,9 +2,11 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "common/core/arrays.h"
 #include "common/hdf5/value_checks.h"
+#include "common/model/reduced_model.h"
 
 namespace exmat {
 

@@ -58,12 +58,12 @@ async function visit(options, use, hash = "") {
 const loaded = (page, name) => page.waitForFunction((wanted) => {
   const { state } = window.exmat ?? {};
   return state?.current && (wanted === undefined || state.name === wanted) && state.current.world.time > 0 && document.getElementById("message").textContent === "";
-}, name, { timeout: 30000 });
+}, name, { timeout: 60000 });
 
 /** Waits until the scene has gone on by so much [s]. */
 const goOn = async (page, seconds) => {
   const end = await page.evaluate((length) => window.exmat.state.current.world.time + length, seconds);
-  await page.waitForFunction((time) => window.exmat.state.current.world.time >= time, end);
+  await page.waitForFunction((time) => window.exmat.state.current.world.time >= time, end, { timeout: 60000 });
 };
 
 const picture = async (page, name) => {
@@ -143,23 +143,23 @@ function projected(points, { projection, inverse, width, height }) {
   return pairs;
 }
 
-/** Bounds of what is drawn in the colour of bodies, in pixels of the view. */
-async function drawn(page) {
+/** Bounds of what is drawn in the colour of bodies, or brightly, in pixels of the view. */
+async function drawn(page, how = "coloured") {
   await page.addStyleTag({ content: "#stage p { display: none }" });
   const shot = (await page.locator("#view").screenshot({ scale: "css" })).toString("base64");
-  return page.evaluate(async (data) => {
+  return page.evaluate(async ([data, wanted]) => {
     const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
     const canvas = new OffscreenCanvas(image.width, image.height), context = canvas.getContext("2d");
     context.drawImage(image, 0, 0);
     const { data: pixels, width } = context.getImageData(0, 0, image.width, image.height);
     let [left, top, right, bottom] = [Infinity, Infinity, -Infinity, -Infinity];
     for (let i = 0; i < pixels.length; i += 4)
-      if (pixels[i] > pixels[i + 2] + 40) {
+      if (wanted === "bright" ? pixels[i] > 60 : pixels[i] > pixels[i + 2] + 40) {
         const x = (i / 4) % width, y = Math.floor(i / 4 / width);
         [left, top, right, bottom] = [Math.min(left, x), Math.min(top, y), Math.max(right, x + 1), Math.max(bottom, y + 1)];
       }
     return [left, top, right, bottom];
-  }, shot);
+  }, [shot, how]);
 }
 
 async function compareWithLibrary(page, t) {
@@ -203,6 +203,20 @@ test("starts", (t) => {
     t.diagnostic(`first step after ${Math.round(performance.now() - begun)} ms and ${bytes} bytes, of which none are compressed`);
   });
 });
+
+test("the page of docs/web.md", () => visit({}, async (page) => {
+  await page.goto(`${address}own/index.html`);
+  await page.waitForTimeout(3000);
+  const { width, height } = page.viewportSize();
+  const before = await drawn(page, "bright");
+  await page.mouse.move(width / 2, height / 2);
+  await page.mouse.down();
+  await page.mouse.move(width / 2 + 200, height / 2, { steps: 5 });
+  await page.waitForTimeout(1500);
+  await picture(page, "own");
+  const now = await drawn(page, "bright");
+  assert.ok(before[0] > 0 && now[2] > before[2] + 20, `${before}, then ${now}`);
+}));
 
 test("every scene is stepped", (t) => visit({}, async (page) => {
   for (const name of await page.locator("#scenes button").allTextContents()) {

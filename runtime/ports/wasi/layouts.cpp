@@ -5,12 +5,12 @@
 #include "exmat/exmat.h"
 
 // Where the host finds the members of the structs of the interface: one line each, "STRUCT MEMBER OFFSET TYPE COUNT",
-// and "STRUCT . SIZE". TYPE is d (double), i (int32), u (uint32), l (int64) or z (size_t).
+// and "STRUCT . SIZE s 1". TYPE is d (double), i (int32), u (uint32), l (int64) or z (size_t).
 
 namespace {
 
 template <typename Member>
-char type_of() {
+constexpr char type_of() {
   using Value = std::remove_extent_t<Member>;
   if (std::is_same_v<Value, double>) return 'd';
   if (std::is_same_v<Value, std::int32_t>) return 'i';
@@ -18,81 +18,55 @@ char type_of() {
   return std::is_same_v<Value, std::size_t> ? 'z' : 'u';
 }
 
-template <typename Member>
-std::string line(const char* name, std::size_t offset) {
-  constexpr std::size_t kCount = std::is_array_v<Member> ? std::extent_v<Member> : 1;
-  return std::string(name) + ' ' + std::to_string(offset) + ' ' + type_of<Member>() + ' ' + std::to_string(kCount) +
-         '\n';
-}
+struct Line {
+  const char* words;
+  std::size_t offset;
+  char type;
+  std::size_t count;
+};
 
-#define EXMAT_MEMBER(structure, member) \
-  text += line<decltype(exmat_##structure::member)>(#structure " " #member, offsetof(exmat_##structure, member));
-#define EXMAT_SIZE(structure) text += #structure " . " + std::to_string(sizeof(exmat_##structure)) + '\n';
+template <typename Member>
+constexpr std::size_t kCount = std::is_array_v<Member> ? std::extent_v<Member> : 1;
+
+#define EXMAT_MEMBER(structure, member)                                                                         \
+  {#structure " " #member, offsetof(exmat_##structure, member), type_of<decltype(exmat_##structure::member)>(), \
+   kCount<decltype(exmat_##structure::member)>},
+#define EXMAT_SIZE(structure) {#structure " .", sizeof(exmat_##structure), 's', 1},
+
+constexpr Line kLines[] = {
+    EXMAT_SIZE(settings) EXMAT_MEMBER(settings, size) EXMAT_MEMBER(settings, time_step) EXMAT_MEMBER(
+        settings, gravity) EXMAT_MEMBER(settings, mass_damping) EXMAT_MEMBER(settings, stiffness_damping)
+        EXMAT_MEMBER(settings, newton_tolerance) EXMAT_MEMBER(settings, example_stiffness) EXMAT_MEMBER(
+            settings, example_damping) EXMAT_MEMBER(settings, example_bias) EXMAT_MEMBER(settings, newton_iterations)
+            EXMAT_MEMBER(settings, integrator) EXMAT_MEMBER(settings, internal_force) EXMAT_MEMBER(
+                settings, use_examples) EXMAT_MEMBER(settings, example_target) EXMAT_MEMBER(settings, target_iterations)
+                EXMAT_MEMBER(settings, energy_reference) EXMAT_MEMBER(settings, use_contact) EXMAT_MEMBER(
+                    settings, sleep_energy) EXMAT_MEMBER(settings, sleep_time) EXMAT_MEMBER(settings, precision)
+                    EXMAT_MEMBER(settings, space) EXMAT_MEMBER(
+                        settings, space_release) EXMAT_SIZE(contact_law) EXMAT_MEMBER(contact_law, size)
+                        EXMAT_MEMBER(contact_law, stiffness) EXMAT_MEMBER(contact_law, damping) EXMAT_MEMBER(
+                            contact_law, friction) EXMAT_MEMBER(contact_law, self) EXMAT_MEMBER(contact_law, apart)
+                            EXMAT_MEMBER(contact_law, release) EXMAT_SIZE(obstacle) EXMAT_MEMBER(
+                                obstacle, size) EXMAT_MEMBER(obstacle, point) EXMAT_MEMBER(obstacle, direction)
+                                EXMAT_MEMBER(obstacle, half_extents) EXMAT_MEMBER(obstacle, orientation) EXMAT_MEMBER(
+                                    obstacle, radius) EXMAT_MEMBER(obstacle, stiffness) EXMAT_MEMBER(obstacle, damping)
+                                    EXMAT_MEMBER(obstacle, friction) EXMAT_MEMBER(obstacle, shape) EXMAT_MEMBER(
+                                        obstacle, group) EXMAT_MEMBER(obstacle, mask) EXMAT_SIZE(motion)
+                                        EXMAT_MEMBER(motion, size) EXMAT_MEMBER(motion, position) EXMAT_MEMBER(
+                                            motion, orientation) EXMAT_MEMBER(motion, linear_velocity)
+                                            EXMAT_MEMBER(motion, angular_velocity) EXMAT_SIZE(attachment) EXMAT_MEMBER(
+                                                attachment, size) EXMAT_MEMBER(attachment, kind)
+                                                EXMAT_MEMBER(attachment, stiffness) EXMAT_MEMBER(attachment, damping)
+                                                    EXMAT_MEMBER(attachment, break_force) EXMAT_SIZE(energies)
+                                                        EXMAT_MEMBER(energies, size) EXMAT_MEMBER(energies, kinetic)
+                                                            EXMAT_MEMBER(energies, elastic) EXMAT_MEMBER(
+                                                                energies, potential) EXMAT_MEMBER(energies, contact)};
 
 std::string layouts() {
   std::string text;
-  EXMAT_SIZE(settings)
-  EXMAT_MEMBER(settings, size)
-  EXMAT_MEMBER(settings, time_step)
-  EXMAT_MEMBER(settings, gravity)
-  EXMAT_MEMBER(settings, mass_damping)
-  EXMAT_MEMBER(settings, stiffness_damping)
-  EXMAT_MEMBER(settings, newton_tolerance)
-  EXMAT_MEMBER(settings, example_stiffness)
-  EXMAT_MEMBER(settings, example_damping)
-  EXMAT_MEMBER(settings, example_bias)
-  EXMAT_MEMBER(settings, newton_iterations)
-  EXMAT_MEMBER(settings, integrator)
-  EXMAT_MEMBER(settings, internal_force)
-  EXMAT_MEMBER(settings, use_examples)
-  EXMAT_MEMBER(settings, example_target)
-  EXMAT_MEMBER(settings, target_iterations)
-  EXMAT_MEMBER(settings, energy_reference)
-  EXMAT_MEMBER(settings, use_contact)
-  EXMAT_MEMBER(settings, sleep_energy)
-  EXMAT_MEMBER(settings, sleep_time)
-  EXMAT_MEMBER(settings, precision)
-  EXMAT_MEMBER(settings, space)
-  EXMAT_MEMBER(settings, space_release)
-  EXMAT_SIZE(contact_law)
-  EXMAT_MEMBER(contact_law, size)
-  EXMAT_MEMBER(contact_law, stiffness)
-  EXMAT_MEMBER(contact_law, damping)
-  EXMAT_MEMBER(contact_law, friction)
-  EXMAT_MEMBER(contact_law, self)
-  EXMAT_MEMBER(contact_law, apart)
-  EXMAT_MEMBER(contact_law, release)
-  EXMAT_SIZE(obstacle)
-  EXMAT_MEMBER(obstacle, size)
-  EXMAT_MEMBER(obstacle, point)
-  EXMAT_MEMBER(obstacle, direction)
-  EXMAT_MEMBER(obstacle, half_extents)
-  EXMAT_MEMBER(obstacle, orientation)
-  EXMAT_MEMBER(obstacle, radius)
-  EXMAT_MEMBER(obstacle, stiffness)
-  EXMAT_MEMBER(obstacle, damping)
-  EXMAT_MEMBER(obstacle, friction)
-  EXMAT_MEMBER(obstacle, shape)
-  EXMAT_MEMBER(obstacle, group)
-  EXMAT_MEMBER(obstacle, mask)
-  EXMAT_SIZE(motion)
-  EXMAT_MEMBER(motion, size)
-  EXMAT_MEMBER(motion, position)
-  EXMAT_MEMBER(motion, orientation)
-  EXMAT_MEMBER(motion, linear_velocity)
-  EXMAT_MEMBER(motion, angular_velocity)
-  EXMAT_SIZE(attachment)
-  EXMAT_MEMBER(attachment, size)
-  EXMAT_MEMBER(attachment, kind)
-  EXMAT_MEMBER(attachment, stiffness)
-  EXMAT_MEMBER(attachment, damping)
-  EXMAT_MEMBER(attachment, break_force)
-  EXMAT_SIZE(energies)
-  EXMAT_MEMBER(energies, size)
-  EXMAT_MEMBER(energies, kinetic)
-  EXMAT_MEMBER(energies, elastic)
-  EXMAT_MEMBER(energies, potential)
-  EXMAT_MEMBER(energies, contact)
+  for (const Line& line : kLines)
+    text += std::string(line.words) + ' ' + std::to_string(line.offset) + ' ' + line.type + ' ' +
+            std::to_string(line.count) + '\n';
   return text;
 }
 

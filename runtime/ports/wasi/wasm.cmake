@@ -3,6 +3,22 @@
 file(GLOB kernels CONFIGURE_DEPENDS ${runtime}/kernels/*.cpp)
 file(GLOB ports CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/wasi/*.cpp)
 
+# The functions of the interface, by their declarations: others, such as those of libc++, are dropped where nothing
+# calls them.
+set(exports --export=malloc --export=free --export=__stack_pointer --export=exmat_web_layouts)
+file(GLOB headers CONFIGURE_DEPENDS ${runtime}/include/exmat/*.h)
+set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${headers})
+foreach(header IN LISTS headers)
+  file(READ ${header} text)
+  string(REGEX MATCHALL "exmat_[a-z0-9_]+\\(" names "${text}")
+  foreach(name IN LISTS names)
+    string(REPLACE "(" "" name ${name})
+    list(APPEND exports --export-if-defined=${name})
+  endforeach()
+endforeach()
+list(REMOVE_DUPLICATES exports)
+list(TRANSFORM exports PREPEND -Wl,)
+
 # exmat_module(NAME FLAG...)
 function(exmat_module name)
   add_library(${name}_kernels OBJECT ${kernels})
@@ -16,10 +32,12 @@ function(exmat_module name)
     target_compile_definitions(${target} PRIVATE _WASI_EMULATED_PROCESS_CLOCKS)
     target_include_directories(${target} BEFORE PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/wasi)
   endforeach()
+  # All but the kernels is optimised for size, at no cost in time.
+  target_compile_options(${name} PRIVATE -Os)
   target_sources(${name} PRIVATE $<TARGET_OBJECTS:${name}_kernels>)
   # The stack comes first, so that one that overflows traps: Eigen's products overflow the default of 64 kB.
   target_link_options(${name} PRIVATE -mexec-model=reactor -Wl,-z,stack-size=1048576 -Wl,--stack-first
-    -Wl,--export-dynamic -Wl,--export=malloc -Wl,--export=free -Wl,--export=__stack_pointer -Wl,--gc-sections -Wl,--strip-all)
+    -Wl,--gc-sections -Wl,--strip-all ${exports})
   target_link_libraries(${name} PRIVATE c++abi)
 endfunction()
 
