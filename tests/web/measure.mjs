@@ -1,6 +1,6 @@
 // Sizes and speeds of the package, as docs/web.md has them: tests/web/run first, then
 //   node build/web/tests/measure.mjs [FOLDER_OF_PROGRAMS]
-// Medians over the first 1,500 steps of the page's scenes, in Node and by exmat-runtime, which reads the same files.
+// Microseconds are those of a body: medians over the first 1,500 steps of the page's scenes, in Node and by exmat-runtime, which reads the same files.
 import { execFileSync } from "node:child_process";
 import { readFileSync, readdirSync, unlinkSync, writeFileSync } from "node:fs";
 import { dirname, join, resolve } from "node:path";
@@ -25,7 +25,7 @@ if (process.argv[2] === "--one") {
     step(current, { pull() {} });
     times.push(1000 * (performance.now() - start));
   }
-  console.log(JSON.stringify({ first, us: median(times) }));
+  console.log(JSON.stringify({ first, us: median(times) / current.world.bodies.length }));
 } else {
   const installed = join(here, "node_modules/exmat");
   console.log("| file | bytes | gzip -9 | brotli |\n| --- | ---: | ---: | ---: |");
@@ -37,14 +37,14 @@ if (process.argv[2] === "--one") {
   const native = (name, space, simd) => {
     const scene = { ...JSON.parse(readFileSync(join(scenes, `${name}.json`))), space, steps: STEPS }, file = join(scenes, `native_${name}.json`);
     writeFileSync(file, JSON.stringify(scene));
-    const told = execFileSync(join(programs, "exmat-runtime"), ["run", file, "--threads", "1", "--log-level", "error"], { env: { ...process.env, EXMAT_SIMD: simd }, encoding: "utf8" });
+    const told = execFileSync(join(programs, "exmat-runtime"), ["run", file, "--threads", "1", "--log-level", "error", "--progress", "none"], { env: { ...process.env, EXMAT_SIMD: simd }, encoding: "utf8" });
     unlinkSync(file);
     return Number(/median step time +([\d.]+) us/.exec(told)[1]);
   };
   const simds = ["portable", "avx2"];
   console.log(`\n| scene | space | first step [ms] | simd128 [us] | plain [us] | native ${simds.join(" [us] | native ")} [us] |\n| --- | --- | ---: | ---: | ---: | ---: | ---: |`);
   for (const name of readdirSync(scenes).filter((file) => file.endsWith(".json")).map((file) => file.slice(0, -5)))
-    for (const space of name === "character" ? ["full"] : ["reduced", "full"]) {
+    for (const space of { character: ["full"], pile: ["reduced"] }[name] ?? ["reduced", "full"]) {
       const [simd, plain] = ["simd", "plain"].map((module) => ours(name, space, module)), others = simds.map((kind) => native(name, space, kind));
       console.log(`| ${name} | ${space} | ${simd.first.toFixed(0)} | ${[simd.us, plain.us, ...others].map((us) => us.toFixed(0)).join(" | ")} |`);
     }

@@ -15,6 +15,7 @@ const { worldOf, step, free } = await import(join(folder, "scene.js"));
 let server, browser, address;
 before(async () => {
   server = createServer((request, response) => {
+    if (request.url === "/favicon.ico") return response.writeHead(204).end();
     try {
       const file = join(folder, normalize(new URL(request.url, "http://page").pathname).replace(/\/$/, "/index.html"));
       const bytes = readFileSync(file);
@@ -48,7 +49,7 @@ async function visit(options, use, hash = "") {
     await use(page, context);
     assert.deepEqual(complaints, []);
   } catch (error) {
-    error.message += `; the page: ${complaints.join(" ")} ${await page.locator("#message").textContent()}`;
+    error.message += `; the page: ${complaints.join(" ")} ${await page.evaluate(() => document.getElementById("message")?.textContent ?? "")}`;
     throw error;
   } finally {
     await context.close();
@@ -207,11 +208,11 @@ test("starts", (t) => {
 test("the page of docs/web.md", () => visit({}, async (page) => {
   await page.goto(`${address}own/index.html`);
   await page.waitForTimeout(3000);
-  const { width, height } = page.viewportSize();
+  const { x, y, width, height } = await page.locator("#view").boundingBox();
   const before = await drawn(page, "bright");
-  await page.mouse.move(width / 2, height / 2);
+  await page.mouse.move(x + width / 2, y + height / 2);
   await page.mouse.down();
-  await page.mouse.move(width / 2 + 200, height / 2, { steps: 5 });
+  await page.mouse.move(x + width / 2 + 200, y + height / 2, { steps: 5 });
   await page.waitForTimeout(1500);
   await picture(page, "own");
   const now = await drawn(page, "bright");
