@@ -126,7 +126,7 @@ void take_state(std::span<const double> numbers, exmat_body& body) {
   State state = body.state;
   state.step = static_cast<std::int64_t>(reader.count("steps", kMostSteps));
   state.time = static_cast<double>(state.step) * body.scene.time_step;
-  state.begins_anew = reader.flag("begins_anew");
+  state.begins_anew = reader.flag("begins_anew") || holds_modes(state.attachments);  // whose past it does not hold
   const auto contacts = static_cast<std::size_t>(reader.count("contacts", kMostSteps));
   if (contacts != (numbers.size() - least) / kContactNumbers)
     throw InvalidArgument(

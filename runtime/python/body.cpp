@@ -205,7 +205,9 @@ void bind_settings(BodyClass& type) {
            py::arg("break_force") = std::numeric_limits<double>::infinity(),
            "Holds `vertices` of the object by a frame of shape (3, 4), by where they are in it now: \"fixed\", each of "
            "them; \"ball\", their mean by mass; \"spring\", that by a stiffness [N/m] and a damping [N s/m]. Beyond "
-           "break_force [N] it lets go. For a body of space \"full\" or \"auto\". Returns its id.")
+           "break_force [N] it lets go. Of a body of space \"reduced\", \"fixed\" holds their mean and the rotation "
+           "that "
+           "fits them best. Returns its id.")
       .def(
           "move_attachment",
           [](BodyObject& body, std::int64_t id, const Numbers& frame) {

@@ -350,11 +350,13 @@ EXMAT_API exmat_status exmat_body_set_bones(exmat_body* body, const double* tran
 /* Transforms of all bones at the end of the last step. */
 EXMAT_API exmat_status exmat_body_read_bones(const exmat_body* body, double* transforms, int64_t count) EXMAT_NOEXCEPT;
 
-/* Attachments: a frame of the host, such as a rigid body, a bone or a hand, holds a patch of a body. The body steps in
-   all vertices of its mesh for as long as something holds it: its model has to be of space _FULL or _AUTO. What is held
-   is exactly where the frame is at the end of each step; the frame's transform [12] is as a bone's. */
+/* Attachments: a frame of the host, such as a rigid body, a bone or a hand, holds a patch of a body. What is held is
+   exactly where the frame is at the end of each step; the frame's transform [12] is as a bone's. A body of space _AUTO
+   steps in all vertices of its mesh for as long as something holds it. */
 enum {
-  EXMAT_ATTACHMENT_FIXED = 0, /* each vertex of the patch stays where it is in the frame */
+  EXMAT_ATTACHMENT_FIXED = 0, /* each vertex of the patch stays where it is in the frame; of a body of space _REDUCED,
+                                 their mean by mass and the rotation that fits the patch best do: 6 conditions, 5 of
+                                 vertices in a line, 3 of one; less than half a turn in a step */
   EXMAT_ATTACHMENT_BALL = 1,  /* their mean does, by their masses; the patch turns about it */
   EXMAT_ATTACHMENT_SPRING = 2 /* a spring and a damper pull that mean to where it is in the frame */
 };
@@ -370,7 +372,8 @@ typedef struct exmat_attachment {
 EXMAT_API exmat_status exmat_attachment_default(exmat_attachment* attachment, size_t size) EXMAT_NOEXCEPT;
 
 /* From the next step on, by where `vertices` [count] of the object are now in the frame. None of them may be fixed, or
-   held already. `id` of the attachment is the body's own. */
+   held already. `id` of the attachment is the body's own. Of a body of space _REDUCED the bundle is read; its modes
+   have to be able to hold the patch, and a body that may touch others is held by springs alone. */
 EXMAT_API exmat_status exmat_body_attach(exmat_body* body, const int64_t* vertices, int64_t count,
                                          const exmat_attachment* attachment, const double* frame,
                                          int64_t* id) EXMAT_NOEXCEPT;

@@ -142,7 +142,8 @@ class BodyFrame {
   virtual FrameVelocity expected_velocity(const FrameState& state, const FrameWorkspace& /*workspace*/) const noexcept {
     return velocity(state);
   }
-  /// Moves what external forces move. `near`: obstacles may touch in this step; `dissipative`: by backward Euler.
+  /// Moves what external forces move. `near`: the motion of the frame is unknown in this step, obstacles may touch or a
+  /// host holds the body; `dissipative`: by backward Euler, else a step that is near is by BDF2.
   virtual void move(const FrameStep& /*step*/, bool /*near*/, bool /*dissipative*/, const FrameState& /*state*/,
                     FrameWorkspace& /*workspace*/, Eigen::VectorXd& /*external_force*/) const noexcept {}
   /// After move(), until end_contact(): the momenta that external forces alone have made; where it is moved by them.
@@ -194,7 +195,7 @@ class BodyFrame {
                       const Eigen::VectorXd& /*v*/, Eigen::VectorXd& /*a*/, FrameWorkspace& /*workspace*/,
                       FrameState& /*state*/) const noexcept {}
 
-  // ---- A step near obstacles, by backward Euler, in the unknowns x = (rigid unknowns of the frame, q - q_n).
+  // ---- A step near obstacles or held by a host, in the unknowns x = (rigid unknowns of the frame, q - q_n).
 
   /// Number of the frame's unknowns: 6 where contacts move it (d [m] and the rotation vector t [rad] of the step),
   /// else none.
@@ -223,6 +224,10 @@ class BodyFrame {
   virtual void add_rigid_hessian(const Eigen::VectorXd& /*x*/, const Placement& /*placement*/,
                                  Eigen::MatrixXd& /*contact_stiffness*/, FrameWorkspace& /*workspace*/,
                                  Eigen::MatrixXd& /*hessian*/) const noexcept {}
+  /// The force that moves the centre of mass to where x has it [N].
+  virtual Eigen::Vector3d force_of(const Eigen::VectorXd& /*x*/, const FrameWorkspace& /*workspace*/) const noexcept {
+    return Eigen::Vector3d::Zero();
+  }
   /// A force [N] in the units of the residual [kg^1/2 m/s^2].
   virtual double residual_of(const Eigen::Vector3d& /*force*/) const noexcept { return 0; }
   /// Pose and momenta of the solution x. Momenta come from the contacts' force and torque; where those are not balanced

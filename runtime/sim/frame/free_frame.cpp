@@ -234,10 +234,21 @@ void FreeFrame::move(const FrameStep& step, bool near, bool dissipative, const F
     external_force.noalias() += scripted.mean_basis.transpose() * local;
   }
   // Forces that contacts balance have to act on the position as those do.
-  const double share = near ? 1 : 0.5;
-  body.position += dt / mass * (body.linear_momentum + share * dt * force);
-  body.linear_momentum += dt * force;
-  body.angular_momentum += dt * torque;
+  RigidUnknowns& unknowns = own_free(workspace).unknowns;
+  unknowns.second_order = near && !dissipative;
+  if (unknowns.second_order) {
+    const FreeStart& before = start.before;
+    const double h = 2 * dt / 3;
+    body.linear_momentum = (4 * start.linear_momentum - before.linear_momentum) / 3 + h * force;
+    body.angular_momentum = (4 * start.angular_momentum - before.angular_momentum) / 3 + h * torque;
+    body.position = (4 * start.position - before.position) / 3 + h / mass * body.linear_momentum;
+    unknowns.last_turn = before.orientation.conjugate() * start.orientation;
+  } else {
+    const double share = near ? 1 : 0.5;
+    body.position += dt / mass * (body.linear_momentum + share * dt * force);
+    body.linear_momentum += dt * force;
+    body.angular_momentum += dt * torque;
+  }
   begin_rotation(body, dt, dissipative, own_free(workspace));
 }
 
@@ -310,16 +321,16 @@ Placement FreeFrame::place(const Eigen::VectorXd& x, FrameWorkspace& workspace) 
   FreeMotionWorkspace& free = own_free(workspace);
   const Eigen::Vector3d turn = x.segment<3>(3);
   free.solution.rotation = turn;
-  free.solution.spin = turn / free.unknowns.time_step;
+  free.solution.spin = free.unknowns.spin(turn);
   return {origin(), origin() + free.moved.position + x.head<3>(), free.unknowns.start_rotation * rotation_of(turn)};
 }
 
 double FreeFrame::rigid_potential(const Eigen::VectorXd& x, FrameWorkspace& workspace) const noexcept {
   const RigidUnknowns& unknowns = own_free(workspace).unknowns;
-  const double dt = unknowns.time_step;
+  const double h = 1 / unknowns.velocity_factor();
   const Eigen::Vector3d d = x.head<3>(), t = x.segment<3>(3);
-  const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (dt * dt);
-  return 0.5 * inertia_.mass() / (dt * dt) * d.squaredNorm() + 0.5 * (t - unknowns.expected_turn).dot(quadratic) +
+  const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (h * h);
+  return 0.5 * inertia_.mass() / (h * h) * d.squaredNorm() + 0.5 * (t - unknowns.expected_turn).dot(quadratic) +
          unknowns.frozen_turn.dot(t);
 }
 
@@ -327,16 +338,16 @@ void FreeFrame::rigid_gradient(const Eigen::VectorXd& x, const FrameMomenta& con
                                Eigen::VectorXd& gradient) const noexcept {
   FreeMotionWorkspace& free = own_free(workspace);
   RigidUnknowns& unknowns = free.unknowns;
-  const double dt = unknowns.time_step, mass = inertia_.mass();
+  const double h = 1 / unknowns.velocity_factor(), mass = inertia_.mass();
   const Eigen::Vector3d d = x.head<3>(), t = x.segment<3>(3);
-  const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (dt * dt);
+  const Eigen::Vector3d quadratic = unknowns.start_inertia * (t - unknowns.expected_turn) / (h * h);
   const Eigen::Matrix3d turn = rotation_of(t);
   const Eigen::Vector3d momentum =
       free.moments.inertia * free.solution.spin + free.moments.deformation().transpose() * free.velocity;
   const Eigen::Matrix3d to_turn = right_jacobian(t).transpose();
-  const Eigen::Vector3d inertia = to_turn * ((momentum - turn.transpose() * free.problem.momentum) / dt);
+  const Eigen::Vector3d inertia = to_turn * ((momentum - turn.transpose() * free.problem.momentum) / h);
   unknowns.next_frozen_turn = inertia - quadratic;
-  gradient.head<3>() = mass / (dt * dt) * d - contact.linear;
+  gradient.head<3>() = mass / (h * h) * d - contact.linear;
   gradient.segment<3>(3) =
       inertia - to_turn * (turn.transpose() * (unknowns.start_rotation.transpose() * contact.angular));
 }
@@ -358,7 +369,7 @@ void FreeFrame::add_rigid_hessian(const Eigen::VectorXd& x, const Placement& pla
                                   Eigen::MatrixXd& contact_stiffness, FrameWorkspace& workspace,
                                   Eigen::MatrixXd& hessian) const noexcept {
   const FreeMotionWorkspace& free = own_free(workspace);
-  const double dt = free.unknowns.time_step;
+  const double h = 1 / free.unknowns.velocity_factor();
   const Eigen::Matrix3d to_world = turn_to_world(x, placement);
   Eigen::MatrixXd& K = contact_stiffness;
   K.triangularView<Eigen::StrictlyUpper>() = K.transpose();
@@ -371,9 +382,14 @@ void FreeFrame::add_rigid_hessian(const Eigen::VectorXd& x, const Placement& pla
     K.block<3, 1>(3, j) = column;
   }
   hessian.triangularView<Eigen::Lower>() += K;
-  hessian.diagonal().head<3>().array() += inertia_.mass() / (dt * dt);
-  hessian.block<3, 3>(3, 3).triangularView<Eigen::Lower>() += free.moments.inertia / (dt * dt);
-  hessian.block(6, 3, inertia_.modes(), 3) += free.moments.deformation() / (dt * dt);
+  hessian.diagonal().head<3>().array() += inertia_.mass() / (h * h);
+  hessian.block<3, 3>(3, 3).triangularView<Eigen::Lower>() += free.moments.inertia / (h * h);
+  hessian.block(6, 3, inertia_.modes(), 3) += free.moments.deformation() / (h * h);
+}
+
+Eigen::Vector3d FreeFrame::force_of(const Eigen::VectorXd& x, const FrameWorkspace& workspace) const noexcept {
+  const double factor = own_free(workspace).unknowns.velocity_factor();
+  return inertia_.mass() * factor * factor * x.head<3>();
 }
 
 double FreeFrame::residual_of(const Eigen::Vector3d& force) const noexcept {
@@ -384,20 +400,20 @@ void FreeFrame::end_contact(const Eigen::VectorXd& x, bool converged, const Eige
                             const FrameState& state, FrameWorkspace& workspace, Eigen::Vector3d& force) const noexcept {
   FreeMotionWorkspace& free = own_free(workspace);
   FreeState& body = free.moved;
-  const double dt = free.unknowns.time_step;
+  const double h = 1 / free.unknowns.velocity_factor();
   const Eigen::Matrix3d rotation = own_free(state).orientation.toRotationMatrix() * rotation_of(free.solution.rotation);
   const Eigen::Vector3d deformation = free.moments.deformation().transpose() * free.velocity;
   if (converged) {
-    body.position += dt * dt / body.mass * force;  // d, but for the residual: the centre goes as its momentum says
-    body.angular_momentum += dt * torque;
+    body.position += h * h / body.mass * force;  // d, but for the residual: the centre goes as its momentum says
+    body.angular_momentum += h * torque;
     free.solution.spin = free.moments.inertia.inverse() * (rotation.transpose() * body.angular_momentum - deformation);
   } else {
     body.position += x.head<3>();
-    force = body.mass / (dt * dt) * x.head<3>();
-    free.solution.spin = free.solution.rotation / dt;
+    force = force_of(x, workspace);
+    free.solution.spin = free.unknowns.spin(free.solution.rotation);
     body.angular_momentum = rotation * (free.moments.inertia * free.solution.spin + deformation);
   }
-  body.linear_momentum += dt * force;
+  body.linear_momentum += h * force;
 }
 
 }  // namespace exmat::runtime

@@ -78,6 +78,7 @@ class FreeFrame final : public BodyFrame {
   double accept_rigid(FrameWorkspace& workspace) const noexcept override;
   void add_rigid_hessian(const Eigen::VectorXd& x, const Placement& placement, Eigen::MatrixXd& contact_stiffness,
                          FrameWorkspace& workspace, Eigen::MatrixXd& hessian) const noexcept override;
+  Eigen::Vector3d force_of(const Eigen::VectorXd& x, const FrameWorkspace& workspace) const noexcept override;
   double residual_of(const Eigen::Vector3d& force) const noexcept override;
   void end_contact(const Eigen::VectorXd& x, bool converged, const Eigen::Vector3d& torque, const FrameState& state,
                    FrameWorkspace& workspace, Eigen::Vector3d& force) const noexcept override;

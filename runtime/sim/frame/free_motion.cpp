@@ -45,6 +45,13 @@ FreeMotionWorkspace::FreeMotionWorkspace(const DeformingInertia& inertia)
   moved.momentum = moved.momentum_previous = force;
 }
 
+// With the angles t of one step and s of two, omega = (4 t - s) / (2 dt): exact for a constant spin.
+Eigen::Vector3d RigidUnknowns::spin(const Eigen::Vector3d& turn) const noexcept {
+  if (!second_order) return turn / time_step;
+  const Eigen::AngleAxisd both(last_turn * quaternion_of(turn));
+  return (4 * turn - both.angle() * both.axis()) / (2 * time_step);
+}
+
 void begin_rotation(const FreeState& body, double time_step, bool dissipative,
                     FreeMotionWorkspace& workspace) noexcept {
   workspace.problem.momentum = body.orientation.conjugate() * body.angular_momentum;
@@ -146,6 +153,7 @@ void commit_free_motion(double rate, const Eigen::VectorXd& v, const FreeMotionW
   body.momentum.swap(body.momentum_previous);
   body.momentum.noalias() = v + workspace.moments.deformation().lazyProduct(spin);
   a += rate * (body.momentum - v);
+  body.before = {body.position, body.orientation, body.linear_momentum, body.angular_momentum};
   body.orientation = body.orientation * quaternion_of(workspace.solution.rotation);
   body.orientation.normalize();
   body.spin = spin;

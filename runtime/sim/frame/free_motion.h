@@ -7,6 +7,13 @@
 
 namespace exmat::runtime {
 
+/// Where a step of a free body began, for BDF2 of one that a host holds.
+struct FreeStart {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
+  Eigen::Vector3d linear_momentum = Eigen::Vector3d::Zero(), angular_momentum = Eigen::Vector3d::Zero();
+};
+
 /// Pose and momenta of a free body: x = c + R (X + U q). World frame unless it says body frame. The momenta are
 /// what it carries; spin and velocities follow from them.
 struct FreeState {
@@ -19,17 +26,25 @@ struct FreeState {
   Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< of the host, beside State::applied_force [N]
   Eigen::Vector3d applied_torque = Eigen::Vector3d::Zero();         ///< about c [N m]
   Eigen::VectorXd momentum, momentum_previous;                      ///< [r] pi = qdot - sum_c omega_c A_c q
+  FreeStart before{};                                               ///< likewise at the end of the step before
 };
 
-/// The motion of a free body within one step near obstacles, where it is unknown: its centre of mass at
-/// start_position + d, its rotation R_n exp([t]x).
+/// The motion of a free body within one step near obstacles or held by a host, where it is unknown: its centre of mass
+/// at start_position + d, its rotation R_n exp([t]x). By backward Euler, or BDF2: see FreeFrame::move().
 struct RigidUnknowns {
-  double time_step = 0;                                          ///< [s]
-  Eigen::Matrix3d start_rotation = Eigen::Matrix3d::Identity();  ///< R_n
-  Eigen::Matrix3d start_inertia = Eigen::Matrix3d::Zero();       ///< J at the first pose [kg m^2]
-  Eigen::Vector3d expected_turn = Eigen::Vector3d::Zero();       ///< t of free flight at the first pose
-  Eigen::Vector3d frozen_turn = Eigen::Vector3d::Zero();         ///< see BodyFrame::rigid_potential()
+  double time_step = 0;                                           ///< [s]
+  bool second_order = false;                                      ///< BDF2
+  Eigen::Quaterniond last_turn = Eigen::Quaterniond::Identity();  ///< R_(n-1)^T R_n, for that
+  Eigen::Matrix3d start_rotation = Eigen::Matrix3d::Identity();   ///< R_n
+  Eigen::Matrix3d start_inertia = Eigen::Matrix3d::Zero();        ///< J at the first pose [kg m^2]
+  Eigen::Vector3d expected_turn = Eigen::Vector3d::Zero();        ///< t of free flight at the first pose
+  Eigen::Vector3d frozen_turn = Eigen::Vector3d::Zero();          ///< see BodyFrame::rigid_potential()
   Eigen::Vector3d next_frozen_turn = Eigen::Vector3d::Zero();
+
+  /// c_v [1/s]
+  double velocity_factor() const noexcept { return (second_order ? 1.5 : 1) / time_step; }
+  /// omega at the end of the step, body frame, of a turn t.
+  Eigen::Vector3d spin(const Eigen::Vector3d& turn) const noexcept;
 };
 
 /// Rotation of a free body within one step, and what it does to q: with the spin w(q, v) that keeps the angular

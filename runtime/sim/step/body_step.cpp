@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 
+#include "runtime/sim/step/attached_problem.h"
 #include "runtime/sim/step/contact_step.h"
 #include "runtime/sim/step/example_forces.h"
 #include "runtime/sim/step/sleep.h"
@@ -26,10 +27,11 @@ StepHistory history_of(const Model& model, const State& state) {
 }
 
 /// What resolves a step: backward Euler where a body that is not clamped in the world turns too far in it for anything
-/// of second order.
-Integrator integrator_of_step(const Model& model, const StepScene& scene, const State& state, bool near) {
+/// of second order. What holds a body is exact at the end of steps, which Newmark's forces would oscillate about: BDF2.
+Integrator integrator_of_step(const Model& model, const StepScene& scene, const State& state, bool near, bool held) {
   const bool resolved = !near && model.frame->turn_rate(state.frame) * scene.time_step <= kResolvedTurn;
-  return resolved ? scene.integrator : Integrator::kBackwardEuler;
+  if (!resolved || (held && begins_anew(model, scene, state))) return Integrator::kBackwardEuler;
+  return held && scene.integrator == Integrator::kNewmark ? Integrator::kBdf2 : scene.integrator;
 }
 
 /// a_n of Newmark's method from the equation of motion at the beginning of the step.
@@ -152,14 +154,15 @@ BodyStep::BodyStep(const Model& model, const StepScene& scene, State& state, Wor
       state_(state),
       workspace_(workspace),
       in_frame_(frame_step(scene, state)),
-      potential_(model, scene, state, workspace) {}
+      potential_(model, scene, state, workspace),
+      held_(holds_modes(state.attachments)) {}
 
 void BodyStep::begin(bool touches_others) noexcept {
   const BodyFrame& frame = *model_.frame;
   frame.begin(in_frame_, workspace_.frame, workspace_.external_force);
   near_ = is_near_obstacles(model_, scene_, state_, workspace_) || touches_others;
-  const Integrator integrator = integrator_of_step(model_, scene_, state_, near_);
-  frame.move(in_frame_, near_, integrator == Integrator::kBackwardEuler, state_.frame, workspace_.frame,
+  const Integrator integrator = integrator_of_step(model_, scene_, state_, near_, held_);
+  frame.move(in_frame_, near_ || held_, integrator == Integrator::kBackwardEuler, state_.frame, workspace_.frame,
              workspace_.external_force);
   prepare_integrator(model_, scene_, in_frame_, integrator, state_, workspace_, report_);
   workspace_.newton.profile = workspace_.profile;
@@ -184,20 +187,21 @@ NewtonReport BodyStep::solve_once() noexcept {
   NewtonReport failed;
   failed.status = NewtonStatus::kNonFinite;
   if (!prepare()) return failed;
+  if (held_) return solve_attached(model_, scene_, state_, potential_, workspace_);
   return near_ ? solve_with_contacts(model_, scene_, state_, potential_, workspace_)
                : newton_minimise(potential_, scene_.newton, workspace_.q, workspace_.newton);
 }
 
 NewtonReport BodyStep::solve() noexcept {
   const NewtonReport newton = solve_once();
-  if (newton.status != NewtonStatus::kNonFinite || near_) return newton;
+  if (newton.status != NewtonStatus::kNonFinite || near_ || held_) return newton;
   if (!model_.frame->fall_back(in_frame_, workspace_.frame)) return newton;
   backward_euler_form(history_of(model_, state_), scene_.time_step, workspace_.form);
   return solve_once();
 }
 
 StepReport BodyStep::finish(const NewtonReport& newton) noexcept {
-  const bool unbalanced = near_ && newton.status != NewtonStatus::kConverged;
+  const bool unbalanced = near_ && !held_ && newton.status != NewtonStatus::kConverged;
   const Energies before = unbalanced ? energies(model_, scene_, state_) : Energies{};
   take(newton);
   if (unbalanced && (report_.status & kStepNonFinite) == 0) {
@@ -225,6 +229,8 @@ const StepReport& BodyStep::take(const NewtonReport& newton) noexcept {
   commit(model_, scene_, potential_.elastic_energy(), workspace, state_);
   state_.begins_anew = near_;
   commit_contacts(model_, near_, workspace, state_);
+  if (held_ && end_attachments(pose_of(model_, state_), workspace.near->held, state_.attachments))
+    state_.begins_anew = true;
   return report_;
 }
 

@@ -73,7 +73,7 @@ class BodyStep {
   Workspace& workspace_;
   FrameStep in_frame_;
   IncrementalPotential potential_;
-  bool near_ = false;
+  bool near_ = false, held_ = false;
   StepReport report_;
 };
 

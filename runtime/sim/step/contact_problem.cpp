@@ -43,8 +43,11 @@ PotentialEvaluation ContactProblem::evaluate_alone(const Eigen::VectorXd& x, boo
   const BodyPose pose = place(x);
   const PotentialEvaluation alone = first ? potential_.evaluate(near_.q, near_.gradient_q, workspace_.newton.hessian)
                                           : potential_.evaluate(near_.q, near_.gradient_q);
-  model_.contact->evaluate(pose, near_.contact);
-  near_.extent = pose.position.norm() + model_.contact->reach();
+  if (model_.contact) {
+    model_.contact->evaluate(pose, near_.contact);
+    near_.extent = pose.position.norm() + model_.contact->reach();
+  }
+  evaluate_springs(state_.attachments, potential_.rate(), pose, near_.held);
   return alone;
 }
 
@@ -52,22 +55,26 @@ PotentialEvaluation ContactProblem::finish(const Eigen::VectorXd& x, const Poten
                                            Eigen::VectorXd& gradient) noexcept {
   const ContactWorkspace& contact = near_.contact;
   PotentialEvaluation evaluation = alone;
-  gradient.tail(near_.q.size()) = near_.gradient_q - contact.generalised;
-  const double added = contact.potential + frame_.rigid_potential(x, workspace_.frame);
-  frame_.rigid_gradient(x, {contact.force, contact.torque}, workspace_.frame, gradient);
+  const ContactSums& held = near_.held.sums;
+  gradient.tail(near_.q.size()) = near_.gradient_q - contact.generalised - held.generalised;
+  const double added = contact.potential + held.potential + frame_.rigid_potential(x, workspace_.frame);
+  frame_.rigid_gradient(x, {contact.force + held.force, contact.torque + held.torque}, workspace_.frame, gradient);
   evaluation.potential.value += added;
   evaluation.potential.magnitude += std::abs(added);
-  evaluation.force_scale += contact.generalised.norm();
+  evaluation.force_scale += contact.generalised.norm() + held.generalised.norm();
   // A gap is known to the rounding of where its vertex is: no residual comes below what that makes of its force.
-  const double rounding = kGapRounding * near_.extent * contact.stiffness / potential_.tolerance();
+  const double rounding = kGapRounding * near_.extent * (contact.stiffness + held.stiffness) / potential_.tolerance();
   evaluation.force_scale += frame_.residual_of(contact.force) + frame_.residual_of({rounding, 0, 0});
+  evaluation.force_scale += frame_.residual_of(held.force);
   return evaluation;
 }
 
 PotentialValue ContactProblem::value(const Eigen::VectorXd& x) noexcept {
   const BodyPose pose = place(x);
   PotentialValue value = potential_.value(near_.q);
-  const double added = model_.contact->potential(pose, near_.contact) + frame_.rigid_potential(x, workspace_.frame);
+  const double touching = model_.contact ? model_.contact->potential(pose, near_.contact) : 0;
+  const double added = touching + spring_potential(state_.attachments, potential_.rate(), pose) +
+                       frame_.rigid_potential(x, workspace_.frame);
   value.value += added;
   value.magnitude += std::abs(added);
   return value;
@@ -86,6 +93,8 @@ void ContactProblem::evaluate_elastic_hessian(const BodyPose& pose, Tangent tang
 
 void ContactProblem::start_stiffness(const BodyPose& pose) noexcept {
   near_.stiffness.setZero();
+  add_spring_stiffness(state_.attachments, potential_.rate(), pose, near_.stiffness);
+  if (!model_.contact) return;
   if (frame_.rigid_unknowns() == 0)
     model_.contact->add_reduced_stiffness(pose, near_.contact, near_.stiffness);
   else

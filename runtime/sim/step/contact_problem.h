@@ -7,7 +7,8 @@
 
 namespace exmat::runtime {
 
-/// A step near obstacles, by backward Euler: IncrementalPotential and the potential of the contacts in the unknowns
+/// A step near obstacles, by backward Euler, or of a body that a host holds: IncrementalPotential and the potential of
+/// the contacts and of the host's springs in the unknowns
 ///   d   displacement of the centre of mass beyond what external forces make of it [m],
 ///   t   rotation of the step, R = R_n exp([t]x) [rad],
 ///   y   q - q_n,
@@ -36,14 +37,14 @@ class ContactProblem {
   // The same in parts: between them others add what they do to this body, to the sums and the stiffness in
   // workspace.near.
 
-  /// What the body and its obstacles make of x; sums of the contacts in workspace.near->contact. `first`: with the
-  /// elastic Hessian of the potential's start().
+  /// What the body, its obstacles and springs make of x; sums of the contacts in workspace.near->contact, of the
+  /// springs in workspace.near->held. `first`: with the elastic Hessian of the potential's start().
   PotentialEvaluation evaluate_alone(const Eigen::VectorXd& x, bool first) noexcept;
   PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,
                              Eigen::VectorXd& gradient) noexcept;
   /// The elastic Hessian at a pose, into workspace.newton.
   void evaluate_elastic_hessian(const BodyPose& pose, Tangent tangent) noexcept;
-  /// The stiffness of the obstacles, alone in workspace.near->stiffness.
+  /// The stiffness of obstacles and springs, alone in workspace.near->stiffness.
   void start_stiffness(const BodyPose& pose) noexcept;
   /// Lower triangle of the sum of both and of inertia.
   void finish_hessian(const BodyPose& pose, const Eigen::VectorXd& x, Eigen::MatrixXd& hessian) noexcept;

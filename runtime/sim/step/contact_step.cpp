@@ -18,7 +18,10 @@ void finish_contact(const Model& model, const State& state, bool converged, cons
                     Workspace& workspace) noexcept {
   ContactProblemWorkspace& near = *workspace.near;
   workspace.q = state.q + near.x.tail(state.q.size());
-  model.frame->end_contact(near.x, converged, torque, state.frame, workspace.frame, near.contact.force);
+  const ContactSums& held = near.held.sums;
+  near.contact.force += held.force;
+  model.frame->end_contact(near.x, converged, torque + held.torque, state.frame, workspace.frame, near.contact.force);
+  near.contact.force -= held.force;
 }
 
 bool is_near_obstacles(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {

@@ -17,7 +17,7 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, State& state,
 void start_contact(const Model& model, const StepScene& scene, const State& state, Workspace& workspace) noexcept;
 
 /// q, and where a free body will be and its momenta, into the workspace, from the unknowns of the solution, the force
-/// of its contacts and this torque of theirs about the centre of mass [N m].
+/// of its contacts and this torque of theirs about the centre of mass [N m], beside those of its attachments.
 void finish_contact(const Model& model, const State& state, bool converged, const Eigen::Vector3d& torque,
                     Workspace& workspace) noexcept;
 
@@ -27,16 +27,16 @@ void add(const NewtonReport& more, NewtonReport& total) noexcept;
 /// Newton's method from x with friction as it follows the normal forces of the solution. A round goes on with the
 /// factor of the one before it, as friction of other size changes the stiffness little. Where there is none,
 /// `restart()` starts the elastic potential where the last round ended. `refresh()` sets friction and returns its
-/// relative change.
+/// relative change. `begin`: of the first round.
 template <class Problem, class Restart, class Refresh>
 NewtonReport minimise_with_friction(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
-                                    NewtonWorkspace& workspace, const Restart& restart,
-                                    const Refresh& refresh) noexcept {
+                                    NewtonWorkspace& workspace, const Restart& restart, const Refresh& refresh,
+                                    NewtonBegin begin = NewtonBegin::kHessian) noexcept {
   NewtonReport total;
   for (int round = 0; round < kFrictionRounds; ++round) {
     const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
     if (round > 0 && !has_factor) restart();
-    const NewtonBegin begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
+    if (round > 0) begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
     add(newton_minimise(problem, settings, x, workspace, begin), total);
     if (total.status == NewtonStatus::kNonFinite || refresh() <= kSameFriction) break;
   }

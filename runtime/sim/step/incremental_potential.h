@@ -54,6 +54,7 @@ class IncrementalPotential {
   static constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();
 
   double tolerance() const noexcept { return scene_.newton.tolerance; }
+  StepRate rate() const noexcept { return {workspace_.form.velocity_factor, scene_.time_step}; }
 
  private:
   void set_offset(const Eigen::VectorXd& q) noexcept;

@@ -3,12 +3,15 @@
 namespace exmat::runtime {
 
 ContactProblemWorkspace::ContactProblemWorkspace(const Model& model, const StepScene& scene)
-    : contact(*model.contact, scene.obstacles.size()),
+    : contact(model.contact ? ContactWorkspace(*model.contact, scene.obstacles.size()) : ContactWorkspace()),
       newton(model.modes() + model.frame->rigid_unknowns()),
       x(Eigen::VectorXd::Zero(model.modes() + model.frame->rigid_unknowns())),
       q(Eigen::VectorXd::Zero(model.modes())),
       gradient_q(q),
-      stiffness(Eigen::MatrixXd::Zero(x.size(), x.size())) {}
+      stiffness(Eigen::MatrixXd::Zero(x.size(), x.size())) {
+  contact.set_zero(model.modes());
+  held.sums.set_zero(model.modes());
+}
 
 ExampleWorkspace::ExampleWorkspace(const ExampleModel& model) : weights_solver(model.weights.make_workspace()) {
   if (model.table) target_table = model.table->make_workspace();
@@ -36,6 +39,11 @@ Workspace::Workspace(const Model& model, const StepScene& scene, bool meets_bodi
   product.setZero(padded(model.modes()));
   quadratic.setZero(padded(model.modes()), model.modes());
   for (std::size_t i = 0; i < scene.examples.size(); ++i) examples.emplace_back(model.examples[i]);
+}
+
+void Workspace::fit(const Model& model, const StepScene& scene, std::span<const Attachment> attachments) {
+  if (!near) near.emplace(model, scene);
+  near->held = AttachmentWorkspace(attachments, model.modes(), near->x.size());
 }
 
 }  // namespace exmat::runtime

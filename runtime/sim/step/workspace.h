@@ -7,18 +7,20 @@
 #include "runtime/sim/contact/contact.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/solver/profile.h"
+#include "runtime/sim/step/attachment_terms.h"
 #include "runtime/sim/step/integrator.h"
 #include "runtime/sim/step/model.h"
 #include "runtime/sim/step/scene.h"
 
 namespace exmat::runtime {
 
-/// Scratch of steps near obstacles, sized once.
+/// Scratch of steps near obstacles or held by a host, sized once.
 struct ContactProblemWorkspace {
   ContactProblemWorkspace() = default;
   ContactProblemWorkspace(const Model& model, const StepScene& scene);
 
   ContactWorkspace contact;
+  AttachmentWorkspace held;
   NewtonWorkspace newton;         ///< of the unknowns below
   Eigen::VectorXd x;              ///< 6 + r, or r of a constrained body
   Eigen::VectorXd q, gradient_q;  ///< r
@@ -46,6 +48,9 @@ struct ExampleWorkspace {
 struct Workspace {
   Workspace(const Model& model, const StepScene& scene, bool meets_bodies = false);
 
+  /// Sizes it for the steps of a body with these attachments.
+  void fit(const Model& model, const StepScene& scene, std::span<const Attachment> attachments);
+
   Profile* profile = nullptr;  ///< times every stage, if set
 
   NewtonWorkspace newton;
@@ -64,7 +69,7 @@ struct Workspace {
 
   bool predictor_was_lower = true;  ///< in the last step than where it began: which of the two is looked at first
 
-  std::optional<ContactProblemWorkspace> near;  ///< where it may touch anything
+  std::optional<ContactProblemWorkspace> near;  ///< where it may touch anything, or is held
   FrameWorkspace frame;                         ///< of the model's frame
   std::vector<ExampleWorkspace> examples;       ///< one for each of the scene's
 };

@@ -104,7 +104,7 @@ void Crowd::take(const Body& body) {
   const auto index = static_cast<int>(bodies_.size());
   bodies_.push_back(body);
   Kind& kind = kinds_[static_cast<std::size_t>(body.kind)];
-  const bool in_lanes = body.full == nullptr && is_in_lanes(body.kind, *body.scene);
+  const bool in_lanes = !body.goes_alone && is_in_lanes(body.kind, *body.scene);
   if (!in_lanes || kind.open < 0) {
     groups_.push_back({body.kind, in_lanes});
     if (in_lanes) kind.open = static_cast<int>(groups_.size()) - 1;

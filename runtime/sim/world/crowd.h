@@ -35,6 +35,7 @@ class Crowd {
     StepReport* report = nullptr;
     const FullModel* full = nullptr;  ///< it steps in full space
     FullWorkspace* full_workspace = nullptr;
+    bool goes_alone = false;  ///< not side by side with others: in full space, or held by a host
   };
 
   /// One more body of this model; its kind. Sizes scratch.
@@ -47,8 +48,8 @@ class Crowd {
   /// Scratch for so many threads.
   void prepare(int threads);
 
-  // One step: begin(), count() of all bodies in reduced space, then take() or leave() of each in the same order, take()
-  // of those in full space, step().
+  // One step: begin(), count() of all bodies that do not go alone, then take() or leave() of each in the same order,
+  // take() of those that do, step().
 
   void begin() noexcept;
   void count(int kind, const StepScene& scene) noexcept;

@@ -98,7 +98,17 @@ void World::fit(int body) {
   Member& own = at(body);
   crowd_.fit(own.crowd_kind, *own.kind.scene);
   if (own.touching) own.touching->workspace.near.emplace(*own.kind.model, *own.kind.scene);
+  own.held.reset();
+  if (!own.state->attachments.empty()) fit_attachments(body);
   prepare_contacts(*own.kind.model, own.kind.scene->obstacles.size(), *own.state);
+}
+
+void World::fit_attachments(int body) {
+  Member& own = at(body);
+  if (own.state->attachments.empty()) own.held.reset();
+  if (own.state->attachments.empty() && !own.touching) return;
+  if (!own.touching && own.held == nullptr) own.held = std::make_unique<Workspace>(*own.kind.model, *own.kind.scene);
+  scratch(body).fit(*own.kind.model, *own.kind.scene, own.state->attachments);
 }
 
 void World::set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew) {
@@ -120,7 +130,9 @@ void World::read_touches(std::vector<BodyTouch>& touches) const {
 }
 
 Workspace& World::scratch(int body) noexcept {
-  return at(body).touching ? at(body).touching->workspace : crowd_.scratch(at(body).crowd_kind);
+  Member& own = at(body);
+  if (own.touching) return own.touching->workspace;
+  return own.held != nullptr ? *own.held : crowd_.scratch(own.crowd_kind);
 }
 
 void World::prepare(int threads) {
@@ -258,17 +270,19 @@ void World::find_contacts(int threads) {
 void World::step_crowd(int threads, StepObserver* observer) {
   const StageTimer timer(profile_, WorldStage::kSingleBodies);
   crowd_.begin();
+  const auto goes_alone = [](const Member& own) { return own.state->full || holds_modes(own.state->attachments); };
   for (const Member& own : bodies_)
-    if (!own.state->full) crowd_.count(own.crowd_kind, *own.kind.scene);
+    if (!goes_alone(own)) crowd_.count(own.crowd_kind, *own.kind.scene);
   for (int i = 0; i < count(); ++i) {
     Member& own = at(i);
     if (!is_in_island(i) && !own.asleep) {
-      Workspace* const scratch = own.touching ? &own.touching->workspace : nullptr;
+      Workspace* const scratch = own.touching ? &own.touching->workspace : own.held.get();
       const FullModel* const full = own.state->full ? own.kind.full : nullptr;
-      crowd_.take({i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report, full, own.full.get()});
+      crowd_.take(
+          {i, own.crowd_kind, own.kind.scene, own.state, scratch, &own.report, full, own.full.get(), goes_alone(own)});
       continue;
     }
-    if (!own.state->full) crowd_.leave(own.crowd_kind, *own.kind.scene);
+    if (!goes_alone(own)) crowd_.leave(own.crowd_kind, *own.kind.scene);
     if (own.asleep) own.report = sleep_through(*own.kind.scene, *own.state);
   }
   crowd_.step(threads, observer, profile_);

@@ -50,6 +50,10 @@ class World {
   void forget(int body);
   /// To be called after its scene has other obstacles: scratch and state hold the contacts with these.
   void fit(int body);
+  /// To be called after a host attached the body in its modes: scratch holds the attachments.
+  void fit_attachments(int body);
+  /// Whether a body may touch others or itself.
+  bool may_touch(int body) const noexcept { return at(body).touching != nullptr; }
 
   void set_law(const ContactLaw& law) noexcept { law_ = law; }
 
@@ -104,6 +108,7 @@ class World {
     std::unique_ptr<WorldBody> touching{};  ///< of a body that may touch others or itself
     bool asleep = false;                    ///< in this step
     std::unique_ptr<FullWorkspace> full{};  ///< of a body in full space
+    std::unique_ptr<Workspace> held{};      ///< of a body in its modes that a host holds and that touches no other
     bool is_bounded = false;                ///< its ball is that of where it is: it has slept since
   };
 

@@ -1,0 +1,167 @@
+#include "runtime/sim/step/attached_problem.h"
+
+#include <limits>
+
+namespace exmat::runtime {
+namespace {
+
+constexpr int kReturns = 16;   // to the conditions, at most
+constexpr double kSlow = 0.1;  // of what a return begins with: if more is left, the inverse is made again
+constexpr double kHeldRounding = 16 * std::numeric_limits<double>::epsilon();  // of where things are
+
+}  // namespace
+
+AttachedProblem::AttachedProblem(const Model& model, const State& state, IncrementalPotential& potential,
+                                 Workspace& workspace) noexcept
+    : frame_(*model.frame),
+      state_(state),
+      near_(*workspace.near),
+      held_(near_.held),
+      problem_(model, state, potential, workspace) {}
+
+bool AttachedProblem::begin(Eigen::VectorXd& x, NewtonReport& report) noexcept {
+  NewtonWorkspace& newton = near_.newton;
+  problem_.evaluate(x, newton.gradient, newton.hessian);
+  set_conditions(x);
+  if (!detail::factorise(*this, newton, report)) {
+    ++report.projections;
+    problem_.hessian(x, Tangent::kPositiveSemidefinite, newton.hessian);
+    if (!detail::factorise_shifted(*this, newton, report)) return false;
+  }
+  hold(x);
+  return x.allFinite();
+}
+
+void AttachedProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
+  if (held_.conditions() > 0) runtime::set_conditions(state_.attachments, frame_, x, problem_.place(x), held_);
+}
+
+/// To the conditions, and J and the factor of J A^-1 J_f^T there, J_f that of the last factorisation.
+void AttachedProblem::hold(Eigen::VectorXd& x) noexcept {
+  if (held_.conditions() == 0) return;
+  double last = std::numeric_limits<double>::infinity();
+  bool is_current = false;
+  set_conditions(x);
+  for (int i = 0; i < kReturns; ++i) {
+    const double lacking = held_.violation.lpNorm<Eigen::Infinity>();
+    const double rounding = kHeldRounding * (1 + problem_.place(x).position.norm());
+    if (!(lacking > rounding) || (is_current && !(lacking < 0.5 * last))) break;
+    is_current = lacking > kSlow * last;
+    if (is_current) held_.invert();
+    last = lacking;
+    held_.change.noalias() = held_.inverse.lazyProduct(held_.violation);
+    x.noalias() -= held_.directions.lazyProduct(held_.change);
+    set_conditions(x);
+  }
+  held_.invert();
+}
+
+void AttachedProblem::finish(PotentialEvaluation& evaluation, const Eigen::VectorXd& x,
+                             Eigen::VectorXd& gradient) noexcept {
+  if (held_.conditions() == 0) return;
+  held_.change.noalias() = held_.directions.transpose().lazyProduct(gradient);
+  held_.multipliers.noalias() = held_.inverse.transpose().lazyProduct(held_.change);
+  gradient.noalias() -= held_.gradients.lazyProduct(held_.multipliers);
+  add_condition_forces(state_.attachments, problem_.place(x), held_);
+  const Eigen::Index modes = near_.q.size();
+  evaluation.force_scale +=
+      frame_.residual_of(held_.sums.force) + held_.gradients.bottomRows(modes).lazyProduct(held_.multipliers).norm();
+}
+
+PotentialEvaluation AttachedProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient,
+                                              Eigen::MatrixXd& hessian) noexcept {
+  hold(x);
+  PotentialEvaluation evaluation = problem_.evaluate(x, gradient, hessian);
+  finish(evaluation, x, gradient);
+  return evaluation;
+}
+
+PotentialEvaluation AttachedProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
+  hold(x);
+  PotentialEvaluation evaluation = problem_.evaluate(x, gradient);
+  finish(evaluation, x, gradient);
+  return evaluation;
+}
+
+PotentialValue AttachedProblem::value(Eigen::VectorXd& x) noexcept {
+  hold(x);
+  return problem_.value(x);
+}
+
+void AttachedProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
+  problem_.hessian(x, tangent, hessian);
+  set_conditions(x);
+}
+
+bool AttachedProblem::factorise() noexcept {
+  NewtonWorkspace& newton = near_.newton;
+  const Eigen::Index size = newton.hessian.rows();
+  if (!kernels().cholesky(newton.hessian.data(), size, newton.hessian.outerStride(), newton.factor.data()))
+    return false;
+  Eigen::Map<Eigen::VectorXd> column(newton.direction.data(), size);
+  for (Eigen::Index k = 0; k < held_.conditions(); ++k) {
+    column = held_.gradients.col(k);
+    kernels().cholesky_solve(newton.factor.data(), size, newton.direction.data());
+    held_.directions.col(k) = column;
+  }
+  if (held_.conditions() > 0) held_.invert();
+  return true;
+}
+
+void AttachedProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
+  kernels().cholesky_solve(near_.newton.factor.data(), x.size(), x.data());
+  if (held_.conditions() == 0) return;
+  held_.violation.noalias() = held_.gradients.transpose().lazyProduct(x);
+  held_.change.noalias() = held_.inverse.lazyProduct(held_.violation);
+  x.noalias() -= held_.directions.lazyProduct(held_.change);
+}
+
+namespace {
+
+/// The centre of mass goes exactly as the conditions have it, and the momentum with it: the residual of Newton's method
+/// in its force goes to the first attachment that is hard.
+void settle_force(const BodyFrame& frame, std::span<const Attachment> attachments, const BodyPose& pose,
+                  const FrameWorkspace& workspace, ContactProblemWorkspace& near) noexcept {
+  if (frame.rigid_unknowns() == 0) return;
+  const Eigen::Vector3d lacking = frame.force_of(near.x, workspace) - near.contact.force - near.held.sums.force;
+  for (std::size_t i = 0; i < attachments.size(); ++i) {
+    if (attachments[i].conditions() == 0 || !attachments[i].holds()) continue;
+    near.held.forces.col(static_cast<Eigen::Index>(i)) += lacking;
+    near.held.sums.force += lacking;
+    near.held.sums.torque += (mean_of(attachments[i], pose) - pose.position).cross(lacking);
+    return;
+  }
+}
+
+}  // namespace
+
+NewtonReport solve_attached(const Model& model, const StepScene& scene, const State& state,
+                            IncrementalPotential& potential, Workspace& workspace) noexcept {
+  ContactProblemWorkspace& near = *workspace.near;
+  start_contact(model, scene, state, workspace);
+  near.newton.profile = workspace.profile;
+  AttachedProblem problem(model, state, potential, workspace);
+  NewtonReport start;
+  if (!problem.begin(near.x, start)) {
+    start.status = NewtonStatus::kNonFinite;
+    return start;
+  }
+  const auto restart = [&] {
+    workspace.q = state.q + near.x.tail(state.q.size());
+    potential.start(workspace.q);
+  };
+  const auto refresh = [&] {
+    return near.contact.candidate_count > 0 ? model.contact->refresh_friction(near.contact) : 0;
+  };
+  NewtonReport total =
+      minimise_with_friction(problem, scene.newton, near.x, near.newton, restart, refresh, NewtonBegin::kFactor);
+  total.factorisations += start.factorisations;
+  total.projections += start.projections;
+  if (total.status == NewtonStatus::kNonFinite) return total;
+  const BodyPose pose{model.frame->place(near.x, workspace.frame), near.q};
+  settle_force(*model.frame, state.attachments, pose, workspace.frame, near);
+  finish_contact(model, state, total.status == NewtonStatus::kConverged, near.contact.torque, workspace);
+  return total;
+}
+
+}  // namespace exmat::runtime

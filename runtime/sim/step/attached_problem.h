@@ -1,0 +1,52 @@
+#pragma once
+
+#include "runtime/sim/step/contact_problem.h"
+#include "runtime/sim/step/contact_step.h"
+
+namespace exmat::runtime {
+
+/// The step of a body in its modes that a host holds: ContactProblem, whose springs are the host's too, under the
+/// conditions C(x) = 0 of fixed patches and balls at the end of the step. Every iterate fulfils them: x goes back to
+/// them along A^-1 J^T, A the last Hessian that was factorised, J = dC/dx. Gradients are those of the Lagrangian, g -
+/// J^T lambda, with the multipliers lambda that make Newton's direction tangent; the multipliers of the solution are
+/// the forces of the attachments. The curvature of C is left out of the Hessian: it is to inertia as (turn of a
+/// step)^2. docs/step_in_detail.md, "Attachments". For newton_minimise.
+class AttachedProblem {
+ public:
+  static constexpr bool kSeeksLowest = ContactProblem::kSeeksLowest;
+
+  /// As ContactProblem, and scratch for the state's attachments in workspace.near.
+  AttachedProblem(const Model& model, const State& state, IncrementalPotential& potential,
+                  Workspace& workspace) noexcept;
+
+  /// The Hessian at the first iterate `x`, factorised, and x where the conditions hold. False where numbers are not
+  /// finite.
+  bool begin(Eigen::VectorXd& x, NewtonReport& report) noexcept;
+
+  PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
+  PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
+  PotentialValue value(Eigen::VectorXd& x) noexcept;
+  void hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept;
+  void accept(PotentialEvaluation& evaluation) noexcept { problem_.accept(evaluation); }
+  const Eigen::MatrixXd* gyroscopic() const noexcept { return nullptr; }
+  bool factorise() noexcept;
+  void shift(double share) noexcept { shift_diagonal(share, near_.newton.hessian); }
+  void solve(Eigen::Map<Eigen::VectorXd>& x) noexcept;
+
+ private:
+  void hold(Eigen::VectorXd& x) noexcept;
+  void set_conditions(const Eigen::VectorXd& x) noexcept;
+  void finish(PotentialEvaluation& evaluation, const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
+
+  const BodyFrame& frame_;
+  const State& state_;
+  ContactProblemWorkspace& near_;
+  AttachmentWorkspace& held_;
+  ContactProblem problem_;
+};
+
+/// Newton's method of the step of a body that a host holds, from workspace.q; likewise solve_with_contacts().
+NewtonReport solve_attached(const Model& model, const StepScene& scene, const State& state,
+                            IncrementalPotential& potential, Workspace& workspace) noexcept;
+
+}  // namespace exmat::runtime

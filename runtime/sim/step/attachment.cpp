@@ -1,0 +1,41 @@
+#include "runtime/sim/step/attachment.h"
+
+#include <Eigen/Eigenvalues>
+
+namespace exmat::runtime {
+namespace {
+
+constexpr double kFlat = 1e-12;  // of the largest second moment: vertices on an axis do not say how they turn about it
+
+}  // namespace
+
+void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment) {
+  ReducedPatch& patch = attachment.patch;
+  const bool turns = attachment.kind == AttachmentKind::kFixed;
+  const Eigen::Index moments = turns ? 12 : 3;
+  const Eigen::Matrix3Xd places = attachment.places.colwise() - attachment.places * attachment.shares;
+  patch.rest = Eigen::VectorXd::Zero(moments);
+  patch.rows = RowMatrix::Zero(moments, basis_rows.cols());
+  patch.axes.resize(3, 0);
+  patch.square = 0;
+  Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
+  for (Eigen::Index k = 0; k < rest.rows(); ++k) {
+    const double share = attachment.shares[k];
+    const auto own = basis_rows.middleRows<3>(3 * k);
+    patch.rest.head<3>() += share * rest.row(k).transpose();
+    patch.rows.topRows<3>() += share * own;
+    for (Eigen::Index axis = 0; turns && axis < 3; ++axis) {
+      patch.rest.segment<3>(3 + 3 * axis) += share * places(axis, k) * rest.row(k).transpose();
+      patch.rows.middleRows<3>(3 + 3 * axis) += share * places(axis, k) * own;
+    }
+    const Eigen::Vector3d place = places.col(k);
+    inertia += share * (place.squaredNorm() * Eigen::Matrix3d::Identity() - place * place.transpose());
+    patch.square += share * place.squaredNorm();
+  }
+  if (!turns || !(patch.square > 0)) return;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia);
+  const Eigen::Index flat = (solver.eigenvalues().array() <= kFlat * solver.eigenvalues()[2]).count();
+  patch.axes = solver.eigenvectors().rightCols(3 - flat);
+}
+
+}  // namespace exmat::runtime
