@@ -31,6 +31,18 @@ void apply_forces(BodyObject& body, const PointsObject& points, const Numbers& f
   body.get().apply_forces(points.points, read_span(forces));
 }
 
+py::tuple compliance(BodyObject& body, const PointsObject& points) {
+  const auto size = static_cast<py::ssize_t>(3 * points.count);
+  py::array_t<double> velocity({size / 3, py::ssize_t{3}}), matrix({size, size});
+  body.get().read_compliance(points.points, span_of(velocity), span_of(matrix));
+  return py::make_tuple(velocity, matrix);
+}
+
+void apply_impulses(BodyObject& body, const PointsObject& points, const Numbers& impulses) {
+  require_shape(impulses, "impulses", {static_cast<py::ssize_t>(points.count), 3});
+  body.get().apply_impulses(points.points, read_span(impulses));
+}
+
 py::array positions(BodyObject& body, const PointsObject& points, const py::object& out) {
   return positions_of(body, points.points, points.count, out);
 }
@@ -208,6 +220,12 @@ void bind_settings(BodyClass& type) {
            "break_force [N] it lets go. Of a body of space \"reduced\", \"fixed\" holds their mean and the rotation "
            "that "
            "fits them best. Returns its id.")
+      .def("compliance", &compliance, py::arg("points"),
+           "Velocities of k points at the end of the last step, of shape (k, 3) [m/s], and what impulses on their "
+           "coordinates make of them in a step, of shape (3k, 3k) [1/kg]; of a body that steps in its modes.")
+      .def("apply_impulses", &apply_impulses, py::arg("points"), py::arg("impulses"),
+           "Gives k points impulses [N s] of shape (k, 3): velocities change by the compliance times these, and the "
+           "body moves on by that times the time step.")
       .def(
           "move_attachment",
           [](BodyObject& body, std::int64_t id, const Numbers& frame) {

@@ -446,7 +446,8 @@ class Calls {
         exmat_points* const at = choices_.of(points_);
         const std::int64_t count = 3 * std::max<std::int64_t>(exmat_points_count(at), 0);
         const std::vector<double> forces = choices_.numbers(count);
-        checked(exmat_body_apply_forces(one, at, forces.data(), choices_.length(count)));
+        checked(choices_.one_in(4) ? exmat_body_apply_impulses(one, at, forces.data(), choices_.length(count))
+                                   : exmat_body_apply_forces(one, at, forces.data(), choices_.length(count)));
         return;
       }
       case 3:
@@ -631,6 +632,7 @@ class Calls {
         checked(exmat_body_read_contact_load(one, choices_.one_in(2) ? -1 : choices_.whole(), numbers.data(), nullptr));
         checked(exmat_body_read_placement(one, numbers.data()));
         checked(exmat_body_read_point_compliance(one, at, numbers.data()));
+        checked(exmat_body_read_compliance(one, at, nullptr, nullptr, choices_.length(3 * k)));
         return;
       case 6: {
         Padded<exmat_energies> energies;

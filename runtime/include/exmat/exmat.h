@@ -389,6 +389,22 @@ EXMAT_API exmat_status exmat_body_detach(exmat_body* body, int64_t id) EXMAT_NOE
 EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, int64_t id, double* force,
                                                        double* torque, int32_t* broken) EXMAT_NOEXCEPT;
 
+/* Impulses: a host that solves its own joints and contacts takes the body as a thing of these velocities and this
+   inverse mass between two steps, and gives it the impulses that it found, as often as it likes. Of a body that steps
+   in its modes. */
+
+/* World `velocity` [coordinates = 3k] [m/s] of the points at the end of the last step, and `compliance` [3k x 3k, by
+   rows] [1/kg]: the change of these velocities by an impulse of 1 N s on each coordinate, W = J A^-1 J^T with the mass,
+   damping and stiffness of a step in A and what is held by hard attachments held; contacts are left out. Each may be
+   NULL. */
+EXMAT_API exmat_status exmat_body_read_compliance(const exmat_body* body, const exmat_points* points, double* velocity,
+                                                  double* compliance, int64_t coordinates) EXMAT_NOEXCEPT;
+
+/* Gives the points impulses [coordinates = 3k] [N s], world: their velocities change by W times these, the body moves
+   on by that times the time step, and the momenta of a free one change by exactly these impulses. */
+EXMAT_API exmat_status exmat_body_apply_impulses(exmat_body* body, const exmat_points* points, const double* impulses,
+                                                 int64_t coordinates) EXMAT_NOEXCEPT;
+
 /* Settings of the example force. `region`: -1 is the whole body, else as in exmat_body_read_region_weights(). The model
    has to have that example force: use_examples, or the scene. */
 

@@ -406,6 +406,17 @@ class BodyRef {
     check(exmat_body_move_attachment(get(), id, frame.data()));
   }
   void detach(std::int64_t id) { check(exmat_body_detach(get(), id)); }
+  /// `velocity` [3k], `compliance` [3k x 3k] by rows.
+  void read_compliance(const Points& points, std::span<double> velocity, std::span<double> compliance) const {
+    if (compliance.size() != velocity.size() * velocity.size())
+      throw Error(EXMAT_INVALID_ARGUMENT, "compliance: expected the square of the length of velocity");
+    check(
+        exmat_body_read_compliance(get(), points.get(), velocity.data(), compliance.data(), detail::length(velocity)));
+  }
+  /// `impulses` [3k].
+  void apply_impulses(const Points& points, std::span<const double> impulses) {
+    check(exmat_body_apply_impulses(get(), points.get(), impulses.data(), detail::length(impulses)));
+  }
   AttachmentLoad attachment_load(std::int64_t id) const {
     AttachmentLoad load;
     std::int32_t broken = 0;

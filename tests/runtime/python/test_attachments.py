@@ -85,6 +85,20 @@ def test_modes_alone_refuse_what_they_cannot_hold(bundle, free_bundle):
         free.attach([60], frame_at([0, 0, 0]), kind="ball")
 
 
+def test_impulses_change_momenta(free_bundle):
+    model = exmat.Model(free_bundle)
+    vertices, xyz = end_of(model)
+    body = exmat.Body(model)
+    points = exmat.Points(model, vertices[:2])
+    velocity, compliance = body.compliance(points)
+    assert np.abs(velocity).max() == 0 and np.allclose(compliance, compliance.T)
+    impulses = np.array([[0, 0, 100.0], [50, 0, 0]])
+    body.apply_impulses(points, impulses)
+    after, _ = body.compliance(points)
+    assert np.abs(after.ravel() - compliance @ impulses.ravel()).max() < 1e-3 * np.abs(after).max()
+    assert np.abs(np.array(body.motion.linear_velocity) * MASS - impulses.sum(0)).max() < 1e-9
+
+
 def test_what_is_held_goes_with_its_frame_and_is_let_go(hung):
     vertices, xyz = end_of(hung)
     body = exmat.Body(hung)

@@ -1,0 +1,56 @@
+#include <algorithm>
+#include <cinttypes>
+
+#include "exmat/exmat.h"
+#include "runtime/api/arguments.h"
+#include "runtime/api/world_handle.h"
+#include "runtime/sim/step/impulse_response.h"
+
+using namespace exmat;           // NOLINT(google-build-using-namespace)
+using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
+
+namespace {
+
+exmat_status check_points(const char* function, const exmat_body& body, const exmat_points& points) noexcept {
+  if (points.source != body.source)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", function);
+  if (body.state.full)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: expected a body that steps in its modes, found one in all its vertices",
+                function);
+  return require_rows(function, points.set);
+}
+
+}  // namespace
+
+exmat_status exmat_body_read_compliance(const exmat_body* body, const exmat_points* points, double* velocity,
+                                        double* compliance, std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  if (const exmat_status status = check_points(__func__, *body, *points)) return status;
+  EXMAT_REQUIRE_LENGTH(coordinates, points->set.basis_rows.rows());
+  return guarded(__func__, [&] {
+    const MaterialPoints own{points->set.rest, points->set.basis_rows};
+    const ImpulseResponse response(body->model(), body->scene, body->state);
+    if (velocity != nullptr) Eigen::Map<Eigen::VectorXd>(velocity, coordinates) = response.velocity(own);
+    if (compliance == nullptr) return;
+    const Eigen::MatrixXd J = response.jacobian(own);
+    Eigen::Map<RowMatrix>(compliance, coordinates, coordinates) = J * response.solve(J.transpose());
+  });
+}
+
+exmat_status exmat_body_apply_impulses(exmat_body* body, const exmat_points* points, const double* impulses,
+                                       std::int64_t coordinates) noexcept {
+  EXMAT_REQUIRE(body);
+  EXMAT_REQUIRE(points);
+  EXMAT_REQUIRE(impulses);
+  if (const exmat_status status = check_points(__func__, *body, *points)) return status;
+  EXMAT_REQUIRE_LENGTH(coordinates, points->set.basis_rows.rows());
+  if (const double* const far = find_far(impulses, coordinates))
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: impulses[%td] = %g: expected finite numbers of at most %g", __func__,
+                far - impulses, *far, kFarthest);
+  return guarded(__func__, [&] {
+    const MaterialPoints own{points->set.rest, points->set.basis_rows};
+    const ImpulseResponse response(body->model(), body->scene, body->state);
+    response.apply(own, Eigen::Map<const Eigen::VectorXd>(impulses, coordinates), scratch_of(*body), body->state);
+  });
+}
