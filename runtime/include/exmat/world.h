@@ -111,8 +111,8 @@ typedef struct exmat_world_report {
 EXMAT_API exmat_status exmat_world_step(exmat_world* world, int64_t steps, int32_t threads,
                                         exmat_world_report* report) EXMAT_NOEXCEPT;
 
-/* Runs tasks on a host's threads: calls task(data, i) once for each i < count, at the same time where it can, and returns
-   when all have returned. They may be called by any thread, and do not wait for each other. */
+/* Runs tasks on a host's threads: calls task(data, i) once for each i < count, at the same time where it can, and
+   returns when all have returned. They may be called by any thread, and do not wait for each other. */
 typedef void (*exmat_run_tasks)(void* user, void (*task)(void* data, int32_t i), void* data, int32_t count);
 /* Steps of worlds are shared among the threads of `run` from then on, in this process; NULL: among the library's own.
    Not while a world steps. Of no call more than `threads` tasks. */

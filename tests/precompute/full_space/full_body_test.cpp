@@ -321,8 +321,11 @@ struct CarriedTwin {
     scene.carrier = runtime::RigidMotion(std::vector<runtime::Keyframe>{
         {0, {0, 0, 0}, turned(0)}, {0.16, {0.1, 0.2, -0.1}, turned(0.9)}, {0.32, {-0.1, 0.3, 0.2}, turned(1.6)}});
     if (has_examples)
-      scene.examples = {
-          {.stiffness = is_elastic ? 2.0 : 300.0, .damping = 2, .bias = 0.4, .target_iterations = 50, .elastic = is_elastic}};
+      scene.examples = {{.stiffness = is_elastic ? 2.0 : 300.0,
+                         .damping = 2,
+                         .bias = 0.4,
+                         .target_iterations = 50,
+                         .elastic = is_elastic}};
     return scene;
   }
 

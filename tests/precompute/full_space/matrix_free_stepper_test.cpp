@@ -201,8 +201,8 @@ TEST(MatrixFreeStepperTest, IsTheReferenceOfAFreeBodyToTheOrderOfTheStep) {
   const FreeErrors coarse = errors_of_a_free_bar(model, 0.004), fine = errors_of_a_free_bar(model, 0.002),
                    finest = errors_of_a_free_bar(model, 0.001);
   EXPECT_LE(finest.position, 1e-5);
-  // Damping takes off rigid motion by where the body is, in the reference by where it rests. A force with a torque would
-  // leave 2.5e-3 at each time step.
+  // Damping takes off rigid motion by where the body is, in the reference by where it rests. A force with a torque
+  // would leave 2.5e-3 at each time step.
   EXPECT_LE(finest.shape, 3e-4);
   EXPECT_GE(coarse.position / fine.position, 3.4);
   EXPECT_GE(fine.position / finest.position, 3.4);
