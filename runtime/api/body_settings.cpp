@@ -90,6 +90,11 @@ exmat_status exmat_body_set_space(exmat_body* body, std::int32_t space) noexcept
   if (space != EXMAT_SPACE_FULL && body->model().skeleton)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: space = %" PRId32 ": expected EXMAT_SPACE_FULL: the body is on a skeleton",
                 __func__, space);
+  const bool in_modes = space == EXMAT_SPACE_REDUCED;
+  if (is_held(body->state.attachments) && in_modes != (body->scene.space.space == Space::kReduced))
+    return fail(EXMAT_INVALID_ARGUMENT,
+                "%s: space = %" PRId32 ": a body that is held stays in its modes, or in full or auto: detach it first",
+                __func__, space);
   body->scene.space.space = static_cast<Space>(space);
   return EXMAT_OK;
 }

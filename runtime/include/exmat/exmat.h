@@ -308,8 +308,8 @@ EXMAT_API exmat_status exmat_body_set_damping(exmat_body* body, double alpha, do
 EXMAT_API exmat_status exmat_body_set_integrator(exmat_body* body, int32_t integrator) EXMAT_NOEXCEPT;
 
 /* EXMAT_SPACE_...; from the next step on. Positions and momenta stay, but for what the modes cannot hold when the body
-   leaves the full space. The model has to be of space _FULL or _AUTO. Where parts of a body
-   may touch each other it steps in the modes. */
+   leaves the full space. The model has to be of space _FULL or _AUTO. Where parts of a body may touch each other it
+   steps in the modes. What holds a body holds it in its modes or in the others: detach it before a change. */
 EXMAT_API exmat_status exmat_body_set_space(exmat_body* body, int32_t space) EXMAT_NOEXCEPT;
 
 /* The space that the last step was in: EXMAT_SPACE_REDUCED or EXMAT_SPACE_FULL; negative where `body` is NULL. */

@@ -123,6 +123,8 @@ def test_what_cannot_be_is_refused(hung, bundle):
     body = exmat.Body(hung)
     frame = frame_at([0, 0, 0])
     body.attach(vertices[:4], frame)
+    with pytest.raises(exmat.InvalidArgument, match="detach it first"):
+        body.space = "reduced"
     for given, words in (([vertices[0]], "held already"), ([10**6], "no such vertex"), ([vertices[5]] * 2, "twice"), ([], "count")):
         with pytest.raises(exmat.InvalidArgument, match=words):
             body.attach(given, frame)
