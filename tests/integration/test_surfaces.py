@@ -212,7 +212,7 @@ class Surfaces(unittest.TestCase):
                                         {"name": "other", "surface": "other.glb", "morph": "there"}])
         with file:
             sources = {"morph": "bend", "obj": "posed.obj", "frame": "posed.pc2", "other": "there"}
-            self.assertEqual(sources, {name: file[f"examples/{name}"].attrs["source"] for name in sources})
+            self.assertEqual(sources, {name: file[f"examples/{name}"].attrs["source"].decode() for name in sources})
             poses = {name: file[f"examples/{name}/pose"][:] for name in sources}
             size = np.linalg.norm(poses["morph"])
             for name, pose in poses.items():  # single precision in the files: 1e-7 of 3 m, of a pose of 2 m
