@@ -22,8 +22,8 @@ struct CarriedInertia {
 /// Frame of a carried body, and the kinetic energy of its motion; part of a State.
 struct CarriedState {
   MotionSample frame;
-  double kinetic_energy = 0;      ///< of all of it in the world [J]
-  double potential_of_frame = 0;  ///< of gravity, beyond that of q [J]
+  double kinetic_energy = 0;      ///< whole motion in the world [J]
+  double potential_of_frame = 0;  ///< potential of gravity beyond that of q [J]
 };
 
 struct CarriedWorkspace {

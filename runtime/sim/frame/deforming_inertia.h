@@ -77,7 +77,7 @@ class DeformingInertia {
   double mass_ = 0;
   Eigen::Vector3d centre_of_mass_ = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second_moments_ = Eigen::Matrix3d::Zero();
-  Eigen::Matrix<double, 6, 1> pairs_ = Eigen::Matrix<double, 6, 1>::Zero();  ///< of the second moments
+  Eigen::Matrix<double, 6, 1> pairs_ = Eigen::Matrix<double, 6, 1>::Zero();  ///< second moments at rest
   Eigen::MatrixXd linear_;                                                   ///< r x 6, p1_ab
   AlignedArray stacked_;                  ///< kProducts padded(r) x r by columns: S_ab and A_c
   AlignedArray panels_, turning_panels_;  ///< see RotationArrays

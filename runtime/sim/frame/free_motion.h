@@ -7,7 +7,7 @@
 
 namespace exmat::runtime {
 
-/// Where a step of a free body began, for BDF2 of one that a host holds.
+/// Start of a step of a free body, for BDF2 of one that a host holds.
 struct FreeStart {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();
@@ -23,7 +23,7 @@ struct FreeState {
   Eigen::Vector3d linear_momentum = Eigen::Vector3d::Zero();        ///< p [kg m/s]
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();       ///< L about c [kg m^2/s]
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();                   ///< omega, body frame [rad/s]
-  Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< of the host, beside State::applied_force [N]
+  Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< from the host, beside State::applied_force [N]
   Eigen::Vector3d applied_torque = Eigen::Vector3d::Zero();         ///< about c [N m]
   Eigen::VectorXd momentum, momentum_previous;                      ///< [r] pi = qdot - sum_c omega_c A_c q
   FreeStart before{};                                               ///< likewise at the end of the step before
@@ -55,7 +55,7 @@ struct FreeMotionWorkspace {
   FreeMotionWorkspace() = default;
   explicit FreeMotionWorkspace(const DeformingInertia& inertia);
 
-  SpinProblem problem;                                        ///< of this step
+  SpinProblem problem;                                        ///< spin equation of this step
   bool spin_is_given = false;                                 ///< near obstacles the spin is an unknown of its own
   bool turn_is_given = false;                                 ///< see turn_rigidly()
   Eigen::Vector3d turned_momentum = Eigen::Vector3d::Zero();  ///< L in the body frame at the end of a given turn

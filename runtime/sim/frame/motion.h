@@ -9,7 +9,7 @@ namespace exmat::runtime {
 /// Pose of a rigid frame at a time. The orientation is a unit quaternion.
 struct Keyframe {
   double time = 0;                                                  ///< [s]
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< of the frame's origin, world [m]
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();               ///< frame's origin, world [m]
   Eigen::Quaterniond orientation = Eigen::Quaterniond::Identity();  ///< frame to world
 };
 
@@ -17,9 +17,9 @@ struct Keyframe {
 struct MotionSample {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();              ///< [m]
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();          ///< frame to world
-  Eigen::Vector3d linear_velocity = Eigen::Vector3d::Zero();       ///< of the frame's origin [m/s]
+  Eigen::Vector3d linear_velocity = Eigen::Vector3d::Zero();       ///< frame's origin [m/s]
   Eigen::Vector3d angular_velocity = Eigen::Vector3d::Zero();      ///< [rad/s]
-  Eigen::Vector3d linear_acceleration = Eigen::Vector3d::Zero();   ///< of the frame's origin [m/s^2]
+  Eigen::Vector3d linear_acceleration = Eigen::Vector3d::Zero();   ///< frame's origin [m/s^2]
   Eigen::Vector3d angular_acceleration = Eigen::Vector3d::Zero();  ///< [rad/s^2]
 
   /// World position of a point of the frame.
@@ -39,7 +39,7 @@ struct MotionSample {
   }
 };
 
-inline constexpr double kBesideKey = 1e-6;  ///< of a step
+inline constexpr double kBesideKey = 1e-6;  ///< share of a step
 
 /// A prescribed rigid motion through keyframes: cubic Hermite positions (non-uniform Catmull-Rom) and cubic Bezier
 /// orientations (Kim, Kim and Shin 1995), both C1; accelerations may jump at keys. Held at rest before the first key

@@ -9,14 +9,14 @@
 
 namespace exmat::runtime {
 
-/// Where the joint of a bone is, world [m], and how the bone has turned since it was bound.
+/// Joint of a bone, world [m], and the bone's rotation since it was bound.
 struct BonePose {
   Eigen::Vector3d joint = Eigen::Vector3d::Zero();
   Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
 };
 using BonePoses = std::vector<BonePose>;
 
-using BoneMatrix = Eigen::Matrix<double, 3, 4>;  ///< of a bone to the world: axes and joint [m]
+using BoneMatrix = Eigen::Matrix<double, 3, 4>;  ///< bone to world: axes and joint [m]
 
 /// A motion of all bones of a skeleton through poses at ascending times, the first 0; between them joints go straight
 /// and bones turn at a constant rate.
@@ -46,9 +46,9 @@ class Skeleton {
   int parent(std::size_t bone) const { return parents_[bone]; }  ///< -1 of a root
   const BoneMatrix& bind(std::size_t bone) const { return binds_[bone]; }
   BonePoses bound() const;
-  /// Of a bone whose axes and joint are here; of axes that are stretched the nearest rotation is taken.
+  /// Pose of a bone whose axes and joint are here; stretched axes give the nearest rotation.
   BonePose pose(std::size_t bone, const BoneMatrix& world) const noexcept;
-  BoneMatrix matrix(std::size_t bone, const BonePose& pose) const noexcept;  ///< where pose() is from, unstretched
+  BoneMatrix matrix(std::size_t bone, const BonePose& pose) const noexcept;  ///< inverse of pose(), unstretched
 
   const std::vector<BoneAnimation>& animations() const { return animations_; }
   const BoneAnimation* find_animation(const std::string& name) const noexcept;  ///< null where none has the name
@@ -60,7 +60,7 @@ class Skeleton {
   std::vector<BoneAnimation> animations_;
 };
 
-/// How a body's bones follow an animation, which outlives it: at `start` [s] of it at time 0, `speed` times as fast.
+/// Animation that a body's bones follow, which outlives it: at `start` [s] of it at time 0, `speed` times as fast.
 struct BonePlay {
   const BoneAnimation* animation = nullptr;
   double speed = 1;

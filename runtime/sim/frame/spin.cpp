@@ -10,7 +10,7 @@ namespace {
 constexpr int kMaxIterations = 30;
 constexpr double kSmall = 1e-4;       // [rad^2]
 constexpr double kTolerance = 4e-15;  // of |J w| + |h|
-/// Of the square of the residual: where an iteration leaves no more, its derivative serves again.
+/// Share of the last squared residual; an iteration that leaves no more keeps its derivative.
 constexpr double kServes = 1e-6;
 
 struct Coefficients {
@@ -28,7 +28,7 @@ inline Coefficients coefficients(const Eigen::Vector3d& t) {
   return {std::sin(angle) / angle, 2 * half * half, (angle - std::sin(angle)) / (angle * angle * angle)};
 }
 
-/// Of the residual J w + h - l, l = exp(-[t]x) l_n: dl/dt = [l]x J_r(t), J_r the right Jacobian of SO(3).
+/// Derivative of the residual J w + h - l, l = exp(-[t]x) l_n: dl/dt = [l]x J_r(t), J_r the right Jacobian of SO(3).
 Eigen::Matrix3d derivative(const SpinProblem& problem, const Eigen::Matrix3d& inertia, const Eigen::Vector3d& t,
                            const Coefficients& c, const Eigen::Vector3d& l) {
   Eigen::Matrix3d found = inertia;

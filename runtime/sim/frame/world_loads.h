@@ -29,8 +29,8 @@ struct WorldLoads {
   Eigen::Vector3d gravity = Eigen::Vector3d::Zero();  ///< [m/s^2]; moves a free body
   Eigen::VectorXd gravity_force;                      ///< [r], gravity_load^T g
   std::vector<ScriptedForce> forces;
-  std::optional<RigidMotion> carrier;  ///< of a body that is carried: what carries its fixed part
-  std::optional<BonePlay> animation;   ///< of a body on a skeleton; none: its host moves the bones
+  std::optional<RigidMotion> carrier;  ///< motion of the fixed part of a carried body
+  std::optional<BonePlay> animation;   ///< moves the bones of a body on a skeleton; none: its host does
 
   /// True if a force begins or ends between two times.
   bool forces_jump(double from, double to) const noexcept {

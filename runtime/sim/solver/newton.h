@@ -40,7 +40,7 @@ enum class NewtonStatus {
 struct NewtonReport {
   NewtonStatus status = NewtonStatus::kConverged;
   int iterations = 0;
-  int factorisations = 0;           ///< of the Hessian; fewer than iterations where an older one served
+  int factorisations = 0;           ///< Hessians factored; fewer than iterations where an older one served
   int line_search_evaluations = 0;  ///< beyond the one that each iteration needs
   int projections = 0;              ///< times that the exact Hessian was not positive definite
   double residual = 0;              ///< |gradient| at the end

@@ -28,7 +28,7 @@ using Profile = StageProfile<Stage, kStageNames.size()>;
 /// The stages on the wall clock; and those of the steps of single bodies, as the threads' clocks add up.
 struct WorldProfile : StageProfile<WorldStage, kWorldStageNames.size()> {
   Profile bodies;
-  double bodies_seconds = 0;  ///< of whole steps of these
+  double bodies_seconds = 0;  ///< time of their whole steps
 };
 
 /// Adds the time of its own life and `flops` to one stage; without a profile it does not look at the clock.

@@ -11,18 +11,18 @@
 
 namespace exmat::runtime {
 
-/// How a frame of a host holds a patch of a body: each vertex where it is in the frame, in full space, or their mean
-/// and the rotation that fits them best, of a body in its modes; their mean alone; their mean by a spring and a damper.
+/// Hold of a host's frame on a patch of a body: each vertex at its place in the frame, in full space, or their mean and
+/// the rotation that fits them best, of a body in its modes; their mean alone; their mean by a spring and a damper.
 enum class AttachmentKind { kFixed, kBall, kSpring };
 
-/// What modes make of a patch. Its moments are rest + rows q, in the frame of the body: the mean of its vertices beyond
+/// Patch in the modes. Its moments are rest + rows q, in the frame of the body: the mean of its vertices beyond
 /// Placement::origin [m] and, of a fixed one, sum_k s_k p_k y_k^T [m^2] by rows, s the shares, p the places about their
 /// mean, y the vertices.
 struct ReducedPatch {
   RowMatrix rows;        ///< 3 x r, or 12 x r of a fixed one
   Eigen::VectorXd rest;  ///< 3 or 12
   Eigen::Matrix3Xd
-      axes;           ///< of the host's frame, about which its rotation is held: 3; 2 of vertices in a line; 0 of one
+      axes;           ///< in the host's frame, its rotation is held about them: 3; 2 for vertices in a line; 0 for one
   double square = 0;  ///< sum_k s_k |p_k|^2 [m^2]
 };
 
@@ -33,15 +33,15 @@ struct Attachment {
   std::vector<std::int32_t> vertices;                            ///< k, of the mesh, that move
   Eigen::VectorXd shares;                                        ///< [k] of the mean, of sum 1
   Eigen::Matrix3Xd places;                                       ///< [3 x k] of the vertices in the frame [m]
-  double stiffness = 0, damping = 0;                             ///< of a spring [N/m], [N s/m]
+  double stiffness = 0, damping = 0;                             ///< for a spring [N/m], [N s/m]
   double break_force = std::numeric_limits<double>::infinity();  ///< [N]
-  ReducedPatch patch;                                            ///< of a body that steps in its modes; else empty
+  ReducedPatch patch;                                            ///< filled for a body that steps in its modes
 
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< of the frame, at the end of the next step
+  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< frame to world, at the end of the next step
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< world [m]
   Eigen::Matrix3d rotation_before = rotation;              ///< likewise at the end of the last step
   Eigen::Vector3d position_before = position;
-  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< of the vertices, world, at the end of the last step [m]
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();  ///< mean of the vertices, world, at the end of the last step [m]
   Eigen::Vector3d mean_before = mean;              ///< one step earlier; both of a body that steps in its modes
 
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< on the frame, of the last step [N]
@@ -49,24 +49,24 @@ struct Attachment {
   bool broken = false;                               ///< the force was larger than it bears: it holds no longer
 
   bool holds() const noexcept { return !broken; }
-  /// Whether steps in modes see it.
+  /// True if steps in modes see it.
   bool holds_modes() const noexcept { return !broken && patch.rows.rows() > 0; }
-  /// Of a body in its modes: those of the mean, then those of the rotation about patch.axes.
+  /// Conditions on a body in its modes: those of the mean, then those of the rotation about patch.axes.
   Eigen::Index conditions() const noexcept {
     return kind == AttachmentKind::kSpring || patch.rows.rows() == 0 ? 0 : 3 + patch.axes.cols();
   }
   Eigen::Vector3d target(Eigen::Index k) const noexcept { return position + rotation * places.col(k); }
-  /// Where the mean is held.
+  /// Point that holds the mean, world [m].
   Eigen::Vector3d anchor() const noexcept { return position + rotation * (places * shares); }
   Eigen::Vector3d anchor_before() const noexcept { return position_before + rotation_before * (places * shares); }
 };
 
-/// Whether one of them holds.
+/// True if one of them holds.
 inline bool is_held(std::span<const Attachment> attachments) noexcept {
   return std::ranges::any_of(attachments, &Attachment::holds);
 }
 
-/// Whether one of them holds a body that steps in its modes.
+/// True if one of them holds a body that steps in its modes.
 inline bool holds_modes(std::span<const Attachment> attachments) noexcept {
   return std::ranges::any_of(attachments, &Attachment::holds_modes);
 }

@@ -17,25 +17,25 @@ struct AttachmentWorkspace {
 
   Eigen::Index conditions() const noexcept { return violation.size(); }
 
-  ContactSums sums;                                ///< of all attachments, on the body, at the last evaluation
-  Eigen::Matrix3Xd forces;                         ///< of each on the body, at its mean, world [N]
+  ContactSums sums;                                ///< total of all attachments on the body, at the last evaluation
+  Eigen::Matrix3Xd forces;                         ///< one per attachment, on the body at its mean, world [N]
   Eigen::Matrix3Xd torques;                        ///< likewise beside that [N m]
   Eigen::VectorXd violation, multipliers, change;  ///< c: C, lambda, scratch
   Eigen::MatrixXd gradients, directions;           ///< n x c: J^T, A^-1 J^T
   Eigen::MatrixXd product, inverse;                ///< c x c: J (A^-1 J^T), and its inverse
-  Eigen::PartialPivLU<Eigen::MatrixXd> factor;     ///< of that
+  Eigen::PartialPivLU<Eigen::MatrixXd> factor;     ///< LU factors of product
 
   /// product, factor and inverse of gradients and directions; conditions of what broke stay 0 = 0.
   void invert() noexcept;
 };
 
-/// What the integrator of a step makes of a rate.
+/// Coefficients of a rate in the integrator of a step.
 struct StepRate {
   double velocity_factor;  ///< c_v [1/s]
   double time_step;        ///< [s]
 };
 
-/// Where the mean of the vertices is, world [m].
+/// Mean of the vertices, world [m].
 Eigen::Vector3d mean_of(const Attachment& attachment, const BodyPose& pose) noexcept;
 
 // Springs: k/2 |m - a|^2 + c c_v/2 |m - m_v - (a - a_before) / (dt c_v)|^2 of the mean m and the anchor a.

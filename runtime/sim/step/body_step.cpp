@@ -26,8 +26,9 @@ StepHistory history_of(const Model& model, const State& state) {
           model.frame->former_momentum(state.v_previous, state.frame)};
 }
 
-/// What resolves a step: backward Euler where a body that is not clamped in the world turns too far in it for anything
-/// of second order. What holds a body is exact at the end of steps, which Newmark's forces would oscillate about: BDF2.
+/// Integrator that resolves a step: backward Euler where a body that is not clamped in the world turns too far in it
+/// for anything of second order. A hold on a body is exact at the end of steps, which Newmark's forces would oscillate
+/// about: BDF2.
 Integrator integrator_of_step(const Model& model, const StepScene& scene, const State& state, bool near, bool held) {
   const bool resolved = !near && model.frame->turn_rate(state.frame) * scene.time_step <= kResolvedTurn;
   if (!resolved || (held && begins_anew(model, scene, state))) return Integrator::kBackwardEuler;

@@ -12,14 +12,14 @@
 
 namespace exmat::runtime {
 
-/// Whether the next step has no smooth past: the first one, or one that a scripted force begins or ends with, or in
+/// True if the next step has no smooth past: the first one, or one that a scripted force begins or ends with, or in
 /// which a setting of the scene or the accelerations of the frame jump.
 bool begins_anew(const Model& model, const StepScene& scene, const State& state) noexcept;
 
 /// The counts, the residual and the end of a minimisation.
 void add_newton_report(const NewtonReport& newton, StepReport& report) noexcept;
 
-/// Of the two first iterates: whether their potentials differ by more than rounding of the elastic energy may.
+/// True if the potentials of the two first iterates differ by more than rounding of the elastic energy may.
 inline bool are_clearly_apart(double a, double b, double elastic_energy) noexcept {
   constexpr double kUnclear = 1e-3;
   return std::abs(a - b) > kUnclear * std::abs(elastic_energy);
@@ -40,7 +40,7 @@ class BodyStep {
   /// Targets and example forces alone, at the first iterate in the workspace. False where numbers are not finite.
   bool find_targets() noexcept;
 
-  /// Whether it is one near obstacles or bodies, after begin().
+  /// True near obstacles or bodies, after begin().
   bool is_near() const noexcept { return near_; }
 
   /// prepare() and Newton's method; q at the end of the step into the workspace.

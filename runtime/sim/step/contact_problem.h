@@ -37,7 +37,7 @@ class ContactProblem {
   // The same in parts: between them others add what they do to this body, to the sums and the stiffness in
   // workspace.near.
 
-  /// What the body, its obstacles and springs make of x; sums of the contacts in workspace.near->contact, of the
+  /// Evaluates the body, its obstacles and springs at x; sums of the contacts in workspace.near->contact, of the
   /// springs in workspace.near->held. `first`: with the elastic Hessian of the potential's start().
   PotentialEvaluation evaluate_alone(const Eigen::VectorXd& x, bool first) noexcept;
   PotentialEvaluation finish(const Eigen::VectorXd& x, const PotentialEvaluation& alone,

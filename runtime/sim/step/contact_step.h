@@ -4,13 +4,13 @@
 
 namespace exmat::runtime {
 
-// What a step does near obstacles. docs/step_in_detail.md, "Contact". No call allocates.
+// Steps near obstacles. docs/step_in_detail.md, "Contact". No call allocates.
 
-/// Where the body is.
+/// Pose of the body.
 BodyPose pose_of(const Model& model, const State& state) noexcept;
 
-/// Whether any vertex may touch an obstacle in this step; then the candidates are in workspace.near. Of the state what
-/// saves searches changes.
+/// True if any vertex may touch an obstacle in this step; then the candidates are in workspace.near. In the state, only
+/// what saves searches changes.
 bool is_near_obstacles(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
 /// The unknowns of a step near something, into workspace.near->x: of free flight, and of workspace.q.
@@ -51,7 +51,7 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
 /// The anchors of friction go with a body that is put from one place to another.
 void carry_contacts(const StepScene& scene, const Placement& from, const Placement& to, State& state) noexcept;
 
-/// What the state, already that of the end of the step, remembers of its contacts.
+/// Writes the contacts of the step into the state, already that of its end.
 void commit_contacts(const Model& model, bool near, Workspace& workspace, State& state) noexcept;
 
 }  // namespace exmat::runtime

@@ -3,7 +3,7 @@
 namespace exmat::runtime {
 namespace {
 
-/// What the force of the target is made of: its pull, or the elasticity from it.
+/// Finds the pull of the target or, for an elastic force, the elasticity from it.
 void find_target(const ExampleModel& model, const ExampleSettings& settings, const ExampleState& state,
                  ExampleWorkspace& workspace, StepReport& report) noexcept {
   const bool elastic = settings.elastic;

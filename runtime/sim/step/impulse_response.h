@@ -16,9 +16,9 @@ struct MaterialPoints {
   const RowMatrix& basis_rows;
 };
 
-/// How a body in its modes answers impulses where it stands at the end of a step, as one more step of backward Euler
-/// would: the change of velocity is A^-1 J^T P with A = M + dt D + dt^2 K, K that of elasticity, example forces and the
-/// host's springs, and under the conditions of hard attachments. Contacts and what spin does to A are left out.
+/// Response of a body in its modes to impulses where it stands at the end of a step, as one more step of backward Euler
+/// would give it: the change of velocity is A^-1 J^T P with A = M + dt D + dt^2 K, K that of elasticity, example forces
+/// and the host's springs, and under the conditions of hard attachments. Contacts and what spin does to A are left out.
 /// n unknowns: the velocity of the centre of mass and the spin in the body's frame, of a free body, and qdot.
 class ImpulseResponse {
  public:

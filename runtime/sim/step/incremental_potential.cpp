@@ -153,7 +153,7 @@ void IncrementalPotential::set_offset(const Eigen::VectorXd& q) noexcept {
                           workspace_.product.data());
 }
 
-/// Of internal_force and elastic_energy_ at q; leaves q - q_n in the workspace.
+/// Potential and gradient at q from internal_force and elastic_energy_; leaves q - q_n in the workspace.
 PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eigen::VectorXd& gradient) noexcept {
   const StepForm& form = workspace_.form;
   set_offset(q);
@@ -172,7 +172,7 @@ PotentialEvaluation IncrementalPotential::assemble(const Eigen::VectorXd& q, Eig
   return evaluation;
 }
 
-/// Of q, into next_frozen_force. False where the frame has no motion for it.
+/// Writes the forces without a potential at q to next_frozen_force. False where the frame has no motion for it.
 bool IncrementalPotential::update_frozen_force(const Eigen::VectorXd& q) noexcept {
   workspace_.next_frozen_force.setZero();
   for (std::size_t i = 0; skew_ && i < scene_.examples.size(); ++i)
@@ -211,7 +211,7 @@ const Eigen::VectorXd& IncrementalPotential::gyroscopic_product(const Eigen::Vec
   return *model_.frame->gyroscopic_product(workspace_.form.velocity_factor, x, workspace_.frame);
 }
 
-/// Of offset and its product with A.
+/// Potential from offset and its product with A, with the elastic energy.
 PotentialValue IncrementalPotential::quadratic(double elastic_energy) noexcept {
   const double square = 0.5 * workspace_.offset.dot(workspace_.product.head(workspace_.offset.size()));
   const double linear = workspace_.linear.dot(workspace_.offset);

@@ -9,7 +9,7 @@
 
 namespace exmat::runtime {
 
-/// What one step minimises:
+/// Potential that one step minimises:
 ///   c_a/2 |q - q_a|^2 + c_v/2 (q - q_v)^T D (q - q_v) + E(q) - f_ext . q
 ///   + sum over the example forces of k/2 (q - q_c)^T P_s (q - q_c) - kappa g . q, or of k/2 ... + W(q) with k =
 ///   c_kappa c_v where they are elastic,
@@ -26,7 +26,7 @@ class IncrementalPotential {
   /// force alone; comparable with potential_at_start().
   double start(const Eigen::VectorXd& first_iterate) noexcept;
   double potential_at_start() const noexcept;
-  /// What start() returns, but for rounding, and nothing else of it.
+  /// Value of start() alone, but for rounding.
   double potential_of_start(const Eigen::VectorXd& first_iterate) noexcept;
 
   /// The quadratic form. After start(); with example forces, after prepare_example_forces().
@@ -40,17 +40,17 @@ class IncrementalPotential {
   void accept(PotentialEvaluation& evaluation) noexcept;
   const Eigen::MatrixXd* gyroscopic() const noexcept;
   int gyroscopic_terms() const noexcept;
-  /// Whether an antisymmetric part of that ratio to inertia is weak: then so many terms of a series serve.
+  /// True if an antisymmetric part of that ratio to inertia is weak: then so many terms of a series serve.
   static bool is_weak(double ratio) noexcept;
   static int gyroscopic_terms(double ratio) noexcept;
   const Eigen::VectorXd& gyroscopic_product(const Eigen::VectorXd& x) const noexcept;
 
   /// E at the last evaluate() or start().
   double elastic_energy() const noexcept { return elastic_energy_; }
-  /// Of a solution that was found elsewhere.
+  /// Sets E of a solution that was found elsewhere.
   void set_elastic_energy(double energy) noexcept { elastic_energy_ = energy; }
 
-  /// Of internal forces, over trace(K) |q|.
+  /// Relative, of internal forces over trace(K) |q|.
   static constexpr double kForceRounding = 4 * std::numeric_limits<double>::epsilon();
 
   double tolerance() const noexcept { return scene_.newton.tolerance; }

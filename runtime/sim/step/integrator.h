@@ -4,7 +4,7 @@
 
 namespace exmat::runtime {
 
-/// What an integrator goes on from; [r] each. Refers to a state.
+/// State that an integrator continues; [r] each. Refers to a state.
 struct StepHistory {
   const Eigen::VectorXd &q, &v, &q_previous;
   const Eigen::VectorXd &momentum, &momentum_previous;  ///< BodyFrame::momentum(); v where the frame stands still

@@ -10,7 +10,7 @@ Complaint missing_group(const std::string& group) {
   return {"", group, "this part", "none", "precompute the bundle again with this scene (--scene)"};
 }
 
-/// What the energies of targets need beside the examples.
+/// Data that the energies of targets need beside the examples.
 struct RestModel {
   MaterialModel material;
   const CubatureData& cubature;

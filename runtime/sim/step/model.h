@@ -21,15 +21,15 @@
 
 namespace exmat::runtime {
 
-/// What one example force needs. K examples.
+/// Data of one example force. K examples.
 struct ExampleModel {
   std::string region;  ///< empty: the whole body
   ExampleWeights weights;
-  /// Of the pull U^T P p*, with `elasticity` of coordinates y; serves the targets if there is one.
+  /// Table of the pull U^T P p* or, with `elasticity`, coordinates y; serves the targets if there is one.
   std::optional<TargetTable> table;
   std::optional<TargetSolver> target;          ///< otherwise
   Eigen::MatrixXd target_pull;                 ///< r x d, with `target`: the pull of its coordinates y
-  std::optional<TargetElasticity> elasticity;  ///< of an elastic force
+  std::optional<TargetElasticity> elasticity;  ///< present for an elastic force
   ShapeFilter filter;                          ///< P_s
 };
 
@@ -37,9 +37,9 @@ struct ExampleModel {
 struct Model {
   InternalForce internal_force;
   RowMatrix gravity_load;                    ///< 3 x r
-  std::shared_ptr<const BodyFrame> frame;    ///< what the body deforms in
+  std::shared_ptr<const BodyFrame> frame;    ///< in which the body deforms
   std::shared_ptr<const Skeleton> skeleton;  ///< that the body hangs on; null: on none
-  std::optional<ContactSet> contact;         ///< of a scene with obstacles
+  std::optional<ContactSet> contact;         ///< present for a scene with obstacles
   std::vector<ExampleModel> examples;        ///< the whole body's, then those of regions; none where prepared without
 
   Eigen::Index modes() const { return internal_force.modes(); }

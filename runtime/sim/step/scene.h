@@ -37,17 +37,17 @@ struct SpaceSettings {
   double release = 0.5;  ///< [s] that a body in space `auto` stays full after the last load that asked for it
   bool contact = true;   ///< to touch an obstacle is such a load, as forces of the caller are
   bool forces = true;    ///< the scene's forces are
-  NewtonSettings newton{20, 0.01};  ///< of steps in full space
+  NewtonSettings newton{20, 0.01};  ///< settings for steps in full space
 };
 
-/// What acts on a body, and how it is integrated. The time step is the same for the whole life of a State.
+/// Loads on a body, and how it is integrated. The time step is the same for the whole life of a State.
 struct StepScene : WorldLoads {
   double time_step = 0.001;  ///< > 0 [s]
   Integrator integrator = Integrator::kBdf2;
   double mass_damping = 0;       ///< alpha >= 0 [1/s]
   double stiffness_damping = 0;  ///< beta >= 0 [s]
   NewtonSettings newton;
-  Precision precision = Precision::kDouble;  ///< of bodies side by side, the same for all of them
+  Precision precision = Precision::kDouble;  ///< the same for all bodies that step side by side
   SleepSettings sleep;
   SpaceSettings space;
   MeetingGroup meeting;
@@ -56,7 +56,7 @@ struct StepScene : WorldLoads {
   bool begins_anew = false;  ///< something of it has jumped since the last step, which is no smooth past then
 };
 
-/// Whether these examples exert a force; weights and targets of those that do not are left out.
+/// True if these examples exert a force; weights and targets of those that do not are left out.
 inline bool acts(const ExampleSettings& examples) noexcept { return examples.stiffness > 0 || examples.damping > 0; }
 
 /// kappa of a linear force, and the factor e of an elastic one; 0 of the other.
@@ -67,15 +67,15 @@ inline double elastic_factor(const ExampleSettings& examples) noexcept {
   return examples.elastic ? examples.stiffness : 0;
 }
 
-/// Whether the force has a part that the shape filter takes: a spring to the target, or damping.
+/// True if the force has a part that the shape filter takes: a spring to the target, or damping.
 inline bool is_filtered(const ExampleSettings& examples) noexcept {
   return linear_stiffness(examples) > 0 || examples.damping > 0;
 }
 
-/// Whether any examples exert a force.
+/// True if any examples exert a force.
 inline bool runs_examples(const StepScene& scene) noexcept { return std::ranges::any_of(scene.examples, acts); }
 
-/// Whether steps look for contacts with obstacles.
+/// True if steps look for contacts with obstacles.
 inline bool touches(const Model& model, const StepScene& scene) noexcept {
   return model.contact && !scene.obstacles.empty();
 }

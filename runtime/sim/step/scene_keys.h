@@ -22,7 +22,7 @@ class KeyedSetting {
 
   /// Into `value` [columns], which has its size.
   void sample(double time, Eigen::Ref<Eigen::VectorXd> value) const noexcept;
-  /// Whether it is another at `to` than at `from` without anything between.
+  /// True if it is another at `to` than at `from` without anything between.
   bool jumps(double from, double to) const noexcept;
 
  private:

@@ -19,14 +19,14 @@ class WordHash {
   void add_all(const auto& numbers) noexcept {
     for (const double number : numbers) add(number);
   }
-  /// Of 53 bits, which any number of a file holds.
+  /// 53 bits, which any number of a file holds.
   std::uint64_t value() const noexcept { return value_ >> 11U; }
 
  private:
   std::uint64_t value_ = 0x243f6a8885a308d3U;
 };
 
-/// Of all that acts on the body and has a value at any time.
+/// Hash of all loads on the body that have a value at any time.
 std::uint64_t hash_of_loads(const StepScene& scene, const State& state) noexcept {
   WordHash hash;
   hash.add_all(scene.gravity);
@@ -43,7 +43,7 @@ std::uint64_t hash_of_loads(const StepScene& scene, const State& state) noexcept
   return hash.value();
 }
 
-/// Whether an obstacle goes on in this step that the body may meet.
+/// True if an obstacle that the body may meet moves in this step.
 bool is_met(const Model& model, const StepScene& scene, const State& state) noexcept {
   if (!touches(model, scene)) return false;
   const double end = static_cast<double>(state.step + 1) * scene.time_step;

@@ -11,7 +11,7 @@ namespace exmat::runtime {
 // A body that rests is left alone until something acts on it. docs/step_in_detail.md, "Sleep". No call allocates or
 // throws.
 
-/// Whether the body's next step is one that it sleeps through. Wakes one that something acts on.
+/// True if the body sleeps through its next step. Wakes one that something acts on.
 bool sleeps(const Model& model, const StepScene& scene, State& state) noexcept;
 
 /// That step: time goes on, and nothing else.

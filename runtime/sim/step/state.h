@@ -12,7 +12,7 @@
 
 namespace exmat::runtime {
 
-/// What one example force carries from step to step. K examples, d target coordinates.
+/// State of one example force from step to step. K examples, d target coordinates.
 struct ExampleState {
   Eigen::VectorXd weights;  ///< [K] of the last step, after the bias; (1, 0, ...) before the first
   Eigen::VectorXd target;   ///< [d] y of the last step, see TargetSolver; empty with a table
@@ -20,20 +20,20 @@ struct ExampleState {
   bool target_converged = false;
 };
 
-/// Of a body that may fall asleep.
+/// Sleep of a body that may fall asleep.
 struct SleepState {
   bool asleep = false;           ///< nothing has acted on it since it was put to sleep
   std::int64_t still_steps = 0;  ///< without a break, before it was
   std::uint64_t loads = 0;       ///< hash of what acted on it in the last step
 };
 
-/// How the unknowns of a body move: r reduced coordinates, or in full space the f coordinates of the vertices that
+/// Motion of the unknowns of a body: r reduced coordinates, or in full space the f coordinates of the vertices that
 /// move.
 struct Motion {
   Eigen::VectorXd q, v;                    ///< displacement, velocity
   Eigen::VectorXd q_previous, v_previous;  ///< one step earlier (BDF2)
   Eigen::VectorXd a;                       ///< acceleration (Newmark)
-  Eigen::VectorXd applied_force;           ///< of the caller, added to the scene's
+  Eigen::VectorXd applied_force;           ///< set by the caller, added to the scene's
   std::int64_t step = 0;                   ///< steps taken
   double time = 0;                         ///< step * time_step [s]
   double elastic_energy = 0;               ///< E(q) [J]
@@ -64,12 +64,12 @@ struct FullMotion : Motion {
 /// modes nearest to it, and steps change them with it.
 struct State : Motion {
   std::vector<ExampleState> examples;   ///< one for each of the model's example forces
-  ContactState contacts;                ///< what touches; sized for its scene by prepare_contacts()
-  SleepState sleep;                     ///< where the scene lets bodies sleep
-  FrameState frame;                     ///< of the model's frame; nothing of a clamped body
+  ContactState contacts;                ///< sized for its scene by prepare_contacts()
+  SleepState sleep;                     ///< used where the scene lets bodies sleep
+  FrameState frame;                     ///< state of the model's frame; empty for a clamped body
   std::optional<FullMotion> full;       ///< in full space
   Eigen::VectorXd vertex_force;         ///< [f] of the caller, world [N], of a body that may step in full space
-  std::vector<Attachment> attachments;  ///< of its host, likewise
+  std::vector<Attachment> attachments;  ///< made by its host
 };
 
 /// Those of a free body.

@@ -18,17 +18,17 @@ enum StepStatus : std::uint32_t {
 /// The bits that say that a residual is above its tolerance.
 inline constexpr std::uint32_t kStepUnconverged = kStepIterationLimit | kStepStagnated | kTargetNotConverged;
 
-/// What one step did.
+/// Result of one step.
 struct StepReport {
   std::uint32_t status = 0;
   int newton_iterations = 0;
-  int factorisations = 0;           ///< of the Hessian; the residual of a later iteration may do with an earlier one
+  int factorisations = 0;           ///< Hessians factored; the residual of a later iteration may do with an earlier one
   int line_search_evaluations = 0;  ///< beyond one evaluation of each iterate
   int projections = 0;              ///< Hessians that needed positive semi-definite element tangents
   int target_iterations = 0;
   int contacts = 0;                                         ///< vertices that touch an obstacle
   Eigen::Vector3d contact_force = Eigen::Vector3d::Zero();  ///< sum over them [N]
-  double residual = 0;                                      ///< of the equation of motion [kg^1/2 m/s^2]
+  double residual = 0;                                      ///< residual of the equation of motion [kg^1/2 m/s^2]
 };
 
 }  // namespace exmat::runtime

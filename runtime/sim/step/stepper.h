@@ -27,10 +27,10 @@ bool move_body(const Model& model, const StepScene& scene, const FrameMotion& mo
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept;
 
 struct Energies {
-  double kinetic = 0;    ///< of the body in the world [J]
+  double kinetic = 0;    ///< motion of the whole body in the world [J]
   double elastic = 0;    ///< E(q) [J]
-  double potential = 0;  ///< of gravity, 0 at rest [J]
-  double contact = 0;    ///< of a world: the springs of the contacts between its bodies [J]
+  double potential = 0;  ///< potential of gravity, 0 at rest [J]
+  double contact = 0;    ///< springs of the contacts between the bodies of a world [J]
 
   double total() const { return kinetic + elastic + potential + contact; }
 };

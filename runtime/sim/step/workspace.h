@@ -21,11 +21,11 @@ struct ContactProblemWorkspace {
 
   ContactWorkspace contact;
   AttachmentWorkspace held;
-  NewtonWorkspace newton;         ///< of the unknowns below
+  NewtonWorkspace newton;         ///< solves for the unknowns below
   Eigen::VectorXd x;              ///< 6 + r, or r of a constrained body
   Eigen::VectorXd q, gradient_q;  ///< r
-  Eigen::MatrixXd stiffness;      ///< of the contacts, as the unknowns
-  double extent = 0;              ///< how far vertices are from the world's origin, about [m]
+  Eigen::MatrixXd stiffness;      ///< stiffness of the contacts, in the unknowns
+  double extent = 0;              ///< distance of the vertices from the world's origin, about [m]
 };
 
 /// Scratch of one example force. K examples, d target coordinates.
@@ -37,9 +37,9 @@ struct ExampleWorkspace {
   TargetSolver::Workspace target_solver;
   Eigen::VectorXd weights;        ///< K
   Eigen::VectorXd solved_target;  ///< d, its coordinates, where it is solved for or the force is elastic
-  bool target_converged = false;  ///< of solved_target
+  bool target_converged = false;  ///< true if solved_target converged
   Eigen::VectorXd target;         ///< r, its pull g, of a linear force
-  std::optional<TargetElasticity::Workspace> elasticity;  ///< of an elastic one
+  std::optional<TargetElasticity::Workspace> elasticity;  ///< present for an elastic force
   ExampleForce force;
 };
 
@@ -69,8 +69,8 @@ struct Workspace {
 
   bool predictor_was_lower = true;  ///< in the last step than where it began: which of the two is looked at first
 
-  std::optional<ContactProblemWorkspace> near;  ///< where it may touch anything, or is held
-  FrameWorkspace frame;                         ///< of the model's frame
+  std::optional<ContactProblemWorkspace> near;  ///< present for a body that may touch anything, or is held
+  FrameWorkspace frame;                         ///< scratch of the model's frame
   std::vector<ExampleWorkspace> examples;       ///< one for each of the scene's
 };
 

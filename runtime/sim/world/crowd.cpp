@@ -162,7 +162,7 @@ void Crowd::step_group(const Group& group, const Group* next, Thread& thread, St
   if (profiled) thread.seconds += std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-/// What is read of the bodies of the next group is fetched meanwhile.
+/// Reads for the bodies of the next group are prefetched meanwhile.
 void Crowd::step_lanes(const Group& group, const Group* next, LaneWorkspace& scratch) noexcept {
   std::array<LaneBody, kLanes> bodies, others;
   std::array<StepReport, kLanes> reports;

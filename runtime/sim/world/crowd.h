@@ -63,7 +63,7 @@ class Crowd {
     const Model* model = nullptr;  ///< null: its last body was removed
     StepScene scene;               ///< that scratch is sized for: the one of most obstacles
     int bodies = 0;
-    // Of one step: how many can go side by side, how many of these were seen, and the group that is not full, or -1.
+    // One step: bodies able to go side by side, those of them seen, and the group that is not full, or -1.
     int able = 0, seen = 0, open = -1;
 
     /// Those of a last group that is too small for lanes step by themselves.

@@ -16,7 +16,7 @@ class FullMember {
   FullMember(const FullModel& full, const Model& model, const StepScene& scene, State& state, Workspace& workspace,
              FullWorkspace& own, const TouchingSurface& touching);
 
-  /// Where the state says, for searches.
+  /// Puts the surface where the state says, for searches.
   void place_surface();
   MovingSurface& surface() noexcept { return surface_; }
   const MovingSurface& surface() const noexcept { return surface_; }
@@ -56,7 +56,7 @@ class FullMember {
     const SurfacePlace& on = candidates.places[i];
     for (int c = 0; c < 3; ++c) take(surface_.object_corner(on.triangle, c), -on.shares[c]);
   }
-  /// How far a field moves them.
+  /// Displacement of a candidate's point by a field x.
   Eigen::Vector3d way(const BodyCandidates& candidates, std::size_t i, bool is_vertex,
                       const Eigen::Ref<const Eigen::VectorXd>& x) const {
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
@@ -64,7 +64,7 @@ class FullMember {
                [&](std::int32_t place, double share) { sum += share * x.segment<3>(4 * place); });
     return sum;
   }
-  /// How far rounding may put a vertex, over kGapRounding [m].
+  /// Bound on the rounding of a vertex's place, over kGapRounding [m].
   double reach() const noexcept { return full_.space.extent() + state_.full->q.lpNorm<Eigen::Infinity>(); }
 
   void begin_blocks() noexcept { step_->step().begin_blocks(); }
@@ -82,7 +82,7 @@ class FullMember {
   /// Momenta that external forces alone make, or nothing of a body that is not free.
   std::optional<FrameMomenta> expected_momenta() noexcept;
   Eigen::Matrix3d inertia() const noexcept { return own_.potential.rigid.inertia; }  ///< after finish() [kg m^2]
-  /// Whether something outside moves parts of it.
+  /// True if something outside moves parts of it.
   bool is_driven() const noexcept { return full_.is_driven() || is_held(state_.attachments); }
   Energies energies() const noexcept { return runtime::energies(&full_, model_, scene_, state_); }
 
@@ -98,7 +98,7 @@ class FullMember {
   std::optional<FullBodyStep> step_;
 };
 
-/// What contacts see of it, as ReducedSide: forces on it go to its vertices, and it has no columns.
+/// Side of a contact, as ReducedSide: forces on it go to its vertices, and it has no columns.
 struct FullSide {
   const FullMember& member;
   const MovingSurface& surface;

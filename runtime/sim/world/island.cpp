@@ -313,8 +313,8 @@ bool IslandProblem::project() noexcept {
   return true;
 }
 
-/// Where the matrix is not positive definite, the iterate before it shows: a direction of descent in any case. Bodies
-/// in full space multiply in single precision: forces are taken over their norm.
+/// Conjugate gradients. Where the matrix is not positive definite they return the iterate before: a direction of
+/// descent in any case. Bodies in full space multiply in single precision: forces are taken over their norm.
 void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept {
   const double size = has_full_ ? x.norm() : 1;
   if (has_full_) {
@@ -460,7 +460,7 @@ IslandEnergy energy_of(std::span<WorldBody* const> bodies) noexcept {
 /// Energy of an island where a step begins [J].
 struct IslandStart {
   IslandEnergy bodies;
-  double springs = 0;   ///< of all contacts between them
+  double springs = 0;   ///< energy of all contacts between them
   double accounts = 0;  ///< the most that these may ever give back
 };
 
@@ -500,8 +500,8 @@ void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* con
   for (WorldBody* const own : bodies) own->limit_kinetic_energy(share);
 }
 
-/// What the step has done to the accounts of the pairs. `closed`: they never gain more together than the bodies have
-/// lost, as where nothing else acts.
+/// Ends the accounts of the pairs after a step. `closed`: they never gain more together than the bodies have lost, as
+/// where nothing else acts.
 void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs, const IslandStart& start,
                   bool closed, bool converged) noexcept {
   double sum = 0;

@@ -15,10 +15,10 @@ struct IslandWorkspace {
   NewtonWorkspace newton;
   Eigen::VectorXd x;
   Eigen::VectorXd trial;                         ///< another start
-  std::vector<PotentialEvaluation> evaluations;  ///< of each body
-  std::vector<PotentialValue> values;            ///< of each body, then of each pair
-  std::vector<Eigen::VectorXd> unknowns;         ///< of each body
-  Eigen::VectorXd right;                         ///< of conjugate gradients, where bodies are in full space
+  std::vector<PotentialEvaluation> evaluations;  ///< one per body
+  std::vector<PotentialValue> values;            ///< one per body, then one per pair
+  std::vector<Eigen::VectorXd> unknowns;         ///< one per body
+  Eigen::VectorXd right;  ///< right-hand side of conjugate gradients, where bodies are in full space
   IslandBegin begin;
   std::vector<FrameMomenta> from_others;  ///< force and torque of other bodies on each
 
@@ -30,7 +30,7 @@ struct IslandWorkspace {
 
 /// The pairs that a body of an island is in.
 struct Incidence {
-  int pair = 0;  ///< of the island's
+  int pair = 0;  ///< index in the island's pairs
   int side = 0;  ///< which of the pair's bodies it is
 };
 
@@ -79,7 +79,7 @@ class IslandProblem {
   int threads_;
   IslandWorkspace& workspace_;
   Eigen::Index unknowns_ = 0;
-  double tolerance_;  ///< of Newton's method
+  double tolerance_;  ///< tolerance of Newton's method
   bool has_full_, is_projected_ = false;
   bool is_dense_ = false;
   int conjugate_gradients_ = 0;

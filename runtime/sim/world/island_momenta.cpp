@@ -33,14 +33,14 @@ struct Together {
     if (!motion.angular.allFinite()) motion.angular.setZero();  // the inertia overflows: they are too far apart to turn
     return motion;
   }
-  /// Of the rigid motion that has these momenta: no other has less.
+  /// Energy of the rigid motion that has these momenta: no other has less.
   double energy_of(const IslandMomenta& momenta) const {
     const FrameVelocity motion = motion_of(momenta);
     return 0.5 * (momenta.total.linear.dot(motion.linear) + angular_momentum(momenta).dot(motion.angular));
   }
 
   double mass = 0;                                    ///< [kg]
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< of mass [m]
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   ///< centre of mass [m]
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();  ///< about it [kg m^2]
 };
 

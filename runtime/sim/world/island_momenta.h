@@ -8,8 +8,8 @@
 
 namespace exmat::runtime {
 
-/// What bodies have together, about a point of the world. Bodies that nothing else touches keep it, whatever they do to
-/// each other.
+/// Momentum of several bodies together, about a point of the world. Bodies that nothing else touches keep it, whatever
+/// they do to each other.
 struct IslandMomenta {
   Eigen::Vector3d about = Eigen::Vector3d::Zero();  ///< [m]
   FrameMomenta total;
@@ -18,7 +18,7 @@ struct IslandMomenta {
 /// A body where a step begins.
 struct BodyBegin {
   FrameMotion motion;
-  Eigen::VectorXd q;          ///< of a body in full space all of its displacement
+  Eigen::VectorXd q;          ///< for a body in full space, its whole displacement
   double elastic_energy = 0;  ///< [J]
 };
 

@@ -91,8 +91,8 @@ void PairContact::begin_account() noexcept {
       if (depth_of(candidate) > 0) candidate.stiffness *= account_ / energy;
 }
 
-/// What contacts lose is theirs to give back: of springs, by friction and damping, and what backward Euler takes from
-/// the motion of the two against each other, 1/2 dt F . (u_1 - u_0).
+/// Contacts may give back their losses: of springs, by friction and damping, and what backward Euler takes from the
+/// motion of the two against each other, 1/2 dt F . (u_1 - u_0).
 void PairContact::end_account(const WorldBody& first, const WorldBody& second, const Eigen::Vector3d& parted,
                               bool converged) noexcept {
   double given = 0;

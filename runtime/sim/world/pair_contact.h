@@ -9,20 +9,20 @@
 
 namespace exmat::runtime {
 
-/// What two bodies remember of their contacts from step to step.
+/// Memory of two bodies' contacts from step to step.
 struct HeldPair {
   int first = 0, second = 0;                           ///< bodies, first < second
   std::array<std::vector<HeldBodyContact>, 2> held{};  ///< the first's vertices, the second's vertices
-  double energy = 0;   ///< of the springs of all contacts at the end of the last step [J]
+  double energy = 0;                                   ///< springs of all contacts at the end of the last step [J]
   double account = 0;  ///< the most that they may hold where the next step begins [J]; not finite: what they do hold
 };
 
 /// A vertex of one body that touched the surface of another, or of its own, at the end of a step.
 struct BodyTouch {
   int body = 0, other = 0;                             ///< numbers in the world
-  int vertex = 0;                                      ///< of the body's object
+  int vertex = 0;                                      ///< vertex of the body's object
   double depth = 0;                                    ///< [m]; negative where damping alone acts
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the vertex, world [m]
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< the vertex, world [m]
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();    ///< unit, away from the other
   Eigen::Vector3d force = Eigen::Vector3d::Zero();     ///< on the body [N]; the other has its negative
 };
@@ -36,7 +36,7 @@ struct BodyTouch {
 /// it. docs/step_in_detail.md, "Energy of contacts".
 class PairContact {
  public:
-  /// Of other bodies than before.
+  /// Forgets the contacts of earlier bodies.
   void forget() noexcept {
     for (NearVertices& near : near_) {
       near.radius = -1;
@@ -48,7 +48,7 @@ class PairContact {
 
   /// Its bodies are called by these numbers from now on.
   void number(int first, int second) noexcept { bodies_ = {first, second}; }
-  /// Whether it is a body with itself: of the first side alone, and without coupling.
+  /// True for a body with itself: contacts of the first side alone, and without coupling.
   bool is_own() const noexcept { return bodies_[0] == bodies_[1]; }
   int body(int side) const noexcept { return bodies_[static_cast<std::size_t>(side)]; }
   bool empty() const noexcept { return candidates_[0].all.empty() && candidates_[1].all.empty(); }
@@ -65,7 +65,7 @@ class PairContact {
                    bool converged) noexcept;
   void scale_account(double share) noexcept { account_ *= share; }
   double account() const noexcept { return account_; }            ///< [J]
-  double start_energy() const noexcept { return start_energy_; }  ///< of the springs where the step begins [J]
+  double start_energy() const noexcept { return start_energy_; }  ///< springs at the start of the step [J]
   double spring_energy() const noexcept;                          ///< at the last evaluation [J]
   /// The step was not taken: the pair remembers what it did before.
   void abandon() noexcept { is_abandoned_ = true; }
@@ -85,7 +85,7 @@ class PairContact {
                     const Eigen::VectorXd& x_second);
   const Eigen::MatrixXd& coupling() const noexcept { return coupling_; }  ///< first's unknowns x second's
 
-  // Where one of the two is in full space, or both are: coupling() is empty then.
+  // With one of the two in full space, or both; coupling() is empty then.
 
   /// Subtracts the forces on a side's body, in full space, from its gradient. Returns the square of their norm [N^2].
   double add_forces(int side, WorldBody& own) const;
@@ -100,9 +100,9 @@ class PairContact {
 
   void refresh_friction(FrictionChange& change) noexcept;
 
-  /// What has to be added to the torque on either body [N m], if both move freely, for the angular momentum of the two
-  /// to stay what it is: forces act at points that are apart by the gap and the slip, and momenta are taken about
-  /// centres of mass that go on during the step by `way_first` and `way_second` [m].
+  /// Torque to add on either body [N m], if both move freely, so that the angular momentum of the two stays what it is:
+  /// forces act at points that are apart by the gap and the slip, and momenta are taken about centres of mass that go
+  /// on during the step by `way_first` and `way_second` [m].
   Eigen::Vector3d torque_correction(const WorldBody& first, const Eigen::Vector3d& way_first, const WorldBody& second,
                                     const Eigen::Vector3d& way_second) const noexcept;
 
@@ -117,8 +117,7 @@ class PairContact {
   template <class Work>
   void for_full(int side, const FullMember& member, const Work& work) const;
   void set_directions();
-  /// How far vertices of one and the surface of the other may have gone from where they were at the first evaluation
-  /// [m].
+  /// Bound on the way of vertices of one and the surface of the other since the first evaluation [m].
   double way_since_first(const WorldBody& first, const WorldBody& second) const noexcept;
 
   std::array<int, 2> bodies_{};
@@ -135,12 +134,12 @@ class PairContact {
   // Columns of the candidates of each, of the side's body and of the other.
   std::array<Eigen::MatrixXd, 2> own_columns_, other_columns_;
   std::array<Eigen::Index, 2> used_{};
-  /// Of a column: the direction that is in it, times the root of its stiffness, and its candidate.
+  /// Direction in a column, times the root of its stiffness, and its candidate.
   struct Direction {
     Eigen::Vector3d direction;
     std::size_t candidate;
   };
-  // Where a body is in full space, of the columns: the directions, and the ways of the vertex and against it of y.
+  // Columns with a body in full space: the directions, and the ways of the vertex and against it of y.
   std::array<std::vector<Direction>, 2> directions_;
   std::array<Eigen::Matrix2Xd, 2> ways_;
   Eigen::MatrixXd coupling_;

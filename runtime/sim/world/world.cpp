@@ -385,7 +385,7 @@ const HeldPair* World::held_of(int first, int second) const {
   return found != held_.end() && found->first == first && found->second == second ? &*found : nullptr;
 }
 
-/// How far apart vertices of one body and the surface of another, or of its own, may be and yet touch in the step [m].
+/// Distance up to which vertices of one body and the surface of another, or of its own, may touch in the step [m].
 double World::margin_between(int own, int other) const noexcept {
   const WorldBody &a = touching(own), &b = touching(other);
   if (own == other) return kOwnMargin * balls_[static_cast<std::size_t>(own)].radius;

@@ -16,12 +16,12 @@ struct WorldBodyStart {
   State state;
 };
 
-/// What one step of a World did.
+/// Result of one step of a World.
 struct WorldReport {
   int asleep = 0;          ///< bodies that slept through it
-  int pairs = 0;           ///< of bodies whose bounds overlap
-  int touching_pairs = 0;  ///< of those, with vertices that may touch
-  int islands = 0;         ///< of bodies that touch, each solved together
+  int pairs = 0;           ///< pairs of bodies with overlapping bounds
+  int touching_pairs = 0;  ///< pairs among these with vertices that may touch
+  int islands = 0;         ///< groups of touching bodies, each solved together
   int largest_island = 0;  ///< bodies
   int unconverged_islands = 0;
   int newton_iterations = 0;  ///< most of an island
@@ -52,7 +52,7 @@ class World {
   void fit(int body);
   /// To be called after a host attached the body in its modes: scratch holds the attachments.
   void fit_attachments(int body);
-  /// Whether a body may touch others or itself.
+  /// True if a body may touch others or itself.
   bool may_touch(int body) const noexcept { return at(body).touching != nullptr; }
 
   void set_law(const ContactLaw& law) noexcept { law_ = law; }
@@ -94,7 +94,7 @@ class World {
   /// Times the stages of steps, if set; kOther stays what it is.
   void set_profile(WorldProfile* profile) noexcept { profile_ = profile; }
 
-  /// Of one body [J].
+  /// Energies of one body [J].
   Energies energies(int body) const noexcept;
   /// Kinetic, elastic and potential energy of all bodies, and that of the contacts between them [J].
   Energies energies() const;
@@ -105,10 +105,10 @@ class World {
     State* state = nullptr;
     int crowd_kind = 0;
     StepReport report{};
-    std::unique_ptr<WorldBody> touching{};  ///< of a body that may touch others or itself
+    std::unique_ptr<WorldBody> touching{};  ///< present for a body that may touch others or itself
     bool asleep = false;                    ///< in this step
-    std::unique_ptr<FullWorkspace> full{};  ///< of a body in full space
-    std::unique_ptr<Workspace> held{};      ///< of a body in its modes that a host holds and that touches no other
+    std::unique_ptr<FullWorkspace> full{};  ///< present for a body in full space
+    std::unique_ptr<Workspace> held{};      ///< present for a held body in its modes that touches no other
     bool is_bounded = false;                ///< its ball is that of where it is: it has slept since
   };
 
@@ -164,7 +164,7 @@ class World {
   std::vector<DeformationTree::Ball> balls_;  // of these
   std::vector<double> margins_;               // of each body: how far it may go beyond its centre's straight way [m]
 
-  // Of one step.
+  // State of one step.
   bool found_contacts_ = false;
   std::vector<int> order_, parents_, island_of_, place_in_island_;
   std::vector<std::pair<int, int>> near_, last_near_;

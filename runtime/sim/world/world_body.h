@@ -17,7 +17,7 @@ struct BodyKind {
   const Model* model = nullptr;                    ///< with contact, where there is a surface
   const StepScene* scene = nullptr;                ///< may change between steps
   std::shared_ptr<const TouchingSurface> surface;  ///< null: its bodies touch no other body and not themselves
-  const FullModel* full = nullptr;                 ///< of bodies that may step in full space
+  const FullModel* full = nullptr;                 ///< null unless its bodies may step in full space
 };
 
 /// A body of a World that may touch others or itself. Its state is another's.
@@ -42,19 +42,19 @@ struct WorldBody {
   bool anew = true;                  ///< no step has led to where it is: what it overlaps was not watched coming
   std::unique_ptr<FullMember> full;  ///< while it is in full space
 
-  // Of one step.
+  // State of one step.
   std::optional<BodyStep> step;  ///< not of one in full space, as the problem
   std::optional<ContactProblem> problem;
-  Eigen::Vector3d start_velocity = Eigen::Vector3d::Zero();  ///< of the centre of mass, where the step begins [m/s]
+  Eigen::Vector3d start_velocity = Eigen::Vector3d::Zero();  ///< centre of mass at the start of the step [m/s]
   Placement placement;                                       ///< at the iterate
-  Eigen::Index offset = 0;                                   ///< of its unknowns in those of its island
+  Eigen::Index offset = 0;                                   ///< place of its unknowns in those of its island
 
   ContactProblemWorkspace& near() noexcept { return *workspace.near; }
   const ContactProblemWorkspace& near() const noexcept { return *workspace.near; }
   const ContactSet& contact() const noexcept { return *model.contact; }
   int rigid() const noexcept { return static_cast<int>(model.frame->rigid_unknowns()); }
   Eigen::Index unknowns() const noexcept { return full ? full->unknowns() : near().x.size(); }
-  /// Where a step begins.
+  /// The body where a step begins.
   TouchingBody touching_body() const {
     if (full) return full->surface().touching();
     return {contact(),

@@ -18,7 +18,7 @@ class CarriedPart {
 
   const Eigen::Matrix4Xd& rest() const { return rest_; }  ///< X of each place, world [m]
 
-  /// Where the frame takes a place at rest from where it was meshed [m].
+  /// Displacement by the frame of a place at rest, from where it was meshed [m].
   Eigen::Vector3d displacement(const MotionSample& frame, Eigen::Index place) const noexcept {
     const Eigen::Vector3d rest = rest_.col(place).head<3>();
     return frame.to_world(rest) - rest;

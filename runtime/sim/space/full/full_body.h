@@ -76,8 +76,8 @@ StepReport step_in_full_space(const FullModel& full, const Model& model, const S
 /// It stands still, and sleeps from the next step on.
 void put_full_to_sleep(const Model& model, State& state, Workspace& workspace) noexcept;
 
-/// Where a vertex of the mesh is displaced to from where it was meshed, and its velocity, world [m], [m/s]; of a body
-/// whose frame is there and moves so.
+/// Displacement of a vertex of the mesh from where it was meshed, and its velocity, world [m], [m/s], while the body's
+/// frame is there and moves so.
 Eigen::Vector3d full_displacement(const FullModel& full, const Placement& frame, const FullMotion& motion,
                                   Eigen::Index vertex) noexcept;
 Eigen::Vector3d full_velocity(const FullModel& full, const Placement& frame, const FrameVelocity& velocity,

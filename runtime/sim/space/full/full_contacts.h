@@ -16,7 +16,7 @@ struct FullContactScratch {
     block_of.assign(blocks.size(), -1);
   }
 
-  /// Of a vertex that something pushes or rubs.
+  /// Stiffness at a vertex that something pushes or rubs.
   struct Block {
     Eigen::Index place = 0;     ///< in fields
     Eigen::Matrix3f stiffness;  ///< -df/dx of obstacles [N/m]
@@ -25,7 +25,7 @@ struct FullContactScratch {
   };
   std::vector<Block> blocks;  ///< the first block_count
   std::size_t block_count = 0;
-  std::vector<std::int32_t> block_of;  ///< of a place, -1: none
+  std::vector<std::int32_t> block_of;  ///< block of each place, -1: none
 
   void clear() noexcept;
   /// That of a vertex that moves, zero where it is a new one.
@@ -61,7 +61,7 @@ class FullContacts {
   Eigen::Vector3d point(int vertex, const double* u) const noexcept {
     return rest_.row(vertex).transpose() + at(vertex, u);
   }
-  /// Of a field.
+  /// Entry of a vertex in a field.
   Eigen::Map<const Eigen::Vector3d> at(int vertex, const double* field) const noexcept {
     return Eigen::Map<const Eigen::Vector3d>(field + 4 * places_[static_cast<std::size_t>(vertex)]);
   }

@@ -16,11 +16,10 @@
 
 namespace exmat::runtime {
 
-/// What the whole body's examples are in full space: weights and targets in the coefficients c = W^T u [3m], row 3i +
-/// axis.
+/// The whole body's examples in full space: weights and targets in the coefficients c = W^T u [3m], row 3i + axis.
 struct FullExamples {
   ExampleWeights weights;
-  std::optional<TargetTable> table;  ///< of c*; else `from_target`
+  std::optional<TargetTable> table;  ///< gives c*; else `from_target`
   Eigen::MatrixXd from_target;       ///< 3m x d: c* of the coordinates that the model's TargetSolver has
   Eigen::MatrixXd shapes;            ///< f x d, u* of those that it or the model's table has; of an elastic force
   Eigen::MatrixX3d rest;             ///< m x 3, W^T X of a body whose frame moves, X about the frame's origin
@@ -29,7 +28,7 @@ struct FullExamples {
   /// A coefficient of the deformation in a frame that moves, and that of the displacement in the world.
   struct Frame {
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-    Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the origin, world [m]
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< origin, world [m]
   };
   Eigen::Vector3d to_world(Eigen::Index k, const Frame& frame, const Eigen::Vector3d& own) const noexcept {
     const Eigen::Vector3d at_rest = rest.row(k);
@@ -48,16 +47,16 @@ struct FullModel {
   explicit FullModel(FullSpace of) : space(std::move(of)) {}
 
   FullSpace space;
-  std::optional<RigidPart> rigid;        ///< of a free body
-  std::optional<CarriedPart> carried;    ///< of a body whose fixed vertices a motion carries
-  std::optional<SkinnedPart> skin;       ///< of a body on a skeleton
-  std::optional<FullContacts> contacts;  ///< where the model has contact
+  std::optional<RigidPart> rigid;        ///< present for a free body
+  std::optional<CarriedPart> carried;    ///< present where a motion carries the fixed vertices
+  std::optional<SkinnedPart> skin;       ///< present for a body on a skeleton
+  std::optional<FullContacts> contacts;  ///< present where the model has contact
   std::optional<FullExamples> examples;
-  bool is_elastic = false;  ///< whether the example force may be elastic
-  /// Whether the fixed vertices go where something takes them.
+  bool is_elastic = false;  ///< true if the example force may be elastic
+  /// True if something else moves the fixed vertices.
   bool is_driven() const { return carried || skin; }
 
-  /// Of a body whose frame moves, how its coefficients go with that, into its examples.
+  /// For a body whose frame moves: writes how its coefficients follow the frame into its examples.
   void set_frame_of_examples();
   /// The shapes [3n x d] that an elastic force of the reduced body's examples takes.
   void set_shapes(const RowMatrix& all, const ExampleModel& reduced);

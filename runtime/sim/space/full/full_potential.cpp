@@ -91,8 +91,8 @@ void FullPotential::set_attachments(std::span<Attachment> attachments) noexcept 
   host_ = first == attachments.end() ? nullptr : &*first;
 }
 
-// Of a free body that a host holds damping acts beside what the host does: the motion of its frame where that holds the
-// patch's vertices, else its anchor's with the turn that the body has at the first iterate.
+// Damping acts on a held free body beside the host's motion: that of its frame where the frame holds the patch's
+// vertices, else that of its anchor with the body's turn at the first iterate.
 void FullPotential::remove_host_motion(bool freeze) noexcept {
   const RigidWorkspace& rigid = workspace_.rigid;
   const double per_rate = 1 / (scene_.time_step * form_.velocity_factor);

@@ -13,7 +13,8 @@
 
 namespace exmat::runtime {
 
-inline constexpr double kPlaceRounding = 4 * std::numeric_limits<double>::epsilon();  ///< of where a vertex is
+inline constexpr double kPlaceRounding =
+    4 * std::numeric_limits<double>::epsilon();  ///< relative error of a vertex's place
 
 /// Scratch of a FullPotential, sized once.
 struct FullPotentialWorkspace {
@@ -21,16 +22,16 @@ struct FullPotentialWorkspace {
   explicit FullPotentialWorkspace(const FullModel& model);
 
   Eigen::VectorXd start, offset, rate, external;  ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
-  Eigen::VectorXd frame_rate;            ///< of q - q_v, what the frame of a carried body makes, or the bones alone
-  SkinPose skin;                         ///< of a body on a skeleton: at the end of the step
+  Eigen::VectorXd frame_rate;            ///< q - q_v that the frame of a carried body makes, or the bones alone
+  SkinPose skin;                         ///< pose by the bones at the end of the step, on a skeleton
   Eigen::VectorXd turned;                ///< a field in its bones' axes, or of a free body a force
   Eigen::VectorXd unused;                ///< a gradient that nobody asked for
   AlignedArray x, a, w, inertia, force;  ///< fields at the last d
   AlignedArray frozen;                   ///< tangents of damping, see Kernels::mesh_force()
-  AlignedFloats tangents;                ///< of the Hessian
+  AlignedFloats tangents;                ///< element tangents for the Hessian
   AlignedArray coefficients, target, rate_coefficients;  ///< 3 x stride: W^T q at the last d, c*, W^T (q - q_v)
-  FullTarget elastic_target;                             ///< of an elastic example force
-  RigidWorkspace rigid;                                  ///< of a free body, where freeze() was last called
+  FullTarget elastic_target;                             ///< target of an elastic example force
+  RigidWorkspace rigid;                                  ///< pose of a free body where freeze() was last called
 };
 
 /// Takes off a field [places x 4] what would move what attachments hold, and calls use(attachment, k, taken) with that
@@ -62,7 +63,7 @@ void project_held(const FullSpace& space, std::span<Attachment> attachments, Num
   project_held(space, attachments, field, [](const Attachment&, Eigen::Index, const auto&) {});
 }
 
-/// What a step in full space minimises, a function of the field d = q - q_n:
+/// Potential that a step in full space minimises, a function of the field d = q - q_n:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + c_v/2 (q - q_v)^T D (q - q_v)
 ///     + kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2,
 /// of an elastic example force its energy, once there is a target, in place of the term with kappa;
@@ -144,7 +145,7 @@ class FullPotential {
   std::span<Attachment> attachments_;
   const Attachment* host_ = nullptr;                     ///< the first that holds
   Eigen::Vector3d host_turn_ = Eigen::Vector3d::Zero();  ///< in q - q_v
-  RigidPart::Turn turn_;                                 ///< of a free body with a filter, at the last evaluation
+  RigidPart::Turn turn_;                                 ///< turn of a free body with a filter, at the last evaluation
   MotionSample frame_;                                   ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;

@@ -19,7 +19,7 @@
 namespace exmat::runtime {
 namespace {
 
-// Of the scalar Laplacian that stands for the stiffness: mu and lambda of the material count so much. Anything between
+// The scalar Laplacian that stands for the stiffness counts mu and lambda of the material so much. Anything between
 // half and 1.4 times as much needs about as many iterations.
 constexpr double kShearShare = 1.42, kVolumeShare = 0.5;
 
@@ -38,7 +38,7 @@ std::vector<std::int32_t> by_length(Eigen::Index count, const Length& length) {
 
 using Gradients = Eigen::Matrix<double, 4, 3>;
 
-// Of (L L^T)^-1, from its entries on the pattern of L alone (Takahashi, Fagan and Chen 1973).
+// Diagonal of (L L^T)^-1, from its entries on the pattern of L alone (Takahashi, Fagan and Chen 1973).
 Eigen::VectorXd diagonal_of_inverse(const Eigen::SparseMatrix<double>& L) {
   Eigen::SparseMatrix<double> inverse = L;
   Eigen::VectorXd column = Eigen::VectorXd::Zero(L.rows());
@@ -334,7 +334,7 @@ void FullSpace::projected_tangents(const double* field, const FullTarget* exampl
                                    bool freeze, double* frozen, float* tangents) const noexcept {
   with_material(model_, [&](auto material) {
     using Own = decltype(material);
-    // Of e v Psi((I + H) A): A times each block of rows and columns of an axis, times A^T.
+    // Tangent of e v Psi((I + H) A): A times each block of rows and columns of an axis, times A^T.
     const auto example_tangent = [&](Eigen::Index e, const Eigen::Matrix3d& H) -> Matrix9 {
       const double* const numbers = example->inverses.data() + e / kLanes * kInverseNumbers * kLanes + e % kLanes;
       Eigen::Matrix3d A;

@@ -36,7 +36,7 @@ struct FullTarget {
   AlignedArray factor;    ///< e
 };
 
-/// Whether the fixed vertices of a body stay where they were meshed, or go where something else takes them.
+/// Fixed vertices stay where they were meshed, or go where something else takes them.
 enum class FixedVertices { kStay, kDriven };
 
 /// The space of all displacements of a mesh's vertices that are not fixed, and what a step sums over in it. Immutable.
@@ -54,16 +54,16 @@ class FullSpace {
   Eigen::Index vertices() const { return std::ssize(vertex_of_); }  ///< n
   Eigen::Index driven() const { return driven_; }                   ///< p, where they have places in fields
   Eigen::Index places() const { return vertices() + driven_; }
-  Eigen::Index field_size() const { return 4 * places(); }  ///< of a field
-  Eigen::Index functions() const { return functions_; }     ///< m
-  bool is_clamped() const { return clamped_; }              ///< whether a vertex is fixed
-  double edge() const { return edge_; }                     ///< mean length of the edges [m]
-  double wave_rate() const { return wave_rate_; }           ///< of the fastest waves, edges a second [1/s]
-  double extent() const { return extent_; }                 ///< largest coordinate at rest [m]
-  double stiffness() const { return stiffness_; }           ///< norm of those of the vertices, about [N/m]
+  Eigen::Index field_size() const { return 4 * places(); }
+  Eigen::Index functions() const { return functions_; }  ///< m
+  bool is_clamped() const { return clamped_; }           ///< true if a vertex is fixed
+  double edge() const { return edge_; }                  ///< mean length of the edges [m]
+  double wave_rate() const { return wave_rate_; }        ///< edges a second that the fastest waves pass [1/s]
+  double extent() const { return extent_; }              ///< largest coordinate at rest [m]
+  double stiffness() const { return stiffness_; }        ///< norm of those of the vertices, about [N/m]
   const Eigen::Matrix<double, Eigen::Dynamic, 3>& gravity_load() const { return gravity_load_; }  ///< f x 3 [kg]
-  /// Of a vertex of the mesh: its place in fields, -1 where it has none, and its number among those that move, -1 where
-  /// it is fixed.
+  /// Place in fields of a vertex of the mesh, -1 where it has none, and its number among those that move, -1 where it
+  /// is fixed.
   std::int32_t place(Eigen::Index vertex) const { return place_of_[static_cast<std::size_t>(vertex)]; }
   std::int32_t number(Eigen::Index vertex) const {
     const std::int32_t own = place(vertex);
@@ -85,7 +85,7 @@ class FullSpace {
   /// and mu [N/m], and times the stiffness that the preconditioner takes for theirs [N/m].
   using Scalar = Eigen::SparseMatrix<double, Eigen::RowMajor>;
   Scalar mass() const { return scalar_matrix(mass_); }
-  Eigen::VectorXd masses() const;  ///< of each place, row sums over all [kg]
+  Eigen::VectorXd masses() const;  ///< row sums of the mass matrix over all places [kg]
   Scalar preconditioning_stiffness() const { return scalar_matrix(laplacian_); }
   Eigen::Index entries() const { return std::ssize(columns_); }
   double mass_value(Eigen::Index k) const { return mass_[static_cast<std::size_t>(k)]; }
@@ -128,8 +128,8 @@ class FullSpace {
   MaterialModel model_ = MaterialModel::kStVenantKirchhoff;
   bool clamped_ = false;
   double edge_ = 0, extent_ = 0, wave_rate_ = 0, stiffness_ = 0;
-  std::vector<std::int32_t> vertex_of_;  ///< of each place in a field, among those that move
-  std::vector<std::int32_t> place_of_;   ///< of each vertex of the mesh, -1 where it has none
+  std::vector<std::int32_t> vertex_of_;  ///< vertex of each place in a field, among those that move
+  std::vector<std::int32_t> place_of_;   ///< place of each vertex of the mesh, -1: none
   Eigen::Index driven_ = 0;
   Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load_;
   std::vector<std::int32_t> starts_{0}, corners_;
@@ -173,7 +173,7 @@ class FullPreconditioner {
   Eigen::VectorXd diagonal_;
   std::vector<std::int32_t> row_starts_, columns_, column_starts_, rows_;
   std::vector<float> by_row_, by_column_, inverse_diagonal_;
-  AlignedFloats functions_;  ///< what the filter takes off, as a square
+  AlignedFloats functions_;  ///< the filter's part, subtracted as a square
 };
 
 }  // namespace exmat::runtime

@@ -47,7 +47,7 @@ bool jumps(const StepScene& scene, const Motion& state) {
          (scene.carrier && scene.carrier->has_key(before, midpoint));
 }
 
-/// Where the frame of a carried body is; the identity where nothing carries it.
+/// Frame of a carried body; the identity where nothing carries it.
 MotionSample frame_at(const StepScene& scene, double time) {
   return scene.carrier ? scene.carrier->sample(time) : MotionSample();
 }
@@ -185,7 +185,7 @@ void FullStep::begin(bool touches_others) noexcept {
   choose_first_iterate();
 }
 
-// Where the bones are at the end of the step. A body that was put on them has the velocity that they then make.
+// Places the skin by the bones at the end of the step. A body that was put on them takes the velocity that they make.
 void FullStep::take_along() noexcept {
   const SkinnedPart& skin = *model_.skin;
   SkeletonMotion& bones = *memory_.bones;
@@ -290,7 +290,7 @@ void FullStep::choose_first_iterate() noexcept {
   potential_.evaluate_elements(d, FullPotential::Tangents::kExact, true);
 }
 
-// Of a vertex, beside the others of a free body.
+// Largest displacement of a vertex, less the mean of all for a free body.
 double FullStep::largest_move(const Eigen::VectorXd& field) const noexcept {
   const Eigen::Map<const Eigen::Matrix4Xd> columns(field.data(), 4, field.size() / 4);
   Eigen::Vector4d mean = Eigen::Vector4d::Zero();
@@ -349,7 +349,7 @@ void FullStep::precondition_freely() noexcept {
   }
 }
 
-/// What is held goes where it is held.
+/// Held vertices go where they are held.
 void FullStep::hold(Eigen::VectorXd& d) const noexcept {
   const Eigen::VectorXd& start = workspace_.potential.start;
   for (const Attachment& attachment : memory_.attachments) {
@@ -439,7 +439,7 @@ FullStep::Outcome FullStep::find_direction(double tolerance) noexcept {
     square = next;
   }
   work.direction = sum.cast<double>() * size;
-  // What single precision leaves of what is held.
+  // Removes the motion that single precision leaves in held vertices.
   project_held(space_, memory_.attachments, work.direction.data());
   return Outcome::kFound;
 }
@@ -452,7 +452,7 @@ void FullStep::project() noexcept {
   here_ = potential_.gradient_there(workspace_.d, workspace_.gradient);
 }
 
-// What a direction leaves in stiff modes feeds them where nothing damps them.
+// Errors that a direction leaves in stiff modes feed them where nothing damps them.
 double FullStep::direction_tolerance() const noexcept {
   const bool delicate = scene_.stiffness_damping == 0 || scene_.time_step > kLongStep;
   return delicate ? kDelicate * workspace_.accuracy.tolerance : workspace_.accuracy.tolerance;

@@ -16,10 +16,10 @@
 
 namespace exmat::runtime {
 
-/// How far a step solves for a direction of Newton's method, whose own limits are those of the scene.
+/// Accuracy of a direction of Newton's method, whose own limits are those of the scene.
 struct FullAccuracy {
-  double tolerance = 1e-3;  ///< of the preconditioned residual, beside the initial one
-  int iterations = 300;     ///< of conjugate gradients, at most
+  double tolerance = 1e-3;  ///< largest preconditioned residual over the initial one
+  int iterations = 300;     ///< most iterations of conjugate gradients
   /// The first direction of a step from the predictor is taken without an evaluation at its end if it moves no vertex
   /// by more than this share of an edge; 0: never. Saves a third of a step of few iterations.
   double unchecked_move = 0;
@@ -43,7 +43,7 @@ struct FullWorkspace {
   /// Makes factors again where they do not serve the scene.
   void fit(const FullModel& model, const StepScene& scene);
 
-  /// What a step form makes constant.
+  /// Arrays that are constant for a step form.
   struct Linear {
     FullPreconditioner preconditioner;
     std::vector<float> matrix;  ///< M (c_a + alpha c_v) + (1 + beta c_v) V, see Kernels::mesh_product()
@@ -58,14 +58,14 @@ struct FullWorkspace {
   };
 
   FullAccuracy accuracy;
-  Linear first, second;  ///< of backward Euler, of BDF2
+  Linear first, second;  ///< for backward Euler, for BDF2
   Key key;
   StepForm form;
-  StepForm fixed_form;  ///< of the fixed vertices of a body on a skeleton
+  StepForm fixed_form;  ///< for the fixed vertices of a body on a skeleton
   FullPotentialWorkspace potential;
   Eigen::VectorXd external, moved, rate, acceleration;               ///< f
   Eigen::VectorXd d, gradient, direction, trial, trial_gradient;     ///< fields
-  AlignedFloats residual, solved, search, image, sum, coefficients;  ///< of conjugate gradients
+  AlignedFloats residual, solved, search, image, sum, coefficients;  ///< scratch of conjugate gradients
   AlignedFloats scaled;                                              ///< residual that the preconditioner takes
   AlignedFloats turned;                                              ///< in the axes of bones, where there are some
   FullContactScratch contact;
@@ -74,8 +74,8 @@ struct FullWorkspace {
   Eigen::VectorXd coefficients_there, target;  ///< 3m, of an example force
 };
 
-/// How far the mean of vertices of the mesh moves in a step by a force of 1 N that these shares of it act with on them,
-/// by the preconditioner [m/N]. Vertices and shares [k] each.
+/// Mean displacement of vertices of the mesh in a step by a force of 1 N shared out to them so, by the preconditioner
+/// [m/N]. Vertices and shares [k] each.
 double compliance(const FullModel& model, std::span<const std::int32_t> vertices, std::span<const double> shares,
                   FullWorkspace& workspace) noexcept;
 
@@ -83,11 +83,11 @@ struct FullReport : StepReport {
   int cg_iterations = 0;
 };
 
-/// What a step in full space reads and changes beside its motion; null where there is none.
+/// State that a step in full space reads and changes beside its motion; null where there is none.
 struct FullMemory {
   ContactState* held = nullptr;
   ContactWorkspace* found = nullptr;    ///< scratch, which then holds the contacts of the step
-  SkeletonMotion* bones = nullptr;      ///< of a body on a skeleton
+  SkeletonMotion* bones = nullptr;      ///< present for a body on a skeleton
   std::span<Attachment> attachments{};  ///< which then have their loads
 };
 

@@ -12,7 +12,7 @@ struct RigidWorkspace {
   RigidWorkspace() = default;
   explicit RigidWorkspace(const FullSpace& space);
 
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< of mass, world [m]
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();        ///< centre of mass, world [m]
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< that fits the rest shape best in the mass
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();       ///< about the centre [kg m^2]
   Eigen::Matrix4Xd arms;                                   ///< from the centre [m]
@@ -34,7 +34,7 @@ class RigidPart {
   Eigen::Vector3d centre(const double* u) const noexcept {
     return centre_ + (as_columns(u).lazyProduct(masses_) / mass_).head<3>();
   }
-  /// Where it stands.
+  /// Finds centre, rotation and inertia of the body displaced by `u`.
   void place(const double* u, RigidWorkspace& workspace) const noexcept;
 
   /// Momenta of the velocities `v` where place() was called, and the rigid motion that has such momenta.
@@ -45,17 +45,17 @@ class RigidPart {
   /// Adds a rigid motion to `v`; takes off the one that has its momenta.
   static void add_motion(const FrameVelocity& motion, const RigidWorkspace& workspace, double* v) noexcept;
   void remove_motion(const RigidWorkspace& workspace, double* v) const noexcept;
-  /// Where the frame of the body displaced by `u` is turned to, and A^-1 of spin(), world.
+  /// Rotation of the frame of the body displaced by `u`, and A^-1 of spin(), world.
   struct Turn {
     Eigen::Matrix3d rotation, inverse;
   };
   Turn turn(const double* u) const noexcept;
-  /// Of forces that see the deformation in that frame: takes off what turns it along, so that they have no torque.
+  /// Takes what turns the frame along off forces that see the deformation in it: they then have no torque.
   void remove_torque(const Turn& turn, const double* u, double* forces) const noexcept;
-  /// Of forces that see what remove_motion() leaves of velocities, where place() was called; the body is at `u`.
+  /// Takes the rigid part off forces that see velocities less remove_motion(), where place() was called; body at `u`.
   void remove_rigid_force(const double* u, const RigidWorkspace& workspace, double* forces) const noexcept;
 
-  /// How fast the fitted frame turns while the vertices move by `v`, world [rad/s].
+  /// Angular velocity of the fitted frame while the vertices move by `v`, world [rad/s].
   Eigen::Vector3d spin(const double* v, const RigidWorkspace& workspace) const noexcept;
 
  private:

@@ -9,13 +9,13 @@
 
 namespace exmat::runtime {
 
-/// Where the bones alone take every place of a body: y and R of each.
+/// Place and rotation, y and R, of every place of a body by its bones alone.
 struct SkinPose {
   Eigen::Matrix4Xd base;                           ///< y, world [m]; the last row is 0
   Eigen::Matrix<double, 9, Eigen::Dynamic> turns;  ///< R, by columns
 };
 
-/// Of one place.
+/// One place of a body.
 struct SkinPlace {
   Eigen::Vector3d base;
   Eigen::Quaterniond turn;
@@ -52,7 +52,7 @@ class SkinnedPart {
   template <typename Number>
   void turn_back(const SkinPose& pose, const Number* v, Number* turned) const noexcept;
 
-  /// Of the fixed vertices displaced by `q` [3p], zero where they were meshed [J].
+  /// Potential of gravity on the fixed vertices displaced by `q` [3p], zero where they were meshed [J].
   double fixed_potential(const Eigen::VectorXd& q, const Eigen::Vector3d& gravity) const noexcept;
 
  private:
