@@ -23,7 +23,7 @@ struct FreeState {
   Eigen::Vector3d linear_momentum = Eigen::Vector3d::Zero();        ///< p [kg m/s]
   Eigen::Vector3d angular_momentum = Eigen::Vector3d::Zero();       ///< L about c [kg m^2/s]
   Eigen::Vector3d spin = Eigen::Vector3d::Zero();                   ///< omega, body frame [rad/s]
-  Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< from the host, beside State::applied_force [N]
+  Eigen::Vector3d applied_force = Eigen::Vector3d::Zero();          ///< the host's, beside State::applied_force [N]
   Eigen::Vector3d applied_torque = Eigen::Vector3d::Zero();         ///< about c [N m]
   Eigen::VectorXd momentum, momentum_previous;                      ///< [r] pi = qdot - sum_c omega_c A_c q
   FreeStart before{};                                               ///< likewise at the end of the step before

@@ -19,11 +19,10 @@ enum class AttachmentKind { kFixed, kBall, kSpring };
 /// Placement::origin [m] and, of a fixed one, sum_k s_k p_k y_k^T [m^2] by rows, s the shares, p the places about their
 /// mean, y the vertices.
 struct ReducedPatch {
-  RowMatrix rows;        ///< 3 x r, or 12 x r of a fixed one
-  Eigen::VectorXd rest;  ///< 3 or 12
-  Eigen::Matrix3Xd
-      axes;           ///< in the host's frame, its rotation is held about them: 3; 2 for vertices in a line; 0 for one
-  double square = 0;  ///< sum_k s_k |p_k|^2 [m^2]
+  RowMatrix rows;         ///< 3 x r, or 12 x r of a fixed one
+  Eigen::VectorXd rest;   ///< 3 or 12
+  Eigen::Matrix3Xd axes;  ///< hold its rotation, host's frame: 3; 2 for vertices in a line; 0 for one
+  double square = 0;      ///< sum_k s_k |p_k|^2 [m^2]
 };
 
 /// A patch of a body that a frame of a host holds. No two hold the same vertex.
@@ -33,7 +32,7 @@ struct Attachment {
   std::vector<std::int32_t> vertices;                            ///< k, of the mesh, that move
   Eigen::VectorXd shares;                                        ///< [k] of the mean, of sum 1
   Eigen::Matrix3Xd places;                                       ///< [3 x k] of the vertices in the frame [m]
-  double stiffness = 0, damping = 0;                             ///< for a spring [N/m], [N s/m]
+  double stiffness = 0, damping = 0;                             ///< both for a spring [N/m], [N s/m]
   double break_force = std::numeric_limits<double>::infinity();  ///< [N]
   ReducedPatch patch;                                            ///< filled for a body that steps in its modes
 

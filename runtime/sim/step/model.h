@@ -37,7 +37,7 @@ struct ExampleModel {
 struct Model {
   InternalForce internal_force;
   RowMatrix gravity_load;                    ///< 3 x r
-  std::shared_ptr<const BodyFrame> frame;    ///< in which the body deforms
+  std::shared_ptr<const BodyFrame> frame;    ///< the body deforms in it
   std::shared_ptr<const Skeleton> skeleton;  ///< that the body hangs on; null: on none
   std::optional<ContactSet> contact;         ///< present for a scene with obstacles
   std::vector<ExampleModel> examples;        ///< the whole body's, then those of regions; none where prepared without

@@ -18,7 +18,7 @@ struct IslandMomenta {
 /// A body where a step begins.
 struct BodyBegin {
   FrameMotion motion;
-  Eigen::VectorXd q;          ///< for a body in full space, its whole displacement
+  Eigen::VectorXd q;          ///< whole displacement, for a body in full space
   double elastic_energy = 0;  ///< [J]
 };
 

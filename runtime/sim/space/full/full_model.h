@@ -56,7 +56,7 @@ struct FullModel {
   /// True if something else moves the fixed vertices.
   bool is_driven() const { return carried || skin; }
 
-  /// For a body whose frame moves: writes how its coefficients follow the frame into its examples.
+  /// Writes how coefficients follow the frame, where it moves, into the body's examples.
   void set_frame_of_examples();
   /// The shapes [3n x d] that an elastic force of the reduced body's examples takes.
   void set_shapes(const RowMatrix& all, const ExampleModel& reduced);

@@ -58,10 +58,10 @@ struct FullWorkspace {
   };
 
   FullAccuracy accuracy;
-  Linear first, second;  ///< for backward Euler, for BDF2
+  Linear first, second;  ///< one for backward Euler, one for BDF2
   Key key;
   StepForm form;
-  StepForm fixed_form;  ///< for the fixed vertices of a body on a skeleton
+  StepForm fixed_form;  ///< form for the fixed vertices of a body on a skeleton
   FullPotentialWorkspace potential;
   Eigen::VectorXd external, moved, rate, acceleration;               ///< f
   Eigen::VectorXd d, gradient, direction, trial, trial_gradient;     ///< fields
