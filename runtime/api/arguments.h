@@ -43,7 +43,7 @@ inline const double* find_far(const double* numbers, std::int64_t count) {
   return far != numbers + count ? far : nullptr;
 }
 
-/// Whether a struct that a caller hands over begins with a size that some version of it has.
+/// Checks that a struct which a caller hands over begins with a size that some version of it has.
 inline exmat_status check_size(const char* function, std::size_t size, const StructSizes& sizes) noexcept {
   if (sizes.first <= size && size <= kMostStructBytes) return EXMAT_OK;
   return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected %zu, the sizeof of the struct", function, size,
@@ -65,7 +65,7 @@ void give_entry(const Struct& from, std::size_t size, void* to) noexcept {
   std::memcpy(to, &from, std::min(size, sizeof from));
 }
 
-/// What the caller's version knows of a struct, the rest as it is in `known`.
+/// Members that the caller's version has come from `given`, the others from `known`.
 template <typename Struct>
 Struct completed(const Struct& given, Struct known) noexcept {
   std::memcpy(static_cast<void*>(&known), &given, std::min(given.size, sizeof known));

@@ -94,7 +94,7 @@ Patch patch_in_full(std::span<const std::int64_t> vertices, exmat_body& body) {
   return patch;
 }
 
-/// What steps in modes need of the attachment beside those that there are.
+/// Adds the data that steps in modes need to the attachment. Throws where modes cannot hold it beside the others.
 void reduce(const Patch& patch, exmat_body& body, Attachment& attachment) {
   if (attachment.kind != AttachmentKind::kSpring && body.world->world.may_touch(place_of(body)))
     throw InvalidArgument(

@@ -4,7 +4,7 @@
 
 namespace exmat::runtime {
 
-// What functions that step bodies share.
+// Helpers of the functions that step bodies.
 
 /// Only one caller at a time may step a body; whether this one may.
 inline bool acquire(exmat_body& body) noexcept { return !body.in_use.test_and_set(std::memory_order_acquire); }
@@ -24,7 +24,7 @@ void add_step(const StepReport& step, exmat_body& body) noexcept;
 /// After the last step of a call: the lost work of a body that has a capacity.
 void measure_lost_work(exmat_body& body) noexcept;
 
-/// Of such a body: remembers `forces` [k x 3] that were applied to points, in its own frame.
+/// Remembers, for a body with a capacity, `forces` [k x 3] that were applied to points, in its own frame.
 void add_load(const PointSet& points, const VertexArray& forces, exmat_body& body);
 
 inline bool non_finite(const exmat_body& body) noexcept { return (body.report.status & kStepNonFinite) != 0; }

@@ -15,11 +15,11 @@ struct ContactLoad {
   Eigen::Vector3d force = Eigen::Vector3d::Zero(), torque = Eigen::Vector3d::Zero();
 };
 
-/// What contacts did to a body in one call of its steps. Only prepare() allocates.
+/// Contacts of a body in one call of its steps. Only prepare() allocates.
 class ContactRecord {
  public:
   struct Touch {
-    int vertex = 0;  ///< of the object
+    int vertex = 0;  ///< vertex of the object
     int obstacle = 0;
     double depth = 0;                                                                   ///< [m]
     Eigen::Vector3d position = Eigen::Vector3d::Zero();                                 ///< world [m]

@@ -24,7 +24,7 @@ std::int32_t place_in(const IndexVector& ascending, std::int32_t id) {
   return static_cast<std::int32_t>(std::lower_bound(ascending.begin(), ascending.end(), id) - ascending.begin());
 }
 
-/// Of each vertex its tets, by volume.
+/// Shares of the tets of each vertex, by volume.
 DensityField::Shares shares_by_volume(const TetMesh& mesh, const IndexVector& vertices) {
   const Eigen::VectorXd volumes = tet_volumes(mesh);
   DensityField::Shares shares(static_cast<std::size_t>(vertices.size()));
@@ -42,7 +42,7 @@ DensityField::Shares shares_by_volume(const TetMesh& mesh, const IndexVector& ve
   return shares;
 }
 
-/// Of each point the nearest vertex of the boundary among the corners of its tet, else of all of the boundary.
+/// Nearest vertex of the boundary to each point: among the corners of its tet, else on all of the boundary.
 IndexVector nearest_vertices(const ObjectData& object, const RenderData& render) {
   const IndexVector boundary = vertices_of(object.surface);
   IndexVector nearest(render.vertices.rows());
@@ -88,7 +88,7 @@ ReadSurface surface_of_render_mesh(const ReducedModel& data) {
     corners.row(i) = object.mesh.tets.row(render.tets[i]);
     shares.push_back({{render.tets[i], 1.0}});
   }
-  // Where the tets put it: the vertices of the file are rounded.
+  // The tets place the points, since the vertices of the file are rounded.
   VertexArray rest = VertexArray::Zero(corners.rows(), 3);
   for (Eigen::Index i = 0; i < corners.rows(); ++i)
     for (int c = 0; c < 4; ++c) rest.row(i) += render.barycentric(i, c) * object.mesh.vertices.row(corners(i, c));

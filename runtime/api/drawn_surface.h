@@ -29,8 +29,8 @@ class DensityField {
   void set_displacements(const State& state, const FullModel* full, const Placement& frame) noexcept;
 
   struct Tet {
-    std::array<std::int32_t, 4> corners{};  ///< of displacements_
-    Eigen::Matrix<double, 4, 3> gradients;  ///< of the shape functions [1/m]
+    std::array<std::int32_t, 4> corners{};  ///< indices into displacements_
+    Eigen::Matrix<double, 4, 3> gradients;  ///< gradients of the shape functions [1/m]
     LameParameters lame;
   };
 
@@ -38,8 +38,8 @@ class DensityField {
   std::vector<Tet> tets_;
   std::vector<std::int32_t> begins_{0};                  ///< k + 1, in members_
   std::vector<std::pair<std::int32_t, float>> members_;  ///< tet and share
-  std::vector<std::int32_t> vertices_;                   ///< of the object: the tets' corners
-  VertexPositions displacements_;                        ///< of these: U q
+  std::vector<std::int32_t> vertices_;                   ///< vertices of the object: the tets' corners
+  VertexPositions displacements_;                        ///< U q of these
   VertexPositions::Workspace workspace_;
   std::vector<float> moved_, densities_;  ///< scratch
 };

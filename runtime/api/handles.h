@@ -15,7 +15,7 @@
 
 namespace exmat::runtime {
 
-/// Of no steps, and nothing measured.
+/// Report of no steps, with nothing measured.
 inline exmat_report empty_report() noexcept {
   exmat_report report{};
   report.lost_applied = report.lost_contact = -1;
@@ -24,7 +24,7 @@ inline exmat_report empty_report() noexcept {
 
 }  // namespace exmat::runtime
 
-// What the handles of the C API point to. NOLINTBEGIN(readability-identifier-naming): their names are the API's.
+// Structs behind the handles of the C API. NOLINTBEGIN(readability-identifier-naming): their names are the API's.
 
 struct exmat_model {
   std::shared_ptr<const exmat::runtime::Source> source;
@@ -73,15 +73,15 @@ struct exmat_body {
   exmat::runtime::State start, state;
   exmat::runtime::VertexPositions::Workspace drawing;
   Eigen::VectorXd force;      ///< r
-  std::size_t frame_numbers;  ///< of the frame's state
+  std::size_t frame_numbers;  ///< count of numbers in the frame's state
   exmat_report report = exmat::runtime::empty_report();
-  exmat::runtime::ContactRecord contacts;  ///< of the last call that stepped it
+  exmat::runtime::ContactRecord contacts;  ///< contacts of the last call that stepped it
   std::atomic_flag in_use = ATOMIC_FLAG_INIT;
   exmat_world* world = nullptr;                                  ///< that it is in, always one
   std::int64_t id = 0;                                           ///< in that
   std::int64_t next_attachment = 0;                              ///< its id
   std::unique_ptr<exmat_world> own;                              ///< the world, where it is the body's own
-  std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< where reports hold lost work
+  std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< present where reports hold lost work
   Eigen::VectorXd load;                                          ///< 3n applied forces, there alone; the body's frame
 };
 

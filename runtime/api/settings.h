@@ -8,7 +8,7 @@
 
 namespace exmat::runtime {
 
-/// Of a struct of the API that begins with its size: in the first version, and in this one.
+/// Sizes of a struct of the API that begins with its size: in the first version, and in this one.
 struct StructSizes {
   std::size_t first = 0, now = 0;
 };
@@ -25,7 +25,7 @@ inline constexpr StructSizes kBundleInfoSizes{72, sizeof(exmat_bundle_info)};
 inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
 inline constexpr StructSizes kAttachmentSizes{offsetof(exmat_attachment, break_force) + sizeof(double),
                                               sizeof(exmat_attachment)};
-inline constexpr std::size_t kMostStructBytes = 4096;  ///< of any version
+inline constexpr std::size_t kMostStructBytes = 4096;  ///< limit on the size of any version
 
 /// The defaults of a scene file.
 exmat_settings default_settings();

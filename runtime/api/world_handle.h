@@ -28,7 +28,7 @@ struct exmat_world {
   exmat_world& operator=(const exmat_world&) = delete;
 
   exmat_contact_law law;
-  bool is_own = false;  ///< of a body, which keeps it
+  bool is_own = false;  ///< true for the world of a single body, which keeps it
   exmat::runtime::World world;
   std::vector<Member> members;  ///< in ascending order of ids
   std::int64_t next_id = 0;
@@ -37,8 +37,8 @@ struct exmat_world {
   std::int64_t steps = 0;                    ///< its time over the time step
   std::vector<exmat_body_contact> contacts;  ///< at the end of the last step
   bool profiled = false;
-  exmat::runtime::WorldProfile profile;  ///< of the last call that stepped it, where it is profiled
-  /// Of the models whose bodies were ever in it.
+  exmat::runtime::WorldProfile profile;  ///< profile of the last call that stepped it, where it is profiled
+  /// Surfaces of the models whose bodies were ever in it.
   std::map<std::shared_ptr<const exmat::runtime::Source>, std::shared_ptr<const exmat::runtime::TouchingSurface>>
       surfaces;
 };

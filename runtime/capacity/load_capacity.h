@@ -9,7 +9,7 @@
 
 namespace exmat::runtime {
 
-/// How much of a load a modal basis can answer. docs/method.md, "Load capacity".
+/// Share of a load that a modal basis can answer. docs/method.md, "Load capacity".
 ///
 /// A load f that acts for one step of backward Euler of length h on a body at rest moves it by h^2 A^-1 f, with
 /// A = M + h^2 K of all degrees of freedom, and does the work h^2 f^T A^-1 f. Within the span of B, the modes and the
@@ -18,7 +18,7 @@ namespace exmat::runtime {
 /// count alike where the body moves most.
 class LoadCapacity {
  public:
-  /// Of a bundle's /object and /modal, complete. `spread` >= 0 [m]: how far from its point a force is spread.
+  /// Takes a bundle's /object and /modal, complete. `spread` >= 0 [m]: how far from its point a force is spread.
   LoadCapacity(const ReducedModel& model, double spread);
 
   double time_scale() const { return time_scale_; }  ///< h [s]
@@ -39,8 +39,8 @@ class LoadCapacity {
   Eigen::VectorXd areas_;                                   ///< n, of the surface; 0 inside
   std::vector<Eigen::Index> place_;                         ///< n, the first unknown of each vertex; -1 of fixed ones
   Eigen::MatrixXd reduced_basis_;                           ///< unknowns x columns of B
-  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> full_;  ///< of A
-  Eigen::LLT<Eigen::MatrixXd> reduced_;                     ///< of B^T A B
+  Eigen::SimplicialLLT<Eigen::SparseMatrix<double>> full_;  ///< factor of A
+  Eigen::LLT<Eigen::MatrixXd> reduced_;                     ///< factor of B^T A B
 };
 
 }  // namespace exmat::runtime

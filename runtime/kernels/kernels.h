@@ -155,12 +155,12 @@ constexpr std::ptrdiff_t lane_bernstein_scratch(std::ptrdiff_t degree, std::ptrd
 struct LeafBoxes {
   const double* places = nullptr;
   const double* velocities = nullptr;  ///< null where nothing moves
-  const double* rest = nullptr;        ///< of the places at rest
+  const double* rest = nullptr;        ///< boxes of the places at rest
 };
 /// Query for leaves near some points. Their boxes are six numbers, as above.
 struct LeafQuery {
   double places[6] = {}, velocities[6] = {}, rest[6] = {};
-  double radius = 0;             ///< what is farther away is far
+  double radius = 0;             ///< leaves farther away than this are far
   double near = 0, time = 0;     ///< and, of what moves, what is farther away than `near` and the way of both in `time`
   double share = 0, beyond = 0;  ///< and what is no nearer than `share` of how far it is at most at rest, and `beyond`
 };
@@ -178,7 +178,7 @@ struct alignas(kAlignment) PlaneContactPanel {
   double normal[3][kLanes] = {};   ///< n_0
   double start[3][kLanes] = {};    ///< x_0 [m]
   double stretch[3][kLanes] = {};  ///< x_0 - anchor, along the plane [m]
-  double distance[kLanes] = {};    ///< of x_0 [m]
+  double distance[kLanes] = {};    ///< signed distance of x_0 from the plane [m]
   double stiffness[kLanes] = {};   ///< kappa [N/m]
   double damping[kLanes] = {};     ///< gamma
   double share[kLanes] = {};       ///< 1 / (1 + gamma)
@@ -200,7 +200,7 @@ inline constexpr std::ptrdiff_t kMeshLanes = 16;  ///< elements of a panel, of t
 /// Elements of common/mesh/elements.h, and two symmetric scalar matrices [n x n] on one pattern.
 struct MeshArrays {
   std::ptrdiff_t vertices = 0;               ///< n
-  std::ptrdiff_t panels = 0;                 ///< of kMeshLanes elements; those that pad have no corners
+  std::ptrdiff_t panels = 0;                 ///< panels of kMeshLanes elements; those that pad have no corners
   const int* starts = nullptr;               ///< panels x kMeshLanes + 1, into `corners`
   const int* corners = nullptr;              ///< vertices of each element that move
   const double* gradients = nullptr;         ///< three of each corner [1/m]

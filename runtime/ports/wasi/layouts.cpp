@@ -4,7 +4,7 @@
 
 #include "exmat/exmat.h"
 
-// Where the host finds the members of the structs of the interface: one line each, "STRUCT MEMBER OFFSET TYPE COUNT",
+// Layout of the interface's structs for the host: one line per member, "STRUCT MEMBER OFFSET TYPE COUNT",
 // and "STRUCT . SIZE s 1". TYPE is d (double), i (int32), u (uint32), l (int64) or z (size_t).
 
 namespace {
