@@ -75,7 +75,7 @@ void set_reduced(BatchObject& batch, const Numbers& q, const Numbers& v) {
     body_of(batch, i).body.set_reduced(read_span(q).subspan(i * width, width), read_span(v).subspan(i * width, width));
 }
 
-/// Of shape (k, 3), the same for all, or (N, k, 3).
+/// Applies forces of shape (k, 3), the same for all, or (N, k, 3).
 void apply_forces(BatchObject& batch, const PointsObject& points, const Numbers& forces) {
   const auto k = static_cast<py::ssize_t>(points.count);
   if (forces.ndim() == 2)

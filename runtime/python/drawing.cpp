@@ -65,7 +65,7 @@ py::dict profile(const WorldRef& world) {
   return seconds;
 }
 
-/// Of a body alone, a world or a batch.
+/// Binds the profile of a body alone, a world or a batch.
 template <typename Class>
 void bind_profile(Class& type) {
   using Object = typename Class::type;

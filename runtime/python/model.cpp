@@ -61,7 +61,7 @@ exmat_settings settings_of(const py::dict& given) {
   return settings;
 }
 
-/// Of a scene where `settings` is None.
+/// Loads the model of a scene where `settings` is None, else of a bundle.
 std::shared_ptr<ModelObject> load(const std::string& path, const py::object& settings) {
   if (settings.is_none()) {
     const py::gil_scoped_release unlocked;

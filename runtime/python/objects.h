@@ -14,8 +14,8 @@
 #include <utility>
 #include <vector>
 
-// What the Python classes hold. All calls into Python, and all that reads or sets `stepping`, hold the interpreter's
-// lock.
+// Structs behind the Python classes. All calls into Python, and all that reads or sets `stepping`, hold the
+// interpreter's lock.
 
 namespace exmat::python {
 
@@ -78,10 +78,10 @@ struct StateObject {
   bool operator==(const StateObject&) const = default;
 };
 
-/// What an obstacle is made of, in its own frame.
+/// Shape of an obstacle, in its own frame.
 struct ShapeObject {
   exmat_obstacle description;   ///< its law is not looked at
-  std::optional<Shape> arrays;  ///< of a mesh or a height field
+  std::optional<Shape> arrays;  ///< present for a mesh or a height field
   py::tuple arguments;          ///< that it was made of
 };
 
@@ -119,7 +119,7 @@ enum class ExampleFactor { kStiffness, kDamping, kBias };
 struct BodyObject {
   explicit BodyObject(const ModelHold& its_model) : BodyObject(Body(its_model->model), its_model) {}
   BodyObject(Body made, ModelHold its_model);
-  /// Of a world, which owns it.
+  /// Body of a world, which owns it.
   BodyObject(BodyRef its_body, ModelHold its_model, std::shared_ptr<WorldHold> its_world);
 
   /// Throws where another thread steps it.
@@ -139,14 +139,14 @@ struct BodyObject {
   std::optional<std::array<double, 2>> damping;                      ///< likewise
   std::optional<std::int32_t> integrator, space;                     ///< likewise
   std::optional<std::array<std::uint32_t, 2>> group;                 ///< likewise, and its mask
-  ObstacleRecord obstacles;                                          ///< of a world of its own
+  ObstacleRecord obstacles;                                          ///< obstacles of a world of its own
 };
 
 using BodyList = std::vector<std::shared_ptr<BodyObject>>;
 
 struct WorldStateObject {
   std::vector<double> numbers;
-  std::vector<std::string> shas;  ///< of the bodies' bundles
+  std::vector<std::string> shas;  ///< hashes of the bodies' bundles
 
   bool operator==(const WorldStateObject&) const = default;
 };
@@ -212,7 +212,7 @@ void set_weights(BodyObject& body, const std::vector<double>& weights, std::int6
 StateObject state_of(BodyObject& body);
 void set_state(BodyObject& body, const StateObject& state);
 
-/// What a body has of its own but for its state, for pickle, and a body that takes it.
+/// Settings of a body beside its state, for pickle, and a body that takes them.
 py::tuple kept_settings(BodyObject& body);
 void set_settings(BodyObject& body, const py::tuple& kept);
 
@@ -233,7 +233,7 @@ void set_obstacles(const ObstacleAccess& to, const py::dict& kept);
 /// To be called after the state is set, with which obstacles stay where they are.
 void set_obstacle_motions(const ObstacleAccess& to, const py::dict& kept);
 
-/// Of the name of a region, -1, the whole body, where it is None.
+/// Number of the region of that name; -1, the whole body, where it is None.
 std::int64_t region_of(const Model& model, const py::object& name);
 
 /// A number that is one of `names`.
@@ -292,7 +292,7 @@ auto read_span(const Array& array) {
   return std::span<const typename Array::value_type>(array.data(), static_cast<std::size_t>(array.size()));
 }
 
-/// What read(0.0) returns where `out` is of doubles, else read(0.0F).
+/// Result of read(0.0) where `out` is of doubles, else of read(0.0F).
 template <typename Read>
 py::array in_precision_of(const py::object& out, const Read& read) {
   return py::isinstance<py::array_t<double>>(out) ? py::array(read(0.0)) : py::array(read(0.0F));

@@ -4,7 +4,7 @@
 
 #include "runtime/python/objects.h"
 
-// What the library reports, as Python reads it.
+// Reports of the library, as Python reads them.
 
 namespace exmat::python {
 namespace {

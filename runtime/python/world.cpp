@@ -61,7 +61,7 @@ std::int64_t kinds(WorldObject& world) {
   return last + 1;
 }
 
-/// Of a world of a scene, which has the bodies but not yet their models' Python objects, by kind.
+/// Makes the Python bodies of a scene's world, whose models by kind are given.
 void take_models(WorldObject& world, const std::vector<std::shared_ptr<ModelObject>>& models) {
   for (const std::int64_t id : world.get().ids()) {
     const auto kind = static_cast<std::size_t>(world.hold->world.kind(id));
