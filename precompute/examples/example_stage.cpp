@@ -28,7 +28,7 @@ constexpr double kMovedClamp = 0.005;
 // A turn that is worth words [rad].
 constexpr double kTurned = 0.02;
 
-// Of ExampleData::source.
+// Value of ExampleData::source.
 std::string source_of(const AssetConfig& asset, const std::string& name) {
   const auto example = std::ranges::find(asset.examples, name, &ExampleConfig::name);
   if (example == asset.examples.end()) return "";

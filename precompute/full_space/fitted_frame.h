@@ -16,7 +16,7 @@ class FittedFrame {
   /// `mass` [n x n], weighted by density.
   FittedFrame(const TetMesh& mesh, const SparseMatrix& mass);
 
-  /// Where the frame is, and what its derivatives need.
+  /// Pose of the frame, and what its derivatives need.
   struct Placement {
     Eigen::Vector3d centre;    ///< c, world [m]
     Eigen::Matrix3d rotation;  ///< R

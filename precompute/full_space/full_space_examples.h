@@ -17,8 +17,8 @@ namespace exmat::precompute {
 
 /// The examples of the whole body or of a region, from what a bundle holds.
 struct ExamplePoses {
-  const ExampleSet* examples = nullptr;  ///< of the bundle
-  std::optional<RegionView> view;        ///< of a region
+  const ExampleSet* examples = nullptr;  ///< examples of the bundle
+  std::optional<RegionView> view;        ///< present for a region
   Eigen::MatrixXd fields;  ///< [f x 3m], displacements that changes of descriptor stand for; of a free body without
                            ///< their rigid part
   std::optional<PoseCoordinates> coordinates{};  ///< that hold all targets; absent: targets are sought in all fields
@@ -31,7 +31,7 @@ ExamplePoses whole_body_example_poses(const ReducedModel& model, const ElasticSy
 std::vector<ExamplePoses> region_example_poses(const ReducedModel& model, const ElasticSystem& system,
                                                const std::vector<std::string>& regions);
 
-/// Of a region or, where its name is empty, of the whole body, in displacements that hold all targets.
+/// Poses of a region or, where its name is empty, of the whole body, in displacements that hold all targets.
 ExamplePoses known_example_poses(const ReducedModel& model, const std::string& region, PoseCoordinates coordinates);
 
 /// Example forces without a modal basis, of which those of docs/step_in_detail.md, "Target", are the Galerkin

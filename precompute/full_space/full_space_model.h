@@ -25,11 +25,11 @@ struct FullSpaceModel {
   VertexArray rest;                         ///< n x 3 [m]
   ElasticSystem system;                     ///< consistent mass, f x f and 3n x 3n
   MeshElasticity elasticity;                ///< all tets
-  Eigen::VectorXd mass_values;              ///< of the mass on the pattern of the stiffness [kg]
+  Eigen::VectorXd mass_values;              ///< values of the mass matrix on the pattern of the stiffness [kg]
   Eigen::MatrixXd gravity_load;             ///< f x 3, force per unit acceleration along each axis [kg]
-  std::optional<FittedFrame> frame;         ///< of a free body
-  std::optional<VertexContacts> contacts;   ///< of a bundle with /contact
-  std::vector<FullSpaceExamples> examples;  ///< of the whole body, if they are asked for, then of regions
+  std::optional<FittedFrame> frame;         ///< present for a free body
+  std::optional<VertexContacts> contacts;   ///< present for a bundle with /contact
+  std::vector<FullSpaceExamples> examples;  ///< the whole body's, if they are asked for, then the regions'
   /// In place of the targets of `examples`, one for each of them; or none.
   std::vector<std::shared_ptr<const TargetMethod>> target_methods;
 
@@ -42,7 +42,7 @@ struct FullSpaceModel {
 };
 
 struct FullSpaceOptions {
-  bool whole_body = false;  ///< whether to have its examples
+  bool whole_body = false;  ///< true to have its examples
   EnergyReference energy_reference = EnergyReference::kExample;
   struct Region {
     std::string name{};

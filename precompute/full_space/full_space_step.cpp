@@ -68,7 +68,7 @@ void FullSpaceStep::set_rate_centre(Integrator integrator) {
     terms_.rate_centre = (4 * start.u() - Deformation(model_, state_.q_previous).u()) / 3;
 }
 
-// Of the equation of motion at the beginning of the step.
+// Acceleration at the beginning of the step, by the equation of motion.
 Eigen::VectorXd FullSpaceStep::start_acceleration() {
   Eigen::VectorXd internal;
   LowerTriangle stiffness;

@@ -12,8 +12,8 @@
 
 namespace exmat::precompute {
 
-/// What acts on a body in full space, and how it is integrated: runtime::StepScene without a basis. A body that a
-/// motion carries has no full-space scene.
+/// Loads on a body in full space, and how it is integrated: runtime::StepScene without a basis. A body that a motion
+/// carries has no full-space scene.
 struct FullSpaceScene {
   double time_step = 0.001;  ///< > 0 [s]
   Integrator integrator = Integrator::kBdf2;
@@ -30,7 +30,7 @@ struct FullSpaceScene {
 struct FullSpaceWorkspace {
   explicit FullSpaceWorkspace(const FullSpaceModel& model);
 
-  SparseDirection direction;                 ///< of Newton's method
+  SparseDirection direction;                 ///< solves for Newton's directions
   std::unique_ptr<SupernodalCholesky> mass;  ///< once it is needed
   struct Examples {
     std::optional<runtime::TargetSolver::Workspace> target;
@@ -39,7 +39,7 @@ struct FullSpaceWorkspace {
   std::vector<Examples> examples;  ///< as the model's
 };
 
-/// What one step did, and how long it took.
+/// Result of one step, with its time.
 struct FullSpaceReport : runtime::StepReport {
   Eigen::Index inverted_tets = 0;  ///< that an elastic example force leaves out, since the target inverts them
   double target_seconds = 0;       ///< weights and target: t_interp of the paper's Table 2

@@ -23,16 +23,16 @@ struct FullSpaceBody {
   const FullSpaceScene* scene;
   FullSpaceState state;
   FullSpaceWorkspace workspace;
-  FullSpaceReport report;  ///< of the last step
+  FullSpaceReport report;  ///< report of the last step
 };
 
-/// What one step of a FullSpaceWorld did.
+/// Result of one step of a FullSpaceWorld.
 struct FullSpaceWorldReport {
   int touching_bodies = 0;  ///< that were solved together
   int contacts = 0;         ///< vertices with a normal force from other bodies
   runtime::NewtonReport newton;
   double seconds = 0;
-  bool unconverged = false;  ///< of any body
+  bool unconverged = false;  ///< true if any body did not converge
   bool non_finite = false;   ///< likewise; those bodies are as they were
 };
 

@@ -69,8 +69,8 @@ class MeshElasticity {
   decltype(Elements::gradients) gradients_;  // of the elements, from the undeformed shape on
   Eigen::VectorXd rest_volumes_;             // of the elements, times the share
   Eigen::VectorXd volumes_;                  // of the undeformed shape; 0 where an element is left out
-  // Of each element the places among the values of the blocks of its pairs of vertices i, j that are free, that of i
-  // not before that of j, row by row in the element's order: the first entry of the first column.
+  // Places among the values of the blocks of each element's pairs of free vertices i, j, i not before j, row by row in
+  // the element's order: the first entry of the first column.
   std::vector<std::size_t> starts_;
   std::vector<std::int32_t> slots_;
   LowerTriangle pattern_;

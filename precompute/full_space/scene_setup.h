@@ -16,8 +16,7 @@ FullSpaceScene full_space_scene(const SceneConfig& config, runtime::Obstacles ob
 /// The targets that the scene needs, those of the reduced model.
 FullSpaceOptions full_space_options(const SceneConfig& config);
 
-/// Where the scene begins, at the deformation u [3n], such as U q. Throws InputError where the scene moves a clamped
-/// body.
+/// Start of the scene, at the deformation u [3n], such as U q. Throws InputError where the scene moves a clamped body.
 FullSpaceState full_space_start(const SceneConfig& config, const FullSpaceModel& model,
                                 const Eigen::VectorXd& deformation);
 

@@ -7,7 +7,7 @@
 
 namespace exmat::precompute {
 
-/// What minimise_step() minimises in d, of a body or of several.
+/// Potential that minimise_step() minimises in d, of a body or of several.
 class SparsePotential {
  public:
   SparsePotential() = default;
@@ -15,7 +15,7 @@ class SparsePotential {
   SparsePotential& operator=(const SparsePotential&) = delete;
   virtual ~SparsePotential() = default;
 
-  /// Where the potential was started; anywhere.
+  /// Evaluates at the d where the potential was started; evaluate() anywhere.
   virtual runtime::PotentialEvaluation evaluate_first(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) = 0;
   virtual runtime::PotentialEvaluation evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) = 0;
   virtual runtime::PotentialValue value(const Eigen::VectorXd& d) const = 0;

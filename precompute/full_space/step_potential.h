@@ -38,19 +38,19 @@ struct ExampleTerm {
   const FullSpaceExamples* examples = nullptr;
   const runtime::ExampleSettings* settings = nullptr;
   Eigen::VectorXd target;                      ///< u* [f]
-  const MeshElasticity* elasticity = nullptr;  ///< of displacements from u*, of an elastic force
+  const MeshElasticity* elasticity = nullptr;  ///< elasticity of displacements from u*, for an elastic force
 };
 
-/// What one step knows before its Newton iterations.
+/// Terms that one step knows before its Newton iterations.
 struct StepTerms {
-  runtime::StepForm form;                    ///< of q
+  runtime::StepForm form;                    ///< form of the integrator in q
   Eigen::VectorXd rate_centre;               ///< u_v [f]: u' = c_v (u - u_v)
   Eigen::VectorXd external_force;            ///< [f]
   std::vector<ExampleTerm> examples;         ///< those that act; known when prepare() is called
   VertexContacts::Step* contacts = nullptr;  ///< near obstacles
 };
 
-/// What one step minimises, in d = q - q_n, which keeps the digits that c_a and a body far from its rest would take:
+/// Potential of one step, in d = q - q_n, which keeps the digits that c_a and a body far from its rest would take:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + W_c(q) + c_v/2 (u - u_v)^T D (u - u_v)
 ///     + sum k/2 (u - u_c)^T P (u - u_c) - kappa (P u*) . u,
 /// the terms of runtime::IncrementalPotential in full space, summed over the example forces; an elastic one

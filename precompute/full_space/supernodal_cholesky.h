@@ -19,18 +19,18 @@ class SupernodalCholesky {
   /// The lower triangle of the pattern, by columns.
   explicit SupernodalCholesky(const Matrix& pattern);
 
-  /// Of the lower triangle of a matrix of that pattern. False where it is not positive definite; then there are no
-  /// factors.
+  /// Factorises from the lower triangle of a matrix of that pattern. False where it is not positive definite; then
+  /// there are no factors.
   bool factorise(const Matrix& matrix);
 
   /// x = A^-1 b.
   Eigen::VectorXd solve(const Eigen::VectorXd& b) const;
 
-  std::int64_t entries() const { return plan_.entries(); }  ///< of L, zeros of its blocks among them
-  double operations() const { return plan_.operations(); }  ///< of a factorisation
+  std::int64_t entries() const { return plan_.entries(); }  ///< entries of L, zeros of its blocks among them
+  double operations() const { return plan_.operations(); }  ///< operations of a factorisation
 
  private:
-  /// Where a value of the matrix goes.
+  /// Target of a value of the matrix.
   struct Entry {
     std::int32_t row = 0, column = 0;
   };
@@ -40,8 +40,8 @@ class SupernodalCholesky {
 
   Elimination plan_;
   std::vector<Eigen::MatrixXd> blocks_;            ///< [(columns + rows) x columns] of each node
-  std::vector<std::vector<std::int32_t>> values_;  ///< of the matrix that each node takes in, as an index of entry_
-  std::vector<Entry> entry_;                       ///< of each value
+  std::vector<std::vector<std::int32_t>> values_;  ///< matrix values that each node takes in, indices into entry_
+  std::vector<Entry> entry_;                       ///< target of each value
   std::vector<std::int32_t> position_;             ///< scratch: of each row in a front
 };
 

@@ -24,7 +24,7 @@ class MovingSurface {
 
   const runtime::Placement& placement() const { return placement_; }
   const Eigen::AlignedBox3d& box() const { return box_; }  ///< about it, world [m]
-  double speed() const { return surface_.speed(); }        ///< of its fastest vertex [m/s]
+  double speed() const { return surface_.speed(); }        ///< speed of its fastest vertex [m/s]
   std::int32_t object_vertex(int vertex) const { return surface_.object_vertex(vertex); }
   std::int32_t corner(int triangle, int c) const { return surface_.object_corner(triangle, c); }
 
@@ -58,14 +58,14 @@ class SurfaceContacts {
   /// A part of -df/dx of the last evaluation: the positive semi-definite `matrix` acts on how `vertex` moves against
   /// the sum of the shares of how the corners move.
   struct Stiffness {
-    std::int32_t vertex = 0;                ///< of a
-    std::array<std::int32_t, 3> corners{};  ///< of b
+    std::int32_t vertex = 0;                ///< vertex of a
+    std::array<std::int32_t, 3> corners{};  ///< corners of b
     Eigen::Vector3d shares = Eigen::Vector3d::Zero();
     Eigen::Matrix3d matrix = Eigen::Matrix3d::Zero();  ///< [N/m]
   };
   std::vector<Stiffness> stiffness() const;
 
-  /// What the next step has to know of the last evaluation; `rotation_b` of the frame of b at the end.
+  /// Data of the last evaluation that the next step needs; `rotation_b` of the frame of b at the end.
   HeldVertices held(const Eigen::Matrix3d& rotation_b) const;
   int touching() const;
 

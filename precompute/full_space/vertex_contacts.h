@@ -14,12 +14,12 @@ namespace exmat::precompute {
 /// displacements u [f] are those of the free degrees of freedom, from rest in the world.
 class VertexContacts {
  public:
-  /// What one step finds.
+  /// Contacts that one step finds.
   struct Step {
     std::vector<runtime::PlacedObstacle> obstacles;     ///< at the end of the step
     std::vector<runtime::ContactCandidate> candidates;  ///< in order of vertex and obstacle
 
-    // Of the last evaluation.
+    // Results of the last evaluation.
     Eigen::VectorXd force;                                  ///< [f] on the body [N]
     Eigen::Vector3d total_force = Eigen::Vector3d::Zero();  ///< sum over the vertices, world [N]
     double potential = 0;                                   ///< W [J], force = -dW/du
@@ -45,7 +45,7 @@ class VertexContacts {
   /// Adds -df/du of the last evaluation, without the curvature of the obstacles, which is positive semi-definite.
   void add_stiffness(const Step& step, LowerTriangle& stiffness) const;
 
-  /// What the next step remembers of the last evaluation, at u.
+  /// Writes the memory of the last evaluation, at u, for the next step.
   void commit(const Eigen::VectorXd& u, const Step& step, runtime::ContactState& held) const;
 
  private:

@@ -23,14 +23,14 @@ struct DirectedContacts {
   std::unique_ptr<SurfaceContacts> contacts;
 };
 
-/// What one step of bodies that touch minimises, in the changes d of all of them: the sum of their own potentials and
-/// that of the contacts between them. Its sparse Hessian has a block for each body; what couples them is in the product
-/// alone.
+/// Potential that one step of touching bodies minimises in the changes d of all of them: the sum of their own
+/// potentials and that of the contacts between them. Its sparse Hessian has a block for each body; what couples them is
+/// in the product alone.
 class WorldPotential : public SparsePotential {
  public:
   WorldPotential(std::vector<SteppedBody> bodies, std::vector<DirectedContacts>& contacts);
 
-  /// Of the Hessian's, of bodies of these models.
+  /// Pattern of the Hessian of bodies of these models.
   static LowerTriangle pattern(const std::vector<SteppedBody>& bodies);
 
   Eigen::VectorXd start() const;  ///< the d of the bodies
@@ -53,7 +53,7 @@ class WorldPotential : public SparsePotential {
   }
   std::vector<VertexArray> positions(const Eigen::VectorXd& d) const;
   runtime::PotentialEvaluation evaluate_all(const Eigen::VectorXd& d, bool is_first, Eigen::VectorXd& gradient);
-  /// Of the x of a vertex among all unknowns; negative: it is fixed.
+  /// Index of the x of a vertex among all unknowns; negative: it is fixed.
   Eigen::Index unknown(std::size_t body, std::int32_t vertex) const {
     return unknowns_[body][static_cast<std::size_t>(vertex)];
   }
