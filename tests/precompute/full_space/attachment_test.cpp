@@ -171,7 +171,7 @@ TEST(Attachment, ExertsWhatTheMomentumSays) {
   }
 }
 
-// What hangs weighs on the frame, a spring is as long as its stiffness says, and what bears less lets go.
+// Hanging bodies weigh on the frame, a spring is as long as its stiffness says, and a weaker hold lets go.
 TEST(Attachment, BearsTheWeightOfWhatHangs) {
   for (const auto kind :
        {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
@@ -198,8 +198,8 @@ TEST(Attachment, BearsTheWeightOfWhatHangs) {
   }
 }
 
-// What broke holds nothing: the body falls freely, its momentum changes by its weight alone, and in space `auto` it
-// leaves the full space.
+// A broken attachment holds nothing: the body falls freely, its momentum changes by its weight alone, and in space
+// `auto` it leaves the full space.
 TEST(Attachment, ThatBrokeLetsTheBodyFly) {
   AttachedBar body(true);
   body.scene.mass_damping = 3;
@@ -371,7 +371,7 @@ TEST(AttachmentInModes, BearsTheWeightOfWhatHangsAndBreaks) {
   }
 }
 
-// Of bodies of one model those that nothing holds go side by side, and what is held does what it does alone.
+// Bodies of one model that nothing holds go side by side, and a held one does what it does alone.
 TEST(AttachmentInModes, IsTheSameAmongOthers) {
   AttachedBar alone(true, /*modes=*/true), many(true, /*modes=*/true);
   alone.attach(runtime::AttachmentKind::kFixed);

@@ -65,7 +65,7 @@ struct Meeting {
     for (int i = 0; i < steps; ++i) {
       const runtime::WorldReport report = world.step(1);
       for (int k = 0; k < 2; ++k) ASSERT_EQ(world.report(k).status & runtime::kStepNonFinite, 0U) << i;
-      // Where nothing pushes, forces are those of rounding, which no solution is above.
+      // Without contacts, forces are those of rounding, which no solution is above.
       if (world.report(0).contacts > 0) unconverged += report.unconverged_islands;
       touching += report.touching_pairs;
     }
@@ -87,7 +87,7 @@ struct Meeting {
     return state.full->v;
   }
 
-  /// Of both, linear and about the origin.
+  /// Momentum of both, linear and about the origin.
   runtime::FrameMomenta momenta() const {
     runtime::FrameMomenta sum;
     for (const runtime::State& state : states) {
@@ -124,7 +124,7 @@ TEST_P(FullMeetings, MeetAsByRungeAndKuttaToTheOrderOfTheStep) {
     EXPECT_GT(meeting.touching, 10);
     EXPECT_EQ(meeting.unconverged, 0);
     const runtime::FrameMomenta after = meeting.momenta();
-    // Of the momentum of either.
+    // Changes relative to the momentum of either.
     EXPECT_LE((after.linear - before.linear).norm(), 1e-11 * meeting.full->rigid->mass());
     EXPECT_LE((after.angular - before.angular).norm(), 1e-11 * meeting.full->rigid->mass());
     for (std::size_t i = 0; i < 2; ++i) x[i] = meeting.positions(i);

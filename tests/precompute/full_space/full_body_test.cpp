@@ -222,7 +222,7 @@ runtime::FrameMotion tumbling() {
   return motion;
 }
 
-/// How much nearer the two are with half the time step.
+/// Ratio of the difference of the two to that with half the time step.
 double convergence(TwinOptions options, int steps) {
   Twin coarse(options);
   options.time_step *= 0.5;

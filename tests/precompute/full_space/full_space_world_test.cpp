@@ -17,7 +17,7 @@ using runtime::FrameMotion;
 using runtime::test::Blocks;
 using test::FullCollision;
 
-/// Of few vertices, all of which are on the surface.
+/// Bar of few vertices, all of which are on the surface.
 test::BarOptions bar_options(int linear_modes = 12) {
   test::BarOptions options = Blocks::free_block();
   options.cells = {3, 1, 1};
@@ -82,7 +82,7 @@ void run(FullSpaceWorld& world, int steps, int* contacts = nullptr) {
   for (int i = 0; i < steps; ++i) {
     const FullSpaceWorldReport report = world.step();
     ASSERT_FALSE(report.non_finite) << i;
-    // Where nothing pushes, forces are those of rounding, which no solution is above.
+    // Without contacts, forces are those of rounding, which no solution is above.
     if (report.contacts > 0) {
       ASSERT_EQ(report.newton.status, runtime::NewtonStatus::kConverged) << i;
     }

@@ -48,7 +48,7 @@ FullSpaceScene pushed(const FullSpaceModel& model, double tolerance) {
 }
 
 struct Compared {
-  double largest = 0, error = 0;  ///< of displacements, |q|
+  double largest = 0, error = 0;  ///< largest norms of q expected and of the difference
   void add(const Eigen::VectorXd& q, const Eigen::VectorXd& expected) {
     largest = std::max(largest, expected.norm());
     error = std::max(error, (q - expected).norm());
@@ -163,7 +163,7 @@ TEST(MatrixFreeStepperTest, IsTheReferenceUnderAnExampleForce) {
   EXPECT_GE((other.q - expected.q).norm(), 0.05 * compared.largest);
 }
 
-/// How far a free bar that turns and is pulled by an example is from the reference after 0.2 s, over the way of its
+/// Distance of a free bar that turns and is pulled by an example from the reference after 0.2 s, over the way of its
 /// vertices and over its deformation.
 struct FreeErrors {
   double position = 0, shape = 0;

@@ -92,7 +92,7 @@ class ReducedTwin {
   int contacts() const { return contacts_; }
 
  private:
-  /// Of all tets; targets in reduced coordinates.
+  /// Elastic examples on all tets; targets in reduced coordinates.
   void make_elastic(runtime::ModelOptions& options) {
     const CubatureData& all = *bar_.model.cubature;
     TargetElasticityData data;

@@ -45,7 +45,7 @@ TEST_F(SparseDirectionTest, OwnFactorsTakeOneIterationAndOlderOnesServe) {
   EXPECT_LE(residual(product, x_, b_), 1e-5);
 }
 
-// Of rank two: at most three different eigenvalues, and as many iterations.
+// The term has rank two: at most three different eigenvalues, and as many iterations.
 TEST_F(SparseDirectionTest, SolvesWithATermThatIsNotInTheMatrix) {
   const LowerTriangle A = matrix(1, 5);
   const Eigen::MatrixXd low_rank = test::random_matrix(size_, 2, 2);

@@ -128,7 +128,7 @@ TEST_P(StepPotentialTest, ProductIsThatOfTheSecondDerivative) {
   EXPECT_LE(error, is_free() ? 0.02 : 1e-6);  // 1e-6: of differences over 1e-8
 }
 
-// Of linear example forces, and of elastic ones.
+// Parameters: clamped or free, linear or elastic example forces.
 INSTANTIATE_TEST_SUITE_P(ClampedAndFree, StepPotentialTest, testing::Combine(testing::Bool(), testing::Bool()));
 
 }  // namespace

@@ -74,7 +74,7 @@ TEST(ImpulseResponse, ChangesMomentaByTheImpulses) {
   EXPECT_LE((after.angular - angular).norm(), 1e-12 * angular.norm());
 }
 
-// What velocities become in a step to which the force P / dt is added, less what they become without it.
+// Velocities after a step to which the force P / dt is added, less those without it.
 TEST(ImpulseResponse, IsThatOfAStep) {
   for (const bool free : {true, false}) {
     Pushed body({.free = free});

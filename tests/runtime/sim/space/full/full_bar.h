@@ -14,7 +14,7 @@ struct FullBarOptions {
   Formulation formulation = Formulation::kSmoothed;
   double youngs_modulus = 1e5, poisson_ratio = 0.35;
   bool two_parts = false;  ///< the outer half is ten times as stiff, twice as heavy, and of another Poisson ratio
-  int functions = 0;       ///< of a filter
+  int functions = 0;       ///< functions of a filter; 0: no filter
   bool free = false;
 };
 

@@ -276,7 +276,7 @@ TEST(FullStepTest, FreeBodyWithoutDampingKeepsItsMomenta) {
   EXPECT_LE((momentum() - before).norm(), 1e-9 * (mass * kick).norm());
 }
 
-// What a workspace holds must not matter: only the state goes on.
+// Workspaces must not matter: only the state goes on.
 TEST(FullStepTest, SameBitsFromACopyOfTheStateAndWithAnyNumberOfThreads) {
   for (const bool real_time : {false, true}) {
     const FullBar bar;
