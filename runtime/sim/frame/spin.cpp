@@ -9,7 +9,7 @@ namespace {
 
 constexpr int kMaxIterations = 30;
 constexpr double kSmall = 1e-4;       // [rad^2]
-constexpr double kTolerance = 4e-15;  // of |J w| + |h|
+constexpr double kTolerance = 4e-15;  // residual over |l_n| + |h|
 /// Share of the last squared residual; an iteration that leaves no more keeps its derivative.
 constexpr double kServes = 1e-6;
 
