@@ -114,8 +114,8 @@ EXMAT_API exmat_status exmat_world_step(exmat_world* world, int64_t steps, int32
 /* Runs tasks on a host's threads: calls task(data, i) once for each i < count, at the same time where it can, and
    returns when all have returned. They may be called by any thread, and do not wait for each other. */
 typedef void (*exmat_run_tasks)(void* user, void (*task)(void* data, int32_t i), void* data, int32_t count);
-/* Shares steps of all worlds of this process among the threads of `run` from then on; NULL: among the library's own. Not
-   while a world steps. A call of `run` gets at most `threads` tasks. */
+/* Shares steps of all worlds of this process among the threads of `run` from then on; NULL: among the library's own.
+   Not while a world steps. A call of `run` gets at most `threads` tasks. */
 EXMAT_API void exmat_set_scheduler(exmat_run_tasks run, void* user) EXMAT_NOEXCEPT;
 
 /* A vertex of one body that touched the surface of another, or of its own, at the end of the last step.
