@@ -254,10 +254,11 @@ void bind_model(py::module_& module) {
       .def_property_readonly(
           "bound_bones",
           [](const ModelObject& model) {
-            return array_of(model.model.bound_bones(), {model.model.bones(), 3, 4});
+            const std::size_t bones = model.model.bones();
+            return array_of(bones > 0 ? model.model.bound_bones() : std::vector<double>(), {bones, 3, 4});
           },
           "Matrices that take the bones to the world where the mesh is at rest: shape (b, 3, 4), the last column the "
-          "joint [m]. A copy.")
+          "joint [m]; none of a model without a skeleton. A copy.")
       .def_property_readonly(
           "animations",
           [](const ModelObject& model) {

@@ -1,10 +1,8 @@
 """Exceptions of exmat. All are of Error; each also is the built-in one that it is a kind of."""
-
-
 import re
 
 
-def in_words(text):
+def in_words(text: str) -> str:
     """The text of a TypeError of pybind11 as a message: what the function takes, and what it was given."""
     name, separator, rest = text.partition("(): incompatible ")
     if not separator:
@@ -14,11 +12,13 @@ def in_words(text):
     for scope, arguments in re.findall(r"^ +\d+\. ([\w.]*)\((.*?)\)(?: -> .*)?$", rest, re.M):
         if name == "__init__" and scope:
             name = scope.rpartition(".")[2]
-        own, comma, others = arguments.partition(", ")
-        if own.startswith("self: "):
-            arguments, found = others, re.sub(r"^<[^<>]*>(, )?", "", found)
-        takes.append(f"({arguments.replace('_exmat.', '')})")
-    return f"{name}: expected {' or '.join(takes)}, found {f'({found})' if found else 'nothing'}"
+        own, _, others = arguments.partition(", ")
+        if own.startswith("self: ") or not name:  # a property has no name
+            arguments = others if name else others.partition(": ")[2]
+            found = re.sub(r"^<[^<>]*>(, )?", "", found)
+        takes.append(f"({arguments})" if name else arguments)
+    expected, given = " or ".join(takes), f"({found})" if found and name else found or "nothing"
+    return f"{name}{': ' if name else ''}expected {expected}, found {given}".replace("_exmat.", "")
 
 
 class Error(Exception):
