@@ -118,14 +118,15 @@ export async function sceneOf(name, read) {
     touches = false;
     model = await load(pack);
   }
-  const { rest } = model.surface("object").points, free = model.mass > 0;
+  const surface = model.surface("object"), { rest } = surface.points, isFree = model.mass > 0;
   let least = Infinity, most = -Infinity;
   for (let i = 1; i < rest.length; i += 3) [least, most] = [Math.min(least, rest[i]), Math.max(most, rest[i])];
   const examples = await load(pack, { useExamples: true }).catch(() => null);
   const scene = { bundle: name, time_step: 0.004, gravity: [0, -9.81, 0], space: "auto", damping: { mass: 0.5, stiffness: 0.005 } };
   if (examples !== null && examples.examples > 0) scene.examples = { stiffness: 2000, damping: 2 };
-  if (free && touches) scene.obstacles = [{ plane: { point: [0, least - 0.3 * (most - least), 0], normal: [0, 1, 0] }, stiffness: 1e7, damping: 3e4, friction: 0.5 }];
+  if (isFree && touches) scene.obstacles = [{ plane: { point: [0, least - 0.3 * (most - least), 0], normal: [0, 1, 0] }, stiffness: 1e7, damping: 3e4, friction: 0.5 }];
   examples?.free();
+  surface.free();
   model.free();
   return scene;
 }

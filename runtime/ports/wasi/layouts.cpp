@@ -33,34 +33,72 @@ constexpr std::size_t kCount = std::is_array_v<Member> ? std::extent_v<Member> :
    kCount<decltype(exmat_##structure::member)>},
 #define EXMAT_SIZE(structure) {#structure " .", sizeof(exmat_##structure), 's', 1},
 
+// clang-format off
 constexpr Line kLines[] = {
-    EXMAT_SIZE(settings) EXMAT_MEMBER(settings, size) EXMAT_MEMBER(settings, time_step) EXMAT_MEMBER(
-        settings, gravity) EXMAT_MEMBER(settings, mass_damping) EXMAT_MEMBER(settings, stiffness_damping)
-        EXMAT_MEMBER(settings, newton_tolerance) EXMAT_MEMBER(settings, example_stiffness) EXMAT_MEMBER(
-            settings, example_damping) EXMAT_MEMBER(settings, example_bias) EXMAT_MEMBER(settings, newton_iterations)
-            EXMAT_MEMBER(settings, integrator) EXMAT_MEMBER(settings, internal_force) EXMAT_MEMBER(
-                settings, use_examples) EXMAT_MEMBER(settings, example_target) EXMAT_MEMBER(settings, target_iterations)
-                EXMAT_MEMBER(settings, energy_reference) EXMAT_MEMBER(settings, use_contact) EXMAT_MEMBER(
-                    settings, sleep_energy) EXMAT_MEMBER(settings, sleep_time) EXMAT_MEMBER(settings, precision)
-                    EXMAT_MEMBER(settings, space) EXMAT_MEMBER(
-                        settings, space_release) EXMAT_SIZE(contact_law) EXMAT_MEMBER(contact_law, size)
-                        EXMAT_MEMBER(contact_law, stiffness) EXMAT_MEMBER(contact_law, damping) EXMAT_MEMBER(
-                            contact_law, friction) EXMAT_MEMBER(contact_law, self) EXMAT_MEMBER(contact_law, apart)
-                            EXMAT_MEMBER(contact_law, release) EXMAT_SIZE(obstacle) EXMAT_MEMBER(
-                                obstacle, size) EXMAT_MEMBER(obstacle, point) EXMAT_MEMBER(obstacle, direction)
-                                EXMAT_MEMBER(obstacle, half_extents) EXMAT_MEMBER(obstacle, orientation) EXMAT_MEMBER(
-                                    obstacle, radius) EXMAT_MEMBER(obstacle, stiffness) EXMAT_MEMBER(obstacle, damping)
-                                    EXMAT_MEMBER(obstacle, friction) EXMAT_MEMBER(obstacle, shape) EXMAT_MEMBER(
-                                        obstacle, group) EXMAT_MEMBER(obstacle, mask) EXMAT_SIZE(motion)
-                                        EXMAT_MEMBER(motion, size) EXMAT_MEMBER(motion, position) EXMAT_MEMBER(
-                                            motion, orientation) EXMAT_MEMBER(motion, linear_velocity)
-                                            EXMAT_MEMBER(motion, angular_velocity) EXMAT_SIZE(attachment) EXMAT_MEMBER(
-                                                attachment, size) EXMAT_MEMBER(attachment, kind)
-                                                EXMAT_MEMBER(attachment, stiffness) EXMAT_MEMBER(attachment, damping)
-                                                    EXMAT_MEMBER(attachment, break_force) EXMAT_SIZE(energies)
-                                                        EXMAT_MEMBER(energies, size) EXMAT_MEMBER(energies, kinetic)
-                                                            EXMAT_MEMBER(energies, elastic) EXMAT_MEMBER(
-                                                                energies, potential) EXMAT_MEMBER(energies, contact)};
+  EXMAT_SIZE(settings)
+  EXMAT_MEMBER(settings, size)
+  EXMAT_MEMBER(settings, time_step)
+  EXMAT_MEMBER(settings, gravity)
+  EXMAT_MEMBER(settings, mass_damping)
+  EXMAT_MEMBER(settings, stiffness_damping)
+  EXMAT_MEMBER(settings, newton_tolerance)
+  EXMAT_MEMBER(settings, example_stiffness)
+  EXMAT_MEMBER(settings, example_damping)
+  EXMAT_MEMBER(settings, example_bias)
+  EXMAT_MEMBER(settings, newton_iterations)
+  EXMAT_MEMBER(settings, integrator)
+  EXMAT_MEMBER(settings, internal_force)
+  EXMAT_MEMBER(settings, use_examples)
+  EXMAT_MEMBER(settings, example_target)
+  EXMAT_MEMBER(settings, target_iterations)
+  EXMAT_MEMBER(settings, energy_reference)
+  EXMAT_MEMBER(settings, use_contact)
+  EXMAT_MEMBER(settings, sleep_energy)
+  EXMAT_MEMBER(settings, sleep_time)
+  EXMAT_MEMBER(settings, precision)
+  EXMAT_MEMBER(settings, space)
+  EXMAT_MEMBER(settings, space_release)
+  EXMAT_SIZE(contact_law)
+  EXMAT_MEMBER(contact_law, size)
+  EXMAT_MEMBER(contact_law, stiffness)
+  EXMAT_MEMBER(contact_law, damping)
+  EXMAT_MEMBER(contact_law, friction)
+  EXMAT_MEMBER(contact_law, self)
+  EXMAT_MEMBER(contact_law, apart)
+  EXMAT_MEMBER(contact_law, release)
+  EXMAT_SIZE(obstacle)
+  EXMAT_MEMBER(obstacle, size)
+  EXMAT_MEMBER(obstacle, point)
+  EXMAT_MEMBER(obstacle, direction)
+  EXMAT_MEMBER(obstacle, half_extents)
+  EXMAT_MEMBER(obstacle, orientation)
+  EXMAT_MEMBER(obstacle, radius)
+  EXMAT_MEMBER(obstacle, stiffness)
+  EXMAT_MEMBER(obstacle, damping)
+  EXMAT_MEMBER(obstacle, friction)
+  EXMAT_MEMBER(obstacle, shape)
+  EXMAT_MEMBER(obstacle, group)
+  EXMAT_MEMBER(obstacle, mask)
+  EXMAT_SIZE(motion)
+  EXMAT_MEMBER(motion, size)
+  EXMAT_MEMBER(motion, position)
+  EXMAT_MEMBER(motion, orientation)
+  EXMAT_MEMBER(motion, linear_velocity)
+  EXMAT_MEMBER(motion, angular_velocity)
+  EXMAT_SIZE(attachment)
+  EXMAT_MEMBER(attachment, size)
+  EXMAT_MEMBER(attachment, kind)
+  EXMAT_MEMBER(attachment, stiffness)
+  EXMAT_MEMBER(attachment, damping)
+  EXMAT_MEMBER(attachment, break_force)
+  EXMAT_SIZE(energies)
+  EXMAT_MEMBER(energies, size)
+  EXMAT_MEMBER(energies, kinetic)
+  EXMAT_MEMBER(energies, elastic)
+  EXMAT_MEMBER(energies, potential)
+  EXMAT_MEMBER(energies, contact)
+};
+// clang-format on
 
 std::string layouts() {
   std::string text;

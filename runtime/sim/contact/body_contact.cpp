@@ -40,6 +40,13 @@ void take_stretch(const HeldBodyContact& held, const Eigen::Matrix3d& rotation, 
   if (length > 0) candidate.anchor -= held.stretch.norm() / length * along;
 }
 
+/// For a vertex that is inside, of which a part of the surface alone may tell that it is outside.
+void put_inside(SurfaceHit& hit) {
+  if (hit.distance <= 0) return;
+  hit.distance = -hit.distance;
+  hit.normal = -hit.normal;
+}
+
 /// The nearest point; of a vertex inside that looks the way `looks`, preferably of what does not look the same way and
 /// is no deeper than `deepest` [m]: where edges lie on each other, the nearest may be that of a side.
 std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen::Vector3d& point,
@@ -49,10 +56,7 @@ std::optional<SurfaceHit> nearest_facing(const BodySurface& surface, const Eigen
   if (!hit || hit->distance >= 0 || hit->normal.dot(looks) <= 0) return hit;
   auto facing = surface.nearest(point, radius, shape, &looks);
   if (!facing || std::abs(facing->distance) > deepest) return hit;
-  if (facing->distance > 0) {  // told by a part of the surface alone; it is inside
-    facing->distance = -facing->distance;
-    facing->normal = -facing->normal;
-  }
+  put_inside(*facing);
   return facing;
 }
 
@@ -63,10 +67,7 @@ std::optional<SurfaceHit> nearest_on_way_out(const BodySurface& surface, const E
   if (!hit || hit->distance > kOnSurface * radius) return hit;
   auto side = surface.nearest_looking(point, radius, shape, out);
   if (!side) return hit;
-  if (side->distance > 0) {  // told by a part of the surface alone; it is inside
-    side->distance = -side->distance;
-    side->normal = -side->normal;
-  }
+  put_inside(*side);
   return side;
 }
 
@@ -80,10 +81,7 @@ std::optional<SurfaceHit> nearest_by_side(const BodySurface& surface, const Eige
   const Eigen::Vector3d far_side = -side;
   auto entry = surface.nearest(point, radius, shape, &far_side);
   if (!entry) return hit;
-  if (entry->distance > 0) {  // told by a part of the surface alone, as above
-    entry->distance = -entry->distance;
-    entry->normal = -entry->normal;
-  }
+  put_inside(*entry);
   return entry->normal.dot(side) > 0 ? entry : hit;
 }
 
@@ -120,6 +118,16 @@ struct Gathering {
     own_place.offset = a.pose.position + own_place.arm - b.pose.position;
     own_place.point = b.pose.rotation.transpose() * own_place.offset;
     return own_place;
+  }
+
+  /// Share of the vertices of a that are inside or on the surface of b.
+  double share_inside() const {
+    int inside = 0;
+    for (int vertex = 0; vertex < a.set.vertices(); ++vertex) {
+      const auto hit = b.touching.surface.nearest(placed(vertex).point, 2 * surface_radius, shape);
+      inside += hit && hit->distance <= kOnSurface * surface_radius ? 1 : 0;
+    }
+    return static_cast<double>(inside) / static_cast<double>(a.set.vertices());
   }
 
   /// Memory of the vertex, null where it was not inside.
@@ -295,23 +303,6 @@ Eigen::Vector3d place_of(const BodyPose& a, const BodyPose& b, const BodyCandida
 
 }  // namespace
 
-namespace {
-
-/// Share of the vertices of `a` that are inside or on the surface of `b`.
-double share_inside(const TouchingBody& a, const TouchingBody& b, SurfaceShape& shape) {
-  const BodySurface& surface = b.touching.surface;
-  const double radius = surface.bound(b.pose.q).radius;
-  int inside = 0;
-  for (int vertex = 0; vertex < a.set.vertices(); ++vertex) {
-    const Eigen::Vector3d offset = a.pose.position + a.set.world_arm(vertex, a.pose) - b.pose.position;
-    const auto hit = surface.nearest(b.pose.rotation.transpose() * offset, 2 * radius, shape);
-    inside += hit && hit->distance <= kOnSurface * radius ? 1 : 0;
-  }
-  return static_cast<double>(inside) / static_cast<double>(a.set.vertices());
-}
-
-}  // namespace
-
 std::optional<Eigen::Vector3d> way_out_of(const TouchingBody& a, const TouchingBody& b) {
   struct Extent {
     Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity()), most = -least;
@@ -340,7 +331,7 @@ void BodyContact::gather(const TouchingBody& a, const TouchingBody& b, const Can
   SurfaceShape& shape = search.shape;
   NearVertices& near = search.near;
   Gathering gathering{law_, a, b, time_step, margin, search.anew, /*own=*/false, search.held, shape, candidates};
-  if (search.way_out && share_inside(a, b, shape) >= kDeepShare)
+  if (search.way_out && gathering.share_inside() >= kDeepShare)
     gathering.way_out = b.pose.rotation.transpose() * *search.way_out;
   const auto test_all = [&](double radius) {
     for_near(a, b, radius, shape, [&](int vertex) { gathering.test_other(vertex); });

@@ -119,7 +119,7 @@ class BodySurface {
   std::optional<SurfaceHit> nearest(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                     const Eigen::Vector3d* facing = nullptr) const noexcept;
 
-  /// That of the surface that does look the same way as a unit vector, within 60 degrees.
+  /// nearest() on the part of the surface that looks the same way as a unit vector, within 60 degrees.
   std::optional<SurfaceHit> nearest_looking(const Eigen::Vector3d& point, double radius, SurfaceShape& shape,
                                             const Eigen::Vector3d& way) const noexcept;
 

@@ -146,15 +146,7 @@ NewtonReport solve_attached(const Model& model, const StepScene& scene, const St
     start.status = NewtonStatus::kNonFinite;
     return start;
   }
-  const auto restart = [&] {
-    workspace.q = state.q + near.x.tail(state.q.size());
-    potential.start(workspace.q);
-  };
-  const auto refresh = [&] {
-    return near.contact.candidate_count > 0 ? model.contact->refresh_friction(near.contact) : 0;
-  };
-  NewtonReport total =
-      minimise_with_friction(problem, scene.newton, near.x, near.newton, restart, refresh, NewtonBegin::kFactor);
+  NewtonReport total = minimise_near(problem, model, scene, state, potential, workspace, NewtonBegin::kFactor);
   total.factorisations += start.factorisations;
   total.projections += start.projections;
   if (total.status == NewtonStatus::kNonFinite) return total;

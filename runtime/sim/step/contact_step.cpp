@@ -61,12 +61,7 @@ NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, con
   start_contact(model, scene, state, workspace);
   near.newton.profile = workspace.profile;
   ContactProblem problem(model, state, potential, workspace);
-  const auto restart = [&] {
-    workspace.q = state.q + near.x.tail(state.q.size());
-    potential.start(workspace.q);
-  };
-  const auto refresh = [&] { return model.contact->refresh_friction(near.contact); };
-  const NewtonReport total = minimise_with_friction(problem, scene.newton, near.x, near.newton, restart, refresh);
+  const NewtonReport total = minimise_near(problem, model, scene, state, potential, workspace);
   if (total.status == NewtonStatus::kNonFinite) return total;
   finish_contact(model, state, total.status == NewtonStatus::kConverged, near.contact.torque, workspace);
   return total;

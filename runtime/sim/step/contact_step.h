@@ -43,6 +43,22 @@ NewtonReport minimise_with_friction(Problem& problem, const NewtonSettings& sett
   return total;
 }
 
+/// The same of the step of one body near obstacles, or that a host holds, from workspace.near->x.
+template <class Problem>
+NewtonReport minimise_near(Problem& problem, const Model& model, const StepScene& scene, const State& state,
+                           IncrementalPotential& potential, Workspace& workspace,
+                           NewtonBegin begin = NewtonBegin::kHessian) noexcept {
+  ContactProblemWorkspace& near = *workspace.near;
+  const auto restart = [&] {
+    workspace.q = state.q + near.x.tail(state.q.size());
+    potential.start(workspace.q);
+  };
+  const auto refresh = [&] {
+    return near.contact.candidate_count > 0 ? model.contact->refresh_friction(near.contact) : 0;
+  };
+  return minimise_with_friction(problem, scene.newton, near.x, near.newton, restart, refresh, begin);
+}
+
 /// Newton's method of a step near obstacles, from workspace.q; friction follows the normal forces of the solution.
 /// Leaves q, and where a free body will be and its momenta, in the workspace.
 NewtonReport solve_with_contacts(const Model& model, const StepScene& scene, const State& state,

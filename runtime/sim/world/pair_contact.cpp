@@ -58,17 +58,14 @@ void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, 
     near.without = 1;
   }
   CandidateSearch search{own.scene.time_step, margin, own.anew || other.anew, held, other.placed_shape(), near};
-  if (is_own())
-    contact.gather_own(own.touching_body(), search, candidates_[at]);
-  else {
-    const TouchingBody its_own = own.touching_body(), its_other = other.touching_body();
-    if (search.anew) {
-      const bool is_first = side == 0;
-      search.way_out = way_out_of(is_first ? its_own : its_other, is_first ? its_other : its_own);
-      if (search.way_out && !is_first) *search.way_out *= -1;
-    }
-    contact.gather(its_own, its_other, search, candidates_[at]);
+  if (is_own()) return contact.gather_own(own.touching_body(), search, candidates_[at]);
+  const TouchingBody its_own = own.touching_body(), its_other = other.touching_body();
+  if (search.anew) {
+    const bool is_first = side == 0;
+    search.way_out = way_out_of(is_first ? its_own : its_other, is_first ? its_other : its_own);
+    if (search.way_out && !is_first) *search.way_out *= -1;
   }
+  contact.gather(its_own, its_other, search, candidates_[at]);
 }
 
 void PairContact::begin_account() noexcept {

@@ -171,24 +171,30 @@ TEST(Attachment, ExertsWhatTheMomentumSays) {
   }
 }
 
+/// Hangs a bar by both ends, else it would swing, which nothing damps, and expects that it weighs on the frames.
+void expect_weight(AttachedBar& body, runtime::AttachmentKind kind) {
+  body.scene.stiffness_damping = 0.02;
+  body.scene.mass_damping = 4;
+  body.attach(kind);
+  body.attach(runtime::AttachmentKind::kFixed, /*last=*/true);
+  auto& held = body.state.attachments;
+  for (runtime::Attachment& one : held) {
+    one.stiffness = 5000;
+    one.damping = 100;
+  }
+  for (int i = 0; i < 3000; ++i) body.step();
+  EXPECT_LE((held[0].force + held[1].force - body.weight()).norm(), 1e-6 * body.weight().norm());
+  if (kind == runtime::AttachmentKind::kSpring)
+    EXPECT_LE((body.mean(held[0]) - held[0].anchor() - held[0].force / 5000).norm(), 1e-7);
+}
+
 // Hanging bodies weigh on the frame, a spring is as long as its stiffness says, and a weaker hold lets go.
 TEST(Attachment, BearsTheWeightOfWhatHangs) {
   for (const auto kind :
        {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
     AttachedBar body(true);
-    body.scene.stiffness_damping = 0.02;
-    body.scene.mass_damping = 4;
-    body.attach(kind);
-    body.attach(runtime::AttachmentKind::kFixed, /*last=*/true);  // else it would swing, which nothing damps
+    expect_weight(body, kind);
     auto& held = body.state.attachments;
-    for (runtime::Attachment& one : held) {
-      one.stiffness = 5000;
-      one.damping = 100;
-    }
-    for (int i = 0; i < 3000; ++i) body.step();
-    EXPECT_LE((held[0].force + held[1].force - body.weight()).norm(), 1e-6 * body.weight().norm());
-    if (kind == runtime::AttachmentKind::kSpring)
-      EXPECT_LE((body.mean(held[0]) - held[0].anchor() - held[0].force / 5000).norm(), 1e-7);
     held[0].break_force = 0.1 * held[0].force.norm();
     body.step();
     EXPECT_TRUE(held[0].broken);
@@ -346,19 +352,8 @@ TEST(AttachmentInModes, BearsTheWeightOfWhatHangsAndBreaks) {
   for (const auto kind :
        {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
     AttachedBar body(true, /*modes=*/true);
-    body.scene.stiffness_damping = 0.02;
-    body.scene.mass_damping = 4;
-    body.attach(kind);
-    body.attach(runtime::AttachmentKind::kFixed, /*last=*/true);  // else it would swing, which nothing damps
+    expect_weight(body, kind);
     auto& held = body.state.attachments;
-    for (runtime::Attachment& one : held) {
-      one.stiffness = 5000;
-      one.damping = 100;
-    }
-    for (int i = 0; i < 3000; ++i) body.step();
-    EXPECT_LE((held[0].force + held[1].force - body.weight()).norm(), 1e-6 * body.weight().norm());
-    if (kind == runtime::AttachmentKind::kSpring)
-      EXPECT_LE((body.mean(held[0]) - held[0].anchor() - held[0].force / 5000).norm(), 1e-7);
     const double bears = 0.1 * held[0].force.norm();
     for (runtime::Attachment& one : held) one.break_force = bears;
     body.step();

@@ -37,7 +37,7 @@ def test_no_call_speaks_of_its_binding(model):
         try:
             function(*arguments, **named)
         except Exception as error:  # any kind will do: its words are what counts
-            # What has no constructor says so in words of its own.
+            # A class without a constructor says so in words of its own.
             if any(word in str(error) for word in BINDING) and not str(error).endswith("No constructor defined!"):
                 told.add(str(error).splitlines()[0])
 

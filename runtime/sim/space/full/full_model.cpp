@@ -19,6 +19,15 @@ FullExamples full_examples(const FullSpaceData& data, const ReducedModel& reduce
   return made;
 }
 
+/// Rows [f] of the vertices that move, of those [3n] of all.
+RowMatrix moving_rows(const FullSpace& space, const RowMatrix& all) {
+  RowMatrix own(space.size(), all.cols());
+  for (Eigen::Index v = 0; v < space.mesh_vertices(); ++v)
+    if (const std::int32_t number = space.number(v); number >= 0)
+      own.middleRows<3>(3 * number) = all.middleRows<3>(3 * v);
+  return own;
+}
+
 }  // namespace
 
 void FullModel::set_frame_of_examples() {
@@ -32,10 +41,7 @@ void FullModel::set_frame_of_examples() {
 }
 
 void FullModel::set_shapes(const RowMatrix& all, const ExampleModel& reduced) {
-  RowMatrix own(space.size(), all.cols());
-  for (Eigen::Index v = 0; v < space.mesh_vertices(); ++v)
-    if (const std::int32_t number = space.number(v); number >= 0)
-      own.middleRows<3>(3 * number) = all.middleRows<3>(3 * v);
+  const RowMatrix own = moving_rows(space, all);
   examples->shapes = reduced.table ? Eigen::MatrixXd(own) : Eigen::MatrixXd(own * reduced.target->basis());
   is_elastic = true;
 }
@@ -71,10 +77,7 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
       full->set_shapes(shapes, model.examples.front());
     }
   }
-  full->basis.resize(full->space.size(), model.modes());
-  for (Eigen::Index v = 0; v < object.mesh.vertex_count(); ++v)
-    if (const std::int32_t number = full->space.number(v); number >= 0)
-      full->basis.middleRows<3>(3 * number) = reduced.modal->basis.middleRows<3>(3 * v);
+  full->basis = moving_rows(full->space, reduced.modal->basis);
   full->projection.resize(full->basis.rows(), full->basis.cols());
   for (Eigen::Index i = 0; i < model.modes(); ++i) full->projection.col(i) = full->space.momentum(full->basis.col(i));
   return {std::move(full), {}};

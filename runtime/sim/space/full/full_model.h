@@ -25,15 +25,11 @@ struct FullExamples {
   Eigen::MatrixX3d rest;             ///< m x 3, W^T X of a body whose frame moves, X about the frame's origin
   Eigen::VectorXd ones;              ///< [m] W^T 1 of such a body; 0 of a free one
 
-  /// A coefficient of the deformation in a frame that moves, and that of the displacement in the world.
+  /// Frame that moves, and the coefficient in it of the deformation, by the one of the displacement in the world.
   struct Frame {
     Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
     Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< origin, world [m]
   };
-  Eigen::Vector3d to_world(Eigen::Index k, const Frame& frame, const Eigen::Vector3d& own) const noexcept {
-    const Eigen::Vector3d at_rest = rest.row(k);
-    return frame.rotation * (at_rest + own) + ones[k] * frame.position - at_rest;
-  }
   Eigen::Vector3d to_frame(Eigen::Index k, const Frame& frame, const Eigen::Vector3d& moved) const noexcept {
     const Eigen::Vector3d at_rest = rest.row(k);
     return frame.rotation.transpose() * (at_rest + moved - ones[k] * frame.position) - at_rest;

@@ -153,6 +153,10 @@ void FullPotential::set_elastic_target(const Eigen::VectorXd& shape) noexcept {
   has_elastic_target_ = true;
 }
 
+FullPotential::Coefficient FullPotential::at(AlignedArray& coefficients, Eigen::Index k) const noexcept {
+  return Coefficient(coefficients.data() + k, Eigen::InnerStride<>(space_.filter().stride));
+}
+
 void FullPotential::set_coefficients() noexcept {
   const double* field = workspace_.x.data();
   if (model_.skin) {
@@ -160,6 +164,17 @@ void FullPotential::set_coefficients() noexcept {
     field = workspace_.turned.data();
   }
   kernels().mesh_coefficients(space_.filter(), field, workspace_.coefficients.data());
+  if (!has_moving_frame()) return;
+  if (model_.rigid) {
+    turn_ = model_.rigid->turn(field);
+    examples_frame_.rotation = turn_.rotation;
+  } else {
+    examples_frame_ = {frame_.rotation, frame_.position};
+  }
+  for (Eigen::Index k = 0; k < space_.functions(); ++k) {
+    auto own = at(workspace_.coefficients, k);
+    own = model_.examples->to_frame(k, examples_frame_, own);
+  }
 }
 
 PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) noexcept {
@@ -204,27 +219,15 @@ void FullPotential::set_filter_coefficients(PotentialValue& total) noexcept {
     }
     kernels().mesh_coefficients(space_.filter(), rate, work.rate_coefficients.data());
   }
-  if (model_.rigid) turn_ = model_.rigid->turn(work.x.data());
-  const Eigen::Index stride = space_.filter().stride;
   double energy = 0;
   for (Eigen::Index k = 0; k < space_.functions(); ++k) {
-    const auto at = [&](AlignedArray& all) {
-      return Eigen::Map<Eigen::Vector3d, 0, Eigen::InnerStride<>>(all.data() + k, Eigen::InnerStride<>(stride));
-    };
-    auto spring = at(work.coefficients), damper = at(work.rate_coefficients);
-    // The deformation of a free body is that in the frame which fits it.
-    if (model_.rigid) {
-      const Eigen::Vector3d rest = model_.examples->rest.row(k);
-      spring = (turn_.rotation.transpose() * (rest + spring) - rest).eval();
-    }
-    spring -= at(work.target);
+    auto spring = at(work.coefficients, k), damper = at(work.rate_coefficients, k);
+    spring -= at(work.target, k);
     energy += 0.5 * (kappa * spring.squaredNorm() + damping * damper.squaredNorm());
     spring *= kappa;
     damper *= damping;
-    if (model_.rigid)
-      spring = (turn_.rotation * spring).eval();
-    else
-      spring += damper;
+    if (has_moving_frame()) spring = (examples_frame_.rotation * spring).eval();
+    if (!model_.rigid) spring += damper;
   }
   total.value += energy;
   total.magnitude += energy;

@@ -112,7 +112,7 @@ class FullPotential {
   }
   PotentialValue value(const Eigen::VectorXd& d) noexcept { return evaluate(d, workspace_.unused).potential; }
 
-  /// W^T q at the last d into the workspace's coefficients.
+  /// W^T q at the last d into the workspace's coefficients; of a body whose frame moves that of its deformation.
   void set_coefficients() noexcept;
   /// The shape [field] of no energy of an elastic example force; before the next evaluate_elements().
   void set_elastic_target(const Eigen::VectorXd& shape) noexcept;
@@ -127,6 +127,9 @@ class FullPotential {
   }
   MeshInertia terms() const noexcept;
 
+  bool has_moving_frame() const noexcept { return model_.rigid || model_.carried; }
+  using Coefficient = Eigen::Map<Eigen::Vector3d, 0, Eigen::InnerStride<>>;  ///< [3] of one function
+  Coefficient at(AlignedArray& coefficients, Eigen::Index k) const noexcept;
   void set_filter_coefficients(PotentialValue& total) noexcept;
   void add_filter_force(Eigen::VectorXd& gradient) noexcept;
   void add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
@@ -145,7 +148,8 @@ class FullPotential {
   std::span<Attachment> attachments_;
   const Attachment* host_ = nullptr;                     ///< the first that holds
   Eigen::Vector3d host_turn_ = Eigen::Vector3d::Zero();  ///< in q - q_v
-  RigidPart::Turn turn_;                                 ///< turn of a free body with a filter, at the last evaluation
+  RigidPart::Turn turn_;                                 ///< turn of a free body, at the last coefficients
+  FullExamples::Frame examples_frame_;                   ///< frame of those, where it moves
   MotionSample frame_;                                   ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;

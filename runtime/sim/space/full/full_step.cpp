@@ -303,21 +303,11 @@ void FullStep::first_iterate(Eigen::VectorXd& u) const noexcept {
   u += state_.q;
 }
 
-FullExamples::Frame FullStep::frame_of_examples() const noexcept {
-  if (model_.carried) return {to_.rotation, to_.position};
-  return {workspace_.potential.rigid.rotation, Eigen::Vector3d::Zero()};
-}
-
 void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
   potential_.set_coefficients();
-  const FullExamples::Frame frame = frame_of_examples();
-  const FullPotentialWorkspace& work = workspace_.potential;
-  const Eigen::Index stride = space_.filter().stride;
-  for (Eigen::Index k = 0; k < space_.functions(); ++k) {
-    Eigen::Vector3d own(work.coefficients[k], work.coefficients[stride + k], work.coefficients[2 * stride + k]);
-    if (moves()) own = model_.examples->to_frame(k, frame, own);
-    coefficients.segment<3>(3 * k) = own;
-  }
+  for (Eigen::Index k = 0; k < space_.functions(); ++k)
+    for (int a = 0; a < 3; ++a)
+      coefficients[3 * k + a] = workspace_.potential.coefficients[a * space_.filter().stride + k];
 }
 
 // Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a

@@ -115,12 +115,8 @@ class FullStep {
   /// c*(k, a), of a free body that of its deformation.
   template <typename Coefficients>
   void set_target(const Coefficients& target) noexcept {
-    const FullExamples::Frame frame = frame_of_examples();
-    for (Eigen::Index k = 0; k < space_.functions(); ++k) {
-      Eigen::Vector3d own(target(k, 0), target(k, 1), target(k, 2));
-      if (model_.carried) own = model_.examples->to_world(k, frame, own);
-      for (int a = 0; a < 3; ++a) workspace_.potential.target[a * space_.filter().stride + k] = own[a];
-    }
+    for (Eigen::Index k = 0; k < space_.functions(); ++k)
+      for (int a = 0; a < 3; ++a) workspace_.potential.target[a * space_.filter().stride + k] = target(k, a);
   }
 
   /// u* [f] of an elastic example force, in any frame, in place of set_target().
@@ -159,8 +155,6 @@ class FullStep {
   enum class Outcome { kFound, kIndefinite };
   static constexpr double kStiffStep = 10;  ///< edges that waves go
 
-  bool moves() const noexcept { return model_.rigid || model_.carried; }
-  FullExamples::Frame frame_of_examples() const noexcept;
   void own_velocity(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;
