@@ -107,6 +107,7 @@ void BundleReader::add_regions(ReducedModel& model) const {
     if (needs.targets && file_->has_group(path + "/targets")) region.targets.emplace();
     if (needs.target_space && file_->has_group(path + "/target_space")) region.target_space.emplace();
     if (needs.target_elasticity && file_->has_group(path + "/target_elasticity")) region.target_elasticity.emplace();
+    if (needs.full_space && file_->has_group(path + "/full_space")) region.full_space.emplace();
     model.regions.push_back(std::move(region));
   };
   if (request_.regions)

@@ -18,6 +18,7 @@ ReducedModel model_of_all_groups() {
   region.targets.emplace();
   region.target_space.emplace();
   region.target_elasticity.emplace();
+  region.full_space.emplace();
   return model;
 }
 

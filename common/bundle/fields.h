@@ -189,8 +189,8 @@ void visit_target_elasticity(const FieldPlace& place, Elasticity& elasticity, Vi
 }
 
 template <typename FullSpace, typename Visitor>
-void visit_full_space(FullSpace& full, Visitor& visit) {
-  enter(kTopPlace, "/full_space", visit);
+void visit_full_space(const FieldPlace& place, FullSpace& full, Visitor& visit) {
+  enter(place, "/full_space", visit);
   visit.dataset("filter", full.filter);
   visit.dataset("slopes", full.slopes);
   visit.dataset("control_points", full.control_points);
@@ -225,11 +225,14 @@ void visit_region(Region& region, Visitor& visit) {
   enter(place, "", visit);
   visit.attribute("index", region.index);
   visit.dataset("vertices", region.vertices);
+  visit.dataset("window", region.window);
+  visit.dataset("band", region.band);
   visit_examples(place, region.examples, visit);
   visit_projection(place, region.projection, visit);
   if (region.targets) visit_targets(place, *region.targets, visit);
   if (region.target_space) visit_target_space(place, *region.target_space, visit);
   if (region.target_elasticity) visit_target_elasticity(place, *region.target_elasticity, visit);
+  if (region.full_space) visit_full_space(place, *region.full_space, visit);
 }
 
 template <typename Regions, typename Visitor>
@@ -303,7 +306,7 @@ void visit_fields(Model& model, Visitor& visit) {
   if (model.targets) visit_targets(kTopPlace, *model.targets, visit);
   if (model.target_space) visit_target_space(kTopPlace, *model.target_space, visit);
   if (model.target_elasticity) visit_target_elasticity(kTopPlace, *model.target_elasticity, visit);
-  if (model.full_space) visit_full_space(*model.full_space, visit);
+  if (model.full_space) visit_full_space(kTopPlace, *model.full_space, visit);
   if (model.fidelity) visit_fidelity(*model.fidelity, visit);
   if (!model.regions.empty()) visit_regions(model.regions, visit);
   if (model.rigid) visit_rigid(*model.rigid, visit);

@@ -35,7 +35,8 @@ Needs needs_of(const SceneConfig& scene) {
     regions.push_back({.name = name,
                        .targets = force.target != TargetSource::kSolve,
                        .energy_reference = force.energy_reference,
-                       .target_elasticity = force.law == ExampleForceLaw::kElastic});
+                       .target_elasticity = force.law == ExampleForceLaw::kElastic,
+                       .full_space = needs.full_space});
   return needs;
 }
 

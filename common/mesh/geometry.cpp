@@ -70,6 +70,13 @@ double longest_box_edge(const VertexArray& vertices) {
   return (vertices.colwise().maxCoeff() - vertices.colwise().minCoeff()).maxCoeff();
 }
 
+Eigen::VectorXd region_tet_shares(const TetMesh& mesh, const FlagVector& inside, const Eigen::VectorXd& window) {
+  Eigen::VectorXd shares = Eigen::VectorXd::Zero(mesh.tet_count());
+  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
+    if (inside(mesh.tets.row(t).transpose()).all()) shares[t] = window(mesh.tets.row(t).transpose()).mean();
+  return shares;
+}
+
 TriangleArray surface_triangles(const TetArray& tets) {
   struct Face {
     std::array<std::int32_t, 3> corners;

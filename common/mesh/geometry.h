@@ -33,6 +33,10 @@ Eigen::Vector3d origin_near(const Eigen::Vector3d& place, double size);
 /// Origin of vertices that are drawn.
 Eigen::Vector3d origin_near(const VertexArray& vertices);
 
+/// [n_t] shares of the tets in an elastic energy of a region: the mean of the window over a tet whose vertices are all
+/// inside, 0 of others. `inside` [n] flags the region's vertices, `window` [n] are the values there.
+Eigen::VectorXd region_tet_shares(const TetMesh& mesh, const FlagVector& inside, const Eigen::VectorXd& window);
+
 /// n_f x 3 outward-oriented boundary triangles, in the order of their tets.
 TriangleArray surface_triangles(const TetArray& tets);
 

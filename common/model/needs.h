@@ -20,6 +20,7 @@ struct RegionNeeds {
   EnergyReference energy_reference = EnergyReference::kExample;
   bool target_space = true;        ///< space that targets are solved for in
   bool target_elasticity = false;  ///< elements for an elastic example force
+  bool full_space = true;          ///< what steps in all vertices take of its examples
 };
 
 /// Needs of a scene (or an asset's `needs`) from a bundle beyond the object, its modes and its cubature.

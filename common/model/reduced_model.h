@@ -169,6 +169,17 @@ struct ProjectionData {
   RowMatrix target_basis;        ///< r x d, orthonormal basis of the poses that descriptors stand for, d <= min(r, 3m)
 };
 
+/// Group /full_space, of a region too: what steps in all vertices take of examples, in the coefficients W^T u of the
+/// whole body, W^T D'' u of a region. The filter of the example force is P = W W^T (x) I3; row 3i + axis of a
+/// coefficient. docs/method.md, "Force".
+struct FullSpaceData {
+  RowMatrix filter;          ///< n x m, W; of a region D W
+  RowMatrix slopes;          ///< K x 3m: h = h0 + slopes W^T u of the weights problem
+  RowMatrix control_points;  ///< P c x 3m, W^T of those of /targets; without a table of the examples
+  RowMatrix from_target;     ///< d x 3m, W^T Y, Y [3n x d] the displacements of /target_space
+  RowMatrix shapes;          ///< 3n x d (dataset n 3 d), Y, which an elastic example force takes; else empty
+};
+
 /// One group /regions/NAME: examples that act on some of the vertices alone, with weights, projection and targets of
 /// their own, in the groups' form above. docs/method.md, "Regions".
 struct RegionData {
@@ -176,20 +187,13 @@ struct RegionData {
   std::int64_t index = 0;  ///< place in the asset
   IndexVector vertices;    ///< n_r, of the object, ascending
   ExampleSet examples;     ///< K of its own; descriptors of the displacement inside the region, zero outside
+  Eigen::VectorXd window;  ///< n_r, from 0 at the region's border to 1: how much its example force sees of a vertex
+  Eigen::VectorXd band;    ///< n_r, shares of the vertices that the region is seen from; 0 where it is seen as it moves
   ProjectionData projection;
   std::optional<TargetTableData> targets;
   std::optional<TargetSpaceData> target_space;
   std::optional<TargetElasticityData> target_elasticity;
-};
-
-/// Group /full_space: what steps in all vertices take of the whole body's examples, in the coefficients W^T u. The
-/// filter of the example force is P = W W^T (x) I3; row 3i + axis of a coefficient. docs/method.md, "Force".
-struct FullSpaceData {
-  RowMatrix filter;          ///< n x m, W
-  RowMatrix slopes;          ///< K x 3m: h = h0 + slopes W^T u of the weights problem
-  RowMatrix control_points;  ///< P c x 3m, W^T of those of /targets; without a table of the examples
-  RowMatrix from_target;     ///< d x 3m, W^T Y, Y [3n x d] the displacements of /target_space
-  RowMatrix shapes;          ///< 3n x d (dataset n 3 d), Y, which an elastic example force takes; else empty
+  std::optional<FullSpaceData> full_space;
 };
 
 /// FidelityData::loads of a bundle whose basis has learned from a scene.

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/core/log.h"
+#include "common/mesh/geometry.h"
 #include "precompute/examples/function_counter.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/shape_space/region_poses.h"
@@ -61,6 +62,8 @@ RegionData region_of(const ExampleGroup& group, std::int64_t index) {
   region.name = group.region;
   region.index = index;
   region.vertices = flagged(group.view->inside());
+  region.window = group.view->window()(region.vertices);
+  region.band = group.view->band()(region.vertices);
   region.examples = group.examples;
   return region;
 }

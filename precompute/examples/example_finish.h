@@ -30,6 +30,11 @@ class PoseFitter {
   Eigen::Index groups() const { return std::ssize(poses_); }
   /// Empty: that of the whole body.
   const std::string& region(Eigen::Index group) const { return stage_.groups[static_cast<std::size_t>(group)].region; }
+  /// Null: the whole body's.
+  const RegionView* view(Eigen::Index group) const {
+    const auto& view = stage_.groups[static_cast<std::size_t>(group)].view;
+    return view ? &*view : nullptr;
+  }
 
   /// All poses that descriptors of a group stand for; of a free body without their rigid part.
   PoseCoordinates range(Eigen::Index group) const;

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/core/error.h"
+#include "common/mesh/geometry.h"
 #include "precompute/modes/field_clamp.h"
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
@@ -88,7 +89,7 @@ ExamplePoses known_example_poses(const ReducedModel& model, const std::string& r
 
 FullSpaceExamples::FullSpaceExamples(const ReducedModel& model, const ElasticSystem& system, const ExamplePoses& poses,
                                      EnergyReference reference)
-    : view_(poses.view), free_dofs_(system.free_dofs) {
+    : view_(poses.view), free_dofs_(system.free_dofs), vertices_(model.object->mesh.vertex_count()) {
   if (view_) tet_shares_ = region_tet_shares(model.object->mesh, view_->inside(), view_->window());
   set_filter(model, *poses.examples);
   set_target(model, system, poses, reference);
@@ -147,9 +148,20 @@ Eigen::VectorXd FullSpaceExamples::filter(const Eigen::VectorXd& u) const {
   return force(filter_.synthesis, coefficients(filter_.analysis, u));
 }
 
-std::optional<Eigen::MatrixXd> FullSpaceExamples::root() const {
-  if (view_ || !filter_.symmetric) return std::nullopt;
-  return Eigen::MatrixXd(filter_.root_over_analysis() * filter_.analysis);
+std::optional<FullSpaceExamples::Root> FullSpaceExamples::root() const {
+  if (!filter_.symmetric) return std::nullopt;
+  Root root{RowMatrix::Zero(vertices_, filter_.analysis.cols()), {}};
+  if (view_) root.band = view_->band();
+  for (std::size_t i = 0; i < free_dofs_.size(); i += 3) {
+    const Eigen::Index vertex = free_dofs_[i] / 3, row = view_ ? vertex : static_cast<Eigen::Index>(i / 3);
+    const double window = view_ ? view_->window()[vertex] : 1;
+    root.filter.row(vertex) = window * filter_.root_over_analysis() * filter_.analysis.row(row);
+  }
+  return root;
+}
+
+Eigen::VectorXd FullSpaceExamples::root_coefficients(const Eigen::VectorXd& u) const {
+  return filter_.root_over_analysis() * flat(coefficients(filter_.analysis, u));
 }
 
 Eigen::VectorXd FullSpaceExamples::transposed_filter(const Eigen::VectorXd& u) const {

@@ -58,8 +58,15 @@ class FullSpaceExamples {
   Eigen::VectorXd filter(const Eigen::VectorXd& u) const;
   Eigen::VectorXd transposed_filter(const Eigen::VectorXd& u) const;
   bool symmetric() const { return filter_.symmetric; }
-  /// [free vertices x m] W, P = W W^T (x) I3; none of a region, or where P is not symmetric.
-  std::optional<Eigen::MatrixXd> root() const;
+  /// [n x m] W of P = W W^T (x) I3, of a region times its window, and [n] what it has of a band (RegionView::band());
+  /// none where P is not symmetric.
+  struct Root {
+    RowMatrix filter;
+    Eigen::VectorXd band;
+  };
+  std::optional<Root> root() const;
+  /// [3m] W^T u of what is seen of u [f], row 3i + axis.
+  Eigen::VectorXd root_coefficients(const Eigen::VectorXd& u) const;
 
   /// [f x d] mass-orthonormal basis of the poses that descriptors stand for, and [d] the examples in it.
   const Eigen::MatrixXd& pose_basis() const { return coordinates_.basis; }
@@ -79,9 +86,10 @@ class FullSpaceExamples {
 
   std::optional<RegionView> view_;
   std::optional<Eigen::VectorXd> tet_shares_;
-  std::vector<std::int32_t> free_dofs_;  // of a region
-  FilterFunctions filter_;               // of free vertices, of a region all
-  runtime::ExampleWeights weights_;      // of Phi^T (M_s/V) u [3m]
+  std::vector<std::int32_t> free_dofs_;
+  Eigen::Index vertices_ = 0;        // of the mesh
+  FilterFunctions filter_;           // of free vertices, of a region all
+  runtime::ExampleWeights weights_;  // of Phi^T (M_s/V) u [3m]
   PoseCoordinates coordinates_;
   Eigen::MatrixXd target_fields_;
   runtime::TargetSolver target_;

@@ -34,21 +34,25 @@ void add_examples(const ReducedModel& model, const FullSpaceOptions& options, Fu
     add(poses[i], options.regions[i].energy_reference, model.asset_name + ", region " + names[i]);
 }
 
-void add_space(const ObjectData& object, FullSpaceModel& full) {
-  RowMatrix filter;
-  if (full.examples.size() == 1 && full.examples.front().root()) {
-    full.space_root = *full.examples.front().root();
-    filter.setZero(full.rest.rows(), full.space_root.cols());
-    for (Eigen::Index i = 0; i < full.space_root.rows(); ++i)
-      filter.row(full.system.free_dofs[static_cast<std::size_t>(3 * i)] / 3) = full.space_root.row(i);
+void add_space(const ReducedModel& data, FullSpaceModel& full) {
+  const ObjectData& object = *data.object;
+  RowMatrix functions(full.rest.rows(), 0);
+  std::vector<runtime::FullExamples> groups;
+  for (const FullSpaceExamples& examples : full.examples) {
+    const auto root = examples.root();
+    if (!root) break;
+    runtime::FullExamples& own = groups.emplace_back();
+    runtime::append_functions(root->filter, root->band, full.rest, own, functions);
+    own.is_elastic = true;
   }
-  full.matrix_free = runtime::FullModel(runtime::FullSpace(object.mesh, object.materials, object.fixed, filter));
-  full.matrix_free.is_elastic = filter.size() > 0;
-  if (full.system.constrained()) return;
-  full.matrix_free.rigid.emplace(full.matrix_free.space, full.rest);
-  if (filter.size() == 0) return;
-  full.matrix_free.examples.emplace();
-  full.matrix_free.set_frame_of_examples();
+  full.matrix_free = runtime::FullModel(runtime::FullSpace(object.mesh, object.materials, object.fixed, functions));
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    if (const auto& shares = full.examples[i].tet_shares())
+      groups[i].shares = full.matrix_free.space.element_means(object.mesh, object.materials, *shares);
+  full.matrix_free.examples = std::move(groups);
+  if (full.contacts) full.matrix_free.contacts.emplace(*data.contact, full.matrix_free.space);
+  if (!full.system.constrained()) full.matrix_free.rigid.emplace(full.matrix_free.space, full.rest);
+  full.matrix_free.set_frame_of_functions();
 }
 
 }  // namespace
@@ -65,7 +69,7 @@ FullSpaceModel build_full_space_model(const ReducedModel& model, const FullSpace
   if (!full.system.constrained()) full.frame.emplace(object.mesh, scalar_mass(object.mesh, object.materials.density));
   if (model.contact) full.contacts.emplace(*model.contact, full.system.free_dofs);
   add_examples(model, options, full);
-  add_space(object, full);
+  add_space(model, full);
   return full;
 }
 

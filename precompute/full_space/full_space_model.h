@@ -33,10 +33,8 @@ struct FullSpaceModel {
   /// In place of the targets of `examples`, one for each of them; or none.
   std::vector<std::shared_ptr<const TargetMethod>> target_methods;
 
-  /// The same elements for MatrixFreeStepper, with the filter of the whole body's example force, if there is one and it
-  /// is symmetric, and W of it [free vertices x m].
+  /// The same elements for MatrixFreeStepper; without examples where their filters are not symmetric.
   runtime::FullModel matrix_free;
-  Eigen::MatrixXd space_root;
 
   Eigen::Index size() const { return elasticity.size(); }
 };

@@ -1,5 +1,6 @@
 #include "precompute/full_space/matrix_free_stepper.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "common/core/timer.h"
@@ -38,32 +39,46 @@ bool MatrixFreeStepper::set(const FullSpaceScene& scene) {
     workspace_->fit(model_.matrix_free, next);
   else
     workspace_.emplace(model_.matrix_free, next);
+  if (!next.obstacles.empty())
+    contact_ = runtime::ContactWorkspace(model_.matrix_free.contacts->vertices(), 0, next.obstacles.size());
   scene_ = std::move(next);
   return true;
+}
+
+void MatrixFreeStepper::set_targets(const FullSpaceState& state, runtime::FullStep& step,
+                                    std::vector<runtime::ExampleState>& examples, FullSpaceReport& report) {
+  Eigen::VectorXd q(model_.size());
+  step.first_iterate(q);
+  if (!q.allFinite()) return;
+  const Deformation deformation(model_, q);
+  for (std::size_t group = 0; group < scene_.examples.size(); ++group) {
+    const runtime::ExampleSettings& settings = scene_.examples[group];
+    if (!runtime::acts(settings)) continue;
+    examples[group] =
+        next_target(model_, group, settings, state.examples[group], deformation.u(), targets_[group], report);
+    if ((report.status & runtime::kStepNonFinite) != 0) return;
+    const Eigen::VectorXd target = target_displacement(model_, group, examples[group]);
+    if (settings.elastic)
+      step.set_elastic_target(group, target);
+    else
+      step.set_target(group, model_.examples[group].root_coefficients(target));
+  }
 }
 
 FullSpaceReport MatrixFreeStepper::step(FullSpaceState& state) {
   const Timer timer;
   FullSpaceReport report;
-  runtime::FullStep one(model_.matrix_free, scene_, state, *workspace_);
-  one.begin();
-  std::optional<runtime::ExampleState> examples;
-  if (!scene_.examples.empty()) {
-    Eigen::VectorXd q(model_.size());
-    one.first_iterate(q);
-    if (q.allFinite())
-      examples = next_target(model_, 0, scene_.examples.front(), state.examples.front(), Deformation(model_, q).u(),
-                             target_, report);
-    if (examples && (report.status & runtime::kStepNonFinite) == 0) {
-      const Eigen::VectorXd target = target_displacement(model_, 0, *examples);
-      if (scene_.examples.front().elastic)
-        one.set_elastic_target(target);
-      else
-        one.set_target(
-            Eigen::MatrixXd(model_.space_root.transpose() * target.reshaped<Eigen::RowMajor>(model_.size() / 3, 3)));
-    }
-    report.target_seconds = timer.seconds();
+  runtime::FullMemory memory;
+  if (!scene_.obstacles.empty()) {
+    state.contacts.held.resize(std::max(state.contacts.held.size(), contact_.candidates.size()));
+    memory.held = &state.contacts;
+    memory.found = &contact_;
   }
+  runtime::FullStep one(model_.matrix_free, scene_, state, *workspace_, memory);
+  one.begin();
+  std::vector<runtime::ExampleState> examples = state.examples;
+  if (!scene_.examples.empty()) set_targets(state, one, examples, report);
+  report.target_seconds = timer.seconds();
   one.solve();
   const runtime::FullReport& found = one.finish();
   const std::uint32_t status = report.status | found.status;
@@ -71,9 +86,20 @@ FullSpaceReport MatrixFreeStepper::step(FullSpaceState& state) {
   static_cast<runtime::StepReport&>(report) = found;
   report.status = status;
   report.target_iterations = target_iterations;
-  if (examples && (found.status & runtime::kStepNonFinite) == 0) state.examples.front() = *std::move(examples);
+  if ((found.status & runtime::kStepNonFinite) == 0) state.examples = std::move(examples);
   report.seconds = timer.seconds();
   return report;
+}
+
+void FullSpaceStepper::set(const FullSpaceScene& scene) {
+  is_fast_ = fast_.set(scene);
+  if (is_fast_) return;
+  scene_ = scene;
+  if (!workspace_) workspace_.emplace(model_);
+}
+
+FullSpaceReport FullSpaceStepper::step(FullSpaceState& state) {
+  return is_fast_ ? fast_.step(state) : precompute::step(model_, scene_, state, *workspace_);
 }
 
 }  // namespace exmat::precompute

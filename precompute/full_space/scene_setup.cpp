@@ -15,17 +15,9 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
   if (const std::string keys = place_of_keys(config); !keys.empty())
     throw InputError({file, keys, "a value: the full-space reference takes no keys", "keys",
                       "measure scenes with the values between the keys, one by one"});
-  const auto require_no_weights = [&](const std::string& member, const ExampleForceConfig& force) {
-    if (force.weights)
-      throw InputError({file, member + "/weights",
-                        "no given weights: the full-space reference takes those of the shape", "some", ""});
-  };
-  if (config.examples) require_no_weights("/examples", *config.examples);
   if (config.examples && config.examples->compensate)
     throw InputError({file, "/examples/compensate", "false: targets of the full-space reference are not compensated",
                       "true", "compare with a bundle made without it"});
-  for (std::size_t i = 0; i < config.regions.size(); ++i)
-    require_no_weights("/regions/" + std::to_string(i), config.regions[i].force);
   if (!config.body.motion.empty())
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
   const auto require_part = [&](bool needed, bool there, const char* group) {
@@ -36,6 +28,15 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
   const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
   require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
+  const auto check_weights = [&](const std::string& member, const ExampleForceConfig& force, std::size_t group) {
+    if (force.weights && force.weights->size() != model.examples[group].count())
+      throw InputError({file, member + "/weights",
+                        std::to_string(model.examples[group].count()) + " weights, one for each example",
+                        std::to_string(force.weights->size()), "the first is that of the rest pose"});
+  };
+  if (config.examples) check_weights("/examples", *config.examples, 0);
+  for (std::size_t i = 0; i < config.regions.size(); ++i)
+    check_weights("/regions/" + std::to_string(i), config.regions[i].force, i + (config.examples ? 1 : 0));
   for (std::size_t i = 0; i < forces.size(); ++i)
     for (const std::int64_t vertex : forces[i].vertices)
       if (vertex < 0 || vertex >= model.rest.rows())
@@ -60,7 +61,8 @@ FullSpaceScene full_space_scene(const SceneConfig& config, runtime::Obstacles ob
     scene.examples.push_back({.stiffness = force.stiffness,
                               .damping = force.damping,
                               .bias = force.bias,
-                              .elastic = force.law == ExampleForceLaw::kElastic});
+                              .elastic = force.law == ExampleForceLaw::kElastic,
+                              .given_weights = force.weights.value_or(Eigen::VectorXd())});
   };
   if (config.examples) add(*config.examples);
   for (const RegionForceConfig& region : config.regions) add(region.force);

@@ -43,8 +43,12 @@ ExampleState next_target(const FullSpaceModel& model, std::size_t group, const r
                          const ExampleState& former, const Eigen::VectorXd& u,
                          std::optional<runtime::TargetSolver::Workspace>& scratch, FullSpaceReport& report) {
   ExampleState next = former;
-  next.weights = model.examples[group].weights(u);
-  runtime::apply_example_bias(settings.bias, next.weights);
+  if (settings.given_weights.size() > 0) {
+    next.weights = settings.given_weights;
+  } else {
+    next.weights = model.examples[group].weights(u);
+    runtime::apply_example_bias(settings.bias, next.weights);
+  }
   if (!former.has_target) next.target = start_target(model, group, next.weights);
   next.has_target = true;
   next.target_converged = former.has_target && former.target_converged && next.weights == former.weights;

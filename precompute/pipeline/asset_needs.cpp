@@ -12,7 +12,8 @@ std::optional<RegionNeeds> needs_of_region(const Needs& needs, const std::string
     return RegionNeeds{.name = name,
                        .targets = needs.targets,
                        .energy_reference = needs.energy_reference,
-                       .target_elasticity = needs.target_elasticity};
+                       .target_elasticity = needs.target_elasticity,
+                       .full_space = needs.full_space};
   const auto found = std::ranges::find(*needs.regions, name, &RegionNeeds::name);
   return found == needs.regions->end() ? std::nullopt : std::optional(*found);
 }

@@ -122,6 +122,7 @@ class Pipeline {
   }
   void add_contact(ReducedModel& model);
   void settle_examples(const BodyStages& stages, ReducedModel& model);
+  void add_full_space(const BodyStages& stages, ReducedModel& model);
   void refuse_full_space();
   void add_fidelity(const BodyStages& stages, const Motions& motions, const BasisChoice& choice, ReducedModel& model);
 
@@ -416,6 +417,23 @@ void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
   }
 }
 
+void Pipeline::add_full_space(const BodyStages& stages, ReducedModel& model) {
+  auto region = model.regions.begin();
+  for (Eigen::Index group = 0; group < stages.fitter->groups(); ++group) {
+    const std::string& name = stages.fitter->region(group);
+    const bool whole = name.empty();
+    const bool wanted =
+        whole ? includes(report_.ledger, "full_space") : object_.skeleton || needs_of_region(needs_, name)->full_space;
+    std::optional<FullSpaceData>& data = whole ? model.full_space : region->full_space;
+    const auto at = static_cast<std::size_t>(group);
+    if (wanted)
+      data = full_space_data(model, stages.system, stages.fitter->view(group),
+                             whole ? *model.examples : region->examples, stages.targets[at], stages.elastic[at]);
+    if (wanted && !data) return refuse_full_space();
+    if (!whole) ++region;
+  }
+}
+
 void Pipeline::refuse_full_space() {
   const std::string reason = "parts of the body have several densities";
   if (object_.skeleton)
@@ -543,10 +561,7 @@ ReducedModel Pipeline::run() {
                         [&] { return rigid_moments(object_.mesh, object_.materials.density, model.modal->basis); });
   add_contact(model);
   if (motions) add_fidelity(stages, *motions, choice, model);
-  if (includes(report_.ledger, "full_space")) {
-    model.full_space = full_space_data(model, system, targets.front(), includes(report_.ledger, "target_elasticity"));
-    if (!model.full_space) refuse_full_space();
-  }
+  if (fitter) add_full_space(stages, model);
   if (fitter) settle_examples(stages, model);
   return model;
 }

@@ -179,7 +179,7 @@ std::optional<PoseSettler::Shifts> PoseSettler::shifts(double strength) const {
     full->evaluate(Eigen::VectorXd::Unit(count, k), scratch, target);
     found.coefficients.col(k) =
         share *
-        (target - filter_coefficients(*model_.full_space, model_.modal->basis * *q).reshaped<Eigen::RowMajor>());
+        (target - filter_coefficients(model_.full_space->filter, model_.modal->basis * *q).reshaped<Eigen::RowMajor>());
   }
   return found;
 }

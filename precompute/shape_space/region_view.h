@@ -21,6 +21,10 @@ class RegionView {
   /// [n] weights of the vertices whose motion the region is seen from: those of its band, or the lumped volumes of its
   /// fixed ones; zeros where there are neither.
   const Eigen::VectorXd& frame() const { return frame_; }
+  /// [n] shares of the vertices of the band, whose motion D'' takes off, 1 together; zeros where it takes none off.
+  Eigen::VectorXd band() const {
+    return band_.size() > 0 ? Eigen::VectorXd(frame_ / frame_.sum()) : Eigen::VectorXd::Zero(frame_.size());
+  }
 
   /// D'' applied to displacements [3n x k].
   Eigen::MatrixXd see(const Eigen::MatrixXd& displacements) const;

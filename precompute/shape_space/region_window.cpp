@@ -175,11 +175,4 @@ RegionWindow region_window(const TetMesh& mesh, const FlagVector& inside) {
   return window;
 }
 
-Eigen::VectorXd region_tet_shares(const TetMesh& mesh, const FlagVector& inside, const Eigen::VectorXd& window) {
-  Eigen::VectorXd shares = Eigen::VectorXd::Zero(mesh.tet_count());
-  for (Eigen::Index t = 0; t < mesh.tet_count(); ++t)
-    if (inside(mesh.tets.row(t).transpose()).all()) shares[t] = window(mesh.tets.row(t).transpose()).mean();
-  return shares;
-}
-
 }  // namespace exmat::precompute

@@ -24,10 +24,6 @@ struct RegionWindow {
 /// `inside` [n] flags the region's vertices.
 RegionWindow region_window(const TetMesh& mesh, const FlagVector& inside);
 
-/// [n_t] shares of the tets in an elastic energy of the region: the mean of the window over a tet whose vertices are
-/// all inside, 0 of others. `inside` [n] flags the region's vertices, `window` [n] are the values there.
-Eigen::VectorXd region_tet_shares(const TetMesh& mesh, const FlagVector& inside, const Eigen::VectorXd& window);
-
 /// [n] volumes, a quarter of each tet with each of its vertices [m^3].
 Eigen::VectorXd lumped_volumes(const TetMesh& mesh);
 

@@ -6,7 +6,6 @@
 
 #include "common/core/progress.h"
 #include "common/core/timer.h"
-#include "precompute/full_space/full_space_stepper.h"
 #include "precompute/full_space/matrix_free_stepper.h"
 #include "precompute/full_space/step_potential.h"
 
@@ -24,7 +23,7 @@ struct ChainRun {
 class ChainRunner {
  public:
   ChainRunner(const FullSpaceModel& model, const TrainingRunOptions& options, const Timer& timer)
-      : model_(model), options_(options), timer_(timer), fast_(model) {
+      : model_(model), options_(options), timer_(timer), stepper_(model) {
     scene_.time_step = time_step_of(options);
     scene_.mass_damping = options.mass_damping.value_or(0);
     scene_.stiffness_damping = stiffness_damping_of(options);
@@ -36,16 +35,13 @@ class ChainRunner {
 
  private:
   void set_loads(const Segment& segment);
-  FullSpaceReport step_once(FullSpaceState& state);
   FullSpaceState begin(const Segment& segment) const;
 
   const FullSpaceModel& model_;
   const TrainingRunOptions& options_;
   const Timer& timer_;
   FullSpaceScene scene_;
-  MatrixFreeStepper fast_;
-  bool is_fast_ = false;
-  std::optional<FullSpaceWorkspace> workspace_;  // where it is not fast
+  FullSpaceStepper stepper_;
 };
 
 void ChainRunner::set_loads(const Segment& segment) {
@@ -54,12 +50,7 @@ void ChainRunner::set_loads(const Segment& segment) {
   scene_.examples = segment.examples;
   scene_.obstacles.clear();
   if (segment.obstacle) scene_.obstacles.push_back(*segment.obstacle);
-  is_fast_ = fast_.set(scene_);
-  if (!is_fast_ && !workspace_) workspace_.emplace(model_);
-}
-
-FullSpaceReport ChainRunner::step_once(FullSpaceState& state) {
-  return is_fast_ ? fast_.step(state) : step(model_, scene_, state, *workspace_);
+  stepper_.set(scene_);
 }
 
 FullSpaceState ChainRunner::begin(const Segment& segment) const {
@@ -84,7 +75,7 @@ ChainRun ChainRunner::run(const Chain& chain, Advance advance) {
     set_loads(segment);
     state.begins_anew = true;
     for (std::int64_t i = 0; i < steps && sound; ++i) {
-      sound = (step_once(state).status & runtime::kStepNonFinite) == 0;
+      sound = (stepper_.step(state).status & runtime::kStepNonFinite) == 0;
       ++result.steps;
       advance(1);
       if (!sound || (i + 1) % kStepsPerSnapshot != 0) continue;

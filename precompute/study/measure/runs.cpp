@@ -206,10 +206,12 @@ FullSpaceRun::FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
     : model(model_of(config, data, coordinates)),
       scene(full_space_scene(config, runtime::make_obstacles(config), model)),
       state(full_space_start(config, model, start_of(config, data))),
-      workspace(model) {}
+      stepper(model) {
+  stepper.set(scene);
+}
 
 FullSpaceReport FullSpaceRun::sound_step() {
-  const FullSpaceReport report = step(model, scene, state, workspace);
+  const FullSpaceReport report = step();
   if (report.status & runtime::kStepNonFinite) fail_non_finite(state.step, state.time);
   return report;
 }
@@ -223,7 +225,7 @@ BodyFrames run_full_space(const SceneConfig& config, const ReducedModel& data, c
       return world_velocities(body.model, body.state).transpose() * weights / weights.sum();
     };
   return run(
-      config.time_step, times, [&] { return step(body.model, body.scene, body.state, body.workspace); },
+      config.time_step, times, [&] { return body.step(); },
       [&](BodyFrames& frames) {
         frames.positions.push_back(world_positions(body.model, body.state));
         frames.velocities.push_back(world_velocities(body.model, body.state));

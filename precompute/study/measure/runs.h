@@ -6,7 +6,7 @@
 
 #include "common/config/scene_config.h"
 #include "common/model/reduced_model.h"
-#include "precompute/full_space/full_space_stepper.h"
+#include "precompute/full_space/matrix_free_stepper.h"
 #include "precompute/study/measure/frames.h"
 #include "runtime/scene/scene_loader.h"
 
@@ -47,13 +47,14 @@ struct FullSpaceRun {
   FullSpaceRun(const SceneConfig& config, const ReducedModel& data,
                const std::vector<PoseCoordinates>& coordinates = {});
 
+  FullSpaceReport step() { return stepper.step(state); }
   /// Throws WorkError at a number that is not finite.
   FullSpaceReport sound_step();
 
   FullSpaceModel model;
   FullSpaceScene scene;
   FullSpaceState state;
-  FullSpaceWorkspace workspace;
+  FullSpaceStepper stepper;
 };
 
 }  // namespace exmat::precompute

@@ -49,18 +49,21 @@ double way_bound(double reach, const MovementBound& movement, const BodyPose& po
 }
 
 ContactWorkspace::ContactWorkspace(const ContactSet& set, std::size_t obstacle_count)
+    : ContactWorkspace(set.vertices(), set.modes(), obstacle_count) {}
+
+ContactWorkspace::ContactWorkspace(Eigen::Index vertices, Eigen::Index modes, std::size_t obstacle_count)
     : obstacles(obstacle_count),
-      candidates(obstacle_count * static_cast<std::size_t>(set.vertices())),
+      candidates(obstacle_count * static_cast<std::size_t>(vertices)),
       clearances(candidates.size()),
       is_left(candidates.size()),
       loaded(candidates.size()),
       planes(candidates.size()),
-      first_q(set.modes()),
-      x(set.modes()),
-      loads(set.modes()),
-      factors(kBatch * padded(6 + set.modes())),
-      squares(padded(6 + set.modes()) * padded(6 + set.modes())) {
-  set_zero(set.modes());
+      first_q(modes),
+      x(modes),
+      loads(modes),
+      factors(kBatch * padded(6 + modes)),
+      squares(padded(6 + modes) * padded(6 + modes)) {
+  set_zero(modes);
 }
 
 bool ContactWorkspace::add_candidate(std::size_t number, double own_potential) noexcept {

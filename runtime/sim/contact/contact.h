@@ -62,6 +62,7 @@ struct ContactSums {
 struct ContactWorkspace : ContactSums {
   ContactWorkspace() = default;
   ContactWorkspace(const ContactSet& set, std::size_t obstacle_count);
+  ContactWorkspace(Eigen::Index vertices, Eigen::Index modes, std::size_t obstacle_count);
 
   std::vector<PlacedObstacle> obstacles;     ///< at the end of the step
   std::vector<ContactCandidate> candidates;  ///< the first candidate_count, in order of vertex and obstacle

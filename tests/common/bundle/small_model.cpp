@@ -222,21 +222,31 @@ RenderData small_render() {
   return render;
 }
 
-// The second with an example less and no targets.
+// The second with an example less and no targets, and nothing for steps in all vertices.
 std::vector<RegionData> small_regions(const ReducedModel& model) {
   std::vector<RegionData> regions(2);
-  regions[0] = {"left",
-                0,
-                IndexVector{{0, 2}},
-                *model.examples,
-                *model.projection,
-                model.targets,
-                model.target_space,
-                model.target_elasticity};
-  regions[1] = {"far right",           1,
-                IndexVector{{1}},      *model.examples,
-                *model.projection,     std::nullopt,
-                small_target_space(2), small_target_elasticity(2)};
+  regions[0] = {.name = "left",
+                .index = 0,
+                .vertices = IndexVector{{0, 2}},
+                .examples = *model.examples,
+                .window = Eigen::Vector2d(0.25, 1),
+                .band = Eigen::Vector2d(1, 0),
+                .projection = *model.projection,
+                .targets = model.targets,
+                .target_space = model.target_space,
+                .target_elasticity = model.target_elasticity,
+                .full_space = model.full_space};
+  regions[1] = {.name = "far right",
+                .index = 1,
+                .vertices = IndexVector{{1}},
+                .examples = *model.examples,
+                .window = Eigen::VectorXd::Ones(1),
+                .band = Eigen::VectorXd::Zero(1),
+                .projection = *model.projection,
+                .targets = std::nullopt,
+                .target_space = small_target_space(2),
+                .target_elasticity = small_target_elasticity(2),
+                .full_space = std::nullopt};
   ExampleSet& fewer = regions[1].examples;
   fewer.examples.pop_back();
   fewer.gram = RowMatrix(fewer.gram.topLeftCorner(2, 2));

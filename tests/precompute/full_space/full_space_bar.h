@@ -42,10 +42,19 @@ inline void add_region(ReducedModel& model, const std::string& name, const FlagV
   RegionData& added = model.regions.back();
   const LaplaceBasis basis = laplace_basis_of(model);
   const RegionView view(object.mesh, inside, object.fixed);
+  added.window = view.window()(added.vertices);
+  added.band = view.band()(added.vertices);
   added.projection = direct_projection(basis, descriptor_weights(basis, model.shape_space->weighting), system.full_mass,
                                        RowMatrix(view.see(model.modal->basis)));
   const ExamplePoses poses = region_example_poses(model, system, {name}).front();
   reduce_examples(model, system, poses, added.projection, added.examples);
+}
+
+/// Flags of the vertices beyond three tenths of a bar, which are seen from a band, or of those in its first eight, some
+/// of which are fixed where it is clamped.
+inline FlagVector part_of_bar(const ReducedModel& model, bool outer) {
+  const Eigen::ArrayXd x = model.object->mesh.vertices.col(0) / model.object->mesh.vertices.col(0).maxCoeff();
+  return outer ? FlagVector((x > 0.3).cast<std::uint8_t>()) : FlagVector((x < 0.8).cast<std::uint8_t>());
 }
 
 /// A bar with all modes in its basis and the example poses that descriptors stand for on all vertices.

@@ -246,7 +246,7 @@ TEST(Skeleton, BalancesTheForcesOfItsSteps) {
         turns.emplace_back(Eigen::Quaterniond(mean.normalized()).toRotationMatrix());
         own.row(at) = turns.back().transpose() * (rest + u_now.segment<3>(3 * at) - base);
       }
-      const Eigen::Map<const RowMatrix> target(bending.own.target.data(), filter.cols(), 3);
+      const Eigen::Map<const RowMatrix> target(bending.own.examples.front().target.data(), filter.cols(), 3);
       pull = 300 * filter * (filter.transpose() * own - target);
       for (Eigen::Index at = 0; at < body.rest().rows(); ++at)
         balance.segment<3>(3 * at) += turns[static_cast<std::size_t>(at)] * pull.row(at).transpose();

@@ -44,29 +44,35 @@ FullMemory full_memory(const FullModel& full, const StepScene& scene, State& sta
   return memory;
 }
 
-/// Weights at the first iterate, into the workspace, and the target of the step.
-void find_target(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
-                 Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
+/// Weights at the first iterate, into the workspace, and the targets of the step.
+void find_targets(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
+                  Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
   if (!runs_examples(scene)) return;
-  const ExampleSettings& settings = scene.examples.front();
-  const FullExamples& examples = *full.examples;
-  ExampleWorkspace& scratch = workspace.examples.front();
-  if (settings.given_weights.size() == 0) step.first_coefficients(own.coefficients_there);
-  set_weights(examples.weights, settings, own.coefficients_there, scratch);
-  const ExampleModel& reduced = model.examples.front();
-  if (!reduced.table)
-    solve_target(reduced, settings.target_iterations, state.examples.front(), scratch, report);
-  else if (settings.elastic)
-    reduced.table->evaluate(scratch.weights, scratch.target_table, scratch.solved_target);
-  if (settings.elastic) {
-    own.moved.noalias() = examples.shapes * scratch.solved_target;
-    return step.set_elastic_target(own.moved);
+  const auto reads_pose = [](const ExampleSettings& own) { return acts(own) && own.given_weights.size() == 0; };
+  if (std::ranges::any_of(scene.examples, reads_pose)) step.first_coefficients();
+  for (std::size_t group = 0; group < scene.examples.size(); ++group) {
+    const ExampleSettings& settings = scene.examples[group];
+    if (!acts(settings)) continue;
+    const FullExamples& examples = full.examples[group];
+    const ExampleModel& reduced = model.examples[group];
+    ExampleWorkspace& scratch = workspace.examples[group];
+    FullWorkspace::Examples& found = own.examples[group];
+    set_weights(examples.weights, settings, found.coefficients, scratch);
+    if (!reduced.table)
+      solve_target(reduced, settings.target_iterations, state.examples[group], scratch, report);
+    else if (settings.elastic)
+      reduced.table->evaluate(scratch.weights, scratch.target_table, scratch.solved_target);
+    if (settings.elastic) {
+      own.moved.noalias() = examples.shapes * scratch.solved_target;
+      step.set_elastic_target(group, own.moved);
+      continue;
+    }
+    if (examples.table)
+      examples.table->evaluate(scratch.weights, found.table, found.target);
+    else
+      found.target.noalias() = examples.from_target * scratch.solved_target;
+    step.set_target(group, found.target);
   }
-  if (examples.table)
-    examples.table->evaluate(scratch.weights, own.table, own.target);
-  else
-    own.target.noalias() = examples.from_target * scratch.solved_target;
-  step.set_target(Eigen::Map<const VertexArray>(own.target.data(), full.space.functions(), 3));
 }
 
 }  // namespace
@@ -176,7 +182,7 @@ bool FullBodyStep::begin(bool touches_others) noexcept {
     workspace_.near->contact.set_zero(workspace_.near->contact.generalised.size());
   }
   step_.begin(touches_others);
-  find_target(full_, model_, scene_, state_, workspace_, step_, own_, report_);
+  find_targets(full_, model_, scene_, state_, workspace_, step_, own_, report_);
   return (report_.status & kStepNonFinite) == 0;
 }
 

@@ -15,6 +15,11 @@ FullContacts::FullContacts(const ContactSet& set, const FullSpace& space, const 
   }
 }
 
+FullContacts::FullContacts(const ContactData& data, const FullSpace& space)
+    : rest_(data.positions), areas_(data.areas) {
+  for (const std::int32_t vertex : data.vertices) places_.push_back(space.place(vertex));
+}
+
 bool FullContacts::begin(const Obstacles& obstacles, double end_time, double time_step, const Eigen::Vector3d& gravity,
                          const double* u, const double* v, const ContactState& held,
                          ContactWorkspace& contact) const noexcept {

@@ -39,7 +39,10 @@ struct FullContactScratch {
 /// then commit(). Displacements u are fields of FullSpace. Immutable; no call but the constructor allocates.
 class FullContacts {
  public:
+  /// `origin` of the set's rest positions, world [m].
   FullContacts(const ContactSet& set, const FullSpace& space, const Eigen::Vector3d& origin);
+  /// The vertices in the order of the data.
+  FullContacts(const ContactData& data, const FullSpace& space);
 
   Eigen::Index vertices() const { return areas_.size(); }
 

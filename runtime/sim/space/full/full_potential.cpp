@@ -26,9 +26,13 @@ FullPotentialWorkspace::FullPotentialWorkspace(const FullModel& model)
       frozen(model.space.padded_elements() * kTangentNumbers),
       tangents(model.space.padded_elements() * kTangentNumbers),
       coefficients(3 * model.space.filter().stride),
-      target(coefficients),
-      rate_coefficients(coefficients) {
-  if (model.is_elastic) elastic_target = model.space.make_target();
+      rate_coefficients(coefficients),
+      target(Eigen::VectorXd::Zero(3 * model.space.functions())),
+      raw(target),
+      spring(target),
+      damper(target) {
+  if (std::ranges::any_of(model.examples, &FullExamples::is_elastic))
+    elastic_target = model.space.make_target(std::ssize(model.examples));
   if (model.rigid) rigid = RigidWorkspace(model.space);
   if (model.skin) skin = model.skin->make_pose();
   if (model.skin || model.rigid) turned = start;
@@ -148,8 +152,10 @@ void FullPotential::evaluate_elements(const Eigen::VectorXd& d, Tangents tangent
   work_ = work.external.dot(d);
 }
 
-void FullPotential::set_elastic_target(const Eigen::VectorXd& shape) noexcept {
-  space_.set_target(shape.data(), elastic_factor(scene_.examples.front()), workspace_.elastic_target);
+void FullPotential::set_elastic_target(std::size_t group, const Eigen::VectorXd& shape) noexcept {
+  if (!has_elastic_target_) workspace_.elastic_target.set_none();
+  space_.set_target(shape.data(), elastic_factor(scene_.examples[group]), model_.examples[group].shares, group,
+                    workspace_.elastic_target);
   has_elastic_target_ = true;
 }
 
@@ -173,7 +179,41 @@ void FullPotential::set_coefficients() noexcept {
   }
   for (Eigen::Index k = 0; k < space_.functions(); ++k) {
     auto own = at(workspace_.coefficients, k);
-    own = model_.examples->to_frame(k, examples_frame_, own);
+    own = model_.functions.to_frame(k, examples_frame_, own);
+  }
+}
+
+// `from`: null, or from the axes that the region sees in to those of the coefficients.
+void FullPotential::see(const FullExamples& examples, AlignedArray& coefficients, const Eigen::Matrix3d* from,
+                        Eigen::VectorXd& seen) noexcept {
+  const Eigen::Index columns = examples.columns();
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    const Eigen::Vector3d own = at(coefficients, examples.first + k);
+    workspace_.raw.segment<3>(3 * k) = from == nullptr ? own : from->transpose() * own;
+  }
+  if (examples.seen.size() == 0)
+    seen.head(3 * columns) = workspace_.raw.head(3 * columns);
+  else
+    seen.head(3 * examples.functions).noalias() = examples.seen * workspace_.raw.head(3 * columns);
+}
+
+void FullPotential::see(const FullExamples& examples, Eigen::VectorXd& seen) noexcept {
+  see(examples, workspace_.coefficients, nullptr, seen);
+}
+
+// Its transpose, of a force [3m]; `to` likewise.
+void FullPotential::put_force(const FullExamples& examples, Eigen::VectorXd& force, const Eigen::Matrix3d* to,
+                              AlignedArray& coefficients) noexcept {
+  const Eigen::Index columns = examples.columns();
+  Eigen::VectorXd* from = &force;
+  if (examples.seen.size() > 0) {
+    from = &workspace_.raw;
+    from->head(3 * columns).noalias() = examples.seen.transpose() * force.head(3 * examples.functions);
+  }
+  for (Eigen::Index k = 0; k < columns; ++k) {
+    auto own = at(coefficients, examples.first + k);
+    own = from->segment<3>(3 * k);
+    if (to != nullptr) own = (*to * own).eval();
   }
 }
 
@@ -183,7 +223,8 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   const Field inertia(work.inertia.data(), size), force(work.force.data(), size);
   PotentialEvaluation evaluation;
   // A vertex is known to rounding: no residual comes below what that makes of its force.
-  const double times = has_elastic_target_ ? 1 + elastic_factor(scene_.examples.front()) : 1;
+  double times = 1;
+  for (const ExampleSettings& own : scene_.examples) times += has_elastic_target_ ? elastic_factor(own) : 0;
   evaluation.force_scale = external_norm_ + inertia.norm() + force.norm() +
                            times * kPlaceRounding * reach_ * space_.stiffness() / scene_.space.newton.tolerance;
   PotentialValue& total = evaluation.potential;
@@ -194,7 +235,7 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
   if (filters()) set_filter_coefficients(total);
   if (model_.rigid && damps() && host_ == nullptr) {
     // Damping sees velocities without the rigid motion of the body; all else here has no torque.
-    if (filter_damping() > 0)
+    if (damps_filtered())
       kernels().mesh_add_functions(space_.filter(), 1, work.rate_coefficients.data(), gradient.data());
     model_.rigid->remove_rigid_force(work.x.data(), work.rigid, gradient.data());
   }
@@ -210,8 +251,7 @@ PotentialEvaluation FullPotential::gradient_there(const Eigen::VectorXd& d, Eige
 void FullPotential::set_filter_coefficients(PotentialValue& total) noexcept {
   FullPotentialWorkspace& work = workspace_;
   set_coefficients();
-  const double kappa = filter_stiffness(), damping = filter_damping();
-  if (damping > 0) {
+  if (damps_filtered()) {
     const double* rate = work.w.data();
     if (model_.skin) {
       model_.skin->turn_back(work.skin, rate, work.turned.data());
@@ -219,18 +259,33 @@ void FullPotential::set_filter_coefficients(PotentialValue& total) noexcept {
     }
     kernels().mesh_coefficients(space_.filter(), rate, work.rate_coefficients.data());
   }
-  double energy = 0;
-  for (Eigen::Index k = 0; k < space_.functions(); ++k) {
-    auto spring = at(work.coefficients, k), damper = at(work.rate_coefficients, k);
-    spring -= at(work.target, k);
-    energy += 0.5 * (kappa * spring.squaredNorm() + damping * damper.squaredNorm());
-    spring *= kappa;
-    damper *= damping;
-    if (has_moving_frame()) spring = (examples_frame_.rotation * spring).eval();
-    if (!model_.rigid) spring += damper;
+  for (std::size_t group = 0; group < scene_.examples.size(); ++group) add_group(group, total);
+  if (model_.rigid) return;
+  for (Eigen::Index i = 0; i < work.coefficients.size(); ++i) work.coefficients[i] += work.rate_coefficients[i];
+}
+
+// Turns the group's coefficients into the forces on them.
+void FullPotential::add_group(std::size_t group, PotentialValue& total) noexcept {
+  FullPotentialWorkspace& work = workspace_;
+  const FullExamples& examples = model_.examples[group];
+  const double kappa = linear_stiffness(scene_.examples[group]);
+  const double damping = scene_.examples[group].damping * form_.velocity_factor;
+  auto spring = work.spring.head(3 * examples.functions), damper = work.damper.head(3 * examples.functions);
+  spring.setZero();
+  damper.setZero();
+  if (kappa > 0) {
+    see(examples, work.coefficients, nullptr, work.spring);
+    spring -= work.target.segment(3 * examples.first, spring.size());
   }
+  const Eigen::Matrix3d* const turn = has_moving_frame() ? &frame_rotation() : nullptr;
+  if (damping > 0) see(examples, work.rate_coefficients, turn, work.damper);
+  const double energy = 0.5 * (kappa * spring.squaredNorm() + damping * damper.squaredNorm());
   total.value += energy;
   total.magnitude += energy;
+  spring *= kappa;
+  damper *= damping;
+  put_force(examples, work.spring, has_moving_frame() ? &examples_frame_.rotation : nullptr, work.coefficients);
+  put_force(examples, work.damper, turn, work.rate_coefficients);
 }
 
 void FullPotential::add_filter_force(Eigen::VectorXd& gradient) noexcept {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <limits>
 #include <span>
@@ -22,16 +23,18 @@ struct FullPotentialWorkspace {
   explicit FullPotentialWorkspace(const FullModel& model);
 
   Eigen::VectorXd start, offset, rate, external;  ///< fields at d = 0: q_n, q_n - q_a, q_n - q_v, f_ext
-  Eigen::VectorXd frame_rate;            ///< q - q_v that the frame of a carried body makes, or the bones alone
-  SkinPose skin;                         ///< pose by the bones at the end of the step, on a skeleton
-  Eigen::VectorXd turned;                ///< a field in its bones' axes, or of a free body a force
-  Eigen::VectorXd unused;                ///< a gradient that nobody asked for
-  AlignedArray x, a, w, inertia, force;  ///< fields at the last d
-  AlignedArray frozen;                   ///< tangents of damping, see Kernels::mesh_force()
-  AlignedFloats tangents;                ///< element tangents for the Hessian
-  AlignedArray coefficients, target, rate_coefficients;  ///< 3 x stride: W^T q at the last d, c*, W^T (q - q_v)
-  FullTarget elastic_target;                             ///< target of an elastic example force
-  RigidWorkspace rigid;                                  ///< pose of a free body where freeze() was last called
+  Eigen::VectorXd frame_rate;                    ///< q - q_v that the frame of a carried body makes, or the bones alone
+  SkinPose skin;                                 ///< pose by the bones at the end of the step, on a skeleton
+  Eigen::VectorXd turned;                        ///< a field in its bones' axes, or of a free body a force
+  Eigen::VectorXd unused;                        ///< a gradient that nobody asked for
+  AlignedArray x, a, w, inertia, force;          ///< fields at the last d
+  AlignedArray frozen;                           ///< tangents of damping, see Kernels::mesh_force()
+  AlignedFloats tangents;                        ///< element tangents for the Hessian
+  AlignedArray coefficients, rate_coefficients;  ///< 3 x stride: F^T q at the last d, F^T (q - q_v); forces on them
+  Eigen::VectorXd target;                        ///< c* of each group [3m] from 3 `first` on
+  Eigen::VectorXd raw, spring, damper;           ///< numbers of one group
+  FullTarget elastic_target;                     ///< targets of elastic example forces
+  RigidWorkspace rigid;                          ///< pose of a free body where freeze() was last called
 };
 
 /// Takes off a field [places x 4] what would move what attachments hold, and calls use(attachment, k, taken) with that
@@ -65,8 +68,9 @@ void project_held(const FullSpace& space, std::span<Attachment> attachments, Num
 
 /// Potential that a step in full space minimises, a function of the field d = q - q_n:
 ///   c_a/2 (q - q_a)^T M (q - q_a) + E(q) - f_ext . d + c_v/2 (q - q_v)^T D (q - q_v)
-///     + kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2,
-/// of an elastic example force its energy, once there is a target, in place of the term with kappa;
+///     + sum kappa/2 |W^T q - c*|^2 + c_kappa c_v/2 |W^T (q - q_v)|^2
+/// over the examples, of a region what it sees of q (FullExamples), of an elastic example force its energy, once there
+/// is a target, in place of the term with kappa;
 /// D = alpha M + beta K, K of the iterate that was last frozen, and with obstacles near their potential. Of a free body
 /// q - q_v is that without the rigid motion that has its momenta, of a carried one without that of its frame, as the
 /// body stands at that iterate; and W^T q - c* of a free body is that of its deformation in the frame that fits it at
@@ -112,32 +116,38 @@ class FullPotential {
   }
   PotentialValue value(const Eigen::VectorXd& d) noexcept { return evaluate(d, workspace_.unused).potential; }
 
-  /// W^T q at the last d into the workspace's coefficients; of a body whose frame moves that of its deformation.
+  /// F^T q at the last d into the workspace's coefficients; of a body whose frame moves that of its deformation.
   void set_coefficients() noexcept;
-  /// The shape [field] of no energy of an elastic example force; before the next evaluate_elements().
-  void set_elastic_target(const Eigen::VectorXd& shape) noexcept;
+  /// What a group [3m] sees of them.
+  void see(const FullExamples& examples, Eigen::VectorXd& seen) noexcept;
+  /// The shape [field] of no energy of an elastic example force of a group; before the next evaluate_elements().
+  void set_elastic_target(std::size_t group, const Eigen::VectorXd& shape) noexcept;
+  bool has_moving_frame() const noexcept { return model_.rigid || model_.carried; }
+  /// From the frame of the deformations that example forces see to the world, as damping has it in this step.
+  const Eigen::Matrix3d& frame_rotation() const noexcept {
+    return model_.rigid ? workspace_.rigid.rotation : frame_.rotation;
+  }
 
  private:
-  bool filters() const noexcept { return filter_stiffness() + filter_damping() > 0; }
-  double filter_stiffness() const noexcept {
-    return scene_.examples.empty() ? 0 : linear_stiffness(scene_.examples.front());
-  }
-  double filter_damping() const noexcept {
-    return scene_.examples.empty() ? 0 : scene_.examples.front().damping * form_.velocity_factor;
+  bool filters() const noexcept { return std::ranges::any_of(scene_.examples, is_filtered); }
+  bool damps_filtered() const noexcept {
+    return std::ranges::any_of(scene_.examples, [](const ExampleSettings& own) { return own.damping > 0; });
   }
   MeshInertia terms() const noexcept;
 
-  bool has_moving_frame() const noexcept { return model_.rigid || model_.carried; }
   using Coefficient = Eigen::Map<Eigen::Vector3d, 0, Eigen::InnerStride<>>;  ///< [3] of one function
   Coefficient at(AlignedArray& coefficients, Eigen::Index k) const noexcept;
+  void see(const FullExamples& examples, AlignedArray& coefficients, const Eigen::Matrix3d* from,
+           Eigen::VectorXd& seen) noexcept;
+  void put_force(const FullExamples& examples, Eigen::VectorXd& force, const Eigen::Matrix3d* to,
+                 AlignedArray& coefficients) noexcept;
   void set_filter_coefficients(PotentialValue& total) noexcept;
+  void add_group(std::size_t group, PotentialValue& total) noexcept;
   void add_filter_force(Eigen::VectorXd& gradient) noexcept;
   void add_contacts(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
   void remove_host_motion(bool freeze) noexcept;
   void add_attachments(PotentialEvaluation& evaluation, Eigen::VectorXd& gradient) noexcept;
-  bool damps() const noexcept {
-    return scene_.mass_damping > 0 || scene_.stiffness_damping > 0 || filter_damping() > 0;
-  }
+  bool damps() const noexcept { return scene_.mass_damping > 0 || scene_.stiffness_damping > 0 || damps_filtered(); }
 
   const FullModel& model_;
   const FullSpace& space_;
@@ -149,7 +159,7 @@ class FullPotential {
   const Attachment* host_ = nullptr;                     ///< the first that holds
   Eigen::Vector3d host_turn_ = Eigen::Vector3d::Zero();  ///< in q - q_v
   RigidPart::Turn turn_;                                 ///< turn of a free body, at the last coefficients
-  FullExamples::Frame examples_frame_;                   ///< frame of those, where it moves
+  FrameOfFunctions::Frame examples_frame_;               ///< frame of those, where it moves
   MotionSample frame_;                                   ///< at the end of the step, of a carried body
   std::array<double, kMeshSums> sums_{};
   double work_ = 0, external_norm_ = 0, reach_ = 0;

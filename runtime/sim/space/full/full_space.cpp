@@ -189,6 +189,7 @@ void FullSpace::add_elements(const Elements& elements, const TetMaterials& mater
   mu_ = lambda_ = variance_ = AlignedArray(padded_count);
   for (Eigen::Index at = 0; at < elements.count(); ++at) {
     const std::int32_t element = order[static_cast<std::size_t>(within[static_cast<std::size_t>(at)])];
+    element_at_.push_back(element);
     const auto gradients = elements.gradients_of(element);
     Eigen::Index row = 0;
     for (const std::int32_t vertex : elements.vertices_of(element)) {
@@ -298,26 +299,39 @@ ElementLaw FullSpace::law() const noexcept {
   return law;
 }
 
-FullTarget FullSpace::make_target() const {
-  return {AlignedArray(padded_elements() * 9), AlignedArray(padded_elements() * kInverseNumbers), AlignedArray(1)};
+FullTarget FullSpace::make_target(Eigen::Index groups) const {
+  return {groups, AlignedArray(padded_elements() * groups * 9),
+          AlignedArray(padded_elements() * groups * kInverseNumbers), AlignedArray(groups)};
 }
 
-void FullSpace::set_target(const double* field, double factor, FullTarget& target) const noexcept {
+void FullSpace::set_target(const double* field, double factor, const Eigen::VectorXd& shares, std::size_t group,
+                           FullTarget& target) const noexcept {
+  const auto own = static_cast<Eigen::Index>(group);
   for (Eigen::Index e = 0; e < padded_elements(); ++e) {
     const Eigen::Matrix3d H = displacement_gradient(field, e);
-    double* const shift = target.shifts.data() + e / kLanes * 9 * kLanes + e % kLanes;
+    double* const shift = target.shifts.data() + target.place(e, own, 9);
+    double* const inverse = target.inverses.data() + target.place(e, own, kInverseNumbers);
     for (Eigen::Index i = 0; i < 9; ++i) shift[i * kLanes] = H(i / 3, i % 3);
-    invert_target(shift, target.inverses.data() + e / kLanes * kInverseNumbers * kLanes + e % kLanes);
+    invert_target(shift, inverse);
+    if (shares.size() > 0) inverse[9 * kLanes] *= shares[e];
   }
-  target.factor[0] = factor;
+  target.factors[own] = factor;
+}
+
+Eigen::VectorXd FullSpace::element_means(const TetMesh& mesh, const TetMaterials& materials,
+                                         const Eigen::VectorXd& values) const {
+  const Eigen::VectorXd means = mean_over_elements(mesh, elements_of(mesh, materials), values);
+  Eigen::VectorXd own = Eigen::VectorXd::Zero(padded_elements());
+  own.head(std::ssize(element_at_)) = means(element_at_);
+  return own;
 }
 
 ElementLaw FullSpace::law(const FullTarget& target) const noexcept {
   ElementLaw own = law();
-  own.shift_count = 1;
+  own.shift_count = target.count;
   own.shifts = target.shifts.data();
   own.inverses = target.inverses.data();
-  own.shift_weights = target.factor.data();
+  own.shift_weights = target.factors.data();
   return own;
 }
 
@@ -335,11 +349,11 @@ void FullSpace::projected_tangents(const double* field, const FullTarget* exampl
   with_material(model_, [&](auto material) {
     using Own = decltype(material);
     // Tangent of e v Psi((I + H) A): A times each block of rows and columns of an axis, times A^T.
-    const auto example_tangent = [&](Eigen::Index e, const Eigen::Matrix3d& H) -> Matrix9 {
-      const double* const numbers = example->inverses.data() + e / kLanes * kInverseNumbers * kLanes + e % kLanes;
+    const auto example_tangent = [&](Eigen::Index e, Eigen::Index group, const Eigen::Matrix3d& H) -> Matrix9 {
+      const double* const numbers = example->inverses.data() + example->place(e, group, kInverseNumbers);
       Eigen::Matrix3d A;
       for (Eigen::Index i = 0; i < 9; ++i) A(i / 3, i % 3) = numbers[i * kLanes];
-      const double weight = example->factor[0] * numbers[9 * kLanes];
+      const double weight = example->factors[group] * numbers[9 * kLanes];
       const Eigen::Matrix3d own = (Eigen::Matrix3d::Identity() + H) * A - Eigen::Matrix3d::Identity();
       Matrix9 D = projected_tangent<Own>(own, {weight * mu_[e], weight * lambda_[e]});
       for (Eigen::Index a = 0; a < 9; a += 3)
@@ -351,7 +365,8 @@ void FullSpace::projected_tangents(const double* field, const FullTarget* exampl
       Matrix9 D = projected_tangent<Own>(H, {mu_[e], lambda_[e]});
       D.diagonal().array() -= variance_[e];
       Matrix9 pulled = Matrix9::Zero();
-      if (example != nullptr) pulled = example_tangent(e, H);
+      for (Eigen::Index group = 0; example != nullptr && group < example->count; ++group)
+        if (example->factors[group] > 0) pulled += example_tangent(e, group, H);
       double* const own_frozen = frozen + e / kLanes * kLanes * kTangentNumbers + e % kLanes;
       float* const own = tangents + e / kMeshLanes * kMeshLanes * kTangentNumbers + e % kMeshLanes;
       for (Eigen::Index i = 0, entry = 0; i < 9; ++i)
@@ -368,7 +383,7 @@ void FullSpace::projected_tangents(const double* field, const FullTarget* exampl
 }
 
 FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor,
-                                       double filter_stiffness, bool with_diagonal)
+                                       const Eigen::VectorXd& filter_stiffness, bool with_diagonal)
     : size_(space.vertices()), stride_(space.filter().stride) {
   const Eigen::SparseMatrix<double> matrix =
       mass_factor * space.mass() + stiffness_factor * space.preconditioning_stiffness();
@@ -397,13 +412,15 @@ FullPreconditioner::FullPreconditioner(const FullSpace& space, double mass_facto
 
   if (with_diagonal) diagonal_ = diagonal_of_inverse(L);
 
-  // Woodbury: S^-1 - Z (1/k + W^T Z)^-1 Z^T with Z = S^-1 W, as the square of Z times a root of the inverse.
-  functions_ = AlignedFloats(filter_stiffness > 0 ? size_ * stride_ : 0);
-  if (filter_stiffness <= 0 || stride_ == 0) return;
-  const Eigen::Map<const RowMatrix> W(space.filter().functions, size_, stride_);
-  const Eigen::MatrixXd Z = factor.solve(Eigen::MatrixXd(W));
-  Eigen::MatrixXd small = W.transpose() * Z;
-  small.diagonal().array() += 1 / filter_stiffness;
+  // Woodbury: S^-1 - Z (1 + V^T Z)^-1 Z^T with V = W k^1/2, Z = S^-1 V, as the square of Z times a root of the inverse.
+  const bool filters = filter_stiffness.size() > 0 && !filter_stiffness.isZero(0);
+  functions_ = AlignedFloats(filters ? size_ * stride_ : 0);
+  if (!filters) return;
+  Eigen::MatrixXd V = Eigen::Map<const RowMatrix>(space.filter().functions, size_, stride_);
+  V.leftCols(filter_stiffness.size()) *= filter_stiffness.cwiseSqrt().asDiagonal();
+  const Eigen::MatrixXd Z = factor.solve(V);
+  Eigen::MatrixXd small = V.transpose() * Z;
+  small.diagonal().array() += 1;
   const Eigen::MatrixXd root =
       small.llt().matrixU().solve(Eigen::MatrixXd(Eigen::MatrixXd::Identity(stride_, stride_)));
   Eigen::Map<Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>>(functions_.data(), size_, stride_) =

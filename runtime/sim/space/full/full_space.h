@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -29,11 +30,20 @@ class AlignedFloats {
   Eigen::Index size_ = 0;
 };
 
-/// The target of an elastic example force in the elements, as its law takes it; sized once.
+/// Targets of elastic example forces in the elements, one for each group of examples, as their law takes them; sized
+/// once.
 struct FullTarget {
-  AlignedArray shifts;    ///< F* - I, panels x 9 x kLanes
-  AlignedArray inverses;  ///< F*^-1 and det F*, 0 where that turns an element inside out, panels x 10 x kLanes
-  AlignedArray factor;    ///< e
+  Eigen::Index count = 0;
+  AlignedArray shifts;  ///< F* - I, panels x count x 9 x kLanes
+  /// F*^-1 and det F* times the element's share, 0 where F* turns it inside out, panels x count x 10 x kLanes.
+  AlignedArray inverses;
+  AlignedArray factors;  ///< e of each, 0 where it has no such force
+
+  /// Place of a group's numbers of an element among the panels, of `numbers` each.
+  Eigen::Index place(Eigen::Index element, Eigen::Index group, Eigen::Index numbers) const noexcept {
+    return (element / kLanes * count + group) * numbers * kLanes + element % kLanes;
+  }
+  void set_none() noexcept { std::fill_n(factors.data(), factors.size(), 0.0); }
 };
 
 /// Fixed vertices stay where they were meshed, or go where something else takes them.
@@ -46,7 +56,8 @@ enum class FixedVertices { kStay, kDriven };
 class FullSpace {
  public:
   FullSpace() = default;
-  /// `filter` [vertices of the mesh x m], none or W of the shape filter P = W W^T (x) I3 of a linear example force.
+  /// `filter` [vertices of the mesh x M], none or the functions of example forces: W of the shape filter P = W W^T (x)
+  /// I3 of the whole body's.
   FullSpace(const TetMesh& mesh, const TetMaterials& materials, const FlagVector& fixed, const RowMatrix& filter = {},
             FixedVertices fixed_vertices = FixedVertices::kStay);
 
@@ -55,7 +66,7 @@ class FullSpace {
   Eigen::Index driven() const { return driven_; }                   ///< p, where they have places in fields
   Eigen::Index places() const { return vertices() + driven_; }
   Eigen::Index field_size() const { return 4 * places(); }
-  Eigen::Index functions() const { return functions_; }  ///< m
+  Eigen::Index functions() const { return functions_; }  ///< M
   bool is_clamped() const { return clamped_; }           ///< true if a vertex is fixed
   double edge() const { return edge_; }                  ///< mean length of the edges [m]
   double wave_rate() const { return wave_rate_; }        ///< edges a second that the fastest waves pass [1/s]
@@ -93,9 +104,13 @@ class FullSpace {
 
   MeshArrays arrays() const noexcept;
   ElementLaw law() const noexcept;
-  FullTarget make_target() const;
-  /// `field`: displacements u* of the target from rest, in any frame.
-  void set_target(const double* field, double factor, FullTarget& target) const noexcept;
+  FullTarget make_target(Eigen::Index groups) const;
+  /// `field`: displacements u* of the target from rest, in any frame. `shares` of the elements; empty: all 1.
+  void set_target(const double* field, double factor, const Eigen::VectorXd& shares, std::size_t group,
+                  FullTarget& target) const noexcept;
+  /// Means over the elements of values [n_t] of the tets; `mesh` and `materials` as the constructor had them.
+  Eigen::VectorXd element_means(const TetMesh& mesh, const TetMaterials& materials,
+                                const Eigen::VectorXd& values) const;
   ElementLaw law(const FullTarget& target) const noexcept;
   MeshFilter<double> filter() const noexcept { return {vertices(), stride_, filter_.data()}; }
   MeshFilter<float> rounded_filter() const noexcept { return {vertices(), stride_, rounded_filter_.data()}; }
@@ -132,6 +147,7 @@ class FullSpace {
   std::vector<std::int32_t> place_of_;   ///< place of each vertex of the mesh, -1: none
   Eigen::Index driven_ = 0;
   Eigen::Matrix<double, Eigen::Dynamic, 3> gravity_load_;
+  std::vector<std::int32_t> element_at_;  ///< of Elements, at each place in the panels
   std::vector<std::int32_t> starts_{0}, corners_;
   std::vector<double> gradients_;
   std::vector<float> rounded_gradients_;
@@ -153,13 +169,13 @@ double FullSpace::kinetic_energy(const Eigen::VectorXd& v, const Driven& driven)
   return 0.5 * sum;
 }
 
-/// (M (c_a + alpha c_v) + (1 + beta c_v) L + k W W^T)^-1, factored once for these numbers, in single precision.
+/// (M (c_a + alpha c_v) + (1 + beta c_v) L + W k W^T)^-1, factored once for these numbers, in single precision.
 class FullPreconditioner {
  public:
   FullPreconditioner() = default;
-  /// `with_diagonal`: also inverse_diagonal().
-  FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor, double filter_stiffness,
-                     bool with_diagonal = false);
+  /// `filter_stiffness` [M], k of each function, or none. `with_diagonal`: also inverse_diagonal().
+  FullPreconditioner(const FullSpace& space, double mass_factor, double stiffness_factor,
+                     const Eigen::VectorXd& filter_stiffness, bool with_diagonal = false);
 
   /// x = (S (x) I3)^-1 right, fields; coefficients: 3 x stride of the filter.
   void solve(const Kernels& run, const AlignedFloats& right, AlignedFloats& x,

@@ -16,14 +16,28 @@ constexpr double kDelicate = 0.1;       // of the accuracy, in long steps and wi
 constexpr double kForcing = 0.3;        // of what is left to the tolerance, that a direction is solved to
 
 FullWorkspace::Key key_of(const StepScene& scene) {
-  const ExampleSettings examples = scene.examples.empty() ? ExampleSettings{.stiffness = 0} : scene.examples.front();
-  return {scene.time_step,
-          scene.mass_damping,
-          scene.stiffness_damping,
-          linear_stiffness(examples),
-          elastic_factor(examples),
-          examples.damping,
-          scene.integrator == Integrator::kBdf2};
+  FullWorkspace::Key key{scene.time_step, scene.mass_damping, scene.stiffness_damping, scene.integrator, {}};
+  for (const ExampleSettings& examples : scene.examples)
+    key.pulls.push_back({linear_stiffness(examples), elastic_factor(examples), examples.damping});
+  return key;
+}
+
+/// True if factors of the key are those of the scene; does not allocate.
+bool serves(const FullWorkspace::Key& key, const StepScene& scene) noexcept {
+  const auto is_same = [](const FullWorkspace::Key::Pull& own, const ExampleSettings& examples) {
+    return own.stiffness == linear_stiffness(examples) && own.elasticity == elastic_factor(examples) &&
+           own.damping == examples.damping;
+  };
+  return key.time_step == scene.time_step && key.mass_damping == scene.mass_damping &&
+         key.stiffness_damping == scene.stiffness_damping && key.integrator == scene.integrator &&
+         std::ranges::equal(key.pulls, scene.examples, is_same);
+}
+
+/// Product of a group's filter on the coefficients of its functions, of `stiffness`.
+FullWorkspace::Filter make_filter(const FullExamples& examples, double stiffness) {
+  FullWorkspace::Filter filter{examples.first, examples.columns(), static_cast<float>(stiffness), {}};
+  if (examples.seen.size() > 0) filter.product = (stiffness * examples.seen.transpose() * examples.seen).cast<float>();
+  return filter;
 }
 
 FullWorkspace::Linear make_linear(const FullModel& model, const FullWorkspace::Key& key, double time_scale,
@@ -31,10 +45,19 @@ FullWorkspace::Linear make_linear(const FullModel& model, const FullWorkspace::K
   const FullSpace& space = model.space;
   const double c_v = 1 / time_scale;
   const double mass = c_v * c_v + key.mass_damping * c_v, stiffness = 1 + key.stiffness_damping * c_v;
-  const double filter = key.example_stiffness + key.example_damping * c_v;
-  FullWorkspace::Linear linear{FullPreconditioner(space, mass, stiffness + key.example_elasticity, filter, touches),
-                               {},
-                               static_cast<float>(filter)};
+  FullWorkspace::Linear linear;
+  // What a region does not see of its band's motion the preconditioner takes as seen.
+  Eigen::VectorXd of_functions = Eigen::VectorXd::Zero(space.functions());
+  double elasticity = 0;
+  for (std::size_t group = 0; group < key.pulls.size(); ++group) {
+    const FullExamples& examples = model.examples[group];
+    const double filter = key.pulls[group].stiffness + key.pulls[group].damping * c_v;
+    elasticity += key.pulls[group].elasticity;
+    linear.filters.push_back(make_filter(examples, filter));
+    of_functions.segment(examples.first, examples.functions).setConstant(filter);
+  }
+  linear.is_filtered = !of_functions.isZero(0);
+  linear.preconditioner = FullPreconditioner(space, mass, stiffness + elasticity, of_functions, touches);
   for (Eigen::Index k = 0; k < space.entries(); ++k)
     linear.matrix.push_back(static_cast<float>(mass * space.mass_value(k) + stiffness * space.variance_value(k)));
   return linear;
@@ -55,16 +78,19 @@ MotionSample frame_at(const StepScene& scene, double time) {
 }  // namespace
 
 const char* unsupported(const FullModel& model, const StepScene& scene) noexcept {
-  if (scene.integrator == Integrator::kNewmark) return "Newmark's integrator";
+  if (scene.integrator == Integrator::kNewmark && model.skin) return "Newmark's integrator of a body on a skeleton";
   if (!scene.obstacles.empty() && !model.contacts) return "obstacles, since the bundle has no /contact";
   if (scene.carrier && !model.carried) return "a motion that carries the body";
   if (scene.animation && !model.skin) return "an animation of bones";
-  if (scene.examples.size() > 1) return "more than one example force";
   const bool acts_example = std::ranges::any_of(scene.examples, acts);
-  const bool is_elastic = acts_example && scene.examples.front().elastic;
-  if (is_elastic && !model.is_elastic) return "an elastic example force, since the bundle was made for a linear one";
-  if (is_elastic && (model.skin || model.rigid)) return "an elastic example force of a free body or one on a skeleton";
-  if (acts_example && model.space.functions() == 0) return "an example force, since the space has no filter";
+  if (acts_example && scene.examples.size() != model.examples.size())
+    return "an example force, since the space has no filter of it";
+  for (std::size_t group = 0; acts_example && group < scene.examples.size(); ++group) {
+    if (elastic_factor(scene.examples[group]) == 0) continue;
+    if (!model.examples[group].is_elastic)
+      return "an elastic example force, since the bundle was made for a linear one";
+    if (model.skin || model.rigid) return "an elastic example force of a free body or one on a skeleton";
+  }
   const bool damped = scene.mass_damping > 0 || scene.stiffness_damping > 0;
   if (!model.space.is_clamped() && !model.rigid && (damped || acts_example))
     return "damping or example force of a free body whose rigid motion is not known";
@@ -96,20 +122,24 @@ FullWorkspace::FullWorkspace(const FullModel& model, const StepScene& scene, con
       turned(model.skin ? residual.size() : 0),
       field(d) {
   fit(model, scene);
-  if (!model.examples) return;
-  if (model.examples->table) table = model.examples->table->make_workspace();
-  coefficients_there.setZero(3 * model.space.functions());
-  target = coefficients_there;
+  for (const FullExamples& of_model : model.examples) {
+    Examples& own = examples.emplace_back();
+    if (of_model.table) own.table = of_model.table->make_workspace();
+    own.coefficients.setZero(3 * of_model.functions);
+    own.target = own.coefficients;
+    of_group.resize(std::max<Eigen::Index>(of_group.size(), 6 * of_model.columns()));
+  }
 }
 
 void FullWorkspace::fit(const FullModel& model, const StepScene& scene) {
-  const Key wanted = key_of(scene);
   const bool touches = model.contacts.has_value();
   if (touches && contact.blocks.empty()) contact = FullContactScratch(model.space.vertices());
-  if (key == wanted) return;
-  first = make_linear(model, wanted, scene.time_step, touches);
-  second = wanted.bdf2 ? make_linear(model, wanted, 2 * scene.time_step / 3, false) : first;
-  key = wanted;
+  if (serves(key, scene)) return;
+  key = key_of(scene);
+  first = make_linear(model, key, scene.time_step, touches);
+  second = first;
+  if (key.integrator == Integrator::kBdf2) second = make_linear(model, key, 2 * scene.time_step / 3, false);
+  if (key.integrator == Integrator::kNewmark) second = make_linear(model, key, 0.5 * scene.time_step, false);
 }
 
 double compliance(const FullModel& model, std::span<const std::int32_t> vertices, std::span<const double> shares,
@@ -166,8 +196,13 @@ void FullStep::begin(bool touches_others) noexcept {
     expected_momenta_ = model_.rigid->momenta(workspace_.field.data(), workspace_.potential.rigid);
   }
   const StepHistory history{state_.q, state_.v, state_.q_previous, state_.v, state_.v_previous};
-  const bool second_order = scene_.integrator == Integrator::kBdf2 && !anew_ && !near_ && !touches_others;
-  if (second_order)
+  const bool newmark = scene_.integrator == Integrator::kNewmark;
+  // A hold is exact at the end of steps, which Newmark's forces would oscillate about.
+  const bool second_order = scene_.integrator != Integrator::kBackwardEuler && !anew_ && !near_ && !touches_others &&
+                            !(newmark && is_attached());
+  if (second_order && newmark)
+    newmark_form(history, state_.a, scene_.time_step, workspace_.form);
+  else if (second_order)
     bdf2_form(history, scene_.time_step, workspace_.form);
   else
     backward_euler_form(history, scene_.time_step, workspace_.form);
@@ -303,11 +338,10 @@ void FullStep::first_iterate(Eigen::VectorXd& u) const noexcept {
   u += state_.q;
 }
 
-void FullStep::first_coefficients(Eigen::VectorXd& coefficients) noexcept {
+void FullStep::first_coefficients() noexcept {
   potential_.set_coefficients();
-  for (Eigen::Index k = 0; k < space_.functions(); ++k)
-    for (int a = 0; a < 3; ++a)
-      coefficients[3 * k + a] = workspace_.potential.coefficients[a * space_.filter().stride + k];
+  for (std::size_t group = 0; group < model_.examples.size(); ++group)
+    potential_.see(model_.examples[group], workspace_.examples[group].coefficients);
 }
 
 // Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a
@@ -320,7 +354,7 @@ void FullStep::precondition() noexcept {
 void FullStep::precondition_freely() noexcept {
   FullWorkspace& work = workspace_;
   const Kernels& run = kernels();
-  const bool turns = model_.skin && linear_->filter_stiffness > 0;
+  const bool turns = model_.skin && linear_->is_filtered;
   if (work.contact.block_count == 0 && !turns)
     return linear_->preconditioner.solve(run, work.residual, work.solved, work.coefficients);
   const auto blocks = std::span(work.contact.blocks).first(work.contact.block_count);
@@ -360,24 +394,51 @@ void FullStep::hold(Eigen::VectorXd& d) const noexcept {
   }
 }
 
+// Turns F^T x into the forces of the filters on it.
+void FullStep::filter_coefficients() noexcept {
+  const Eigen::Index stride = space_.filter().stride;
+  Eigen::Map<Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor>> all(workspace_.coefficients.data(), 3, stride);
+  Eigen::Matrix3f to_world;
+  if (potential_.has_moving_frame()) to_world = potential_.frame_rotation().cast<float>();
+  for (const FullWorkspace::Filter& filter : linear_->filters) {
+    auto own = all.middleCols(filter.first, filter.columns);
+    if (filter.product.size() == 0) {
+      own *= filter.stiffness;
+      continue;
+    }
+    Eigen::Map<Eigen::Matrix3Xf> numbers(workspace_.of_group.data(), 3, filter.columns);
+    Eigen::Map<Eigen::Matrix3Xf> forces(workspace_.of_group.data() + numbers.size(), 3, filter.columns);
+    numbers = own;
+    if (potential_.has_moving_frame())
+      for (Eigen::Index k = 0; k < filter.columns; ++k) numbers.col(k) = (to_world.transpose() * numbers.col(k)).eval();
+    Eigen::Map<Eigen::VectorXf>(forces.data(), forces.size()).noalias() =
+        filter.product * Eigen::Map<const Eigen::VectorXf>(numbers.data(), numbers.size());
+    if (potential_.has_moving_frame())
+      for (Eigen::Index k = 0; k < filter.columns; ++k) forces.col(k) = (to_world * forces.col(k)).eval();
+    own = forces;
+  }
+}
+
 // Sets image = A search.
 void FullStep::multiply() noexcept {
   const Kernels& run = kernels();
   FullWorkspace& work = workspace_;
   run.mesh_product(space_.arrays(), linear_->matrix.data(), work.potential.tangents.data(), work.search.data(),
                    work.image.data());
-  if (linear_->filter_stiffness > 0) {
+  if (linear_->is_filtered) {
     const MeshFilter<float> filter = space_.rounded_filter();
     if (model_.skin) {
       model_.skin->turn_back(work.potential.skin, work.search.data(), work.turned.data());
       run.mesh_rounded_coefficients(filter, work.turned.data(), work.coefficients.data());
       work.turned.vector().setZero();
-      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.turned.data());
+      filter_coefficients();
+      run.mesh_add_rounded_functions(filter, 1, work.coefficients.data(), work.turned.data());
       model_.skin->turn(work.potential.skin, work.turned.data(), work.turned.data());
       work.image.vector() += work.turned.vector();
     } else {
       run.mesh_rounded_coefficients(filter, work.search.data(), work.coefficients.data());
-      run.mesh_add_rounded_functions(filter, linear_->filter_stiffness, work.coefficients.data(), work.image.data());
+      filter_coefficients();
+      run.mesh_add_rounded_functions(filter, 1, work.coefficients.data(), work.image.data());
     }
   }
   for (const auto& block : std::span(work.contact.blocks).first(work.contact.block_count))
@@ -532,11 +593,11 @@ NewtonStatus FullStep::minimise_with_friction() noexcept {
   }
 }
 
-void FullStep::set_elastic_target(const Eigen::VectorXd& shape) noexcept {
+void FullStep::set_elastic_target(std::size_t group, const Eigen::VectorXd& shape) noexcept {
   Eigen::VectorXd& field = workspace_.trial;
   field.setZero();
   space_.to_field(shape, field);
-  potential_.set_elastic_target(field);
+  potential_.set_elastic_target(group, field);
   potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kExact, false);
 }
 

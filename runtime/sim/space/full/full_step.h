@@ -43,22 +43,31 @@ struct FullWorkspace {
   /// Makes factors again where they do not serve the scene.
   void fit(const FullModel& model, const StepScene& scene);
 
+  /// The example force of a group in the Hessian, on the coefficients of its functions.
+  struct Filter {
+    Eigen::Index first = 0, columns = 0;
+    float stiffness = 0;
+    Eigen::MatrixXf product;  ///< that of a region that is seen from its band, in place of the stiffness
+  };
   /// Arrays that are constant for a step form.
   struct Linear {
     FullPreconditioner preconditioner;
     std::vector<float> matrix;  ///< M (c_a + alpha c_v) + (1 + beta c_v) V, see Kernels::mesh_product()
-    float filter_stiffness = 0;
+    std::vector<Filter> filters;
+    bool is_filtered = false;
   };
   /// The settings of a scene that factors are made of.
   struct Key {
+    struct Pull {
+      double stiffness = 0, elasticity = 0, damping = 0;
+    };
     double time_step = 0, mass_damping = 0, stiffness_damping = 0;
-    double example_stiffness = 0, example_elasticity = 0, example_damping = 0;
-    bool bdf2 = false;
-    bool operator==(const Key&) const = default;
+    Integrator integrator = Integrator::kBdf2;
+    std::vector<Pull> pulls;  ///< of each group of examples
   };
 
   FullAccuracy accuracy;
-  Linear first, second;  ///< one for backward Euler, one for BDF2
+  Linear first, second;  ///< one for backward Euler, one for the scene's integrator
   Key key;
   StepForm form;
   StepForm fixed_form;  ///< form for the fixed vertices of a body on a skeleton
@@ -69,9 +78,13 @@ struct FullWorkspace {
   AlignedFloats scaled;                                              ///< residual that the preconditioner takes
   AlignedFloats turned;                                              ///< in the axes of bones, where there are some
   FullContactScratch contact;
-  Eigen::VectorXd field;  ///< a field
-  TargetTable::Workspace table;
-  Eigen::VectorXd coefficients_there, target;  ///< 3m, of an example force
+  Eigen::VectorXd field;     ///< a field
+  Eigen::VectorXf of_group;  ///< coefficients of a group, and forces on them
+  struct Examples {
+    TargetTable::Workspace table;
+    Eigen::VectorXd coefficients, target;  ///< 3m
+  };
+  std::vector<Examples> examples;  ///< as the model's
 };
 
 /// Mean displacement of vertices of the mesh in a step by a force of 1 N shared out to them so, by the preconditioner
@@ -110,17 +123,15 @@ class FullStep {
 
   /// Displacement [f] at the first iterate, of which weights and target are made.
   void first_iterate(Eigen::VectorXd& u) const noexcept;
-  /// W^T u [3m] there, of a body whose frame moves that of its deformation.
-  void first_coefficients(Eigen::VectorXd& coefficients) noexcept;
-  /// c*(k, a), of a free body that of its deformation.
-  template <typename Coefficients>
-  void set_target(const Coefficients& target) noexcept {
-    for (Eigen::Index k = 0; k < space_.functions(); ++k)
-      for (int a = 0; a < 3; ++a) workspace_.potential.target[a * space_.filter().stride + k] = target(k, a);
+  /// Coefficients of the examples there into the workspace; of a body whose frame moves those of its deformation.
+  void first_coefficients() noexcept;
+  /// c* [3m] of a group of examples, of a body whose frame moves that of its deformation.
+  void set_target(std::size_t group, const Eigen::VectorXd& target) noexcept {
+    workspace_.potential.target.segment(3 * model_.examples[group].first, target.size()) = target;
   }
 
   /// u* [f] of an elastic example force, in any frame, in place of set_target().
-  void set_elastic_target(const Eigen::VectorXd& shape) noexcept;
+  void set_elastic_target(std::size_t group, const Eigen::VectorXd& shape) noexcept;
 
   void solve() noexcept;
 
@@ -160,6 +171,7 @@ class FullStep {
   void carry(Eigen::VectorXd& d) const noexcept;
   bool find_contacts() noexcept;
   void precondition_freely() noexcept;
+  void filter_coefficients() noexcept;
   void hold(Eigen::VectorXd& d) const noexcept;
   void end_attachments() noexcept;
   bool is_attached() const noexcept { return is_held(memory_.attachments); }

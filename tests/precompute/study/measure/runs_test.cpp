@@ -55,9 +55,12 @@ TEST_F(Runs, WithAllModesAreTheFullSpace) {
   config.examples->damping = 2;
   config.examples->bias = 0.5;
   config.examples->target_iterations = 50;
-  const TrajectoryErrors found = errors(config, {0.05, 0.1, 0.2, 0.4});
-  EXPECT_LE(found.position.max, 1e-7);
-  EXPECT_LE(found.velocity.max, 1e-6);
+  for (const bool given : {false, true}) {
+    if (given) config.examples->weights = Eigen::Vector3d(0.1, 0.7, 0.2);
+    const TrajectoryErrors found = errors(config, {0.05, 0.1, 0.2, 0.4});
+    EXPECT_LE(found.position.max, 1e-7);
+    EXPECT_LE(found.velocity.max, 1e-6);
+  }
   EXPECT_LE(found.energy, 1e-6);
   EXPECT_EQ(reduced_.frames.steps, 40);
   EXPECT_EQ(reduced_.modes, static_cast<std::size_t>(bar_.modes()));
@@ -194,14 +197,14 @@ TEST_F(Runs, StopAtNumbersThatAreNotFinite) {
   EXPECT_THROW(run_reduced(config, {0.1}), WorkError);
 }
 
-TEST_F(Runs, TakeNoKeysAndNoGivenWeights) {
+TEST_F(Runs, TakeNoKeysAndAWeightForEachExample) {
   make({.cells = {2, 1, 1}, .examples = 3});
   SceneConfig config = scene();
   config.gravity_keys = {{0}, {config.gravity}};
   EXPECT_THROW(run_reduced(config, {0.1}), InputError);
   EXPECT_THROW(run_full_space(config, bar_.model, {0.1}), InputError);
   config.gravity_keys = {};
-  config.examples.emplace().weights = Eigen::Vector3d::UnitX();
+  config.examples.emplace().weights = Eigen::Vector2d::UnitX();
   EXPECT_THROW(run_full_space(config, bar_.model, {0.1}), InputError);
 }
 

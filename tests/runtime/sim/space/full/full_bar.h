@@ -47,6 +47,7 @@ struct FullBar {
     RowMatrix filter;
     if (options.functions > 0) filter = 0.3 * test::random_matrix(mesh.vertex_count(), options.functions, 5);
     model = FullModel(FullSpace(mesh, materials, fixed, filter));
+    if (options.functions > 0) model.examples.push_back({.functions = options.functions});
   }
 
   /// [f] the same force [N] on each vertex of the end.
