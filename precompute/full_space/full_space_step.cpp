@@ -169,7 +169,7 @@ void FullSpaceStep::commit() {
   state_.elastic_energy = potential_->elastic_energy();
   ++state_.step;
   state_.time = static_cast<double>(state_.step) * scene_.time_step;
-  state_.begins_anew = terms_.contacts != nullptr || touches_others_;
+  state_.begins_anew = terms_.contacts != nullptr;
   state_.contacts.count = 0;
   if (terms_.contacts != nullptr) {
     model_.contacts->commit(state_.q, contacts_, state_.contacts);
@@ -179,11 +179,9 @@ void FullSpaceStep::commit() {
   state_.examples = std::move(examples_);
 }
 
-bool FullSpaceStep::begin(bool touches_others) {
-  touches_others_ = touches_others;
+bool FullSpaceStep::begin() {
   gather_external_force();
-  const bool touches = find_contacts() || touches_others;
-  const Integrator integrator = touches ? Integrator::kBackwardEuler : scene_.integrator;
+  const Integrator integrator = find_contacts() ? Integrator::kBackwardEuler : scene_.integrator;
   set_form(integrator);
   set_rate_centre(integrator);
   potential_.emplace(model_, scene_, state_, terms_);

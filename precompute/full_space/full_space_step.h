@@ -9,8 +9,8 @@
 
 namespace exmat::precompute {
 
-/// One step of a body from its beginning to its end, for the body alone or with others that it touches: begin(), then
-/// whoever minimises the potential in d(), then finish().
+/// One step of a body from its beginning to its end: begin(), then whoever minimises the potential in d(), then
+/// finish().
 class FullSpaceStep {
  public:
   FullSpaceStep(const FullSpaceModel& model, const FullSpaceScene& scene, FullSpaceState& state,
@@ -19,9 +19,8 @@ class FullSpaceStep {
   FullSpaceStep(const FullSpaceStep&) = delete;
   FullSpaceStep& operator=(const FullSpaceStep&) = delete;
 
-  /// True if the potential can be minimised: all numbers are finite. Near obstacles and others it is that of backward
-  /// Euler.
-  bool begin(bool touches_others);
+  /// True if the potential can be minimised: all numbers are finite. Near obstacles it is that of backward Euler.
+  bool begin();
 
   StepPotential& potential() { return *potential_; }
   Eigen::VectorXd& d() { return d_; }  ///< [f] change of the displacement; the first iterate, then the solution
@@ -58,7 +57,6 @@ class FullSpaceStep {
   std::vector<runtime::ExampleState> examples_;  // at the end of the step, of those that act
   std::optional<StepPotential> potential_;
   Eigen::VectorXd d_;
-  bool touches_others_ = false;
 };
 
 }  // namespace exmat::precompute

@@ -36,8 +36,7 @@ FullSpaceReport step(const FullSpaceModel& model, const FullSpaceScene& scene, F
                      FullSpaceWorkspace& workspace) {
   const Timer timer;
   FullSpaceStep one(model, scene, state, workspace);
-  const NewtonStatus status =
-      one.begin(/*touches_others=*/false) ? minimise(scene, workspace, one) : NewtonStatus::kNonFinite;
+  const NewtonStatus status = one.begin() ? minimise(scene, workspace, one) : NewtonStatus::kNonFinite;
   FullSpaceReport report = one.finish(status);
   report.seconds = timer.seconds();
   return report;

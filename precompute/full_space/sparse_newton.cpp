@@ -14,7 +14,7 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 class Minimisation {
  public:
-  Minimisation(SparsePotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
+  Minimisation(StepPotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
                Eigen::VectorXd& d)
       : potential_(potential), settings_(settings), solver_(solver), d_(d) {}
 
@@ -25,7 +25,7 @@ class Minimisation {
   bool find_direction();
   bool move();
 
-  SparsePotential& potential_;
+  StepPotential& potential_;
   const runtime::NewtonSettings& settings_;
   SparseDirection& solver_;
   Eigen::VectorXd& d_;
@@ -101,7 +101,7 @@ NewtonReport Minimisation::run() {
 
 }  // namespace
 
-NewtonReport minimise_step(SparsePotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
+NewtonReport minimise_step(StepPotential& potential, const runtime::NewtonSettings& settings, SparseDirection& solver,
                            Eigen::VectorXd& d) {
   return Minimisation(potential, settings, solver, d).run();
 }

@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "precompute/full_space/full_space_stepper.h"
-#include "precompute/full_space/sparse_potential.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/step/integrator.h"
 
@@ -56,7 +55,7 @@ struct StepTerms {
 /// the terms of runtime::IncrementalPotential in full space, summed over the example forces; an elastic one
 /// has e E*(q - u*) and of the filter the damping alone, k = c_kappa c_v. The skew part of P has no potential: in
 /// values its force is that of the iterate last accepted. Hessians leave out how the frame of a free body turns.
-class StepPotential : public SparsePotential {
+class StepPotential {
  public:
   StepPotential(const FullSpaceModel& model, const FullSpaceScene& scene, const FullSpaceState& state,
                 const StepTerms& terms);
@@ -70,14 +69,17 @@ class StepPotential : public SparsePotential {
   void prepare();
 
   /// evaluate_first(): at the d of start(), whose elasticity serves.
-  runtime::PotentialEvaluation evaluate_first(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) override;
-  runtime::PotentialEvaluation evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient) override;
-  runtime::PotentialValue value(const Eigen::VectorXd& d) const override;
-  void accept(runtime::PotentialEvaluation& evaluation) override;
+  runtime::PotentialEvaluation evaluate_first(const Eigen::VectorXd& d, Eigen::VectorXd& gradient);
+  runtime::PotentialEvaluation evaluate(const Eigen::VectorXd& d, Eigen::VectorXd& gradient);
+  runtime::PotentialValue value(const Eigen::VectorXd& d) const;
+  /// The d of the last evaluate() is the next iterate.
+  void accept(runtime::PotentialEvaluation& evaluation);
 
-  void assemble(const Eigen::VectorXd& d, runtime::Tangent tangent) override;
-  LowerTriangle& hessian() override { return hessian_; }
-  Eigen::VectorXd product(const Eigen::VectorXd& x) const override;
+  /// The sparse part of the Hessian at the d of the last evaluate(), and the product with all of it. With projected
+  /// tangents at the first iterate, damping is frozen anew: evaluate again.
+  void assemble(const Eigen::VectorXd& d, runtime::Tangent tangent);
+  LowerTriangle& hessian() { return hessian_; }
+  Eigen::VectorXd product(const Eigen::VectorXd& x) const;
   /// Its part that hessian() has not, of the filters of example forces; empty where there is none.
   Eigen::VectorXd filter_product(const Eigen::VectorXd& x) const;
 

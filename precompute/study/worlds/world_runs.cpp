@@ -3,18 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
-#include <memory>
 #include <utility>
 
-#include "common/bundle/bundle.h"
 #include "common/core/error.h"
 #include "common/core/progress.h"
 #include "common/core/timer.h"
-#include "precompute/full_space/full_space_world.h"
-#include "precompute/full_space/scene_setup.h"
 #include "precompute/study/measure/runs.h"
 #include "runtime/scene/bodies.h"
-#include "runtime/scene/obstacle_loader.h"
 #include "runtime/scene/samples.h"
 #include "runtime/scene/world_loader.h"
 
@@ -75,39 +70,9 @@ void run(double time_step, const std::vector<double>& times, const Take& take, c
   }
 }
 
-/// A scene of one body, at one of the places of its kind.
-SceneConfig placed(SceneConfig scene, const BodyPlace& place) {
-  BodyConfig& body = scene.body;
-  const bool moves = !place.position.isZero(0) || !place.orientation.isApprox(Eigen::Quaterniond::Identity(), 0);
-  if (!moves) return scene;
-  body.position = place.position + body.position.value_or(Eigen::Vector3d::Zero());
-  body.orientation = place.orientation * body.orientation.value_or(Eigen::Quaterniond::Identity());
-  return scene;
-}
-
-/// A kind of bodies in full space.
-struct FullKind {
-  explicit FullKind(const SceneConfig& its_scene)
-      : config(its_scene),
-        data(read_bundle(its_scene.bundle)),
-        model(build_full_space_model(data, full_space_options(its_scene))),
-        scene(full_space_scene(its_scene, runtime::make_obstacles(its_scene), model)) {}
-
-  FullSpaceState start(const BodyPlace& place) const {
-    const RowMatrix& basis = data.modal->basis;
-    return full_space_start(placed(config, place), model,
-                            basis * runtime::start_coordinates(config, data, basis.cols()));
-  }
-
-  SceneConfig config;
-  ReducedModel data;
-  FullSpaceModel model;
-  FullSpaceScene scene;
-};
-
 }  // namespace
 
-WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>& times) {
+WorldRun run_world(const WorldConfig& config, const std::vector<double>& times) {
   const runtime::LoadedWorld loaded = runtime::load_world_run(config);
   runtime::Bodies bodies(loaded, config);
   runtime::World& world = bodies.world();
@@ -136,43 +101,15 @@ WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>&
     WorldFrame now = world_frame(kind.data, *kind.model->frame, world.state(body), kind.full.get());
     frames.positions.push_back(std::move(now.positions));
     frames.velocities.push_back(std::move(now.velocities));
-    add_energies(runtime::energies(*kind.model, kind.scene, world.state(body)), frames);
+    add_energies(runtime::energies(kind.full.get(), *kind.model, kind.scene, world.state(body)), frames);
   };
   run(config.time_step, times, take, record, result);
   return result;
 }
 
-WorldRun run_full_space_world(const WorldConfig& config, const std::vector<double>& times) {
-  FullSpaceWorld world(
-      {config.contact.stiffness, config.contact.damping, config.contact.friction, config.contact.release});
-  std::vector<std::unique_ptr<const FullKind>> kinds;
-  WorldRun result;
-  for (const BodiesConfig& bodies : config.bodies) {
-    kinds.push_back(std::make_unique<const FullKind>(bodies.scene));
-    const FullKind& kind = *kinds.back();
-    for (std::size_t i = 0; i < bodies.places.size(); ++i) {
-      world.add(kind.data, kind.model, kind.scene, kind.start(bodies.places[i]));
-      result.names.push_back(bodies.places.size() == 1 ? bodies.name : fmt::format("{}_{}", bodies.name, i));
-      result.kinds.push_back(kinds.size() - 1);
-    }
-  }
-  const auto take = [&] {
-    const FullSpaceWorldReport report = world.step();
-    StepCount step{.unconverged = report.unconverged, .non_finite = report.non_finite};
-    for (std::size_t i = 0; i < world.count(); ++i) {
-      step.newton_iterations = std::max(step.newton_iterations, world.body(i).report.newton_iterations);
-      step.factorisations = std::max(step.factorisations, world.body(i).report.factorisations);
-    }
-    return step;
-  };
-  const auto record = [&](std::size_t i, BodyFrames& frames) {
-    const FullSpaceBody& body = world.body(i);
-    frames.positions.push_back(world_positions(*body.model, body.state));
-    frames.velocities.push_back(world_velocities(*body.model, body.state));
-    add_energies(energies(*body.model, *body.scene, body.state), frames);
-  };
-  run(config.time_step, times, take, record, result);
-  return result;
+WorldRun run_full_space_world(WorldConfig config, const std::vector<double>& times) {
+  for (BodiesConfig& bodies : config.bodies) bodies.scene.space = {.space = Space::kFull, .newton = {50, 1e-8}};
+  return run_world(config, times);
 }
 
 std::vector<StepTimes> time_worlds(const std::vector<WorldConfig>& scenes, const TimingConfig& config) {

@@ -18,12 +18,12 @@ struct WorldRun {
   std::vector<std::size_t> modes, elements;  ///< r and s of each kind; none in full space
 };
 
-/// Steps the reduced bodies up to the last of `times`, each a multiple of the time step. Throws WorkError at a number
-/// that is not finite.
-WorldRun run_reduced_world(const WorldConfig& config, const std::vector<double>& times);
+/// Steps the bodies up to the last of `times`, each a multiple of the time step. Throws WorkError at a number that is
+/// not finite.
+WorldRun run_world(const WorldConfig& config, const std::vector<double>& times);
 
-/// The same with all degrees of freedom of all bodies, of whole bundles.
-WorldRun run_full_space_world(const WorldConfig& config, const std::vector<double>& times);
+/// The same with all bodies in full space, solved to 1e-8 of the forces; their bundles have /full_space.
+WorldRun run_full_space_world(WorldConfig config, const std::vector<double>& times);
 
 /// Times of steps of all bodies over their number [s], by one thread, of each scene in turns.
 std::vector<StepTimes> time_worlds(const std::vector<WorldConfig>& scenes, const TimingConfig& config);

@@ -173,6 +173,7 @@ std::size_t WorldStudy::plan_bundle(std::size_t kind, const PointSettings& setti
   if (found != bundles_.end()) return static_cast<std::size_t>(found - bundles_.begin());
   plan.asset = with_settings(assets_[kind], settings);
   plan.needs = needs_of(with_settings(world_.bodies[kind].scene, settings));
+  plan.needs.full_space = true;  // the reference's
   // Bases learn from the body alone.
   plan.scene = with_force(world_.bodies[kind].scene, settings);
   plan.scene.meets_others = plan.scene.meets_bodies = false;
@@ -346,7 +347,7 @@ Ordered error_json(const std::string& name, const TrajectoryErrors& errors) {
 }
 
 void WorldStudy::run_point(const WorldPointPlan& plan) const {
-  const WorldRun run = run_reduced_world(config_of(plan.settings, plan.bundles), result_.times);
+  const WorldRun run = run_world(config_of(plan.settings, plan.bundles), result_.times);
   const WorldRun full = read_reference(references_[plan.reference]);
   std::vector<Weighed> kinds;
   std::vector<bool> free;
