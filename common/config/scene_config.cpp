@@ -5,6 +5,7 @@
 #include <cmath>
 #include <fmt/format.h>
 
+#include "common/config/attachment_reader.h"
 #include "common/config/config.h"
 #include "common/config/json_file.h"
 #include "common/config/json_values.h"
@@ -203,7 +204,10 @@ SceneConfig scene_of(const Json& json, const std::filesystem::path& file) {
     throw InputError({file.string(), "/bodies", "a scene of one body, by \"bundle\"", "one of several",
                       "run and bench of exmat-runtime step scenes of several; what is asked for here takes one of the "
                       "bodies as a scene of its own, with the \"bundle\" and members of that body at the root"});
-  return scene_of(json, json, file, "");
+  SceneConfig scene = scene_of(json, json, file, "");
+  scene.attachments =
+      std::move(read_attachments(json, file, {{"", static_cast<std::size_t>(scene.instances)}}).front());
+  return scene;
 }
 
 SceneConfig load_scene(const std::filesystem::path& file) { return scene_of(read_json(file), file); }
@@ -232,6 +236,10 @@ WorldConfig world_of(const Json& json, const std::filesystem::path& file) {
     bodies.scene.instances = static_cast<int>(bodies.places.size());
     world.bodies.push_back(std::move(bodies));
   }
+  std::vector<NamedBodies> names;
+  for (const BodiesConfig& bodies : world.bodies) names.push_back({bodies.name, bodies.places.size()});
+  auto attachments = read_attachments(json, file, names);
+  for (std::size_t i = 0; i < attachments.size(); ++i) world.bodies[i].scene.attachments = std::move(attachments[i]);
   const SceneConfig& shared = world.bodies.front().scene;
   world.time_step = shared.time_step;
   world.steps = shared.steps;

@@ -153,6 +153,18 @@ struct BodyConfig {
   std::optional<AnimationConfig> animation;  ///< moves the bones of a body on a skeleton
 };
 
+/// A patch of bodies of one kind that the world or an obstacle holds.
+struct AttachmentConfig {
+  std::string place;                      ///< JSON pointer in the scene's file
+  std::optional<std::size_t> only{};      ///< the one of these bodies; absent: all of them
+  VertexSelection vertices{};             ///< of the object
+  std::optional<std::size_t> obstacle{};  ///< of the scene's; absent: the world
+  std::vector<KeyframeConfig> motion{};   ///< of the frame, of the world
+  AttachmentKind kind = AttachmentKind::kFixed;
+  double stiffness = 1e4, damping = 0;                           ///< both for a spring [N/m], [N s/m]
+  double break_force = std::numeric_limits<double>::infinity();  ///< [N]
+};
+
 /// SCENE.json after validation, paths resolved against its folder. schemas/scene.json.
 struct SceneConfig {
   std::filesystem::path file;
@@ -174,6 +186,7 @@ struct SceneConfig {
   std::vector<RegionForceConfig> regions;
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
+  std::vector<AttachmentConfig> attachments;
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact
   MeetingGroup meeting;
   bool meets_others = false;  ///< contact with obstacles and bodies that a host adds; no file sets it

@@ -61,6 +61,12 @@ enum class Interpolation { kLinear, kStep };
 template <>
 inline constexpr std::array<std::string_view, 2> kNames<Interpolation>{"linear", "step"};
 
+/// Hold of a frame on a patch of a body: each vertex at its place in the frame, in full space, or their mean and the
+/// rotation that fits them best, of a body in its modes; their mean alone; their mean by a spring and a damper.
+enum class AttachmentKind { kFixed, kBall, kSpring };
+template <>
+inline constexpr std::array<std::string_view, 3> kNames<AttachmentKind>{"fixed", "ball", "spring"};
+
 /// Lambda of the descriptors (docs/method.md, "Shape space"): the eigenvalues, or ones.
 enum class Weighting { kEigenvalue, kNone };
 template <>

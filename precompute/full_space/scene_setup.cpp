@@ -23,6 +23,10 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
   const auto require_part = [&](bool needed, bool there, const char* group) {
     if (needed && !there)
       throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
+  if (!config.attachments.empty())
+    throw InputError({file, config.attachments.front().place,
+                      "no attachment: nothing holds a body of the full-space reference", "one",
+                      "let the asset fix these vertices"});
                         "precompute the bundle again with this scene (--scene)"});
   };
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");

@@ -4,15 +4,12 @@
 #include <mutex>
 
 #include "common/elastic/polar_rotation.h"
-#include "common/mesh/assembly.h"
 #include "exmat/exmat.h"
 #include "runtime/api/frames.h"
 #include "runtime/api/handles.h"
 #include "runtime/api/reading.h"
 #include "runtime/api/world_handle.h"
-#include "runtime/sim/space/full/full_body.h"
-#include "runtime/sim/step/attachment_terms.h"
-#include "runtime/sim/step/contact_step.h"
+#include "runtime/scene/attachment_loader.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -37,80 +34,14 @@ exmat_attachment default_attachment() noexcept {
   return {sizeof(exmat_attachment), EXMAT_ATTACHMENT_FIXED, 1e4, 0, std::numeric_limits<double>::infinity()};
 }
 
-bool steps_in_modes(const exmat_body& body) noexcept {
-  return body.full() == nullptr || body.scene.space.space == Space::kReduced;
-}
+bool steps_in_modes(const exmat_body& body) noexcept { return runtime::steps_in_modes(body.full(), body.scene); }
 
-/// The vertices of a patch.
-struct Patch {
-  PointSet points{};  ///< with rows of the basis, of a body that steps in its modes alone
-  Eigen::VectorXd masses{};
-  Eigen::Matrix3Xd here{};  ///< world [m]
-};
-
-/// Null, or why the k-th vertex cannot be held.
-const char* fault_of(const exmat_body& body, const Patch& patch, std::size_t k, std::int64_t vertex) {
-  const bool fixed = steps_in_modes(body)
-                         ? patch.points.basis_rows.middleRows<3>(3 * static_cast<Eigen::Index>(k)).isZero(0)
-                         : body.full()->space.number(vertex) < 0;
-  if (fixed) return "it is fixed";
-  for (const Attachment& other : body.state.attachments)
-    if (other.holds() && std::ranges::count(other.vertices, vertex) > 0) return "it is held already";
-  return nullptr;
-}
-
-Patch patch_in_modes(std::span<const std::int64_t> vertices, const exmat_body& body) {
-  Patch patch;
+Patch read_patch(const std::vector<std::int32_t>& vertices, const exmat_body& body) {
+  if (!steps_in_modes(body)) return {vertices, {}, {}, {}};
+  const std::vector<std::int64_t> ids(vertices.begin(), vertices.end());
   const std::lock_guard lock(reading());
-  patch.points = read_vertices(*body.source, vertices);
-  const ReducedModel data = read_groups(*body.source, {"object"});
-  const Eigen::VectorXd masses = scalar_mass(data.object->mesh, data.object->materials.density) *
-                                 Eigen::VectorXd::Ones(data.object->mesh.vertex_count());
-  const Placement placement = body.model().frame->placement(body.state.frame);
-  patch.masses.resize(std::ssize(vertices));
-  patch.here.resize(3, std::ssize(vertices));
-  for (Eigen::Index k = 0; k < patch.masses.size(); ++k) {
-    patch.masses[k] = masses[vertices[static_cast<std::size_t>(k)]];
-    const Eigen::Vector3d rest = patch.points.rest.row(k);
-    patch.here.col(k) = placement.to_world(rest + patch.points.basis_rows.middleRows<3>(3 * k) * body.state.q);
-  }
-  return patch;
-}
-
-Patch patch_in_full(std::span<const std::int64_t> vertices, exmat_body& body) {
-  const FullModel& full = *body.full();
-  Patch patch;
-  enter_full_space(full, body.model(), body.state);
-  const Placement placement = body.model().frame->placement(body.state.frame);
-  const Eigen::VectorXd masses = full.space.masses();
-  patch.masses.resize(std::ssize(vertices));
-  patch.here.resize(3, std::ssize(vertices));
-  for (Eigen::Index k = 0; k < patch.masses.size(); ++k) {
-    const Eigen::Index vertex = vertices[static_cast<std::size_t>(k)];
-    patch.masses[k] = masses[full.space.place(vertex)];
-    patch.here.col(k) =
-        full.rest.row(vertex).transpose() + full_displacement(full, placement, *body.state.full, vertex);
-  }
-  return patch;
-}
-
-/// Adds the data that steps in modes need to the attachment. Throws where modes cannot hold it beside the others.
-void reduce(const Patch& patch, exmat_body& body, Attachment& attachment) {
-  if (attachment.kind != AttachmentKind::kSpring && body.world->world.may_touch(place_of(body)))
-    throw InvalidArgument(
-        "kind: a body that may touch others is held by springs while it steps in its modes: expected a spring, a model "
-        "of space full or auto, or a world with law.apart = 1");
-  const BodyPose pose = pose_of(body.model(), body.state);
-  VertexArray rest = patch.points.rest;
-  rest.rowwise() -= pose.origin.transpose();
-  reduce_patch(rest, patch.points.basis_rows, attachment);
-  attachment.mean = attachment.mean_before = mean_of(attachment, pose);
-  std::vector<Attachment> all = body.state.attachments;
-  all.push_back(attachment);
-  if (!can_hold(all, *body.model().frame, pose))
-    throw InvalidArgument(
-        "vertices: the modes of the body cannot hold them beside what is held or fixed: expected a ball or a spring, "
-        "other vertices, or a model of space full or auto");
+  RowMatrix rows = read_vertices(*body.source, ids).basis_rows;
+  return make_patch(*read_groups(*body.source, {"object"}).object, vertices, std::move(rows));
 }
 
 void attach(std::span<const std::int64_t> vertices, const exmat_attachment& settings, const double* frame,
@@ -120,31 +51,22 @@ void attach(std::span<const std::int64_t> vertices, const exmat_attachment& sett
   attachment.stiffness = settings.stiffness;
   attachment.damping = settings.damping;
   attachment.break_force = settings.break_force;
+  attachment.id = body.next_attachment;
   set_frame(frame, attachment);
   const std::int64_t count = body.source->loaded.summary.vertices;
+  std::vector<std::int32_t> ids;
   for (const std::int64_t vertex : vertices) {
     if (vertex < 0 || vertex >= count)
       throw InvalidArgument("vertices: " + std::to_string(vertex) + ": there is no such vertex");
-    if (std::ranges::count(attachment.vertices, vertex) > 0)
+    if (std::ranges::count(ids, vertex) > 0)
       throw InvalidArgument("vertices: " + std::to_string(vertex) + " is there twice");
-    attachment.vertices.push_back(static_cast<std::int32_t>(vertex));
+    ids.push_back(static_cast<std::int32_t>(vertex));
   }
-  const bool in_modes = steps_in_modes(body);
-  Patch patch;
-  if (in_modes) patch = patch_in_modes(vertices, body);
-  for (std::size_t k = 0; k < vertices.size(); ++k)
-    if (const char* fault = fault_of(body, patch, k, vertices[k]))
-      throw InvalidArgument("vertices: " + std::to_string(vertices[k]) + ": " + fault);
-  if (!in_modes) patch = patch_in_full(vertices, body);
-  attachment.shares = patch.masses / patch.masses.sum();
-  attachment.places = attachment.rotation.transpose() * (patch.here.colwise() - attachment.position);
-  attachment.rotation_before = attachment.rotation;
-  attachment.position_before = attachment.position;
-  if (in_modes) reduce(patch, body, attachment);
-  attachment.id = id = body.next_attachment++;
-  body.state.attachments.push_back(std::move(attachment));
-  if (in_modes) body.world->world.fit_attachments(place_of(body));
-  body.state.begins_anew = true;
+  if (const auto fault = hold(body.model(), body.full(), body.scene, body.world->world.may_touch(place_of(body)),
+                              read_patch(ids, body), std::move(attachment), body.state))
+    throw InvalidArgument(std::string(fault->member) + ": " + fault->found + ": expected " + fault->expected);
+  id = body.next_attachment++;
+  if (steps_in_modes(body)) body.world->world.fit_attachments(place_of(body));
   was_put(body);
 }
 
@@ -185,6 +107,7 @@ exmat_status exmat_body_move_attachment(exmat_body* body, std::int64_t id, const
   if (const exmat_status status = check_frames(__func__, "frame", frame, 1)) return status;
   Attachment* const attachment = find(__func__, *body, id);
   if (attachment == nullptr) return EXMAT_INVALID_ARGUMENT;
+  attachment->motion.reset();
   set_frame(frame, *attachment);
   return EXMAT_OK;
 }

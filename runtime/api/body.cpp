@@ -6,6 +6,7 @@
 #include "runtime/api/arguments.h"
 #include "runtime/api/body_steps.h"
 #include "runtime/api/world_handle.h"
+#include "runtime/scene/world_loader.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -13,7 +14,7 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 namespace exmat::runtime {
 
 void put_to_start(exmat_body& body) noexcept {
-  body.state = body.start;  // vectors of the same lengths: no allocation
+  body.state = body.start;  // vectors of the same lengths, but perhaps attachments: no allocation
   body.load.setZero();
   begin_steps(body);
   was_put(body);
@@ -69,6 +70,7 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start
   Workspace workspace(model(), scene);
   refresh_weights(model(), scene, start, workspace);
   state = start;
+  next_attachment = std::ssize(state.attachments);
 }
 
 exmat_body::~exmat_body() = default;
@@ -78,7 +80,7 @@ exmat_status exmat_body_create(const exmat_model* model, exmat_body** body) noex
   *body = nullptr;
   EXMAT_REQUIRE(model);
   return guarded(__func__, [&] {
-    auto made = std::make_unique<exmat_body>(model->source, model->source->loaded.start);
+    auto made = std::make_unique<exmat_body>(model->source, start_of(model->source->loaded));
     join_own(*made);
     *body = made.release();
   });

@@ -173,8 +173,9 @@ std::unique_ptr<exmat_world> load_world(const WorldConfig& config) {
   }
   for (LoadedBody& body : loaded.bodies) {
     const std::shared_ptr<const Source>& source = sources[body.kind];
-    auto made = std::make_unique<exmat_body>(source, start_of(source->loaded, body.place));
+    auto made = std::make_unique<exmat_body>(source, start_of(source->loaded, body));
     join(*world, loaded.kinds[body.kind].surface, std::move(body.name), *made);
+    hold_by_copies(loaded.obstacles, *made);
     static_cast<void>(made.release());
     world->members.back().kind = static_cast<std::int64_t>(body.kind);
   }
@@ -186,6 +187,7 @@ void join_own(exmat_body& body) {
   world->is_own = true;
   take_obstacles(body.source->loaded.scene.obstacles, *world);
   join(*world, nullptr, "", body);
+  hold_by_copies(body.source->loaded.scene.obstacles, body);
   body.own = std::move(world);
 }
 

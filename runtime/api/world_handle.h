@@ -82,4 +82,7 @@ void meet_obstacles(exmat_body& body);
 /// A world's obstacles from now on: copies of a scene's.
 void take_obstacles(const Obstacles& obstacles, exmat_world& world);
 
+/// After that: what these hold of a body of the world goes with the copies.
+void hold_by_copies(const Obstacles& obstacles, exmat_body& body);
+
 }  // namespace exmat::runtime

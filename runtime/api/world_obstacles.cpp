@@ -299,6 +299,14 @@ void take_obstacles(const Obstacles& obstacles, exmat_world& world) {
     world.obstacles.push_back({world.next_obstacle++, std::make_shared<Obstacle>(*obstacle), false});
 }
 
+void hold_by_copies(const Obstacles& obstacles, exmat_body& body) {
+  for (State* const state : {&body.start, &body.state})
+    for (Attachment& attachment : state->attachments)
+      for (std::size_t i = 0; i < obstacles.size(); ++i)
+        if (attachment.motion == obstacles[i].motion())
+          attachment.motion = SharedObstacle(body.world->obstacles[i].obstacle).motion();
+}
+
 }  // namespace exmat::runtime
 
 exmat_status exmat_obstacle_default(exmat_obstacle* obstacle, std::size_t size) noexcept {

@@ -21,6 +21,11 @@ bool may_touch_each_other(const LoadedWorld& loaded) {
   return std::ranges::any_of(loaded.kinds, [](const LoadedKind& kind) { return kind.surface != nullptr; });
 }
 
+std::string body_name(const LoadedWorld& loaded, int body) {
+  const std::string& name = loaded.bodies[static_cast<std::size_t>(body)].name;
+  return name.empty() ? fmt::format("body {}", body) : fmt::format("body \"{}\"", name);
+}
+
 void print_times(const RunSummary& summary, const WorldConfig& config) {
   const bool several = summary.bodies > 1;
   const double mean = summary.step_seconds.mean();
@@ -63,6 +68,9 @@ void print_summary(const RunSummary& summary, const LoadedWorld& loaded, const W
     print("energy at the start", fmt::format("{:.6g} J", summary.start.total()));
     print("deepest contact", fmt::format("{:.3g} m between bodies at the end", summary.deepest));
   }
+  for (const BrokenAttachment& broken : summary.broken)
+    print("broken attachment", fmt::format("{} of {} at {:g} s, under {:.4g} N", broken.place,
+                                           body_name(loaded, broken.body), broken.time, broken.force));
   if (summary.largest_displacement)
     print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
   print("state hash", fmt::format("{:016x}", summary.state_hash));
@@ -111,10 +119,7 @@ void warn_of_steps(const RunSummary& summary, const WorldConfig& config) {
 
 void warn_of_overlap(const RunSummary& summary, const LoadedWorld& loaded, const WorldConfig& config) {
   if (!summary.overlap) return;
-  const auto name_of = [&](int body) {
-    const std::string& name = loaded.bodies[static_cast<std::size_t>(body)].name;
-    return name.empty() ? fmt::format("body {}", body) : fmt::format("body \"{}\"", name);
-  };
+  const auto name_of = [&](int body) { return body_name(loaded, body); };
   const StartOverlap& overlap = *summary.overlap;
   log::warning(fmt::format(
       "{} starts {:.3g} m inside {} (its vertex {}): what overlaps at the start is let out at {:g} m/s "

@@ -23,6 +23,7 @@ SymbolSizes sizes_of(const ReducedModel& model, const TrajectoryInfo& info) {
   sizes.set("n", model.object->mesh.vertex_count(), "the bundle");
   sizes.set("n_t", model.object->mesh.tet_count(), "the bundle");
   sizes.set("r", model.modal->basis.cols(), "the bundle");
+  if (info.attachments > 0) sizes.set("a", info.attachments, "the scene");
   if (!model.render) return sizes;
   sizes.set("v", model.render->tets.size(), "the bundle");
   sizes.set("f", model.render->triangles.rows(), "the bundle");
@@ -65,8 +66,8 @@ BodyFrames::BodyFrames(Hdf5File& file, std::string group, const NamedBody& body,
       displacements_(model_.object->mesh.vertex_count(), 3),
       velocities_(model_.object->mesh.vertex_count(), 3) {
   write_run(file, group_.empty() ? "/" : group_, model_, info_);
-  write_body_groups(file, group_, model_.render.has_value(), info_.weights);
   const SymbolSizes sizes = sizes_of(model_, info_);
+  write_body_groups(file, group_, sizes, info_.weights);
   const auto write = [&](const char* name, const auto& array) {
     const DatasetSchema& schema = trajectory_schema().dataset(name);
     write_dataset(file, schema, group_ + schema.path, sizes.evaluate(schema.dims), array.data());
@@ -95,6 +96,15 @@ void BodyFrames::append(const State& state, const Energies& energies, double ste
   datasets_->step_time.append(step_seconds);
   for (std::size_t i = 0; i < info_.weights.size(); ++i)
     datasets_->weights[i].append(row_of(state.examples[info_.weights[i].force].weights));
+  if (info_.attachments == 0) return;
+  Eigen::Matrix3Xd forces(3, info_.attachments), torques = forces;
+  for (Eigen::Index i = 0; i < forces.cols(); ++i) {
+    const Attachment& attachment = state.attachments[static_cast<std::size_t>(i)];
+    forces.col(i) = attachment.force;
+    torques.col(i) = attachment.torque;
+  }
+  datasets_->attachment_forces->append(row_of(forces));
+  datasets_->attachment_torques->append(row_of(torques));
 }
 
 /// World positions and velocities, and displacements in the body's frame.

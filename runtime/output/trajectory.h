@@ -24,6 +24,7 @@ struct TrajectoryInfo {
   double time_step = 0;     ///< [s]
   std::int64_t frames = 0;  ///< that will be appended
   std::vector<WeightInfo> weights{};
+  std::int64_t attachments = 0;  ///< that hold the body
 };
 
 /// A body whose frames a trajectory holds.

@@ -8,13 +8,15 @@
 
 namespace exmat::runtime {
 
-void write_body_groups(Hdf5File& file, const std::string& parent, bool render, const std::vector<WeightInfo>& forces) {
+void write_body_groups(Hdf5File& file, const std::string& parent, const SymbolSizes& sizes,
+                       const std::vector<WeightInfo>& forces) {
   const auto regional = [](const WeightInfo& force) { return !force.region.empty(); };
   for (const GroupSchema& group : trajectory_schema().groups) {
     if (group.group == "bodies") continue;
     if (group.group == "examples" && std::ranges::all_of(forces, regional)) continue;
     if (group.group == "regions" && std::ranges::none_of(forces, regional)) continue;
-    if (group.group == "render" && !render) continue;
+    if (group.group == "render" && sizes.find("v") == nullptr) continue;
+    if (group.group == "attachments" && sizes.find("a") == nullptr) continue;
     if (is_single(group.path)) {
       write_group(file, group, parent + group.path);
       continue;
@@ -39,12 +41,13 @@ TrajectoryRows::TrajectoryRows(Hdf5File& file, const std::string& group, const S
 }
 
 void TrajectoryRows::finish() {
-  for (RowWriter* dataset : {&time, &positions, reduced ? &*reduced : nullptr,
-                             reduced_velocity ? &*reduced_velocity : nullptr, &body_position, &body_orientation,
-                             &linear_momentum, &angular_momentum, &kinetic, &elastic, &potential, &step_time})
-    if (dataset != nullptr) dataset->finish();
+  for (RowWriter* dataset : {&time, &positions, &body_position, &body_orientation, &linear_momentum, &angular_momentum,
+                             &kinetic, &elastic, &potential, &step_time})
+    dataset->finish();
   for (RowWriter& dataset : weights) dataset.finish();
-  if (render) render->finish();
+  for (std::optional<RowWriter>* dataset :
+       {&reduced, &reduced_velocity, &attachment_forces, &attachment_torques, &render})
+    if (*dataset) (*dataset)->finish();
 }
 
 RowWriter TrajectoryRows::rows(const char* path) const {

@@ -19,14 +19,16 @@ struct WeightInfo {
   std::int64_t count = 0;  ///< K
 };
 
-/// Writes the groups of one body below `parent`: "" for the root, or "/bodies/NAME".
-void write_body_groups(Hdf5File& file, const std::string& parent, bool render, const std::vector<WeightInfo>& forces);
+/// Writes the groups of one body below `parent`: "" for the root, or "/bodies/NAME". Bound v: with the render mesh; a:
+/// with attachments.
+void write_body_groups(Hdf5File& file, const std::string& parent, const SymbolSizes& sizes,
+                       const std::vector<WeightInfo>& forces);
 
 /// Open datasets of one body's frames, in the order of the format.
 class TrajectoryRows {
  public:
   /// Below `group`, as write_body_groups(), which comes first. Bound r: with reduced coordinates; v: with the render
-  /// mesh.
+  /// mesh; a: with attachments.
   TrajectoryRows(Hdf5File& file, const std::string& group, const SymbolSizes& sizes,
                  const std::vector<WeightInfo>& forces);
   TrajectoryRows(const TrajectoryRows&) = delete;
@@ -60,13 +62,16 @@ class TrajectoryRows {
   RowWriter elastic = rows("/energy/elastic");
   RowWriter potential = rows("/energy/potential");
   RowWriter step_time = rows("/step_time");
+  std::optional<RowWriter> attachment_forces = rows_if("a", "/attachments/force");
+  std::optional<RowWriter> attachment_torques = rows_if("a", "/attachments/torque");
   std::vector<RowWriter> weights;   ///< in the order of `forces`
   std::optional<RowWriter> render;  ///< vertices of the render mesh
 };
 
-inline std::span<const double> row_of(const Eigen::VectorXd& vector) {
-  return {vector.data(), static_cast<std::size_t>(vector.size())};
+/// All numbers of a vector, or of a matrix by columns.
+template <typename Numbers>
+std::span<const double> row_of(const Eigen::PlainObjectBase<Numbers>& numbers) {
+  return {numbers.data(), static_cast<std::size_t>(numbers.size())};
 }
-inline std::span<const double> row_of(const Eigen::Vector3d& vector) { return {vector.data(), 3}; }
 
 }  // namespace exmat::runtime

@@ -23,8 +23,12 @@ SurfaceFile read_plain_surface(const std::filesystem::path& file) { refuse_file(
 
 RowMatrix read_heights(const std::filesystem::path& file) { refuse_file(file); }
 
-// Settings name no forces.
+// Settings name no forces and no attachments.
 std::vector<VertexForceConfig> forces_on_vertices(const SceneConfig& config) { return config.forces; }
+std::vector<std::int32_t> select_vertices(const SceneConfig&, const ObjectData&, const VertexSelection&,
+                                          const std::string&) {
+  return {};
+}
 
 }  // namespace exmat
 

@@ -46,7 +46,7 @@ std::vector<WorldBodyStart> Bodies::starts() const {
   bodies.reserve(loaded_.bodies.size());
   for (const LoadedBody& body : loaded_.bodies) {
     const LoadedKind& kind = loaded_.kinds[body.kind];
-    State state = start_of(kind.loaded, body.place);
+    State state = start_of(kind.loaded, body);
     state.examples = examples[body.kind];
     bodies.push_back(
         {{kind.loaded.model.get(), &scenes_[body.kind], kind.surface, kind.loaded.full.get()}, std::move(state)});

@@ -10,6 +10,7 @@
 #include "common/config/scene_needs.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
 #include "runtime/sim/lanes/lane_step.h"
@@ -133,7 +134,7 @@ ExampleSettings example_settings(const ExampleForceConfig& config) {
   return settings;
 }
 
-StepScene step_scene(const SceneConfig& config, const Obstacles* obstacles, LoadedScene& loaded) {
+StepScene step_scene(const SceneConfig& config, const Obstacles& obstacles, LoadedScene& loaded) {
   StepScene scene;
   scene.time_step = config.time_step;
   scene.integrator = config.integrator;
@@ -148,7 +149,7 @@ StepScene step_scene(const SceneConfig& config, const Obstacles* obstacles, Load
                  /*forces=*/!loaded.summary.knows_scene,
                  {config.space.newton.max_iterations, config.space.newton.tolerance}};
   scene.meeting = config.meeting;
-  scene.obstacles = obstacles != nullptr ? obstacles_of(config.meeting, *obstacles) : make_obstacles(config);
+  scene.obstacles = obstacles_of(config.meeting, obstacles);
   if (loaded.model->skeleton) scene.space.space = Space::kFull;
   if (const auto& animation = config.body.animation)
     scene.animation = BonePlay{loaded.model->skeleton->find_animation(animation->name), animation->speed,
@@ -321,9 +322,11 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   if (steps_in_full) loaded.full = prepare_full_space(config, loaded);
   loaded.keys = make_keys(config, *loaded.model);
   check_animation(config, loaded);
-  loaded.scene = step_scene(config, obstacles, loaded);
+  const Obstacles all = obstacles != nullptr ? *obstacles : make_obstacles(config.obstacles);
+  loaded.scene = step_scene(config, all, loaded);
   if (steps_in_full) check_full_space(config, loaded);
   loaded.start = start_state(config, loaded);
+  loaded.attachments = load_attachments(config, all, loaded);
   count_bytes(loaded.records, loaded.ledger);
   loaded.poses = named_poses(loaded);
   loaded.element_weights = loaded.data.cubature->weights;
@@ -389,6 +392,7 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   } else {
     plan.push_back(fmt::format("scripted forces: {}", scene.forces.size()));
   }
+  if (!loaded.attachments.empty()) plan.push_back(fmt::format("attachments: {}", loaded.attachments.size()));
   if (model.frame->moves())
     plan.push_back(fmt::format("rigid motion: {}", model.frame->description()));
   else

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,14 +20,26 @@ struct NamedPose {
   Eigen::VectorXd pose;  ///< r
 };
 
+struct Patch;
+
+/// A hold of a scene on bodies of one kind. runtime/scene/attachment_loader.h.
+struct LoadedAttachment {
+  std::string file, place;               ///< in the scene
+  std::optional<std::size_t> only{};     ///< the one of these bodies; absent: all of them
+  bool may_touch = false;                ///< they may touch others
+  std::shared_ptr<const Patch> patch{};  ///< vertices that it holds
+  Attachment attachment{};               ///< all but these, and id and frame
+};
+
 /// A scene ready to step, and how it came to be.
 struct LoadedScene {
   std::unique_ptr<const Model> model;
   std::unique_ptr<const FullModel> full;  ///< present where the scene, or a host, may have steps in full space
   StepScene scene;                        ///< settings with keys as strong as they ever are
   SceneKeys keys;  ///< settings that change in time: to be applied to a copy of the scene before each step
-  State start;     ///< start of every body
+  State start;     ///< start of every body, before anything holds it
   std::vector<VertexForceConfig> forces;  ///< forces of the scene's file, their vertices known
+  std::vector<LoadedAttachment> attachments;
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;            ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;            ///< datasets that were read, in order

@@ -4,17 +4,20 @@
 #include <memory>
 #include <mutex>
 #include <span>
+#include <utility>
 
 #include "common/core/progress.h"
 #include "common/core/timer.h"
 #include "runtime/output/trajectory.h"
+#include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/contact_load.h"
 #include "runtime/scene/state_file.h"
 
 namespace exmat::runtime {
 namespace {
 
-TrajectoryInfo trajectory_info(const LoadedScene& kind, const SceneConfig& scene, const WorldConfig& config) {
+TrajectoryInfo trajectory_info(const LoadedScene& kind, std::size_t number, const SceneConfig& scene,
+                               const WorldConfig& config) {
   const std::filesystem::path folder = std::filesystem::absolute(*config.trajectory).parent_path();
   const std::string bundle =
       std::filesystem::proximate(std::filesystem::absolute(scene.bundle), folder).generic_string();
@@ -24,6 +27,7 @@ TrajectoryInfo trajectory_info(const LoadedScene& kind, const SceneConfig& scene
     const ExampleModel& examples = kind.model->examples[i];
     if (acts(kind.scene.examples[i])) info.weights.push_back({i, examples.region, examples.weights.examples()});
   }
+  info.attachments = std::ssize(attachments_of(kind, number));
   return info;
 }
 
@@ -33,7 +37,7 @@ std::unique_ptr<TrajectoryWriter> open_trajectory(const LoadedWorld& loaded, con
   for (const LoadedBody& body : loaded.bodies) {
     const LoadedScene& kind = loaded.kinds[body.kind].loaded;
     bodies.push_back({body.name, kind.data, *kind.model->frame,
-                      trajectory_info(kind, config.bodies[body.kind].scene, config), kind.full.get()});
+                      trajectory_info(kind, body.number, config.bodies[body.kind].scene, config), kind.full.get()});
     if (!config.is_list) break;
   }
   return std::make_unique<TrajectoryWriter>(*config.trajectory, bodies);
@@ -89,6 +93,33 @@ class ContactKeeper final : public StepObserver {
   std::vector<std::size_t> changed_;
   std::vector<BodyTouch> touches_;
   bool is_new_ = false;
+};
+
+/// Finds attachments that break, step by step.
+class BreakFinder {
+ public:
+  explicit BreakFinder(const Bodies& bodies) : bodies_(bodies) {
+    for (int i = 0; i < bodies.count(); ++i)
+      for (const Attachment& attachment : bodies.world().state(i).attachments)
+        if (attachment.holds()) holding_.push_back({i, attachment.id});
+  }
+  /// Those that broke in the last step.
+  void find(std::vector<BrokenAttachment>& broken) {
+    std::erase_if(holding_, [&](const std::pair<int, std::int64_t>& held) {
+      const State& state = bodies_.world().state(held.first);
+      const Attachment& attachment = state.attachments[static_cast<std::size_t>(held.second)];
+      if (attachment.holds()) return false;
+      const LoadedBody& body = bodies_.loaded().bodies[static_cast<std::size_t>(held.first)];
+      const auto own = attachments_of(bodies_.loaded().kinds[body.kind].loaded, body.number);
+      broken.push_back(
+          {held.first, own[static_cast<std::size_t>(held.second)]->place, state.time, attachment.force.norm()});
+      return true;
+    });
+  }
+
+ private:
+  const Bodies& bodies_;
+  std::vector<std::pair<int, std::int64_t>> holding_;  // body and attachment
 };
 
 double deepest_of(const World& world) {
@@ -185,6 +216,7 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
   };
   if (trajectory) append(0);
   ContactKeeper contacts(bodies);
+  BreakFinder breaks(bodies);
   BodiesMemory before;  // the step, for the state file of one that fails
   Progress progress("steps", config.steps);
   while (summary.steps < config.steps) {
@@ -198,6 +230,7 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
     bodies.require_finite();
     if (options.keeps_contacts) contacts.add_touches();
     add(report, world, seconds, summary);
+    breaks.find(summary.broken);
     if (summary.steps == 1 && !options.from_state)
       summary.overlap = start_overlap(world, config.time_step * config.contact.release);
     const Timer output;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "runtime/scene/bodies.h"
@@ -34,6 +35,14 @@ struct StartOverlap {
   double depth = 0;  ///< [m]
 };
 
+/// An attachment that bore more than it can.
+struct BrokenAttachment {
+  int body = 0;       ///< number in the world
+  std::string place;  ///< JSON pointer in the scene
+  double time = 0;    ///< end of the step [s]
+  double force = 0;   ///< in that step [N]
+};
+
 /// Results of a run.
 struct RunSummary {
   std::int64_t steps = 0;  ///< steps of each body
@@ -52,6 +61,7 @@ struct RunSummary {
   std::int64_t unconverged_islands = 0;              ///< sum over all steps
   double deepest = 0;                                ///< that a vertex is inside another body at the end [m]
   Energies start, end;                               ///< sums over all bodies
+  std::vector<BrokenAttachment> broken;              ///< in this run, in order
   std::optional<StartOverlap> overlap;               ///< the deepest, where bodies overlap something at the start
   std::uint64_t state_hash = 0;                      ///< hash of all bodies at the end; see Bodies::hash
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< origin of the trajectory [m]

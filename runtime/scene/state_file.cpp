@@ -73,7 +73,7 @@ class Reader {
       require_text(from, place, "name", body.name);
       require_text(from, place, "bundle_input_sha256", kind.summary.input_sha256);
     }
-    State& state = memory.states.emplace_back(start_of(kind, body.place));
+    State& state = memory.states.emplace_back(start_of(kind, body));
     read_body_state(file_, place, from, kind, state);
     if (state.step != memory.states.front().step)
       refuse(place + "/step", fmt::format("{}, as of the first body", memory.states.front().step),

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/core/error.h"
+#include "runtime/sim/frame/frame_numbers.h"
 
 namespace exmat::runtime {
 namespace {
@@ -35,6 +36,28 @@ constexpr VertexMember kVertexArrays[] = {{"displacement", &FullMotion::q},
                                           {"displacement_before", &FullMotion::q_previous},
                                           {"velocity_before", &FullMotion::v_previous}};
 
+// Those of an Attachment that are vectors.
+struct AttachmentVector {
+  const char* name;
+  Eigen::Vector3d Attachment::*member;
+};
+constexpr std::size_t kNumbersBefore = 13;  // of a FreeStart
+constexpr AttachmentVector kAttachmentVectors[] = {{"force", &Attachment::force},
+                                                   {"torque", &Attachment::torque},
+                                                   {"mean", &Attachment::mean},
+                                                   {"mean_before", &Attachment::mean_before}};
+
+/// What the next step of a held free body in its modes knows of the step before; null of other bodies. The state may be
+/// const.
+auto* frame_before(auto& state) {
+  auto* const free = std::get_if<FreeState>(&state.frame);
+  return free != nullptr && holds_modes(state.attachments) ? &free->before : nullptr;
+}
+
+void visit_numbers(auto& before, auto&& visitor) {
+  visitor(before.position, before.orientation.coeffs(), before.linear_momentum, before.angular_momentum);
+}
+
 // One body of a file.
 class BodyReader {
  public:
@@ -58,6 +81,7 @@ class BodyReader {
     for (std::size_t i = 0; i < state.examples.size(); ++i) read_examples(i, state.examples[i]);
     read_contacts(state.contacts);
     read_full_space(state);
+    read_attachments(state);
   }
 
  private:
@@ -79,6 +103,20 @@ class BodyReader {
     read_array(name + "target", from["target"], examples.target);
     examples.has_target = from["has_target"];
     examples.target_converged = from["target_converged"];
+  }
+  void read_attachments(State& state) const {
+    std::vector<Attachment>& attachments = state.attachments;
+    const Json from = body_.value("attachments", Json::array());
+    require_count("/attachments", from.size(), attachments.size());
+    for (std::size_t i = 0; i < attachments.size(); ++i) {
+      attachments[i].broken = from[i]["broken"];
+      for (const auto& [name, member] : kAttachmentVectors) attachments[i].*member = vector_of(from[i][name]);
+    }
+    FreeStart* const before = frame_before(state);
+    if (before == nullptr) return;
+    const auto numbers = body_.value("frame_before", std::vector<double>());
+    require_count("/frame_before", numbers.size(), kNumbersBefore);
+    visit_numbers(*before, NumberReader{numbers});
   }
   void read_full_space(State& state) const {
     if (loaded_.model->skeleton && !(body_.contains("full_space") && body_["full_space"].contains("skeleton")))
@@ -154,6 +192,15 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
       for (const auto& [name, member] : kVertexArrays) full[name] = array_of((*state.full).*member);
       if (state.full->skeleton) full["skeleton"] = array_of(numbers_of(*state.full->skeleton));
     }
+  }
+  if (const FreeStart* const before = frame_before(state)) {
+    NumberWriter writer;
+    visit_numbers(*before, writer);
+    body["frame_before"] = writer.numbers;
+  }
+  for (const Attachment& attachment : state.attachments) {
+    OrderedJson& own = body["attachments"].emplace_back(OrderedJson{{"broken", attachment.broken}});
+    for (const auto& [name, member] : kAttachmentVectors) own[name] = array_of(attachment.*member);
   }
   for (const HeldContact& held : std::span(state.contacts.held).first(state.contacts.count)) {
     body["contacts"].push_back({{"vertex", held.vertex},

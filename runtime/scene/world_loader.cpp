@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "common/core/error.h"
+#include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/obstacle_loader.h"
 
 namespace exmat::runtime {
@@ -17,13 +18,16 @@ void check_places(const WorldConfig& config, const BodiesConfig& bodies, bool co
 
 }  // namespace
 
-State start_of(const LoadedScene& kind, const BodyPlace& place) {
+State start_of(const LoadedScene& kind, const LoadedBody& body) {
   State state = kind.start;
-  if (place.position.isZero(0) && place.orientation.coeffs() == Eigen::Quaterniond::Identity().coeffs()) return state;
-  FrameMotion motion = kind.model->frame->motion(state.frame);
-  motion.position += place.position;
-  motion.orientation = place.orientation * motion.orientation;
-  set_motion(*kind.model, motion, state);
+  const BodyPlace& place = body.place;
+  if (!place.position.isZero(0) || place.orientation.coeffs() != Eigen::Quaterniond::Identity().coeffs()) {
+    FrameMotion motion = kind.model->frame->motion(state.frame);
+    motion.position += place.position;
+    motion.orientation = place.orientation * motion.orientation;
+    set_motion(*kind.model, motion, state);
+  }
+  hold_body(kind, body.number, state);
   return state;
 }
 
@@ -46,8 +50,8 @@ LoadedWorld load_world_run(const WorldConfig& config) {
     if (bodies.scene.meets_bodies) kind.surface = touching_surface(*loaded.model, loaded.data, config.contact.self);
     for (std::size_t i = 0; i < bodies.places.size(); ++i) {
       const bool has_number = config.is_list && bodies.places.size() > 1;
-      world.bodies.push_back(
-          {has_number ? fmt::format("{}_{}", bodies.name, i) : bodies.name, world.kinds.size() - 1, bodies.places[i]});
+      world.bodies.push_back({has_number ? fmt::format("{}_{}", bodies.name, i) : bodies.name, world.kinds.size() - 1,
+                              i, bodies.places[i]});
     }
   }
   return world;

@@ -18,9 +18,10 @@ struct LoadedKind {
 
 /// A body of a loaded scene.
 struct LoadedBody {
-  std::string name;      ///< that of its kind, with its number where there are several: teddy_12
-  std::size_t kind = 0;  ///< in LoadedWorld::kinds
-  BodyPlace place;
+  std::string name;        ///< that of its kind, with its number where there are several: teddy_12
+  std::size_t kind = 0;    ///< in LoadedWorld::kinds
+  std::size_t number = 0;  ///< among those of its kind
+  BodyPlace place{};
 };
 
 /// All bodies of a scene, ready to step.
@@ -34,8 +35,8 @@ struct LoadedWorld {
 /// places.
 LoadedWorld load_world_run(const WorldConfig& config);
 
-/// The start of a body of a kind at one of its places.
-State start_of(const LoadedScene& kind, const BodyPlace& place);
+/// The start of a body of a kind. Throws InputError where what is to hold it cannot.
+State start_of(const LoadedScene& kind, const LoadedBody& body = {});
 
 /// The surface of bodies of a model, from what /object and /modal of its bundle hold.
 std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, const ReducedModel& data,

@@ -118,6 +118,7 @@ TEST(Choices, AreThoseOfTheAsset) {
 TEST(Choices, AreThoseOfTheScene) {
   expect_names<Integrator>("scene", "/properties/integrator/enum");
   expect_names<ForceMethod>("scene", "/properties/internal_force/enum");
+  expect_names<AttachmentKind>("scene", "/properties/attachments/items/properties/kind/enum");
   for (const std::string examples : {"/properties/examples", "/properties/regions/items"}) {
     expect_names<TargetSource>("scene", (examples + "/properties/target/enum").c_str());
     expect_names<EnergyReference>("scene", (examples + "/properties/energy_reference/enum").c_str());

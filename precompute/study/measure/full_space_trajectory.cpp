@@ -27,8 +27,16 @@ std::vector<runtime::WeightInfo> acting(const SceneConfig& config, const FullSpa
   return forces;
 }
 
+SymbolSizes sizes_of(const ReducedModel& data, std::int64_t frames) {
+  SymbolSizes sizes;
+  sizes.set("F", frames, "the scene");
+  sizes.set("n", data.object->mesh.vertex_count(), "the bundle");
+  sizes.set("n_t", data.object->mesh.tet_count(), "the bundle");
+  return sizes;
+}
+
 Hdf5File create_file(const AtomicFile& output, const SceneConfig& config, const ReducedModel& data,
-                     const std::vector<runtime::WeightInfo>& forces) {
+                     const SymbolSizes& sizes, const std::vector<runtime::WeightInfo>& forces) {
   Hdf5File file = Hdf5File::create(output.temporary(), output.target().string());
   write_header(file, trajectory_schema(), generator_name());
   file.write_attribute("/", "asset_name", data.asset_name);
@@ -36,16 +44,8 @@ Hdf5File create_file(const AtomicFile& output, const SceneConfig& config, const 
   file.write_attribute("/", "bundle", std::string());
   file.write_attribute("/", "integrator", std::string(name_of(config.integrator)));
   file.write_attribute("/", "time_step", config.time_step);
-  runtime::write_body_groups(file, "", false, forces);
+  runtime::write_body_groups(file, "", sizes, forces);
   return file;
-}
-
-SymbolSizes sizes_of(const ReducedModel& data, std::int64_t frames) {
-  SymbolSizes sizes;
-  sizes.set("F", frames, "the scene");
-  sizes.set("n", data.object->mesh.vertex_count(), "the bundle");
-  sizes.set("n_t", data.object->mesh.tet_count(), "the bundle");
-  return sizes;
 }
 
 }  // namespace
@@ -56,7 +56,7 @@ FullSpaceTrajectory::FullSpaceTrajectory(const std::filesystem::path& file, cons
       body_(body),
       output_(file),
       weights_(acting(config, body)),
-      file_(create_file(output_, config, data, weights_)),
+      file_(create_file(output_, config, data, sizes_of(data, frames), weights_)),
       mass_(scalar_mass(data.object->mesh, data.object->materials.density)) {
   const SymbolSizes sizes = sizes_of(data, frames);
   const DatasetSchema& tets = trajectory_schema().dataset("/tets");

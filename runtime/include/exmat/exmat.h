@@ -372,13 +372,15 @@ typedef struct exmat_attachment {
 EXMAT_API exmat_status exmat_attachment_default(exmat_attachment* attachment, size_t size) EXMAT_NOEXCEPT;
 
 /* From the next step on, by where `vertices` [count] of the object are now in the frame. None of them may be fixed, or
-   held already. `id` of the attachment is the body's own. Of a body of space _REDUCED the bundle is read; its modes
-   have to be able to hold the patch, and a body that may touch others is held by springs alone. */
+   held already. `id` of the attachment is the body's own; those that a scene gives it have the ids 0, 1, ... in the
+   scene's order and are there again after a reset. Of a body of space _REDUCED the bundle is read; its modes have to be
+   able to hold the patch, and a body that may touch others is held by springs alone. */
 EXMAT_API exmat_status exmat_body_attach(exmat_body* body, const int64_t* vertices, int64_t count,
                                          const exmat_attachment* attachment, const double* frame,
                                          int64_t* id) EXMAT_NOEXCEPT;
 
-/* Where the frame is at the end of the next step, and of those after it until the next call. */
+/* Where the frame is at the end of the next step, and of those after it until the next call; one of a scene follows
+   neither its motion nor its obstacle from then on. */
 EXMAT_API exmat_status exmat_body_move_attachment(exmat_body* body, int64_t id, const double* frame) EXMAT_NOEXCEPT;
 
 /* Lets the patch go. */

@@ -89,6 +89,8 @@ class SharedObstacle {
 
   const Obstacle& operator*() const noexcept { return *obstacle_; }
   const Obstacle* operator->() const noexcept { return obstacle_.get(); }
+  /// Its motion, which keeps it alive.
+  std::shared_ptr<const RigidMotion> motion() const noexcept { return {obstacle_, &obstacle_->motion}; }
 
  private:
   std::shared_ptr<const Obstacle> obstacle_;

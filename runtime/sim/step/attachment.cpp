@@ -9,6 +9,22 @@ constexpr double kFlat = 1e-12;  // of the largest second moment: vertices on an
 
 }  // namespace
 
+void Attachment::follow(double start, double end) noexcept {
+  if (!motion) return;
+  const MotionSample from = motion->sample(start), to = motion->sample(end);
+  rotation_before = from.rotation;
+  position_before = from.position;
+  rotation = to.rotation;
+  position = to.position;
+}
+
+void take_hold(const Eigen::VectorXd& masses, const Eigen::Matrix3Xd& here, Attachment& attachment) {
+  attachment.shares = masses / masses.sum();
+  attachment.places = attachment.rotation.transpose() * (here.colwise() - attachment.position);
+  attachment.rotation_before = attachment.rotation;
+  attachment.position_before = attachment.position;
+}
+
 void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment) {
   ReducedPatch& patch = attachment.patch;
   const bool turns = attachment.kind == AttachmentKind::kFixed;

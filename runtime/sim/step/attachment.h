@@ -4,16 +4,15 @@
 #include <algorithm>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "common/core/arrays.h"
+#include "common/model/choices.h"
+#include "runtime/sim/frame/motion.h"
 
 namespace exmat::runtime {
-
-/// Hold of a host's frame on a patch of a body: each vertex at its place in the frame, in full space, or their mean and
-/// the rotation that fits them best, of a body in its modes; their mean alone; their mean by a spring and a damper.
-enum class AttachmentKind { kFixed, kBall, kSpring };
 
 /// Patch in the modes. Its moments are rest + rows q, in the frame of the body: the mean of its vertices beyond
 /// Placement::origin [m] and, of a fixed one, sum_k s_k p_k y_k^T [m^2] by rows, s the shares, p the places about their
@@ -25,7 +24,7 @@ struct ReducedPatch {
   double square = 0;      ///< sum_k s_k |p_k|^2 [m^2]
 };
 
-/// A patch of a body that a frame of a host holds. No two hold the same vertex.
+/// A patch of a body that a frame holds, which its host moves or a motion. No two hold the same vertex.
 struct Attachment {
   std::int64_t id = 0;
   AttachmentKind kind = AttachmentKind::kFixed;
@@ -35,6 +34,7 @@ struct Attachment {
   double stiffness = 0, damping = 0;                             ///< both for a spring [N/m], [N s/m]
   double break_force = std::numeric_limits<double>::infinity();  ///< [N]
   ReducedPatch patch;                                            ///< filled for a body that steps in its modes
+  std::shared_ptr<const RigidMotion> motion{};  ///< of the frame, perhaps an obstacle's; null: its host moves it
 
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< frame to world, at the end of the next step
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< world [m]
@@ -46,6 +46,9 @@ struct Attachment {
   Eigen::Vector3d force = Eigen::Vector3d::Zero();   ///< on the frame, of the last step [N]
   Eigen::Vector3d torque = Eigen::Vector3d::Zero();  ///< about its origin [N m]
   bool broken = false;                               ///< the force was larger than it bears: it holds no longer
+
+  /// Puts the frame where its motion has it at the ends of a step [s], if it has one.
+  void follow(double start, double end) noexcept;
 
   bool holds() const noexcept { return !broken; }
   /// True if steps in modes see it.
@@ -69,6 +72,9 @@ inline bool is_held(std::span<const Attachment> attachments) noexcept {
 inline bool holds_modes(std::span<const Attachment> attachments) noexcept {
   return std::ranges::any_of(attachments, &Attachment::holds_modes);
 }
+
+/// Sets shares and places of the vertices, whose masses are these [k], from where they are in the world [3 x k].
+void take_hold(const Eigen::VectorXd& masses, const Eigen::Matrix3Xd& here, Attachment& attachment);
 
 /// Sets the patch of an attachment that has kind, shares and places: of vertices at rest at `rest` [k x 3] beyond
 /// Placement::origin, with `basis_rows` [3k x r].

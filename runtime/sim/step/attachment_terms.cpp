@@ -51,6 +51,12 @@ Eigen::Matrix3d second_moment(const ReducedPatch& patch, const Eigen::VectorXd& 
   return Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(rows.data());
 }
 
+Eigen::Index conditions_of(std::span<const Attachment> attachments) noexcept {
+  Eigen::Index count = 0;
+  for (const Attachment& attachment : attachments) count += attachment.conditions();
+  return count;
+}
+
 /// Calls use(attachment, its number, its first condition).
 template <typename Use>
 void for_conditions(std::span<const Attachment> attachments, const Use& use) {
@@ -66,8 +72,7 @@ void for_conditions(std::span<const Attachment> attachments, const Use& use) {
 
 AttachmentWorkspace::AttachmentWorkspace(std::span<const Attachment> attachments, Eigen::Index modes,
                                          Eigen::Index unknowns) {
-  Eigen::Index count = 0;
-  for (const Attachment& attachment : attachments) count += attachment.conditions();
+  const Eigen::Index count = conditions_of(attachments);
   sums.set_zero(modes);
   forces.setZero(3, std::ssize(attachments));
   torques = forces;
@@ -77,6 +82,10 @@ AttachmentWorkspace::AttachmentWorkspace(std::span<const Attachment> attachments
   product.setIdentity(count, count);
   inverse = product;
   if (count > 0) factor.compute(product);
+}
+
+bool AttachmentWorkspace::fits(std::span<const Attachment> attachments) const noexcept {
+  return forces.cols() == std::ssize(attachments) && conditions() == conditions_of(attachments);
 }
 
 void AttachmentWorkspace::invert() noexcept {

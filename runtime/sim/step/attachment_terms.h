@@ -16,6 +16,8 @@ struct AttachmentWorkspace {
   AttachmentWorkspace(std::span<const Attachment> attachments, Eigen::Index modes, Eigen::Index unknowns);
 
   Eigen::Index conditions() const noexcept { return violation.size(); }
+  /// True if it has the size for steps with these.
+  bool fits(std::span<const Attachment> attachments) const noexcept;
 
   ContactSums sums;                                ///< total of all attachments on the body, at the last evaluation
   Eigen::Matrix3Xd forces;                         ///< one per attachment, on the body at its mean, world [N]

@@ -137,8 +137,24 @@ Workspace& World::scratch(int body) noexcept {
 
 void World::prepare(int threads) {
   crowd_.prepare(threads);
-  for (const Member& own : bodies_)
+  for (int i = 0; i < count(); ++i) {
+    const Member& own = at(i);
     if (own.full != nullptr) own.full->fit(*own.kind.full, *own.kind.scene);
+    if (!holds_modes(own.state->attachments)) continue;
+    const Workspace* const scratch = own.touching ? &own.touching->workspace : own.held.get();
+    if (scratch == nullptr || !scratch->near || !scratch->near->held.fits(own.state->attachments)) fit_attachments(i);
+  }
+}
+
+/// Frames that a motion moves go where it has them at the end of the step; what broke bears nothing.
+void World::move_attachments() noexcept {
+  for (const Member& own : bodies_)
+    for (Attachment& attachment : own.state->attachments) {
+      attachment.follow(own.state->time, static_cast<double>(own.state->step + 1) * own.kind.scene->time_step);
+      if (!attachment.broken) continue;
+      attachment.force.setZero();
+      attachment.torque.setZero();
+    }
 }
 
 /// Scratch for the first body of a kind that enters full space: later ones make theirs as they enter.
@@ -228,6 +244,7 @@ void World::choose_spaces() {
 
 WorldReport World::step(int threads, StepObserver* observer) {
   prepare(threads);
+  move_attachments();
   find_sleepers(threads);
   choose_spaces();
   find_contacts(threads);

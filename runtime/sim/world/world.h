@@ -50,7 +50,7 @@ class World {
   void forget(int body);
   /// To be called after its scene has other obstacles: scratch and state hold the contacts with these.
   void fit(int body);
-  /// To be called after a host attached the body in its modes: scratch holds the attachments.
+  /// To be called after a host attached the body in its modes: scratch holds the attachments. Steps do it themselves.
   void fit_attachments(int body);
   /// True if a body may touch others or itself.
   bool may_touch(int body) const noexcept { return at(body).touching != nullptr; }
@@ -116,6 +116,7 @@ class World {
   Member& at(int body) noexcept { return bodies_[static_cast<std::size_t>(body)]; }
   WorldBody& touching(int body) const noexcept { return *at(body).touching; }
   void wake_neighbours(int body);
+  void move_attachments() noexcept;
   void find_sleepers(int threads);
   void find_contacts(int threads);
   void find_pairs(int threads);

@@ -190,7 +190,25 @@ TEST(LoadScene, ReadsEveryMember) {
     "forces": [{"vertices": {"ids": [10, 11]}, "force": [0, 0, 50], "start": 0.25, "end": 0.5},
                {"vertices": {"file": "ids.txt"}, "force": [1, 0, 0]},
                {"vertices": {"part": "hand"}, "force": [1, 0, 0]}, {"vertices": {"point": [1, 2, 3]}, "force": [1, 0, 0]}],
+    "attachments": [{"vertices": {"part": "hand"}, "body": 3, "to": "world", "kind": "spring", "stiffness": 50,
+                     "damping": 7, "break_force": 9, "motion": [{"time": 0}, {"time": 1, "position": [1, 0, 0]}]},
+                    {"vertices": {"file": "ids.txt"}}],
     "output": {"trajectory": "run.h5", "every": 2, "render": true}})");
+  ASSERT_EQ(scene.attachments.size(), 2u);
+  EXPECT_EQ(scene.attachments[0].place, "/attachments/0");
+  EXPECT_EQ(std::get<PartSelection>(scene.attachments[0].vertices).name, "hand");
+  EXPECT_EQ(scene.attachments[0].only, 3U);
+  EXPECT_EQ(scene.attachments[0].kind, AttachmentKind::kSpring);
+  EXPECT_EQ(scene.attachments[0].stiffness, 50);
+  EXPECT_EQ(scene.attachments[0].damping, 7);
+  EXPECT_EQ(scene.attachments[0].break_force, 9);
+  EXPECT_EQ(scene.attachments[0].motion.size(), 2U);
+  EXPECT_FALSE(scene.attachments[0].obstacle || scene.attachments[1].obstacle || scene.attachments[1].only);
+  EXPECT_EQ(std::get<FileSelection>(scene.attachments[1].vertices).file, folder / "ids.txt");
+  EXPECT_EQ(scene.attachments[1].kind, AttachmentKind::kFixed);
+  EXPECT_EQ(scene.attachments[1].stiffness, 1e4);
+  EXPECT_EQ(scene.attachments[1].damping, 0);
+  EXPECT_EQ(scene.attachments[1].break_force, std::numeric_limits<double>::infinity());
   EXPECT_EQ(scene.time_step, 0.01);
   EXPECT_EQ(scene.steps, 20);
   EXPECT_EQ(scene.gravity, Eigen::Vector3d(0, -0.98, 0));

@@ -139,3 +139,28 @@ def test_what_cannot_be_is_refused(hung, bundle):
     clamped = exmat.Model(bundle, space="full")
     with pytest.raises(exmat.InvalidArgument, match="fixed"):
         exmat.Body(clamped).attach(end_of(clamped)[0][:1], frame)
+
+
+def test_an_attachment_of_a_scene_goes_with_its_obstacle(free_bundle):
+    scene = {"bundle": free_bundle, "time_step": 0.004, "space": "full", "obstacles": [{"sphere": {"radius": 0.1, "center": [0, 9, 0]}}],
+             "attachments": [{"vertices": {"point": [0, 0, 0]}, "to": {"obstacle": 0}}]}
+    model = exmat.Model.from_scene(scene)
+    body = exmat.Body(model)
+    points = exmat.Points(model, np.arange(model.vertices))
+    start = body.positions(points, np.empty((model.vertices, 3)))
+    held = np.linalg.norm(start, axis=1).argmin()
+    for k in range(1, 20):
+        body.move_obstacle(0, exmat.Motion(position=(0, 0.002 * k, 0)))
+        body.step()
+        now = body.positions(points, np.empty((model.vertices, 3)))
+        assert np.abs(now[held] - start[held] - [0, 0.002 * k, 0]).max() < 1e-10
+    assert body.attachment_load(0)[0][1] < 0  # it is pulled up
+    body.move_attachment(0, frame_at([0, 0, 0]))
+    body.step()
+    assert np.abs(body.positions(points, np.empty((model.vertices, 3)))[held] - start[held]).max() < 1e-10
+    body.detach(0)
+    body.reset()
+    body.step()
+    assert np.abs(body.positions(points, np.empty((model.vertices, 3)))[held] - start[held] - [0, 0.002 * 19, 0]).max() < 1e-10
+    with pytest.raises(exmat.BadInput, match="/attachments/0/vertices"):
+        exmat.Model.from_scene({**scene, "attachments": [{"vertices": {"ids": [10**6]}}]})

@@ -1,0 +1,149 @@
+#include "runtime/scene/attachment_loader.h"
+
+#include <algorithm>
+#include <fmt/format.h>
+#include <utility>
+
+#include "common/bundle/scene_places.h"
+#include "common/core/error.h"
+#include "common/mesh/assembly.h"
+#include "runtime/scene/obstacle_loader.h"
+#include "runtime/sim/space/full/full_body.h"
+#include "runtime/sim/step/attachment_terms.h"
+#include "runtime/sim/step/contact_step.h"
+
+namespace exmat::runtime {
+namespace {
+
+/// What is to blame for the k-th vertex.
+std::optional<HoldFault> fault_of(const FullModel* full, bool in_modes, const Patch& patch, std::size_t k,
+                                  const State& state) {
+  const std::int32_t vertex = patch.vertices[k];
+  const bool is_fixed = in_modes ? patch.basis_rows.middleRows<3>(3 * static_cast<Eigen::Index>(k)).isZero(0)
+                                 : full->space.number(vertex) < 0;
+  if (is_fixed) return HoldFault{"vertices", "vertices that move", fmt::format("{}, which is fixed", vertex)};
+  for (const Attachment& other : state.attachments)
+    if (other.holds() && std::ranges::count(other.vertices, vertex) > 0)
+      return HoldFault{"vertices", "vertices that nothing holds", fmt::format("{}, which is held already", vertex)};
+  return std::nullopt;
+}
+
+/// Takes hold of a body in its modes.
+std::optional<HoldFault> hold_in_modes(const Model& model, const Patch& patch, Attachment& attachment, State& state) {
+  const BodyPose pose = pose_of(model, state);
+  const Placement placement = model.frame->placement(state.frame);
+  Eigen::Matrix3Xd here(3, patch.masses.size());
+  for (Eigen::Index k = 0; k < here.cols(); ++k)
+    here.col(k) = placement.to_world(patch.rest.row(k).transpose() + patch.basis_rows.middleRows<3>(3 * k) * state.q);
+  take_hold(patch.masses, here, attachment);
+  VertexArray rest = patch.rest;
+  rest.rowwise() -= pose.origin.transpose();
+  reduce_patch(rest, patch.basis_rows, attachment);
+  attachment.mean = attachment.mean_before = mean_of(attachment, pose);
+  std::vector<Attachment> all = state.attachments;
+  all.push_back(attachment);
+  if (can_hold(all, *model.frame, pose)) return std::nullopt;
+  return HoldFault{"vertices",
+                   "ones that the modes can hold beside what is held or fixed: a ball or a spring, other vertices, or "
+                   "space full or auto",
+                   "ones that the modes of the body cannot hold"};
+}
+
+void hold_in_full(const Model& model, const FullModel& full, const Patch& patch, Attachment& attachment, State& state) {
+  enter_full_space(full, model, state);
+  const Placement placement = model.frame->placement(state.frame);
+  const Eigen::VectorXd masses = full.space.masses();
+  Eigen::VectorXd own(std::ssize(patch.vertices));
+  Eigen::Matrix3Xd here(3, own.size());
+  for (Eigen::Index k = 0; k < own.size(); ++k) {
+    const Eigen::Index vertex = patch.vertices[static_cast<std::size_t>(k)];
+    own[k] = masses[full.space.place(vertex)];
+    here.col(k) = full.rest.row(vertex).transpose() + full_displacement(full, placement, *state.full, vertex);
+  }
+  take_hold(own, here, attachment);
+}
+
+}  // namespace
+
+bool steps_in_modes(const FullModel* full, const StepScene& scene) noexcept {
+  return full == nullptr || scene.space.space == Space::kReduced;
+}
+
+Patch make_patch(const ObjectData& object, std::vector<std::int32_t> vertices, RowMatrix basis_rows) {
+  Patch patch{std::move(vertices), {}, std::move(basis_rows), {}};
+  const Eigen::VectorXd masses =
+      scalar_mass(object.mesh, object.materials.density) * Eigen::VectorXd::Ones(object.mesh.vertex_count());
+  patch.masses = masses(patch.vertices);
+  patch.rest = object.mesh.vertices(patch.vertices, Eigen::all);
+  return patch;
+}
+
+std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
+                              const Patch& patch, Attachment attachment, State& state) {
+  const bool in_modes = steps_in_modes(full, scene);
+  if (in_modes && may_touch && attachment.kind != AttachmentKind::kSpring)
+    return HoldFault{"kind", "spring, or space full or auto: bodies that may touch others are held so in their modes",
+                     std::string(name_of(attachment.kind))};
+  for (std::size_t k = 0; k < patch.vertices.size(); ++k)
+    if (auto fault = fault_of(full, in_modes, patch, k, state)) return fault;
+  attachment.vertices = patch.vertices;
+  if (!in_modes)
+    hold_in_full(model, *full, patch, attachment, state);
+  else if (auto fault = hold_in_modes(model, patch, attachment, state))
+    return fault;
+  state.attachments.push_back(std::move(attachment));
+  state.begins_anew = true;
+  return std::nullopt;
+}
+
+std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const Obstacles& obstacles,
+                                               LoadedScene& loaded) {
+  std::vector<LoadedAttachment> attachments;
+  if (config.attachments.empty()) return attachments;
+  const BundleRequest request{.groups = {{"object", true, 0, "attachments hold vertices of it"}}};
+  const ObjectData object = *read_bundle(bundle_of(config), request, &loaded.records).object;
+  const bool in_modes = steps_in_modes(loaded.full.get(), loaded.scene);
+  for (const AttachmentConfig& own : config.attachments) {
+    LoadedAttachment& made = attachments.emplace_back(LoadedAttachment{config.file.string(), own.place, own.only});
+    made.may_touch = config.meets_bodies;
+    std::vector<std::int32_t> vertices = select_vertices(config, object, own.vertices, own.place + "/vertices");
+    RowMatrix rows;
+    if (in_modes) {
+      const std::vector<std::int64_t> ids(vertices.begin(), vertices.end());
+      rows = read_basis_rows(bundle_of(config), ids, &loaded.records);
+    }
+    made.patch = std::make_shared<Patch>(make_patch(object, std::move(vertices), std::move(rows)));
+    Attachment& attachment = made.attachment;
+    attachment.kind = own.kind;
+    attachment.stiffness = own.stiffness;
+    attachment.damping = own.damping;
+    attachment.break_force = own.break_force;
+    if (own.obstacle) {
+      const SharedObstacle& obstacle = obstacles[*own.obstacle];
+      attachment.motion = obstacle.motion();
+    } else {
+      attachment.motion = std::make_shared<RigidMotion>(make_motion(own.motion));
+    }
+  }
+  return attachments;
+}
+
+std::vector<const LoadedAttachment*> attachments_of(const LoadedScene& kind, std::size_t number) {
+  std::vector<const LoadedAttachment*> found;
+  for (const LoadedAttachment& own : kind.attachments)
+    if (!own.only || *own.only == number) found.push_back(&own);
+  return found;
+}
+
+void hold_body(const LoadedScene& kind, std::size_t number, State& state) {
+  for (const LoadedAttachment* const own : attachments_of(kind, number)) {
+    Attachment attachment = own->attachment;
+    attachment.id = std::ssize(state.attachments);
+    attachment.follow(state.time, state.time);
+    if (const auto fault =
+            hold(*kind.model, kind.full.get(), kind.scene, own->may_touch, *own->patch, std::move(attachment), state))
+      throw InputError({own->file, fmt::format("{}/{}", own->place, fault->member), fault->expected, fault->found, ""});
+  }
+}
+
+}  // namespace exmat::runtime

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "runtime/scene/scene_loader.h"
+
+namespace exmat::runtime {
+
+/// Vertices of a body that something is to hold.
+struct Patch {
+  std::vector<std::int32_t> vertices;  ///< k
+  VertexArray rest;                    ///< k x 3; this and the next two of a body that steps in its modes alone
+  RowMatrix basis_rows;                ///< 3k x r
+  Eigen::VectorXd masses;              ///< k
+};
+
+/// Reason why a body cannot be held as asked.
+struct HoldFault {
+  const char* member;  ///< that is to blame: "vertices" or "kind"
+  std::string expected, found;
+};
+
+/// True if bodies of this model and scene step in their modes alone.
+bool steps_in_modes(const FullModel* full, const StepScene& scene) noexcept;
+
+/// The patch of these vertices of an object, with `basis_rows` [3k x r] where the body steps in its modes.
+Patch make_patch(const ObjectData& object, std::vector<std::int32_t> vertices, RowMatrix basis_rows);
+
+/// Adds an attachment that has id, kind and frame to a body whose vertices it holds from where they are. Enters full
+/// space where bodies are held there. `may_touch`: the body may touch others. What is to blame, and the state is as it
+/// was, but perhaps in full space, where it cannot be held.
+std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
+                              const Patch& patch, Attachment attachment, State& state);
+
+/// The attachments of a scene for bodies of one kind; `obstacles` are all of the scene. Reads the bundle for places and
+/// masses. Throws InputError: no such vertex, nothing selected.
+std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const Obstacles& obstacles,
+                                               LoadedScene& loaded);
+
+/// Those that hold one of these bodies, in the order of its state's.
+std::vector<const LoadedAttachment*> attachments_of(const LoadedScene& kind, std::size_t number);
+
+/// These take hold of it where its state is. Throws InputError where they cannot.
+void hold_body(const LoadedScene& kind, std::size_t number, State& state);
+
+}  // namespace exmat::runtime
