@@ -93,6 +93,14 @@ BodyConfig read_body(const Json& json, const std::filesystem::path& file, const 
     body.animation = AnimationConfig{animation["name"], animation.value("speed", absent.speed),
                                      animation.value("loop", absent.loop), animation.value("start", absent.start)};
   }
+  const Json bones = member_or(json, "bones", Json::array());
+  for (std::size_t i = 0; i < bones.size(); ++i) {
+    const std::string own = fmt::format("{}/bones/{}", place, i);
+    const std::string joint = bones[i]["joint"];
+    if (std::ranges::find(body.bones, joint, &JointMotionConfig::joint) != body.bones.end())
+      throw InputError({file.string(), own + "/joint", "each joint once", fmt::format("\"{}\" again", joint), ""});
+    body.bones.push_back({joint, read_motion(bones[i]["motion"], file, own + "/motion")});
+  }
   return body;
 }
 

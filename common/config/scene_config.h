@@ -142,6 +142,12 @@ struct AnimationConfig {
   double start = 0;  ///< [s]
 };
 
+/// Motion of a joint in its own axes, beyond its animation or the bind pose.
+struct JointMotionConfig {
+  std::string joint;
+  std::vector<KeyframeConfig> motion;
+};
+
 /// Start of a body, and what carries it. Position to velocities are a free body's, motion a constrained one's.
 struct BodyConfig {
   std::optional<Eigen::Vector3d> position;        ///< displacement of the centre of mass from rest [m]
@@ -151,6 +157,7 @@ struct BodyConfig {
   std::optional<PoseConfig> pose;
   std::vector<KeyframeConfig> motion;  ///< moves the fixed vertices: x = position + orientation X, X the rest mesh
   std::optional<AnimationConfig> animation;  ///< moves the bones of a body on a skeleton
+  std::vector<JointMotionConfig> bones;      ///< on top of it
 };
 
 /// A patch of bodies of one kind that the world or an obstacle holds.

@@ -25,7 +25,7 @@ Needs needs_of(const SceneConfig& scene) {
               .carried = !scene.body.motion.empty(),
               .targets = scene.examples && scene.examples->target != TargetSource::kSolve,
               .target_elasticity = scene.examples && scene.examples->law == ExampleForceLaw::kElastic,
-              .full_space = scene.space.space != Space::kReduced || scene.body.animation,
+              .full_space = scene.space.space != Space::kReduced || scene.body.animation || !scene.body.bones.empty(),
               .contact = scene.meets_others || scene.meets_bodies || !scene.obstacles.empty(),
               .render = scene.render,
               .internal_force = scene.internal_force};

@@ -10,6 +10,7 @@
 #include "common/config/scene_needs.h"
 #include "common/core/error.h"
 #include "common/core/log.h"
+#include "common/core/nearest_name.h"
 #include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
@@ -127,6 +128,46 @@ ScriptedForce scripted_force_of(const SceneConfig& config, const VertexForceConf
   return scripted;
 }
 
+/// Advice where a name is none of these.
+std::string known_names(const std::string& name, const std::vector<std::string>& known) {
+  const std::string nearest = nearest_name(name, known);
+  return nearest.empty() ? fmt::format("it has \"{}\"", fmt::join(known, "\", \""))
+                         : fmt::format("did you mean \"{}\"?", nearest);
+}
+
+/// A joint of the body's skeleton by its name.
+std::size_t find_joint(const SceneConfig& config, const LoadedScene& loaded, const std::string& name,
+                       const std::string& place) {
+  const std::string file = config.file.string(), bundle = config.bundle.string();
+  const Skeleton* const skeleton = loaded.model->skeleton.get();
+  if (skeleton == nullptr)
+    throw InputError({file, place, "a bundle of a surface with bones", bundle + ", which has none", ""});
+  const std::vector<std::string>& names = skeleton->names();
+  const auto found = std::ranges::find(names, name);
+  if (found != names.end()) return static_cast<std::size_t>(found - names.begin());
+  throw InputError({file, place, "a joint of " + bundle, fmt::format("\"{}\"", name), known_names(name, names)});
+}
+
+/// The motion of the bones that the scene asks for, if any.
+std::optional<BonePlay> bone_play(const SceneConfig& config, const LoadedScene& loaded) {
+  const BodyConfig& body = config.body;
+  if (!body.animation && body.bones.empty()) return std::nullopt;
+  BonePlay play;
+  if (const auto& animation = body.animation)
+    play = {loaded.model->skeleton->find_animation(animation->name), animation->speed, animation->start,
+            animation->loop};
+  for (std::size_t i = 0; i < body.bones.size(); ++i) {
+    const std::size_t bone =
+        find_joint(config, loaded, body.bones[i].joint, fmt::format("{}/body/bones/{}/joint", config.place, i));
+    const Skeleton& skeleton = *loaded.model->skeleton;
+    play.keys.push_back({skeleton.branch(bone), skeleton.axes(bone), make_motion(body.bones[i].motion)});
+  }
+  if (loaded.model->skeleton) play.bound = loaded.model->skeleton->bound();
+  // What hangs on a bone has a smaller branch.
+  std::ranges::stable_sort(play.keys, {}, [](const BoneKeys& own) { return own.branch.size(); });
+  return play;
+}
+
 ExampleSettings example_settings(const ExampleForceConfig& config) {
   ExampleSettings settings{config.stiffness, config.damping, config.bias, config.target_iterations,
                            config.law == ExampleForceLaw::kElastic};
@@ -151,9 +192,7 @@ StepScene step_scene(const SceneConfig& config, const Obstacles& obstacles, Load
   scene.meeting = config.meeting;
   scene.obstacles = obstacles_of(config.meeting, obstacles);
   if (loaded.model->skeleton) scene.space.space = Space::kFull;
-  if (const auto& animation = config.body.animation)
-    scene.animation = BonePlay{loaded.model->skeleton->find_animation(animation->name), animation->speed,
-                               animation->start, animation->loop};
+  scene.animation = bone_play(config, loaded);
   if (!config.body.motion.empty()) scene.carrier = make_motion(config.body.motion);
   scene.gravity = config.gravity;
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
@@ -270,6 +309,14 @@ std::string describe_target(const ExampleModel& examples, const ExampleSettings&
                      examples.target->dimension(), examples.target->elements(), settings.target_iterations);
 }
 
+std::string describe_bones(const std::optional<BonePlay>& play) {
+  if (!play) return "which stay where they were bound";
+  std::string words = play->animation != nullptr ? fmt::format("moved by \"{}\"", play->animation->name()) : "";
+  if (!play->keys.empty())
+    words += fmt::format("{}keys of {} joints", words.empty() ? "moved by " : " and ", play->keys.size());
+  return words;
+}
+
 void describe_examples(const ExampleModel& examples, const ExampleSettings& settings, std::vector<std::string>& plan) {
   const std::string owner = examples.region.empty() ? "" : fmt::format("region {}: ", examples.region);
   if (!acts(settings)) {
@@ -375,9 +422,7 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
             : ", in all steps"));
   if (model.skeleton)
     plan.push_back(fmt::format("skeleton: {} bones hold {} vertices, {}", model.skeleton->size(),
-                               loaded.full->space.driven(),
-                               scene.animation ? "moved by \"" + scene.animation->animation->name() + "\""
-                                               : std::string("which stay where they were bound")));
+                               loaded.full->space.driven(), describe_bones(scene.animation)));
   if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {
     plan.push_back(
         fmt::format("damping: mass {:g} 1/s, stiffness {:g} s", scene.mass_damping, scene.stiffness_damping));

@@ -26,6 +26,7 @@ Skeleton::Skeleton(const SkeletonData& data) : names_(data.bones) {
     const auto row = static_cast<Eigen::Index>(b);
     parents_.push_back(data.parents[row]);
     binds_.emplace_back(data.bind.middleRows(3 * row, 3));
+    axes_.emplace_back(nearest_rotation(binds_.back().leftCols<3>()));
   }
   for (std::size_t a = 0; a < data.animations.size(); ++a) {
     std::vector<double> times;
@@ -49,6 +50,14 @@ BonePoses Skeleton::bound() const {
   return poses;
 }
 
+std::vector<std::size_t> Skeleton::branch(std::size_t bone) const {
+  std::vector<std::size_t> found{bone};
+  for (std::size_t next = 0; next < found.size(); ++next)
+    for (std::size_t b = 0; b < size(); ++b)
+      if (parents_[b] >= 0 && static_cast<std::size_t>(parents_[b]) == found[next]) found.push_back(b);
+  return found;
+}
+
 BonePose Skeleton::pose(std::size_t bone, const BoneMatrix& world) const noexcept {
   const Eigen::Matrix3d stretched = world.leftCols<3>() * binds_[bone].leftCols<3>().inverse();
   return {world.col(3), Eigen::Quaterniond(nearest_rotation(stretched))};
@@ -66,10 +75,24 @@ const BoneAnimation* Skeleton::find_animation(const std::string& name) const noe
 }
 
 void BonePlay::sample(double time, BonePoses& poses) const noexcept {
-  double at = start + speed * time;
-  const double duration = animation->duration();
-  if (loop && duration > 0) at -= duration * std::floor(at / duration);
-  animation->sample(at, poses);
+  if (animation != nullptr) {
+    double at = start + speed * time;
+    const double duration = animation->duration();
+    if (loop && duration > 0) at -= duration * std::floor(at / duration);
+    animation->sample(at, poses);
+  } else {
+    std::ranges::copy(bound, poses.begin());
+  }
+  // A bone is where the animation has it until those that it hangs on take it along.
+  for (const BoneKeys& own : keys) {
+    const MotionSample key = own.motion.sample(time);
+    const BonePose bone = poses[own.branch.front()];
+    const Eigen::Quaterniond axes = bone.turn * own.axes;
+    const Eigen::Quaterniond turn = axes * Eigen::Quaterniond(key.rotation) * axes.conjugate();
+    const Eigen::Vector3d joint = bone.joint + axes * key.position;
+    for (const std::size_t b : own.branch)
+      poses[b] = {joint + turn * (poses[b].joint - bone.joint), (turn * poses[b].turn).normalized()};
+  }
 }
 
 }  // namespace exmat::runtime

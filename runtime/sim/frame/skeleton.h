@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/model/reduced_model.h"
+#include "runtime/sim/frame/motion.h"
 
 namespace exmat::runtime {
 
@@ -45,7 +46,10 @@ class Skeleton {
   const std::vector<std::string>& names() const { return names_; }
   int parent(std::size_t bone) const { return parents_[bone]; }  ///< -1 of a root
   const BoneMatrix& bind(std::size_t bone) const { return binds_[bone]; }
+  const Eigen::Quaterniond& axes(std::size_t bone) const { return axes_[bone]; }  ///< to the world, where it is bound
   BonePoses bound() const;
+  /// The bone and all that hang on it, itself first.
+  std::vector<std::size_t> branch(std::size_t bone) const;
   /// Pose of a bone whose axes and joint are here; stretched axes give the nearest rotation.
   BonePose pose(std::size_t bone, const BoneMatrix& world) const noexcept;
   BoneMatrix matrix(std::size_t bone, const BonePose& pose) const noexcept;  ///< inverse of pose(), unstretched
@@ -57,15 +61,26 @@ class Skeleton {
   std::vector<std::string> names_;
   std::vector<int> parents_;
   std::vector<BoneMatrix> binds_;
+  std::vector<Eigen::Quaterniond> axes_;
   std::vector<BoneAnimation> animations_;
 };
 
-/// Animation that a body's bones follow, which outlives it: at `start` [s] of it at time 0, `speed` times as fast.
+/// A bone that moves in its own axes beside what else moves it, and all that hang on it with it.
+struct BoneKeys {
+  std::vector<std::size_t> branch;                           ///< Skeleton::branch()
+  Eigen::Quaterniond axes = Eigen::Quaterniond::Identity();  ///< Skeleton::axes() of the bone
+  RigidMotion motion;
+};
+
+/// Motion that a body's bones follow: an animation, which outlives it, at `start` [s] of it at time 0, `speed` times as
+/// fast, or none; and keys of single bones on top of it.
 struct BonePlay {
   const BoneAnimation* animation = nullptr;
   double speed = 1;
   double start = 0;
   bool loop = true;
+  BonePoses bound{};             ///< poses where there is no animation
+  std::vector<BoneKeys> keys{};  ///< a bone before those that it hangs on
 
   void sample(double time, BonePoses& poses) const noexcept;
 };

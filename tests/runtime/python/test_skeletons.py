@@ -204,3 +204,24 @@ def test_what_cannot_be_is_refused(model, bundle):
     assert other.bones == {} and other.animations == {}
     with pytest.raises(exmat.InvalidArgument, match="no bones"):
         exmat.Body(other).set_bones(np.empty((0, 3, 4)))
+
+
+def test_keys_of_a_joint_turn_what_hangs_on_it(skinned, model, held):
+    angle = np.radians(40)
+    keys = [{"time": 0}, {"time": 0.2, "orientation": [np.cos(angle / 2), 0, 0, np.sin(angle / 2)]}]
+    scene = {"bundle": str(skinned), "time_step": 0.004, "damping": {"stiffness": 0.005},
+             "body": {"animation": {"name": "curl"}, "bones": [{"joint": "middle", "motion": keys}]}}
+    body = exmat.Body(exmat.Model.from_scene(scene))
+    body.step(75)
+    expected = model.animated_bones("curl", 0.3)
+    turn, joint = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]), expected[1, :, 3].copy()
+    expected[1:] = turn @ expected[1:]
+    expected[1:, :, 3] += joint - turn @ joint
+    assert np.allclose(body.bones, expected, atol=1e-12)
+    assert off_bones(body, body.bones, held) < 1e-12 * LENGTH
+    body.set_bones(model.bound_bones)  # of the host, in place of the scene's
+    body.step()
+    assert np.allclose(body.bones, model.bound_bones)
+    scene["body"]["bones"][0]["joint"] = "midle"
+    with pytest.raises(exmat.BadInput, match=r'/body/bones/0/joint: .*did you mean "middle"'):
+        exmat.Model.from_scene(scene)
