@@ -40,12 +40,13 @@ Eigen::Vector3d read_direction(const Json& json, const std::filesystem::path& fi
   return direction;
 }
 
-Eigen::Quaterniond read_orientation(const Json& object, const std::filesystem::path& file, const std::string& place) {
-  if (!object.contains("orientation")) return Eigen::Quaterniond::Identity();
-  const auto [w, x, y, z] = object["orientation"].get<std::array<double, 4>>();
+Eigen::Quaterniond read_orientation(const Json& object, const std::filesystem::path& file, const std::string& place,
+                                    const char* name) {
+  if (!object.contains(name)) return Eigen::Quaterniond::Identity();
+  const auto [w, x, y, z] = object[name].get<std::array<double, 4>>();
   const Eigen::Quaterniond orientation(w, x, y, z);
   if (!(std::abs(orientation.norm() - 1) <= kUnitTolerance))
-    throw InputError({file.string(), place + "/orientation", "a quaternion of length 1, w first",
+    throw InputError({file.string(), fmt::format("{}/{}", place, name), "a quaternion of length 1, w first",
                       fmt::format("length {:g}", orientation.norm()), ""});
   return orientation.normalized();
 }

@@ -20,9 +20,40 @@
 namespace exmat {
 namespace {
 
+DriverConfig read_driver(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  DriverConfig driver{json["example"], json["joint"]};
+  const bool by_angle = json.contains("axis") && json.contains("angles");
+  const bool by_rotation = json.contains("rotation") && json.contains("radius");
+  if (by_angle == by_rotation || json.size() != 4)
+    throw InputError({file.string(), place, "axis and angles, or rotation and radius",
+                      json.size() > 4 ? "members of both" : "other members", ""});
+  if (by_rotation) {
+    driver.rotation = read_orientation(json, file, place, "rotation");
+    driver.radius = json["radius"];
+    return driver;
+  }
+  driver.axis = read_direction(json["axis"], file, place + "/axis");
+  driver.angles = json["angles"].get<std::array<double, 2>>();
+  if (driver.angles[0] == driver.angles[1])
+    throw InputError({file.string(), place + "/angles", "two angles that differ", json["angles"].dump(), ""});
+  return driver;
+}
+
+void read_drivers(const Json& json, const std::filesystem::path& file, const std::string& place,
+                  ExampleForceConfig& config) {
+  if (!json.contains("drivers")) return;
+  for (const char* name : {"weights", "bias"})
+    if (json.contains(name))
+      throw InputError({file.string(), place, fmt::format("{} or drivers", name), "both",
+                        "weights of drivers are taken as they are"});
+  for (std::size_t i = 0; i < json["drivers"].size(); ++i)
+    config.drivers.push_back(read_driver(json["drivers"][i], file, fmt::format("{}/drivers/{}", place, i)));
+}
+
 ExampleForceConfig read_example_force(const Json& json, const std::filesystem::path& file, const std::string& place) {
   ExampleForceConfig config;
   read_example_settings(json, file, place, config);
+  read_drivers(json, file, place, config);
   config.law = choice_or(json, "force", config.law);
   config.target = choice_or(json, "target", config.target);
   config.target_iterations = json.value("target_iterations", config.target_iterations);

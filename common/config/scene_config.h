@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -43,6 +44,16 @@ struct ExampleKeysConfig {
   bool empty() const { return stiffness.empty() && damping.empty() && bias.empty() && weights.empty(); }
 };
 
+/// An example whose weight follows the rotation of a joint against its parent, beyond the bind pose, in the joint's
+/// axes: its angle about an axis, or its distance from another rotation.
+struct DriverConfig {
+  std::string example, joint;
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();  ///< unit
+  std::array<double, 2> angles{};                   ///< of weights 0 and 1 [rad]
+  std::optional<Eigen::Quaterniond> rotation{};     ///< of weight 1, in place of the two
+  double radius = 0;                                ///< beyond which it is 0 [rad]
+};
+
 /// Settings that have keys stand here with the value of the key that is strongest: the largest, of a bias the smallest,
 /// of weights the first.
 struct ExampleForceConfig {
@@ -55,6 +66,7 @@ struct ExampleForceConfig {
   EnergyReference energy_reference = EnergyReference::kExample;
   bool compensate = false;  ///< the bundle's targets make up for elasticity and gravity, of the whole body's examples
   std::optional<Eigen::VectorXd> weights{};  ///< [K] in place of those of the shape
+  std::vector<DriverConfig> drivers{};       ///< likewise
   ExampleKeysConfig keys{};
 };
 

@@ -15,18 +15,24 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
   if (const std::string keys = place_of_keys(config); !keys.empty())
     throw InputError({file, keys, "a value: the full-space reference takes no keys", "keys",
                       "measure scenes with the values between the keys, one by one"});
+  const auto require_no_drivers = [&](const std::string& member, const ExampleForceConfig& force) {
+    if (!force.drivers.empty())
+      throw InputError({file, member + "/drivers",
+                        "no drivers: weights of the full-space reference are given or those of the shape", "some", ""});
+  };
+  if (config.examples) require_no_drivers("/examples", *config.examples);
   if (config.examples && config.examples->compensate)
     throw InputError({file, "/examples/compensate", "false: targets of the full-space reference are not compensated",
                       "true", "compare with a bundle made without it"});
   if (!config.body.motion.empty())
     throw InputError({file, "/body/motion", "no motion: the full-space reference carries no bodies", "one", ""});
-  const auto require_part = [&](bool needed, bool there, const char* group) {
-    if (needed && !there)
-      throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
   if (!config.attachments.empty())
     throw InputError({file, config.attachments.front().place,
                       "no attachment: nothing holds a body of the full-space reference", "one",
                       "let the asset fix these vertices"});
+  const auto require_part = [&](bool needed, bool there, const char* group) {
+    if (needed && !there)
+      throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",
                         "precompute the bundle again with this scene (--scene)"});
   };
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");

@@ -168,6 +168,26 @@ std::optional<BonePlay> bone_play(const SceneConfig& config, const LoadedScene& 
   return play;
 }
 
+/// The drivers of the examples of the whole body.
+std::vector<ExampleDriver> example_drivers(const SceneConfig& config, const LoadedScene& loaded) {
+  std::vector<ExampleDriver> drivers;
+  if (!config.examples || config.examples->drivers.empty()) return drivers;
+  std::vector<std::string> names;  // but for the rest pose, which is the first
+  for (const ExampleData& example : loaded.data.examples->examples) names.push_back(example.name);
+  names.erase(names.begin());
+  for (const DriverConfig& own : config.examples->drivers) {
+    const std::string place = fmt::format("{}/examples/drivers/{}", config.place, drivers.size());
+    const auto found = std::ranges::find(names, own.example);
+    if (found == names.end())
+      throw InputError({config.file.string(), place + "/example",
+                        fmt::format("an example of {} other than the rest pose", config.bundle.string()),
+                        fmt::format("\"{}\"", own.example), known_names(own.example, names)});
+    drivers.push_back({1 + (found - names.begin()), find_joint(config, loaded, own.joint, place + "/joint"), own.axis,
+                       own.angles, own.rotation, own.radius});
+  }
+  return drivers;
+}
+
 ExampleSettings example_settings(const ExampleForceConfig& config) {
   ExampleSettings settings{config.stiffness, config.damping, config.bias, config.target_iterations,
                            config.law == ExampleForceLaw::kElastic};
@@ -198,6 +218,7 @@ StepScene step_scene(const SceneConfig& config, const Obstacles& obstacles, Load
   scene.gravity_force = gravity_force(*loaded.model, config.gravity);
   for (const VertexForceConfig& force : loaded.forces) scene.forces.push_back(scripted_force_of(config, force, loaded));
   if (config.examples) scene.examples.push_back(example_settings(*config.examples));
+  if (config.examples) scene.examples.front().drivers = example_drivers(config, loaded);
   for (const RegionForceConfig& region : config.regions) scene.examples.push_back(example_settings(region.force));
   return scene;
 }
@@ -325,9 +346,11 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
   }
   const Eigen::Index modes = examples.filter.matrix().rows();
   plan.push_back(
-      owner + (settings.given_weights.size() > 0
-                   ? fmt::format("weights: K = {} examples, given", examples.weights.examples())
-                   : fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias)));
+      owner +
+      (settings.given_weights.size() > 0 ? fmt::format("weights: K = {} examples, given", examples.weights.examples())
+       : is_driven(settings)
+           ? fmt::format("weights: K = {} examples, by {} joints", examples.weights.examples(), settings.drivers.size())
+           : fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias)));
   plan.push_back(owner + describe_target(examples, settings));
   if (settings.elastic)
     plan.push_back(owner + fmt::format("example_force: elastic, s = {} elements", examples.elasticity->elements()));

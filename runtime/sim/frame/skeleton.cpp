@@ -58,6 +58,13 @@ std::vector<std::size_t> Skeleton::branch(std::size_t bone) const {
   return found;
 }
 
+Eigen::Quaterniond Skeleton::own_turn(std::size_t bone, const BonePoses& poses) const noexcept {
+  const int parent = parents_[bone];
+  Eigen::Quaterniond turn = poses[bone].turn;
+  if (parent >= 0) turn = poses[static_cast<std::size_t>(parent)].turn.conjugate() * turn;
+  return axes_[bone].conjugate() * turn * axes_[bone];
+}
+
 BonePose Skeleton::pose(std::size_t bone, const BoneMatrix& world) const noexcept {
   const Eigen::Matrix3d stretched = world.leftCols<3>() * binds_[bone].leftCols<3>().inverse();
   return {world.col(3), Eigen::Quaterniond(nearest_rotation(stretched))};

@@ -50,6 +50,8 @@ class Skeleton {
   BonePoses bound() const;
   /// The bone and all that hang on it, itself first.
   std::vector<std::size_t> branch(std::size_t bone) const;
+  /// Rotation of a bone against its parent since both were bound, in the bone's axes.
+  Eigen::Quaterniond own_turn(std::size_t bone, const BonePoses& poses) const noexcept;
   /// Pose of a bone whose axes and joint are here; stretched axes give the nearest rotation.
   BonePose pose(std::size_t bone, const BoneMatrix& world) const noexcept;
   BoneMatrix matrix(std::size_t bone, const BonePose& pose) const noexcept;  ///< inverse of pose(), unstretched

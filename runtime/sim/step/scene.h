@@ -9,6 +9,7 @@
 #include "runtime/sim/contact/obstacle.h"
 #include "runtime/sim/frame/world_loads.h"
 #include "runtime/sim/solver/newton.h"
+#include "runtime/sim/step/example_drivers.h"
 #include "runtime/sim/step/model.h"
 
 namespace exmat::runtime {
@@ -22,7 +23,8 @@ struct ExampleSettings {
   /// The force is that of the elastic energy with the target as the undeformed shape, times the stiffness, in place of
   /// the linear one; the model has to have what that takes.
   bool elastic = false;
-  Eigen::VectorXd given_weights{};  ///< [K] taken as they are, without the bias; empty: those of the pose
+  Eigen::VectorXd given_weights{};       ///< [K] taken as they are, without the bias; empty: those of the pose
+  std::vector<ExampleDriver> drivers{};  ///< that make the weights of a body on a skeleton, unless some are given
 };
 
 /// When a body is left alone: once its kinetic energy has been below `energy` for `time`.
@@ -58,6 +60,11 @@ struct StepScene : WorldLoads {
 
 /// True if these examples exert a force; weights and targets of those that do not are left out.
 inline bool acts(const ExampleSettings& examples) noexcept { return examples.stiffness > 0 || examples.damping > 0; }
+
+/// True if drivers make the weights.
+inline bool is_driven(const ExampleSettings& examples) noexcept {
+  return examples.given_weights.size() == 0 && !examples.drivers.empty();
+}
 
 /// kappa of a linear force, and the factor e of an elastic one; 0 of the other.
 inline double linear_stiffness(const ExampleSettings& examples) noexcept {

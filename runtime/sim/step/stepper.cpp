@@ -16,6 +16,9 @@ StepReport step(const Model& model, const StepScene& scene, State& state, Worksp
 
 void refresh_weights(const Model& model, const StepScene& scene, State& state, Workspace& workspace) noexcept {
   evaluate_weights(model, scene, state.q, workspace);
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    if (acts(scene.examples[i]) && is_driven(scene.examples[i]))
+      drive(scene.examples[i].drivers, *model.skeleton, state.full->skeleton->bones, workspace.examples[i].weights);
   commit_weights(scene, workspace, state);
 }
 

@@ -23,8 +23,9 @@ LENGTH, BONES = 3.0, 3
 SETTINGS = dict(time_step=0.004, stiffness_damping=0.005, gravity=(0, -9.81, 0))
 
 
-def write_skinned(path):
-    """On bones of 1 m in a row, whose weights go over within 0.3 m; an animation turns each by 30 degrees about z, and back."""
+def write_skinned(path, bulge=0.0):
+    """On bones of 1 m in a row, whose weights go over within 0.3 m; an animation turns each by 30 degrees about z, and back. A morph
+    target bulges the middle."""
     points, triangles = tube(LENGTH)
     document = {"asset": {"version": "2.0"}, "scene": 0, "accessors": [], "bufferViews": []}
     binary = bytearray()
@@ -46,6 +47,10 @@ def write_skinned(path):
     document["meshes"] = [{"primitives": [{
         "attributes": {"POSITION": floats(points, "VEC3"), "JOINTS_0": accessor(joints, "VEC4", 5121), "WEIGHTS_0": floats(weights, "VEC4")},
         "indices": accessor(np.ascontiguousarray(triangles.ravel(), np.uint32), "SCALAR", 5125)}]}]
+    if bulge:
+        out = bulge * np.exp(-((points[:, 0] - 1.5) / 0.3) ** 2)[:, None] * points * [0, 1, 1]
+        document["meshes"][0]["primitives"][0]["targets"] = [{"POSITION": floats(out, "VEC3")}]
+        document["meshes"][0]["extras"] = {"targetNames": ["flex"]}
     inverse = np.tile(np.eye(4), (BONES, 1, 1))
     inverse[:, 0, 3] = -np.arange(BONES)
     document["skins"] = [{"joints": [1, 2, 3], "inverseBindMatrices": floats(inverse.transpose(0, 2, 1).reshape(-1, 16), "MAT4")}]
@@ -64,16 +69,20 @@ def write_skinned(path):
                      + struct.pack("<II", len(binary), 0x004E4942) + bytes(binary))
 
 
-@pytest.fixture(scope="module")
-def skinned(folder):
+def bundle_of(path, cells, **more):
     if not (BUILD / "bin/exmat-precompute").exists() and "EXMAT_PRECOMPUTE" not in os.environ:
         pytest.skip("built without the offline stage")
-    write_skinned(folder / "tube.glb")
     exmat.precompute.bundle({
-        "name": "tube", "object": {"surface": folder / "tube.glb", "cells": 1500,
+        "name": "tube", "object": {"surface": path, "cells": cells,
                                    "material": {"youngs_modulus": 3e5, "poisson_ratio": 0.4, "density": 1000}},
-        "basis": {"size": 12, "linear_modes": 8, "training": "none"}, "cubature": {"elements": 30}}, folder / "tube.h5")
-    return folder / "tube.h5"
+        "basis": {"size": 12, "linear_modes": 8, "training": "none"}, "cubature": {"elements": 30}, **more}, path.with_suffix(".h5"))
+    return path.with_suffix(".h5")
+
+
+@pytest.fixture(scope="module")
+def skinned(folder):
+    write_skinned(folder / "tube.glb")
+    return bundle_of(folder / "tube.glb", 1500)
 
 
 @pytest.fixture(scope="module")
@@ -225,3 +234,21 @@ def test_keys_of_a_joint_turn_what_hangs_on_it(skinned, model, held):
     scene["body"]["bones"][0]["joint"] = "midle"
     with pytest.raises(exmat.BadInput, match=r'/body/bones/0/joint: .*did you mean "middle"'):
         exmat.Model.from_scene(scene)
+
+
+def test_a_joint_drives_the_weight_of_an_example(folder):
+    write_skinned(folder / "arm.glb", bulge=0.4)
+    bundle = bundle_of(folder / "arm.glb", 400, targets={"tolerance": 0.01})
+    driver = {"example": "flex", "joint": "middle", "axis": [0, 0, 1], "angles": [0, np.radians(60)]}
+    scene = {"bundle": str(bundle), "time_step": 0.004, "damping": {"mass": 10, "stiffness": 0.01},
+             "examples": {"stiffness": 20000, "drivers": [driver]}, "body": {"animation": {"name": "curl"}}}
+    body = exmat.Body(exmat.Model.from_scene(scene))
+    assert np.allclose(body.weights, [1, 0])
+    for k in range(1, 60):
+        body.step()
+        assert np.allclose(body.weights[1], 0.004 * k, atol=1e-6)  # 30 degrees in half a second, keys in single precision
+    for member, value in (("example", "fles"), ("joint", "mittle")):
+        with pytest.raises(exmat.BadInput, match=f"/examples/drivers/0/{member}: .*did you mean"):
+            exmat.Model.from_scene({**scene, "examples": {"stiffness": 1, "drivers": [{**driver, member: value}]}})
+    with pytest.raises(exmat.BadInput, match="axis and angles, or rotation and radius"):
+        exmat.Model.from_scene({**scene, "examples": {"stiffness": 1, "drivers": [{**driver, "radius": 1}]}})

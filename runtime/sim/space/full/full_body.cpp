@@ -48,7 +48,9 @@ FullMemory full_memory(const FullModel& full, const StepScene& scene, State& sta
 void find_targets(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
                   Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
   if (!runs_examples(scene)) return;
-  const auto reads_pose = [](const ExampleSettings& own) { return acts(own) && own.given_weights.size() == 0; };
+  const auto reads_pose = [](const ExampleSettings& own) {
+    return acts(own) && !is_driven(own) && own.given_weights.size() == 0;
+  };
   if (std::ranges::any_of(scene.examples, reads_pose)) step.first_coefficients();
   for (std::size_t group = 0; group < scene.examples.size(); ++group) {
     const ExampleSettings& settings = scene.examples[group];
@@ -57,7 +59,10 @@ void find_targets(const FullModel& full, const Model& model, const StepScene& sc
     const ExampleModel& reduced = model.examples[group];
     ExampleWorkspace& scratch = workspace.examples[group];
     FullWorkspace::Examples& found = own.examples[group];
-    set_weights(examples.weights, settings, found.coefficients, scratch);
+    if (is_driven(settings))
+      drive(settings.drivers, *model.skeleton, state.full->skeleton->next, scratch.weights);
+    else
+      set_weights(examples.weights, settings, found.coefficients, scratch);
     if (!reduced.table)
       solve_target(reduced, settings.target_iterations, state.examples[group], scratch, report);
     else if (settings.elastic)

@@ -78,5 +78,20 @@ TEST(BonePlay, TurnsBonesInTheirOwnAxesAndWhatHangsOnThem) {
   }
 }
 
+TEST(Skeleton, TellsHowABoneIsTurnedAgainstItsParent) {
+  const Skeleton skeleton(limbs());
+  EXPECT_EQ(skeleton.branch(0), (std::vector<std::size_t>{0, 1, 3, 2}));
+  EXPECT_EQ(skeleton.branch(2), (std::vector<std::size_t>{2}));
+  const Eigen::Quaterniond hip = about(0.7, {1, 2, 3}), shin = about(-1.1, {0, 1, 1});
+  BonePlay play{.bound = skeleton.bound()};
+  play.keys = {{skeleton.branch(2), skeleton.axes(2), RigidMotion({{0, {0, 0, 0}, shin}})},
+               {skeleton.branch(0), skeleton.axes(0), RigidMotion({{0, {0, 0, 0}, hip}})}};
+  BonePoses poses = skeleton.bound();
+  play.sample(0, poses);
+  EXPECT_LE(skeleton.own_turn(0, poses).angularDistance(hip), 1e-7);
+  EXPECT_LE(skeleton.own_turn(1, poses).angularDistance(Eigen::Quaterniond::Identity()), 1e-7);
+  EXPECT_LE(skeleton.own_turn(2, poses).angularDistance(shin), 1e-7);
+}
+
 }  // namespace bone_play_test
 }  // namespace exmat::runtime
