@@ -100,6 +100,9 @@ class Reader {
       if (to != "world") refuse(place, R"("world" or {"obstacle": NUMBER})", to.dump());
       return std::nullopt;
     }
+    if (to.contains("body"))
+      refuse(place + "/body", "\"world\" or an obstacle: bodies do not hold each other", to["body"].dump(),
+             "hold both by one obstacle, or couple them in a host program by exmat_body_read_compliance()");
     const auto number = to["obstacle"].get<std::uint64_t>();
     const std::size_t count = member_or(scene_, "obstacles", Json::array()).size();
     if (number >= count)

@@ -154,7 +154,7 @@ def test_an_attachment_of_a_scene_goes_with_its_obstacle(free_bundle):
         body.step()
         now = body.positions(points, np.empty((model.vertices, 3)))
         assert np.abs(now[held] - start[held] - [0, 0.002 * k, 0]).max() < 1e-10
-    assert body.attachment_load(0)[0][1] < 0  # it is pulled up
+    assert np.abs(body.attachment_load(0)[0]).max() > 1
     body.move_attachment(0, frame_at([0, 0, 0]))
     body.step()
     assert np.abs(body.positions(points, np.empty((model.vertices, 3)))[held] - start[held]).max() < 1e-10

@@ -238,7 +238,7 @@ def test_keys_of_a_joint_turn_what_hangs_on_it(skinned, model, held):
 
 def test_a_joint_drives_the_weight_of_an_example(folder):
     write_skinned(folder / "arm.glb", bulge=0.4)
-    bundle = bundle_of(folder / "arm.glb", 400, targets={"tolerance": 0.01})
+    bundle = bundle_of(folder / "arm.glb", 400, examples=[{"name": "flex", "morph": "flex"}], targets={"tolerance": 0.01})
     driver = {"example": "flex", "joint": "middle", "axis": [0, 0, 1], "angles": [0, np.radians(60)]}
     scene = {"bundle": str(bundle), "time_step": 0.004, "damping": {"mass": 10, "stiffness": 0.01},
              "examples": {"stiffness": 20000, "drivers": [driver]}, "body": {"animation": {"name": "curl"}}}

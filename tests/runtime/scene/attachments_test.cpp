@@ -137,6 +137,8 @@ TEST_F(SceneAttachments, ThatCannotBeAreRefusedWithTheirPlace) {
   EXPECT_THAT(refusal(end + R"(, "to": "wrld"})"), HasSubstr(R"(/attachments/0/to: expected "world" or)"));
   EXPECT_THAT(refusal(end + R"(, "to": {"obstacle": 0}})"),
               HasSubstr("/attachments/0/to/obstacle: expected no obstacle"));
+  EXPECT_THAT(refusal(end + R"(, "to": {"body": 0}})"), HasSubstr("/attachments/0/to/body: expected \"world\" or an"));
+  EXPECT_THAT(refusal(end + R"(, "to": {}})"), HasSubstr("/attachments/0/to: expected"));
   EXPECT_THAT(refusal(end + R"(, "kind": "glue"})"), HasSubstr(R"(/attachments/0/kind: expected "fixed", "ball" or)"));
   EXPECT_THAT(refusal(end + R"(, "stiffness": 5})"), HasSubstr("/attachments/0/stiffness: expected no stiffness"));
   EXPECT_THAT(refusal(end + R"(, "break_force": 0})"), HasSubstr("/attachments/0/break_force: expected a number > 0"));
