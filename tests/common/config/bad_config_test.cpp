@@ -260,6 +260,16 @@ const BadConfig kBadScenes[] = {
      "a.json: /examples/weights/keys/1/value: expected 2 numbers, as in the first key, found 1"},
     {"WeightsAndBias", scene(R"("examples": {"stiffness": 1, "weights": [0.5, 0.5], "bias": 0.5})"),
      "a.json: /examples: expected weights or bias, found both"},
+    {"DriversAndBias", scene(R"("examples": {"stiffness": 1, "bias": 0.5, "drivers": []})"),
+     "a.json: /examples: expected bias or drivers, found both"},
+    {"DriverOfBothKinds", scene(R"("examples": {"stiffness": 1, "drivers": [
+        {"example": "a", "joint": "b", "axis": [1, 0, 0], "radius": 1}]})"),
+     "a.json: /examples/drivers/0: expected axis and angles, or rotation and radius, found other members"},
+    {"DriverOfOneAngle", scene(R"("examples": {"stiffness": 1, "drivers": [
+        {"example": "a", "joint": "b", "axis": [1, 0, 0], "angles": [1, 1]}]})"),
+     "a.json: /examples/drivers/0/angles: expected two angles that differ, found [1,1]"},
+    {"JointTwice", scene(R"("body": {"bones": [{"joint": "a", "motion": []}, {"joint": "a", "motion": []}]})"),
+     "a.json: /body/bones/1/joint: expected each joint once, found \"a\" again"},
     {"BiasTooLarge", scene(R"("examples": {"stiffness": 1, "bias": 1.5})"),
      "a.json: /examples/bias: expected a number >= 0 and <= 1"},
     {"EndBeforeStart", force(R"({"ids": [1]})", R"(, "start": 2, "end": 1)"),

@@ -300,6 +300,28 @@ TEST(LoadScene, ReadsKeys) {
   EXPECT_EQ(place_of_keys(scene), "/gravity");
 }
 
+TEST(LoadScene, ReadsJointsAndWhatTheyDrive) {
+  const TemporaryFolder folder;
+  const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5",
+    "examples": {"stiffness": 5, "drivers": [
+      {"example": "flex", "joint": "arm", "axis": [0, 0, 2], "angles": [0.5, -1]},
+      {"example": "shrug", "joint": "neck", "rotation": [0.6, 0, 0.8, 0], "radius": 0.25}]},
+    "body": {"bones": [{"joint": "arm", "motion": [{"time": 0}, {"time": 2, "position": [0, 1, 0]}]}]}})");
+  ASSERT_EQ(scene.examples->drivers.size(), 2U);
+  const DriverConfig &flex = scene.examples->drivers[0], &shrug = scene.examples->drivers[1];
+  EXPECT_EQ(flex.example, "flex");
+  EXPECT_EQ(flex.joint, "arm");
+  EXPECT_EQ(flex.axis, Eigen::Vector3d::UnitZ());
+  EXPECT_THAT(flex.angles, ElementsAre(0.5, -1));
+  EXPECT_FALSE(flex.rotation);
+  EXPECT_DOUBLE_EQ(shrug.rotation->y(), 0.8);
+  EXPECT_EQ(shrug.radius, 0.25);
+  ASSERT_EQ(scene.body.bones.size(), 1U);
+  EXPECT_EQ(scene.body.bones[0].joint, "arm");
+  EXPECT_EQ(scene.body.bones[0].motion[1].position, Eigen::Vector3d::UnitY());
+  EXPECT_TRUE(needs_of(scene).full_space);
+}
+
 TEST(LoadScene, ReadsObstacles) {
   const TemporaryFolder folder;
   const SceneConfig scene = load(folder, load_scene, R"({"bundle": "b.h5", "obstacles": [
