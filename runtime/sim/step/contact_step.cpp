@@ -39,6 +39,7 @@ bool is_near_obstacles(const Model& model, const StepScene& scene, State& state,
   ContactWorkspace& contact = workspace.near->contact;
   set.gather(scene.obstacles, static_cast<double>(state.step + 1) * dt, dt, pose, margin, state.contacts.near_planes,
              contact);
+  contact.are_all_planes &= contact.candidate_count > 0;  // else those of an earlier step would be evaluated
   if (contact.candidate_count == 0) return false;
   FrameVelocity loaded = expected;
   loaded.linear += dt * scene.gravity;

@@ -28,7 +28,9 @@ bool FullContacts::begin(const Obstacles& obstacles, double end_time, double tim
   contact.set_zero(contact.generalised.size());
   contact.obstacles.resize(obstacles.size());  // within what it was sized for
   double square = 0;
-  for (int vertex = 0; vertex < std::ssize(places_); ++vertex) square = std::max(square, at(vertex, v).squaredNorm());
+  const auto moves = [this](int vertex) { return places_[static_cast<std::size_t>(vertex)] >= 0; };
+  for (int vertex = 0; vertex < std::ssize(places_); ++vertex)
+    if (moves(vertex)) square = std::max(square, at(vertex, v).squaredNorm());
   const double way = time_step * std::sqrt(square);
   const double margin = kContactMarginSteps * way + time_step * time_step * gravity.norm() + held.longest_way_out();
   for (std::size_t i = 0; i < obstacles.size(); ++i) {
@@ -36,10 +38,11 @@ bool FullContacts::begin(const Obstacles& obstacles, double end_time, double tim
     if (!placed.obstacle->motion.moves()) continue;
     const double limit = kSweep * shortest_passage(placed.obstacle->shape);
     for (int vertex = 0; vertex < std::ssize(places_) && !placed.sweeps; ++vertex)
-      placed.sweeps = placed.sweep(point(vertex, u), 0) > limit;
+      placed.sweeps = moves(vertex) && placed.sweep(point(vertex, u), 0) > limit;
   }
   std::size_t next = 0;
   for (int vertex = 0; vertex < std::ssize(places_); ++vertex) {
+    if (!moves(vertex)) continue;
     const Eigen::Vector3d here = point(vertex, u);
     for (std::size_t i = 0; i < obstacles.size(); ++i) {
       if (!contact.obstacles[i].may_meet(here, 0, margin)) continue;
