@@ -13,23 +13,8 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-/// The force of a region, of the whole body where it is -1.
-std::size_t example_force(const exmat_body& body, std::int64_t region) {
-  const Model& model = body.model();
-  const bool whole = region == -1 && model.has_whole_body_examples();
-  if (model.examples.empty())
-    throw InvalidArgument("the model has no example force: set use_examples, or let its scene have examples");
-  if (!whole && model.region(region) == nullptr)
-    throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
-                                      model.has_whole_body_examples() ? "the whole body (-1) and " : "",
-                                      model.region_count()));
-  const std::size_t force = whole ? 0 : static_cast<std::size_t>(model.region(region) - model.examples.data());
-  if (force >= body.scene.examples.size()) throw InvalidArgument("the model was created without its example force");
-  return force;
-}
-
 ExampleSettings& example_settings(exmat_body& body, std::int64_t region) {
-  return body.scene.examples[example_force(body, region)];
+  return body.scene.examples[body.example_force(region)];
 }
 
 void check_weights(std::span<const double> weights, Eigen::Index examples) {
@@ -48,6 +33,20 @@ void check_weights(std::span<const double> weights, Eigen::Index examples) {
 bool is_factor(double number) { return number >= 0 && std::isfinite(number); }
 
 }  // namespace
+
+std::size_t exmat_body::example_force(std::int64_t region) const {
+  const Model& model = this->model();
+  const bool whole = region == -1 && model.has_whole_body_examples();
+  if (model.examples.empty())
+    throw InvalidArgument("the model has no example force: set use_examples, or let its scene have examples");
+  if (!whole && model.region(region) == nullptr)
+    throw InvalidArgument(fmt::format("region = {}: the model has {}{} regions", region,
+                                      model.has_whole_body_examples() ? "the whole body (-1) and " : "",
+                                      model.region_count()));
+  const std::size_t found = whole ? 0 : static_cast<std::size_t>(model.region(region) - model.examples.data());
+  if (found >= scene.examples.size()) throw InvalidArgument("the model was created without its example force");
+  return found;
+}
 
 exmat_status exmat_body_set_gravity(exmat_body* body, const double* gravity) noexcept {
   EXMAT_REQUIRE(body);
@@ -131,7 +130,7 @@ exmat_status exmat_body_set_example_weights(exmat_body* body, std::int64_t regio
   if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
   if (count > 0) EXMAT_REQUIRE(weights);
   return guarded(__func__, [&] {
-    const std::size_t force = example_force(*body, region);
+    const std::size_t force = body->example_force(region);
     const std::span given(weights, static_cast<std::size_t>(count));
     if (count > 0) check_weights(given, body->model().examples[force].weights.examples());
     body->scene.examples[force].given_weights = Eigen::Map<const Eigen::VectorXd>(weights, count);

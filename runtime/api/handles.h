@@ -11,6 +11,7 @@
 #include "runtime/api/drawn_surface.h"
 #include "runtime/api/point_set.h"
 #include "runtime/capacity/load_capacity.h"
+#include "runtime/sim/step/reach.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::runtime {
@@ -80,9 +81,13 @@ struct exmat_body {
   exmat_world* world = nullptr;                                  ///< that it is in, always one
   std::int64_t id = 0;                                           ///< in that
   std::int64_t next_attachment = 0;                              ///< its id
+  std::unique_ptr<exmat::runtime::Reach> reach;                  ///< present while it reaches for something
   std::unique_ptr<exmat_world> own;                              ///< the world, where it is the body's own
   std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< present where reports hold lost work
   Eigen::VectorXd load;                                          ///< 3n applied forces, there alone; the body's frame
+
+  /// Which of the model's example forces is that of a region, of the whole body where it is -1. Throws InvalidArgument.
+  std::size_t example_force(std::int64_t region) const;
 };
 
 // NOLINTEND(readability-identifier-naming)

@@ -3,15 +3,15 @@
 
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
+#include "runtime/api/points_in_modes.h"
 #include "runtime/api/world_handle.h"
 #include "runtime/sim/step/impulse_response.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
-namespace {
-
-exmat_status check_points(const char* function, const exmat_body& body, const exmat_points& points) noexcept {
+exmat_status exmat::runtime::check_points_in_modes(const char* function, const exmat_body& body,
+                                                   const exmat_points& points) noexcept {
   if (points.source != body.source)
     return fail(EXMAT_INVALID_ARGUMENT, "%s: the points are those of another model", function);
   if (body.state.full)
@@ -20,13 +20,11 @@ exmat_status check_points(const char* function, const exmat_body& body, const ex
   return require_rows(function, points.set);
 }
 
-}  // namespace
-
 exmat_status exmat_body_read_compliance(const exmat_body* body, const exmat_points* points, double* velocity,
                                         double* compliance, std::int64_t coordinates) noexcept {
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(points);
-  if (const exmat_status status = check_points(__func__, *body, *points)) return status;
+  if (const exmat_status status = check_points_in_modes(__func__, *body, *points)) return status;
   EXMAT_REQUIRE_LENGTH(coordinates, points->set.basis_rows.rows());
   return guarded(__func__, [&] {
     const MaterialPoints own{points->set.rest, points->set.basis_rows};
@@ -43,7 +41,7 @@ exmat_status exmat_body_apply_impulses(exmat_body* body, const exmat_points* poi
   EXMAT_REQUIRE(body);
   EXMAT_REQUIRE(points);
   EXMAT_REQUIRE(impulses);
-  if (const exmat_status status = check_points(__func__, *body, *points)) return status;
+  if (const exmat_status status = check_points_in_modes(__func__, *body, *points)) return status;
   EXMAT_REQUIRE_LENGTH(coordinates, points->set.basis_rows.rows());
   if (const double* const far = find_far(impulses, coordinates))
     return fail(EXMAT_INVALID_ARGUMENT, "%s: impulses[%td] = %g: expected finite numbers of at most %g", __func__,

@@ -25,6 +25,7 @@ inline constexpr StructSizes kBundleInfoSizes{72, sizeof(exmat_bundle_info)};
 inline constexpr StructSizes kProfileSizes{48, sizeof(exmat_profile)};
 inline constexpr StructSizes kAttachmentSizes{offsetof(exmat_attachment, break_force) + sizeof(double),
                                               sizeof(exmat_attachment)};
+inline constexpr StructSizes kReachSizes{56, sizeof(exmat_reach)};
 inline constexpr std::size_t kMostStructBytes = 4096;  ///< limit on the size of any version
 
 /// The defaults of a scene file.

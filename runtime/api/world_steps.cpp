@@ -89,7 +89,10 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
   world.world.set_profile(world.profiled ? &world.profile : nullptr);
   for (const auto& member : world.members) begin_steps(*member.body);
   while (report.steps < steps && failed_of(world) == nullptr) {
-    for (const auto& member : world.members) apply_keys(*member.body);
+    for (const auto& member : world.members) {
+      apply_keys(*member.body);
+      if (member.body->reach) member.body->reach->choose_weights(member.body->scene);
+    }
     add(world.world.step(threads, &recorder), report);
     for (int i = 0; i < world.world.count(); ++i)
       add_step(world.world.report(i), *world.members[static_cast<std::size_t>(i)].body);

@@ -43,6 +43,38 @@ void apply_impulses(BodyObject& body, const PointsObject& points, const Numbers&
   body.get().apply_impulses(points.points, read_span(impulses));
 }
 
+py::array_t<double> sensitivity(BodyObject& body, const PointsObject& points, const py::object& region) {
+  const std::int64_t own = region_of(body.model->model, region);
+  const std::size_t examples =
+      own < 0 ? body.model->model.examples() : body.model->model.region_examples(static_cast<std::size_t>(own));
+  py::array_t<double> matrix(
+      {static_cast<py::ssize_t>(points.count), py::ssize_t{3}, static_cast<py::ssize_t>(examples)});
+  body.get().read_sensitivity(points.points, span_of(matrix), own);
+  return matrix;
+}
+
+void reach(BodyObject& body, const PointsObject* points, const py::object& targets, const py::object& region,
+           const py::object& lowest, const py::object& highest, double change, double horizon) {
+  if (points == nullptr && targets.is_none()) return body.get().stop_reaching();
+  if (points == nullptr || targets.is_none())
+    throw Error(EXMAT_INVALID_ARGUMENT, "points, targets: expected both, or neither to stop");
+  const auto places = targets.cast<Numbers>();
+  require_shape(places, "targets", {static_cast<py::ssize_t>(points->count), 3});
+  std::vector<double> least, most;
+  if (!lowest.is_none()) least = lowest.cast<std::vector<double>>();
+  if (!highest.is_none()) most = highest.cast<std::vector<double>>();
+  if (!lowest.is_none() && !highest.is_none() && least.size() != most.size())
+    throw Error(EXMAT_INVALID_ARGUMENT, "lowest, highest: expected as many numbers");
+  exmat_reach settings = default_reach();
+  settings.region = region_of(body.model->model, region);
+  settings.change = change;
+  settings.horizon = horizon;
+  if (!lowest.is_none()) settings.lowest = least.data();
+  if (!highest.is_none()) settings.highest = most.data();
+  settings.examples = static_cast<std::int64_t>(std::max(least.size(), most.size()));
+  body.get().reach(points->points, read_span(places), settings);
+}
+
 py::array positions(BodyObject& body, const PointsObject& points, const py::object& out) {
   return positions_of(body, points.points, points.count, out);
 }
@@ -226,6 +258,17 @@ void bind_settings(BodyClass& type) {
       .def("apply_impulses", &apply_impulses, py::arg("points"), py::arg("impulses"),
            "Gives k points impulses [N s] of shape (k, 3): velocities change by the compliance times these, and the "
            "body moves on by that times the time step.")
+      .def("reach", &reach, py::arg("points") = py::none(), py::arg("targets") = py::none(), py::kw_only(),
+           py::arg("region") = py::none(), py::arg("lowest") = py::none(), py::arg("highest") = py::none(),
+           py::arg("change") = 0.05, py::arg("horizon") = 0.5,
+           "Examples as muscles: from the next step on their weights are chosen so that k points come as near to "
+           "`targets`, world, of shape (k, 3) [m], as they can, the sum of squared distances being least. `lowest` and "
+           "`highest`: limits of the weights, one for each example. `change`: most that a weight changes in a step. "
+           "`horizon` [s]: how far ahead the body is looked at; of the order of its slowest period. Without arguments "
+           "the weights stay as they are; set_example_weights(None) gives them back to the pose.")
+      .def("sensitivity", &sensitivity, py::arg("points"), py::arg("region") = py::none(),
+           "Displacement of k points at the end of the next step by weight that goes from the rest pose to each "
+           "example, of shape (k, 3, K) [m]; of a body that steps in its modes.")
       .def(
           "move_attachment",
           [](BodyObject& body, std::int64_t id, const Numbers& frame) {

@@ -24,6 +24,20 @@ inline test::Bar full_bar(const test::BarOptions& options) {
   return bar;
 }
 
+/// A bar whose elastic example force is by the elements of its cubature, targets in reduced coordinates.
+inline test::Bar elastic_bar(const test::BarOptions& options) {
+  test::Bar bar = full_bar(options);
+  const CubatureData& cubature = *bar.model.cubature;
+  TargetElasticityData& data = bar.model.target_elasticity.emplace();
+  data.weights = cubature.weights;
+  data.volumes = cubature.volumes;
+  data.gradient = data.target_gradient = cubature.gradient;
+  data.youngs_modulus = cubature.youngs_modulus;
+  data.poisson_ratio = cubature.poisson_ratio;
+  data.control_points = bar.model.targets->control_points;
+  return bar;
+}
+
 /// No load, no damping, no examples.
 inline StepScene free_scene(const Model& model, Integrator integrator, double time_step) {
   StepScene scene;

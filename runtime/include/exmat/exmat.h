@@ -424,6 +424,34 @@ EXMAT_API exmat_status exmat_body_set_example_bias(exmat_body* body, int64_t reg
 EXMAT_API exmat_status exmat_body_set_example_weights(exmat_body* body, int64_t region, const double* weights,
                                                       int64_t count) EXMAT_NOEXCEPT;
 
+/* Muscles: the weights of examples are chosen before each step so that points of the body come as near to their targets
+   as they can. Of a body that steps in its modes; while it sleeps or is in all vertices its weights stay. */
+typedef struct exmat_reach {
+  size_t size;    /* sizeof(exmat_reach), set by the caller */
+  int64_t region; /* whose examples; -1: of the whole body; -1 */
+  double change;  /* most that a weight changes in a step, in (0, 1]; 0.05 */
+  double horizon; /* > 0 [s]: the body is looked at where it would be after so long, at the end of one long step; of the
+                     order of its slowest period, or it swings about its targets; 0.5 */
+  const double* lowest;  /* [examples] limits of the weights in [0, 1], which let them add up to 1; NULL: 0 */
+  const double* highest; /* likewise; NULL: 1 */
+  int64_t examples;      /* K, the length of the two; 0 where both are NULL */
+} exmat_reach;
+
+/* Sets all members to their defaults; `size` is sizeof(exmat_reach). */
+EXMAT_API exmat_status exmat_reach_default(exmat_reach* reach, size_t size) EXMAT_NOEXCEPT;
+
+/* From the next step on: brings `points` to the world places `targets` [coordinates = 3k] [m], the sum of their squared
+   distances being least, until it is called again. `reach` NULL: the defaults. `points` NULL, with 0 coordinates: the
+   weights stay as they are from now on; exmat_body_set_example_weights() gives them back to the pose. Allocates. */
+EXMAT_API exmat_status exmat_body_reach(exmat_body* body, const exmat_points* points, const double* targets,
+                                        int64_t coordinates, const exmat_reach* reach) EXMAT_NOEXCEPT;
+
+/* Displacement of the points at the end of the next step by a change of the weights, `sensitivity` [count = 3k K], a
+   row of K for each coordinate: per weight that goes from the rest pose to example k [m], 0 for the rest pose itself.
+   With the mass, damping and stiffness of a step; contacts are left out. */
+EXMAT_API exmat_status exmat_body_read_sensitivity(const exmat_body* body, int64_t region, const exmat_points* points,
+                                                   double* sensitivity, int64_t count) EXMAT_NOEXCEPT;
+
 /* ---- contacts of one body ---------------------------------------------------------------------------------------- */
 
 /* A vertex of the object that touched at the end of the last step. */

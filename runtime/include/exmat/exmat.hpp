@@ -65,6 +65,12 @@ inline exmat_attachment default_attachment() {
   return attachment;
 }
 
+inline exmat_reach default_reach() {
+  exmat_reach reach;
+  check(exmat_reach_default(&reach, sizeof reach));
+  return reach;
+}
+
 /// On the frame of an attachment [N], about its origin [N m].
 struct AttachmentLoad {
   std::array<double, 3> force{}, torque{};
@@ -447,6 +453,15 @@ class BodyRef {
   /// Empty: those of the pose again.
   void set_example_weights(std::span<const double> weights, std::int64_t region = -1) {
     check(exmat_body_set_example_weights(get(), region, weights.data(), detail::length(weights)));
+  }
+  /// Brings points to `targets` [3k] by the weights of examples.
+  void reach(const Points& points, std::span<const double> targets, const exmat_reach& settings = default_reach()) {
+    check(exmat_body_reach(get(), points.get(), targets.data(), detail::length(targets), &settings));
+  }
+  void stop_reaching() { check(exmat_body_reach(get(), nullptr, nullptr, 0, nullptr)); }
+  /// [3k x K] by rows.
+  void read_sensitivity(const Points& points, std::span<double> sensitivity, std::int64_t region = -1) const {
+    check(exmat_body_read_sensitivity(get(), region, points.get(), sensitivity.data(), detail::length(sensitivity)));
   }
 
   std::vector<exmat_contact> contacts() const {

@@ -1,9 +1,7 @@
 #include "runtime/sim/step/example_forces.h"
 
 namespace exmat::runtime {
-namespace {
 
-/// Finds the pull of the target or, for an elastic force, the elasticity from it.
 void find_target(const ExampleModel& model, const ExampleSettings& settings, const ExampleState& state,
                  ExampleWorkspace& workspace, StepReport& report) noexcept {
   const bool elastic = settings.elastic;
@@ -17,8 +15,6 @@ void find_target(const ExampleModel& model, const ExampleSettings& settings, con
   else if (!model.table)
     workspace.target.noalias() = model.target_pull * workspace.solved_target;
 }
-
-}  // namespace
 
 void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
                   ExampleWorkspace& workspace, StepReport& report) noexcept {

@@ -17,6 +17,10 @@ void set_weights(const ExampleWeights& weights, const ExampleSettings& settings,
 void evaluate_weights(const Model& model, const StepScene& scene, const Eigen::VectorXd& q,
                       Workspace& workspace) noexcept;
 
+/// Finds the pull of the target for the weights in the workspace or, for an elastic force, the elasticity from it.
+void find_target(const ExampleModel& model, const ExampleSettings& settings, const ExampleState& state,
+                 ExampleWorkspace& workspace, StepReport& report) noexcept;
+
 /// p* of these examples by Newton's method from the last target, for the weights in the workspace: its coordinates.
 void solve_target(const ExampleModel& model, int most_iterations, const ExampleState& state,
                   ExampleWorkspace& workspace, StepReport& report) noexcept;

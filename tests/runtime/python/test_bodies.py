@@ -208,3 +208,29 @@ def test_given_weights_and_stiffness_are_of_the_body_alone(bundle):
     body.set_example_weights(None)
     body.step()
     assert body.weights[0] > 0
+
+
+def test_examples_pull_points_to_places(bundle):
+    model = exmat.Model(bundle, mass_damping=8, example_stiffness=4000)
+    there, body = exmat.Body(model), exmat.Body(model)
+    there.set_example_weights([0.4, 0.6])
+    there.step(2000)
+    every = exmat.Points(model, range(model.vertices))
+    moved = np.linalg.norm(there.positions(every, np.empty((model.vertices, 3))) - every.rest, axis=1)
+    points = exmat.Points(model, [int(np.argmax(moved))])
+    target = there.positions(points, np.empty((1, 3)))
+    body.reach(points, target, change=0.01, highest=[1, 0.9])
+    body.step(1)
+    assert body.weights[1] == pytest.approx(0.01)
+    body.step(2000)
+    assert body.weights[1] == pytest.approx(0.6, abs=0.01)
+    assert np.linalg.norm(body.positions(points, np.empty((1, 3))) - target) < 0.01
+    sensitivity = body.sensitivity(points)
+    assert sensitivity.shape == (1, 3, 2) and np.all(sensitivity[..., 0] == 0) and np.abs(sensitivity).max() > 0
+    body.reach()
+    body.step(10)
+    assert body.weights[1] == pytest.approx(0.6, abs=0.01), "they stay as they were"
+    with pytest.raises(exmat.InvalidArgument, match=r"reach.highest\[0\] = 3"):
+        body.reach(points, target, highest=[3, 1])
+    with pytest.raises(exmat.InvalidArgument, match="expected both"):
+        body.reach(points)

@@ -10,20 +10,6 @@
 namespace exmat::runtime {
 namespace {
 
-// A bar whose elastic force is by the elements of its cubature, targets in reduced coordinates.
-test::Bar elastic_bar(int examples = 3) {
-  test::Bar bar = full_bar({.examples = examples});
-  const CubatureData& cubature = *bar.model.cubature;
-  TargetElasticityData& data = bar.model.target_elasticity.emplace();
-  data.weights = cubature.weights;
-  data.volumes = cubature.volumes;
-  data.gradient = data.target_gradient = cubature.gradient;
-  data.youngs_modulus = cubature.youngs_modulus;
-  data.poisson_ratio = cubature.poisson_ratio;
-  data.control_points = bar.model.targets->control_points;
-  return bar;
-}
-
 class ElasticForce : public testing::TestWithParam<std::tuple<Integrator, bool>> {
  protected:
   ElasticForce()
@@ -37,7 +23,7 @@ class ElasticForce : public testing::TestWithParam<std::tuple<Integrator, bool>>
     return state;
   }
 
-  const test::Bar bar_ = elastic_bar();
+  const test::Bar bar_ = elastic_bar({.examples = 3});
   std::unique_ptr<const Model> model_;
   StepScene scene_;
 };
@@ -80,7 +66,7 @@ TEST_P(ElasticForce, LeavesOutWhatIsZero) {
 
 // The force is the slope of the energy, where the body starts: the acceleration of Newmark's first step.
 TEST(ElasticExampleForce, IsThatOfTheEnergyAtTheStart) {
-  const test::Bar bar = elastic_bar(2);
+  const test::Bar bar = elastic_bar({.examples = 2});
   const auto model = prepared(bar, {.target_table = true, .elastic = true});
   StepScene scene = free_scene(*model, Integrator::kNewmark, 1e-6);
   scene.examples = {{.stiffness = 0.5, .bias = 0, .elastic = true}};
@@ -105,7 +91,7 @@ TEST(ElasticExampleForce, IsThatOfTheEnergyAtTheStart) {
 }
 
 TEST(ElasticExampleForce, NamesWhatABundleLacks) {
-  test::Bar bar = elastic_bar();
+  test::Bar bar = elastic_bar({.examples = 3});
   bar.model.target_elasticity->control_points = RowMatrix(3, bar.modes());
   ModelResult result = build_model(bar.model, {.target_table = true, .elastic = true});
   EXPECT_EQ(result.complaint.place, "/target_elasticity/control_points");
