@@ -5,17 +5,75 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <span>
+#include <vector>
 
 #include "runtime/api/failures.h"
 
 namespace exmat::runtime {
 
-/// The numbers of a state, from the first on. Throws InvalidArgument where they are not what is asked for.
-class StateNumbers {
- public:
-  explicit StateNumbers(std::span<const double> numbers) : numbers_(numbers) {}
+// Two archives that go through the members of a state in the same order: visit(archive, state) describes a state once.
 
-  std::size_t left() const { return numbers_.size(); }
+/// Writes the numbers of a state from `to` on, or only counts them where that is null.
+class StateWriter {
+ public:
+  explicit StateWriter(double* to = nullptr) : to_(to) {}
+
+  std::size_t count() const noexcept { return count_; }
+  static constexpr bool checks() noexcept { return false; }
+
+  void number(double number) noexcept {
+    if (to_ != nullptr) to_[count_] = number;
+    ++count_;
+  }
+  template <typename Dense>
+  void array(const Dense& array) noexcept {
+    if (to_ != nullptr) std::copy_n(array.data(), array.size(), to_ + count_);
+    count_ += static_cast<std::size_t>(array.size());
+  }
+  template <typename Dense>
+  void array(const Dense& own, Eigen::Index /*rows*/, Eigen::Index /*columns*/) noexcept {
+    array(own);
+  }
+  /// Room for as many numbers; null where they are only counted.
+  double* room(std::size_t count) noexcept {
+    double* const room = to_ != nullptr ? to_ + count_ : nullptr;
+    count_ += count;
+    return room;
+  }
+
+  void same(const char* /*name*/, double expected, const char* /*unit*/, const char* /*advice*/) noexcept {
+    number(expected);
+  }
+  bool flag(const char* /*name*/, bool value) noexcept {
+    number(value ? 1 : 0);
+    return value;
+  }
+  void not_negative(const char* /*name*/, double value) noexcept { number(value); }
+  template <typename Whole>
+  std::size_t whole(const char* /*name*/, Whole value, double /*end*/) noexcept {
+    number(static_cast<double>(value));
+    return static_cast<std::size_t>(value);
+  }
+  void skip(std::size_t /*count*/) const noexcept {}
+  template <typename List>
+  std::size_t size(const char* name, const List& list) noexcept {
+    return whole(name, list.size(), 0);
+  }
+
+ private:
+  double* to_;
+  std::size_t count_ = 0;
+};
+
+/// Takes the numbers of a state, from the first on, or only checks them: throws InvalidArgument where they are not
+/// those of such a state. To be used twice, since what takes them stops nowhere that the check has passed.
+class StateReader {
+ public:
+  enum class Use { kCheck, kTake };
+  StateReader(std::span<const double> numbers, Use use) : numbers_(numbers), takes_(use == Use::kTake) {}
+
+  std::size_t left() const noexcept { return numbers_.size(); }
+  bool checks() const noexcept { return !takes_; }
 
   std::span<const double> take(std::size_t count) {
     if (count > numbers_.size()) throw InvalidArgument("numbers: they end early: are they of another model or world?");
@@ -23,29 +81,64 @@ class StateNumbers {
     numbers_ = numbers_.subspan(count);
     return taken;
   }
-  double number() { return take(1).front(); }
-  Eigen::Vector3d vector() { return Eigen::Vector3d(take(3).data()); }
-  void read(Eigen::VectorXd& array) { std::ranges::copy(take(static_cast<std::size_t>(array.size())), array.begin()); }
+  void skip(std::size_t count) { take(count); }
+  void number(double& number) { set(take(1).front(), number); }
+  template <typename Dense>
+  void array(Dense& array) {
+    const auto from = take(static_cast<std::size_t>(array.size()));
+    if (takes_) std::copy_n(from.data(), from.size(), array.data());
+  }
+  /// Into an array that gets this size.
+  template <typename Dense>
+  void array(Dense& own, Eigen::Index rows, Eigen::Index columns) {
+    if (!takes_) return skip(static_cast<std::size_t>(rows * columns));
+    own.resize(rows, columns);
+    array(own);
+  }
 
-  bool flag(const char* name) {
-    const double found = number();
+  void same(const char* name, double expected, const char* unit, const char* advice) {
+    if (const double found = take(1).front(); found != expected)
+      throw InvalidArgument(
+          fmt::format("numbers: {} {:g}{}: expected {:g}{}{}", name, found, unit, expected, unit, advice));
+  }
+  bool flag(const char* name, bool& value) {
+    const double found = take(1).front();
     if (found != 0 && found != 1)
       throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected 0 or 1", name, found));
+    set(found == 1, value);
     return found == 1;
   }
+  void not_negative(const char* name, double& value) {
+    const double found = take(1).front();
+    if (!(found >= 0)) throw InvalidArgument(fmt::format("numbers: expected {} >= 0", name));
+    set(found, value);
+  }
   /// A whole number below `end`.
-  double count(const char* name, double end) {
-    const double found = number();
+  template <typename Whole>
+  std::size_t whole(const char* name, Whole& value, double end) {
+    const double found = take(1).front();
     if (!(found >= 0 && found < end && found == std::floor(found)))
       throw InvalidArgument(fmt::format("numbers: {} = {:g}: expected a whole number below {:g}", name, found, end));
-    return found;
+    set(static_cast<Whole>(found), value);
+    return static_cast<std::size_t>(found);
   }
-  std::size_t count(const char* name, std::size_t end) {
-    return static_cast<std::size_t>(count(name, static_cast<double>(end)));
+  /// The size of a list, each entry of which takes at least one number.
+  template <typename Entry>
+  std::size_t size(const char* name, std::vector<Entry>& list) {
+    std::size_t unused = 0;
+    const std::size_t size = whole(name, unused, static_cast<double>(left()));
+    if (takes_) list.resize(size);
+    return size;
   }
 
  private:
+  template <typename Value>
+  void set(Value found, Value& value) const noexcept {
+    if (takes_) value = found;
+  }
+
   std::span<const double> numbers_;
+  bool takes_;
 };
 
 }  // namespace exmat::runtime

@@ -20,10 +20,6 @@ const exmat_world::Member* member_of(const exmat_world& world, std::int64_t id) 
   return found != world.members.end() && found->id == id ? &*found : nullptr;
 }
 
-ContactLaw contact_law_of(const exmat_contact_law& law) noexcept {
-  return {law.stiffness, law.damping, law.friction, law.release};
-}
-
 exmat_contact_law default_law() noexcept {
   const BodyContactConfig defaults;
   return {sizeof(exmat_contact_law), defaults.stiffness, defaults.damping, defaults.friction,
@@ -61,6 +57,10 @@ exmat_world::~exmat_world() {
 }
 
 namespace exmat::runtime {
+
+ContactLaw contact_law_of(const exmat_contact_law& law) noexcept {
+  return {law.stiffness, law.damping, law.friction, law.release};
+}
 
 int place_of(const exmat_body& body) noexcept {
   const auto& members = body.world->members;

@@ -19,7 +19,8 @@ struct exmat_world {
   struct HostedObstacle {
     std::int64_t id = 0;
     std::shared_ptr<exmat::runtime::Obstacle> obstacle;
-    bool hosted = false;  ///< added or moved by the host, not by the scene
+    bool hosted = false;                         ///< added or moved by the host, not by the scene
+    exmat::runtime::RigidMotion scene_motion{};  ///< where it goes until a host moves it
   };
 
   explicit exmat_world(const exmat_contact_law& its_law);
@@ -46,6 +47,8 @@ struct exmat_world {
 // NOLINTEND(readability-identifier-naming)
 
 namespace exmat::runtime {
+
+ContactLaw contact_law_of(const exmat_contact_law& law) noexcept;
 
 /// A body's place among the members of its world.
 int place_of(const exmat_body& body) noexcept;

@@ -296,7 +296,7 @@ void meet_obstacles(exmat_body& body) {
 
 void take_obstacles(const Obstacles& obstacles, exmat_world& world) {
   for (const SharedObstacle& obstacle : obstacles)
-    world.obstacles.push_back({world.next_obstacle++, std::make_shared<Obstacle>(*obstacle), false});
+    world.obstacles.push_back({world.next_obstacle++, std::make_shared<Obstacle>(*obstacle), false, obstacle->motion});
 }
 
 void hold_by_copies(const Obstacles& obstacles, exmat_body& body) {

@@ -1,5 +1,8 @@
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cinttypes>
+#include <cstring>
 #include <fmt/format.h>
 
 #include "exmat/exmat.h"
@@ -7,131 +10,371 @@
 #include "runtime/api/body_state.h"
 #include "runtime/api/state_numbers.h"
 #include "runtime/api/world_handle.h"
+#include "runtime/sim/step/state.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
-// The state of a world: how many bodies; of each its number of numbers, whether it is anew, and these; how many pairs;
-// of each its bodies, how many vertices of either touch, its energy and account, and ten numbers for each vertex.
+// A state of a world is the motion of its bodies and the memory of their contacts, for a world like this one. A
+// snapshot is that and all else that a host or a step changes, for this world: settings, attachments, obstacles that
+// move.
 
 namespace {
 
-constexpr std::size_t kHeadNumbers = 2, kBodyNumbers = 2, kPairNumbers = 6, kContactNumbers = 10;
+// ---- what both hold
 
-std::size_t size_of(const exmat_world& world) {
-  std::size_t size = kHeadNumbers;
-  for (const auto& member : world.members) size += kBodyNumbers + state_size(*member.body);
-  for (const HeldPair& pair : world.world.held())
-    size += kPairNumbers + kContactNumbers * (pair.held[0].size() + pair.held[1].size());
-  return size;
+bool visit_anew(StateWriter& archive, const exmat_world& world, int body) {
+  return archive.flag("anew", world.world.is_anew(body));
 }
 
-void write_contacts(const HeldPair& pair, std::vector<double>& numbers) {
-  for (const auto number :
-       {static_cast<double>(pair.first), static_cast<double>(pair.second), static_cast<double>(pair.held[0].size()),
-        static_cast<double>(pair.held[1].size()), pair.energy, pair.account})
-    numbers.push_back(number);
-  for (const auto& side : pair.held)
-    for (const HeldBodyContact& held : side) {
-      for (const double number : {static_cast<double>(held.vertex), held.gap, held.normal_force, held.overlap})
-        numbers.push_back(number);
-      numbers.insert(numbers.end(), held.stretch.begin(), held.stretch.end());
-      numbers.insert(numbers.end(), held.normal.begin(), held.normal.end());
-    }
+void visit_anew(StateReader& archive, exmat_world& world, int body) {
+  bool anew = false;
+  anew = archive.flag("anew", anew);
+  if (!archive.checks()) world.world.set_anew(body, anew);
 }
 
-std::vector<double> write_world(const exmat_world& world) {
-  std::vector<double> numbers{static_cast<double>(world.members.size())};
-  for (std::size_t i = 0; i < world.members.size(); ++i) {
-    const std::vector<double> own = write_state(*world.members[i].body);
-    numbers.push_back(static_cast<double>(own.size()));
-    numbers.push_back(world.world.is_anew(static_cast<int>(i)) ? 1 : 0);
-    numbers.insert(numbers.end(), own.begin(), own.end());
+/// A bound that may be infinite, which no number of a state is.
+void visit_bound(StateWriter& archive, double bound) { archive.number(std::isfinite(bound) ? bound : -1); }
+
+void visit_bound(StateReader& archive, double& bound) {
+  archive.number(bound);
+  if (!archive.checks() && bound < 0) bound = std::numeric_limits<double>::infinity();
+}
+
+template <typename Archive, typename Contacts>
+void visit_contacts(Archive& archive, Contacts& contacts, std::size_t count, const exmat_body& body) {
+  HeldBodyContact unused;
+  std::size_t end = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& held = *(archive.checks() ? &unused : &contacts[i]);
+    const std::size_t vertex =
+        archive.whole("vertex", held.vertex, static_cast<double>(body.model().contact->vertices()));
+    if (archive.checks() && vertex < end)
+      throw InvalidArgument("numbers: expected vertices of a contact in ascending order");
+    end = vertex + 1;
+    archive.number(held.gap);
+    archive.number(held.normal_force);
+    archive.not_negative("overlaps of contacts", held.overlap);
+    archive.array(held.stretch);
+    archive.array(held.normal);
   }
-  numbers.push_back(static_cast<double>(world.world.held().size()));
-  for (const HeldPair& pair : world.world.held()) write_contacts(pair, numbers);
+}
+
+template <typename Archive, typename Body>
+void visit_body(Archive& archive, Body& body) try {
+  visit_state(archive, body);
+} catch (const InvalidArgument& error) {
+  throw InvalidArgument(fmt::format("body {}: {}", body.id, error.what()));
+}
+
+template <typename Archive, typename World, typename Pairs>
+void visit_pairs(Archive& archive, World& world, Pairs& pairs) {
+  const auto bodies = static_cast<double>(world.members.size());
+  const std::size_t count = archive.size("pairs", pairs);
+  HeldPair unused;
+  std::pair<std::size_t, std::size_t> last(0, 0);
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& pair = *(archive.checks() ? &unused : &pairs[i]);
+    std::pair<std::size_t, std::size_t> own;
+    own.first = archive.whole("body", pair.first, bodies);
+    own.second = archive.whole("body", pair.second, bodies);
+    if (archive.checks() && (own.second < own.first || (i > 0 && own <= last)))
+      throw InvalidArgument("numbers: expected pairs of bodies, and the bodies of each, in ascending order");
+    if (archive.checks() &&
+        !(world.world.may_touch(static_cast<int>(own.first)) && world.world.may_touch(static_cast<int>(own.second))))
+      throw InvalidArgument("numbers: expected pairs of bodies that may touch");
+    last = own;
+    archive.not_negative("energies of a pair", pair.energy);
+    visit_bound(archive, pair.account);
+    for (const std::size_t side : {0U, 1U}) {
+      auto& contacts = pair.held[side];
+      const exmat_body& body = *world.members[side == 0 ? own.first : own.second].body;
+      visit_contacts(archive, contacts, archive.size("contacts", contacts), body);
+    }
+  }
+}
+
+/// How many bodies; the state of each, and whether it is anew; how many pairs; of each its bodies, its energy and its
+/// account, how many vertices of either touch, and ten numbers for each of these.
+template <typename Archive, typename World>
+void visit_motion(Archive& archive, World& world) {
+  archive.same("bodies", static_cast<double>(world.members.size()), "", ", those of the world");
+  for (std::size_t i = 0; i < world.members.size(); ++i) {
+    visit_anew(archive, world, static_cast<int>(i));
+    visit_body(archive, *world.members[i].body);
+  }
+  visit_pairs(archive, world, world.world.held());
+}
+
+// ---- what snapshots hold beside
+
+template <typename Archive, typename Held>
+void visit_attachment(Archive& archive, Held& held, const exmat_body& body) {
+  archive.whole("id", held.id, kMostSteps);
+  archive.whole("kind", held.kind, 3);
+  const std::size_t count = archive.size("vertices", held.vertices);
+  std::int32_t unused = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    auto& vertex = *(archive.checks() ? &unused : &held.vertices[k]);
+    const std::size_t own = archive.whole("vertex", vertex, static_cast<double>(body.source->loaded.summary.vertices));
+    if (archive.checks() && body.full() != nullptr && body.full()->space.number(static_cast<Eigen::Index>(own)) < 0)
+      throw InvalidArgument("numbers: expected attachments of vertices that move");
+  }
+  const auto points = static_cast<Eigen::Index>(count);
+  archive.array(held.shares, points, 1);
+  archive.array(held.places, 3, points);
+  for (auto* number : {&held.stiffness, &held.damping, &held.patch.square}) archive.number(*number);
+  visit_bound(archive, held.break_force);
+  Eigen::Index rows = held.patch.rows.rows(), axes = held.patch.axes.cols();
+  rows = static_cast<Eigen::Index>(archive.whole("rows", rows, 13));
+  axes = static_cast<Eigen::Index>(archive.whole("axes", axes, 4));
+  archive.array(held.patch.rows, rows, body.model().modes());
+  archive.array(held.patch.rest, rows, 1);
+  archive.array(held.patch.axes, 3, axes);
+  for (auto* rotation : {&held.rotation, &held.rotation_before}) archive.array(*rotation);
+  for (auto* place : {&held.position, &held.position_before, &held.mean, &held.mean_before, &held.force, &held.torque})
+    archive.array(*place);
+  archive.flag("broken", held.broken);
+}
+
+/// Attachments, and what steps of a held body know of the last one.
+template <typename Archive, typename Body>
+void visit_attachments(Archive& archive, Body& body) {
+  archive.whole("attachments", body.next_attachment, kMostSteps);
+  auto& all = body.state.attachments;
+  bool fits = true;  // the scratch of steps, which is for those that are there
+  const std::size_t before = all.size(), count = archive.size("attachments", all);
+  Attachment unused;
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& held = *(archive.checks() ? &unused : &all[i]);
+    const std::int64_t id = held.id;
+    visit_attachment(archive, held, body);
+    fits &= i < before && held.id == id;
+  }
+  if (auto* free = std::get_if<FreeState>(&body.state.frame); free != nullptr && count > 0) {
+    archive.array(free->before.position);
+    archive.array(free->before.orientation.coeffs());
+    archive.array(free->before.linear_momentum);
+    archive.array(free->before.angular_momentum);
+  }
+  if constexpr (!std::is_const_v<Body>)
+    if (!archive.checks() && (!fits || before != count)) body.world->world.fit_attachments(place_of(body));
+}
+
+/// What the body reaches for, with its points.
+template <typename Archive, typename Body>
+void visit_reach(Archive& archive, Body& body) {
+  bool reaches = body.reach != nullptr;
+  reaches = archive.flag("reach", reaches);
+  ReachTargets unused;
+  ReachTargets& targets = body.reach ? body.reach->targets() : unused;
+  const std::size_t force = targets.force;
+  Eigen::Index points = targets.rest.rows(), examples = targets.lowest.size();
+  const Eigen::Index before = points;
+  if (reaches) {
+    archive.whole("force", targets.force, static_cast<double>(body.scene.examples.size()));
+    points = static_cast<Eigen::Index>(archive.whole("points", points, kMostSteps));
+    examples = static_cast<Eigen::Index>(archive.whole("weights", examples, kMostSteps));
+    archive.array(targets.rest, points, 3);
+    archive.array(targets.basis_rows, 3 * points, body.model().modes());
+    archive.array(targets.places, 3 * points, 1);
+    archive.array(targets.lowest, examples, 1);
+    archive.array(targets.highest, examples, 1);
+    archive.number(targets.change);
+    archive.number(targets.horizon);
+  }
+  if constexpr (!std::is_const_v<Body>) {
+    if (archive.checks()) return;
+    if (!reaches)
+      body.reach.reset();
+    else if (!body.reach || force != targets.force || before != points)
+      body.reach = std::make_unique<Reach>(body.model(), body.scene, body.state, std::move(targets));
+  }
+}
+
+/// Settings that a host may change.
+template <typename Archive, typename Body>
+void visit_settings(Archive& archive, Body& body) {
+  auto& scene = body.scene;
+  const Eigen::Vector3d gravity = scene.gravity;
+  archive.array(scene.gravity);
+  if constexpr (!std::is_const_v<Body>)
+    if (scene.gravity != gravity) scene.gravity_force.noalias() = body.model().gravity_load.transpose() * scene.gravity;
+  archive.number(scene.mass_damping);
+  archive.number(scene.stiffness_damping);
+  archive.whole("integrator", scene.integrator, 3);
+  archive.whole("space", scene.space.space, body.full() != nullptr ? 3 : 1);
+  for (std::size_t i = 0; i < scene.examples.size(); ++i) {
+    auto& force = scene.examples[i];
+    archive.number(force.stiffness);
+    archive.number(force.damping);
+    archive.number(force.bias);
+    bool given = force.given_weights.size() > 0;
+    given = archive.flag("given weights", given);
+    archive.array(force.given_weights, given ? body.model().examples[i].weights.examples() : 0, 1);
+  }
+}
+
+template <typename Archive, typename World>
+void visit_contact_law(Archive& archive, World& world) {
+  for (auto* number : {&world.law.stiffness, &world.law.damping, &world.law.friction, &world.law.release})
+    archive.number(*number);
+}
+
+template <typename Archive, typename Hosted>
+void visit_obstacle(Archive& archive, Hosted& hosted) {
+  auto& obstacle = *hosted.obstacle;
+  archive.number(obstacle.stiffness);
+  archive.number(obstacle.damping);
+  archive.number(obstacle.friction);
+  const bool was_hosted = hosted.hosted;
+  archive.flag("hosted", hosted.hosted);
+  double start = obstacle.motion.start();
+  MotionSample first = obstacle.motion.first();
+  archive.number(start);
+  archive.array(first.position);
+  archive.array(first.rotation);
+  archive.array(first.linear_velocity);
+  archive.array(first.angular_velocity);
+  if constexpr (!std::is_const_v<Hosted>) {
+    if (archive.checks()) return;
+    if (hosted.hosted)
+      obstacle.motion = RigidMotion::going_on(start, first);
+    else if (was_hosted)
+      obstacle.motion = hosted.scene_motion;
+  }
+}
+
+template <typename Archive, typename World>
+void visit_snapshot(Archive& archive, World& world) {
+  archive.whole("steps", world.steps, kMostSteps);
+  visit_contact_law(archive, world);
+  int most_full = world.world.full_bodies();
+  archive.whole("bodies in full space", most_full, 1 + static_cast<double>(std::numeric_limits<int>::max()));
+  for (auto& hosted : world.obstacles) visit_obstacle(archive, hosted);
+  for (std::size_t i = 0; i < world.members.size(); ++i) {
+    auto& body = *world.members[i].body;
+    visit_settings(archive, body);
+    visit_reach(archive, body);
+    visit_attachments(archive, body);
+    int contacts = world.world.lone_contacts(static_cast<int>(i));
+    archive.whole("contacts", contacts, kMostSteps);
+    if constexpr (!std::is_const_v<World>)
+      if (!archive.checks()) world.world.set_lone_contacts(static_cast<int>(i), contacts);
+  }
+  visit_motion(archive, world);
+  if constexpr (!std::is_const_v<World>) {
+    if (archive.checks()) return;
+    world.world.set_law(contact_law_of(world.law));
+    world.world.set_full_bodies(most_full);
+    world.world.take_states();
+    world.contacts.clear();
+  }
+}
+
+// ---- snapshots as bytes
+
+/// A snapshot begins with this; its numbers follow.
+struct Header {
+  char format[8] = {'e', 'x', 'm', 'a', 't', 's', 'n', 'p'};
+  std::uint64_t version = 1;
+  std::uint64_t world = 0;    ///< fingerprint of the world
+  std::uint64_t numbers = 0;  ///< that follow
+  std::uint64_t sum = 0;      ///< of their bits
+};
+static_assert(sizeof(Header) == 5 * sizeof(double));
+
+/// Tells worlds apart, word by word: models, ids and groups of bodies, ids and groups of obstacles.
+std::uint64_t fingerprint(const exmat_world& world) noexcept {
+  std::uint64_t hash = 0x243f6a8885a308d3;
+  const auto add = [&](std::uint64_t word) {
+    hash = (hash ^ word) * 0x9e3779b97f4a7c15;
+    hash ^= hash >> 32U;
+  };
+  for (const exmat_world::Member& member : world.members) {
+    const exmat_body& body = *member.body;
+    const std::string& sha = body.source->loaded.summary.input_sha256;
+    for (std::size_t at = 0; at + sizeof(std::uint64_t) <= sha.size(); at += sizeof(std::uint64_t)) {
+      std::uint64_t word = 0;
+      std::memcpy(&word, sha.data() + at, sizeof word);
+      add(word);
+    }
+    add(static_cast<std::uint64_t>(member.id));
+    add(static_cast<std::uint64_t>(body.modes()));
+    add(std::uint64_t{body.scene.meeting.group} << 32U | body.scene.meeting.mask);
+  }
+  for (const exmat_world::HostedObstacle& hosted : world.obstacles) {
+    add(static_cast<std::uint64_t>(hosted.id));
+    add(std::uint64_t{hosted.obstacle->meeting.group} << 32U | hosted.obstacle->meeting.mask);
+    add(hosted.obstacle->shape.index());
+  }
+  return hash;
+}
+
+/// Sum of the bits of numbers. `finite`: false if one of them is not.
+std::uint64_t sum_of(std::span<const double> numbers, bool& finite) noexcept {
+  constexpr std::uint64_t kExponent = 0x7ff0000000000000, kOne = 0x0010000000000000;
+  std::uint64_t sum = 0, carries = 0;
+  for (const double number : numbers) {
+    const auto bits = std::bit_cast<std::uint64_t>(number);
+    sum += bits;
+    carries |= (bits & kExponent) + kOne;
+  }
+  finite = carries >> 63U == 0;
+  return sum;
+}
+
+std::size_t snapshot_numbers(const exmat_world& world) {
+  StateWriter counter;
+  visit_snapshot(counter, world);
+  return counter.count();
+}
+
+bool is_aligned(const void* buffer) noexcept { return reinterpret_cast<std::uintptr_t>(buffer) % alignof(double) == 0; }
+
+/// The numbers of a snapshot of this world. Throws where it is none.
+std::span<const double> numbers_of(const void* buffer, std::size_t size, const exmat_world& world) {
+  Header header;
+  const Header own;
+  if (size >= sizeof header) std::memcpy(&header, buffer, sizeof header);
+  if (size < sizeof header || std::memcmp(header.format, own.format, sizeof header.format) != 0)
+    throw InvalidArgument("buffer: expected a snapshot of exmat_world_save()");
+  if (header.version != own.version)
+    throw InvalidArgument(fmt::format("buffer: version {}: expected {}: it was saved by another version of the library",
+                                      header.version, own.version));
+  if (header.world != fingerprint(world))
+    throw InvalidArgument(
+        "buffer: the snapshot is of a world of other bodies or obstacles, or of other groups: expected this one as it "
+        "was");
+  if (header.numbers > (size - sizeof header) / sizeof(double))
+    throw InvalidArgument(fmt::format("buffer: {} bytes: expected {}: it ends early", size,
+                                      sizeof header + header.numbers * sizeof(double)));
+  const std::span numbers(reinterpret_cast<const double*>(static_cast<const char*>(buffer) + sizeof header),
+                          header.numbers);
+  bool finite = false;
+  if (sum_of(numbers, finite) != header.sum)
+    throw InvalidArgument("buffer: the snapshot was changed: its sum is another one");
+  if (!finite) throw InvalidArgument("buffer: expected finite numbers: the world was saved with others");
   return numbers;
 }
 
-std::vector<HeldBodyContact> read_contacts(StateNumbers& reader, std::size_t count, const exmat_body& body) {
-  std::vector<HeldBodyContact> contacts(count);
-  int last = -1;
-  for (HeldBodyContact& held : contacts) {
-    held.vertex = static_cast<int>(reader.count("vertex", static_cast<std::size_t>(body.model().contact->vertices())));
-    if (held.vertex <= last) throw InvalidArgument("numbers: expected vertices of a contact in ascending order");
-    last = held.vertex;
-    held.gap = reader.number();
-    held.normal_force = reader.number();
-    held.overlap = reader.number();
-    if (held.overlap < 0) throw InvalidArgument("numbers: expected overlaps of contacts >= 0");
-    held.stretch = reader.vector();
-    held.normal = reader.vector();
-  }
-  return contacts;
-}
-
-std::vector<HeldPair> read_pairs(StateNumbers& reader, const exmat_world& world) {
-  const std::size_t bodies = world.members.size();
-  std::vector<HeldPair> pairs(reader.count("pairs", reader.left()));
-  for (HeldPair& pair : pairs) {
-    const std::size_t first = reader.count("body", bodies), second = reader.count("body", bodies);
-    if (second < first) throw InvalidArgument("numbers: expected the bodies of a pair in ascending order");
-    pair.first = static_cast<int>(first);
-    pair.second = static_cast<int>(second);
-    const std::size_t of_first = reader.count("contacts", reader.left()),
-                      of_second = reader.count("contacts", reader.left());
-    pair.energy = reader.number();
-    pair.account = reader.number();
-    if (pair.energy < 0 || pair.account < 0) throw InvalidArgument("numbers: expected energies of a pair >= 0");
-    pair.held[0] = read_contacts(reader, of_first, *world.members[first].body);
-    pair.held[1] = read_contacts(reader, of_second, *world.members[second].body);
-  }
-  const auto before = [](const HeldPair& a, const HeldPair& b) {
-    return std::pair(a.first, a.second) < std::pair(b.first, b.second);
-  };
-  if (!std::ranges::is_sorted(pairs, before)) throw InvalidArgument("numbers: expected pairs in ascending order");
-  return pairs;
-}
-
-struct ReadState {
-  std::vector<std::span<const double>> bodies;
-  std::vector<bool> anew;
-  std::vector<HeldPair> held;
-};
-
-ReadState read(std::span<const double> numbers, const exmat_world& world) {
-  if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
-  StateNumbers reader(numbers);
-  ReadState state;
-  if (const std::size_t bodies = reader.count("bodies", numbers.size() + 1); bodies != world.members.size())
-    throw InvalidArgument(fmt::format("numbers: {} bodies: expected {}", bodies, world.members.size()));
-  for (std::size_t i = 0; i < world.members.size(); ++i) {
-    const std::size_t size = reader.count("numbers of a body", numbers.size());
-    state.anew.push_back(reader.flag("anew"));
-    state.bodies.push_back(reader.take(size));
-  }
-  state.held = read_pairs(reader, world);
+/// Throws where the archive does not fit the world.
+template <typename Visit>
+void check(std::span<const double> numbers, const Visit& visit) {
+  StateReader reader(numbers, StateReader::Use::kCheck);
+  visit(reader);
   if (reader.left() > 0) throw InvalidArgument(fmt::format("numbers: {} too many", reader.left()));
-  return state;
 }
 
-/// All bodies take their states, or none does.
 void set_world(std::span<const double> numbers, exmat_world& world) {
-  ReadState state = read(numbers, world);
-  std::vector<std::vector<double>> before;
-  for (const auto& member : world.members) before.push_back(write_state(*member.body));
-  std::vector<bool> anew_before;
-  std::vector<HeldPair> held_before = world.world.held();
-  for (int i = 0; i < world.world.count(); ++i) anew_before.push_back(world.world.is_anew(i));
+  if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
+  check(numbers, [&](StateReader& reader) { visit_motion(reader, world); });
   const double time = time_of(world);
-  for (std::size_t i = 0; i < world.members.size(); ++i) try {
-      take_state(state.bodies[i], *world.members[i].body);
-    } catch (const InvalidArgument& error) {
-      for (std::size_t k = 0; k < i; ++k) take_state(before[k], *world.members[k].body);
-      world.world.set_memory(std::move(held_before), anew_before);
-      throw InvalidArgument(fmt::format("body {}: {}", world.members[i].id, error.what()));
-    }
-  world.world.set_memory(std::move(state.held), state.anew);
+  StateReader reader(numbers, StateReader::Use::kTake);
+  visit_motion(reader, world);
+  for (const auto& member : world.members)
+    member.body->state.begins_anew |= holds_modes(member.body->state.attachments);  // whose past it does not hold
+  world.world.take_states();
   world.contacts.clear();
   follow_times(world, time);
 }
@@ -139,14 +382,19 @@ void set_world(std::span<const double> numbers, exmat_world& world) {
 }  // namespace
 
 std::int64_t exmat_world_state_size(const exmat_world* world) noexcept {
-  return world != nullptr ? static_cast<std::int64_t>(size_of(*world)) : -1;
+  if (world == nullptr) return -1;
+  StateWriter counter;
+  visit_motion(counter, *world);
+  return static_cast<std::int64_t>(counter.count());
 }
 
 exmat_status exmat_world_read_state(const exmat_world* world, double* numbers, std::int64_t count) noexcept {
   EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(numbers);
-  EXMAT_REQUIRE_LENGTH(count, size_of(*world));
-  return guarded(__func__, [&] { std::ranges::copy(write_world(*world), numbers); });
+  EXMAT_REQUIRE_LENGTH(count, exmat_world_state_size(world));
+  StateWriter writer(numbers);
+  visit_motion(writer, *world);
+  return EXMAT_OK;
 }
 
 exmat_status exmat_world_set_state(exmat_world* world, const double* numbers, std::int64_t count) noexcept {
@@ -154,4 +402,39 @@ exmat_status exmat_world_set_state(exmat_world* world, const double* numbers, st
   EXMAT_REQUIRE(numbers);
   if (count < 0) return fail(EXMAT_INVALID_ARGUMENT, "%s: count = %" PRId64 ": expected >= 0", __func__, count);
   return guarded(__func__, [&] { set_world({numbers, static_cast<std::size_t>(count)}, *world); });
+}
+
+std::size_t exmat_world_snapshot_size(const exmat_world* world) noexcept {
+  return world != nullptr ? sizeof(Header) + sizeof(double) * snapshot_numbers(*world) : 0;
+}
+
+exmat_status exmat_world_save(const exmat_world* world, void* buffer, std::size_t size) noexcept {
+  EXMAT_REQUIRE(world);
+  EXMAT_REQUIRE(buffer);
+  if (!is_aligned(buffer)) return fail(EXMAT_INVALID_ARGUMENT, "%s: buffer: expected one aligned to 8 bytes", __func__);
+  const std::size_t numbers = snapshot_numbers(*world), needed = sizeof(Header) + sizeof(double) * numbers;
+  if (size < needed)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected at least %zu", __func__, size, needed);
+  auto* const to = reinterpret_cast<double*>(static_cast<char*>(buffer) + sizeof(Header));
+  StateWriter writer(to);
+  visit_snapshot(writer, *world);
+  Header header;
+  header.world = fingerprint(*world);
+  header.numbers = numbers;
+  bool finite = true;
+  header.sum = sum_of({to, numbers}, finite);
+  std::memcpy(buffer, &header, sizeof header);
+  return EXMAT_OK;
+}
+
+exmat_status exmat_world_restore(exmat_world* world, const void* buffer, std::size_t size) noexcept {
+  EXMAT_REQUIRE(world);
+  EXMAT_REQUIRE(buffer);
+  if (!is_aligned(buffer)) return fail(EXMAT_INVALID_ARGUMENT, "%s: buffer: expected one aligned to 8 bytes", __func__);
+  return guarded(__func__, [&] {
+    const auto numbers = numbers_of(buffer, size, *world);
+    check(numbers, [&](StateReader& reader) { visit_snapshot(reader, *world); });
+    StateReader reader(numbers, StateReader::Use::kTake);
+    visit_snapshot(reader, *world);
+  });
 }

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cstring>
 #include <pybind11/stl.h>
 
 #include "runtime/python/objects.h"
@@ -221,6 +222,26 @@ void set_state(WorldObject& world, const WorldStateObject& state) {
   world.get().set_state(state.numbers);
 }
 
+namespace {
+
+py::bytes save(WorldObject& world) {
+  const exmat_world* const own = world.get().get();
+  const std::size_t size = exmat_world_snapshot_size(own);
+  std::vector<double> numbers(size / sizeof(double));
+  check(exmat_world_save(own, numbers.data(), size));
+  return {reinterpret_cast<const char*>(numbers.data()), size};
+}
+
+void restore(WorldObject& world, const py::bytes& snapshot) {
+  for (const auto& [id, body] : world.bodies) body->get();
+  const auto bytes = static_cast<std::string_view>(snapshot);
+  std::vector<double> numbers((bytes.size() + sizeof(double) - 1) / sizeof(double) + 1);
+  std::memcpy(numbers.data(), bytes.data(), bytes.size());
+  check(exmat_world_restore(world.get().get(), numbers.data(), bytes.size()));
+}
+
+}  // namespace
+
 // ---- copies
 
 py::dict kept_world(WorldObject& world) {
@@ -346,7 +367,11 @@ WorldClass bind_world(py::module_& module) {
       .def_property(
           "state", [](WorldObject& world) { return state_of(world); },
           [](WorldObject& world, const WorldStateObject& state) { set_state(world, state); },
-          "The whole WorldState, a copy; likewise to be set.");
+          "The whole WorldState, a copy; likewise to be set.")
+      .def("save", &save, "A snapshot for rollback: all that steps and set... functions change, as bytes.")
+      .def("restore", &restore, py::arg("snapshot"),
+           "Goes back to a snapshot of save(), of this world or of one made the same way; the next steps then are the "
+           "same to the last bit. Of other bodies or obstacles it is refused.");
   module.def("state_hash", &hash_of, py::arg("bodies"),
              "Hash over the bits of the states of some bodies, in order: as a hexadecimal number of 16 digits it is "
              "the state hash that `exmat-runtime run` prints.");

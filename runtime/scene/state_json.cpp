@@ -134,7 +134,7 @@ class BodyReader {
     if (state.full->skeleton) {
       Eigen::VectorXd bones = numbers_of(*state.full->skeleton);
       read_array("full_space/skeleton", from["skeleton"], bones);
-      set_numbers(bones, *state.full->skeleton);
+      set_numbers({bones.data(), static_cast<std::size_t>(bones.size())}, *state.full->skeleton);
     }
     state.full->alone = from["alone"];
     state.full->elastic_energy = state.elastic_energy;

@@ -30,6 +30,7 @@ int main(int argc, char** argv) {
   benchmarks::register_sizes();
   benchmarks::register_crowds();
   benchmarks::register_worlds();
+  benchmarks::register_engines();
 #ifdef EXMAT_SOURCE_DIR
   benchmarks::register_full_space();
 #endif

@@ -13,6 +13,7 @@ void register_free_bodies();
 void register_sizes();
 void register_crowds();
 void register_worlds();
+void register_engines();
 void register_full_space();
 
 /// A benchmark whose inputs are made when it runs, not when it is registered.

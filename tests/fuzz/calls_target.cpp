@@ -448,6 +448,7 @@ class Calls {
         const std::vector<double> forces = choices_.numbers(count);
         checked(choices_.one_in(4) ? exmat_body_apply_impulses(one, at, forces.data(), choices_.length(count))
                                    : exmat_body_apply_forces(one, at, forces.data(), choices_.length(count)));
+        if (count == 3) checked(exmat_body_reach(one, at, forces.data(), count, nullptr));
         return;
       }
       case 3:
@@ -582,6 +583,11 @@ class Calls {
     const std::int64_t count = std::min(choices_.length(size), size + 2);
     checked(single ? exmat_body_set_state(one, numbers.data(), count)
                    : exmat_world_set_state(all, numbers.data(), count));
+    std::vector<std::uint64_t> snapshot(exmat_world_snapshot_size(all) / sizeof(std::uint64_t));
+    if (snapshot.empty()) return;
+    checked(exmat_world_save(all, snapshot.data(), snapshot.size() * sizeof(std::uint64_t)));
+    if (count != size) snapshot[static_cast<std::size_t>(size) % snapshot.size()] ^= 1;
+    checked(exmat_world_restore(all, snapshot.data(), snapshot.size() * sizeof(std::uint64_t)));
   }
 
   static std::int64_t modes_of(const exmat_body* body) {
@@ -633,6 +639,8 @@ class Calls {
         checked(exmat_body_read_placement(one, numbers.data()));
         checked(exmat_body_read_point_compliance(one, at, numbers.data()));
         checked(exmat_body_read_compliance(one, at, nullptr, nullptr, choices_.length(3 * k)));
+        numbers.resize(static_cast<std::size_t>(6 * k));
+        checked(exmat_body_read_sensitivity(one, -1, at, numbers.data(), 6 * k));
         return;
       case 6: {
         Padded<exmat_energies> energies;

@@ -147,6 +147,24 @@ EXMAT_API int64_t exmat_world_state_size(const exmat_world* world) EXMAT_NOEXCEP
 EXMAT_API exmat_status exmat_world_read_state(const exmat_world* world, double* numbers, int64_t count) EXMAT_NOEXCEPT;
 EXMAT_API exmat_status exmat_world_set_state(exmat_world* world, const double* numbers, int64_t count) EXMAT_NOEXCEPT;
 
+/* A snapshot is for rollback: bytes in the caller's memory, saved and restored quickly, of all that steps and the host
+   change in a world: states, contacts, sleep, spaces, attachments, forces, given weights and other settings of bodies,
+   the contact law, obstacles that were moved or whose law was changed. A restored world goes on to the last bit. */
+
+/* Bytes of a snapshot taken now; 0 where `world` is NULL. They grow with the bodies and obstacles of the world, and
+   from step to step with contacts (80 a vertex), attachments, and bodies that go to all vertices. */
+EXMAT_API size_t exmat_world_snapshot_size(const exmat_world* world) EXMAT_NOEXCEPT;
+
+/* Saves a snapshot into `buffer` [size >= exmat_world_snapshot_size()], aligned to 8 bytes. Never allocates. */
+EXMAT_API exmat_status exmat_world_save(const exmat_world* world, void* buffer, size_t size) EXMAT_NOEXCEPT;
+
+/* Goes back to a snapshot, or on to it, from `buffer` [size: not less than what was saved], aligned to 8 bytes. The
+   world has to have the bodies and obstacles, of the same ids and groups, that it had; so has another world, also of
+   another process, with the same version of the library and bodies of the same bundles and settings. Anything else is
+   refused. Reports and lists of contacts are empty until the next step. Allocates only where the world has to hold what
+   it does not now: attachments made or taken off since, bodies in all vertices, more contacts between bodies. */
+EXMAT_API exmat_status exmat_world_restore(exmat_world* world, const void* buffer, size_t size) EXMAT_NOEXCEPT;
+
 /* ---- obstacles ------------------------------------------------------------------------------------------------- */
 
 /* Obstacles are a world's: those of its scene, and those that its host adds, moves and removes between steps. All its

@@ -85,6 +85,16 @@ class WorldRef {
     check(exmat_world_set_state(get(), numbers.data(), detail::length(numbers)));
   }
 
+  /// Saves a snapshot for rollback, into memory that is used again: grown where it is too small.
+  void save(std::vector<std::uint64_t>& snapshot) const {
+    const std::size_t bytes = exmat_world_snapshot_size(get());
+    if (snapshot.size() * sizeof(std::uint64_t) < bytes) snapshot.resize(2 * bytes / sizeof(std::uint64_t));
+    check(exmat_world_save(get(), snapshot.data(), snapshot.size() * sizeof(std::uint64_t)));
+  }
+  void restore(std::span<const std::uint64_t> snapshot) {
+    check(exmat_world_restore(get(), snapshot.data(), snapshot.size_bytes()));
+  }
+
   /// Its id. Sets obstacle.size itself, as the functions below do.
   std::int64_t add_obstacle(exmat_obstacle obstacle) {
     obstacle.size = sizeof obstacle;

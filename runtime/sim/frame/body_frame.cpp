@@ -22,6 +22,12 @@ Eigen::Vector3d BodyFrame::limit_kinetic_energy(double allowed, const Eigen::Vec
   return Eigen::Vector3d::Zero();
 }
 
+std::vector<double> BodyFrame::numbers(const FrameState& state) const {
+  std::vector<double> numbers(write_numbers(state, nullptr));
+  write_numbers(state, numbers.data());
+  return numbers;
+}
+
 std::shared_ptr<const BodyFrame> make_frame(const RigidData* rigid, bool carried, const RowMatrix& gravity_load) {
   if (rigid == nullptr) return std::make_shared<ClampedFrame>();
   if (carried) return std::make_shared<CarriedFrame>(*rigid, gravity_load);

@@ -106,8 +106,10 @@ class BodyFrame {
   using Coordinates = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 13, 1>;
   virtual Coordinates coordinates(const FrameState& /*state*/) const noexcept { return {}; }
 
-  /// All numbers of a state, for files, and a state of so many numbers.
-  virtual std::vector<double> numbers(const FrameState& /*state*/) const { return {}; }
+  /// Writes all numbers of a state, for files, from `to` on, or nothing where that is null; returns their count.
+  virtual std::size_t write_numbers(const FrameState& /*state*/, double* /*to*/) const noexcept { return 0; }
+  std::vector<double> numbers(const FrameState& state) const;
+  /// Takes as many numbers.
   virtual void set_numbers(std::span<const double> /*numbers*/, FrameState& /*state*/) const noexcept {}
 
   /// A force [N] and a torque about the centre of mass [N m] of the host, world, on the frame until clear_forces().

@@ -54,10 +54,13 @@ double CarriedFrame::potential_energy(const Eigen::Vector3d& /*gravity*/, const 
   return std::get_if<CarriedState>(&state)->potential_of_frame;
 }
 
-std::vector<double> CarriedFrame::numbers(const FrameState& state) const {
-  NumberWriter writer;
+std::size_t CarriedFrame::write_numbers(const FrameState& state, double* to) const noexcept {
+  NumberCounter counter;
+  visit(*std::get_if<CarriedState>(&state), counter);
+  if (to == nullptr) return counter.count;
+  NumberWriter writer{to};
   visit(*std::get_if<CarriedState>(&state), writer);
-  return writer.numbers;
+  return counter.count;
 }
 
 void CarriedFrame::set_numbers(std::span<const double> numbers, FrameState& state) const noexcept {

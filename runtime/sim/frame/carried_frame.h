@@ -29,7 +29,7 @@ class CarriedFrame final : public BodyFrame {
   double turn_rate(const FrameState& state) const noexcept override;
   double kinetic_energy(const Eigen::VectorXd& v, const FrameState& state) const noexcept override;
   double potential_energy(const Eigen::Vector3d& gravity, const FrameState& state) const noexcept override;
-  std::vector<double> numbers(const FrameState& state) const override;
+  std::size_t write_numbers(const FrameState& state, double* to) const noexcept override;
   void set_numbers(std::span<const double> numbers, FrameState& state) const noexcept override;
 
   void begin(const FrameStep& step, FrameWorkspace& workspace, Eigen::VectorXd& external_force) const noexcept override;

@@ -1,25 +1,42 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <span>
-#include <vector>
 
 namespace exmat::runtime {
 
 // A state as a list of numbers and back; a list of the members, visited in order, serves both.
 
-struct NumberWriter {
-  std::vector<double> numbers;
+struct NumberCounter {
+  std::size_t count = 0;
   template <typename... Members>
-  void operator()(const Members&... members) {
+  void operator()(const Members&... members) noexcept {
+    count += (size(members) + ...);
+  }
+
+ private:
+  static std::size_t size(double /*number*/) noexcept { return 1; }
+  template <typename Dense>
+  static std::size_t size(const Dense& array) noexcept {
+    return static_cast<std::size_t>(array.size());
+  }
+};
+
+/// Writes from `to` on, which is not null.
+struct NumberWriter {
+  double* to;
+  template <typename... Members>
+  void operator()(const Members&... members) noexcept {
     (write(members), ...);
   }
 
  private:
-  void write(double number) { numbers.push_back(number); }
+  void write(double number) noexcept { *to++ = number; }
   template <typename Dense>
-  void write(const Dense& array) {
-    for (Eigen::Index i = 0; i < array.size(); ++i) numbers.push_back(array.data()[i]);
+  void write(const Dense& array) noexcept {
+    Eigen::Map<Dense>(to, array.rows(), array.cols()) = array;
+    to += array.size();
   }
 };
 
@@ -38,7 +55,9 @@ struct NumberReader {
   }
   template <typename Dense>
   void read(Dense& array) noexcept {
-    for (Eigen::Index i = 0; i < array.size(); ++i) read(array.data()[i]);
+    const auto count = static_cast<std::size_t>(array.size());
+    array = Eigen::Map<const Dense>(numbers.data(), array.rows(), array.cols());
+    numbers = numbers.subspan(count);
   }
 };
 

@@ -117,10 +117,13 @@ BodyFrame::Coordinates FreeFrame::coordinates(const FrameState& state) const noe
   return coordinates;
 }
 
-std::vector<double> FreeFrame::numbers(const FrameState& state) const {
-  NumberWriter writer;
+std::size_t FreeFrame::write_numbers(const FrameState& state, double* to) const noexcept {
+  NumberCounter counter;
+  visit_numbers(own_free(state), counter);
+  if (to == nullptr) return counter.count;
+  NumberWriter writer{to};
   visit_numbers(own_free(state), writer);
-  return writer.numbers;
+  return counter.count;
 }
 
 void FreeFrame::set_numbers(std::span<const double> numbers, FrameState& state) const noexcept {

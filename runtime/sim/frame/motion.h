@@ -62,6 +62,10 @@ class RigidMotion {
   /// True if a key, where accelerations may jump, lies in [from, to).
   bool has_key(double from, double to) const noexcept;
 
+  /// Beginning of one that goes on, and its pose and velocities there.
+  double start() const noexcept { return start_; }
+  const MotionSample& first() const noexcept { return first_; }
+
   /// True if the pose changes at all.
   bool moves() const noexcept { return !segments_.empty() || goes_on_; }
 

@@ -22,16 +22,28 @@ void for_numbers(Bones& motion, const Use& use) {
 
 }  // namespace
 
-Eigen::VectorXd numbers_of(const SkeletonMotion& motion) {
-  std::vector<double> numbers{motion.anew ? 1.0 : 0.0, motion.bound ? 1.0 : 0.0};
-  for_numbers(motion, [&](const double& number) { numbers.push_back(number); });
-  return Eigen::Map<const Eigen::VectorXd>(numbers.data(), std::ssize(numbers));
+std::size_t write_numbers(const SkeletonMotion& motion, double* to) noexcept {
+  std::size_t count = 0;
+  const auto write = [&](double number) {
+    if (to != nullptr) to[count] = number;
+    ++count;
+  };
+  write(motion.anew ? 1.0 : 0.0);
+  write(motion.bound ? 1.0 : 0.0);
+  for_numbers(motion, write);
+  return count;
 }
 
-void set_numbers(const Eigen::VectorXd& numbers, SkeletonMotion& motion) {
+Eigen::VectorXd numbers_of(const SkeletonMotion& motion) {
+  Eigen::VectorXd numbers(static_cast<Eigen::Index>(write_numbers(motion, nullptr)));
+  write_numbers(motion, numbers.data());
+  return numbers;
+}
+
+void set_numbers(std::span<const double> numbers, SkeletonMotion& motion) noexcept {
   motion.anew = numbers[0] != 0;
   motion.bound = numbers[1] != 0;
-  Eigen::Index at = 2;
+  std::size_t at = 2;
   for_numbers(motion, [&](double& number) { number = numbers[at++]; });
 }
 

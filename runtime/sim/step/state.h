@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <variant>
 #include <vector>
 
@@ -50,9 +51,10 @@ struct SkeletonMotion {
   Eigen::VectorXd q, v, q_previous, v_previous;  ///< [3p] displacement and velocity of the fixed vertices
 };
 
-/// All of that as numbers, and back; sizes stay.
+/// All of that as numbers, and back; sizes stay. write_numbers() returns their count, and writes none to null.
 Eigen::VectorXd numbers_of(const SkeletonMotion& motion);
-void set_numbers(const Eigen::VectorXd& numbers, SkeletonMotion& motion);
+std::size_t write_numbers(const SkeletonMotion& motion, double* to) noexcept;
+void set_numbers(std::span<const double> numbers, SkeletonMotion& motion) noexcept;
 
 /// A body that steps in all vertices: q is the displacement of those that move from where they were meshed, world [m].
 struct FullMotion : Motion {

@@ -48,6 +48,7 @@ void World::add(const BodyKind& kind, State& state) {
   member.crowd_kind = crowd_.add(*kind.model, *kind.scene);
   if (kind.full != nullptr && kind.scene->space.space != Space::kReduced) reserve_full(kind);
   bodies_.push_back(std::move(member));
+  if (!island_of_.empty()) island_of_.push_back(-1);
 }
 
 void World::wake_neighbours(int body) {
@@ -58,6 +59,7 @@ void World::wake_neighbours(int body) {
 }
 
 void World::forget(int body) {
+  if (!at(body).state->full) drop_full_scratch(at(body));
   if (!at(body).touching) return;
   wake_neighbours(body);
   touching(body).anew = true;
@@ -75,6 +77,7 @@ void World::remove(int body) {
   if (full != nullptr && std::ranges::count(bodies_, full, [](const Member& own) { return own.kind.full; }) == 1)
     std::erase_if(idle_full_, [=](const auto& idle) { return idle.first == full; });
   bodies_.erase(bodies_.begin() + body);
+  if (!island_of_.empty()) island_of_.erase(island_of_.begin() + body);
   const auto renumber = [=](int& number) { number -= number > body ? 1 : 0; };
   std::erase(touching_, body);
   for (int& number : touching_) renumber(number);
@@ -112,12 +115,21 @@ void World::fit_attachments(int body) {
 }
 
 void World::set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew) {
-  for (const int body : touching_) {
-    touching(body).anew = anew[static_cast<std::size_t>(body)];
-    at(body).is_bounded = false;
-  }
+  for (int body = 0; body < count(); ++body) set_anew(body, anew[static_cast<std::size_t>(body)]);
   held_ = std::move(held);
+  take_states();
+}
+
+void World::take_states() {
+  for (Member& member : bodies_) {
+    member.is_bounded = false;
+    if (member.state->full)
+      enter_full(member);
+    else
+      drop_full_scratch(member);
+  }
   near_.clear();
+  island_of_.clear();
 }
 
 void World::read_touches(std::vector<BodyTouch>& touches) const {
@@ -192,6 +204,10 @@ void World::take_full_scratch(Member& member) {
 
 void World::leave_full(Member& member) noexcept {
   leave_full_space(*member.state);
+  drop_full_scratch(member);
+}
+
+void World::drop_full_scratch(Member& member) noexcept {
   if (member.touching) member.touching->full.reset();
   if (member.full != nullptr) idle_full_.emplace_back(member.kind.full, std::move(member.full));
 }

@@ -82,6 +82,20 @@ class World {
   bool is_anew(int body) const noexcept { return at(body).touching && at(body).touching->anew; }
   /// Goes on from what held() and is_anew() gave of a world of such bodies.
   void set_memory(std::vector<HeldPair> held, const std::vector<bool>& anew);
+  /// The same piece by piece, into the memory that is there; after all of it, and after the states of all bodies were
+  /// set, take_states().
+  std::vector<HeldPair>& held() noexcept { return held_; }
+  void set_anew(int body, bool anew) noexcept {
+    if (at(body).touching) at(body).touching->anew = anew;
+  }
+  void take_states();
+  /// Contacts with obstacles in the last step of a body that touched no other: they keep one of space `auto` full.
+  int lone_contacts(int body) const noexcept { return is_in_island(body) ? 0 : at(body).report.contacts; }
+  /// Set between the two, in place of its last step.
+  void set_lone_contacts(int body, int contacts) noexcept {
+    at(body).report = {};
+    at(body).report.contacts = contacts;
+  }
 
   /// Contacts at the end of the last step, in the order of pairs of bodies and of the vertices of each.
   void read_touches(std::vector<BodyTouch>& touches) const;
@@ -134,6 +148,7 @@ class World {
   void enter_full(Member& member);
   void take_full_scratch(Member& member);
   void leave_full(Member& member) noexcept;
+  void drop_full_scratch(Member& member) noexcept;
   void reserve_full(const BodyKind& kind);
   bool is_in_island(int body) const noexcept;
   void step_crowd(int threads, StepObserver* observer);

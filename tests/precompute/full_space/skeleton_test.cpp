@@ -340,7 +340,8 @@ TEST(Skeleton, GoesOnFromItsNumbers) {
   other.state.step = body.state.step;
   other.state.time = body.state.time;
   other.state.begins_anew = body.state.begins_anew;
-  runtime::set_numbers(runtime::numbers_of(body.bones()), other.bones());
+  const Eigen::VectorXd bones = runtime::numbers_of(body.bones());
+  runtime::set_numbers({bones.data(), static_cast<std::size_t>(bones.size())}, other.bones());
   run(bending, 10);
   run(others, 10);
   EXPECT_EQ((body.state.full->q - other.state.full->q).norm(), 0);

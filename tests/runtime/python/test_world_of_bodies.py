@@ -165,6 +165,29 @@ def test_states_go_back_to_the_last_bit(world, model):
         hash(state)
 
 
+def test_a_snapshot_goes_back_to_the_last_bit(world):
+    world.step(18)
+    world[0].set_example_stiffness(50)
+    snapshot = world.save()
+    assert isinstance(snapshot, bytes)
+    world.step(40)
+    there = world.state_hash
+    world.restore(snapshot)
+    assert world.save() == snapshot
+    world[0].set_example_stiffness(1000)
+    world.step(3)
+    world.restore(snapshot)
+    world.step(40, threads=2)
+    assert world.state_hash == there
+    for wrong, words in ((snapshot[:-1], "ends early"), (snapshot[:200] + b"x" + snapshot[201:], "changed"), (b"no", "expected a snapshot")):
+        with pytest.raises(exmat.InvalidArgument, match=words):
+            world.restore(wrong)
+    assert world.state_hash == there
+    world.remove(0)
+    with pytest.raises(exmat.InvalidArgument, match="other bodies"):
+        world.restore(snapshot)
+
+
 @pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda world: pickle.loads(pickle.dumps(world))])
 def test_a_copied_world_goes_on_to_the_last_bit(world, model, duplicate):
     world.remove(world.add(body_at(model, (5, 5, 5))))
