@@ -1,10 +1,11 @@
-// The recipes of docs/engine_cookbook.md in one program, which a test compiles and runs.
+// The recipes of docs/engines.md in one program, which a test compiles and runs.
 //   cookbook BUNDLE.h5    (a free body with contact, as examples/10_pile/asset_bar.json makes)
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
 #include <exmat/exmat.hpp>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -69,6 +70,8 @@ class Clock {
     owed_ = steps == most ? 0 : owed_ - steps * time_step_;
     return steps;
   }
+  /// How far the frame is beyond the last step, in [0, 1) of a step.
+  double beyond() const { return owed_ / time_step_; }
 
  private:
   double time_step_, owed_ = 0;
@@ -88,6 +91,26 @@ struct Drawn {
   exmat::Surface surface;
   std::vector<std::int32_t> triangles;  // [3f], constant
   std::vector<float> xyz;               // [3k], of this frame
+};
+
+// recipe: interpolation
+/// Pictures between two steps: a step late, and smooth at any frame rate.
+class Between {
+ public:
+  /// After each step.
+  void add(const std::vector<float>& xyz) {
+    last_.swap(now_);
+    now_ = xyz;
+    if (last_.size() != now_.size()) last_ = now_;
+  }
+  /// `beyond` in [0, 1): Clock::beyond().
+  void read(double beyond, std::vector<float>& xyz) const {
+    const auto share = static_cast<float>(beyond);
+    for (std::size_t i = 0; i < xyz.size(); ++i) xyz[i] = (1 - share) * last_[i] + share * now_[i];
+  }
+
+ private:
+  std::vector<float> last_, now_;
 };
 
 // recipe: picking
@@ -178,18 +201,100 @@ struct Ball {
   }
 };
 
-// recipe: save and restore
-struct Saved {
-  std::vector<double> numbers;
-  std::uint64_t hash;
+// recipe: pinning
+/// A frame of the engine, a bone or a rigid body, as three rows of rotation and position.
+using Frame = std::array<double, 12>;
+
+Frame at(const Vector& position) { return {1, 0, 0, position[0], 0, 1, 0, position[1], 0, 0, 1, position[2]}; }
+
+std::int64_t pin(exmat::BodyRef body, const std::vector<std::int64_t>& vertices, const Frame& frame) {
+  exmat_attachment spring = exmat::default_attachment();
+  spring.kind = EXMAT_ATTACHMENT_SPRING;
+  spring.stiffness = 2e4;  // [N/m]
+  spring.damping = 500;
+  spring.break_force = 1e5;
+  return body.attach(vertices, frame, spring);
+}
+
+// recipe: impulses
+/// A joint between a point of a body and a ball of the engine, solved once between two steps.
+void join(exmat::BodyRef body, const exmat::Points& point, Ball& ball) {
+  Vector velocity, impulse;
+  std::array<double, 9> w;  // velocity of the point per impulse [1/kg]
+  body.read_compliance(point, velocity, w);
+  for (std::size_t axis = 0; axis < 3; ++axis) w[4 * axis] += 1 / ball.mass;
+  const Vector a{w[0], w[1], w[2]}, b{w[3], w[4], w[5]}, c{w[6], w[7], w[8]};
+  const Vector wanted = ball.velocity - velocity, bc = cross(b, c), ca = cross(c, a), ab = cross(a, b);
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    impulse[axis] = (wanted[0] * bc[axis] + wanted[1] * ca[axis] + wanted[2] * ab[axis]) / dot(a, bc);
+    ball.velocity[axis] -= impulse[axis] / ball.mass;
+  }
+  body.apply_impulses(point, impulse);
+}
+
+// recipe: reach
+/// The examples pull points of the body to world places, three numbers each, as far as they can.
+void reach(exmat::BodyRef body, const exmat::Points& points, const std::vector<double>& places) {
+  exmat_reach settings = exmat::default_reach();
+  settings.change = 0.02;  // most that a weight changes in a step: 0.2 s from pose to pose
+  settings.horizon = 0.3;  // [s]
+  body.reach(points, places, settings);
+}
+
+// recipe: detail
+/// Bodies near the camera may step in all vertices of their mesh where something pushes them, others in their modes.
+void set_detail(exmat::World& world, const exmat::Model& model, std::int64_t id, bool is_near) {
+  exmat::BodyRef body = world.body(id);
+  body.set_space(is_near ? EXMAT_SPACE_AUTO : EXMAT_SPACE_REDUCED);  // of a model of settings.space = EXMAT_SPACE_AUTO
+  body.set_example_stiffness(model.examples() > 1 && is_near ? 400 : 0);
+  world.set_full_bodies(4);  // at once, those that are pushed hardest
+}
+
+/// Another model, of fewer modes or without contact, takes a body's place and its motion.
+std::int64_t change_model(exmat::World& world, std::int64_t id, const exmat::Model& other) {
+  exmat::Body next(other);
+  next.set_motion(world.body(id).motion());
+  world.remove(id);
+  return world.add(std::move(next));
+}
+
+// recipe: rollback
+/// The last frames of a world in memory that is made once.
+class History {
+ public:
+  explicit History(std::size_t frames) : frames_(frames) {}
+
+  void save(const exmat::World& world, std::size_t frame) { world.save(frames_[frame % frames_.size()]); }
+  void roll_back(exmat::World& world, std::size_t frame) const { world.restore(frames_[frame % frames_.size()]); }
+
+ private:
+  std::vector<std::vector<std::uint64_t>> frames_;
 };
 
-Saved save(const exmat::World& world) { return {world.state(), world.hash()}; }
+// recipe: threads
+/// Stands for the engine's own: calls work(i) for each i < count, at the same time where it can, and waits.
+struct Jobs {
+  void parallel_for(int count, const std::function<void(int)>& work) {
+    for (int i = 0; i < count; ++i) work(i);
+  }
+};
 
-/// Into a world of the same bodies; true if it is the same to the last bit.
-bool restore(exmat::World& world, const Saved& saved) {
-  world.set_state(saved.numbers);
-  return world.hash() == saved.hash;
+void use_threads_of(Jobs& jobs) {
+  exmat_set_scheduler(
+      [](void* user, void (*task)(void*, std::int32_t), void* data, std::int32_t count) {
+        static_cast<Jobs*>(user)->parallel_for(count, [=](int i) { task(data, i); });
+      },
+      &jobs);
+}
+
+// recipe: memory
+/// While a level loads: everything that later frames need is made and has its size.
+exmat::World load_level(const exmat::Model& model, int bodies, History& history) {
+  exmat::World world = make_world();
+  for (int i = 0; i < bodies; ++i) drop(world, model, {0, 0, 0.2 + 0.8 * i});
+  world.step(1, 4);  // scratch of four threads
+  for (std::size_t frame = 0; frame < 8; ++frame) history.save(world, frame);
+  return world;
 }
 
 // recipe: end
@@ -214,7 +319,9 @@ int main(int argc, char** argv) {
 
     frames(60, [] {});
     std::printf("dropped      the upper body at z = %.2f m\n", world.body(upper).motion().position[2]);
-    const Saved saved = save(world);
+    History history(8);
+    history.save(world, 0);
+    const std::uint64_t saved = world.hash();
 
     const Vector eye{3.8, 0.5, 10}, down{0, 0, -1};
     const std::optional<Picked> picked = pick(drawn, eye, down);
@@ -233,8 +340,8 @@ int main(int argc, char** argv) {
     std::printf("posed        weight of the twist %.2f\n", weights[1]);
     forget_pose(world.body(upper));
 
-    const bool same = restore(world, saved);
-    std::printf("restored     %s\n", same ? "the same to the last bit" : "another state");
+    history.roll_back(world, 0);
+    std::printf("rolled back  %s\n", world.hash() == saved ? "the same to the last bit" : "another state");
 
     Ball ball;
     ball.position = {2, 0.5, 2.6};
@@ -245,6 +352,40 @@ int main(int argc, char** argv) {
       ball.step(world, model.time_step());
     }
     std::printf("coupled      the ball rests at z = %.2f m\n", ball.position[2]);
+    world.remove_obstacle(ball.id);
+
+    Jobs jobs;
+    use_threads_of(jobs);
+    exmat::BodyRef body = world.body(upper);
+    const std::array<std::int64_t, 1> corner{0};
+    const exmat::Points points = exmat::Points::vertices(model, corner);
+    const auto height = [&] {
+      Vector place;
+      body.read_positions(points, place);
+      return place[2];
+    };
+    Vector place;
+    body.read_positions(points, place);
+    const std::int64_t pinned = pin(body, {corner[0]}, at(place));
+    const double low = place[2];
+    for (int step = 1; step <= 240; ++step) {
+      body.move_attachment(pinned, at({place[0], place[1], low + step / 240.0}));
+      world.step();
+    }
+    std::printf("pinned       its corner went up by %.2f m with the frame\n", height() - low);
+    body.detach(pinned);
+
+    Ball weight;
+    weight.velocity = {0, 0, -3};
+    join(body, points, weight);
+    std::printf("joined       corner and weight go down by %.2f m/s\n", -weight.velocity[2]);
+
+    Vector there;
+    body.read_positions(points, there);
+    reach(body, points, {there[0], there[1] + 0.3, there[2]});
+    world.step(48);
+    body.read_weights(weights);
+    std::printf("reached      with weight %.2f of the twist\n", weights[1]);
   } catch (const exmat::Error& error) {
     std::fprintf(stderr, "cookbook: %s\n", error.what());
     return error.status();
