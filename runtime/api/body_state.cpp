@@ -112,7 +112,8 @@ void check(std::span<const double> numbers, exmat_body& body) {
   if (!all_finite(numbers.data(), std::ssize(numbers))) throw InvalidArgument("numbers: expected finite ones");
   StateReader reader(numbers, StateReader::Use::kCheck);
   visit(reader, body);
-  if (reader.left() > 0) throw InvalidArgument(fmt::format("numbers: {} too many", reader.left()));
+  if (reader.left() > 0)
+    throw InvalidArgument(fmt::format("numbers: {}: expected {}", numbers.size(), numbers.size() - reader.left()));
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
+#include <limits>
 #include <span>
 #include <vector>
 
@@ -13,22 +14,24 @@ namespace exmat::runtime {
 
 // Two archives that go through the members of a state in the same order: visit(archive, state) describes a state once.
 
-/// Writes the numbers of a state from `to` on, or only counts them where that is null.
+/// Writes the numbers of a state from `to` on, or only counts them where that is null and beyond `room` numbers.
 class StateWriter {
  public:
-  explicit StateWriter(double* to = nullptr) : to_(to) {}
+  explicit StateWriter(double* to = nullptr, std::size_t room = std::numeric_limits<std::size_t>::max())
+      : to_(to), room_(to != nullptr ? room : 0) {}
 
   std::size_t count() const noexcept { return count_; }
   static constexpr bool checks() noexcept { return false; }
 
   void number(double number) noexcept {
-    if (to_ != nullptr) to_[count_] = number;
+    if (fits(1)) to_[count_] = number;
     ++count_;
   }
   template <typename Dense>
   void array(const Dense& array) noexcept {
-    if (to_ != nullptr) std::copy_n(array.data(), array.size(), to_ + count_);
-    count_ += static_cast<std::size_t>(array.size());
+    const auto size = static_cast<std::size_t>(array.size());
+    if (fits(size)) std::copy_n(array.data(), array.size(), to_ + count_);
+    count_ += size;
   }
   template <typename Dense>
   void array(const Dense& own, Eigen::Index /*rows*/, Eigen::Index /*columns*/) noexcept {
@@ -36,7 +39,7 @@ class StateWriter {
   }
   /// Room for as many numbers; null where they are only counted.
   double* room(std::size_t count) noexcept {
-    double* const room = to_ != nullptr ? to_ + count_ : nullptr;
+    double* const room = fits(count) ? to_ + count_ : nullptr;
     count_ += count;
     return room;
   }
@@ -61,8 +64,10 @@ class StateWriter {
   }
 
  private:
+  bool fits(std::size_t more) const noexcept { return count_ + more <= room_; }
+
   double* to_;
-  std::size_t count_ = 0;
+  std::size_t room_, count_ = 0;
 };
 
 /// Takes the numbers of a state, from the first on, or only checks them: throws InvalidArgument where they are not

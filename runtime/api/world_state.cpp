@@ -294,11 +294,9 @@ std::uint64_t fingerprint(const exmat_world& world) noexcept {
   for (const exmat_world::Member& member : world.members) {
     const exmat_body& body = *member.body;
     const std::string& sha = body.source->loaded.summary.input_sha256;
-    for (std::size_t at = 0; at + sizeof(std::uint64_t) <= sha.size(); at += sizeof(std::uint64_t)) {
-      std::uint64_t word = 0;
-      std::memcpy(&word, sha.data() + at, sizeof word);
-      add(word);
-    }
+    std::array<std::uint64_t, 2> words{};  // 16 of the 64 digits: enough to tell bundles apart
+    std::memcpy(words.data(), sha.data(), std::min(sha.size(), sizeof words));
+    for (const std::uint64_t word : words) add(word);
     add(static_cast<std::uint64_t>(member.id));
     add(static_cast<std::uint64_t>(body.modes()));
     add(std::uint64_t{body.scene.meeting.group} << 32U | body.scene.meeting.mask);
@@ -311,16 +309,9 @@ std::uint64_t fingerprint(const exmat_world& world) noexcept {
   return hash;
 }
 
-/// Sum of the bits of numbers. `finite`: false if one of them is not.
-std::uint64_t sum_of(std::span<const double> numbers, bool& finite) noexcept {
-  constexpr std::uint64_t kExponent = 0x7ff0000000000000, kOne = 0x0010000000000000;
-  std::uint64_t sum = 0, carries = 0;
-  for (const double number : numbers) {
-    const auto bits = std::bit_cast<std::uint64_t>(number);
-    sum += bits;
-    carries |= (bits & kExponent) + kOne;
-  }
-  finite = carries >> 63U == 0;
+std::uint64_t sum_of(std::span<const double> numbers) noexcept {
+  std::uint64_t sum = 0;
+  for (const double number : numbers) sum += std::bit_cast<std::uint64_t>(number);
   return sum;
 }
 
@@ -351,10 +342,7 @@ std::span<const double> numbers_of(const void* buffer, std::size_t size, const e
                                       sizeof header + header.numbers * sizeof(double)));
   const std::span numbers(reinterpret_cast<const double*>(static_cast<const char*>(buffer) + sizeof header),
                           header.numbers);
-  bool finite = false;
-  if (sum_of(numbers, finite) != header.sum)
-    throw InvalidArgument("buffer: the snapshot was changed: its sum is another one");
-  if (!finite) throw InvalidArgument("buffer: expected finite numbers: the world was saved with others");
+  if (sum_of(numbers) != header.sum) throw InvalidArgument("buffer: the snapshot was changed: its sum is another one");
   return numbers;
 }
 
@@ -363,7 +351,8 @@ template <typename Visit>
 void check(std::span<const double> numbers, const Visit& visit) {
   StateReader reader(numbers, StateReader::Use::kCheck);
   visit(reader);
-  if (reader.left() > 0) throw InvalidArgument(fmt::format("numbers: {} too many", reader.left()));
+  if (reader.left() > 0)
+    throw InvalidArgument(fmt::format("numbers: {}: expected {}", numbers.size(), numbers.size() - reader.left()));
 }
 
 void set_world(std::span<const double> numbers, exmat_world& world) {
@@ -412,17 +401,16 @@ exmat_status exmat_world_save(const exmat_world* world, void* buffer, std::size_
   EXMAT_REQUIRE(world);
   EXMAT_REQUIRE(buffer);
   if (!is_aligned(buffer)) return fail(EXMAT_INVALID_ARGUMENT, "%s: buffer: expected one aligned to 8 bytes", __func__);
-  const std::size_t numbers = snapshot_numbers(*world), needed = sizeof(Header) + sizeof(double) * numbers;
-  if (size < needed)
-    return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected at least %zu", __func__, size, needed);
   auto* const to = reinterpret_cast<double*>(static_cast<char*>(buffer) + sizeof(Header));
-  StateWriter writer(to);
+  StateWriter writer(size > sizeof(Header) ? to : nullptr,
+                     (std::max(size, sizeof(Header)) - sizeof(Header)) / sizeof(double));
   visit_snapshot(writer, *world);
+  if (const std::size_t needed = sizeof(Header) + sizeof(double) * writer.count(); size < needed)
+    return fail(EXMAT_INVALID_ARGUMENT, "%s: size = %zu: expected at least %zu", __func__, size, needed);
   Header header;
   header.world = fingerprint(*world);
-  header.numbers = numbers;
-  bool finite = true;
-  header.sum = sum_of({to, numbers}, finite);
+  header.numbers = writer.count();
+  header.sum = sum_of({to, writer.count()});
   std::memcpy(buffer, &header, sizeof header);
   return EXMAT_OK;
 }

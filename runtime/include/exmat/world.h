@@ -155,7 +155,8 @@ EXMAT_API exmat_status exmat_world_set_state(exmat_world* world, const double* n
    from step to step with contacts (80 a vertex), attachments, and bodies that go to all vertices. */
 EXMAT_API size_t exmat_world_snapshot_size(const exmat_world* world) EXMAT_NOEXCEPT;
 
-/* Saves a snapshot into `buffer` [size >= exmat_world_snapshot_size()], aligned to 8 bytes. Never allocates. */
+/* Saves a snapshot into `buffer` [size >= exmat_world_snapshot_size()], aligned to 8 bytes. Never allocates. A smaller
+ * one is refused, and is no snapshot then. */
 EXMAT_API exmat_status exmat_world_save(const exmat_world* world, void* buffer, size_t size) EXMAT_NOEXCEPT;
 
 /* Goes back to a snapshot, or on to it, from `buffer` [size: not less than what was saved], aligned to 8 bytes. The

@@ -148,10 +148,10 @@ TEST_F(BadBodyState, IsRefusedAndTheBodyIsAsItWas) {
   EXPECT_THAT(refusal(good.size(), 0), HasSubstr("expected"));
   EXPECT_THAT(refusal(7, std::numeric_limits<double>::infinity()), HasSubstr("numbers: expected finite ones"));
   EXPECT_THAT(refusal(0, 1), HasSubstr("layout 1: expected 4"));
-  EXPECT_THAT(refusal(1, 0.02), HasSubstr("time step 0.02 s: expected the model's 0.01 s"));
+  EXPECT_THAT(refusal(1, 0.02), HasSubstr("time step 0.02 s: expected 0.01 s, the model's"));
   EXPECT_THAT(refusal(2, 0.5), HasSubstr("steps = 0.5: expected a whole number"));
   EXPECT_THAT(refusal(3, 2), HasSubstr("begins_anew = 2: expected 0 or 1"));
-  EXPECT_THAT(refusal(4, good[4] + 1), HasSubstr("contacts: expected"));
+  EXPECT_THAT(refusal(4, good[4] + 1), HasSubstr("numbers: they end early"));
   EXPECT_THAT(refusal(good.size() - 10, 1e6), HasSubstr("vertex = 1e+06: expected a whole number below"));
   EXPECT_THAT(refusal(good.size() - 9, 1), HasSubstr("obstacle = 1: expected a whole number below 1"));
   EXPECT_EQ(refusal(5, good[5]), "taken");
