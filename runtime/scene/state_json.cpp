@@ -1,5 +1,6 @@
 #include "runtime/scene/state_json.h"
 
+#include <array>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -194,9 +195,10 @@ OrderedJson state_to_json(const State& state, const BodyFrame& frame) {
     }
   }
   if (const FreeStart* const before = frame_before(state)) {
-    NumberWriter writer;
+    std::array<double, kNumbersBefore> numbers{};
+    NumberWriter writer{numbers.data()};
     visit_numbers(*before, writer);
-    body["frame_before"] = writer.numbers;
+    body["frame_before"] = numbers;
   }
   for (const Attachment& attachment : state.attachments) {
     OrderedJson& own = body["attachments"].emplace_back(OrderedJson{{"broken", attachment.broken}});

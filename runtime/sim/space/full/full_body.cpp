@@ -48,8 +48,8 @@ FullMemory full_memory(const FullModel& full, const StepScene& scene, State& sta
 void find_targets(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
                   Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
   if (!runs_examples(scene)) return;
-  const auto reads_pose = [](const ExampleSettings& own) {
-    return acts(own) && !is_driven(own) && own.given_weights.size() == 0;
+  const auto reads_pose = [](const ExampleSettings& one) {
+    return acts(one) && !is_driven(one) && one.given_weights.size() == 0;
   };
   if (std::ranges::any_of(scene.examples, reads_pose)) step.first_coefficients();
   for (std::size_t group = 0; group < scene.examples.size(); ++group) {
