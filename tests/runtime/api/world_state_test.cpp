@@ -21,7 +21,7 @@ constexpr double kTimeStep = 0.004;
 constexpr double kEverywhere[] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0};  // a frame that is the world
 
 /// A world and what its host does to it before each frame.
-struct Case {
+struct Replay {
   const char* name;
   test::BarOptions bar;
   exmat_settings settings;
@@ -108,7 +108,7 @@ bool touched(exmat::World& world, const exmat_world_report& /*report*/) {
   return exmat_body_contacts(world.body(0).get()) > 0;
 }
 
-std::vector<Case> cases() {
+std::vector<Replay> replays() {
   const test::BarOptions block{.cells = {3, 2, 2}, .lengths = {0.3, 0.2, 0.2}, .youngs_modulus = 5e5, .free = true};
   test::BarOptions bar{.youngs_modulus = 5e5, .examples = 3};
   return {
@@ -127,16 +127,16 @@ std::vector<Case> cases() {
   };
 }
 
-class Snapshots : public ::testing::TestWithParam<Case> {
+class Snapshots : public ::testing::TestWithParam<Replay> {
  protected:
-  exmat::Model make(const Case& test) {
+  exmat::Model make(const Replay& test) {
     test::Bar bar = test::make_bar(test.bar);
     bar.model.contact = test::surface_contact(bar.model);
     bar.model.input_sha256 = std::string(64, 'a');
     write_bundle(bar.model, folder_ / "bar.h5");
     return exmat::Model(folder_ / "bar.h5", test.settings);
   }
-  static exmat::World make_world(const Case& test, const exmat::Model& model) {
+  static exmat::World make_world(const Replay& test, const exmat::Model& model) {
     exmat_contact_law law = exmat::default_contact_law();
     law.stiffness = 2e6;
     law.damping = 1e4;
@@ -161,7 +161,7 @@ class Snapshots : public ::testing::TestWithParam<Case> {
     }
     return world;
   }
-  static std::vector<std::uint64_t> play(const Case& test, exmat::World& world, const exmat::Points& points, int from,
+  static std::vector<std::uint64_t> play(const Replay& test, exmat::World& world, const exmat::Points& points, int from,
                                          int to, bool& happened) {
     std::vector<std::uint64_t> hashes;
     for (int frame = from; frame < to; ++frame) {
@@ -180,11 +180,11 @@ class Snapshots : public ::testing::TestWithParam<Case> {
 
   test::TemporaryFolder folder_;
 };
-INSTANTIATE_TEST_SUITE_P(Worlds, Snapshots, ::testing::ValuesIn(cases()),
+INSTANTIATE_TEST_SUITE_P(Worlds, Snapshots, ::testing::ValuesIn(replays()),
                          [](const auto& test) { return std::string(test.param.name); });
 
 TEST_P(Snapshots, FramesThatAreReplayedHaveTheSameBits) {
-  const Case test = GetParam();
+  const Replay test = GetParam();
   const exmat::Model model = make(test);
   const exmat::Points points = exmat::Points::vertices(model, std::array<std::int64_t, 1>{35});
   exmat::World world = make_world(test, model);
@@ -219,7 +219,7 @@ TEST_P(Snapshots, FramesThatAreReplayedHaveTheSameBits) {
 
 TEST_P(Snapshots, AreSavedAndRestoredWithoutAllocation) {
   if (!test::AllocationCounter::works()) GTEST_SKIP();
-  const Case test = GetParam();
+  const Replay test = GetParam();
   const exmat::Model model = make(test);
   const exmat::Points points = exmat::Points::vertices(model, std::array<std::int64_t, 1>{35});
   exmat::World world = make_world(test, model);
@@ -243,7 +243,7 @@ TEST_P(Snapshots, AreSavedAndRestoredWithoutAllocation) {
 using BadSnapshots = Snapshots;
 
 TEST_F(BadSnapshots, AreRefusedInWordsAndTheWorldIsAsItWas) {
-  const Case test = cases()[0];
+  const Replay test = replays()[0];
   const exmat::Model model = make(test);
   exmat::World world = make_world(test, model);
   world.step(60);

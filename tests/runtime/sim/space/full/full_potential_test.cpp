@@ -38,10 +38,11 @@ struct Potential {
 
   /// The example force becomes an elastic one, from a target that turns elements inside out where it is large.
   void pull_elastically(double size, double factor = 2) {
-    workspace.elastic_target = bar.space.make_target();
+    if (bar.model.examples.empty()) bar.model.examples.emplace_back();
+    workspace.elastic_target = bar.space.make_target(1);
     scene.examples = {{.stiffness = factor, .damping = 3, .elastic = true}};
     const Eigen::VectorXd target = bar.space.to_field(size * test::random_vector(bar.space.size(), 8));
-    potential.set_elastic_target(target);
+    potential.set_elastic_target(0, target);
     if (factor > 1e3) d = target;  // of a body that was at rest
     potential.evaluate_elements(d, FullPotential::Tangents::kExact, false);
   }
@@ -214,7 +215,7 @@ TEST(FullPotentialTest, InstructionSetsAgree) {
 TEST(FullPreconditionerTest, SolvesWithTheScalarMatrixAndTheFilter) {
   const FullBar bar({.two_parts = true, .functions = 5});
   const FullSpace& space = bar.space;
-  const FullPreconditioner preconditioner(space, 1e5, 3, 700);
+  const FullPreconditioner preconditioner(space, 1e5, 3, Eigen::VectorXd::Constant(5, 700));
   const RowMatrix W = Eigen::Map<const RowMatrix>(space.filter().functions, space.vertices(), space.filter().stride);
   const Eigen::MatrixXd S =
       Eigen::MatrixXd(1e5 * space.mass() + 3 * space.preconditioning_stiffness()) + 700 * W * W.transpose();

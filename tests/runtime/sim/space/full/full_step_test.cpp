@@ -353,7 +353,8 @@ TEST(FullPreconditionerTest, DiagonalOfTheInverseAndComplianceAreThoseOfTheMatri
   for (const int functions : {0, 3}) {
     const FullBar bar({.functions = functions});
     const double mass = 9e4, stiffness = 1.4, filter = functions > 0 ? 500 : 0;
-    const FullPreconditioner preconditioner(bar.space, mass, stiffness, filter, true);
+    const FullPreconditioner preconditioner(bar.space, mass, stiffness, Eigen::VectorXd::Constant(functions, filter),
+                                            true);
     Eigen::MatrixXd S = mass * Eigen::MatrixXd(bar.space.mass()) + stiffness * bar.space.preconditioning_stiffness();
     const Eigen::Map<const RowMatrix> W(bar.space.filter().functions, S.rows(), bar.space.filter().stride);
     if (functions > 0) S += filter * W * W.transpose();
