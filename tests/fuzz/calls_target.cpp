@@ -634,14 +634,15 @@ class Calls {
                                           choices_.length(count), size));
         return;
       }
-      case 5:
+      case 5: {
         checked(exmat_body_read_contact_load(one, choices_.one_in(2) ? -1 : choices_.whole(), numbers.data(), nullptr));
         checked(exmat_body_read_placement(one, numbers.data()));
         checked(exmat_body_read_point_compliance(one, at, numbers.data()));
         checked(exmat_body_read_compliance(one, at, nullptr, nullptr, choices_.length(3 * k)));
-        numbers.resize(static_cast<std::size_t>(6 * k));
-        checked(exmat_body_read_sensitivity(one, -1, at, numbers.data(), 6 * k));
+        std::vector<double> sensitivity(static_cast<std::size_t>(6 * k));
+        checked(exmat_body_read_sensitivity(one, -1, at, sensitivity.data(), 6 * k));
         return;
+      }
       case 6: {
         Padded<exmat_energies> energies;
         energies.value.size = sizeof energies.value;

@@ -34,7 +34,7 @@ struct AttachedBar {
   }
 
   /// Holds the vertices of the bar's first end, or of its last.
-  runtime::Attachment& attach(runtime::AttachmentKind kind, bool last = false) {
+  runtime::Attachment& attach(AttachmentKind kind, bool last = false) {
     runtime::Attachment attachment;
     attachment.kind = kind;
     const double at = last ? rest().col(0).maxCoeff() : rest().col(0).minCoeff();
@@ -106,7 +106,7 @@ struct AttachedBar {
 // Held vertices are eliminated in the one and projected away in the other.
 TEST(Attachment, OfAFixedPatchIsAClamp) {
   AttachedBar clamped(false), held(true);
-  held.attach(runtime::AttachmentKind::kFixed);
+  held.attach(AttachmentKind::kFixed);
   double off = 0, size = 0;
   for (int i = 0; i < 100; ++i) {
     clamped.step();
@@ -121,7 +121,7 @@ TEST(Attachment, OfAFixedPatchIsAClamp) {
 }
 
 TEST(Attachment, HoldsExactlyWhereTheFrameIs) {
-  for (const auto kind : {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall}) {
+  for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall}) {
     AttachedBar body(true);
     runtime::Attachment& attachment = body.attach(kind);
     for (int i = 1; i <= 100; ++i) {
@@ -130,7 +130,7 @@ TEST(Attachment, HoldsExactlyWhereTheFrameIs) {
       attachment.position = Eigen::Vector3d(0, 10 * time, 0);
       body.step();
       EXPECT_LE((body.mean(attachment) - attachment.anchor()).norm(), 1e-12 * (1 + 10 * time)) << i;
-      if (kind == runtime::AttachmentKind::kBall) continue;
+      if (kind == AttachmentKind::kBall) continue;
       for (std::size_t k = 0; k < attachment.vertices.size(); ++k)
         EXPECT_LE((body.position(attachment.vertices[k]) - attachment.target(static_cast<Eigen::Index>(k))).norm(),
                   1e-12)
@@ -142,8 +142,7 @@ TEST(Attachment, HoldsExactlyWhereTheFrameIs) {
 // The forces on the body, its weight and what the frame exerts, change its linear momentum, which is summed here over
 // all vertices with the velocities of the integrator.
 TEST(Attachment, ExertsWhatTheMomentumSays) {
-  for (const auto kind :
-       {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
+  for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall, AttachmentKind::kSpring}) {
     AttachedBar body(true);
     runtime::Attachment& attachment = body.attach(kind);
     attachment.stiffness = 3000;
@@ -172,11 +171,11 @@ TEST(Attachment, ExertsWhatTheMomentumSays) {
 }
 
 /// Hangs a bar by both ends, else it would swing, which nothing damps, and expects that it weighs on the frames.
-void expect_weight(AttachedBar& body, runtime::AttachmentKind kind) {
+void expect_weight(AttachedBar& body, AttachmentKind kind) {
   body.scene.stiffness_damping = 0.02;
   body.scene.mass_damping = 4;
   body.attach(kind);
-  body.attach(runtime::AttachmentKind::kFixed, /*last=*/true);
+  body.attach(AttachmentKind::kFixed, /*last=*/true);
   auto& held = body.state.attachments;
   for (runtime::Attachment& one : held) {
     one.stiffness = 5000;
@@ -184,14 +183,13 @@ void expect_weight(AttachedBar& body, runtime::AttachmentKind kind) {
   }
   for (int i = 0; i < 3000; ++i) body.step();
   EXPECT_LE((held[0].force + held[1].force - body.weight()).norm(), 1e-6 * body.weight().norm());
-  if (kind == runtime::AttachmentKind::kSpring)
+  if (kind == AttachmentKind::kSpring)
     EXPECT_LE((body.mean(held[0]) - held[0].anchor() - held[0].force / 5000).norm(), 1e-7);
 }
 
 // Hanging bodies weigh on the frame, a spring is as long as its stiffness says, and a weaker hold lets go.
 TEST(Attachment, BearsTheWeightOfWhatHangs) {
-  for (const auto kind :
-       {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
+  for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall, AttachmentKind::kSpring}) {
     AttachedBar body(true);
     expect_weight(body, kind);
     auto& held = body.state.attachments;
@@ -209,7 +207,7 @@ TEST(Attachment, BearsTheWeightOfWhatHangs) {
 TEST(Attachment, ThatBrokeLetsTheBodyFly) {
   AttachedBar body(true);
   body.scene.mass_damping = 3;
-  body.attach(runtime::AttachmentKind::kFixed).break_force = 1e-6;
+  body.attach(AttachmentKind::kFixed).break_force = 1e-6;
   for (int i = 0; i < 3; ++i) body.step();
   ASSERT_TRUE(body.state.attachments[0].broken);
   const auto linear = [&] { return body.model->frame->momenta(body.state.frame)->linear; };
@@ -239,7 +237,7 @@ Eigen::Matrix3d fitted_rotation(const AttachedBar& body, const runtime::Attachme
 
 TEST(AttachmentInModes, HoldsExactlyWhereTheFrameIs) {
   for (const bool free : {true, false})
-    for (const auto kind : {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall}) {
+    for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall}) {
       AttachedBar body(free, /*modes=*/true, 1e7);
       const double speed = free ? 10 : 0.2, spin = free ? 20 : 1;  // what is clamped does not go far
       const double rise = 0.1;                                     // [s] until it goes so fast
@@ -251,7 +249,7 @@ TEST(AttachmentInModes, HoldsExactlyWhereTheFrameIs) {
         attachment.position = about - attachment.rotation * about + Eigen::Vector3d(0, speed * time, 0);
         body.step();
         EXPECT_LE((body.mean(attachment) - attachment.anchor()).norm(), 1e-10 * body.bar.length) << i;
-        if (kind == runtime::AttachmentKind::kBall) continue;
+        if (kind == AttachmentKind::kBall) continue;
         EXPECT_LE((fitted_rotation(body, attachment) - attachment.rotation).norm(), 1e-10) << i;
       }
     }
@@ -260,11 +258,10 @@ TEST(AttachmentInModes, HoldsExactlyWhereTheFrameIs) {
 // BDF2 of the momenta that the vertices have, as the masses of the mesh sum them up, in a step of a body that is held
 // twice.
 TEST(AttachmentInModes, ExertsWhatTheMomentaSay) {
-  for (const auto kind :
-       {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
+  for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall, AttachmentKind::kSpring}) {
     AttachedBar body(true, /*modes=*/true);
     body.scene.newton.tolerance = 1e-11;
-    body.attach(runtime::AttachmentKind::kBall, /*last=*/true);
+    body.attach(AttachmentKind::kBall, /*last=*/true);
     body.attach(kind);
     auto& held = body.state.attachments;
     held[1].stiffness = 3000;
@@ -302,7 +299,7 @@ TEST(AttachmentInModes, ExertsWhatTheMomentaSay) {
 // In all modes a body is what it is in all vertices. Pendulums: a soft one on a ball, and one on a spring with a
 // damper.
 TEST(AttachmentInModes, SwingsAsInAllVertices) {
-  for (const auto kind : {runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
+  for (const auto kind : {AttachmentKind::kBall, AttachmentKind::kSpring}) {
     AttachedBar modes(true, /*modes=*/true), vertices(true);
     double off = 0, size = 0, gained = 0;
     for (AttachedBar* const body : {&modes, &vertices}) {
@@ -334,7 +331,7 @@ TEST(AttachmentInModes, RestsAsInAllVertices) {
   AttachedBar modes(false, /*modes=*/true), vertices(false);
   for (AttachedBar* const body : {&modes, &vertices}) {
     body->scene.stiffness_damping = 0.05;
-    runtime::Attachment& attachment = body->attach(runtime::AttachmentKind::kBall, /*last=*/true);
+    runtime::Attachment& attachment = body->attach(AttachmentKind::kBall, /*last=*/true);
     for (int i = 0; i < 1500; ++i) {
       attachment.position = std::min(1.0, 0.01 * i) * Eigen::Vector3d(0.01, -0.03, 0.04);
       body->step();
@@ -349,8 +346,7 @@ TEST(AttachmentInModes, RestsAsInAllVertices) {
 }
 
 TEST(AttachmentInModes, BearsTheWeightOfWhatHangsAndBreaks) {
-  for (const auto kind :
-       {runtime::AttachmentKind::kFixed, runtime::AttachmentKind::kBall, runtime::AttachmentKind::kSpring}) {
+  for (const auto kind : {AttachmentKind::kFixed, AttachmentKind::kBall, AttachmentKind::kSpring}) {
     AttachedBar body(true, /*modes=*/true);
     expect_weight(body, kind);
     auto& held = body.state.attachments;
@@ -369,7 +365,7 @@ TEST(AttachmentInModes, BearsTheWeightOfWhatHangsAndBreaks) {
 // Bodies of one model that nothing holds go side by side, and a held one does what it does alone.
 TEST(AttachmentInModes, IsTheSameAmongOthers) {
   AttachedBar alone(true, /*modes=*/true), many(true, /*modes=*/true);
-  alone.attach(runtime::AttachmentKind::kFixed);
+  alone.attach(AttachmentKind::kFixed);
   std::vector<runtime::State> states(9, many.state);
   states[3].attachments = alone.state.attachments;
   runtime::World world({});
@@ -388,8 +384,8 @@ TEST(AttachmentInModes, IsTheSameAmongOthers) {
 TEST(AttachmentInModes, AllocatesNothingInAStep) {
   if (!test::AllocationCounter::works()) GTEST_SKIP();
   AttachedBar body(true, /*modes=*/true);
-  body.attach(runtime::AttachmentKind::kFixed);
-  body.attach(runtime::AttachmentKind::kSpring, /*last=*/true).stiffness = 100;
+  body.attach(AttachmentKind::kFixed);
+  body.attach(AttachmentKind::kSpring, /*last=*/true).stiffness = 100;
   body.step();
   const test::AllocationCounter counter;
   for (int i = 0; i < 20; ++i) body.step();
