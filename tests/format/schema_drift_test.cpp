@@ -75,8 +75,10 @@ std::vector<std::string> paths_of(const std::string& schema_path, const ReducedM
     for (const ExampleData& example : set.examples) paths.push_back(fill_name(path, kExamplePlaceholder, example.name));
   };
   if (!schema_path.starts_with("/regions/")) add(schema_path, *model.examples);
+  const auto is_of = [&](const char* group) { return schema_path.find(group) != std::string::npos; };
   for (const RegionData& region : model.regions)
-    if (schema_path.starts_with("/regions/") && (region.targets || schema_path.find("/targets") == std::string::npos))
+    if (schema_path.starts_with("/regions/") && (region.targets || !is_of("/targets")) &&
+        (region.full_space || !is_of("/full_space")))
       add(fill_name(schema_path, kRegionPlaceholder, region.name), region.examples);
   return paths;
 }
