@@ -11,8 +11,8 @@
 namespace exmat::precompute {
 namespace {
 
-// Motions below this share of the body's own size are rounding.
-constexpr double kNothing = 1e-12;
+// Motions below this share of the body's own size are what steps that are solved to 1e-8 of the forces leave.
+constexpr double kNothing = 1e-9;
 
 constexpr double kSettledFrom = 0.9 * (1 - 1e-9);  // of the time, and rounding
 

@@ -88,6 +88,8 @@ TEST_F(ApiTest, RegionsHaveWeightsOfTheirOwn) {
   RegionData& region = bar.model.regions.emplace_back();
   region.name = "outer";
   region.vertices = IndexVector::Constant(1, 5);
+  region.window = Eigen::VectorXd::Ones(1);
+  region.band = Eigen::VectorXd::Zero(1);
   region.examples = *bar.model.examples;
   region.projection = *bar.model.projection;
   write_bundle(bar.model, files_.bundle());

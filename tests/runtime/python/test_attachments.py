@@ -81,7 +81,7 @@ def test_modes_alone_refuse_what_they_cannot_hold(bundle, free_bundle):
     free = exmat.Body(exmat.Model(free_bundle, use_contact=True))
     world = exmat.World()
     world.add(free)
-    with pytest.raises(exmat.InvalidArgument, match="springs"):
+    with pytest.raises(exmat.InvalidArgument, match="spring"):
         free.attach([60], frame_at([0, 0, 0]), kind="ball")
 
 
