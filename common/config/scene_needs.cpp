@@ -1,5 +1,9 @@
 #include "common/config/scene_needs.h"
 
+#include <string>
+
+#include "common/core/error.h"
+
 namespace exmat {
 
 WorldConfig world_of(SceneConfig scene) {
@@ -18,6 +22,14 @@ WorldConfig world_of(SceneConfig scene) {
 void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfig& world) {
   world.trajectory = file;
   for (BodiesConfig& bodies : world.bodies) bodies.scene.trajectory = file;
+}
+
+void require_weights(const SceneConfig& scene, const ExampleForceConfig& force, const std::string& member,
+                     Eigen::Index examples) {
+  if (!force.weights || force.weights->size() == examples) return;
+  throw InputError({scene.file.string(), scene.place + '/' + member + "/weights",
+                    std::to_string(examples) + " numbers, one for each example of " + scene.bundle.string(),
+                    std::to_string(force.weights->size()), "the first is that of the rest pose"});
 }
 
 Needs needs_of(const SceneConfig& scene) {

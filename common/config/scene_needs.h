@@ -17,6 +17,11 @@ void set_trajectory(const std::optional<std::filesystem::path>& file, WorldConfi
 /// Throws InputError that names the scene's member where the bundle is not there.
 void require_bundle(const SceneConfig& scene);
 
+/// Throws InputError where an example force, a `member` of the scene, is given weights, but not one for each of its
+/// `examples`.
+void require_weights(const SceneConfig& scene, const ExampleForceConfig& force, const std::string& member,
+                     Eigen::Index examples);
+
 /// Needs of a scene from its bundle.
 Needs needs_of(const SceneConfig& scene);
 

@@ -70,7 +70,7 @@ class Clock {
     owed_ = steps == most ? 0 : owed_ - steps * time_step_;
     return steps;
   }
-  /// How far the frame is beyond the last step, in [0, 1) of a step.
+  /// Share of a step, in [0, 1), that the frame is beyond the last one.
   double beyond() const { return owed_ / time_step_; }
 
  private:

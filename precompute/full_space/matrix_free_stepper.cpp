@@ -78,6 +78,7 @@ FullSpaceReport MatrixFreeStepper::step(FullSpaceState& state) {
   one.begin();
   std::vector<runtime::ExampleState> examples = state.examples;
   if (!scene_.examples.empty()) set_targets(state, one, examples, report);
+  one.take_elastic_targets();
   report.target_seconds = timer.seconds();
   one.solve();
   const runtime::FullReport& found = one.finish();

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/bundle/scene_places.h"
+#include "common/config/scene_needs.h"
 #include "common/core/error.h"
 
 namespace exmat::precompute {
@@ -38,15 +39,10 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
   require_part(!config.obstacles.empty(), model.contacts.has_value(), "/contact");
   const std::size_t groups = (config.examples ? 1 : 0) + config.regions.size();
   require_part(groups > 0, model.examples.size() == groups, config.examples ? "/examples" : "/regions");
-  const auto check_weights = [&](const std::string& member, const ExampleForceConfig& force, std::size_t group) {
-    if (force.weights && force.weights->size() != model.examples[group].count())
-      throw InputError({file, member + "/weights",
-                        std::to_string(model.examples[group].count()) + " weights, one for each example",
-                        std::to_string(force.weights->size()), "the first is that of the rest pose"});
-  };
-  if (config.examples) check_weights("/examples", *config.examples, 0);
+  auto examples = model.examples.begin();
+  if (config.examples) require_weights(config, *config.examples, "examples", (examples++)->count());
   for (std::size_t i = 0; i < config.regions.size(); ++i)
-    check_weights("/regions/" + std::to_string(i), config.regions[i].force, i + (config.examples ? 1 : 0));
+    require_weights(config, config.regions[i].force, "regions/" + std::to_string(i), (examples++)->count());
   for (std::size_t i = 0; i < forces.size(); ++i)
     for (const std::int64_t vertex : forces[i].vertices)
       if (vertex < 0 || vertex >= model.rest.rows())

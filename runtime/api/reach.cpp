@@ -19,7 +19,7 @@ constexpr double kSumTolerance = 1e-9;
 
 exmat_reach default_reach() noexcept { return {sizeof(exmat_reach), -1, 0.05, 0.5, nullptr, nullptr, 0}; }
 
-/// What a step of the scene's integrator is as one of backward Euler: 1 / c_v [s].
+/// Duration of a step of the scene's integrator as one of backward Euler, 1 / c_v [s].
 double duration_of(const StepScene& scene) noexcept {
   if (scene.integrator == Integrator::kBdf2) return 2 * scene.time_step / 3;
   return scene.integrator == Integrator::kNewmark ? scene.time_step / 2 : scene.time_step;

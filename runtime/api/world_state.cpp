@@ -94,8 +94,8 @@ void visit_pairs(Archive& archive, World& world, Pairs& pairs) {
   }
 }
 
-/// How many bodies; the state of each, and whether it is anew; how many pairs; of each its bodies, its energy and its
-/// account, how many vertices of either touch, and ten numbers for each of these.
+/// Number of bodies; the state of each, and whether it is anew; number of pairs; of each its bodies, its energy and its
+/// account, the number of vertices of either that touch, and ten numbers for each of these.
 template <typename Archive, typename World>
 void visit_motion(Archive& archive, World& world) {
   archive.same("bodies", static_cast<double>(world.members.size()), "", ", those of the world");
@@ -161,7 +161,7 @@ void visit_attachments(Archive& archive, Body& body) {
     if (!archive.checks() && (!fits || before != count)) body.world->world.fit_attachments(place_of(body));
 }
 
-/// What the body reaches for, with its points.
+/// Targets that the body reaches for, with its points.
 template <typename Archive, typename Body>
 void visit_reach(Archive& archive, Body& body) {
   bool reaches = body.reach != nullptr;

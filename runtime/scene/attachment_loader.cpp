@@ -15,7 +15,7 @@
 namespace exmat::runtime {
 namespace {
 
-/// What is to blame for the k-th vertex.
+/// Reason why the k-th vertex cannot be held; none where it can.
 std::optional<HoldFault> fault_of(const FullModel* full, bool in_modes, const Patch& patch, std::size_t k,
                                   const State& state) {
   const std::int32_t vertex = patch.vertices[k];

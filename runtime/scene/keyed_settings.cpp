@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 #include <utility>
 
-#include "common/core/error.h"
+#include "common/config/scene_needs.h"
 
 namespace exmat::runtime {
 namespace {
@@ -21,15 +21,6 @@ ExampleKeys make_example_keys(const ExampleKeysConfig& config) {
           make_setting(config.weights)};
 }
 
-void check_weights(const SceneConfig& config, const ExampleForceConfig& force, const std::string& member,
-                   const ExampleModel& examples) {
-  const Eigen::Index count = examples.weights.examples();
-  if (!force.weights || force.weights->size() == count) return;
-  throw InputError({config.file.string(), fmt::format("{}/{}/weights", config.place, member),
-                    fmt::format("{} numbers, one for each example of {}", count, config.bundle.string()),
-                    fmt::format("{}", force.weights->size()), "the first is that of the rest pose"});
-}
-
 void describe(const std::string& owner, const char* name, const KeyedSetting& setting, std::vector<std::string>& plan) {
   if (setting.empty()) return;
   plan.push_back(fmt::format("{}{}: keyed, {} keys from {:g} to {:g} s, {}", owner, name, setting.times().size(),
@@ -42,7 +33,7 @@ SceneKeys make_keys(const SceneConfig& config, const Model& model) {
   SceneKeys keys;
   keys.gravity = make_setting(config.gravity_keys);
   const auto add = [&](const ExampleForceConfig& force, const std::string& member) {
-    check_weights(config, force, member, model.examples[keys.examples.size()]);
+    require_weights(config, force, member, model.examples[keys.examples.size()].weights.examples());
     keys.examples.push_back(make_example_keys(force.keys));
   };
   if (config.examples) add(*config.examples, "examples");

@@ -163,7 +163,7 @@ std::optional<BonePlay> bone_play(const SceneConfig& config, const LoadedScene& 
     play.keys.push_back({skeleton.branch(bone), skeleton.axes(bone), make_motion(body.bones[i].motion)});
   }
   if (loaded.model->skeleton) play.bound = loaded.model->skeleton->bound();
-  // What hangs on a bone has a smaller branch.
+  // A bone has a smaller branch than those that it hangs on.
   std::ranges::stable_sort(play.keys, {}, [](const BoneKeys& own) { return own.branch.size(); });
   return play;
 }

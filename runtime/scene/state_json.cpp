@@ -48,8 +48,8 @@ constexpr AttachmentVector kAttachmentVectors[] = {{"force", &Attachment::force}
                                                    {"mean", &Attachment::mean},
                                                    {"mean_before", &Attachment::mean_before}};
 
-/// What the next step of a held free body in its modes knows of the step before; null of other bodies. The state may be
-/// const.
+/// Start of the step before, which the next step of a held free body in its modes takes; null of other bodies. The
+/// state may be const.
 auto* frame_before(auto& state) {
   auto* const free = std::get_if<FreeState>(&state.frame);
   return free != nullptr && holds_modes(state.attachments) ? &free->before : nullptr;

@@ -379,8 +379,8 @@ EXMAT_API exmat_status exmat_body_attach(exmat_body* body, const int64_t* vertic
                                          const exmat_attachment* attachment, const double* frame,
                                          int64_t* id) EXMAT_NOEXCEPT;
 
-/* Where the frame is at the end of the next step, and of those after it until the next call; one of a scene follows
-   neither its motion nor its obstacle from then on. */
+/* Puts the frame where it is at the end of the next step, and of those after it until the next call; one of a scene
+   follows neither its motion nor its obstacle from then on. */
 EXMAT_API exmat_status exmat_body_move_attachment(exmat_body* body, int64_t id, const double* frame) EXMAT_NOEXCEPT;
 
 /* Lets the patch go. */

@@ -78,6 +78,7 @@ void find_targets(const FullModel& full, const Model& model, const StepScene& sc
       found.target.noalias() = examples.from_target * scratch.solved_target;
     step.set_target(group, found.target);
   }
+  step.take_elastic_targets();
 }
 
 }  // namespace

@@ -122,6 +122,7 @@ class FullPotential {
   void see(const FullExamples& examples, Eigen::VectorXd& seen) noexcept;
   /// The shape [field] of no energy of an elastic example force of a group; before the next evaluate_elements().
   void set_elastic_target(std::size_t group, const Eigen::VectorXd& shape) noexcept;
+  bool has_elastic_target() const noexcept { return has_elastic_target_; }
   bool has_moving_frame() const noexcept { return model_.rigid || model_.carried; }
   /// From the frame of the deformations that example forces see to the world, as damping has it in this step.
   const Eigen::Matrix3d& frame_rotation() const noexcept {

@@ -598,7 +598,11 @@ void FullStep::set_elastic_target(std::size_t group, const Eigen::VectorXd& shap
   field.setZero();
   space_.to_field(shape, field);
   potential_.set_elastic_target(group, field);
-  potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kExact, false);
+}
+
+void FullStep::take_elastic_targets() noexcept {
+  if (potential_.has_elastic_target())
+    potential_.evaluate_elements(workspace_.d, FullPotential::Tangents::kExact, false);
 }
 
 void FullStep::solve() noexcept { status_ = near_ ? minimise_with_friction() : minimise(); }

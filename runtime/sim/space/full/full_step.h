@@ -130,8 +130,10 @@ class FullStep {
     workspace_.potential.target.segment(3 * model_.examples[group].first, target.size()) = target;
   }
 
-  /// u* [f] of an elastic example force, in any frame, in place of set_target().
+  /// u* [f] of an elastic example force, in any frame, in place of set_target(); after all of them,
+  /// take_elastic_targets().
   void set_elastic_target(std::size_t group, const Eigen::VectorXd& shape) noexcept;
+  void take_elastic_targets() noexcept;
 
   void solve() noexcept;
 
