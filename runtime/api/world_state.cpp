@@ -137,6 +137,21 @@ void visit_attachment(Archive& archive, Held& held, const exmat_body& body) {
   archive.flag("broken", held.broken);
 }
 
+/// The attachment follows its motion, which its scene has given it, or its host moves it.
+bool visit_motion_of(StateWriter& archive, const Attachment& held, const exmat_body& /*body*/) {
+  return archive.flag("motion", held.motion != nullptr);
+}
+
+void visit_motion_of(StateReader& archive, Attachment& held, const exmat_body& body) {
+  bool follows = false;
+  follows = archive.flag("motion", follows);
+  if (archive.checks()) return;
+  held.motion.reset();
+  const auto& of_scene = body.start.attachments;
+  const auto own = std::ranges::find(of_scene, held.id, &Attachment::id);
+  if (follows && own != of_scene.end()) held.motion = own->motion;
+}
+
 /// Attachments, and what steps of a held body know of the last one.
 template <typename Archive, typename Body>
 void visit_attachments(Archive& archive, Body& body) {
@@ -149,6 +164,7 @@ void visit_attachments(Archive& archive, Body& body) {
     auto& held = *(archive.checks() ? &unused : &all[i]);
     const std::int64_t id = held.id;
     visit_attachment(archive, held, body);
+    visit_motion_of(archive, held, body);
     fits &= i < before && held.id == id;
   }
   if (auto* free = std::get_if<FreeState>(&body.state.frame); free != nullptr && count > 0) {

@@ -164,3 +164,24 @@ def test_an_attachment_of_a_scene_goes_with_its_obstacle(free_bundle):
     assert np.abs(body.positions(points, np.empty((model.vertices, 3)))[held] - start[held] - [0, 0.002 * 19, 0]).max() < 1e-10
     with pytest.raises(exmat.BadInput, match="/attachments/0/vertices"):
         exmat.Model.from_scene({**scene, "attachments": [{"vertices": {"ids": [10**6]}}]})
+
+
+def test_a_snapshot_brings_back_what_an_attachment_of_a_scene_follows(free_bundle):
+    motion = [{"time": 0, "position": [0, 0, 0]}, {"time": 0.2, "position": [0, 0.1, 0]}]
+    model = exmat.Model.from_scene({"bundle": free_bundle, "time_step": 0.004, "space": "full",
+                                    "obstacles": [{"plane": {"point": [0, -9, 0], "normal": [0, 1, 0]}}],
+                                    "attachments": [{"vertices": {"point": [0, 0, 0]}, "motion": motion}]})
+    world, body = exmat.World(), exmat.Body(model)
+    world.add(body)
+    world.step(2)
+    snapshot = world.save()
+    world.step(5)
+    after = world.state_hash
+    for change in (lambda: body.move_attachment(0, frame_at([0, 0, 0])), lambda: body.detach(0)):
+        world.restore(snapshot)
+        change()
+        world.step(5)
+        assert world.state_hash != after
+        world.restore(snapshot)
+        world.step(5)
+        assert world.state_hash == after
