@@ -135,6 +135,23 @@ BodyConfig read_body(const Json& json, const std::filesystem::path& file, const 
   return body;
 }
 
+ReachConfig read_reach(const Json& json, const std::filesystem::path& file, const std::string& place) {
+  ReachConfig reach;
+  reach.region = json.value("region", reach.region);
+  for (const Json& own : json["targets"]) {
+    const std::string at = fmt::format("{}/targets/{}", place, reach.targets.size());
+    ReachTargetConfig& target = reach.targets.emplace_back();
+    target.vertices = read_selection(own["vertices"], file, at + "/vertices");
+    target.position = read_keys(own["position"], file, at + "/position");
+    if (target.position.empty()) target.position = {{0}, {read_vector(own["position"])}};
+  }
+  if (json.contains("lowest")) reach.lowest = read_numbers(json["lowest"]);
+  if (json.contains("highest")) reach.highest = read_numbers(json["highest"]);
+  reach.change = json.value("change", reach.change);
+  reach.horizon = json.value("horizon", reach.horizon);
+  return reach;
+}
+
 void read_gravity(const Json& json, const std::filesystem::path& file, const std::string& place, SceneConfig& scene) {
   if (!json.contains("gravity")) return;
   scene.gravity_keys = read_keys(json["gravity"], file, place + "/gravity");
@@ -172,6 +189,10 @@ SceneConfig scene_of(const Json& shared, const Json& own, const std::filesystem:
   for (std::size_t i = 0; i < forces.size(); ++i)
     scene.forces.push_back(read_vertex_force(forces[i], file, fmt::format("{}/forces/{}", place, i)));
   scene.body = read_body(member_or(own, "body", Json::object()), file, place + "/body");
+  if (own.contains("reach")) scene.reach = read_reach(own["reach"], file, place + "/reach");
+  if (scene.reach && scene.space.space == Space::kFull)
+    throw InputError({file.string(), place + "/reach", "a body that steps in its modes, space \"reduced\" or \"auto\"",
+                      "space \"full\"", ""});
   const Json obstacles = member_or(shared, "obstacles", Json::array());
   for (std::size_t i = 0; i < obstacles.size(); ++i)
     scene.obstacles.push_back(read_obstacle(obstacles[i], file, fmt::format("/obstacles/{}", i)));
@@ -192,7 +213,7 @@ void check_scene(const Json& json, const std::filesystem::path& file) {
 
 /// Members that a scene of several bodies has elsewhere, or not at all.
 void refuse_members_of_one_body(const Json& json, const std::filesystem::path& file) {
-  for (const char* name : {"internal_force", "examples", "regions", "forces", "body"})
+  for (const char* name : {"internal_force", "examples", "regions", "forces", "body", "reach"})
     if (json.contains(name))
       throw InputError({file.string(), fmt::format("/{}", name), "no such member beside bodies", "one",
                         fmt::format("move it into the bodies that it is for: /bodies/0/{}", name)});

@@ -184,6 +184,21 @@ struct AttachmentConfig {
   double break_force = std::numeric_limits<double>::infinity();  ///< [N]
 };
 
+/// A point of a body, the mean of vertices by mass, and its place in the world [m].
+struct ReachTargetConfig {
+  VertexSelection vertices{};
+  KeysConfig position{};  ///< one key where it stays
+};
+
+/// Places that the weights of examples are to bring points of a body to.
+struct ReachConfig {
+  std::string region;  ///< whose examples; empty: those of the whole body
+  std::vector<ReachTargetConfig> targets;
+  std::optional<Eigen::VectorXd> lowest{}, highest{};  ///< [K] limits of the weights; absent: 0 and 1
+  double change = 0.05;                                ///< most that a weight changes in a step, in (0, 1]
+  double horizon = 0.5;                                ///< > 0 [s]
+};
+
 /// SCENE.json after validation, paths resolved against its folder. schemas/scene.json.
 struct SceneConfig {
   std::filesystem::path file;
@@ -205,6 +220,7 @@ struct SceneConfig {
   std::vector<RegionForceConfig> regions;
   std::vector<VertexForceConfig> forces;
   BodyConfig body;
+  std::optional<ReachConfig> reach;
   std::vector<AttachmentConfig> attachments;
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact
   MeetingGroup meeting;

@@ -31,6 +31,9 @@ void require_supported(const SceneConfig& config, const std::vector<VertexForceC
     throw InputError({file, config.attachments.front().place,
                       "no attachment: nothing holds a body of the full-space reference", "one",
                       "let the asset fix these vertices"});
+  if (config.reach)
+    throw InputError({file, "/reach", "no reach: the full-space reference chooses no weights", "one",
+                      "give it the weights that a run has chosen: examples.weights with keys"});
   const auto require_part = [&](bool needed, bool there, const char* group) {
     if (needed && !there)
       throw InputError({config.bundle.string(), group, "this group, since the scene needs it", "none",

@@ -71,6 +71,9 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start
   refresh_weights(model(), scene, start, workspace);
   state = start;
   next_attachment = std::ssize(state.attachments);
+  if (!source->loaded.reach) return;
+  reach = std::make_unique<Reach>(model(), scene, state, source->loaded.reach->targets);
+  reaches_by_scene = true;
 }
 
 exmat_body::~exmat_body() = default;

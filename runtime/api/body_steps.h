@@ -1,6 +1,7 @@
 #pragma once
 
 #include "runtime/api/handles.h"
+#include "runtime/scene/reach_loader.h"
 
 namespace exmat::runtime {
 
@@ -16,6 +17,13 @@ void begin_steps(exmat_body& body) noexcept;
 /// Before each of its steps: what its scene keys in time.
 inline void apply_keys(exmat_body& body) noexcept {
   body.source->loaded.keys.apply(body.model(), body.state.step, body.scene);
+}
+
+/// Likewise: the weights of a body that reaches for something.
+inline void choose_weights(exmat_body& body) {
+  if (!body.reach) return;
+  if (body.reaches_by_scene) move_targets(*body.source->loaded.reach, body.scene, body.state, *body.reach);
+  body.reach->choose_weights(body.scene);
 }
 
 /// After each of its steps.

@@ -82,6 +82,7 @@ struct exmat_body {
   std::int64_t id = 0;                                           ///< in that
   std::int64_t next_attachment = 0;                              ///< its id
   std::unique_ptr<exmat::runtime::Reach> reach;                  ///< present while it reaches for something
+  bool reaches_by_scene = false;                                 ///< for that of its scene
   std::unique_ptr<exmat_world> own;                              ///< the world, where it is the body's own
   std::shared_ptr<const exmat::runtime::LoadCapacity> capacity;  ///< present where reports hold lost work
   Eigen::VectorXd load;                                          ///< 3n applied forces, there alone; the body's frame

@@ -15,8 +15,6 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-constexpr double kSumTolerance = 1e-9;
-
 exmat_reach default_reach() noexcept { return {sizeof(exmat_reach), -1, 0.05, 0.5, nullptr, nullptr, 0}; }
 
 /// Duration of a step of the scene's integrator as one of backward Euler, 1 / c_v [s].
@@ -50,13 +48,10 @@ ReachTargets targets_of(const exmat_body& body, const exmat_reach& given) {
   targets.horizon = given.horizon;
   targets.lowest = limits_of(given.lowest, 0, "lowest", examples);
   targets.highest = limits_of(given.highest, 1, "highest", examples);
-  for (Eigen::Index k = 0; k < examples; ++k)
-    if (targets.lowest[k] > targets.highest[k])
-      throw InvalidArgument(fmt::format("reach.lowest[{}] = {:g}: expected at most reach.highest, {:g}", k,
-                                        targets.lowest[k], targets.highest[k]));
-  if (targets.lowest.sum() > 1 + kSumTolerance || targets.highest.sum() < 1 - kSumTolerance)
+  if (!can_hold(targets.lowest, targets.highest))
     throw InvalidArgument(
-        fmt::format("reach: expected limits between which weights add up to 1, found sums of {:g} and {:g}",
+        fmt::format("reach: expected limits between which weights add up to 1, none of lowest above that of highest, "
+                    "found sums of {:g} and {:g}",
                     targets.lowest.sum(), targets.highest.sum()));
   return targets;
 }
@@ -69,6 +64,7 @@ void set_reach(ReachTargets targets, exmat_body& body) {
     now->targets() = std::move(targets);
   else
     body.reach = std::make_unique<Reach>(body.model(), body.scene, body.state, std::move(targets));
+  body.reaches_by_scene = false;
   wake(body.state);
 }
 
@@ -87,6 +83,7 @@ exmat_status exmat_body_reach(exmat_body* body, const exmat_points* points, cons
   if (points == nullptr) {
     EXMAT_REQUIRE_LENGTH(coordinates, 0);
     body->reach.reset();
+    body->reaches_by_scene = false;
     return EXMAT_OK;
   }
   EXMAT_REQUIRE(targets);

@@ -187,6 +187,7 @@ void visit_reach(Archive& archive, Body& body) {
   const std::size_t force = targets.force;
   Eigen::Index points = targets.rest.rows(), examples = targets.lowest.size();
   const Eigen::Index before = points;
+  archive.flag("reach of the scene", body.reaches_by_scene);
   if (reaches) {
     archive.whole("force", targets.force, static_cast<double>(body.scene.examples.size()));
     points = static_cast<Eigen::Index>(archive.whole("points", points, kMostSteps));
@@ -201,6 +202,8 @@ void visit_reach(Archive& archive, Body& body) {
   }
   if constexpr (!std::is_const_v<Body>) {
     if (archive.checks()) return;
+    const auto& of_scene = body.source->loaded.reach;
+    body.reaches_by_scene &= reaches && of_scene && std::ssize(of_scene->places) == points;
     if (!reaches)
       body.reach.reset();
     else if (!body.reach || force != targets.force || before != points)

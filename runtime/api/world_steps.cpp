@@ -91,7 +91,7 @@ exmat_world_report advance(exmat_world& world, std::int64_t steps, int threads) 
   while (report.steps < steps && failed_of(world) == nullptr) {
     for (const auto& member : world.members) {
       apply_keys(*member.body);
-      if (member.body->reach) member.body->reach->choose_weights(member.body->scene);
+      choose_weights(*member.body);
     }
     add(world.world.step(threads, &recorder), report);
     for (int i = 0; i < world.world.count(); ++i)

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/core/error.h"
+#include "runtime/scene/reach_loader.h"
 
 namespace exmat::runtime {
 namespace {
@@ -27,10 +28,25 @@ Bodies::Bodies(const LoadedWorld& loaded, const WorldConfig& config)
     : loaded_(loaded),
       config_(config),
       scenes_(scenes_at_start(loaded)),
+      reaching_(reaching_at_start()),
       world_(starts(),
              {config.contact.stiffness, config.contact.damping, config.contact.friction, config.contact.release}),
       threads_(std::min(omp_get_max_threads(), world_.count())) {
   world_.set_full_bodies(config.full_bodies);
+  for (int i = 0; i < count(); ++i) {
+    Reaching* const own = reaching_[static_cast<std::size_t>(i)].get();
+    if (own == nullptr) continue;
+    const LoadedScene& kind = loaded.kinds[loaded.bodies[static_cast<std::size_t>(i)].kind].loaded;
+    own->reach = std::make_unique<Reach>(*kind.model, own->scene, world_.state(i), kind.reach->targets);
+  }
+}
+
+std::vector<std::unique_ptr<Bodies::Reaching>> Bodies::reaching_at_start() const {
+  std::vector<std::unique_ptr<Reaching>> reaching;
+  for (const LoadedBody& body : loaded_.bodies)
+    reaching.push_back(loaded_.kinds[body.kind].loaded.reach ? std::make_unique<Reaching>(scenes_[body.kind])
+                                                             : nullptr);
+  return reaching;
 }
 
 std::vector<WorldBodyStart> Bodies::starts() const {
@@ -48,8 +64,10 @@ std::vector<WorldBodyStart> Bodies::starts() const {
     const LoadedKind& kind = loaded_.kinds[body.kind];
     State state = start_of(kind.loaded, body);
     state.examples = examples[body.kind];
-    bodies.push_back(
-        {{kind.loaded.model.get(), &scenes_[body.kind], kind.surface, kind.loaded.full.get()}, std::move(state)});
+    const Reaching* const own = reaching_[bodies.size()].get();
+    bodies.push_back({{kind.loaded.model.get(), own != nullptr ? &own->scene : &scenes_[body.kind], kind.surface,
+                       kind.loaded.full.get()},
+                      std::move(state)});
   }
   return bodies;
 }
@@ -65,6 +83,14 @@ WorldReport Bodies::step(StepObserver* observer) {
   for (std::size_t i = 0; i < scenes_.size(); ++i) {
     const LoadedScene& kind = loaded_.kinds[i].loaded;
     kind.keys.apply(*kind.model, steps(), scenes_[i]);
+  }
+  for (int i = 0; i < count(); ++i) {
+    Reaching* const own = reaching_[static_cast<std::size_t>(i)].get();
+    if (own == nullptr) continue;
+    const LoadedScene& kind = loaded_.kinds[loaded_.bodies[static_cast<std::size_t>(i)].kind].loaded;
+    kind.keys.apply(*kind.model, steps(), own->scene);
+    move_targets(*kind.reach, own->scene, world_.state(i), *own->reach);
+    own->reach->choose_weights(own->scene);
   }
   return world_.step(threads_, observer);
 }

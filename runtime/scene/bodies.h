@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "runtime/scene/state_hash.h"
@@ -50,11 +51,18 @@ class Bodies {
   std::uint64_t hash() const;
 
  private:
+  /// A body that chooses its weights has a scene of its own.
+  struct Reaching {
+    StepScene scene;
+    std::unique_ptr<Reach> reach;
+  };
+  std::vector<std::unique_ptr<Reaching>> reaching_at_start() const;
   std::vector<WorldBodyStart> starts() const;
 
   const LoadedWorld& loaded_;
   const WorldConfig& config_;
   std::vector<StepScene> scenes_;  // of the kinds, as their keys change them; the world refers to them
+  std::vector<std::unique_ptr<Reaching>> reaching_;  // of each body; null: it does not. The world refers to them
   World world_;
   int threads_;
 };

@@ -6,7 +6,6 @@
 #include "common/config/scene_needs.h"
 
 namespace exmat::runtime {
-namespace {
 
 KeyedSetting make_setting(const KeysConfig& config) {
   if (config.empty()) return {};
@@ -15,6 +14,8 @@ KeyedSetting make_setting(const KeysConfig& config) {
     values.row(static_cast<Eigen::Index>(i)) = config.values[i].transpose();
   return {config.times, std::move(values), config.interpolation};
 }
+
+namespace {
 
 ExampleKeys make_example_keys(const ExampleKeysConfig& config) {
   return {make_setting(config.stiffness), make_setting(config.damping), make_setting(config.bias),

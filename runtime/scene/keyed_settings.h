@@ -8,6 +8,9 @@
 
 namespace exmat::runtime {
 
+/// A setting with these keys; an empty one of none.
+KeyedSetting make_setting(const KeysConfig& config);
+
 /// The keys of a scene. Throws InputError where weights, given or keyed, are not one for each example of the model.
 SceneKeys make_keys(const SceneConfig& config, const Model& model);
 

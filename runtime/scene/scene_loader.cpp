@@ -14,6 +14,7 @@
 #include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/keyed_settings.h"
 #include "runtime/scene/obstacle_loader.h"
+#include "runtime/scene/reach_loader.h"
 #include "runtime/sim/lanes/lane_step.h"
 #include "runtime/sim/step/stepper.h"
 
@@ -338,7 +339,8 @@ std::string describe_bones(const std::optional<BonePlay>& play) {
   return words;
 }
 
-void describe_examples(const ExampleModel& examples, const ExampleSettings& settings, std::vector<std::string>& plan) {
+void describe_examples(const ExampleModel& examples, const ExampleSettings& settings, bool reaches,
+                       std::vector<std::string>& plan) {
   const std::string owner = examples.region.empty() ? "" : fmt::format("region {}: ", examples.region);
   if (!acts(settings)) {
     plan.push_back(owner + "weights, target, example_force: left out, stiffness and damping are 0");
@@ -348,6 +350,8 @@ void describe_examples(const ExampleModel& examples, const ExampleSettings& sett
   plan.push_back(
       owner +
       (settings.given_weights.size() > 0 ? fmt::format("weights: K = {} examples, given", examples.weights.examples())
+       : reaches
+           ? fmt::format("weights: K = {} examples, chosen in each step to reach a place", examples.weights.examples())
        : is_driven(settings)
            ? fmt::format("weights: K = {} examples, by {} joints", examples.weights.examples(), settings.drivers.size())
            : fmt::format("weights: K = {} examples, bias {:g}", examples.weights.examples(), settings.bias)));
@@ -397,6 +401,7 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   if (steps_in_full) check_full_space(config, loaded);
   loaded.start = start_state(config, loaded);
   loaded.attachments = load_attachments(config, all, loaded);
+  loaded.reach = load_reach(config, loaded);
   count_bytes(loaded.records, loaded.ledger);
   loaded.poses = named_poses(loaded);
   loaded.element_weights = loaded.data.cubature->weights;
@@ -423,7 +428,8 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
   const auto left_out = [&plan](std::string_view stage, std::string_view why) {
     plan.push_back(fmt::format("{}: left out, {}", stage, why));
   };
-  for (std::size_t i = 0; i < scene.examples.size(); ++i) describe_examples(model.examples[i], scene.examples[i], plan);
+  for (std::size_t i = 0; i < scene.examples.size(); ++i)
+    describe_examples(model.examples[i], scene.examples[i], loaded.reach && loaded.reach->targets.force == i, plan);
   if (scene.examples.empty()) left_out("weights, target, example_force", "the scene names no examples");
   for (std::string& line : describe_keys(loaded.keys, model)) plan.push_back(std::move(line));
   plan.push_back(model.internal_force.polynomial() ? std::string("internal_force: exact polynomial")

@@ -8,6 +8,7 @@
 #include "common/bundle/bundle.h"
 #include "common/config/scene_config.h"
 #include "runtime/sim/space/full/full_body.h"
+#include "runtime/sim/step/reach.h"
 #include "runtime/sim/step/scene.h"
 #include "runtime/sim/step/scene_keys.h"
 #include "runtime/sim/step/state.h"
@@ -18,6 +19,12 @@ namespace exmat::runtime {
 struct NamedPose {
   std::string name;
   Eigen::VectorXd pose;  ///< r
+};
+
+/// Places that the bodies of a scene reach for. runtime/scene/reach_loader.h.
+struct LoadedReach {
+  ReachTargets targets;              ///< places of the start
+  std::vector<KeyedSetting> places;  ///< of each point [m]
 };
 
 struct Patch;
@@ -40,6 +47,7 @@ struct LoadedScene {
   State start;     ///< start of every body, before anything holds it
   std::vector<VertexForceConfig> forces;  ///< forces of the scene's file, their vertices known
   std::vector<LoadedAttachment> attachments;
+  std::optional<LoadedReach> reach;
   BundleSummary summary;
   std::vector<LedgerEntry> ledger;            ///< groups in and out, bytes as read
   std::vector<ReadRecord> records;            ///< datasets that were read, in order

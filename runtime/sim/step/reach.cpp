@@ -10,6 +10,7 @@ constexpr double kDifference = 1e-3;  // of weight, between forces whose differe
 constexpr double kEffort = 1e-9;      // of the largest slope: of several solutions the nearest
 constexpr int kMostSweeps = 200, kBisections = 60;
 constexpr double kSameWeights = 1e-10;
+constexpr double kSumTolerance = 1e-9;
 
 }  // namespace
 
@@ -46,6 +47,11 @@ void WeightResponse::update(double duration, Tangent tangent) {
   response_.solve_in_place(slopes_);
 }
 
+bool can_hold(const Eigen::VectorXd& lowest, const Eigen::VectorXd& highest) noexcept {
+  return (lowest.array() <= highest.array()).all() && lowest.sum() <= 1 + kSumTolerance &&
+         highest.sum() >= 1 - kSumTolerance;
+}
+
 Reach::Reach(const Model& model, const StepScene& scene, const State& state, ReachTargets targets)
     : state_(state),
       targets_(std::move(targets)),
@@ -61,7 +67,10 @@ Reach::Reach(const Model& model, const StepScene& scene, const State& state, Rea
       highest_(gradient_) {}
 
 void Reach::choose_weights(StepScene& scene) {
-  if (state_.sleep.asleep || state_.full) return;
+  if (state_.sleep.asleep || state_.full) {
+    scene.examples[targets_.force].given_weights = state_.examples[targets_.force].weights;
+    return;
+  }
   const MaterialPoints points{targets_.rest, targets_.basis_rows};
   ImpulseResponse& body = response_.response();
   const Eigen::Index K = response_.examples();

@@ -41,6 +41,9 @@ struct ReachTargets {
   double horizon = 0.5;             ///< how far ahead the body is looked at [s]
 };
 
+/// True if weights of sum 1 are within these limits, in [0, 1].
+bool can_hold(const Eigen::VectorXd& lowest, const Eigen::VectorXd& highest) noexcept;
+
 /// Chooses the weights of a body that reaches for something, before each of its steps. docs/method.md, "Reach".
 class Reach {
  public:
@@ -50,8 +53,8 @@ class Reach {
   ReachTargets& targets() noexcept { return targets_; }  ///< whose sizes stay
 
   /// Sets the weights of the scene's example force as given ones: those in their limits with which the points end
-  /// nearest to their targets, squares summed, where the body would be after the horizon. Nothing of a body that sleeps
-  /// or is in full space. Allocates as WeightResponse::update().
+  /// nearest to their targets, squares summed, where the body would be after the horizon. Those that it has of a body
+  /// that sleeps or is in full space. Allocates as WeightResponse::update().
   void choose_weights(StepScene& scene);
 
  private:

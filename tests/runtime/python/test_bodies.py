@@ -234,3 +234,36 @@ def test_examples_pull_points_to_places(bundle):
         body.reach(points, target, highest=[3, 1])
     with pytest.raises(exmat.InvalidArgument, match="expected both"):
         body.reach(points)
+
+
+def test_a_scene_reaches_as_a_host_does(bundle):
+    members = {"bundle": str(bundle), "time_step": 0.004, "examples": {"stiffness": 4000}}
+    host, there = exmat.Body(exmat.Model.from_scene(members)), exmat.Body(exmat.Model.from_scene(members))
+    far = int(np.argmax(exmat.Points(host.model, range(host.model.vertices)).rest[:, 0]))
+    there.set_example_weights([0.2, 0.8])
+    there.step(500)
+    rest, twisted = exmat.Points(host.model, [far]).rest[0], there.positions(exmat.Points(there.model, [far]), np.empty((1, 3)))[0]
+    keys = [{"time": 0, "value": rest.tolist()}, {"time": 0.1, "value": twisted.tolist()}]
+    reach = {"targets": [{"vertices": {"ids": [far]}, "position": {"keys": keys}}], "change": 0.02}
+    scene = exmat.Body(exmat.Model.from_scene({**members, "reach": reach}))
+    for step in range(40):
+        place = rest + min(1, (step + 1) * 0.004 / 0.1) * (twisted - rest)
+        host.reach(exmat.Points(host.model, [far]), [place], change=0.02)
+        host.step()
+        scene.step()
+    assert scene.weights == pytest.approx(host.weights, abs=1e-9) and 0 < scene.weights[1]
+    world = exmat.World.from_scene({**members, "reach": reach})
+    scene = list(world.bodies)[0]
+    points = exmat.Points(scene.model, [far])
+    world.step(10)
+    snapshot = world.save()
+    world.step(30)
+    after = world.state_hash
+    for change in (lambda: scene.reach(points, [[0, 0, 0]]), scene.reach):
+        world.restore(snapshot)
+        change()
+        world.restore(snapshot)
+        world.step(30)
+        assert world.state_hash == after
+    with pytest.raises(exmat.BadInput, match="/reach/lowest: expected 2 numbers"):
+        exmat.Model.from_scene({**members, "reach": {**reach, "lowest": [0, 0, 0]}})
