@@ -71,6 +71,8 @@ void print_summary(const RunSummary& summary, const LoadedWorld& loaded, const W
   for (const BrokenAttachment& broken : summary.broken)
     print("broken attachment", fmt::format("{} of {} at {:g} s, under {:.4g} N", broken.place,
                                            body_name(loaded, broken.body), broken.time, broken.force));
+  if (summary.farthest_reach)
+    print("reach", fmt::format("{:.3g} m from its place, the farthest point at the end", *summary.farthest_reach));
   if (summary.largest_displacement)
     print("largest displacement", fmt::format("{:.6g} m (over the frames written)", *summary.largest_displacement));
   print("state hash", fmt::format("{:016x}", summary.state_hash));

@@ -111,6 +111,16 @@ void Bodies::take_up(BodiesMemory memory) {
   world_.set_memory(std::move(memory.held), memory.anew);
 }
 
+std::optional<double> Bodies::farthest_reach() const {
+  std::optional<double> most;
+  for (int i = 0; i < count(); ++i) {
+    const Reaching* const own = reaching_[static_cast<std::size_t>(i)].get();
+    if (own == nullptr || world_.state(i).full) continue;
+    most = std::max(most.value_or(0), farthest(world_.model(i), world_.state(i), own->reach->targets()));
+  }
+  return most;
+}
+
 bool Bodies::is_finite() const {
   for (int i = 0; i < count(); ++i)
     if (is_bad(world_, i)) return false;

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "runtime/scene/state_hash.h"
@@ -42,6 +43,9 @@ class Bodies {
   void remember(BodiesMemory& memory) const;
   /// Takes up the memory of the same bodies.
   void take_up(BodiesMemory memory);
+
+  /// Distance from its place of the point that is farthest from it, of bodies that reach in their modes [m].
+  std::optional<double> farthest_reach() const;
 
   bool is_finite() const;
   /// WorkError where the last step was not finite: names step, time, body and what to try.

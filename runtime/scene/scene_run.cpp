@@ -252,6 +252,7 @@ RunSummary run(const LoadedWorld& loaded, const WorldConfig& config, const RunOp
   summary.simulated_seconds = static_cast<double>(config.steps) * config.time_step;
   summary.end = world.energies();
   summary.deepest = deepest_of(world);
+  summary.farthest_reach = bodies.farthest_reach();
   if (options.keeps_contacts) summary.hardest_contacts = std::move(contacts).hardest();
   summary.state_hash = bodies.hash();
   return summary;

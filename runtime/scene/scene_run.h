@@ -62,6 +62,7 @@ struct RunSummary {
   double deepest = 0;                                ///< that a vertex is inside another body at the end [m]
   Energies start, end;                               ///< sums over all bodies
   std::vector<BrokenAttachment> broken;              ///< in this run, in order
+  std::optional<double> farthest_reach;              ///< at the end, see Bodies
   std::optional<StartOverlap> overlap;               ///< the deepest, where bodies overlap something at the start
   std::uint64_t state_hash = 0;                      ///< hash of all bodies at the end; see Bodies::hash
   Eigen::Vector3d origin = Eigen::Vector3d::Zero();  ///< origin of the trajectory [m]

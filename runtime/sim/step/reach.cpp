@@ -47,6 +47,17 @@ void WeightResponse::update(double duration, Tangent tangent) {
   response_.solve_in_place(slopes_);
 }
 
+double farthest(const Model& model, const State& state, const ReachTargets& targets) noexcept {
+  const Placement at = model.frame->placement(state.frame);
+  double most = 0;
+  for (Eigen::Index i = 0; i < targets.rest.rows(); ++i) {
+    const Eigen::Vector3d displacement = targets.basis_rows.middleRows<3>(3 * i).lazyProduct(state.q);
+    const Eigen::Vector3d place = at.to_world(targets.rest.row(i).transpose() + displacement);
+    most = std::max(most, (place - targets.places.segment<3>(3 * i)).norm());
+  }
+  return most;
+}
+
 bool can_hold(const Eigen::VectorXd& lowest, const Eigen::VectorXd& highest) noexcept {
   return (lowest.array() <= highest.array()).all() && lowest.sum() <= 1 + kSumTolerance &&
          highest.sum() >= 1 - kSumTolerance;

@@ -41,6 +41,9 @@ struct ReachTargets {
   double horizon = 0.5;             ///< how far ahead the body is looked at [s]
 };
 
+/// Distance of the point that is farthest from its place, of a body in its modes [m].
+double farthest(const Model& model, const State& state, const ReachTargets& targets) noexcept;
+
 /// True if weights of sum 1 are within these limits, in [0, 1].
 bool can_hold(const Eigen::VectorXd& lowest, const Eigen::VectorXd& highest) noexcept;
 
