@@ -4,6 +4,7 @@
 #include <cinttypes>
 #include <fmt/format.h>
 
+#include "common/config/scene_config.h"
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/points_in_modes.h"
@@ -15,7 +16,10 @@ using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
 
 namespace {
 
-exmat_reach default_reach() noexcept { return {sizeof(exmat_reach), -1, 0.05, 0.5, nullptr, nullptr, 0}; }
+exmat_reach default_reach() noexcept {
+  const ReachConfig defaults;
+  return {sizeof(exmat_reach), -1, defaults.change, defaults.horizon, nullptr, nullptr, 0};
+}
 
 /// Duration of a step of the scene's integrator as one of backward Euler, 1 / c_v [s].
 double duration_of(const StepScene& scene) noexcept {

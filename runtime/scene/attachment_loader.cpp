@@ -78,6 +78,17 @@ Patch make_patch(const ObjectData& object, std::vector<std::int32_t> vertices, R
   return patch;
 }
 
+Patch load_patch(const SceneConfig& config, const ObjectData& object, const VertexSelection& selection,
+                 const std::string& place, bool in_modes, LoadedScene& loaded) {
+  std::vector<std::int32_t> vertices = select_vertices(config, object, selection, place);
+  RowMatrix rows;
+  if (in_modes) {
+    const std::vector<std::int64_t> ids(vertices.begin(), vertices.end());
+    rows = read_basis_rows(bundle_of(config), ids, &loaded.records);
+  }
+  return make_patch(object, std::move(vertices), std::move(rows));
+}
+
 std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
                               const Patch& patch, Attachment attachment, State& state) {
   const bool in_modes = steps_in_modes(full, scene);
@@ -96,23 +107,15 @@ std::optional<HoldFault> hold(const Model& model, const FullModel* full, const S
   return std::nullopt;
 }
 
-std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const Obstacles& obstacles,
-                                               LoadedScene& loaded) {
+std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const ObjectData& object,
+                                               const Obstacles& obstacles, LoadedScene& loaded) {
   std::vector<LoadedAttachment> attachments;
-  if (config.attachments.empty()) return attachments;
-  const BundleRequest request{.groups = {{"object", true, 0, "attachments hold vertices of it"}}};
-  const ObjectData object = *read_bundle(bundle_of(config), request, &loaded.records).object;
   const bool in_modes = steps_in_modes(loaded.full.get(), loaded.scene);
   for (const AttachmentConfig& own : config.attachments) {
     LoadedAttachment& made = attachments.emplace_back(LoadedAttachment{config.file.string(), own.place, own.only});
     made.may_touch = config.meets_bodies;
-    std::vector<std::int32_t> vertices = select_vertices(config, object, own.vertices, own.place + "/vertices");
-    RowMatrix rows;
-    if (in_modes) {
-      const std::vector<std::int64_t> ids(vertices.begin(), vertices.end());
-      rows = read_basis_rows(bundle_of(config), ids, &loaded.records);
-    }
-    made.patch = std::make_shared<Patch>(make_patch(object, std::move(vertices), std::move(rows)));
+    made.patch =
+        std::make_shared<Patch>(load_patch(config, object, own.vertices, own.place + "/vertices", in_modes, loaded));
     Attachment& attachment = made.attachment;
     attachment.kind = own.kind;
     attachment.stiffness = own.stiffness;

@@ -28,16 +28,21 @@ bool steps_in_modes(const FullModel* full, const StepScene& scene) noexcept;
 /// The patch of these vertices of an object, with `basis_rows` [3k x r] where the body steps in its modes.
 Patch make_patch(const ObjectData& object, std::vector<std::int32_t> vertices, RowMatrix basis_rows);
 
+/// The same of the vertices that a selection at `place` of the scene has. Reads the rows from the bundle. Throws
+/// InputError as select_vertices().
+Patch load_patch(const SceneConfig& config, const ObjectData& object, const VertexSelection& selection,
+                 const std::string& place, bool in_modes, LoadedScene& loaded);
+
 /// Adds an attachment that has id, kind and frame to a body whose vertices it holds from where they are. Enters full
 /// space where bodies are held there. `may_touch`: the body may touch others. What is to blame, and the state is as it
 /// was, but perhaps in full space, where it cannot be held.
 std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
                               const Patch& patch, Attachment attachment, State& state);
 
-/// The attachments of a scene for bodies of one kind; `obstacles` are all of the scene. Reads the bundle for places and
-/// masses. Throws InputError: no such vertex, nothing selected.
-std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const Obstacles& obstacles,
-                                               LoadedScene& loaded);
+/// The attachments of a scene for bodies of one kind, of this object; `obstacles` are all of the scene. Throws
+/// InputError: no such vertex, nothing selected.
+std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const ObjectData& object,
+                                               const Obstacles& obstacles, LoadedScene& loaded);
 
 /// Those that hold one of these bodies, in the order of its state's.
 std::vector<const LoadedAttachment*> attachments_of(const LoadedScene& kind, std::size_t number);

@@ -36,16 +36,16 @@ Bodies::Bodies(const LoadedWorld& loaded, const WorldConfig& config)
   for (int i = 0; i < count(); ++i) {
     Reaching* const own = reaching_[static_cast<std::size_t>(i)].get();
     if (own == nullptr) continue;
-    const LoadedScene& kind = loaded.kinds[loaded.bodies[static_cast<std::size_t>(i)].kind].loaded;
-    own->reach = std::make_unique<Reach>(*kind.model, own->scene, world_.state(i), kind.reach->targets);
+    own->reach = std::make_unique<Reach>(*own->kind.model, own->scene, world_.state(i), own->kind.reach->targets);
   }
 }
 
 std::vector<std::unique_ptr<Bodies::Reaching>> Bodies::reaching_at_start() const {
   std::vector<std::unique_ptr<Reaching>> reaching;
-  for (const LoadedBody& body : loaded_.bodies)
-    reaching.push_back(loaded_.kinds[body.kind].loaded.reach ? std::make_unique<Reaching>(scenes_[body.kind])
-                                                             : nullptr);
+  for (const LoadedBody& body : loaded_.bodies) {
+    const LoadedScene& kind = loaded_.kinds[body.kind].loaded;
+    reaching.push_back(kind.reach ? std::make_unique<Reaching>(kind, scenes_[body.kind]) : nullptr);
+  }
   return reaching;
 }
 
@@ -87,9 +87,8 @@ WorldReport Bodies::step(StepObserver* observer) {
   for (int i = 0; i < count(); ++i) {
     Reaching* const own = reaching_[static_cast<std::size_t>(i)].get();
     if (own == nullptr) continue;
-    const LoadedScene& kind = loaded_.kinds[loaded_.bodies[static_cast<std::size_t>(i)].kind].loaded;
-    kind.keys.apply(*kind.model, steps(), own->scene);
-    move_targets(*kind.reach, own->scene, world_.state(i), *own->reach);
+    own->kind.keys.apply(*own->kind.model, steps(), own->scene);
+    move_targets(*own->kind.reach, own->scene, world_.state(i), *own->reach);
     own->reach->choose_weights(own->scene);
   }
   return world_.step(threads_, observer);

@@ -57,6 +57,7 @@ class Bodies {
  private:
   /// A body that chooses its weights has a scene of its own.
   struct Reaching {
+    const LoadedScene& kind;
     StepScene scene;
     std::unique_ptr<Reach> reach;
   };

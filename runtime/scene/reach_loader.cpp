@@ -5,7 +5,6 @@
 #include <fmt/ranges.h>
 #include <utility>
 
-#include "common/bundle/scene_places.h"
 #include "common/core/error.h"
 #include "runtime/scene/attachment_loader.h"
 #include "runtime/scene/keyed_settings.h"
@@ -55,8 +54,7 @@ Eigen::VectorXd limits(const SceneConfig& config, const std::optional<Eigen::Vec
 
 }  // namespace
 
-std::optional<LoadedReach> load_reach(const SceneConfig& config, LoadedScene& loaded) {
-  if (!config.reach) return std::nullopt;
+LoadedReach load_reach(const SceneConfig& config, const ObjectData& object, LoadedScene& loaded) {
   const ReachConfig& own = *config.reach;
   if (loaded.model->skeleton) refuse(config, "", "a body that steps in its modes", "one on a skeleton");
   LoadedReach reach;
@@ -70,8 +68,6 @@ std::optional<LoadedReach> load_reach(const SceneConfig& config, LoadedScene& lo
   if (!can_hold(targets.lowest, targets.highest))
     refuse(config, "", "limits between which weights add up to 1, none of lowest above that of highest",
            fmt::format("sums of {:g} and {:g}", targets.lowest.sum(), targets.highest.sum()));
-  const BundleRequest request{.groups = {{"object", true, 0, "examples bring vertices of it to places"}}};
-  const ObjectData object = *read_bundle(bundle_of(config), request, &loaded.records).object;
   const auto points = std::ssize(own.targets);
   targets.rest.resize(points, 3);
   targets.basis_rows.resize(3 * points, loaded.model->modes());
@@ -79,11 +75,8 @@ std::optional<LoadedReach> load_reach(const SceneConfig& config, LoadedScene& lo
   for (Eigen::Index i = 0; i < points; ++i) {
     const ReachTargetConfig& target = own.targets[static_cast<std::size_t>(i)];
     const std::string member = fmt::format("/targets/{}/vertices", i);
-    std::vector<std::int32_t> vertices =
-        select_vertices(config, object, target.vertices, config.place + "/reach" + member);
-    const std::vector<std::int64_t> ids(vertices.begin(), vertices.end());
-    const Patch patch =
-        make_patch(object, std::move(vertices), read_basis_rows(bundle_of(config), ids, &loaded.records));
+    const Patch patch = load_patch(config, object, target.vertices, config.place + "/reach" + member,
+                                   /*in_modes=*/true, loaded);
     if (!loaded.model->frame->moves() && patch.basis_rows.isZero(0))
       refuse(config, member, "vertices of which some move", "fixed ones alone");
     const Eigen::VectorXd shares = patch.masses / patch.masses.sum();

@@ -400,8 +400,12 @@ LoadedScene load_run(const SceneConfig& config, const Obstacles* obstacles) {
   loaded.scene = step_scene(config, all, loaded);
   if (steps_in_full) check_full_space(config, loaded);
   loaded.start = start_state(config, loaded);
-  loaded.attachments = load_attachments(config, all, loaded);
-  loaded.reach = load_reach(config, loaded);
+  if (!config.attachments.empty() || config.reach) {
+    const BundleRequest whole{.groups = {{"object", true, 0, "the scene holds or moves vertices of it"}}};
+    const ObjectData object = *read_bundle(bundle_of(config), whole, &loaded.records).object;
+    loaded.attachments = load_attachments(config, object, all, loaded);
+    if (config.reach) loaded.reach = load_reach(config, object, loaded);
+  }
   count_bytes(loaded.records, loaded.ledger);
   loaded.poses = named_poses(loaded);
   loaded.element_weights = loaded.data.cubature->weights;

@@ -104,9 +104,7 @@ void ImpulseResponse::example_force(std::size_t i, const Eigen::VectorXd& weight
 }
 
 Eigen::Vector3d ImpulseResponse::place(const MaterialPoints& points, Eigen::Index i) const noexcept {
-  const Eigen::Vector3d own =
-      points.rest.row(i).transpose() + points.basis_rows.middleRows<3>(3 * i).lazyProduct(state_.q);
-  return placement_.to_world(own);
+  return place_of(points, i, placement_, state_.q);
 }
 
 void ImpulseResponse::set_jacobian(const MaterialPoints& points, Eigen::MatrixXd& J) const noexcept {

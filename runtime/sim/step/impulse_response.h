@@ -18,6 +18,13 @@ struct MaterialPoints {
   const RowMatrix& basis_rows;
 };
 
+/// World place [m] of a point of a body that stands at `placement`, in its modes at q [r].
+inline Eigen::Vector3d place_of(const MaterialPoints& points, Eigen::Index i, const Placement& placement,
+                                const Eigen::VectorXd& q) noexcept {
+  const Eigen::Vector3d own = points.rest.row(i).transpose() + points.basis_rows.middleRows<3>(3 * i).lazyProduct(q);
+  return placement.to_world(own);
+}
+
 /// Response of a body in its modes to impulses where it stands at the end of a step, as one more step of backward Euler
 /// would give it: the change of velocity is A^-1 J^T P with A = M + dt D + dt^2 K, K that of elasticity, example forces
 /// and the host's springs, and under the conditions of hard attachments. Contacts and what spin does to A are left out.

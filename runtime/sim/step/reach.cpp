@@ -49,12 +49,10 @@ void WeightResponse::update(double duration, Tangent tangent) {
 
 double farthest(const Model& model, const State& state, const ReachTargets& targets) noexcept {
   const Placement at = model.frame->placement(state.frame);
+  const MaterialPoints points{targets.rest, targets.basis_rows};
   double most = 0;
-  for (Eigen::Index i = 0; i < targets.rest.rows(); ++i) {
-    const Eigen::Vector3d displacement = targets.basis_rows.middleRows<3>(3 * i).lazyProduct(state.q);
-    const Eigen::Vector3d place = at.to_world(targets.rest.row(i).transpose() + displacement);
-    most = std::max(most, (place - targets.places.segment<3>(3 * i)).norm());
-  }
+  for (Eigen::Index i = 0; i < points.rest.rows(); ++i)
+    most = std::max(most, (place_of(points, i, at, state.q) - targets.places.segment<3>(3 * i)).norm());
   return most;
 }
 
