@@ -41,9 +41,9 @@ struct TrainingLoads {
 /// A body as far as loads depend on it.
 struct TrainingBody {
   bool free = false;
-  double size = 0;                  ///< L [m]
-  double angular_frequency = 0;     ///< omega_1, of the lowest linear mode [rad/s]
-  std::vector<std::string> groups;  ///< regions of its example forces by name; empty: the whole body
+  double size = 0;                    ///< L [m]
+  double angular_frequency = 0;       ///< omega_1, of the lowest linear mode [rad/s]
+  std::vector<std::string> groups{};  ///< regions of its example forces by name; empty: the whole body
 };
 
 /// The loads of a scene. A body that a motion carries feels gravity that points anywhere, for its inertia.
