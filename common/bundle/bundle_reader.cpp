@@ -251,6 +251,7 @@ void BundleReader::check_model(const ReducedModel& model) {
   if (model.targets) check_targets("/targets", *model.targets);
   if (model.render) attempt([&] { check_barycentric(model.render->barycentric); });
   if (model.skeleton) attempt([&] { check_skeleton(*model.skeleton); });
+  if (model.skeleton && model.full_space) attempt([&] { check_shifts(model); });
   check_elements(model);
   for (const RegionData& region : model.regions) {
     const std::string path = "/regions/" + region.name;
@@ -357,10 +358,25 @@ void BundleReader::check_barycentric(const RowMatrix& rows) const {
 }
 
 void BundleReader::check_skeleton(const SkeletonData& skeleton) const {
-  for (const char* path : {"/skeleton@bones", "/skeleton@animations", "/skeleton/parents", "/skeleton/bind",
-                           "/skeleton/weights", "/skeleton/first_frames", "/skeleton/times", "/skeleton/poses"})
+  for (const char* path :
+       {"/skeleton@bones", "/skeleton@animations", "/skeleton/parents", "/skeleton/bind", "/skeleton/weights",
+        "/skeleton/first_frames", "/skeleton/times", "/skeleton/poses", "/skeleton/shifts"})
     if (!is_sound(path)) return;
   if (const auto fault = skeleton_fault(skeleton)) refuse(fault->place, fault->expected, fault->found);
+}
+
+void BundleReader::check_shifts(const ReducedModel& model) const {
+  for (const char* path : {"/skeleton/shifts", "/skeleton/weights", "/full_space/shifts", "/full_space/slopes"})
+    if (!is_sound(path)) return;
+  const Eigen::Index vertices = model.skeleton->weights.rows();
+  const RowMatrix &slopes = model.full_space->slopes, &shifts = model.full_space->shifts;
+  const Eigen::Index examples = shifts.rows() > 0 ? slopes.rows() : 0;
+  if (shifts.rows() != examples || (examples > 0 && shifts.cols() != slopes.cols()))
+    refuse("/full_space/shifts", fmt::format("{} x {} numbers, or none", slopes.rows(), slopes.cols()),
+           fmt::format("{} x {}", shifts.rows(), shifts.cols()));
+  if (model.skeleton->shifts.rows() != examples * vertices)
+    refuse("/skeleton/shifts", fmt::format("{} rows, {} for each of /full_space/shifts", examples * vertices, vertices),
+           fmt::format("{}", model.skeleton->shifts.rows()));
 }
 
 void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,

@@ -196,6 +196,7 @@ void visit_full_space(const FieldPlace& place, FullSpace& full, Visitor& visit) 
   visit.dataset("control_points", full.control_points);
   visit.dataset("from_target", full.from_target);
   visit.dataset("shapes", full.shapes);
+  visit.dataset("shifts", full.shifts);
 }
 
 template <typename Fidelity, typename Visitor>
@@ -287,6 +288,7 @@ void visit_skeleton(Skeleton& skeleton, Visitor& visit) {
   visit.dataset("first_frames", skeleton.first_frames);
   visit.dataset("times", skeleton.times);
   visit.dataset("poses", skeleton.poses);
+  visit.dataset("shifts", skeleton.shifts);
 }
 
 /// Visits the groups that the model holds, in bundle order. Model is ReducedModel or const ReducedModel.

@@ -35,6 +35,9 @@ class AssetReader {
     read_shape_space(json, asset);
     read_examples(member_or(json, "examples", Json::array()), asset);
     read_regions(member_or(json, "regions", Json::array()), asset);
+    if (asset.clamp_follows && asset.examples.empty()) refuse("/object/fixed/follow", "examples to follow", "none");
+    if (asset.clamp_follows && !asset.regions.empty())
+      refuse("/object/fixed/follow", "examples of the whole body alone", "regions");
     read_alignment(member_or(json, "alignment", Json::object()), asset);
     read_basis(member_or(json, "basis", Json::object()), asset);
     read_cubature(member_or(json, "cubature", Json::object()), asset);
@@ -66,7 +69,10 @@ class AssetReader {
                                         optional_member<double>(part, "poisson_ratio"),
                                         optional_member<double>(part, "density")});
     }
-    if (json.contains("fixed")) asset.fixed = read_selection(json["fixed"], "/object/fixed");
+    if (json.contains("fixed")) {
+      asset.fixed = read_selection(json["fixed"], "/object/fixed");
+      asset.clamp_follows = json["fixed"].value("follow", asset.clamp_follows);
+    }
     asset.object_drop = read_drop(json);
     asset.render_mesh = asset.object_surface;
     if (json.contains("render_mesh")) asset.render_mesh = resolve_path(file_, json["render_mesh"]);

@@ -128,6 +128,7 @@ struct AssetConfig {
   std::vector<MaterialRegionConfig> material_regions;  ///< later ones win
   Formulation formulation = Formulation::kSmoothed;
   std::optional<VertexSelection> fixed;  ///< absent: a free body
+  bool clamp_follows = false;            ///< fixed vertices go where examples have them
   DropConfig object_drop;
   std::optional<std::filesystem::path> render_mesh;  ///< surface that is drawn in the object's place
   std::vector<ExampleConfig> examples;

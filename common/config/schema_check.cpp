@@ -41,8 +41,14 @@ std::string list(const Json& values, const char* last_word) {
   return text;
 }
 
+// Of an object that has one of several: these.
 std::string member_names(const Json& schema) {
   Json names = Json::array();
+  if (schema.contains("oneOf")) {
+    for (const Json& choice : schema["oneOf"]) names.push_back(choice.at("required").front());
+    std::sort(names.begin(), names.end());
+    return list(names, " and ");
+  }
   for (const auto& [name, member] : schema.at("properties").items()) names.push_back(name);
   return list(names, " and ");
 }
@@ -70,7 +76,8 @@ std::string expectation(const Json& schema, const std::string& type) {
   if (type == "number") return fmt::format("a number{}", range_of(schema));
   if (type == "boolean") return "true or false";
   if (type == "array") return fmt::format("an array{}", range_of(schema, "minItems", "maxItems", "elements"));
-  return schema.contains("minProperties") ? fmt::format("exactly one of {}", member_names(schema)) : "an object";
+  const bool has_one = schema.contains("minProperties") || schema.contains("oneOf");
+  return has_one ? fmt::format("exactly one of {}", member_names(schema)) : "an object";
 }
 
 /// One, or several in an array.
@@ -163,6 +170,9 @@ class FaultFinder {
       if (!value.contains(name))
         return missing_member(resolve(members.at(name)), members.at(name), place / name.get<std::string>());
     if (!has_length(schema, "minProperties", "maxProperties", value.size())) return mismatch(schema, value, place);
+    const Json choices = schema.value("oneOf", Json::array());
+    const auto is_there = [&](const Json& choice) { return value.contains(choice["required"].front()); };
+    if (!choices.empty() && std::ranges::count_if(choices, is_there) != 1) return mismatch(schema, value, place);
     for (const auto& [name, member] : value.items())
       if (auto fault = find(members.at(name), member, place / name)) return fault;
     return std::nullopt;

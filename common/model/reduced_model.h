@@ -178,6 +178,7 @@ struct FullSpaceData {
   RowMatrix control_points;  ///< P c x 3m, W^T of those of /targets; without a table of the examples
   RowMatrix from_target;     ///< d x 3m, W^T Y, Y [3n x d] the displacements of /target_space
   RowMatrix shapes;          ///< 3n x d (dataset n 3 d), Y, which an elastic example force takes; else empty
+  RowMatrix shifts;          ///< K x 3m, W^T of SkeletonData::shifts, fixed vertices with them; or empty
 };
 
 /// One group /regions/NAME: examples that act on some of the vertices alone, with weights, projection and targets of
@@ -268,6 +269,8 @@ struct SkeletonData {
   IndexVector first_frames;             ///< start of each animation, then the end of the last
   Eigen::VectorXd times;                ///< F, of the frames, ascending from 0 in each animation [s]
   RowMatrix poses;  ///< F b x 7 (dataset F b 7), joint [m] and turn from the bind pose, a quaternion, w first
+  /// K n x 3 (dataset K n 3), where each example moves the vertices before the bones do, by its weight [m]; or empty.
+  RowMatrix shifts = RowMatrix(0, 3);
 };
 
 /// Everything a scene may need of one asset. Absent groups were left out (docs/overview.md).

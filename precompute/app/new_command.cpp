@@ -33,8 +33,7 @@ void new_command(const NewCommandOptions& options) {
   require_new(asset_file);
   require_new(scene_file);
   const Json asset = precompute::assumed_asset(surface, folder);
-  const double lowest = precompute::read_surface_file(surface).mesh.vertices.col(1).minCoeff();
-  const Json scene = precompute::assumed_scene(asset, name, lowest);
+  const Json scene = precompute::assumed_scene(asset, name, precompute::read_surface_file(surface));
   std::error_code failed;
   std::filesystem::create_directories(folder, failed);
   if (failed) throw InputError({folder.string(), "", "a folder that can be made", failed.message(), ""});

@@ -104,6 +104,7 @@ PoseFitter::PoseFields PoseFitter::pose_fields(Eigen::Index index, Eigen::Index 
   if (!examples.region.empty()) return {examples.fields.col(k - 1), seen(index, clamped), seen(index, clamped)};
   Eigen::MatrixXd given = examples.fields.col(k - 1);
   hold_fixed_mean(object_.fixed, given);
+  if (examples.shifts.size() > 0) given += examples.shifts.col(k - 1);
   return {given,
           carried_fields(stage_.object, stage_.weights, object_.fixed, changes_from_rest(examples.examples).col(k - 1)),
           clamped};
@@ -156,6 +157,9 @@ PoseFitter::Finished PoseFitter::finish_group(std::size_t index, const ReducedMo
     const double norm = fields.col(k).dot(system_.full_mass * fields.col(k));
     example.basis_error = norm > 0 ? std::sqrt(std::max(0.0, rest.dot(system_.full_mass * rest) / norm)) : 0;
   }
+  if (group.shifts.size() > 0)
+    add_shifts(stage_.data.rest_descriptor, finished.projection,
+               shape_changes(stage_.object, stage_.weights, group.shifts), finished.examples);
   return finished;
 }
 

@@ -48,7 +48,7 @@ class PoseFitter {
 
   /// A pose of a group, k > 0, as its stages leave it: displacements [3n] of the object, as a region sees them.
   struct PoseFields {
-    Eigen::VectorXd given;    ///< as it came, about the mean of the fixed vertices
+    Eigen::VectorXd given;    ///< as it came, about the mean of the fixed vertices; as it stands where these follow
     Eigen::VectorXd carried;  ///< the part that the m functions hold
     Eigen::VectorXd clamped;  ///< and with the fixed vertices put back
   };

@@ -11,6 +11,7 @@
 #include "common/mesh/geometry.h"
 #include "precompute/examples/example_alignment.h"
 #include "precompute/examples/function_counter.h"
+#include "precompute/modes/field_clamp.h"
 #include "precompute/shape_space/pose_map.h"
 #include "precompute/shape_space/projection.h"
 #include "precompute/solvers/eigenpairs.h"
@@ -57,6 +58,8 @@ class ShapeStageBuilder {
   SparseMatrix fit_weights() const;
   void add_rest(const AlignedRest& rest, ExampleGroup& group) const;
   TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
+  void split_by_clamp(const AlignedRest& rest, const std::vector<AlignedPose>& poses);
+  TransferredPose whole_pose(const AlignedRest& rest, const std::vector<AlignedPose>& poses, std::size_t p) const;
   void add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred,
                 ExampleGroup& group) const;
   ExampleData example_data(const AlignmentOutcome& outcome, double scale, const ExampleGroup& group) const;
@@ -76,6 +79,7 @@ class ShapeStageBuilder {
   StageCache& cache_;
   std::vector<std::string>& warnings_;
   Eigen::Index functions_ = asset_.eigenfunctions;  // m
+  Eigen::MatrixXd own_, shifts_;                    // 3n x poses of split_by_clamp() [m]; empty: no clamp follows
   double rest_scale_ = 1;                           // from the rest example's unit of length to the object's
   ShapeStage stage_;
 };
@@ -154,6 +158,36 @@ TransferredPose ShapeStageBuilder::transfer(const AlignedRest& rest, const Align
   return transferred;
 }
 
+// Splits each pose, where it stands, into what it does beside its clamp and the elastic displacement by what it does
+// there.
+void ShapeStageBuilder::split_by_clamp(const AlignedRest& rest, const std::vector<AlignedPose>& poses) {
+  Eigen::MatrixXd fields(object_.mesh.vertices.size(), std::ssize(poses));
+  for (std::size_t p = 0; p < poses.size(); ++p) {
+    const PoseInput& input = input_.poses[p];
+    if (!input.same_connectivity || rest.free_poses)
+      throw InputError({"", "/object/fixed/follow", "poses of the rest example's own mesh, which stand where it does",
+                        fmt::format("example {}, {}", input.name,
+                                    input.same_connectivity ? "which is rotated to it" : "a mesh of its own"),
+                        "leave follow out, or pose the rest example's mesh where the object is"});
+    const VertexArray moved =
+        rest_scale_ * (input.mesh.vertices - input_.rest.mesh.vertices) * rest.rotation.transpose();
+    fields.col(static_cast<Eigen::Index>(p)) = VertexArray(rest.map.pull_back * moved).reshaped<Eigen::RowMajor>();
+  }
+  const ElasticSystem system = build_elastic_system(object_.mesh, object_.materials, object_.fixed);
+  own_ = system.extend(FieldClamp(system, 0, asset_.name).apply(fields));
+  shifts_ = fields - own_;
+}
+
+TransferredPose ShapeStageBuilder::whole_pose(const AlignedRest& rest, const std::vector<AlignedPose>& poses,
+                                              std::size_t p) const {
+  if (own_.size() == 0) return transfer(rest, poses[p], {rest.free_poses, fit_weights(), object_.fixed.any()});
+  const Eigen::VectorXd own = own_.col(static_cast<Eigen::Index>(p)) / std::cbrt(stage_.object.volume);
+  TransferredPose pose = posed_object(stage_.object, stage_.rest_coefficients,
+                                      own.reshaped<Eigen::RowMajor>(object_.mesh.vertex_count(), 3));
+  pose.rotation = rest.rotation;
+  return pose;
+}
+
 // Logs notes on its scale, and warns where it is hardly a pose.
 void ShapeStageBuilder::report(const std::string& name, const AlignedPose& pose, const TransferredPose& transferred) {
   if (!pose.scale.note.empty()) log::info(fmt::format("example {}: {}", name, pose.scale.note));
@@ -169,7 +203,7 @@ void ShapeStageBuilder::report(const std::string& name, const AlignedPose& pose,
 
 // `displacement` is that of the normalised object.
 void ShapeStageBuilder::warn_of_clamp(const std::string& name, const VertexArray& displacement) {
-  if (!object_.fixed.any()) return;
+  if (!object_.fixed.any() || asset_.clamp_follows) return;
   Eigen::MatrixXd field = displacement.reshaped<Eigen::RowMajor>();
   hold_fixed_mean(object_.fixed, field);
   const Eigen::VectorXd distances = field.reshaped<Eigen::RowMajor>(displacement.rows(), 3).rowwise().norm();
@@ -181,7 +215,7 @@ void ShapeStageBuilder::warn_of_clamp(const std::string& name, const VertexArray
   warn(warnings_,
        fmt::format("example {}: the pose moves fixed vertices by up to {:.3g} m ({:.1f} % of the body's size, "
                    "vertex {}), where the body cannot follow; leave them at rest in the pose, or out of "
-                   "object.fixed",
+                   "object.fixed, or have it follow (object.fixed.follow)",
                    name, farthest, 100 * farthest / size, vertex));
 }
 
@@ -201,7 +235,9 @@ void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose
                       group.region.empty()
                           ? "a pose that differs from the rest pose"
                           : fmt::format("a pose that differs from the rest pose in the region {}", group.region),
-                      rest_pose_text(transferred.rotation), "leave it out: the rest pose is always an example"});
+                      asset_.clamp_follows ? "one that does what its fixed vertices make of it"
+                                           : rest_pose_text(transferred.rotation),
+                      "leave it out: the rest pose is always an example"});
   group.fields.conservativeResize(3 * object_.mesh.vertex_count(), group.fields.cols() + 1);
   group.fields.rightCols(1) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
   group.examples.examples.push_back(std::move(example));
@@ -246,15 +282,14 @@ void ShapeStageBuilder::add_examples() {
   if (!remark.empty()) warn(warnings_, fmt::format("rest example {}: {}", rest.outcome.name, remark));
   std::vector<AlignedPose> poses;
   for (const PoseInput& input : input_.poses) poses.push_back(aligner.align_pose(rest, input));
+  if (asset_.clamp_follows) split_by_clamp(rest, poses);
   add_poses(rest, poses);
   if (const Eigen::Index needed = functions_needed(poses); needed > functions_) {
     functions_ = needed;
     set_shape_data(object_basis());
     add_poses(rest, poses);
   }
-  for (std::size_t i = 0; i < poses.size(); ++i)
-    report(input_.poses[i].name, poses[i],
-           transfer(rest, poses[i], {rest.free_poses, fit_weights(), object_.fixed.any()}));
+  for (std::size_t i = 0; i < poses.size(); ++i) report(input_.poses[i].name, poses[i], whole_pose(rest, poses, i));
 }
 
 // The groups of the stage, by its m functions.
@@ -263,12 +298,15 @@ void ShapeStageBuilder::add_poses(const AlignedRest& rest, const std::vector<Ali
   stage_.poses.clear();
   stage_.alignments.assign(1, rest.outcome);
   add_groups(rest);
-  const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
+  if (input_.whole_body) stage_.groups.front().shifts = shifts_;
   for (std::size_t p = 0; p < poses.size(); ++p) {
     const PoseInput& input = input_.poses[p];
     const AlignedPose& pose = poses[p];
-    const TransferredPose whole = transfer(rest, pose, frame);
+    const TransferredPose whole = whole_pose(rest, poses, p);
     stage_.poses.push_back({whole.rotation, rest_scale_ / pose.scale.unit, carried_displacement(whole)});
+    if (shifts_.size() > 0)
+      stage_.poses.back().displacement +=
+          shifts_.col(static_cast<Eigen::Index>(p)).reshaped<Eigen::RowMajor>(object_.mesh.vertex_count(), 3);
     stage_.alignments.push_back(pose.outcome);
     stage_.alignments.back().shape_space_error = whole.shape_space_error;
     if (input_.whole_body && input.in_whole_body) add_pose(input, pose, whole, stage_.groups.front());

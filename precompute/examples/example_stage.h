@@ -20,6 +20,9 @@ struct ExampleGroup {
   std::optional<RegionView> view{};  ///< present for a region
   ExampleSet examples{};             ///< the rest pose first; reduced coordinates and basis errors are not filled in
   Eigen::MatrixXd fields{};          ///< 3n x (K-1) displacement of the object to each pose, as the view sees it [m]
+  /// 3n x (K-1), where the clamp follows examples, the rest of these poses: the elastic displacement of the body by
+  /// what each does to the clamp, whose own part is then left out of descriptors and fields [m].
+  Eigen::MatrixXd shifts{};
 };
 
 /// A pose brought to the object as a whole, whatever it acts on.

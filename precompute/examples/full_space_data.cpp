@@ -17,10 +17,19 @@ std::optional<FullSpaceData> full_space_data(const ReducedModel& model, const El
   if (!functions.symmetric) return std::nullopt;
   const double root = functions.root_over_analysis();
   RowMatrix filter = root * functions.analysis;
-  // Fixed vertices do not move.
+  FullSpaceData data;
+  if (view == nullptr && model.skeleton && model.skeleton->shifts.rows() > 0) {
+    const RowMatrix& shifts = model.skeleton->shifts;
+    data.shifts.resize(std::ssize(examples.examples), 3 * filter.cols());
+    for (Eigen::Index k = 0; k < data.shifts.rows(); ++k)
+      data.shifts.row(k) = (filter.transpose() * shifts.middleRows(k * filter.rows(), filter.rows()))
+                               .eval()
+                               .reshaped<Eigen::RowMajor>()
+                               .transpose();
+  }
+  // Fixed vertices do not move beside what moves them.
   for (Eigen::Index v = 0; v < body.fixed.size(); ++v)
     if (body.fixed[v] != 0) filter.row(v).setZero();
-  FullSpaceData data;
   data.slopes = weight_slopes(object, model.shape_space->weighting, examples) / root;
   const Eigen::MatrixXd& fields = targets.coordinates.basis;
   data.from_target.resize(fields.cols(), 3 * filter.cols());

@@ -92,8 +92,6 @@ Json assumed_asset(const std::filesystem::path& surface, const std::filesystem::
                 {"seed", 1}};
   for (const char* clamp : kClamps)
     if (file.parts.contains(clamp)) asset["object"]["fixed"] = {{"part", clamp}};
-  // A body on a skeleton steps in all vertices: its basis serves no step.
-  if (file.skeleton) asset["basis"]["training"] = "none";
   Json examples = Json::array();
   std::vector<std::string> morphs;
   for (const MorphTarget& morph : file.morphs) morphs.push_back(morph.name);

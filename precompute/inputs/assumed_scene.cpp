@@ -15,7 +15,7 @@ constexpr double kFloorStiffness = 1e6, kFloorFriction = 0.5;
 
 }  // namespace
 
-Json assumed_scene(const Json& asset, const std::string& name, double lowest) {
+Json assumed_scene(const Json& asset, const std::string& name, const SurfaceFile& surface) {
   const std::size_t poses = asset.contains("examples") ? asset["examples"].size() : 0;
   const bool free = !asset["object"].contains("fixed");
   const double duration = 2 * static_cast<double>(poses) + (free ? 2 : 1);
@@ -26,9 +26,10 @@ Json assumed_scene(const Json& asset, const std::string& name, double lowest) {
                 {"damping", {{"mass", free ? 0.2 : 1.0}, {"stiffness", 0.002}}},
                 {"output", {{"trajectory", name + "_run.h5"}, {"every", 5}, {"render", true}}}};
   if (free)
-    scene["obstacles"] = {{{"plane", {{"point", {0, lowest, 0}}, {"normal", {0, 1, 0}}}},
-                           {"stiffness", kFloorStiffness},
-                           {"friction", kFloorFriction}}};
+    scene["obstacles"] = {
+        {{"plane", {{"point", {0, surface.mesh.vertices.col(1).minCoeff(), 0}}, {"normal", {0, 1, 0}}}},
+         {"stiffness", kFloorStiffness},
+         {"friction", kFloorFriction}}};
   if (poses == 0) return scene;
   Json keys = Json::array();
   const auto add = [&](double time, std::size_t example) {
@@ -44,7 +45,8 @@ Json assumed_scene(const Json& asset, const std::string& name, double lowest) {
     add(start + 1 + kTurn, 0);
   }
   scene["examples"] = {{"stiffness", kStiffness}, {"damping", kDamping}, {"weights", {{"keys", keys}}}};
-  if (static_cast<std::int64_t>(poses) + 1 <= kMostTableExamples) scene["examples"]["compensate"] = true;
+  if (!surface.skeleton && static_cast<std::int64_t>(poses) + 1 <= kMostTableExamples)
+    scene["examples"]["compensate"] = true;
   return scene;
 }
 

@@ -428,6 +428,7 @@ ObjectInput read_object(const AssetConfig& asset, InputFiles& files, StageCache&
     object.skeleton = skeleton_of_cage(*object.surface);
     if (!asset.fixed) object.fixed = pin_to_bones(*object.surface, *object.skeleton, object.warnings);
   }
+  if (asset.clamp_follows && !object.skeleton) object.skeleton = clamp_bone(object.mesh, object.fixed);
   object.contact = flag(asset.contact_vertices, 1);
   if (asset.training.loads)
     for (const ForceLoadConfig& force : asset.training.loads->forces)

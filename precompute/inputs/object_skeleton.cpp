@@ -107,4 +107,16 @@ FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, st
   return pinned;
 }
 
+SkeletonData clamp_bone(const TetMesh& mesh, const FlagVector& fixed) {
+  SkeletonData skeleton;
+  skeleton.bones = {"clamp"};
+  skeleton.parents = IndexVector::Constant(1, -1);
+  skeleton.bind = RowMatrix::Identity(3, 4);
+  skeleton.bind.col(3) = mesh.vertices.transpose() * fixed.cast<double>() / fixed.cast<double>().sum();
+  skeleton.weights = RowMatrix::Ones(mesh.vertex_count(), 1);
+  skeleton.first_frames = IndexVector::Zero(1);
+  skeleton.poses.resize(0, 7);
+  return skeleton;
+}
+
 }  // namespace exmat::precompute

@@ -21,4 +21,7 @@ inline constexpr double kLeastWeight = 0.01;
 FlagVector pin_to_bones(const ObjectSurface& surface, SkeletonData& skeleton, std::vector<std::string>& warnings);
 inline constexpr double kOwnWeight = 0.95, kDepth = 0.35;
 
+/// One bone, "clamp", that holds all of the mesh, with its joint in the middle of the fixed vertices.
+SkeletonData clamp_bone(const TetMesh& mesh, const FlagVector& fixed);
+
 }  // namespace exmat::precompute

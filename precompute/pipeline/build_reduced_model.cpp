@@ -284,6 +284,10 @@ void Pipeline::require_vertices(const TrainingLoads& loads) const {
 // While there is a solver, since what comes next takes the memory of its factors.
 std::optional<PlannedTraining> Pipeline::plan(const TrainingInput& input, const SemidefiniteSolver& solver,
                                               ReducedModel& body) {
+  if (object_.skeleton && asset_.training.from == Training::kAuto) {
+    log::info("training: left out, of a body on bones, which steps in all its vertices");
+    return std::nullopt;
+  }
   std::optional<PlannedTraining> planned({plan_training(asset_.training, scene_, object_.pushed, training_body(input)),
                                           asset_.training.seed.value_or(asset_.seed)});
   const TrainingLoads& loads = planned->plan.loads;
@@ -393,12 +397,6 @@ void Pipeline::add_fidelity(const BodyStages& stages, const Motions& motions, co
 }
 
 void Pipeline::settle_examples(const BodyStages& stages, ReducedModel& model) {
-  if (object_.skeleton) {
-    log::info("settled poses: left out, of a body on bones, whose vertices all move");
-    for (ExampleData& example : model.examples->examples)
-      example.best_error = example.settled_error = example.shape_space_error;
-    return;
-  }
   std::optional<SettlingLoad> load;
   if (scene_ != nullptr) {
     TrainingBody body{.free = !stages.system.constrained(), .size = 1, .angular_frequency = 1};
@@ -438,7 +436,7 @@ void Pipeline::refuse_full_space() {
   const std::string reason = "parts of the body have several densities";
   if (object_.skeleton)
     throw InputError({asset_.file.string(), "/object/material", "one density of all parts of a body on bones",
-                      "several", "a body on bones steps in all vertices, where examples ask for that"});
+                      "several", "a body on bones, or whose clamp follows examples, steps in all vertices"});
   if (scene_ != nullptr && scene_->space.space != Space::kReduced)
     throw InputError({scene_->file.string(), scene_->place + "/space", "\"reduced\", since " + reason,
                       fmt::format("\"{}\"", name_of(scene_->space.space)),
@@ -458,6 +456,10 @@ void Pipeline::read() {
                                                           .surface = asset_.object_mesh.string()});
     scene_ = &*own_scene_;
   }
+  if (object_.skeleton && scene_ != nullptr && scene_->examples && scene_->examples->compensate)
+    throw InputError({scene_->file.string(), scene_->place + "/examples/compensate",
+                      "no such member of a body on bones, or whose clamp follows examples", "true",
+                      "its targets are those of its modes, in which it does not step: leave compensate out"});
   warn_of_size(object_, asset_.object_mesh.string(), report_.warnings);
   std::ranges::copy(object_.warnings, std::back_inserter(report_.warnings));
   require_regions(asset_, needs_);
@@ -488,6 +490,14 @@ ReducedModel Pipeline::run() {
   if (examples_)
     shape = timed("shape space and examples",
                   [&] { return build_shape_stage(asset_, object_, *examples_, cache_, report_.warnings); });
+  if (shape && asset_.clamp_follows) {
+    const Eigen::MatrixXd& shifts = shape->groups.front().shifts;
+    const Eigen::Index vertices = object_.mesh.vertex_count();
+    model.skeleton->shifts.setZero((1 + shifts.cols()) * vertices, 3);
+    for (Eigen::Index k = 0; k < shifts.cols(); ++k)
+      model.skeleton->shifts.middleRows((1 + k) * vertices, vertices) =
+          shifts.col(k).reshaped<Eigen::RowMajor>(vertices, 3);
+  }
   if (shape && !options_.alignment_report.empty())
     write_alignment_report(asset_.name, object_.mesh, *examples_, *shape, options_.alignment_report);
   if (shape) require_aligned(asset_, shape->alignments, report_.warnings);

@@ -13,6 +13,7 @@
 #include "precompute/fem/rigid_moments.h"
 #include "precompute/targets/target_table.h"
 #include "precompute/training/reduced_runs.h"
+#include "runtime/sim/space/full/full_body.h"
 #include "runtime/sim/step/stepper.h"
 
 namespace exmat::precompute {
@@ -29,6 +30,7 @@ constexpr double kNextStrength = 10;     // from one strength that is tried to t
 constexpr double kGood = 0.05;           // an error that needs no advice
 
 using Coordinates = std::optional<Eigen::VectorXd>;  // q [r]; nothing where the body does not settle
+using Shape = std::optional<Eigen::VectorXd>;        // displacement [3n], as a group sees it; likewise
 
 // The whole body's, or those of a region.
 template <typename Model>
@@ -53,22 +55,29 @@ class PoseSettler {
   std::optional<Shifts> shifts(double strength) const;
   void compensate();
   std::vector<double> strengths(Eigen::Index group) const;
+  runtime::StepScene scene(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                           const Eigen::Vector3d& gravity) const;
   Coordinates settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
                       const Eigen::Vector3d& gravity) const;
+  Shape settled_in_all_vertices(Eigen::Index group, const runtime::StepScene& scene) const;
+  Shape settled_shape(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                      const Eigen::Vector3d& gravity) const;
+  Eigen::VectorXd held(Eigen::Index group, const Eigen::VectorXd& given) const;
   bool is_elastic(Eigen::Index group) const { return load_.examples[static_cast<std::size_t>(group)].elastic; }
   Eigen::VectorXd field(Eigen::Index group, const Eigen::VectorXd& q) const {
     return stages_.fitter->seen(group, model_.modal->basis * q);
   }
   double norm(const Eigen::VectorXd& field) const { return std::sqrt(field.dot(stages_.system.full_mass * field)); }
-  double error(Eigen::Index group, const Eigen::VectorXd& given, const Coordinates& q) const {
-    return q ? norm(field(group, *q) - given) / norm(given) : 1;
+  double error(const Eigen::VectorXd& given, const Shape& shape) const {
+    return shape ? norm(*shape - given) / norm(given) : 1;
   }
 
   const BodyStages& stages_;
   ReducedModel model_;
   SettlingLoad load_;
-  std::shared_ptr<const runtime::Model> plain_;   // its targets are those of the examples
-  std::shared_ptr<const runtime::Model> loaded_;  // compensated, if asked for
+  std::shared_ptr<const runtime::Model> plain_;     // its targets are those of the examples
+  std::shared_ptr<const runtime::Model> loaded_;    // compensated, if asked for
+  std::unique_ptr<const runtime::FullModel> full_;  // present for a body on bones
 };
 
 PoseSettler::PoseSettler(const BodyStages& stages, const ReducedModel& model, const std::optional<SettlingLoad>& load)
@@ -78,6 +87,10 @@ PoseSettler::PoseSettler(const BodyStages& stages, const ReducedModel& model, co
   load_.examples.resize(static_cast<std::size_t>(stages.fitter->groups()));
   plain_ = loaded_ = stepped_model(model_, reference_of(stages_), load_.examples);
   if (load_.compensate) compensate();
+  if (!model_.skeleton) return;
+  runtime::FullModelResult full = runtime::build_full_model(model_, *plain_);
+  if (!full.model) throw InputError(std::move(full.complaint));
+  full_ = std::move(full.model);
 }
 
 // Stiffnesses that are tried, from that of the lowest mode to one that leaves nothing to elasticity.
@@ -90,13 +103,13 @@ std::vector<double> PoseSettler::strengths(Eigen::Index group) const {
   return all;
 }
 
-// Settles the body with the force of one group; those of others are left out.
-Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
-                                 const Eigen::Vector3d& gravity) const {
+// With the force of one group, and those of others left out.
+runtime::StepScene PoseSettler::scene(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                                      const Eigen::Vector3d& gravity) const {
   runtime::StepScene scene;
   scene.integrator = Integrator::kBackwardEuler;
   scene.time_step = kPeriods * 2 * std::numbers::pi / std::sqrt(stages_.modes.eigenvalues[0]);
-  scene.newton.tolerance = kTolerance;
+  scene.newton.tolerance = scene.space.newton.tolerance = kTolerance;
   if (stages_.system.constrained()) scene.gravity = gravity;
   scene.gravity_force = runtime::gravity_force(model, scene.gravity);
   scene.examples.resize(load_.examples.size());
@@ -104,6 +117,12 @@ Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group
   own.stiffness = stiffness;
   own.elastic = is_elastic(group);
   own.given_weights = Eigen::VectorXd::Unit(std::ssize(examples_of(model_, stages_.fitter->region(group)).examples), k);
+  return scene;
+}
+
+Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                                 const Eigen::Vector3d& gravity) const {
+  const runtime::StepScene scene = this->scene(model, group, k, stiffness, gravity);
   runtime::State state = runtime::make_state(model);
   runtime::Workspace workspace(model, scene);
   for (int step = 0; step < kMostSteps; ++step) {
@@ -116,38 +135,73 @@ Coordinates PoseSettler::settled(const runtime::Model& model, Eigen::Index group
   return std::nullopt;
 }
 
+Shape PoseSettler::settled_in_all_vertices(Eigen::Index group, const runtime::StepScene& scene) const {
+  runtime::State state = runtime::make_state(*plain_);
+  runtime::prepare_full(*full_, state);
+  runtime::enter_full_space(*full_, *plain_, state);
+  runtime::put_by_shifts(*full_, scene, state);
+  runtime::Workspace workspace(*plain_, scene);
+  runtime::FullWorkspace own(*full_, scene);
+  for (int step = 0; step < kMostSteps; ++step) {
+    const Eigen::VectorXd before = state.full->q;
+    const auto report = runtime::step_in_full_space(*full_, *plain_, scene, state, workspace, own);
+    if ((report.status & runtime::kStepNonFinite) != 0) return std::nullopt;
+    runtime::put_on_bones(*full_, state.full->skeleton->bones, state);  // without velocities
+    if ((state.full->q - before).norm() > kSettledChange * state.full->q.norm()) continue;
+    const Eigen::Index vertices = full_->space.mesh_vertices();
+    Eigen::VectorXd shape(3 * vertices);
+    for (Eigen::Index v = 0; v < vertices; ++v)
+      shape.segment<3>(3 * v) = runtime::full_displacement(*full_, {}, *state.full, v);
+    return Eigen::VectorXd(stages_.fitter->seen(group, shape));
+  }
+  return std::nullopt;
+}
+
+Shape PoseSettler::settled_shape(const runtime::Model& model, Eigen::Index group, Eigen::Index k, double stiffness,
+                                 const Eigen::Vector3d& gravity) const {
+  if (full_) return settled_in_all_vertices(group, scene(*plain_, group, k, stiffness, gravity));
+  const Coordinates q = settled(model, group, k, stiffness, gravity);
+  return q ? Shape(field(group, *q)) : std::nullopt;
+}
+
+// What of a pose the unknowns of the body's steps can hold: modes, or all vertices but those that bones hold elsewhere.
+Eigen::VectorXd PoseSettler::held(Eigen::Index group, const Eigen::VectorXd& given) const {
+  if (!full_) return field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * given));
+  if (model_.skeleton->shifts.rows() > 0) return given;
+  return stages_.system.extend(stages_.system.restrict(given));
+}
+
 SettledPose PoseSettler::settle(Eigen::Index group, Eigen::Index k) const {
   const PoseFitter& fitter = *stages_.fitter;
   const PoseFitter::PoseFields pose = fitter.pose_fields(group, k);
   const double size = norm(pose.given);
-  const Eigen::VectorXd in_basis =
-      field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * pose.given));
+  const Eigen::VectorXd in_basis = held(group, pose.given);
   SettledPose found;
   found.region = fitter.region(group);
   found.example = examples_of(model_, found.region).examples[static_cast<std::size_t>(k)].name;
   found.basis = norm(pose.given - in_basis) / size;
-  found.clamp = norm(pose.carried - pose.clamped) / size;
-  found.compensable = found.region.empty() && model_.targets && !is_elastic(group);
+  found.clamp = full_ ? found.basis : norm(pose.carried - pose.clamped) / size;
+  found.compensable = !full_ && found.region.empty() && model_.targets && !is_elastic(group);
 
-  Coordinates best;
+  Shape best;
   for (const double strength : strengths(group)) {
-    Coordinates q = settled(*plain_, group, k, strength, Eigen::Vector3d::Zero());
-    if (q && (!best || error(group, pose.given, q) < error(group, pose.given, best))) best = std::move(q);
+    Shape shape = settled_shape(*plain_, group, k, strength, Eigen::Vector3d::Zero());
+    if (shape && (!best || error(pose.given, shape) < error(pose.given, best))) best = std::move(shape);
   }
-  Coordinates q = best;
-  found.best = error(group, pose.given, best);
+  Shape shape = best;
+  found.best = error(pose.given, best);
   const double stiffness = load_.examples[static_cast<std::size_t>(group)].stiffness;
   if (stiffness > 0) {
-    q = settled(*loaded_, group, k, stiffness, load_.gravity);
-    found.loaded = error(group, pose.given, q);
+    shape = settled_shape(*loaded_, group, k, stiffness, load_.gravity);
+    found.loaded = error(pose.given, shape);
   }
-  found.settles = best && q;
+  found.settles = best && shape;
   if (!found.settles) return found;
-  found.eigenfunctions = norm(in_basis - field(group, *best)) / size;
-  found.force = norm(field(group, *q) - field(group, *best)) / size;
+  found.eigenfunctions = norm(in_basis - *best) / size;
+  found.force = norm(*shape - *best) / size;
   if (found.force > std::max(found.basis, found.eigenfunctions))
-    found.stronger = error(group, pose.given, settled(*loaded_, group, k, kNextStrength * stiffness, load_.gravity));
-  const Eigen::VectorXd off = field(group, *q) - pose.given;
+    found.stronger = error(pose.given, settled_shape(*loaded_, group, k, kNextStrength * stiffness, load_.gravity));
+  const Eigen::VectorXd off = *shape - pose.given;
   const Eigen::VectorXd distances = off.reshaped<Eigen::RowMajor>(off.size() / 3, 3).rowwise().norm();
   found.distance = distances.maxCoeff(&found.vertex);
   return found;
@@ -203,7 +257,7 @@ void PoseSettler::compensate() {
     double largest = 0;
     for (Eigen::Index k = 1; k <= std::ssize(given); ++k)
       largest = std::max(
-          largest, error(0, given[static_cast<std::size_t>(k - 1)], settled(model, 0, k, stiffness, load_.gravity)));
+          largest, error(given[static_cast<std::size_t>(k - 1)], settled_shape(model, 0, k, stiffness, load_.gravity)));
     return largest;
   };
   const TargetTableData plain = *model_.targets;
@@ -242,7 +296,8 @@ std::string advice_on(const SettledPose& pose) {
   if (pose.eigenfunctions > pose.basis)
     return "; more shape_space.eigenfunctions, or a shape_space.tolerance, would hold more of the pose";
   if (2 * pose.clamp > pose.basis)
-    return "; the pose moves fixed vertices: leave these at rest in it, or out of object.fixed";
+    return "; the pose moves fixed vertices: leave these at rest in it, or out of object.fixed, or have them follow it "
+           "(object.fixed.follow)";
   return "; a larger basis.size would hold more of the pose";
 }
 

@@ -80,6 +80,15 @@ void fill_gram(const Eigen::MatrixXd& rest_descriptor, ExampleSet& set) {
   set.h0 = E.transpose() * flatten(rest_descriptor);
 }
 
+namespace {
+
+void fill_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, ExampleSet& set) {
+  fill_gram(rest_descriptor, set);
+  set.hq = descriptors(set).transpose() * projection.shape_from_reduced;
+}
+
+}  // namespace
+
 void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,
                           const RowMatrix& pose_map, ExampleSet& set) {
   for (auto& example : set.examples) {
@@ -87,8 +96,16 @@ void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const Projecti
     example.reduced = projection.reduced_from_shape * change;
     example.pose = pose_map * change;
   }
-  fill_gram(rest_descriptor, set);
-  set.hq = descriptors(set).transpose() * projection.shape_from_reduced;
+  fill_problem(rest_descriptor, projection, set);
+}
+
+void add_shifts(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, const RowMatrix& changes,
+                ExampleSet& set) {
+  for (Eigen::Index k = 0; k < changes.cols(); ++k) {
+    RowMatrix& descriptor = set.examples[static_cast<std::size_t>(k + 1)].descriptor;
+    descriptor += changes.col(k).reshaped<Eigen::RowMajor>(descriptor.rows(), 3);
+  }
+  fill_problem(rest_descriptor, projection, set);
 }
 
 }  // namespace exmat::precompute

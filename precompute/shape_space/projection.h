@@ -33,4 +33,9 @@ RowMatrix shape_changes(const LaplaceBasis& object, const Eigen::VectorXd& weigh
 void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,
                           const RowMatrix& pose_map, ExampleSet& set);
 
+/// Then, of examples that shift the body beside what they are by `changes` of descriptor [3m x (K-1)]: descriptors, and
+/// the weights problem, become those of the whole poses.
+void add_shifts(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, const RowMatrix& changes,
+                ExampleSet& set);
+
 }  // namespace exmat::precompute

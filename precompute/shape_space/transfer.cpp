@@ -123,6 +123,16 @@ TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd&
   return pose;
 }
 
+TransferredPose posed_object(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                             const VertexArray& displacement) {
+  TransferredPose pose;
+  const Eigen::MatrixXd change = coefficients(object, displacement);
+  pose.coefficients = rest_coefficients + change;
+  pose.displacement = centred(displacement, object.mass);
+  pose.shape_space_error = lost_share(object.mass, pose.displacement, object.eigenfunctions * change);
+  return pose;
+}
+
 TransferredPose transfer_carried(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
                                  const CarriedShape& rest, const CarriedShape& posed, const PoseFrame& frame) {
   Eigen::Matrix3d to_rest = Eigen::Matrix3d::Identity();

@@ -67,6 +67,10 @@ struct PoseFrame {
 TransferredPose transfer_pose(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients, const RestMap& map,
                               const LaplaceBasis& rest_basis, const VertexArray& posed, const PoseFrame& frame);
 
+/// The pose of the object that is displaced by [n x 3] in its normalised frame, where it stays as it stands.
+TransferredPose posed_object(const LaplaceBasis& object, const Eigen::MatrixXd& rest_coefficients,
+                             const VertexArray& displacement);
+
 /// An example as a functional map carries it to the object.
 struct CarriedShape {
   Eigen::MatrixXd coefficients;  ///< m x 3

@@ -15,6 +15,7 @@ namespace exmat::runtime {
 
 void put_to_start(exmat_body& body) noexcept {
   body.state = body.start;  // vectors of the same lengths, but perhaps attachments: no allocation
+  if (body.full() != nullptr) put_by_shifts(*body.full(), body.scene, body.state);
   body.load.setZero();
   begin_steps(body);
   was_put(body);
@@ -69,6 +70,7 @@ exmat_body::exmat_body(std::shared_ptr<const Source> its_source, State its_start
   source->loaded.keys.apply_start(model(), scene);
   Workspace workspace(model(), scene);
   refresh_weights(model(), scene, start, workspace);
+  if (full() != nullptr) put_by_shifts(*full(), scene, start);
   state = start;
   next_attachment = std::ssize(state.attachments);
   if (!source->loaded.reach) return;

@@ -134,5 +134,6 @@ exmat_status exmat_body_set_example_weights(exmat_body* body, std::int64_t regio
     const std::span given(weights, static_cast<std::size_t>(count));
     if (count > 0) check_weights(given, body->model().examples[force].weights.examples());
     body->scene.examples[force].given_weights = Eigen::Map<const Eigen::VectorXd>(weights, count);
+    if (body->full() != nullptr) put_by_shifts(*body->full(), body->scene, body->state);
   });
 }

@@ -14,7 +14,7 @@ namespace {
 
 std::vector<LedgerEntry> groups_for(const Needs& needs, const BundleSummary& summary) {
   return plan_groups(needs, summary.constrained, summary.examples, std::ssize(summary.regions),
-                     summary.render_vertices > 0);
+                     summary.render_vertices > 0, summary.bones > 0);
 }
 
 /// Adds what one more kind of bodies needs.
@@ -31,6 +31,7 @@ void add_needs(const Needs& needs, const BundleSummary& summary, BundleRequest& 
     known->targets |= region.targets;
     known->target_space |= region.target_space;
     known->target_elasticity |= region.target_elasticity;
+    known->full_space |= region.full_space;
   }
 }
 

@@ -64,6 +64,7 @@ std::vector<WorldBodyStart> Bodies::starts() const {
     const LoadedKind& kind = loaded_.kinds[body.kind];
     State state = start_of(kind.loaded, body);
     state.examples = examples[body.kind];
+    if (kind.loaded.full) put_by_shifts(*kind.loaded.full, scenes_[body.kind], state);
     const Reaching* const own = reaching_[bodies.size()].get();
     bodies.push_back({{kind.loaded.model.get(), own != nullptr ? &own->scene : &scenes_[body.kind], kind.surface,
                        kind.loaded.full.get()},

@@ -454,8 +454,11 @@ std::vector<std::string> describe_plan(const LoadedScene& loaded, const SceneCon
             ? fmt::format("; until {:g} s after a load that the bundle was not made for", scene.space.release)
             : ", in all steps"));
   if (model.skeleton)
-    plan.push_back(fmt::format("skeleton: {} bones hold {} vertices, {}", model.skeleton->size(),
-                               loaded.full->space.driven(), describe_bones(scene.animation)));
+    plan.push_back(
+        fmt::format("skeleton: {} {} vertices, {}{}",
+                    model.skeleton->size() == 1 ? "a bone holds" : fmt::format("{} bones hold", model.skeleton->size()),
+                    loaded.full->space.driven(), describe_bones(scene.animation),
+                    loaded.data.skeleton->shifts.rows() > 0 ? "; examples shift them by their weights" : ""));
   if (scene.mass_damping > 0 || scene.stiffness_damping > 0) {
     plan.push_back(
         fmt::format("damping: mass {:g} 1/s, stiffness {:g} s", scene.mass_damping, scene.stiffness_damping));

@@ -93,6 +93,10 @@ BodyFrames run(double time_step, const std::vector<double>& times, Take take, Re
 
 FullSpaceModel model_of(const SceneConfig& config, const ReducedModel& data,
                         const std::vector<PoseCoordinates>& coordinates) {
+  if (data.skeleton)
+    throw InputError({config.file.string(), config.place + "/bundle", "the bundle of a body without bones",
+                      config.bundle.string() + ", whose bones or clamp its examples move",
+                      "it steps in all its vertices as it is: exmat-runtime run"});
   FullSpaceOptions options = full_space_options(config);
   options.coordinates = coordinates;
   return build_full_space_model(data, options);

@@ -6,7 +6,7 @@ namespace {
 
 constexpr Eigen::VectorXd SkeletonMotion::*kSkeletonArrays[] = {
     &SkeletonMotion::own, &SkeletonMotion::own_previous, &SkeletonMotion::way_previous, &SkeletonMotion::q,
-    &SkeletonMotion::v,   &SkeletonMotion::q_previous,   &SkeletonMotion::v_previous};
+    &SkeletonMotion::v,   &SkeletonMotion::q_previous,   &SkeletonMotion::v_previous,   &SkeletonMotion::weights};
 
 // Calls use(number) of all that is no flag, in a fixed order.
 template <typename Bones, typename Use>

@@ -49,6 +49,7 @@ struct SkeletonMotion {
   Eigen::VectorXd own, own_previous;             ///< [f] displacement of the vertices that move beside their bones
   Eigen::VectorXd way_previous;                  ///< [f] that the bones alone made in the last step
   Eigen::VectorXd q, v, q_previous, v_previous;  ///< [3p] displacement and velocity of the fixed vertices
+  Eigen::VectorXd weights;                       ///< [K] by which examples shift the body, in the last step
 };
 
 /// All of that as numbers, and back; sizes stay. write_numbers() returns their count, and writes none to null.

@@ -301,6 +301,10 @@ ReducedModel small_model(bool constrained, bool with_examples) {
   model.contact = small_contact(model);
   model.render = small_render();
   model.skeleton = small_skeleton();
+  if (with_examples) {
+    model.full_space->shifts = numbers(kExamples, 3 * kEigenfunctions, 13);
+    model.skeleton->shifts = numbers(kExamples * 5, 3, 14);
+  }
   return model;
 }
 

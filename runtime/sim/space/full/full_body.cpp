@@ -44,14 +44,50 @@ FullMemory full_memory(const FullModel& full, const StepScene& scene, State& sta
   return memory;
 }
 
+bool is_shifted(const State& state) noexcept {
+  return state.full && state.full->skeleton && state.full->skeleton->weights.size() > 0;
+}
+
+bool reads_pose(const ExampleSettings& one) noexcept {
+  return acts(one) && !is_driven(one) && one.given_weights.size() == 0;
+}
+
+/// Weights by which examples shift the body, where its shape does not make them.
+const Eigen::VectorXd& known_shifts(const StepScene& scene, const State& state) noexcept {
+  const bool is_given = !scene.examples.empty() && scene.examples.front().given_weights.size() > 0;
+  return is_given ? scene.examples.front().given_weights : state.examples.front().weights;
+}
+
+/// Puts the body where its bones and its shifts are; what it is displaced by beside them stays.
+void place_on_bones(const FullModel& full, State& state) noexcept {
+  FullMotion& motion = *state.full;
+  SkeletonMotion& own = *motion.skeleton;
+  for (Eigen::Index place = 0; place < full.space.places(); ++place) {
+    const SkinPlace at = full.skin->place(own.bones, own.weights, place);
+    if (place < full.space.vertices()) {
+      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
+      motion.q.segment<3>(dof) = full.skin->displacement(at, place) + at.turn * own.own.segment<3>(dof);
+    } else {
+      own.q.segment<3>(3 * (place - full.space.vertices())) = full.skin->displacement(at, place);
+    }
+  }
+  motion.v.setZero();
+  motion.q_previous = motion.q;
+  motion.v_previous.setZero();
+  own.v.setZero();
+  own.q_previous = own.q;
+  own.v_previous.setZero();
+  own.own_previous = own.own;
+  own.way_previous.setZero();
+  own.anew = motion.begins_anew = state.begins_anew = true;
+}
+
 /// Weights at the first iterate, into the workspace, and the targets of the step.
 void find_targets(const FullModel& full, const Model& model, const StepScene& scene, const State& state,
                   Workspace& workspace, FullStep& step, FullWorkspace& own, StepReport& report) noexcept {
   if (!runs_examples(scene)) return;
-  const auto reads_pose = [](const ExampleSettings& one) {
-    return acts(one) && !is_driven(one) && one.given_weights.size() == 0;
-  };
-  if (std::ranges::any_of(scene.examples, reads_pose)) step.first_coefficients();
+  const bool shifted = is_shifted(state);
+  if (!shifted && std::ranges::any_of(scene.examples, reads_pose)) step.first_coefficients();
   for (std::size_t group = 0; group < scene.examples.size(); ++group) {
     const ExampleSettings& settings = scene.examples[group];
     if (!acts(settings)) continue;
@@ -61,7 +97,7 @@ void find_targets(const FullModel& full, const Model& model, const StepScene& sc
     FullWorkspace::Examples& found = own.examples[group];
     if (is_driven(settings))
       drive(settings.drivers, *model.skeleton, state.full->skeleton->next, scratch.weights);
-    else
+    else if (!shifted || !reads_pose(settings))
       set_weights(examples.weights, settings, found.coefficients, scratch);
     if (!reduced.table)
       solve_target(reduced, settings.target_iterations, state.examples[group], scratch, report);
@@ -99,32 +135,21 @@ void enter_full_space(const FullModel& full, const Model& model, State& state) {
   bones.q.setZero(3 * full.space.driven());
   bones.v = bones.q_previous = bones.v_previous = bones.q;
   bones.bones = bones.next = model.skeleton->bound();
+  if (!full.examples.empty() && full.examples.front().shifts.size() > 0) bones.weights = state.examples.front().weights;
   put_on_bones(full, bones.bones, state);
 }
 
 void put_on_bones(const FullModel& full, const BonePoses& bones, State& state) noexcept {
-  FullMotion& motion = *state.full;
-  SkeletonMotion& own = *motion.skeleton;
+  SkeletonMotion& own = *state.full->skeleton;
   std::ranges::copy(bones, own.bones.begin());
   std::ranges::copy(bones, own.next.begin());
-  for (Eigen::Index place = 0; place < full.space.places(); ++place) {
-    const SkinPlace at = full.skin->place(bones, place);
-    if (place < full.space.vertices()) {
-      const Eigen::Index dof = 3 * static_cast<Eigen::Index>(full.space.number_at(place));
-      motion.q.segment<3>(dof) = full.skin->displacement(at, place) + at.turn * own.own.segment<3>(dof);
-    } else {
-      own.q.segment<3>(3 * (place - full.space.vertices())) = full.skin->displacement(at, place);
-    }
-  }
-  motion.v.setZero();
-  motion.q_previous = motion.q;
-  motion.v_previous.setZero();
-  own.v.setZero();
-  own.q_previous = own.q;
-  own.v_previous.setZero();
-  own.own_previous = own.own;
-  own.way_previous.setZero();
-  own.anew = motion.begins_anew = state.begins_anew = true;
+  place_on_bones(full, state);
+}
+
+void put_by_shifts(const FullModel& full, const StepScene& scene, State& state) noexcept {
+  if (!is_shifted(state) || !state.full->skeleton->anew) return;
+  state.full->skeleton->weights = known_shifts(scene, state);
+  place_on_bones(full, state);
 }
 
 void leave_full_space(State& state) noexcept {
@@ -183,6 +208,7 @@ bool FullBodyStep::begin(bool touches_others) noexcept {
   motion.time = state_.time;
   motion.begins_anew = state_.begins_anew;
   motion.applied_force = state_.vertex_force;
+  if (is_shifted(state_)) choose_shifts();
   if (workspace_.near) {
     workspace_.near->contact.candidate_count = 0;
     workspace_.near->contact.set_zero(workspace_.near->contact.generalised.size());
@@ -190,6 +216,22 @@ bool FullBodyStep::begin(bool touches_others) noexcept {
   step_.begin(touches_others);
   find_targets(full_, model_, scene_, state_, workspace_, step_, own_, report_);
   return (report_.status & kStepNonFinite) == 0;
+}
+
+// The shape makes them where the step begins, with the shifts that it has: they do not depend on those that they make.
+void FullBodyStep::choose_shifts() noexcept {
+  SkeletonMotion& bones = *state_.full->skeleton;
+  if (scene_.examples.empty() || !reads_pose(scene_.examples.front())) {
+    bones.weights = known_shifts(scene_, state_);
+    return;
+  }
+  const FullExamples& examples = full_.examples.front();
+  ExampleWorkspace& scratch = workspace_.examples.front();
+  Eigen::VectorXd& coefficients = own_.examples.front().coefficients;
+  step_.own_coefficients();
+  coefficients.noalias() += examples.shifts * bones.weights;
+  set_weights(examples.weights, scene_.examples.front(), coefficients, scratch);
+  bones.weights = scratch.weights;
 }
 
 /// Sets the reduced coordinates and the frame nearest to where the body is, with its momenta.

@@ -21,6 +21,10 @@ void leave_full_space(State& state) noexcept;
 /// along, and in the next step it goes with them. No call allocates.
 void put_on_bones(const FullModel& full, const BonePoses& bones, State& state) noexcept;
 
+/// Puts a body in full space that no motion has led to where it is there by the shifts of its examples, of the weights
+/// that its next step has; nothing of others. No call allocates.
+void put_by_shifts(const FullModel& full, const StepScene& scene, State& state) noexcept;
+
 /// True if the body's next step is to be in full space: the scene says so, or it says `auto` and a load acts, or has
 /// acted lately, that asks for it. `last` is the body's last step. Counts how long the body was left alone.
 bool asks_for_full_space(const StepScene& scene, const StepReport& last, State& state) noexcept;
@@ -57,6 +61,7 @@ class FullBodyStep {
   void put(const Eigen::VectorXd& q, double elastic_energy, const Eigen::Vector3d& way) noexcept;
 
  private:
+  void choose_shifts() noexcept;
   void set_reduced() noexcept;
 
   const FullModel& full_;

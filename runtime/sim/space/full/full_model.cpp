@@ -128,6 +128,7 @@ FullModelResult build_full_model(const ReducedModel& reduced, const Model& model
     append_functions(full.filter, at_all(data.region, &RegionData::band, vertices), object.mesh.vertices, own,
                      functions);
     own.weights = ExampleWeights(data.set->gram, data.set->h0, full.slopes);
+    own.shifts = full.shifts.transpose();
     if (examples.table) {
       TargetTableData table = **data.targets;
       table.control_points = full.control_points;

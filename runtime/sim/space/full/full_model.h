@@ -28,6 +28,7 @@ struct FullExamples {
   std::optional<TargetTable> table;  ///< gives c*; else `from_target`
   Eigen::MatrixXd from_target;       ///< 3m x d: c* of the coordinates that the model's TargetSolver has
   Eigen::MatrixXd shapes;            ///< f x d, u* of those that it or the model's table has; of an elastic force
+  Eigen::MatrixXd shifts;            ///< 3m x K, c of what each example shifts before the bones; else empty
   bool is_elastic = false;           ///< true if the force may be elastic
   Eigen::VectorXd shares;            ///< shares of the space's elements in such a force of a region; else empty
 

@@ -227,7 +227,7 @@ void FullStep::take_along() noexcept {
   FullPotentialWorkspace& work = workspace_.potential;
   const double end = static_cast<double>(state_.step + 1) * scene_.time_step;
   if (scene_.animation) scene_.animation->sample(end, bones.next);
-  skin.place(bones.next, work.skin);
+  skin.place(bones.next, bones.weights, work.skin);
   if (!bones.anew) return;
   space_.to_field(state_.q, work.start);
   stay(workspace_.trial);
@@ -342,6 +342,15 @@ void FullStep::first_coefficients() noexcept {
   potential_.set_coefficients();
   for (std::size_t group = 0; group < model_.examples.size(); ++group)
     potential_.see(model_.examples[group], workspace_.examples[group].coefficients);
+}
+
+void FullStep::own_coefficients() noexcept {
+  FullWorkspace& work = workspace_;
+  work.trial.setZero();
+  space_.to_field(memory_.bones->own, work.trial);
+  kernels().mesh_coefficients(space_.filter(), work.trial.data(), work.potential.coefficients.data());
+  for (std::size_t group = 0; group < model_.examples.size(); ++group)
+    potential_.see(model_.examples[group], work.examples[group].coefficients);
 }
 
 // Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a

@@ -125,6 +125,8 @@ class FullStep {
   void first_iterate(Eigen::VectorXd& u) const noexcept;
   /// Coefficients of the examples there into the workspace; of a body whose frame moves those of its deformation.
   void first_coefficients() noexcept;
+  /// Before begin(): those of what a body on a skeleton is displaced by beside its bones.
+  void own_coefficients() noexcept;
   /// c* [3m] of a group of examples, of a body whose frame moves that of its deformation.
   void set_target(std::size_t group, const Eigen::VectorXd& target) noexcept {
     workspace_.potential.target.segment(3 * model_.examples[group].first, target.size()) = target;

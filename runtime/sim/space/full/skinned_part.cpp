@@ -13,6 +13,10 @@ SkinnedPart::SkinnedPart(const FullSpace& space, const VertexArray& rest, const 
     rest_.col(space.place(v)).head<3>() = rest.row(v);
     vertex_at[static_cast<std::size_t>(space.place(v))] = v;
   }
+  for (Eigen::Index first = 0; first < data.shifts.rows(); first += rest.rows()) {
+    Eigen::Matrix3Xd& shift = shifts_.emplace_back(3, space.places());
+    for (Eigen::Index v = 0; v < rest.rows(); ++v) shift.col(space.place(v)) = data.shifts.row(first + v);
+  }
   for (const Eigen::Index v : vertex_at) {
     for (Eigen::Index b = 0; b < joints_.cols(); ++b) {
       if (data.weights(v, b) == 0) continue;
@@ -29,10 +33,13 @@ SkinPose SkinnedPart::make_pose() const {
       Eigen::Map<const Eigen::Vector<double, 9>>(Eigen::Matrix3d::Identity().eval().data()).replicate(1, rest_.cols())};
 }
 
-SkinPlace SkinnedPart::place(const BonePoses& bones, Eigen::Index place) const noexcept {
+SkinPlace SkinnedPart::place(const BonePoses& bones, const Eigen::VectorXd& weights,
+                             Eigen::Index place) const noexcept {
   const auto first = static_cast<std::size_t>(starts_[static_cast<std::size_t>(place)]);
   const auto end = static_cast<std::size_t>(starts_[static_cast<std::size_t>(place) + 1]);
-  const Eigen::Vector3d rest = rest_.col(place).head<3>();
+  Eigen::Vector3d rest = rest_.col(place).head<3>();
+  for (Eigen::Index k = 0; k < weights.size(); ++k)
+    rest += weights[k] * shifts_[static_cast<std::size_t>(k)].col(place);
   Eigen::Vector3d base = Eigen::Vector3d::Zero();
   Eigen::Vector4d turn = Eigen::Vector4d::Zero();
   for (std::size_t k = first; k < end; ++k) {
@@ -46,9 +53,9 @@ SkinPlace SkinnedPart::place(const BonePoses& bones, Eigen::Index place) const n
   return {base, Eigen::Quaterniond(turn).normalized()};
 }
 
-void SkinnedPart::place(const BonePoses& bones, SkinPose& pose) const noexcept {
+void SkinnedPart::place(const BonePoses& bones, const Eigen::VectorXd& weights, SkinPose& pose) const noexcept {
   for (Eigen::Index k = 0; k < rest_.cols(); ++k) {
-    const SkinPlace at = place(bones, k);
+    const SkinPlace at = place(bones, weights, k);
     pose.base.col(k).head<3>() = at.base;
     Eigen::Map<Eigen::Matrix3d>(pose.turns.col(k).data()) = at.turn.toRotationMatrix();
   }

@@ -21,16 +21,18 @@ struct SkinPlace {
   Eigen::Quaterniond turn;
 };
 
-/// A body in full space on a skeleton: y = sum_b w_b (R_b (X - J_b) + j_b) of the weights w of its bones, and R the
-/// rotation of the mean of their quaternions. Fixed vertices are at y; of the others x = y + R d, d their own
-/// displacement. Immutable; fields are those of FullSpace, of driven fixed vertices. Only what makes it allocates.
+/// A body in full space on a skeleton: y = sum_b w_b (R_b (X + E - J_b) + j_b) of the weights w of its bones, and R the
+/// rotation of the mean of their quaternions; E = sum_k w_k E_k, the shifts of examples by weights of these. Fixed
+/// vertices are at y; of the others x = y + R d, d their own displacement. Immutable; fields are those of FullSpace, of
+/// driven fixed vertices. Only what makes it allocates.
 class SkinnedPart {
  public:
   SkinnedPart(const FullSpace& space, const VertexArray& rest, const SkeletonData& data);
 
   SkinPose make_pose() const;
-  void place(const BonePoses& bones, SkinPose& pose) const noexcept;
-  SkinPlace place(const BonePoses& bones, Eigen::Index place) const noexcept;
+  /// `weights` [K] of the shifts; empty: no example shifts the body.
+  void place(const BonePoses& bones, const Eigen::VectorXd& weights, SkinPose& pose) const noexcept;
+  SkinPlace place(const BonePoses& bones, const Eigen::VectorXd& weights, Eigen::Index place) const noexcept;
 
   /// Displacement from where a place was meshed, of the bones alone [m].
   Eigen::Vector3d displacement(const SkinPose& pose, Eigen::Index place) const noexcept {
@@ -62,6 +64,7 @@ class SkinnedPart {
 
   Eigen::Index moving_ = 0;
   Eigen::Matrix4Xd rest_;                        // X of each place
+  std::vector<Eigen::Matrix3Xd> shifts_;         // E of each example at each place; none: nothing is shifted
   Eigen::VectorXd masses_;                       // of the fixed vertices
   Eigen::Matrix3Xd joints_;                      // J
   std::vector<std::int32_t> starts_{0}, bones_;  // of each place
