@@ -366,17 +366,16 @@ void BundleReader::check_skeleton(const SkeletonData& skeleton) const {
 }
 
 void BundleReader::check_shifts(const ReducedModel& model) const {
-  for (const char* path : {"/skeleton/shifts", "/skeleton/weights", "/full_space/shifts", "/full_space/slopes"})
+  for (const char* path : {"/full_space/shifts", "/full_space/slopes", "/skeleton/shifts", "/skeleton/weights"})
     if (!is_sound(path)) return;
-  const Eigen::Index vertices = model.skeleton->weights.rows();
   const RowMatrix &slopes = model.full_space->slopes, &shifts = model.full_space->shifts;
-  const Eigen::Index examples = shifts.rows() > 0 ? slopes.rows() : 0;
-  if (shifts.rows() != examples || (examples > 0 && shifts.cols() != slopes.cols()))
+  if (shifts.rows() > 0 && (shifts.rows() != slopes.rows() || shifts.cols() != slopes.cols()))
     refuse("/full_space/shifts", fmt::format("{} x {} numbers, or none", slopes.rows(), slopes.cols()),
            fmt::format("{} x {}", shifts.rows(), shifts.cols()));
-  if (model.skeleton->shifts.rows() != examples * vertices)
-    refuse("/skeleton/shifts", fmt::format("{} rows, {} for each of /full_space/shifts", examples * vertices, vertices),
-           fmt::format("{}", model.skeleton->shifts.rows()));
+  const Eigen::Index found = model.skeleton->shifts.rows() / model.skeleton->weights.rows();
+  if (found != shifts.rows())
+    refuse("/skeleton/shifts", fmt::format("{} examples, as /full_space/shifts has", shifts.rows()),
+           fmt::format("{}", found));
 }
 
 void BundleReader::refuse(const std::string& place, const std::string& expected, const std::string& found,

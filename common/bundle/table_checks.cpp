@@ -67,9 +67,6 @@ std::optional<PlacedFault> skeleton_fault(const SkeletonData& skeleton) {
     if (std::abs(skeleton.weights.row(v).sum() - 1) > kRounding)
       return PlacedFault{"/skeleton/weights", fmt::format("numbers that add up to 1 in row {}", v),
                          fmt::format("{}", skeleton.weights.row(v).sum())};
-  if (skeleton.shifts.rows() % skeleton.weights.rows() != 0)
-    return PlacedFault{"/skeleton/shifts", fmt::format("{} rows for each example", skeleton.weights.rows()),
-                       std::to_string(skeleton.shifts.rows())};
   const IndexVector& first = skeleton.first_frames;
   if (first.size() != std::ssize(skeleton.animations) + 1)
     return PlacedFault{"/skeleton@animations", fmt::format("{} names", first.size() - 1),
