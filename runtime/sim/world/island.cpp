@@ -418,14 +418,33 @@ bool is_above_start(IslandProblem& problem, std::span<WorldBody* const> bodies, 
   return problem.value(workspace.x).value > start.value + kNearRounding * start.magnitude;
 }
 
-/// Minimises from where the bodies would go without each other. If that leads nowhere, or to a minimum that lies above
-/// where they stand, as between bodies that would be deep in each other, from where they stand: there the potential is
-/// the energy that they have. A solution that is still above that is none.
+/// Where the body would go without the others, or, if it touched one of them or an obstacle in the last step, as fast
+/// as it is: contacts that hold a body go on to do so.
+void start_search(WorldBody& body, std::span<PairContact* const> pairs, std::span<const Incidence> incidences,
+                  Eigen::Ref<Eigen::VectorXd> x) noexcept {
+  if (body.full) {
+    x = body.full->first_iterate();
+    return;
+  }
+  x = body.near().x;
+  const bool touched = std::ranges::any_of(incidences, [&](const Incidence& incidence) {
+    const PairContact& pair = *pairs[static_cast<std::size_t>(incidence.pair)];
+    return !pair.is_own() && pair.touched();
+  });
+  if (body.rigid() == 0 || !(touched || body.state.contacts.count > 0)) return;
+  const Eigen::Vector3d end =
+      body.model.frame->placement(body.state.frame).position + body.scene.time_step * body.start_velocity;
+  x.head<3>() = end - body.problem->place(body.near().x).position;
+}
+
+/// Minimises from start_search(). If that leads nowhere, or to a minimum that lies above where they stand, as between
+/// bodies that would be deep in each other, from where they stand: there the potential is the energy that they have. A
+/// solution that is still above that is none.
 NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                           std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace) {
   IslandProblem problem(bodies, pairs, incidences, threads, workspace);
-  for (const WorldBody* const own : bodies)
-    workspace.x.segment(own->offset, own->unknowns()) = own->full ? own->full->first_iterate() : own->near().x;
+  for (std::size_t i = 0; i < bodies.size(); ++i)
+    start_search(*bodies[i], pairs, incidences[i], workspace.x.segment(bodies[i]->offset, bodies[i]->unknowns()));
   NewtonReport total = minimise(problem, bodies, pairs, threads, workspace);
   bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated;
   if (total.status == NewtonStatus::kConverged && is_doubtful(total, bodies))

@@ -51,6 +51,9 @@ class PairContact {
   /// True for a body with itself: contacts of the first side alone, and without coupling.
   bool is_own() const noexcept { return bodies_[0] == bodies_[1]; }
   int body(int side) const noexcept { return bodies_[static_cast<std::size_t>(side)]; }
+  bool touched() const noexcept {  ///< in the last step
+    return held_ != nullptr && !(held_->held[0].empty() && held_->held[1].empty());
+  }
   bool empty() const noexcept { return candidates_[0].all.empty() && candidates_[1].all.empty(); }
 
   /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
