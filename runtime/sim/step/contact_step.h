@@ -27,18 +27,25 @@ void add(const NewtonReport& more, NewtonReport& total) noexcept;
 /// Newton's method from x with friction as it follows the normal forces of the solution. A round goes on with the
 /// factor of the one before it, as friction of other size changes the stiffness little. Where there is none,
 /// `restart()` starts the elastic potential where the last round ended. `refresh()` sets friction and returns its
-/// relative change. `begin`: of the first round.
+/// relative change. `begin`: of the first round. A problem may offer rough_tolerance(), of a round before the others
+/// whose solution is for the normal forces alone.
 template <class Problem, class Restart, class Refresh>
 NewtonReport minimise_with_friction(Problem& problem, const NewtonSettings& settings, Eigen::VectorXd& x,
                                     NewtonWorkspace& workspace, const Restart& restart, const Refresh& refresh,
                                     NewtonBegin begin = NewtonBegin::kHessian) noexcept {
   NewtonReport total;
-  for (int round = 0; round < kFrictionRounds; ++round) {
+  NewtonSettings rough = settings;
+  if constexpr (requires { problem.rough_tolerance(); })
+    rough.tolerance = std::max(settings.tolerance, problem.rough_tolerance());
+  const int first = rough.tolerance > settings.tolerance ? -1 : 0;
+  for (int round = first; round < kFrictionRounds; ++round) {
     const bool has_factor = total.factorisations > 0 && total.status == NewtonStatus::kConverged;
-    if (round > 0 && !has_factor) restart();
-    if (round > 0) begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
-    add(newton_minimise(problem, settings, x, workspace, begin), total);
-    if (total.status == NewtonStatus::kNonFinite || refresh() <= kSameFriction) break;
+    if (round > first && !has_factor) restart();
+    if (round > first) begin = has_factor ? NewtonBegin::kFactor : NewtonBegin::kHessian;
+    add(newton_minimise(problem, round < 0 ? rough : settings, x, workspace, begin), total);
+    if (total.status == NewtonStatus::kNonFinite) break;
+    const bool is_settled = refresh() <= kSameFriction;
+    if (is_settled && round >= 0) break;
   }
   return total;
 }

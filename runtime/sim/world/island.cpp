@@ -14,6 +14,10 @@ namespace {
 
 constexpr Eigen::Index kDenseUnknowns = 160;  // a factorisation of more takes longer than conjugate gradients
 constexpr double kSolutionError = 1e-3;       // of conjugate gradients, in the norm of the preconditioner
+// Where Newton's method is about to end: this share of the residual that it ends at, and no more than kLeastExact.
+constexpr double kShareOfLimit = 0.3, kLeastExact = 0.1;
+// Normal forces are known well enough for friction (kSameFriction) long before the residual has come to its limit.
+constexpr double kRoughTolerance = 0.03;
 constexpr int kMostGradients = 400;
 constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
 constexpr double kGain = 1e-12;     // of the kinetic energy: rounding
@@ -129,7 +133,7 @@ PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool i
     sum.potential.magnitude += evaluation.potential.magnitude;
     squares += evaluation.force_scale * evaluation.force_scale;
   }
-  sum.force_scale = std::sqrt(squares);
+  sum.force_scale = force_scale_ = std::sqrt(squares);
   return sum;
 }
 
@@ -250,6 +254,8 @@ void IslandProblem::shift(double share) noexcept {
     if (!own->full) shift_diagonal(share, own->near().newton.hessian);
 }
 
+double IslandProblem::rough_tolerance() const noexcept { return has_full_ ? tolerance_ : kRoughTolerance; }
+
 void IslandProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
   if (!is_dense_) return solve_by_gradients(x);
   std::copy(x.begin(), x.end(), workspace_.right_side.data());
@@ -316,7 +322,7 @@ bool IslandProblem::project() noexcept {
 /// Conjugate gradients. Where the matrix is not positive definite they return the iterate before: a direction of
 /// descent in any case. Bodies in full space multiply in single precision: forces are taken over their norm.
 void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept {
-  const double size = has_full_ ? x.norm() : 1;
+  const double force = x.norm(), size = has_full_ ? force : 1;
   if (has_full_) {
     workspace_.right = x / size;
     x = workspace_.right;
@@ -328,7 +334,8 @@ void IslandProblem::solve_by_gradients(Eigen::Map<Eigen::VectorXd>& x) noexcept 
   p = z;
   x.setZero();
   double square = residual.dot(z);
-  const double error = has_full_ ? kFullSolutionError : kSolutionError;
+  const double needed = kShareOfLimit * tolerance_ * force_scale_ / force;
+  const double error = has_full_ ? kFullSolutionError : std::clamp(needed, kSolutionError, kLeastExact);
   const double enough = error * error * square;
   for (int iteration = 0; iteration < kMostGradients && square > enough; ++iteration) {
     multiply(p, product);

@@ -57,6 +57,8 @@ class IslandProblem {
   void shift(double share) noexcept;  ///< the Hessians of the bodies, each by its own diagonal
   void solve(Eigen::Map<Eigen::VectorXd>& x) noexcept;
 
+  double rough_tolerance() const noexcept;  ///< see minimise_with_friction()
+
   int conjugate_gradients() const noexcept { return conjugate_gradients_; }  ///< iterations so far
 
  private:
@@ -79,7 +81,8 @@ class IslandProblem {
   int threads_;
   IslandWorkspace& workspace_;
   Eigen::Index unknowns_ = 0;
-  double tolerance_;  ///< tolerance of Newton's method
+  double tolerance_;        ///< tolerance of Newton's method
+  double force_scale_ = 0;  ///< of the last evaluation
   bool has_full_, is_projected_ = false;
   bool is_dense_ = false;
   int conjugate_gradients_ = 0;

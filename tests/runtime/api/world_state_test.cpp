@@ -112,7 +112,7 @@ std::vector<Replay> replays() {
   const test::BarOptions block{.cells = {3, 2, 2}, .lengths = {0.3, 0.2, 0.2}, .youngs_modulus = 5e5, .free = true};
   test::BarOptions bar{.youngs_modulus = 5e5, .examples = 3};
   return {
-      {"pile", block, sleepy(), 6, {0.004, 0.003, 0.2}, push, "sleep", sleeps},
+      {"pile", block, sleepy(), 4, {0.004, 0.003, 0.2}, push, "sleep", sleeps},
       {"lanes", bar, posed(), 11, {0, 2, 0}, pose, "contact", touched},
       {"held_in_modes", {.free = true}, settings(), 1, {0, 2, 0}, hold, "contact", touched},
       {"auto", block, of_space(EXMAT_SPACE_AUTO), 3, {0, 0.5, 0.1}, hold, "all vertices", went_full},

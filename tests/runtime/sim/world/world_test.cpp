@@ -145,6 +145,24 @@ TEST(World, AStackComesToRestAndEachBodyCarriesWhatIsAboveIt) {
   }
 }
 
+// A block slides on another one, which lies on a floor without friction: what Coulomb's law takes from the momentum of
+// the one along the way, and gives to the other, is that share of the impulse of the normal forces.
+TEST(World, ABlockThatSlidesOnAnotherFeelsCoulombsFriction) {
+  Blocks blocks(1e-3);
+  blocks.set_gravity(kGravity);
+  blocks.add_floor(1e7, 0, 1e5);
+  constexpr double kFriction = 0.3, kTime = 0.06;
+  World world({blocks.body({0, 0, 0}), blocks.body({-0.09, 0.013, 0.2}, {1, 0, 0})}, {1e7, 1e5, kFriction});
+  const auto momentum = [&](int i) { return free_state(world.state(i)).linear_momentum; };
+  const Eigen::Vector3d start = momentum(1);
+  for (int i = 0; i < std::lround(kTime / blocks.scene.time_step); ++i) ASSERT_EQ(world.step(1).unconverged_islands, 0);
+  const Eigen::Vector3d change = momentum(1) - start;
+  const double normal = blocks.mass() * kGravity * kTime + change[2];
+  // The normal forces of friction are those of the solution to kSameFriction of the largest, in each step.
+  EXPECT_NEAR(change[0], -kFriction * normal, 0.01 * kFriction * normal);
+  EXPECT_NEAR(momentum(0)[0], -change[0], 1e-9 * start.norm());
+}
+
 // Thirty, at random turned, fall between four slopes: they come to rest, hardly in each other, and gain no energy.
 TEST(World, APileComesToRest) {
   Blocks blocks(4e-3);
