@@ -23,9 +23,12 @@ class Reader {
     const std::size_t kind = find_bodies(json, place + "/body", config.only);
     config.vertices = read_selection(json["vertices"], file_, place + "/vertices");
     config.obstacle = read_obstacle(json, place + "/to");
+    config.body = read_body(json, place + "/to", kind, config.only);
     config.motion = read_motion(member_or(json, "motion", Json::array()), file_, place + "/motion");
     if (config.obstacle && !config.motion.empty())
       refuse(place + "/motion", "no motion, since the obstacle has its own", "one");
+    if (config.body && !config.motion.empty())
+      refuse(place + "/motion", "no motion, since the other body has its own", "one");
     config.kind = choice_or(json, "kind", config.kind);
     for (const char* name : {"stiffness", "damping"})
       if (json.contains(name) && config.kind != AttachmentKind::kSpring)
@@ -100,9 +103,10 @@ class Reader {
       if (to != "world") refuse(place, R"("world" or {"obstacle": NUMBER})", to.dump());
       return std::nullopt;
     }
-    if (to.contains("body"))
-      refuse(place + "/body", "\"world\" or an obstacle: bodies do not hold each other", to["body"].dump(),
-             "hold both by one obstacle, or couple them in a host program by exmat_body_read_compliance()");
+    if (to.contains("body")) return std::nullopt;
+    if (!to.contains("obstacle"))
+      refuse(place, R"({"obstacle": NUMBER} or {"body": NAME, "vertices": ...})", to.dump());
+    if (to.contains("vertices")) refuse(place + "/vertices", "no vertices of an obstacle", "some");
     const auto number = to["obstacle"].get<std::uint64_t>();
     const std::size_t count = member_or(scene_, "obstacles", Json::array()).size();
     if (number >= count)
@@ -110,6 +114,29 @@ class Reader {
              count == 0 ? "no obstacle, since the scene has none" : fmt::format("an obstacle, 0 to {}", count - 1),
              fmt::format("{}", number));
     return number;
+  }
+
+  /// Another body than those that are held.
+  std::optional<HoldingBodyConfig> read_body(const Json& json, const std::string& place, std::size_t kind,
+                                             const std::optional<std::size_t>& only) const {
+    if (!json.contains("to") || !json["to"].is_object() || !json["to"].contains("body")) return std::nullopt;
+    const Json& to = json["to"];
+    if (to.contains("obstacle")) refuse(place, "an obstacle or a body", "both");
+    if (bodies_.front().name.empty())
+      refuse(place + "/body", "\"world\" or an obstacle, since this scene has no \"bodies\"", to["body"].dump());
+    HoldingBodyConfig held;
+    std::optional<std::size_t> number;
+    held.kind = find_bodies(to, place + "/body", number);
+    if (!number && bodies_[held.kind].count > 1)
+      refuse(place + "/body",
+             fmt::format("one of \"{0}_0\" to \"{0}_{1}\"", bodies_[held.kind].name, bodies_[held.kind].count - 1),
+             to["body"].dump());
+    held.number = number.value_or(0);
+    if (held.kind == kind && (!only || *only == held.number))
+      refuse(place + "/body", "another body than the one that is held", to["body"].dump());
+    if (!to.contains("vertices")) refuse(place + "/vertices", "vertices of that body", "no such member");
+    held.vertices = read_selection(to["vertices"], file_, place + "/vertices");
+    return held;
   }
 
   const Json& scene_;

@@ -228,7 +228,7 @@ void check_name(const std::string& name, const std::filesystem::path& file, cons
   throw InputError({file.string(), place + "/name", "letters, digits, _ and -", fmt::format("\"{}\"", name), ""});
 }
 
-/// Says of each kind whether others of its own, of another kind or parts of itself may touch its bodies.
+/// Says of each kind whether others of its own, of another kind or parts of itself may touch its bodies, or hold them.
 void set_meetings(WorldConfig& world) {
   for (BodiesConfig& own : world.bodies) {
     const auto is_met_by = [&](const BodiesConfig& other) {
@@ -236,6 +236,12 @@ void set_meetings(WorldConfig& world) {
     };
     own.scene.meets_bodies = world.contact.self || std::ranges::any_of(world.bodies, is_met_by);
   }
+  for (BodiesConfig& own : world.bodies)
+    for (const AttachmentConfig& attachment : own.scene.attachments) {
+      if (!attachment.body) continue;
+      own.scene.meets_bodies = true;
+      world.bodies[attachment.body->kind].scene.meets_bodies = true;
+    }
 }
 
 std::vector<BodyPlace> read_grid(const Json& grid) {

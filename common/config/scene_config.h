@@ -172,13 +172,20 @@ struct BodyConfig {
   std::vector<JointMotionConfig> bones;      ///< on top of it
 };
 
-/// A patch of bodies of one kind that the world or an obstacle holds.
+/// A patch of a body that holds those of others.
+struct HoldingBodyConfig {
+  std::size_t kind = 0, number = 0;  ///< of the scene's bodies, and among those of its kind
+  VertexSelection vertices{};        ///< of its object
+};
+
+/// A patch of bodies of one kind that the world, an obstacle or another body holds.
 struct AttachmentConfig {
   std::string place;                      ///< JSON pointer in the scene's file
   std::optional<std::size_t> only{};      ///< the one of these bodies; absent: all of them
   VertexSelection vertices{};             ///< of the object
-  std::optional<std::size_t> obstacle{};  ///< of the scene's; absent: the world
-  std::vector<KeyframeConfig> motion{};   ///< of the frame, of the world
+  std::optional<std::size_t> obstacle{};  ///< of the scene's; absent: the world, or
+  std::optional<HoldingBodyConfig> body{};
+  std::vector<KeyframeConfig> motion{};  ///< of the frame, of the world
   AttachmentKind kind = AttachmentKind::kFixed;
   double stiffness = 1e4, damping = 0;                           ///< both for a spring [N/m], [N s/m]
   double break_force = std::numeric_limits<double>::infinity();  ///< [N]
@@ -225,7 +232,7 @@ struct SceneConfig {
   std::vector<ObstacleConfig> obstacles;  ///< none: no contact
   MeetingGroup meeting;
   bool meets_others = false;  ///< contact with obstacles and bodies that a host adds; no file sets it
-  bool meets_bodies = false;  ///< other bodies or parts of itself may touch it; no file sets it
+  bool meets_bodies = false;  ///< other bodies or parts of itself may touch or hold it; no file sets it
   std::string place;          ///< JSON pointer that forces, regions and body are below; empty: the root
   int instances = 1;          ///< bodies that are stepped; the trajectory shows the first
   std::optional<std::filesystem::path> trajectory;

@@ -28,17 +28,23 @@ std::optional<HoldFault> fault_of(const FullModel* full, bool in_modes, const Pa
   return std::nullopt;
 }
 
-/// Takes hold of a body in its modes.
-std::optional<HoldFault> hold_in_modes(const Model& model, const Patch& patch, Attachment& attachment, State& state) {
-  const BodyPose pose = pose_of(model, state);
+/// Takes hold of a patch in the modes, where it is. Returns its patch with the rotation, if `turns`.
+ReducedPatch take_hold_in_modes(const Model& model, const Patch& patch, const State& state, bool turns,
+                                Attachment& attachment) {
   const Placement placement = model.frame->placement(state.frame);
   Eigen::Matrix3Xd here(3, patch.masses.size());
   for (Eigen::Index k = 0; k < here.cols(); ++k)
     here.col(k) = placement.to_world(patch.rest.row(k).transpose() + patch.basis_rows.middleRows<3>(3 * k) * state.q);
   take_hold(patch.masses, here, attachment);
   VertexArray rest = patch.rest;
-  rest.rowwise() -= pose.origin.transpose();
-  reduce_patch(rest, patch.basis_rows, attachment);
+  rest.rowwise() -= placement.origin.transpose();
+  return reduce_patch(rest, patch.basis_rows, attachment.shares, attachment.places, turns);
+}
+
+/// Takes hold of a body in its modes.
+std::optional<HoldFault> hold_in_modes(const Model& model, const Patch& patch, Attachment& attachment, State& state) {
+  const BodyPose pose = pose_of(model, state);
+  attachment.patch = take_hold_in_modes(model, patch, state, attachment.kind == AttachmentKind::kFixed, attachment);
   attachment.mean = attachment.mean_before = mean_of(attachment, pose);
   std::vector<Attachment> all = state.attachments;
   all.push_back(attachment);
@@ -107,6 +113,39 @@ std::optional<HoldFault> hold(const Model& model, const FullModel* full, const S
   return std::nullopt;
 }
 
+std::optional<HoldFault> hold_together(const End& own, const End& other, int body, Attachment attachment,
+                                       State& state) {
+  for (const End* const end : {&own, &other}) {
+    if (!steps_in_modes(end->full, end->scene))
+      return HoldFault{"to", "two bodies of space reduced", "one that may step in all vertices"};
+    if (!end->may_touch)
+      return HoldFault{"to", "two bodies that may touch others: bodies of one world or of a scene's \"bodies\"",
+                       "one that touches obstacles alone"};
+  }
+  OtherEnd held{body, other.patch.vertices, {}, {}};
+  Attachment others;
+  held.patch = take_hold_in_modes(other.model, other.patch, other.state, true, others);
+  const bool is_fixed = attachment.kind == AttachmentKind::kFixed;
+  attachment.vertices = own.patch.vertices;
+  attachment.rotation.setIdentity();
+  attachment.position.setZero();
+  attachment.patch = take_hold_in_modes(own.model, own.patch, own.state, is_fixed, attachment);
+  for (const ReducedPatch* const patch : {&attachment.patch, &held.patch})
+    if (is_fixed && patch->axes.cols() < 3)
+      return HoldFault{patch == &held.patch ? "to/vertices" : "vertices",
+                       "three vertices or more that are not in a line, or kind ball or spring", "others"};
+  const BodyPose own_pose = pose_of(own.model, own.state), other_pose = pose_of(other.model, other.state);
+  PatchPlace there;
+  place_patch(held.patch, other_pose, there);
+  held.offset = there.rotation.transpose() * (mean_of(attachment, own_pose) - other_pose.position - there.arm);
+  attachment.other = std::move(held);
+  if (!can_hold_together(attachment, *own.model.frame, own_pose, *other.model.frame, other_pose))
+    return HoldFault{"vertices", "ones that the modes of one of the two bodies can move",
+                     "ones that no mode moves: a spring holds none of them"};
+  state.attachments.push_back(std::move(attachment));
+  return std::nullopt;
+}
+
 std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const ObjectData& object,
                                                const Obstacles& obstacles, LoadedScene& loaded) {
   std::vector<LoadedAttachment> attachments;
@@ -121,7 +160,9 @@ std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const 
     attachment.stiffness = own.stiffness;
     attachment.damping = own.damping;
     attachment.break_force = own.break_force;
-    if (own.obstacle) {
+    if (own.body) {
+      made.other = LoadedOtherEnd{own.body->kind, own.body->number};
+    } else if (own.obstacle) {
       const SharedObstacle& obstacle = obstacles[*own.obstacle];
       attachment.motion = obstacle.motion();
     } else {
@@ -135,11 +176,13 @@ std::vector<const LoadedAttachment*> attachments_of(const LoadedScene& kind, std
   std::vector<const LoadedAttachment*> found;
   for (const LoadedAttachment& own : kind.attachments)
     if (!own.only || *own.only == number) found.push_back(&own);
+  std::ranges::stable_partition(found, [](const LoadedAttachment* own) { return !own->other; });
   return found;
 }
 
 void hold_body(const LoadedScene& kind, std::size_t number, State& state) {
   for (const LoadedAttachment* const own : attachments_of(kind, number)) {
+    if (own->other) return;
     Attachment attachment = own->attachment;
     attachment.id = std::ssize(state.attachments);
     attachment.follow(state.time, state.time);

@@ -18,7 +18,7 @@ struct Patch {
 
 /// Reason why a body cannot be held as asked.
 struct HoldFault {
-  const char* member;  ///< that is to blame: "vertices" or "kind"
+  const char* member;  ///< that is to blame: "vertices", "kind", "to" or "to/vertices"
   std::string expected, found;
 };
 
@@ -39,15 +39,29 @@ Patch load_patch(const SceneConfig& config, const ObjectData& object, const Vert
 std::optional<HoldFault> hold(const Model& model, const FullModel* full, const StepScene& scene, bool may_touch,
                               const Patch& patch, Attachment attachment, State& state);
 
+/// A body at one end of an attachment between two, where it is.
+struct End {
+  const Model& model;
+  const FullModel* full;
+  const StepScene& scene;
+  bool may_touch;  ///< others
+  const Patch& patch;
+  const State& state;
+};
+
+/// Adds an attachment that has id and kind to `state`, the own end's: the other end's patch, of body number `body` of
+/// the same world, holds its own from where both are. What is to blame, and the state is as it was.
+std::optional<HoldFault> hold_together(const End& own, const End& other, int body, Attachment attachment, State& state);
+
 /// The attachments of a scene for bodies of one kind, of this object; `obstacles` are all of the scene. Throws
 /// InputError: no such vertex, nothing selected.
 std::vector<LoadedAttachment> load_attachments(const SceneConfig& config, const ObjectData& object,
                                                const Obstacles& obstacles, LoadedScene& loaded);
 
-/// Those that hold one of these bodies, in the order of its state's.
+/// Those that hold one of these bodies, in the order of its state's: those to other bodies come last.
 std::vector<const LoadedAttachment*> attachments_of(const LoadedScene& kind, std::size_t number);
 
-/// These take hold of it where its state is. Throws InputError where they cannot.
+/// Those to the world and to obstacles take hold of it where its state is. Throws InputError where they cannot.
 void hold_body(const LoadedScene& kind, std::size_t number, State& state);
 
 }  // namespace exmat::runtime

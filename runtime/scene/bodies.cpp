@@ -58,11 +58,12 @@ std::vector<WorldBodyStart> Bodies::starts() const {
     refresh_weights(*kind.model, scenes_[i], state, workspace);
     examples.push_back(std::move(state.examples));
   }
+  std::vector<State> states = starts_of(loaded_);
   std::vector<WorldBodyStart> bodies;
   bodies.reserve(loaded_.bodies.size());
   for (const LoadedBody& body : loaded_.bodies) {
     const LoadedKind& kind = loaded_.kinds[body.kind];
-    State state = start_of(kind.loaded, body);
+    State& state = states[bodies.size()];
     state.examples = examples[body.kind];
     if (kind.loaded.full) put_by_shifts(*kind.loaded.full, scenes_[body.kind], state);
     const Reaching* const own = reaching_[bodies.size()].get();

@@ -29,13 +29,20 @@ struct LoadedReach {
 
 struct Patch;
 
+/// The patch of a scene's body that holds others.
+struct LoadedOtherEnd {
+  std::size_t kind = 0, number = 0;  ///< of the scene's bodies, and among those of its kind
+  std::shared_ptr<const Patch> patch{};
+};
+
 /// A hold of a scene on bodies of one kind. runtime/scene/attachment_loader.h.
 struct LoadedAttachment {
-  std::string file, place;               ///< in the scene
-  std::optional<std::size_t> only{};     ///< the one of these bodies; absent: all of them
-  bool may_touch = false;                ///< they may touch others
-  std::shared_ptr<const Patch> patch{};  ///< vertices that it holds
-  Attachment attachment{};               ///< all but these, and id and frame
+  std::string file, place;                ///< in the scene
+  std::optional<std::size_t> only{};      ///< the one of these bodies; absent: all of them
+  bool may_touch = false;                 ///< they may touch others
+  std::shared_ptr<const Patch> patch{};   ///< vertices that it holds
+  std::optional<LoadedOtherEnd> other{};  ///< present where a body holds them
+  Attachment attachment{};                ///< all but these, and id and frame
 };
 
 /// A scene ready to step, and how it came to be.

@@ -73,7 +73,7 @@ class Reader {
       require_text(from, place, "name", body.name);
       require_text(from, place, "bundle_input_sha256", kind.summary.input_sha256);
     }
-    State& state = memory.states.emplace_back(start_of(kind, body));
+    State& state = memory.states[index];
     read_body_state(file_, place, from, kind, state);
     if (state.step != memory.states.front().step)
       refuse(place + "/step", fmt::format("{}, as of the first body", memory.states.front().step),
@@ -175,6 +175,7 @@ BodiesMemory read_state(const std::filesystem::path& file, const LoadedWorld& lo
   const Reader reader(file, document, loaded, config);
   reader.check_run();
   BodiesMemory memory;
+  memory.states = starts_of(loaded);
   for (std::size_t i = 0; i < loaded.bodies.size(); ++i) reader.read_body(i, memory);
   if (config.is_list)
     for (std::size_t i = 0; i < document["pairs"].size(); ++i) reader.read_pair(i, memory);

@@ -35,8 +35,11 @@ struct LoadedWorld {
 /// places.
 LoadedWorld load_world_run(const WorldConfig& config);
 
-/// The start of a body of a kind. Throws InputError where what is to hold it cannot.
+/// The start of a body of a kind by itself. Throws InputError where what is to hold it cannot.
 State start_of(const LoadedScene& kind, const LoadedBody& body = {});
+
+/// The starts of all bodies, with what holds them together. Throws InputError likewise.
+std::vector<State> starts_of(const LoadedWorld& world);
 
 /// The surface of bodies of a model, from what /object and /modal of its bundle hold.
 std::shared_ptr<const TouchingSurface> touching_surface(const Model& model, const ReducedModel& data,

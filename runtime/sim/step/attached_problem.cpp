@@ -1,16 +1,6 @@
 #include "runtime/sim/step/attached_problem.h"
 
-#include <limits>
-
 namespace exmat::runtime {
-namespace {
-
-constexpr int kReturns = 16;   // to the conditions, at most
-constexpr double kSlow = 0.1;  // of what a return begins with: if more is left, the inverse is made again
-constexpr double kHeldRounding = 16 * std::numeric_limits<double>::epsilon();  // of where things are
-
-}  // namespace
-
 AttachedProblem::AttachedProblem(const Model& model, const State& state, IncrementalPotential& potential,
                                  Workspace& workspace) noexcept
     : frame_(*model.frame),
@@ -22,7 +12,7 @@ AttachedProblem::AttachedProblem(const Model& model, const State& state, Increme
 bool AttachedProblem::begin(Eigen::VectorXd& x, NewtonReport& report) noexcept {
   NewtonWorkspace& newton = near_.newton;
   problem_.evaluate(x, newton.gradient, newton.hessian);
-  set_conditions(x);
+  if (held_.conditions() > 0) set_conditions(x);
   if (!detail::factorise(*this, newton, report)) {
     ++report.projections;
     problem_.hessian(x, Tangent::kPositiveSemidefinite, newton.hessian);
@@ -32,40 +22,26 @@ bool AttachedProblem::begin(Eigen::VectorXd& x, NewtonReport& report) noexcept {
   return x.allFinite();
 }
 
-void AttachedProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
-  if (held_.conditions() > 0) runtime::set_conditions(state_.attachments, frame_, x, problem_.place(x), held_);
+/// Returns how far the body is from the origin [m].
+double AttachedProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
+  const BodyPose pose = problem_.place(x);
+  runtime::set_conditions(state_.attachments, frame_, x, pose, held_);
+  return pose.position.norm();
 }
 
 /// To the conditions, and J and the factor of J A^-1 J_f^T there, J_f that of the last factorisation.
 void AttachedProblem::hold(Eigen::VectorXd& x) noexcept {
-  if (held_.conditions() == 0) return;
-  double last = std::numeric_limits<double>::infinity();
-  bool is_current = false;
-  set_conditions(x);
-  for (int i = 0; i < kReturns; ++i) {
-    const double lacking = held_.violation.lpNorm<Eigen::Infinity>();
-    const double rounding = kHeldRounding * (1 + problem_.place(x).position.norm());
-    if (!(lacking > rounding) || (is_current && !(lacking < 0.5 * last))) break;
-    is_current = lacking > kSlow * last;
-    if (is_current) held_.invert();
-    last = lacking;
-    held_.change.noalias() = held_.inverse.lazyProduct(held_.violation);
-    x.noalias() -= held_.directions.lazyProduct(held_.change);
-    set_conditions(x);
-  }
-  held_.invert();
+  if (held_.conditions() > 0) held_.hold(x, [this](const Eigen::VectorXd& there) { return set_conditions(there); });
 }
 
 void AttachedProblem::finish(PotentialEvaluation& evaluation, const Eigen::VectorXd& x,
                              Eigen::VectorXd& gradient) noexcept {
   if (held_.conditions() == 0) return;
-  held_.change.noalias() = held_.directions.transpose().lazyProduct(gradient);
-  held_.multipliers.noalias() = held_.inverse.transpose().lazyProduct(held_.change);
-  gradient.noalias() -= held_.gradients.lazyProduct(held_.multipliers);
+  held_.subtract_forces(gradient);
   add_condition_forces(state_.attachments, problem_.place(x), held_);
   const Eigen::Index modes = near_.q.size();
   evaluation.force_scale +=
-      frame_.residual_of(held_.sums.force) + held_.gradients.bottomRows(modes).lazyProduct(held_.multipliers).norm();
+      frame_.residual_of(held_.sums.force) + held_.gradients().bottomRows(modes).lazyProduct(held_.multipliers).norm();
 }
 
 PotentialEvaluation AttachedProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient,
@@ -90,7 +66,7 @@ PotentialValue AttachedProblem::value(Eigen::VectorXd& x) noexcept {
 
 void AttachedProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {
   problem_.hessian(x, tangent, hessian);
-  set_conditions(x);
+  if (held_.conditions() > 0) set_conditions(x);
 }
 
 bool AttachedProblem::factorise() noexcept {
@@ -100,20 +76,17 @@ bool AttachedProblem::factorise() noexcept {
     return false;
   Eigen::Map<Eigen::VectorXd> column(newton.direction.data(), size);
   for (Eigen::Index k = 0; k < held_.conditions(); ++k) {
-    column = held_.gradients.col(k);
+    column = held_.gradients().col(k);
     kernels().cholesky_solve(newton.factor.data(), size, newton.direction.data());
-    held_.directions.col(k) = column;
+    held_.directions().col(k) = column;
   }
-  if (held_.conditions() > 0) held_.invert();
+  if (held_.conditions() > 0) held_.factorise();
   return true;
 }
 
 void AttachedProblem::solve(Eigen::Map<Eigen::VectorXd>& x) noexcept {
   kernels().cholesky_solve(near_.newton.factor.data(), x.size(), x.data());
-  if (held_.conditions() == 0) return;
-  held_.violation.noalias() = held_.gradients.transpose().lazyProduct(x);
-  held_.change.noalias() = held_.inverse.lazyProduct(held_.violation);
-  x.noalias() -= held_.directions.lazyProduct(held_.change);
+  if (held_.conditions() > 0) held_.make_tangent(x);
 }
 
 namespace {

@@ -6,11 +6,9 @@
 namespace exmat::runtime {
 
 /// The step of a body in its modes that a host holds: ContactProblem, whose springs are the host's too, under the
-/// conditions C(x) = 0 of fixed patches and balls at the end of the step. Every iterate fulfils them: x goes back to
-/// them along A^-1 J^T, A the last Hessian that was factorised, J = dC/dx. Gradients are those of the Lagrangian, g -
-/// J^T lambda, with the multipliers lambda that make Newton's direction tangent; the multipliers of the solution are
-/// the forces of the attachments. The curvature of C is left out of the Hessian: it is to inertia as (turn of a
-/// step)^2. docs/step_in_detail.md, "Attachments". For newton_minimise.
+/// Conditions of fixed patches and balls at the end of the step, with the last Hessian that was factorised as their A.
+/// The multipliers of the solution are the forces of the attachments. The curvature of C is left out of the Hessian: it
+/// is to inertia as (turn of a step)^2. docs/step_in_detail.md, "Attachments". For newton_minimise.
 class AttachedProblem {
  public:
   static constexpr bool kSeeksLowest = ContactProblem::kSeeksLowest;
@@ -35,7 +33,7 @@ class AttachedProblem {
 
  private:
   void hold(Eigen::VectorXd& x) noexcept;
-  void set_conditions(const Eigen::VectorXd& x) noexcept;
+  double set_conditions(const Eigen::VectorXd& x) noexcept;
   void finish(PotentialEvaluation& evaluation, const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
 
   const BodyFrame& frame_;

@@ -25,18 +25,16 @@ void take_hold(const Eigen::VectorXd& masses, const Eigen::Matrix3Xd& here, Atta
   attachment.position_before = attachment.position;
 }
 
-void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment) {
-  ReducedPatch& patch = attachment.patch;
-  const bool turns = attachment.kind == AttachmentKind::kFixed;
+ReducedPatch reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, const Eigen::VectorXd& shares,
+                          const Eigen::Matrix3Xd& all_places, bool turns) {
+  ReducedPatch patch;
   const Eigen::Index moments = turns ? 12 : 3;
-  const Eigen::Matrix3Xd places = attachment.places.colwise() - attachment.places * attachment.shares;
+  const Eigen::Matrix3Xd places = all_places.colwise() - all_places * shares;
   patch.rest = Eigen::VectorXd::Zero(moments);
   patch.rows = RowMatrix::Zero(moments, basis_rows.cols());
-  patch.axes.resize(3, 0);
-  patch.square = 0;
   Eigen::Matrix3d inertia = Eigen::Matrix3d::Zero();
   for (Eigen::Index k = 0; k < rest.rows(); ++k) {
-    const double share = attachment.shares[k];
+    const double share = shares[k];
     const auto own = basis_rows.middleRows<3>(3 * k);
     patch.rest.head<3>() += share * rest.row(k).transpose();
     patch.rows.topRows<3>() += share * own;
@@ -48,10 +46,23 @@ void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachme
     inertia += share * (place.squaredNorm() * Eigen::Matrix3d::Identity() - place * place.transpose());
     patch.square += share * place.squaredNorm();
   }
-  if (!turns || !(patch.square > 0)) return;
+  patch.axes.resize(3, 0);
+  if (!turns || !(patch.square > 0)) return patch;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(inertia);
   const Eigen::Index flat = (solver.eigenvalues().array() <= kFlat * solver.eigenvalues()[2]).count();
   patch.axes = solver.eigenvectors().rightCols(3 - flat);
+  return patch;
+}
+
+void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment) {
+  attachment.patch =
+      reduce_patch(rest, basis_rows, attachment.shares, attachment.places, attachment.kind == AttachmentKind::kFixed);
+}
+
+void forget_body(int body, std::vector<Attachment>& attachments) noexcept {
+  std::erase_if(attachments, [=](const Attachment& own) { return own.other && own.other->body == body; });
+  for (Attachment& own : attachments)
+    if (own.other && own.other->body > body) --own.other->body;
 }
 
 }  // namespace exmat::runtime

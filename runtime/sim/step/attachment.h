@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -24,7 +25,16 @@ struct ReducedPatch {
   double square = 0;      ///< sum_k s_k |p_k|^2 [m^2]
 };
 
-/// A patch of a body that a frame holds, which its host moves or a motion. No two hold the same vertex.
+/// The other end of an attachment between two bodies of a world, in their modes.
+struct OtherEnd {
+  int body = 0;                                      ///< number in the world
+  std::vector<std::int32_t> vertices;                ///< of its mesh
+  ReducedPatch patch;                                ///< with the rotation, unless its vertices are in a line
+  Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< of what it holds from its mean, in its own frame [m]
+};
+
+/// A patch of a body that a frame holds, which its host moves or a motion, or another patch of the world's bodies: that
+/// is its frame then, with its mean and the rotation that fits it best. No two frames hold the same vertex.
 struct Attachment {
   std::int64_t id = 0;
   AttachmentKind kind = AttachmentKind::kFixed;
@@ -35,6 +45,7 @@ struct Attachment {
   double break_force = std::numeric_limits<double>::infinity();  ///< [N]
   ReducedPatch patch;                                            ///< filled for a body that steps in its modes
   std::shared_ptr<const RigidMotion> motion{};  ///< of the frame, perhaps an obstacle's; null: its host moves it
+  std::optional<OtherEnd> other{};              ///< present where another body's patch holds it, in place of a frame
 
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();  ///< frame to world, at the end of the next step
   Eigen::Vector3d position = Eigen::Vector3d::Zero();      ///< world [m]
@@ -51,11 +62,13 @@ struct Attachment {
   void follow(double start, double end) noexcept;
 
   bool holds() const noexcept { return !broken; }
-  /// True if steps in modes see it.
-  bool holds_modes() const noexcept { return !broken && patch.rows.rows() > 0; }
-  /// Conditions on a body in its modes: those of the mean, then those of the rotation about patch.axes.
+  /// True if a frame holds the body.
+  bool is_framed() const noexcept { return !broken && !other; }
+  /// True if a frame holds it and steps in modes see that.
+  bool holds_modes() const noexcept { return is_framed() && patch.rows.rows() > 0; }
+  /// Conditions on the body by itself in its modes: those of the mean, then those of the rotation about patch.axes.
   Eigen::Index conditions() const noexcept {
-    return kind == AttachmentKind::kSpring || patch.rows.rows() == 0 ? 0 : 3 + patch.axes.cols();
+    return other || kind == AttachmentKind::kSpring || patch.rows.rows() == 0 ? 0 : 3 + patch.axes.cols();
   }
   Eigen::Vector3d target(Eigen::Index k) const noexcept { return position + rotation * places.col(k); }
   /// Point that holds the mean, world [m].
@@ -63,12 +76,12 @@ struct Attachment {
   Eigen::Vector3d anchor_before() const noexcept { return position_before + rotation_before * (places * shares); }
 };
 
-/// True if one of them holds.
+/// True if a frame holds the body.
 inline bool is_held(std::span<const Attachment> attachments) noexcept {
-  return std::ranges::any_of(attachments, &Attachment::holds);
+  return std::ranges::any_of(attachments, &Attachment::is_framed);
 }
 
-/// True if one of them holds a body that steps in its modes.
+/// True if one holds a body that steps in its modes.
 inline bool holds_modes(std::span<const Attachment> attachments) noexcept {
   return std::ranges::any_of(attachments, &Attachment::holds_modes);
 }
@@ -76,8 +89,14 @@ inline bool holds_modes(std::span<const Attachment> attachments) noexcept {
 /// Sets shares and places of the vertices, whose masses are these [k], from where they are in the world [3 x k].
 void take_hold(const Eigen::VectorXd& masses, const Eigen::Matrix3Xd& here, Attachment& attachment);
 
-/// Sets the patch of an attachment that has kind, shares and places: of vertices at rest at `rest` [k x 3] beyond
-/// Placement::origin, with `basis_rows` [3k x r].
+/// The patch of vertices at rest at `rest` [k x 3] beyond Placement::origin, with `basis_rows` [3k x r], `shares` and
+/// `places` as those of an attachment; `turns`: with its rotation.
+ReducedPatch reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, const Eigen::VectorXd& shares,
+                          const Eigen::Matrix3Xd& places, bool turns);
+/// Sets that of an attachment that has kind, shares and places.
 void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment);
+
+/// After a body was taken out of a world: attachments to it are gone, and bodies after it have a number less.
+void forget_body(int body, std::vector<Attachment>& attachments) noexcept;
 
 }  // namespace exmat::runtime

@@ -1,7 +1,9 @@
 #include "runtime/sim/step/attachment_terms.h"
 
+#include <Eigen/LU>
 #include <Eigen/QR>
 
+#include "common/elastic/polar_rotation.h"
 #include "runtime/sim/frame/spin.h"
 
 namespace exmat::runtime {
@@ -76,33 +78,40 @@ AttachmentWorkspace::AttachmentWorkspace(std::span<const Attachment> attachments
   sums.set_zero(modes);
   forces.setZero(3, std::ssize(attachments));
   torques = forces;
-  violation = multipliers = change = Eigen::VectorXd::Zero(count);
-  gradients.setZero(unknowns, count);
-  directions = gradients;
-  product.setIdentity(count, count);
-  inverse = product;
-  if (count > 0) factor.compute(product);
+  resize(count);
+  blocks.resize(1);
+  gradients().setZero(unknowns, count);
+  directions() = gradients();
 }
 
 bool AttachmentWorkspace::fits(std::span<const Attachment> attachments) const noexcept {
   return forces.cols() == std::ssize(attachments) && conditions() == conditions_of(attachments);
 }
 
-void AttachmentWorkspace::invert() noexcept {
-  product.noalias() = gradients.transpose() * directions;
-  for (Eigen::Index k = 0; k < conditions(); ++k)
-    if (gradients.col(k).isZero(0)) product(k, k) = 1;
-  factor.compute(product);
-  for (Eigen::Index k = 0; k < conditions(); ++k) {
-    multipliers.setZero();
-    multipliers[k] = 1;
-    change.noalias() = factor.solve(multipliers);
-    inverse.col(k) = change;
-  }
-}
-
 Eigen::Vector3d mean_of(const Attachment& attachment, const BodyPose& pose) noexcept {
   return pose.position + arm_of(attachment, pose);
+}
+
+// With N = sum_k s_k y_k p_k^T = R S over the patch's square, S symmetric, R turns by R w where N changes by dN: w is
+// (tr S I - S)^-1 times the axial vector of R^T dN.
+void place_patch(const ReducedPatch& patch, const BodyPose& pose, PatchPlace& place) noexcept {
+  const Eigen::Index modes = pose.q.size();
+  place.arm = pose.rotation * (patch.rest.head<3>() + patch.rows.topRows<3>().lazyProduct(pose.q));
+  place.rotation = pose.rotation;
+  place.turn.setZero(3, modes);
+  if (patch.axes.cols() < 3) return;
+  const Eigen::Matrix3d moment = second_moment(patch, pose.q).transpose() / patch.square;
+  const Eigen::Matrix3d own = nearest_rotation(moment), stretch = own.transpose() * moment;
+  const Eigen::Matrix3d symmetric = 0.5 * (stretch + stretch.transpose());
+  place.rotation = pose.rotation * own;
+  const Eigen::Matrix3d by_axial =
+      place.rotation * (symmetric.trace() * Eigen::Matrix3d::Identity() - symmetric).inverse() / patch.square;
+  for (Eigen::Index j = 0; j < modes; ++j) {
+    const Eigen::Matrix<double, 9, 1> rows = patch.rows.col(j).tail<9>();
+    const Eigen::Matrix3d change = own.transpose() * Eigen::Map<const Eigen::Matrix3d>(rows.data());
+    place.turn.col(j) = by_axial * Eigen::Vector3d(change(2, 1) - change(1, 2), change(0, 2) - change(2, 0),
+                                                   change(1, 0) - change(0, 1));
+  }
 }
 
 void evaluate_springs(std::span<const Attachment> attachments, const StepRate& rate, const BodyPose& pose,
@@ -160,12 +169,12 @@ void set_conditions(std::span<const Attachment> attachments, const BodyFrame& fr
                     const BodyPose& pose, AttachmentWorkspace& workspace) noexcept {
   const Eigen::Index modes = pose.q.size(), rigid = x.size() - modes;
   workspace.violation.setZero();
-  workspace.gradients.setZero();
+  workspace.gradients().setZero();
   const auto set = [&](const Attachment& attachment, Eigen::Index, Eigen::Index first) {
     const ReducedPatch& patch = attachment.patch;
     const Eigen::Vector3d arm = arm_of(attachment, pose);
     workspace.violation.segment<3>(first) = pose.position + arm - attachment.anchor();
-    auto gradients = workspace.gradients.middleCols<3>(first);
+    auto gradients = workspace.gradients().middleCols<3>(first);
     if (rigid > 0) {
       gradients.topRows<3>().setIdentity();
       gradients.middleRows<3>(3) = cross_matrix(arm);
@@ -180,7 +189,7 @@ void set_conditions(std::span<const Attachment> attachments, const BodyFrame& fr
     for (Eigen::Index k = 0; k < patch.axes.cols(); ++k) {
       const Eigen::Vector3d axis = patch.axes.col(k) / patch.square;
       workspace.violation[first + 3 + k] = axis.dot(axial);
-      auto gradient = workspace.gradients.col(first + 3 + k);
+      auto gradient = workspace.gradients().col(first + 3 + k);
       if (rigid > 0) gradient.segment<3>(3) = turn * axis;
       const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> weights = -cross_matrix(axis) * G;
       gradient.tail(modes) = patch.rows.bottomRows<9>().transpose().lazyProduct(
@@ -191,8 +200,8 @@ void set_conditions(std::span<const Attachment> attachments, const BodyFrame& fr
   if (rigid == 0) return;
   const Eigen::Matrix3d to_turn = frame.turn_to_world(x, pose).transpose();
   for (Eigen::Index k = 0; k < workspace.conditions(); ++k) {
-    const Eigen::Vector3d turned = to_turn * workspace.gradients.col(k).segment<3>(3);
-    workspace.gradients.col(k).segment<3>(3) = turned;
+    const Eigen::Vector3d turned = to_turn * workspace.gradients().col(k).segment<3>(3);
+    workspace.gradients().col(k).segment<3>(3) = turned;
   }
 }
 
@@ -248,9 +257,28 @@ bool can_hold(std::span<const Attachment> attachments, const BodyFrame& frame, c
   set_conditions(attachments, frame, x, pose, workspace);
   Eigen::Index held = 0;
   for_conditions(attachments, [&](const Attachment& own, Eigen::Index, Eigen::Index) { held += own.conditions(); });
-  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(workspace.gradients);
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(workspace.gradients());
   factor.setThreshold(kDependent);
   return factor.rank() == held;
+}
+
+bool can_hold_together(const Attachment& attachment, const BodyFrame& own, const BodyPose& own_pose,
+                       const BodyFrame& other, const BodyPose& other_pose) {
+  if (attachment.kind == AttachmentKind::kSpring || own.rigid_unknowns() + other.rigid_unknowns() > 0) return true;
+  const auto motion = [](const ReducedPatch& patch, const BodyPose& pose) {
+    PatchPlace place;
+    place_patch(patch, pose, place);
+    Eigen::MatrixXd rows(6, pose.q.size());
+    rows << pose.rotation * patch.rows.topRows<3>(), place.turn * std::sqrt(patch.square);
+    return rows;
+  };
+  const Eigen::MatrixXd a = motion(attachment.patch, own_pose), b = motion(attachment.other->patch, other_pose);
+  const Eigen::Index count = attachment.kind == AttachmentKind::kFixed ? 6 : 3;
+  Eigen::MatrixXd all(count, a.cols() + b.cols());
+  all << a.topRows(count), b.topRows(count);
+  Eigen::ColPivHouseholderQR<Eigen::MatrixXd> factor(all);
+  factor.setThreshold(kDependent);
+  return factor.rank() == count;
 }
 
 }  // namespace exmat::runtime

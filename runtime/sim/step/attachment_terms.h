@@ -1,34 +1,32 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <span>
 
 #include "runtime/sim/contact/contact.h"
 #include "runtime/sim/frame/body_frame.h"
+#include "runtime/sim/solver/conditions.h"
 #include "runtime/sim/step/attachment.h"
 
 namespace exmat::runtime {
 
-/// Scratch of the steps of a body in its modes that a host holds: n unknowns, c conditions of all its attachments.
-struct AttachmentWorkspace {
+/// Scratch of the steps of a body in its modes that a host holds, with the conditions of all its attachments.
+struct AttachmentWorkspace : Conditions {
   AttachmentWorkspace() = default;
   AttachmentWorkspace(std::span<const Attachment> attachments, Eigen::Index modes, Eigen::Index unknowns);
 
-  Eigen::Index conditions() const noexcept { return violation.size(); }
   /// True if it has the size for steps with these.
   bool fits(std::span<const Attachment> attachments) const noexcept;
 
-  ContactSums sums;                                ///< total of all attachments on the body, at the last evaluation
-  Eigen::Matrix3Xd forces;                         ///< one per attachment, on the body at its mean, world [N]
-  Eigen::Matrix3Xd torques;                        ///< likewise beside that [N m]
-  Eigen::VectorXd violation, multipliers, change;  ///< c: C, lambda, scratch
-  Eigen::MatrixXd gradients, directions;           ///< n x c: J^T, A^-1 J^T
-  Eigen::MatrixXd product, inverse;                ///< c x c: J (A^-1 J^T), and its inverse
-  Eigen::PartialPivLU<Eigen::MatrixXd> factor;     ///< LU factors of product
+  // Of all unknowns and conditions, which are one block.
+  Eigen::MatrixXd& gradients() noexcept { return blocks.front().gradients; }
+  Eigen::MatrixXd& directions() noexcept { return blocks.front().directions; }
+  const Eigen::MatrixXd& gradients() const noexcept { return blocks.front().gradients; }
+  const Eigen::MatrixXd& directions() const noexcept { return blocks.front().directions; }
 
-  /// product, factor and inverse of gradients and directions; conditions of what broke stay 0 = 0.
-  void invert() noexcept;
+  ContactSums sums;          ///< total of all attachments on the body, at the last evaluation
+  Eigen::Matrix3Xd forces;   ///< one per attachment, on the body at its mean, world [N]
+  Eigen::Matrix3Xd torques;  ///< likewise beside that [N m]
 };
 
 /// Coefficients of a rate in the integrator of a step.
@@ -39,6 +37,16 @@ struct StepRate {
 
 /// Mean of the vertices, world [m].
 Eigen::Vector3d mean_of(const Attachment& attachment, const BodyPose& pose) noexcept;
+
+/// Where a patch is: its mean, and the rotation that fits it best, from where it was attached.
+struct PatchPlace {
+  Eigen::Vector3d arm;       ///< mean from the body's position, world [m]
+  Eigen::Matrix3d rotation;  ///< world; of a patch without one that of the body's frame
+  Eigen::Matrix3Xd turn;     ///< 3 x r: how it turns about world axes by q, beside the body
+};
+
+/// Of a patch with rows of its rotation, or of its mean alone, whose rotation is the body's then.
+void place_patch(const ReducedPatch& patch, const BodyPose& pose, PatchPlace& place) noexcept;
 
 // Springs: k/2 |m - a|^2 + c c_v/2 |m - m_v - (a - a_before) / (dt c_v)|^2 of the mean m and the anchor a.
 
@@ -68,5 +76,9 @@ bool end_attachments(const BodyPose& pose, const AttachmentWorkspace& workspace,
 
 /// True if the modes can hold all attachments at once where the body is: their conditions are independent.
 bool can_hold(std::span<const Attachment> attachments, const BodyFrame& frame, const BodyPose& pose);
+
+/// The same of a hard attachment between two bodies.
+bool can_hold_together(const Attachment& attachment, const BodyFrame& own, const BodyPose& own_pose,
+                       const BodyFrame& other, const BodyPose& other_pose);
 
 }  // namespace exmat::runtime

@@ -64,9 +64,9 @@ void ImpulseResponse::update(double duration, Tangent tangent) {
   }
   if (conditions == 0) return;
   set_conditions(state_.attachments, *model_.frame, zero_, pose, held_);
-  held_.directions = held_.gradients;
-  factor_.solveInPlace(held_.directions);
-  held_.invert();
+  held_.directions() = held_.gradients();
+  factor_.solveInPlace(held_.directions());
+  held_.factorise();
 }
 
 /// Stiffness and damping of the example forces, to the lower triangle of A; the stiffness also to that of K.
@@ -128,15 +128,15 @@ void ImpulseResponse::solve_in_place(Eigen::MatrixXd& forces) noexcept {
   factor_.solveInPlace(forces);
   if (held_.conditions() == 0) return;
   for (Eigen::Index k = 0; k < forces.cols(); ++k) {
-    multipliers_.noalias() = held_.gradients.transpose() * forces.col(k);
-    held_.change.noalias() = held_.inverse * multipliers_;
-    forces.col(k).noalias() -= held_.directions * held_.change;
+    multipliers_.noalias() = held_.gradients().transpose() * forces.col(k);
+    held_.change.noalias() = held_.factor.solve(multipliers_);
+    forces.col(k).noalias() -= held_.directions() * held_.change;
   }
 }
 
 Eigen::MatrixXd ImpulseResponse::solve(const Eigen::MatrixXd& forces) const {
   Eigen::MatrixXd x = factor_.solve(forces);
-  if (held_.conditions() > 0) x -= held_.directions * (held_.inverse * (held_.gradients.transpose() * x));
+  if (held_.conditions() > 0) x -= held_.directions() * (held_.factor.solve(held_.gradients().transpose() * x));
   return x;
 }
 

@@ -30,7 +30,7 @@ struct Energies {
   double kinetic = 0;    ///< motion of the whole body in the world [J]
   double elastic = 0;    ///< E(q) [J]
   double potential = 0;  ///< potential of gravity, 0 at rest [J]
-  double contact = 0;    ///< springs of the contacts between the bodies of a world [J]
+  double contact = 0;    ///< springs of contacts and attachments between the bodies of a world [J]
 
   double total() const { return kinetic + elastic + potential + contact; }
 };

@@ -19,8 +19,9 @@ constexpr double kShareOfLimit = 0.3, kLeastExact = 0.1;
 // Normal forces are known well enough for friction (kSameFriction) long before the residual has come to its limit.
 constexpr double kRoughTolerance = 0.03;
 constexpr int kMostGradients = 400;
-constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
-constexpr double kGain = 1e-12;     // of the kinetic energy: rounding
+constexpr int kSureIterations = 8;    // of Newton's method: bodies at rest take fewer
+constexpr double kGain = 1e-12;       // of the kinetic energy: rounding
+constexpr double kRedundant = 1e-13;  // as that of Conditions
 // Likewise where bodies step in all vertices: each of their iterations costs as much as many of others.
 constexpr double kFullSolutionError = 0.03;
 
@@ -53,7 +54,8 @@ IslandProblem::IslandProblem(std::span<WorldBody* const> bodies, std::span<PairC
     workspace.unknowns[i].resize(body(i).unknowns());
     unknowns_ += body(i).unknowns();
   }
-  is_dense_ = unknowns_ <= kDenseUnknowns && !has_full_;
+  collect_hard();
+  is_dense_ = unknowns_ <= kDenseUnknowns && !has_full_ && !has_hard();
   workspace.newton.resize_vectors(unknowns_);
   workspace.x.resize(unknowns_);
   workspace.evaluations.resize(bodies.size());
@@ -82,6 +84,111 @@ void IslandProblem::place(const Eigen::VectorXd& x) noexcept {
     workspace_.unknowns[i] = x.segment(body(i).offset, body(i).unknowns());
     if (!body(i).full) body(i).placement = body(i).problem->place(workspace_.unknowns[i]);
   });
+}
+
+/// Hard attachments, and a block of conditions for either body of each.
+void IslandProblem::collect_hard() {
+  workspace_.hard.clear();
+  for (PairContact* const pair : pairs_)
+    for (PairAttachment& own : pair->attachments())
+      if (own.conditions() > 0) workspace_.hard.push_back({pair, &own});
+  Conditions& conditions = workspace_.conditions;
+  conditions.blocks.resize(2 * workspace_.hard.size());
+  Eigen::Index count = 0;
+  for (std::size_t k = 0; k < workspace_.hard.size(); ++k) {
+    const auto& [pair, own] = workspace_.hard[k];
+    for (const int side : {0, 1}) {
+      ConditionBlock& block = conditions.blocks[2 * k + static_cast<std::size_t>(side)];
+      const WorldBody& held = body(static_cast<std::size_t>(pair->body(side)));
+      block.offset = held.offset;
+      block.first = count;
+      block.directions.setZero(held.unknowns(), own->conditions());
+    }
+    count += own->conditions();
+  }
+  conditions.resize(count);
+}
+
+/// At x; returns how far the bodies are from the origin [m].
+double IslandProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
+  place(x);
+  double extent = 0;
+  for (std::size_t k = 0; k < workspace_.hard.size(); ++k) {
+    const auto& [pair, own] = workspace_.hard[k];
+    own->evaluate(first(*pair), second(*pair));
+    for (const int side : {0, 1}) {
+      const auto index = static_cast<std::size_t>(pair->body(side));
+      const WorldBody& held = body(index);
+      ConditionBlock& block = workspace_.conditions.blocks[2 * k + static_cast<std::size_t>(side)];
+      block.gradients = own->gradients(side).leftCols(own->conditions());
+      if (held.rigid() > 0) {
+        const Eigen::Matrix3d turn = held.model.frame->turn_to_world(workspace_.unknowns[index], held.placement);
+        for (Eigen::Index i = 0; i < own->conditions(); ++i) {
+          const Eigen::Vector3d turned = turn.transpose() * block.gradients.block<3, 1>(3, i);
+          block.gradients.block<3, 1>(3, i) = turned;
+        }
+      }
+      workspace_.conditions.violation.segment(block.first, own->conditions()) =
+          own->violation().head(own->conditions());
+      extent = std::max(extent, held.placement.position.norm());
+    }
+  }
+  return extent;
+}
+
+void IslandProblem::set_condition_directions() noexcept {
+  for (std::size_t k = 0; k < workspace_.conditions.blocks.size(); ++k) {
+    const PairContact& pair = *workspace_.hard[k / 2].pair;
+    NewtonWorkspace& factors = body(static_cast<std::size_t>(pair.body(static_cast<int>(k % 2)))).near().newton;
+    ConditionBlock& block = workspace_.conditions.blocks[k];
+    Eigen::Map<Eigen::VectorXd> column(factors.direction.data(), block.gradients.rows());
+    for (Eigen::Index i = 0; i < block.gradients.cols(); ++i) {
+      column = block.gradients.col(i);
+      kernels().cholesky_solve(factors.factor.data(), column.size(), factors.direction.data());
+      block.directions.col(i) = column;
+    }
+  }
+  workspace_.conditions.factorise();
+}
+
+void IslandProblem::hold(Eigen::VectorXd& x) noexcept {
+  if (has_hard()) workspace_.conditions.hold(x, [this](const Eigen::VectorXd& there) { return set_conditions(there); });
+}
+
+/// After the bodies were evaluated: the gradient of the Lagrangian, and loads of the attachments on the bodies. Returns
+/// the size of these in the units of the residual.
+double IslandProblem::take_condition_forces(Eigen::VectorXd& gradient) noexcept {
+  if (!has_hard()) return 0;
+  Conditions& conditions = workspace_.conditions;
+  conditions.subtract_forces(gradient);
+  double squares = 0;
+  for (std::size_t k = 0; k < workspace_.hard.size(); ++k) {
+    const auto& [pair, own] = workspace_.hard[k];
+    const auto multipliers = conditions.multipliers.segment(conditions.blocks[2 * k].first, own->conditions());
+    own->set_multipliers(multipliers);
+    for (const int side : {0, 1}) {
+      WorldBody& held = body(static_cast<std::size_t>(pair->body(side)));
+      own->add_load(side, held.near().held.sums);
+      const Eigen::MatrixXd& gradients = conditions.blocks[2 * k + static_cast<std::size_t>(side)].gradients;
+      squares += std::pow(held.model.frame->residual_of(multipliers.head<3>()), 2) +
+                 gradients.bottomRows(held.state.q.size()).lazyProduct(multipliers).squaredNorm();
+    }
+  }
+  return std::sqrt(squares);
+}
+
+bool IslandProblem::begin(Eigen::VectorXd& x, NewtonReport& report) noexcept {
+  if (!has_hard()) return true;
+  set_conditions(x);  // the directions are of an earlier x: it is not held yet
+  evaluate_all(x, /*is_first=*/true, workspace_.newton.gradient);
+  assemble();
+  if (!detail::factorise(*this, workspace_.newton, report)) {
+    ++report.projections;
+    hessian(x, Tangent::kPositiveSemidefinite, workspace_.newton.hessian);
+    if (!detail::factorise_shifted(*this, workspace_.newton, report)) return false;
+  }
+  hold(x);
+  return x.allFinite();
 }
 
 /// Gradient of a body in full space with what pairs add.
@@ -120,8 +227,10 @@ PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool i
       gradient.segment(own.offset, own.unknowns()) = own.full->gradient();
       return;
     }
-    for (const auto& [pair, side] : incidences_[i])
+    for (const auto& [pair, side] : incidences_[i]) {
       own.near().contact.add(pairs_[static_cast<std::size_t>(pair)]->sums(side));
+      pairs_[static_cast<std::size_t>(pair)]->add_springs(side, own.near().held.sums);
+    }
     Eigen::VectorXd& part = own.near().newton.gradient;
     workspace_.evaluations[i] = own.problem->finish(workspace_.unknowns[i], workspace_.evaluations[i], part);
     gradient.segment(own.offset, own.unknowns()) = part;
@@ -133,12 +242,13 @@ PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool i
     sum.potential.magnitude += evaluation.potential.magnitude;
     squares += evaluation.force_scale * evaluation.force_scale;
   }
-  sum.force_scale = force_scale_ = std::sqrt(squares);
+  sum.force_scale = force_scale_ = std::sqrt(squares) + take_condition_forces(gradient);
   return sum;
 }
 
-PotentialEvaluation IslandProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient,
+PotentialEvaluation IslandProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                                             Eigen::MatrixXd& /*hessian*/) noexcept {
+  hold(x);
   PotentialEvaluation evaluation = evaluate_all(x, /*is_first=*/true, gradient);
   for (WorldBody* const own : bodies_)
     if (!own->full) evaluation.potential.value += own->model.frame->accept_rigid(own->workspace.frame);
@@ -146,11 +256,13 @@ PotentialEvaluation IslandProblem::evaluate(const Eigen::VectorXd& x, Eigen::Vec
   return evaluation;
 }
 
-PotentialEvaluation IslandProblem::evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
+PotentialEvaluation IslandProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
+  hold(x);
   return evaluate_all(x, /*is_first=*/false, gradient);
 }
 
-PotentialValue IslandProblem::value(const Eigen::VectorXd& x) noexcept {
+PotentialValue IslandProblem::value(Eigen::VectorXd& x) noexcept {
+  hold(x);
   const std::size_t bodies = bodies_.size();
   for_all(bodies, threads_, [&](std::size_t i) {
     Eigen::VectorXd& own = workspace_.unknowns[i];
@@ -177,6 +289,7 @@ PotentialValue IslandProblem::value(const Eigen::VectorXd& x) noexcept {
 
 void IslandProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& /*hessian*/) noexcept {
   place(x);
+  if (has_hard()) set_conditions(x);
   is_projected_ = tangent != Tangent::kExact;
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     if (body(i).full)
@@ -245,8 +358,10 @@ bool IslandProblem::factorise() noexcept {
     const bool positive = kernels().cholesky(own.hessian.data(), size, size, own.factor.data());
     workspace_.values[i].value = positive ? 1 : 0;
   });
-  return std::all_of(workspace_.values.begin(), workspace_.values.begin() + std::ssize(bodies_),
-                     [](const PotentialValue& positive) { return positive.value > 0; });
+  const bool positive = std::all_of(workspace_.values.begin(), workspace_.values.begin() + std::ssize(bodies_),
+                                    [](const PotentialValue& own) { return own.value > 0; });
+  if (positive && has_hard()) set_condition_directions();
+  return positive;
 }
 
 void IslandProblem::shift(double share) noexcept {
@@ -307,6 +422,7 @@ void IslandProblem::precondition(const Eigen::VectorXd& residual, Eigen::VectorX
     kernels().cholesky_solve(factors.factor.data(), own.unknowns(), factors.direction.data());
     result.segment(own.offset, own.unknowns()) = part;
   });
+  if (has_hard()) workspace_.conditions.make_tangent(result);
 }
 
 /// Tangents of bodies in full space become positive semi-definite. False where they are.
@@ -387,11 +503,21 @@ void start_at(WorldBody& own, const Eigen::VectorXd& x, const Eigen::VectorXd& q
 /// was started.
 NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                       int threads, IslandWorkspace& workspace) noexcept {
+  NewtonReport start;
+  if (!problem.begin(workspace.x, start)) {
+    start.status = NewtonStatus::kNonFinite;
+    return start;
+  }
   const auto restart = [&] {
     for_all(bodies.size(), threads, [&](std::size_t i) { start_at(*bodies[i], workspace.x, bodies[i]->near().q); });
   };
   const auto refresh = [&] { return refresh_friction(bodies, pairs); };
-  return minimise_with_friction(problem, newton_of(bodies), workspace.x, workspace.newton, restart, refresh);
+  NewtonReport total =
+      minimise_with_friction(problem, newton_of(bodies), workspace.x, workspace.newton, restart, refresh,
+                             start.factorisations > 0 ? NewtonBegin::kFactor : NewtonBegin::kHessian);
+  total.factorisations += start.factorisations;
+  total.projections += start.projections;
+  return total;
 }
 
 /// The unknowns of a body that stays where it is.
@@ -468,13 +594,14 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
   return total;
 }
 
-/// Kinetic, elastic and potential energy of bodies together [J].
+/// Kinetic, elastic and potential energy of bodies together, and that of springs between them [J].
 struct IslandEnergy {
   double kinetic = 0, total = 0;
 };
 
-IslandEnergy energy_of(std::span<WorldBody* const> bodies) noexcept {
+IslandEnergy energy_of(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
   IslandEnergy sum;
+  for (const PairContact* const pair : pairs) sum.total += pair->attached_energy();
   for (const WorldBody* const own : bodies) {
     const Energies energy = own->energies();
     sum.kinetic += energy.kinetic;
@@ -491,7 +618,7 @@ struct IslandStart {
 };
 
 IslandStart start_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs) noexcept {
-  IslandStart start{energy_of(bodies)};
+  IslandStart start{energy_of(bodies, pairs)};
   for (PairContact* const pair : pairs) {
     pair->begin_account();
     start.springs += pair->start_energy();
@@ -513,7 +640,7 @@ bool is_isolated(std::span<WorldBody* const> bodies, const IslandBegin& begin) n
 /// they have to have, if nothing else touches them, and together no more energy than `allowed` [J].
 void limit_energy(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs, const IslandBegin& begin,
                   double allowed) noexcept {
-  const IslandEnergy now = energy_of(bodies);
+  const IslandEnergy now = energy_of(bodies, pairs);
   if (begin.is_alone) {
     if (!take_momenta(bodies, begin, allowed - (now.total - now.kinetic))) return;
     for (PairContact* const pair : pairs)  // what they remember is of where the bodies are
@@ -541,9 +668,52 @@ void end_accounts(std::span<WorldBody* const> bodies, std::span<PairContact* con
     sum += pair->account();
   }
   if (!closed) return;
-  const double most = std::max(0.0, start.accounts + start.bodies.total - energy_of(bodies).total);
+  const double most = std::max(0.0, start.accounts + start.bodies.total - energy_of(bodies, pairs).total);
   if (sum > most)
     for (PairContact* const pair : pairs) pair->scale_account(most / sum);
+}
+
+/// The centre of mass goes exactly as the momentum, and the momentum as the forces have it, so that what the residual
+/// of Newton's method leaves of force would leave hard attachments open: their forces f become such that they close,
+/// and stay equal and opposite. Of the centres alone, x of attachment k moves against y by sum_j W_kj f_j, W of the
+/// masses.
+void settle(std::span<WorldBody* const> bodies, IslandWorkspace& workspace) noexcept {
+  const auto count = std::ssize(workspace.hard);
+  if (count == 0) return;
+  const auto mobility_of = [&](int number) {
+    const WorldBody& own = *bodies[static_cast<std::size_t>(number)];
+    const double dt = own.scene.time_step;
+    return own.rigid() > 0 ? dt * dt / own.model.frame->inertia_of_momenta()->mass() : 0;
+  };
+  Eigen::MatrixXd& W = workspace.mobility;
+  W.setZero(count, count + 3);  // and how far each is open
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const HardAttachment& own = workspace.hard[static_cast<std::size_t>(k)];
+    for (const int side : {0, 1}) {
+      const int number = own.pair->body(side);
+      const WorldBody& held = *bodies[static_cast<std::size_t>(number)];
+      const double mobility = mobility_of(number), sign = own.attachment->sign(side);
+      if (mobility == 0) continue;
+      const Eigen::Vector3d lacking = held.model.frame->force_of(held.near().x, held.workspace.frame) -
+                                      held.near().contact.force - held.near().held.sums.force;
+      W.row(k).tail<3>() += sign * mobility * lacking.transpose();
+      for (Eigen::Index j = 0; j < count; ++j) {
+        const HardAttachment& other = workspace.hard[static_cast<std::size_t>(j)];
+        for (const int its : {0, 1})
+          if (other.pair->body(its) == number) W(k, j) += sign * other.attachment->sign(its) * mobility;
+      }
+    }
+    W(k, k) = W(k, k) > 0 ? W(k, k) * (1 + kRedundant) : 1;
+  }
+  workspace.mobility_factor.compute(W.leftCols(count));
+  const Eigen::MatrixXd forces = workspace.mobility_factor.solve(W.rightCols<3>());
+  for (Eigen::Index k = 0; k < count; ++k) {
+    const HardAttachment& own = workspace.hard[static_cast<std::size_t>(k)];
+    const auto sums = [&](int side) -> ContactSums& {
+      return bodies[static_cast<std::size_t>(own.pair->body(side))]->near().held.sums;
+    };
+    own.attachment->add_force(forces.row(k), sums(0), sums(1));
+  }
 }
 
 }  // namespace
@@ -569,6 +739,7 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   const IslandStart start = start_accounts(bodies, pairs);
   NewtonReport newton = solve_island(bodies, pairs, incidences, threads, workspace);
   const bool converged = newton.status == NewtonStatus::kConverged;
+  if (converged) settle(bodies, workspace);
   begin_of(bodies, workspace.begin);
   workspace.from_others.resize(bodies.size());
   const bool isolated = is_isolated(bodies, workspace.begin);
@@ -609,10 +780,15 @@ NewtonReport step_island(std::span<WorldBody* const> bodies, std::span<PairConta
   const auto is_finite = [](const WorldBody* own) { return (own->report.status & kStepNonFinite) == 0; };
   if (std::ranges::all_of(bodies, is_finite)) {
     const double allowed = start.bodies.total + (converged ? start.accounts : start.springs);
-    const bool gains = isolated && energy_of(bodies).total > allowed + kGain * start.bodies.kinetic;
+    const bool gains = isolated && energy_of(bodies, pairs).total > allowed + kGain * start.bodies.kinetic;
     if (!converged || gains) limit_energy(bodies, pairs, workspace.begin, allowed);
-    if (gains) newton.status = NewtonStatus::kStagnated;
+    // The torque that attachments have for the angular momentum may give a little energy: to take it away is no fault.
+    if (gains && std::ranges::all_of(pairs, [](const PairContact* pair) { return pair->attachments().empty(); }))
+      newton.status = NewtonStatus::kStagnated;
     end_accounts(bodies, pairs, start, isolated || !converged, converged && !gains);
+    for (PairContact* const pair : pairs)
+      for (PairAttachment& own : pair->attachments())
+        own.end(*bodies[static_cast<std::size_t>(pair->body(0))], *bodies[static_cast<std::size_t>(pair->body(1))]);
   } else {
     for (PairContact* const pair : pairs) pair->abandon();
   }

@@ -4,11 +4,18 @@
 #include <span>
 #include <vector>
 
+#include "runtime/sim/solver/conditions.h"
 #include "runtime/sim/solver/newton.h"
 #include "runtime/sim/world/island_momenta.h"
 #include "runtime/sim/world/pair_contact.h"
 
 namespace exmat::runtime {
+
+/// An attachment between two bodies of an island that is a condition.
+struct HardAttachment {
+  const PairContact* pair = nullptr;
+  PairAttachment* attachment = nullptr;
+};
 
 /// Scratch of the steps of islands; grows, holds nothing from step to step.
 struct IslandWorkspace {
@@ -26,6 +33,11 @@ struct IslandWorkspace {
   Eigen::MatrixXd dense;  ///< all unknowns of a small island, lower triangle
   AlignedArray factor, right_side;
   Eigen::VectorXd residual, preconditioned, direction, product;
+
+  std::vector<HardAttachment> hard;  ///< those whose conditions follow, in their order
+  Conditions conditions;
+  Eigen::MatrixXd mobility;  ///< one for each: see settle()
+  Eigen::PartialPivLU<Eigen::MatrixXd> mobility_factor;
 };
 
 /// The pairs that a body of an island is in.
@@ -37,8 +49,8 @@ struct Incidence {
 /// Bodies that touch in a step and the contacts between them: what one step of all of them minimises, the sum of their
 /// own potentials and that of the contacts, in the unknowns of all. For newton_minimise. Small islands are factorised;
 /// larger ones, and those with bodies in full space, solve by conjugate gradients, preconditioned by the factors of the
-/// bodies' own Hessians or what stands for them. Sums are taken in the order of bodies and pairs, whatever the number
-/// of threads.
+/// bodies' own Hessians or what stands for them. Hard attachments between bodies are Conditions, whose A are the
+/// bodies' own Hessians. Sums are taken in the order of bodies and pairs, whatever the number of threads.
 class IslandProblem {
  public:
   static constexpr bool kSeeksLowest = true;
@@ -47,9 +59,13 @@ class IslandProblem {
   IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                 std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
 
-  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
-  PotentialEvaluation evaluate(const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
-  PotentialValue value(const Eigen::VectorXd& x) noexcept;
+  /// With hard attachments: the Hessian at the first iterate `x`, factorised, and x where they hold. False where
+  /// numbers are not finite.
+  bool begin(Eigen::VectorXd& x, NewtonReport& report) noexcept;
+
+  PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
+  PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
+  PotentialValue value(Eigen::VectorXd& x) noexcept;
   void hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept;
   void accept(PotentialEvaluation& evaluation) noexcept;
 
@@ -66,6 +82,12 @@ class IslandProblem {
   const WorldBody& first(const PairContact& pair) const noexcept;
   const WorldBody& second(const PairContact& pair) const noexcept;
   void place(const Eigen::VectorXd& x) noexcept;
+  bool has_hard() const noexcept { return !workspace_.hard.empty(); }
+  void collect_hard();
+  double set_conditions(const Eigen::VectorXd& x) noexcept;
+  void set_condition_directions() noexcept;
+  void hold(Eigen::VectorXd& x) noexcept;
+  double take_condition_forces(Eigen::VectorXd& gradient) noexcept;
   PotentialEvaluation evaluate_all(const Eigen::VectorXd& x, bool is_first, Eigen::VectorXd& gradient) noexcept;
   PotentialEvaluation finish_full(std::size_t i, PotentialEvaluation evaluation) const noexcept;
   void assemble() noexcept;

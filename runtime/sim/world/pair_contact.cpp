@@ -43,7 +43,13 @@ void PairContact::reset(int first, int second, const HeldPair* held) {
   held_ = held;
   has_first_ = is_abandoned_ = false;
   account_ = start_energy_ = 0;
+  attachment_count_ = 0;
   for (BodyCandidates& candidates : candidates_) candidates.all.clear();
+}
+
+void PairContact::attach(Attachment& attachment, int side, const WorldBody& first, const WorldBody& second) {
+  if (attachment_count_ == attachments_.size()) attachments_.emplace_back();
+  attachments_[attachment_count_++].begin(attachment, side, first, second);
 }
 
 void PairContact::gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin) {
@@ -120,6 +126,16 @@ double PairContact::spring_energy() const noexcept {
   return sum;
 }
 
+double PairContact::attached_energy() const noexcept {
+  double sum = 0;
+  for (const PairAttachment& own : attachments()) sum += own.spring_energy();
+  return sum;
+}
+
+void PairContact::add_springs(int side, ContactSums& sums) const noexcept {
+  for (const PairAttachment& own : attachments()) own.add_spring(side, sums);
+}
+
 double PairContact::way_since_first(const WorldBody& first, const WorldBody& second) const noexcept {
   if (first.full || second.full) return std::numeric_limits<double>::infinity();
   return first.way_bound(first_[0], first_q_[0]) + second.way_bound(first_[1], first_q_[1]);
@@ -128,6 +144,8 @@ double PairContact::way_since_first(const WorldBody& first, const WorldBody& sec
 void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
   sums_[0].set_zero(first.state.q.size());
   sums_[1].set_zero(second.state.q.size());
+  for (PairAttachment& own : attachments())
+    if (own.is_spring()) own.evaluate(first, second);
   const bool is_first = !has_first_;
   if (is_first) {
     has_first_ = true;
@@ -145,12 +163,14 @@ void PairContact::evaluate(const WorldBody& first, const WorldBody& second) {
   contact.set_clearances(second.pose(), first.pose(), candidates_[1]);
 }
 
-double PairContact::potential(const WorldBody& first, const WorldBody& second) const noexcept {
+double PairContact::potential(const WorldBody& first, const WorldBody& second) noexcept {
   const BodyContact contact(half_);
   const double way = way_since_first(first, second);
-  return see(first, second, [&](const auto& a, const auto& b) {
-    return contact.potential(a, b, way, candidates_[0]) + contact.potential(b, a, way, candidates_[1]);
-  });
+  double springs = 0;
+  for (PairAttachment& own : attachments()) springs += own.potential(first, second);
+  return springs + see(first, second, [&](const auto& a, const auto& b) {
+           return contact.potential(a, b, way, candidates_[0]) + contact.potential(b, a, way, candidates_[1]);
+         });
 }
 
 void PairContact::set_columns(const WorldBody& first, const WorldBody& second) {
@@ -159,7 +179,23 @@ void PairContact::set_columns(const WorldBody& first, const WorldBody& second) {
     used_[1] = BodyContact::stiffness_columns(b, a, candidates_[1], own_columns_[1], other_columns_[1]);
   });
   if (first.full || second.full) set_directions();
+  add_spring_columns();
   if (is_own()) own_columns_[0].leftCols(used_[0]) -= other_columns_[0].leftCols(used_[0]);
+}
+
+/// Springs of attachments, as if contacts of the first's vertices.
+void PairContact::add_spring_columns() {
+  for (const PairAttachment& spring : attachments()) {
+    if (!spring.is_spring()) continue;
+    const double root = std::sqrt(spring.stiffness());
+    const auto add = [&](const Eigen::MatrixXd& gradients, double sign, Eigen::MatrixXd& columns) {
+      if (columns.cols() < used_[0] + 3) columns.conservativeResize(gradients.rows(), used_[0] + 3);
+      columns.middleCols<3>(used_[0]) = sign * root * gradients.leftCols<3>();
+    };
+    add(spring.gradients(0), 1, own_columns_[0]);
+    add(spring.gradients(1), -1, other_columns_[0]);
+    used_[0] += 3;
+  }
 }
 
 /// Those of the columns.
@@ -278,6 +314,8 @@ Eigen::Vector3d PairContact::torque_correction(const WorldBody& first, const Eig
       sum -= (is_own() ? 1 : 0.5) * apart.cross(candidate.force);
     }
   }
+  for (const PairAttachment& own : attachments())
+    sum += own.torque_correction(first.placement.position - way_first, second.placement.position - way_second);
   return sum;
 }
 

@@ -2,9 +2,11 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <span>
 #include <vector>
 
 #include "runtime/sim/contact/body_contact.h"
+#include "runtime/sim/world/pair_attachment.h"
 #include "runtime/sim/world/world_body.h"
 
 namespace exmat::runtime {
@@ -28,7 +30,7 @@ struct BodyTouch {
 };
 
 /// Two bodies that may touch in a step, or a body that may touch itself: each one's vertices against the other's
-/// surface, with half of the law.
+/// surface, with half of the law. Two bodies that are attached to each other are a pair, too, without contacts.
 ///
 /// A pair keeps an account of its energy: what its contacts took from the bodies and have not given back. Where a step
 /// begins vertices come in and normals turn, so that springs would hold what nobody put into them: those that push are
@@ -45,6 +47,8 @@ class PairContact {
   }
   /// Bodies and what they remember; nothing is met yet.
   void reset(int first, int second, const HeldPair* held);
+  /// After that: an attachment of the body of this side to the other.
+  void attach(Attachment& attachment, int side, const WorldBody& first, const WorldBody& second);
 
   /// Its bodies are called by these numbers from now on.
   void number(int first, int second) noexcept { bodies_ = {first, second}; }
@@ -54,7 +58,11 @@ class PairContact {
   bool touched() const noexcept {  ///< in the last step
     return held_ != nullptr && !(held_->held[0].empty() && held_->held[1].empty());
   }
-  bool empty() const noexcept { return candidates_[0].all.empty() && candidates_[1].all.empty(); }
+  bool empty() const noexcept {
+    return candidates_[0].all.empty() && candidates_[1].all.empty() && attachment_count_ == 0;
+  }
+  std::span<PairAttachment> attachments() noexcept { return {attachments_.data(), attachment_count_}; }
+  std::span<const PairAttachment> attachments() const noexcept { return {attachments_.data(), attachment_count_}; }
 
   /// The candidates of one side's vertices; the other's surface is placed. `margin` [m].
   void gather(const ContactLaw& law, int side, const WorldBody& own, WorldBody& other, double margin);
@@ -70,14 +78,17 @@ class PairContact {
   double account() const noexcept { return account_; }            ///< [J]
   double start_energy() const noexcept { return start_energy_; }  ///< springs at the start of the step [J]
   double spring_energy() const noexcept;                          ///< at the last evaluation [J]
+  double attached_energy() const noexcept;                        ///< likewise that of the springs of attachments
   /// The step was not taken: the pair remembers what it did before.
   void abandon() noexcept { is_abandoned_ = true; }
 
   // At the iterates of the bodies.
 
   void evaluate(const WorldBody& first, const WorldBody& second);
-  double potential(const WorldBody& first, const WorldBody& second) const noexcept;
+  double potential(const WorldBody& first, const WorldBody& second) noexcept;
   const ContactSums& sums(int side) const noexcept { return sums_[static_cast<std::size_t>(side)]; }
+  /// Adds what the springs of attachments do to a side's body.
+  void add_springs(int side, ContactSums& sums) const noexcept;
 
   /// Stiffness as products of columns, about world axes.
   void set_columns(const WorldBody& first, const WorldBody& second);
@@ -120,6 +131,7 @@ class PairContact {
   template <class Work>
   void for_full(int side, const FullMember& member, const Work& work) const;
   void set_directions();
+  void add_spring_columns();
   /// Bound on the way of vertices of one and the surface of the other since the first evaluation [m].
   double way_since_first(const WorldBody& first, const WorldBody& second) const noexcept;
 
@@ -131,6 +143,8 @@ class PairContact {
   bool has_first_ = false;  // evaluation; where the bodies were in it
   std::array<Placement, 2> first_{};
   std::array<Eigen::VectorXd, 2> first_q_;
+  std::vector<PairAttachment> attachments_;  // the first of them, those of the step
+  std::size_t attachment_count_ = 0;
   std::array<NearVertices, 2> near_{};
   std::array<BodyCandidates, 2> candidates_;  // vertices of the first, of the second
   std::array<ContactSums, 2> sums_;           // of the first, of the second

@@ -56,6 +56,19 @@ void World::wake_neighbours(int body) {
     if (held.first == body) wake(state(held.second));
     if (held.second == body) wake(state(held.first));
   }
+  for (int own = 0; own < count(); ++own)
+    for (const Attachment& attachment : state(own).attachments) {
+      if (!attachment.other) continue;
+      if (own == body) wake(state(attachment.other->body));
+      if (attachment.other->body == body) wake(state(own));
+    }
+}
+
+bool World::is_attached(int body) const noexcept {
+  for (int own = 0; own < count(); ++own)
+    for (const Attachment& attachment : state(own).attachments)
+      if (attachment.other && attachment.holds() && (own == body || attachment.other->body == body)) return true;
+  return false;
 }
 
 void World::forget(int body) {
@@ -76,7 +89,9 @@ void World::remove(int body) {
   const FullModel* const full = at(body).kind.full;
   if (full != nullptr && std::ranges::count(bodies_, full, [](const Member& own) { return own.kind.full; }) == 1)
     std::erase_if(idle_full_, [=](const auto& idle) { return idle.first == full; });
+  std::erase_if(state(body).attachments, [](const Attachment& own) { return own.other.has_value(); });
   bodies_.erase(bodies_.begin() + body);
+  for (const Member& member : bodies_) forget_body(body, member.state->attachments);
   if (!island_of_.empty()) island_of_.erase(island_of_.begin() + body);
   const auto renumber = [=](int& number) { number -= number > body ? 1 : 0; };
   std::erase(touching_, body);
@@ -159,14 +174,25 @@ void World::prepare(int threads) {
 }
 
 /// Frames that a motion moves go where it has them at the end of the step; what broke bears nothing.
-void World::move_attachments() noexcept {
-  for (const Member& own : bodies_)
-    for (Attachment& attachment : own.state->attachments) {
-      attachment.follow(own.state->time, static_cast<double>(own.state->step + 1) * own.kind.scene->time_step);
-      if (!attachment.broken) continue;
-      attachment.force.setZero();
-      attachment.torque.setZero();
+void World::move_attachments() {
+  links_.clear();
+  for (int i = 0; i < count(); ++i)
+    for (Attachment& attachment : state(i).attachments) {
+      attachment.follow(state(i).time, static_cast<double>(state(i).step + 1) * scene(i).time_step);
+      if (attachment.broken) {
+        attachment.force.setZero();
+        attachment.torque.setZero();
+      } else if (attachment.other) {
+        const int other = attachment.other->body;
+        links_.push_back({std::minmax({i, other}), i < other ? 0 : 1, &attachment});
+      }
     }
+  std::ranges::stable_sort(links_, {}, &Link::bodies);
+}
+
+std::span<const World::Link> World::links_of(const std::pair<int, int>& bodies) const noexcept {
+  const auto found = std::ranges::equal_range(links_, bodies, {}, &Link::bodies);
+  return {found.begin(), found.end()};
 }
 
 /// Scratch for the first body of a kind that enters full space: later ones make theirs as they enter.
@@ -383,6 +409,10 @@ void World::find_pairs(int threads) {
     return !at(pair.first).kind.scene->meeting.meets(at(pair.second).kind.scene->meeting);
   });
   const std::size_t others = near_.size();
+  for (const Link& link : links_)
+    if (!std::ranges::binary_search(near_.begin(), near_.begin() + static_cast<std::ptrdiff_t>(others), link.bodies) &&
+        (near_.size() == others || near_.back() != link.bodies))
+      near_.push_back(link.bodies);
   for (const int body : touching_) {
     const WorldBody& own = touching(body);
     if (own.touching->may_meet_itself(own.state.q, own.state.v, own.scene.time_step)) near_.emplace_back(body, body);
@@ -427,7 +457,8 @@ double World::margin_between(int own, int other) const noexcept {
 }
 
 /// Candidates of pairs of which one is awake, the surface of one body at a time: what is computed of its shape serves
-/// all that are near.
+/// all that are near. Bodies that are attached to each other do not touch: contacts where the patches meet would work
+/// against the attachment.
 void World::gather(int threads) {
   const StageTimer timer(profile_, WorldStage::kCandidates);
   for (std::vector<Incidence>& pairs : against_) pairs.clear();
@@ -435,6 +466,11 @@ void World::gather(int threads) {
     const auto [first, second] = near_[p];
     if (is_gathered_[p] || (at(first).asleep && at(second).asleep)) continue;
     is_gathered_[p] = true;
+    if (const std::span<const Link> links = links_of(near_[p]); !links.empty()) {
+      pairs_[p]->reset(first, second, nullptr);
+      for (const Link& link : links) pairs_[p]->attach(*link.attachment, link.side, touching(first), touching(second));
+      continue;
+    }
     pairs_[p]->reset(first, second, held_of(first, second));
     against_[static_cast<std::size_t>(second)].push_back({static_cast<int>(p), 0});
     if (first != second) against_[static_cast<std::size_t>(first)].push_back({static_cast<int>(p), 1});
@@ -451,9 +487,10 @@ void World::gather(int threads) {
   });
 }
 
-/// True if the two bodies of a pair step together: they may touch, or they sleep in touch.
+/// True if the two bodies of a pair step together: they may touch or are attached, or they sleep like that.
 bool World::is_linked(std::size_t pair) const {
-  return is_gathered_[pair] ? !pairs_[pair]->empty() : held_of(near_[pair].first, near_[pair].second) != nullptr;
+  if (is_gathered_[pair]) return !pairs_[pair]->empty();
+  return held_of(near_[pair].first, near_[pair].second) != nullptr || !links_of(near_[pair]).empty();
 }
 
 void World::unite() {
@@ -579,6 +616,11 @@ Energies World::energies() const {
     sum.potential += own.potential;
   }
   for (const HeldPair& pair : held_) sum.contact += pair.energy;
+  for (int i = 0; i < count(); ++i)
+    for (const Attachment& own : state(i).attachments)
+      if (own.holds() && own.other)
+        sum.contact +=
+            spring_energy_of(own, pose_of(model(i), state(i)), pose_of(model(own.other->body), state(own.other->body)));
   return sum;
 }
 

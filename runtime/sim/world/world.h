@@ -2,6 +2,7 @@
 
 #include <limits>
 #include <memory>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -20,7 +21,7 @@ struct WorldBodyStart {
 struct WorldReport {
   int asleep = 0;          ///< bodies that slept through it
   int pairs = 0;           ///< pairs of bodies with overlapping bounds
-  int touching_pairs = 0;  ///< pairs among these with vertices that may touch
+  int touching_pairs = 0;  ///< pairs with vertices that may touch, or that are attached to each other
   int islands = 0;         ///< groups of touching bodies, each solved together
   int largest_island = 0;  ///< bodies
   int unconverged_islands = 0;
@@ -28,11 +29,11 @@ struct WorldReport {
 };
 
 /// The one thing that is stepped: 1 to N bodies, each of which may touch obstacles, other bodies and itself. A step
-/// asks who sleeps and who may touch whom. Bodies that touch, directly or through others, are an island, solved
-/// together, so that a stiff pile converges as one body does. All others go side by side or one by one (Crowd). An
-/// island falls asleep as a whole, and wakes as a whole when something acts on one of its bodies or comes near it.
-/// Linear and angular momentum of free bodies among themselves are conserved to rounding. Results do not depend on the
-/// number of threads. docs/step_in_detail.md, "Bodies that touch".
+/// asks who sleeps and who may touch whom. Bodies that touch or are attached to each other, directly or through others,
+/// are an island, solved together, so that a stiff pile converges as one body does. All others go side by side or one
+/// by one (Crowd). An island falls asleep as a whole, and wakes as a whole when something acts on one of its bodies or
+/// comes near it. Linear and angular momentum of free bodies among themselves are conserved to rounding. Results do not
+/// depend on the number of threads. docs/step_in_detail.md, "Bodies that touch".
 class World {
  public:
   /// `law` between any two bodies and between parts of one whose surface meets itself.
@@ -52,6 +53,8 @@ class World {
   void fit(int body);
   /// To be called after a host attached the body in its modes: scratch holds the attachments. Steps do it themselves.
   void fit_attachments(int body);
+  /// True if the body and another are attached to each other.
+  bool is_attached(int body) const noexcept;
   /// True if a body may touch others or itself.
   bool may_touch(int body) const noexcept { return at(body).touching != nullptr; }
 
@@ -110,7 +113,7 @@ class World {
 
   /// Energies of one body [J].
   Energies energies(int body) const noexcept;
-  /// Kinetic, elastic and potential energy of all bodies, and that of the contacts between them [J].
+  /// Kinetic, elastic and potential energy of all bodies, and that of contacts and springs between them [J].
   Energies energies() const;
 
  private:
@@ -126,11 +129,19 @@ class World {
     bool is_bounded = false;                ///< its ball is that of where it is: it has slept since
   };
 
+  /// An attachment of one body to another.
+  struct Link {
+    std::pair<int, int> bodies;  ///< in ascending order
+    int side;                    ///< whose it is
+    Attachment* attachment;
+  };
+
   const Member& at(int body) const noexcept { return bodies_[static_cast<std::size_t>(body)]; }
   Member& at(int body) noexcept { return bodies_[static_cast<std::size_t>(body)]; }
   WorldBody& touching(int body) const noexcept { return *at(body).touching; }
   void wake_neighbours(int body);
-  void move_attachments() noexcept;
+  void move_attachments();
+  std::span<const Link> links_of(const std::pair<int, int>& bodies) const noexcept;
   void find_sleepers(int threads);
   void find_contacts(int threads);
   void find_pairs(int threads);
@@ -181,6 +192,7 @@ class World {
   std::vector<double> margins_;               // of each body: how far it may go beyond its centre's straight way [m]
 
   // State of one step.
+  std::vector<Link> links_;  // in ascending order of the bodies
   bool found_contacts_ = false;
   std::vector<int> order_, parents_, island_of_, place_in_island_;
   std::vector<std::pair<int, int>> near_, last_near_;

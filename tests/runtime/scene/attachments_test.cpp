@@ -138,6 +138,7 @@ TEST_F(SceneAttachments, ThatCannotBeAreRefusedWithTheirPlace) {
   EXPECT_THAT(refusal(end + R"(, "to": {"obstacle": 0}})"),
               HasSubstr("/attachments/0/to/obstacle: expected no obstacle"));
   EXPECT_THAT(refusal(end + R"(, "to": {"body": 0}})"), HasSubstr("/attachments/0/to/body: expected \"world\" or an"));
+  EXPECT_THAT(refusal(end + R"(, "to": {"vertices": {"ids": [0]}}})"), HasSubstr("/attachments/0/to: expected {\"obs"));
   EXPECT_THAT(refusal(end + R"(, "to": {}})"), HasSubstr("/attachments/0/to: expected"));
   EXPECT_THAT(refusal(end + R"(, "kind": "glue"})"), HasSubstr(R"(/attachments/0/kind: expected "fixed", "ball" or)"));
   EXPECT_THAT(refusal(end + R"(, "stiffness": 5})"), HasSubstr("/attachments/0/stiffness: expected no stiffness"));
@@ -182,7 +183,85 @@ TEST_F(SceneAttachments, OfScenesOfSeveralBodiesNameThem) {
   EXPECT_THAT(refusal(end + "4}"), HasSubstr("/attachments/0/body: expected a body of the scene, 0 to 3"));
 }
 
-// In their modes islands take springs alone.
+/// Scenes of three bars in a row, the first two of one kind, with attachments between their ends.
+class ScenesOfAttachedBodies : public SceneAttachments {
+ protected:
+  WorldConfig world(const std::string& attachments, const std::string& more = "", const char* mask = "") const {
+    test::write_file(folder_ / "world.json",
+                     fmt::format(R"({{"time_step": 0.01, "steps": 20, "gravity": [0, 0, -9.81]{0}, "bodies": [
+      {{"name": "bar", "bundle": "bar.h5", "grid": {{"counts": [2, 1, 1], "spacing": [1, 0, 0]}}{2}}},
+      {{"name": "rod", "bundle": "bar.h5", "poses": "rod.txt"{2}}}], "attachments": [{1}]}})",
+                                 more, attachments, mask));
+    test::write_file(folder_ / "rod.txt", "2 0 0\n");
+    return load_world(folder_ / "world.json");
+  }
+  static std::string between(const std::string& own, const std::string& other, const std::string& more) {
+    return R"({"body": )" + own + R"(, "vertices": {"box": {"min": [-0.01, -1, -1], "max": [0.01, 1, 1]}}, "to":
+      {"body": )" +
+           other + R"(, "vertices": {"box": {"min": [0.99, -1, -1], "max": [1.01, 1, 1]}}})" + more + "}";
+  }
+  std::string refusal(const std::string& attachments, const std::string& more = "") const {
+    try {
+      const WorldConfig config = world(attachments, more);
+      const LoadedWorld loaded = load_world_run(config);
+      const Bodies bodies(loaded, config);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "none";
+  }
+};
+
+// Bars that fall as one: all have the same momentum, so that nothing is exerted but by their springs' start.
+TEST_F(ScenesOfAttachedBodies, AreOneIslandWhoeverMayTouchWhom) {
+  for (const char* mask : {"", R"(, "mask": 0)"}) {
+    const WorldConfig config =
+        world(between("\"bar_1\"", "\"bar_0\"", "") + ", " + between("\"rod\"", "1", R"(, "kind": "ball")"), "", mask);
+    const LoadedWorld loaded = load_world_run(config);
+    Bodies bodies(loaded, config);
+    EXPECT_EQ(bodies.step().largest_island, 3) << mask;
+    EXPECT_TRUE(bodies.world().state(0).attachments.empty());
+    const State &first = bodies.world().state(0), &last = bodies.world().state(2);
+    EXPECT_NEAR(free_state(first).linear_momentum[2], free_state(last).linear_momentum[2], 1e-9);
+  }
+}
+
+TEST_F(ScenesOfAttachedBodies, AreTakenUpFromAStateToTheLastBit) {
+  const std::string attachments = between("\"bar_1\"", "\"bar_0\"", R"(, "kind": "spring", "damping": 30)") + ", " +
+                                  between("\"rod\"", "\"bar_1\"", "") + ", " +
+                                  R"({"body": "bar_0", "vertices": {"point": [0, 0, 0]}, "kind": "spring"})";
+  WorldConfig config = world(attachments, R"(, "output": {"trajectory": "t.h5", "every": 1})");
+  const LoadedWorld loaded = load_world_run(config);
+  const RunSummary whole = run(loaded, config);
+  config.steps = 10;
+  run(loaded, config, {.dump_state = folder_ / "state.json"});
+  EXPECT_EQ(run(loaded, config, {.from_state = folder_ / "state.json"}).state_hash, whole.state_hash);
+  const Hdf5File file = Hdf5File::open(folder_ / "t.h5");
+  EXPECT_EQ(file.open_dataset("/bodies/rod/attachments/force").sizes(), (std::vector<std::int64_t>{11, 1, 3}));
+}
+
+TEST_F(ScenesOfAttachedBodies, ThatCannotBeAreRefusedWithTheirPlace) {
+  EXPECT_EQ(refusal(between("1", "0", "")), "none");
+  EXPECT_THAT(refusal(between("1", "1", "")), HasSubstr("/attachments/0/to/body: expected another body than the one"));
+  EXPECT_THAT(refusal(between("\"rod\"", "\"bar\"", "")),
+              HasSubstr(R"(/attachments/0/to/body: expected one of "bar_0" to "bar_1")"));
+  EXPECT_THAT(refusal(between("\"rod\"", "\"baar_1\"", "")),
+              HasSubstr(R"(/attachments/0/to/body: expected "bar", "bar_0" to "bar_1" or "rod")"));
+  EXPECT_THAT(refusal(between("\"rod\"", "0", R"(, "motion": [{"time": 0}])")),
+              HasSubstr("/attachments/0/motion: expected no motion, since the other body"));
+  EXPECT_THAT(refusal(R"({"body": 1, "vertices": {"ids": [0]}, "to": {"body": 0}})"),
+              HasSubstr("/attachments/0/to/vertices: expected vertices of that body"));
+  EXPECT_THAT(refusal(R"({"body": 1, "vertices": {"ids": [0]}, "to": {"body": 0, "vertices": {"ids": [100000]}}})"),
+              HasSubstr("/attachments/0/to/vertices"));
+  EXPECT_THAT(refusal(R"({"body": 1, "vertices": {"ids": [0]}, "to": {"body": 0, "vertices": {"ids": [0, 1]}}})"),
+              HasSubstr("/attachments/0/vertices: expected three vertices or more"));
+  EXPECT_THAT(refusal(R"({"body": 1, "vertices": {"ids": [0]}, "to": {"body": 0, "obstacle": 0}})"),
+              HasSubstr("/attachments/0/to: expected an obstacle or a body"));
+  EXPECT_THAT(refusal(between("1", "0", ""), R"(, "space": "auto")"),
+              HasSubstr("/attachments/0/to: expected two bodies of space reduced"));
+}
+
+// In their modes islands take springs of frames alone.
 TEST_F(SceneAttachments, OfBodiesThatMayTouchAreSprings) {
   const auto refusal = [&](const std::string& members) -> std::string {
     test::write_file(folder_ / "world.json", R"({"bodies": [
