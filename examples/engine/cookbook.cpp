@@ -216,6 +216,16 @@ std::int64_t pin(exmat::BodyRef body, const std::vector<std::int64_t>& vertices,
   return body.attach(vertices, frame, spring);
 }
 
+// recipe: tying
+/// Two bodies of a world, by patches of the object that each has, from where they are now.
+std::int64_t tie(exmat::BodyRef body, const std::vector<std::int64_t>& vertices, exmat::BodyRef other,
+                 const std::vector<std::int64_t>& other_vertices) {
+  exmat_attachment ball = exmat::default_attachment();
+  ball.kind = EXMAT_ATTACHMENT_BALL;
+  ball.break_force = 1e6;  // [N]
+  return body.attach_to(vertices, other, other_vertices, ball);
+}
+
 // recipe: impulses
 /// A joint between a point of a body and a ball of the engine, solved once between two steps.
 void join(exmat::BodyRef body, const exmat::Points& point, Ball& ball) {
@@ -386,6 +396,9 @@ int main(int argc, char** argv) {
     world.step(48);
     body.read_weights(weights);
     std::printf("reached      with weight %.2f of the twist\n", weights[1]);
+
+    tie(body, {corner[0]}, world.body(0), {corner[0]});
+    std::printf("tied         %d bodies step as one\n", static_cast<int>(world.step(48).largest_island));
   } catch (const exmat::Error& error) {
     std::fprintf(stderr, "cookbook: %s\n", error.what());
     return error.status();

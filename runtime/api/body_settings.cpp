@@ -7,6 +7,7 @@
 #include "exmat/exmat.h"
 #include "runtime/api/arguments.h"
 #include "runtime/api/handles.h"
+#include "runtime/api/world_handle.h"
 
 using namespace exmat;           // NOLINT(google-build-using-namespace)
 using namespace exmat::runtime;  // NOLINT(google-build-using-namespace)
@@ -90,7 +91,8 @@ exmat_status exmat_body_set_space(exmat_body* body, std::int32_t space) noexcept
     return fail(EXMAT_INVALID_ARGUMENT, "%s: space = %" PRId32 ": expected EXMAT_SPACE_FULL: the body is on a skeleton",
                 __func__, space);
   const bool in_modes = space == EXMAT_SPACE_REDUCED;
-  if (is_held(body->state.attachments) && in_modes != (body->scene.space.space == Space::kReduced))
+  const bool held = is_held(body->state.attachments) || body->world->world.is_attached(place_of(*body));
+  if (held && in_modes != (body->scene.space.space == Space::kReduced))
     return fail(EXMAT_INVALID_ARGUMENT,
                 "%s: space = %" PRId32 ": a body that is held stays in its modes, or in full or auto: detach it first",
                 __func__, space);

@@ -97,6 +97,8 @@ void leave_world(exmat_body& body) noexcept {
   exmat_world& world = *body.world;
   const int place = place_of(body);
   world.world.remove(place);
+  std::erase_if(body.start.attachments, [](const Attachment& own) { return own.other.has_value(); });
+  for (const exmat_world::Member& member : world.members) forget_body(place, member.body->start.attachments);
   world.members.erase(world.members.begin() + place);
   body.world = nullptr;
 }
@@ -164,6 +166,7 @@ std::unique_ptr<exmat_world> load_world(const WorldConfig& config) {
                                                                config.is_list ? 0 : 1, contact.release});
   world->world.set_full_bodies(config.full_bodies);
   take_obstacles(loaded.obstacles, *world);
+  std::vector<State> starts = starts_of(loaded);
   std::vector<std::shared_ptr<const Source>> sources;
   for (std::size_t i = 0; i < loaded.kinds.size(); ++i) {
     LoadedKind& kind = loaded.kinds[i];
@@ -171,9 +174,10 @@ std::unique_ptr<exmat_world> load_world(const WorldConfig& config) {
     sources.push_back(std::make_shared<Source>(Source{bundle_of(config.bodies[i].scene), std::move(kind.loaded)}));
     if (kind.surface) world->surfaces[sources.back()] = kind.surface;
   }
-  for (LoadedBody& body : loaded.bodies) {
+  for (std::size_t i = 0; i < loaded.bodies.size(); ++i) {
+    LoadedBody& body = loaded.bodies[i];
     const std::shared_ptr<const Source>& source = sources[body.kind];
-    auto made = std::make_unique<exmat_body>(source, start_of(source->loaded, body));
+    auto made = std::make_unique<exmat_body>(source, std::move(starts[i]));
     join(*world, loaded.kinds[body.kind].surface, std::move(body.name), *made);
     hold_by_copies(loaded.obstacles, *made);
     static_cast<void>(made.release());

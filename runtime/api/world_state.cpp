@@ -108,6 +108,41 @@ void visit_motion(Archive& archive, World& world) {
 
 // ---- what snapshots hold beside
 
+template <typename Archive, typename Patch>
+void visit_patch(Archive& archive, Patch& patch, const exmat_body& body) {
+  archive.number(patch.square);
+  Eigen::Index rows = patch.rows.rows(), axes = patch.axes.cols();
+  rows = static_cast<Eigen::Index>(archive.whole("rows", rows, 13));
+  axes = static_cast<Eigen::Index>(archive.whole("axes", axes, 4));
+  archive.array(patch.rows, rows, body.model().modes());
+  archive.array(patch.rest, rows, 1);
+  archive.array(patch.axes, 3, axes);
+}
+
+/// The end at another body, if there is one.
+template <typename Archive, typename Held>
+void visit_other_end(Archive& archive, Held& held, const exmat_body& body) {
+  bool has_other = held.other.has_value();
+  has_other = archive.flag("other", has_other);
+  OtherEnd unused;
+  if constexpr (!std::is_const_v<Held>) {
+    if (!archive.checks() && !has_other) held.other.reset();
+    if (!archive.checks() && has_other && !held.other) held.other.emplace();
+  }
+  if (!has_other) return;
+  auto& other = *(archive.checks() ? &unused : &*held.other);
+  const auto& members = body.world->members;
+  const auto number = archive.whole("other body", other.body, static_cast<double>(members.size()));
+  const exmat_body& holding = *members[number].body;
+  const std::size_t count = archive.size("other vertices", other.vertices);
+  std::int32_t none = 0;
+  for (std::size_t k = 0; k < count; ++k)
+    archive.whole("vertex", *(archive.checks() ? &none : &other.vertices[k]),
+                  static_cast<double>(holding.source->loaded.summary.vertices));
+  visit_patch(archive, other.patch, holding);
+  archive.array(other.offset);
+}
+
 template <typename Archive, typename Held>
 void visit_attachment(Archive& archive, Held& held, const exmat_body& body) {
   archive.whole("id", held.id, kMostSteps);
@@ -123,18 +158,14 @@ void visit_attachment(Archive& archive, Held& held, const exmat_body& body) {
   const auto points = static_cast<Eigen::Index>(count);
   archive.array(held.shares, points, 1);
   archive.array(held.places, 3, points);
-  for (auto* number : {&held.stiffness, &held.damping, &held.patch.square}) archive.number(*number);
+  for (auto* number : {&held.stiffness, &held.damping}) archive.number(*number);
   visit_bound(archive, held.break_force);
-  Eigen::Index rows = held.patch.rows.rows(), axes = held.patch.axes.cols();
-  rows = static_cast<Eigen::Index>(archive.whole("rows", rows, 13));
-  axes = static_cast<Eigen::Index>(archive.whole("axes", axes, 4));
-  archive.array(held.patch.rows, rows, body.model().modes());
-  archive.array(held.patch.rest, rows, 1);
-  archive.array(held.patch.axes, 3, axes);
+  visit_patch(archive, held.patch, body);
   for (auto* rotation : {&held.rotation, &held.rotation_before}) archive.array(*rotation);
   for (auto* place : {&held.position, &held.position_before, &held.mean, &held.mean_before, &held.force, &held.torque})
     archive.array(*place);
   archive.flag("broken", held.broken);
+  visit_other_end(archive, held, body);
 }
 
 /// The attachment follows its motion, which its scene has given it, or its host moves it.
@@ -296,7 +327,7 @@ void visit_snapshot(Archive& archive, World& world) {
 /// A snapshot begins with this; its numbers follow.
 struct Header {
   char format[8] = {'e', 'x', 'm', 'a', 't', 's', 'n', 'p'};
-  std::uint64_t version = 1;
+  std::uint64_t version = 2;
   std::uint64_t world = 0;    ///< fingerprint of the world
   std::uint64_t numbers = 0;  ///< that follow
   std::uint64_t sum = 0;      ///< of their bits

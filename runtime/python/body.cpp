@@ -197,15 +197,27 @@ std::span<const double, 12> frame_of(const Numbers& frame) {
   return std::span<const double, 12>(read_span(frame).data(), 12);
 }
 
-std::int64_t attach(BodyObject& body, const py::object& vertices, const Numbers& frame, const std::string& kind,
-                    double stiffness, double damping, double break_force) {
-  const Ids ids = whole_numbers(vertices, "vertices");
+exmat_attachment attachment_of(const std::string& kind, double stiffness, double damping, double break_force) {
   exmat_attachment attachment = default_attachment();
   attachment.kind = number_of(py::str(kind), "kind", {"fixed", "ball", "spring"});
   attachment.stiffness = stiffness;
   attachment.damping = damping;
   attachment.break_force = break_force;
-  return body.get().attach(read_span(ids), frame_of(frame), attachment);
+  return attachment;
+}
+
+std::int64_t attach(BodyObject& body, const py::object& vertices, const Numbers& frame, const std::string& kind,
+                    double stiffness, double damping, double break_force) {
+  const Ids ids = whole_numbers(vertices, "vertices");
+  return body.get().attach(read_span(ids), frame_of(frame), attachment_of(kind, stiffness, damping, break_force));
+}
+
+std::int64_t attach_to(BodyObject& body, const py::object& vertices, BodyObject& other,
+                       const py::object& other_vertices, const std::string& kind, double stiffness, double damping,
+                       double break_force) {
+  const Ids ids = whole_numbers(vertices, "vertices"), other_ids = whole_numbers(other_vertices, "other_vertices");
+  return body.get().attach_to(read_span(ids), other.get(), read_span(other_ids),
+                              attachment_of(kind, stiffness, damping, break_force));
 }
 
 void bind_settings(BodyClass& type) {
@@ -252,6 +264,15 @@ void bind_settings(BodyClass& type) {
            "break_force [N] it lets go. Of a body of space \"reduced\", \"fixed\" holds their mean and the rotation "
            "that "
            "fits them best. Returns its id.")
+      .def(
+          "attach_to", &attach_to, py::arg("vertices"), py::arg("other"), py::arg("other_vertices"),
+          py::arg("kind") = "fixed", py::arg("stiffness") = 1e4, py::arg("damping") = 0.0,
+          py::arg("break_force") = std::numeric_limits<double>::infinity(),
+          "Attaches `vertices` of the object to `other_vertices` of another body of the same world, from where both "
+          "are now: \"fixed\", the two patches go and turn alike; \"ball\", the mean by mass of `vertices` stays where "
+          "it is in the other's patch; \"spring\", a stiffness [N/m] and a damping [N s/m] pull it there. Both step in "
+          "their modes, and do not touch each other while it holds. Beyond break_force [N] it lets go. Returns its id, "
+          "which is this body's.")
       .def("compliance", &compliance, py::arg("points"),
            "Velocities of k points at the end of the last step, of shape (k, 3) [m/s], and what impulses on their "
            "coordinates make of them in a step, of shape (3k, 3k) [1/kg]; of a body that steps in its modes.")

@@ -509,6 +509,8 @@ class Calls {
         std::int64_t id = -1;
         checked(exmat_body_attach(one, vertices.data(), choices_.one_in(8) ? -right : right, &attachment,
                                   choices_.numbers(12).data(), choices_.one_in(12) ? nullptr : &id));
+        checked(exmat_body_attach_to(one, vertices.data(), right, body(), vertices.data(), right, &attachment,
+                                     choices_.one_in(12) ? nullptr : &id));
         return;
       }
       case 16: {

@@ -285,7 +285,7 @@ typedef struct exmat_energies {
   double kinetic;   /* of the body in the world [J] */
   double elastic;   /* [J] */
   double potential; /* of gravity, 0 at rest [J] */
-  double contact;   /* of a world: the springs of the contacts between its bodies [J] */
+  double contact;   /* of a world: the springs of contacts and attachments between its bodies [J] */
 } exmat_energies;
 EXMAT_API exmat_status exmat_body_read_energies(const exmat_body* body, exmat_energies* energies) EXMAT_NOEXCEPT;
 
@@ -373,11 +373,21 @@ EXMAT_API exmat_status exmat_attachment_default(exmat_attachment* attachment, si
 
 /* From the next step on, by where `vertices` [count] of the object are now in the frame. None of them may be fixed, or
    held already. `id` of the attachment is the body's own; those that a scene gives it have the ids 0, 1, ... in the
-   scene's order and are there again after a reset. Of a body of space _REDUCED the bundle is read; its modes have to be
-   able to hold the patch, and a body that may touch others is held by springs alone. */
+   scene's order, those to other bodies last, and are there again after a reset. Of a body of space _REDUCED the bundle
+   is read; its modes have to be able to hold the patch, and frames hold a body that may touch others by springs alone.
+ */
 EXMAT_API exmat_status exmat_body_attach(exmat_body* body, const int64_t* vertices, int64_t count,
                                          const exmat_attachment* attachment, const double* frame,
                                          int64_t* id) EXMAT_NOEXCEPT;
+
+/* Attaches the body to `other_vertices` [other_count] of another body of its world, from where both are now: that
+   patch, with its mean and the rotation that fits it best, is the frame. What acts on one body acts on the other
+   with the opposite sign. `id` as above. Both step in their modes (space _REDUCED) in a world without law.apart; they
+   do not touch each other while the attachment holds. Of _FIXED both patches have three vertices or more that are not
+   in a line. Reads the bundles. exmat_body_detach() lets go, and so does taking one of the two out of the world. */
+EXMAT_API exmat_status exmat_body_attach_to(exmat_body* body, const int64_t* vertices, int64_t count, exmat_body* other,
+                                            const int64_t* other_vertices, int64_t other_count,
+                                            const exmat_attachment* attachment, int64_t* id) EXMAT_NOEXCEPT;
 
 /* Puts the frame where it is at the end of the next step, and of those after it until the next call; one of a scene
    follows neither its motion nor its obstacle from then on. */
@@ -386,7 +396,8 @@ EXMAT_API exmat_status exmat_body_move_attachment(exmat_body* body, int64_t id, 
 /* Lets the patch go. */
 EXMAT_API exmat_status exmat_body_detach(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
 
-/* What the body exerts on the frame in the last step: `force` [3] [N] and `torque` [3] about the frame's origin [N m].
+/* What the body exerts on the frame in the last step: `force` [3] [N] and `torque` [3] about the frame's origin [N m];
+   on another body about the point that holds the mean of the patch.
    `broken`: 1 where that was more than the attachment bears. Each may be NULL. */
 EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, int64_t id, double* force,
                                                        double* torque, int32_t* broken) EXMAT_NOEXCEPT;
@@ -397,8 +408,8 @@ EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, i
 
 /* World `velocity` [coordinates = 3k] [m/s] of the points at the end of the last step, and `compliance` [3k x 3k, by
    rows] [1/kg]: the change of these velocities by an impulse of 1 N s on each coordinate, W = J A^-1 J^T with the mass,
-   damping and stiffness of a step in A and what is held by hard attachments held; contacts are left out. Each may be
-   NULL. */
+   damping and stiffness of a step in A and what frames hold by hard attachments held; contacts and attachments to
+   other bodies are left out. Each may be NULL. */
 EXMAT_API exmat_status exmat_body_read_compliance(const exmat_body* body, const exmat_points* points, double* velocity,
                                                   double* compliance, int64_t coordinates) EXMAT_NOEXCEPT;
 

@@ -408,6 +408,15 @@ class BodyRef {
                             frame.data(), &id));
     return id;
   }
+  std::int64_t attach_to(std::span<const std::int64_t> vertices, const BodyRef& other,
+                         std::span<const std::int64_t> other_vertices,
+                         const exmat_attachment& attachment = default_attachment()) {
+    std::int64_t id = 0;
+    check(exmat_body_attach_to(get(), vertices.data(), static_cast<std::int64_t>(vertices.size()), other.get(),
+                               other_vertices.data(), static_cast<std::int64_t>(other_vertices.size()), &attachment,
+                               &id));
+    return id;
+  }
   void move_attachment(std::int64_t id, std::span<const double, 12> frame) {
     check(exmat_body_move_attachment(get(), id, frame.data()));
   }

@@ -100,6 +100,19 @@ void hold(exmat::World& world, const exmat::Points& points, int frame) {
   if (frame == 220) body.set_damping(1, 0.003);
 }
 
+void tie(exmat::World& world, const exmat::Points& points, int frame) {
+  push(world, points, frame);
+  exmat::BodyRef body = world.body(1);
+  const std::array<std::int64_t, 4> own{0, 1, 2, 3}, other{32, 33, 34, 35};
+  static std::array<std::int64_t, 2> held{};
+  exmat_attachment spring = exmat::default_attachment();
+  spring.kind = EXMAT_ATTACHMENT_SPRING;
+  spring.damping = 20;
+  if (frame == 70)
+    held = {body.attach_to(own, world.body(0), other), body.attach_to(own, world.body(2), other, spring)};
+  if (frame == 200) body.detach(held[0]);
+}
+
 bool sleeps(exmat::World& /*world*/, const exmat_world_report& report) { return report.asleep > 0; }
 bool went_full(exmat::World& world, const exmat_world_report& /*report*/) {
   return exmat_body_space(world.body(0).get()) == EXMAT_SPACE_FULL;
@@ -114,6 +127,7 @@ std::vector<Replay> replays() {
   return {
       {"pile", block, sleepy(), 4, {0.004, 0.003, 0.2}, push, "sleep", sleeps},
       {"lanes", bar, posed(), 11, {0, 2, 0}, pose, "contact", touched},
+      {"tied", block, settings(), 3, {0.3, 0, 0.1}, tie, "contact", touched},
       {"held_in_modes", {.free = true}, settings(), 1, {0, 2, 0}, hold, "contact", touched},
       {"auto", block, of_space(EXMAT_SPACE_AUTO), 3, {0, 0.5, 0.1}, hold, "all vertices", went_full},
       {"full",
@@ -278,7 +292,7 @@ TEST_F(BadSnapshots, AreRefusedInWordsAndTheWorldIsAsItWas) {
     }
   Snapshot of_later = good;
   of_later[1] = 9;
-  refuses(of_later, bytes, "version 9: expected 1");
+  refuses(of_later, bytes, "version 9: expected 2");
 
   exmat::World more = make_world(test, model);
   more.add(exmat::Body(model));

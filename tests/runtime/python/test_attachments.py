@@ -185,3 +185,40 @@ def test_a_snapshot_brings_back_what_an_attachment_of_a_scene_follows(free_bundl
         world.restore(snapshot)
         world.step(5)
         assert world.state_hash == after
+
+
+def test_bodies_are_tied_to_each_other(free_bundle):
+    model = exmat.Model(free_bundle, time_step=0.004, gravity=(0, 0, -10), use_contact=True)
+    world, bodies = exmat.World(), [exmat.Body(model), exmat.Body(model)]
+    for body in bodies:
+        world.add(body)
+    vertices, _ = end_of(model)
+    everything = exmat.Points(model, np.arange(model.vertices))
+    xyz = exmat.Body(model).positions(everything, np.empty((model.vertices, 3)))
+    other = np.flatnonzero(xyz[:, 0] > xyz[:, 0].max() - 1e-6)
+    bodies[1].motion = exmat.Motion(position=bodies[1].motion.position + [xyz[:, 0].max() - xyz[:, 0].min(), 0, 0],
+                                    linear_velocity=(0, 1, 0))
+    tied = bodies[1].attach_to(vertices, bodies[0], other, kind="ball")
+    for k in range(1, 40):
+        before = np.array(bodies[1].motion.linear_velocity)
+        world.step(1)
+        rate = (np.array(bodies[1].motion.linear_velocity) - before) / 0.004
+        force, _, broken = bodies[1].attachment_load(tied)
+        assert np.abs(MASS * (rate - [0, 0, -10]) + force).max() < 1e-9 * MASS * 10 and not broken
+    total = sum(np.array(body.motion.linear_velocity) for body in bodies)
+    assert np.abs(total - [0, 1, -2 * 10 * 0.004 * 39]).max() < 1e-12
+    with pytest.raises(exmat.InvalidArgument, match="no frame"):
+        bodies[1].move_attachment(tied, frame_at([0, 0, 0]))
+    with pytest.raises(exmat.InvalidArgument, match="another body"):
+        bodies[1].attach_to(vertices, bodies[1], other)
+    with pytest.raises(exmat.InvalidArgument, match="other_vertices"):
+        bodies[1].attach_to(vertices, bodies[0], [10**6])
+    bodies[1].detach(tied)
+    world.step(1)
+    world.remove(0)
+
+
+def test_bodies_that_touch_obstacles_alone_are_not_tied(free_bundle):
+    body = exmat.Body(exmat.Model(free_bundle))
+    with pytest.raises(exmat.InvalidArgument, match="same world"):
+        body.attach_to([60], exmat.Body(exmat.Model(free_bundle)), [60])
