@@ -219,6 +219,11 @@ export class Body implements Owner {
    * space is "full" or "auto".
    */
   attach(vertices: Numbers, frame: Numbers, attachment?: Attachment): number;
+  /**
+   * Holds vertices of the object by those of another body of the same world from the next step on, as they go and turn;
+   * the attachment's id. Both bodies step in their modes.
+   */
+  attachTo(vertices: Numbers, other: Body, otherVertices: Numbers, attachment?: Attachment): number;
   /** Where the frame [12] is at the end of the next step, and of those after it until the next call. */
   moveAttachment(id: number, frame: Numbers): void;
   detach(id: number): void;

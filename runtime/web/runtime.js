@@ -304,6 +304,13 @@ export class Body extends Owner {
     return module.lend(numbers, (ids) => module.struct("attachment", attachment, (given) => module.lend(ofLength(frame, 12, "frame"), (place) =>
       Number(module.integer64("body_attach", this.handle, ids, BigInt(numbers.length), given, place)))));
   }
+  /** Holds vertices by a patch of another body of the same world from the next step on; the attachment's id. */
+  attachTo(vertices, other, otherVertices, attachment) {
+    const { module } = this, numbers = BigInt64Array.from(vertices, (id) => whole(id, "vertex"));
+    const others = BigInt64Array.from(otherVertices, (id) => whole(id, "vertex of the other body"));
+    return module.lend(numbers, (ids) => module.lend(others, (otherIds) => module.struct("attachment", attachment, (given) =>
+      Number(module.integer64("body_attach_to", this.handle, ids, BigInt(numbers.length), other.handle, otherIds, BigInt(others.length), given)))));
+  }
   moveAttachment(id, frame) {
     this.module.lend(ofLength(frame, 12, "frame"), (address) => this.module.call("body_move_attachment", this.handle, whole(id, "id"), address));
   }

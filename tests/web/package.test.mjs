@@ -126,6 +126,29 @@ test("an attachment holds its vertices where the frame is, and bears the weight 
   model.free();
 });
 
+test("a body that is tied to another falls with it, and neither leaves the other", async () => {
+  const model = await files.load(join(process.env.EXMAT_PACKS, "falling.exmat"), { gravity: [0, 0, -9.81], timeStep: 0.005, useContact: true });
+  const world = new files.World(), body = world.add(new model.Body()), other = world.add(new model.Body());
+  other.motion = { ...other.motion, position: [0, 0, 3] };
+  const all = model.surface("object"), rest = all.points.rest, zs = rest.filter((_, i) => i % 3 === 2);
+  const at = (z) => [...all.vertices].filter((_, i) => Math.abs(rest[3 * i + 2] - z) < 1e-6);
+  const top = at(zs.reduce((a, b) => Math.max(a, b))), bottom = at(zs.reduce((a, b) => Math.min(a, b)));
+  const id = body.attachTo(top, other, bottom, { kind: "ball" });
+  const gap = () => {
+    const of = (own, vertices) => own.readPositions(model.points(vertices)).reduce((sum, x, i) => sum + (i % 3 === 2 ? x / vertices.length : 0), 0);
+    return of(other, bottom) - of(body, top);
+  };
+  const before = gap(), start = body.readPositions(model.points(top))[2];
+  world.step(100);
+  assert.ok(Math.abs(gap() - before) <= 1e-6 * Math.abs(before), `${gap()} and ${before}`);
+  const fallen = start - body.readPositions(model.points(top))[2];
+  assert.ok(Math.abs(fallen - 9.81 * 0.005 ** 2 * 100 * 101 / 2) <= 1e-6, "as bodies in free fall by backward Euler");
+  body.detach(id);
+  assert.throws(() => body.attachTo([0], body, [1], {}), files.InvalidArgument, "itself");
+  world.free();
+  model.free();
+});
+
 test("bones carry the body: a translated skeleton translates every vertex", async () => {
   const model = await files.load(join(process.env.EXMAT_PACKS, "character.exmat"), { timeStep: 0.01, massDamping: 1 });
   assert.equal(model.bones.filter(({ parent }) => parent === -1).length, 1);

@@ -407,7 +407,7 @@ void FullStep::hold(Eigen::VectorXd& d) const noexcept {
 void FullStep::filter_coefficients() noexcept {
   const Eigen::Index stride = space_.filter().stride;
   Eigen::Map<Eigen::Matrix<float, 3, Eigen::Dynamic, Eigen::RowMajor>> all(workspace_.coefficients.data(), 3, stride);
-  Eigen::Matrix3f to_world;
+  Eigen::Matrix3f to_world = Eigen::Matrix3f::Identity();
   if (potential_.has_moving_frame()) to_world = potential_.frame_rotation().cast<float>();
   for (const FullWorkspace::Filter& filter : linear_->filters) {
     auto own = all.middleCols(filter.first, filter.columns);
