@@ -41,7 +41,7 @@ class FollowingClamp : public testing::Test {
     write_msh(folder_.path("pose.msh"), posed);
     Json asset = {{"examples", {{{"name", "step"}, {"mesh", "pose.msh"}}}},
                   {"object", {{"fixed", {{"follow", follow}}}}}};
-    for (const auto& [name, member] : changes.items()) asset[name] = member;
+    for (const auto& [key, member] : changes.items()) asset[key] = member;
     std::vector<std::string> words{"bundle", write_small_bar(folder_, asset), "-o", folder_.path(name + ".h5")};
     words.insert(words.end(), more.begin(), more.end());
     return exmat_precompute(words);
@@ -61,11 +61,11 @@ class FollowingClamp : public testing::Test {
 
   // n x 3, world.
   VertexArray places(const LoadedRun& run, const runtime::Bodies& bodies) const {
-    VertexArray places = mesh_.vertices;
+    VertexArray all = mesh_.vertices;
     const auto& full = bodies.world().state(0).full;  // from the first step on
-    for (Eigen::Index v = 0; full && v < places.rows(); ++v)
-      places.row(v) += runtime::full_displacement(*run.kind().full, {}, *full, v).transpose();
-    return places;
+    for (Eigen::Index v = 0; full && v < all.rows(); ++v)
+      all.row(v) += runtime::full_displacement(*run.kind().full, {}, *full, v).transpose();
+    return all;
   }
 
   static double farthest(const VertexArray& a, const VertexArray& b) { return (a - b).rowwise().norm().maxCoeff(); }
@@ -138,7 +138,9 @@ TEST_F(FollowingClamp, IsWhereThePoseHasIt) {
   for (int step = 0; step < 4000; ++step) bodies.step();
   const VertexArray settled = places(run, bodies);
   for (Eigen::Index v = 0; v < settled.rows(); ++v)
-    if (is_fixed(v)) EXPECT_LE((settled.row(v) - given_.row(v)).norm(), 1e-12 * length_) << v;
+    if (is_fixed(v)) {
+      EXPECT_LE((settled.row(v) - given_.row(v)).norm(), 1e-12 * length_) << v;
+    }
 
   // As the bundle says of the pose.
   const ExampleData example = read_bundle(folder_.path("follows.h5")).examples->examples.back();
@@ -170,8 +172,9 @@ TEST_F(FollowingClamp, FollowsTheWeightsOfItsShape) {
     const Eigen::VectorXd& weights = bodies.world().state(0).examples.front().weights;
     const VertexArray now = places(run, bodies);
     for (Eigen::Index v = 0; v < vertices; ++v)
-      if (is_fixed(v))
+      if (is_fixed(v)) {
         ASSERT_LE((now.row(v) - mesh_.vertices.row(v) - weights[1] * shifts.row(vertices + v)).norm(), 1e-12 * length_);
+      }
     const double last = std::exchange(way, weights[1] - std::exchange(before, weights[1]));
     turns = way * last < 0 ? turns + 1 : 0;
     shakes = std::max(shakes, turns);

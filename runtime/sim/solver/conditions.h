@@ -7,6 +7,9 @@
 
 namespace exmat::runtime {
 
+/// Potential where nothing leads back to the conditions.
+inline constexpr double kNowhere = std::numeric_limits<double>::infinity();
+
 /// Unknowns that enter some of the conditions: m of the conditions, k of the unknowns.
 struct ConditionBlock {
   Eigen::Index offset = 0, first = 0;  ///< of the unknowns, of the conditions
@@ -26,16 +29,17 @@ class Conditions {
   void factorise() noexcept;
 
   /// Takes x to C(x) = 0. set(x) sets violation and gradients there, and returns how far things are from the origin,
-  /// to whose rounding C is known.
+  /// to whose rounding C is known. False if it led away from there: x is then of no use.
   template <class Set>
-  void hold(Eigen::VectorXd& x, const Set& set) noexcept {
+  [[nodiscard]] bool hold(Eigen::VectorXd& x, const Set& set) noexcept {
     double last = std::numeric_limits<double>::infinity();
-    bool is_current = false;
+    bool is_current = false;  // of the product; it is so at first: where x ends depends on where it begins alone
     const double rounding = kRounding * (1 + set(x));
+    const double first = violation.lpNorm<Eigen::Infinity>();
     for (int i = 0; i < kReturns; ++i) {
       const double lacking = violation.lpNorm<Eigen::Infinity>();
       if (!(lacking > rounding) || (is_current && !(lacking < 0.5 * last))) break;
-      is_current = lacking > kSlow * last;
+      is_current = i == 0 || lacking > kSlow * last;
       if (is_current) factorise();
       last = lacking;
       change.noalias() = factor.solve(violation);
@@ -43,6 +47,7 @@ class Conditions {
       set(x);
     }
     factorise();
+    return violation.lpNorm<Eigen::Infinity>() <= first + kLed * rounding;
   }
   /// Takes the forces of the conditions, with the multipliers that they have there, off a gradient.
   void subtract_forces(Eigen::VectorXd& gradient) noexcept;
@@ -59,6 +64,7 @@ class Conditions {
   static constexpr double kSlow =
       0.1;  // of what a return begins with: if more is left, the product is factorised again
   static constexpr double kRounding = 16 * std::numeric_limits<double>::epsilon();
+  static constexpr double kLed = 1e4;  // times the rounding: what conditions that contradict each other may lose
 
   void subtract_directions(Eigen::Ref<Eigen::VectorXd> x) noexcept;
 };

@@ -18,8 +18,7 @@ bool AttachedProblem::begin(Eigen::VectorXd& x, NewtonReport& report) noexcept {
     problem_.hessian(x, Tangent::kPositiveSemidefinite, newton.hessian);
     if (!detail::factorise_shifted(*this, newton, report)) return false;
   }
-  hold(x);
-  return x.allFinite();
+  return hold(x) && x.allFinite();
 }
 
 /// Returns how far the body is from the origin [m].
@@ -30,8 +29,9 @@ double AttachedProblem::set_conditions(const Eigen::VectorXd& x) noexcept {
 }
 
 /// To the conditions, and J and the factor of J A^-1 J_f^T there, J_f that of the last factorisation.
-void AttachedProblem::hold(Eigen::VectorXd& x) noexcept {
-  if (held_.conditions() > 0) held_.hold(x, [this](const Eigen::VectorXd& there) { return set_conditions(there); });
+bool AttachedProblem::hold(Eigen::VectorXd& x) noexcept {
+  return held_.conditions() == 0 ||
+         held_.hold(x, [this](const Eigen::VectorXd& there) { return set_conditions(there); });
 }
 
 void AttachedProblem::finish(PotentialEvaluation& evaluation, const Eigen::VectorXd& x,
@@ -46,22 +46,23 @@ void AttachedProblem::finish(PotentialEvaluation& evaluation, const Eigen::Vecto
 
 PotentialEvaluation AttachedProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                                               Eigen::MatrixXd& hessian) noexcept {
-  hold(x);
+  const bool held = hold(x);
   PotentialEvaluation evaluation = problem_.evaluate(x, gradient, hessian);
   finish(evaluation, x, gradient);
+  if (!held) evaluation.potential.value = kNowhere;
   return evaluation;
 }
 
 PotentialEvaluation AttachedProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
-  hold(x);
+  const bool held = hold(x);
   PotentialEvaluation evaluation = problem_.evaluate(x, gradient);
   finish(evaluation, x, gradient);
+  if (!held) evaluation.potential.value = kNowhere;
   return evaluation;
 }
 
 PotentialValue AttachedProblem::value(Eigen::VectorXd& x) noexcept {
-  hold(x);
-  return problem_.value(x);
+  return hold(x) ? problem_.value(x) : PotentialValue{kNowhere, 0};
 }
 
 void AttachedProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& hessian) noexcept {

@@ -32,7 +32,7 @@ class AttachedProblem {
   void solve(Eigen::Map<Eigen::VectorXd>& x) noexcept;
 
  private:
-  void hold(Eigen::VectorXd& x) noexcept;
+  bool hold(Eigen::VectorXd& x) noexcept;
   double set_conditions(const Eigen::VectorXd& x) noexcept;
   void finish(PotentialEvaluation& evaluation, const Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept;
 

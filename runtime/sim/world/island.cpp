@@ -151,8 +151,9 @@ void IslandProblem::set_condition_directions() noexcept {
   workspace_.conditions.factorise();
 }
 
-void IslandProblem::hold(Eigen::VectorXd& x) noexcept {
-  if (has_hard()) workspace_.conditions.hold(x, [this](const Eigen::VectorXd& there) { return set_conditions(there); });
+bool IslandProblem::hold(Eigen::VectorXd& x) noexcept {
+  return !has_hard() ||
+         workspace_.conditions.hold(x, [this](const Eigen::VectorXd& there) { return set_conditions(there); });
 }
 
 /// After the bodies were evaluated: the gradient of the Lagrangian, and loads of the attachments on the bodies. Returns
@@ -187,8 +188,7 @@ bool IslandProblem::begin(Eigen::VectorXd& x, NewtonReport& report) noexcept {
     hessian(x, Tangent::kPositiveSemidefinite, workspace_.newton.hessian);
     if (!detail::factorise_shifted(*this, workspace_.newton, report)) return false;
   }
-  hold(x);
-  return x.allFinite();
+  return hold(x) && x.allFinite();
 }
 
 /// Gradient of a body in full space with what pairs add.
@@ -248,8 +248,9 @@ PotentialEvaluation IslandProblem::evaluate_all(const Eigen::VectorXd& x, bool i
 
 PotentialEvaluation IslandProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient,
                                             Eigen::MatrixXd& /*hessian*/) noexcept {
-  hold(x);
+  const bool held = hold(x);
   PotentialEvaluation evaluation = evaluate_all(x, /*is_first=*/true, gradient);
+  if (!held) evaluation.potential.value = kNowhere;
   for (WorldBody* const own : bodies_)
     if (!own->full) evaluation.potential.value += own->model.frame->accept_rigid(own->workspace.frame);
   assemble();
@@ -257,12 +258,14 @@ PotentialEvaluation IslandProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd&
 }
 
 PotentialEvaluation IslandProblem::evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient) noexcept {
-  hold(x);
-  return evaluate_all(x, /*is_first=*/false, gradient);
+  const bool held = hold(x);
+  PotentialEvaluation evaluation = evaluate_all(x, /*is_first=*/false, gradient);
+  if (!held) evaluation.potential.value = kNowhere;
+  return evaluation;
 }
 
 PotentialValue IslandProblem::value(Eigen::VectorXd& x) noexcept {
-  hold(x);
+  if (!hold(x)) return {kNowhere, 0};
   const std::size_t bodies = bodies_.size();
   for_all(bodies, threads_, [&](std::size_t i) {
     Eigen::VectorXd& own = workspace_.unknowns[i];
@@ -505,7 +508,7 @@ NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies
                       int threads, IslandWorkspace& workspace) noexcept {
   NewtonReport start;
   if (!problem.begin(workspace.x, start)) {
-    start.status = NewtonStatus::kNonFinite;
+    start.status = NewtonStatus::kStagnated;
     return start;
   }
   const auto restart = [&] {
@@ -579,7 +582,9 @@ NewtonReport solve_island(std::span<WorldBody* const> bodies, std::span<PairCont
   for (std::size_t i = 0; i < bodies.size(); ++i)
     start_search(*bodies[i], pairs, incidences[i], workspace.x.segment(bodies[i]->offset, bodies[i]->unknowns()));
   NewtonReport total = minimise(problem, bodies, pairs, threads, workspace);
-  bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated;
+  // Where bodies would go without each other may be so far from the conditions of attachments that nothing leads back.
+  bool again = total.status == NewtonStatus::kIterationLimit || total.status == NewtonStatus::kStagnated ||
+               (total.status == NewtonStatus::kNonFinite && problem.has_hard());
   if (total.status == NewtonStatus::kConverged && is_doubtful(total, bodies))
     again = is_above_start(problem, bodies, workspace);
   if (again) {

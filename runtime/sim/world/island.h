@@ -59,8 +59,10 @@ class IslandProblem {
   IslandProblem(std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                 std::span<const std::vector<Incidence>> incidences, int threads, IslandWorkspace& workspace);
 
+  bool has_hard() const noexcept { return !workspace_.hard.empty(); }  ///< attachments between its bodies
+
   /// With hard attachments: the Hessian at the first iterate `x`, factorised, and x where they hold. False where
-  /// numbers are not finite.
+  /// nothing leads there.
   bool begin(Eigen::VectorXd& x, NewtonReport& report) noexcept;
 
   PotentialEvaluation evaluate(Eigen::VectorXd& x, Eigen::VectorXd& gradient, Eigen::MatrixXd& hessian) noexcept;
@@ -82,11 +84,10 @@ class IslandProblem {
   const WorldBody& first(const PairContact& pair) const noexcept;
   const WorldBody& second(const PairContact& pair) const noexcept;
   void place(const Eigen::VectorXd& x) noexcept;
-  bool has_hard() const noexcept { return !workspace_.hard.empty(); }
   void collect_hard();
   double set_conditions(const Eigen::VectorXd& x) noexcept;
   void set_condition_directions() noexcept;
-  void hold(Eigen::VectorXd& x) noexcept;
+  bool hold(Eigen::VectorXd& x) noexcept;
   double take_condition_forces(Eigen::VectorXd& gradient) noexcept;
   PotentialEvaluation evaluate_all(const Eigen::VectorXd& x, bool is_first, Eigen::VectorXd& gradient) noexcept;
   PotentialEvaluation finish_full(std::size_t i, PotentialEvaluation evaluation) const noexcept;
