@@ -41,7 +41,7 @@ std::string list(const Json& values, const char* last_word) {
   return text;
 }
 
-// Of an object that has one of several: these.
+// An object that has one of several members names these.
 std::string member_names(const Json& schema) {
   Json names = Json::array();
   if (schema.contains("oneOf")) {

@@ -59,7 +59,8 @@ class ShapeStageBuilder {
   void add_rest(const AlignedRest& rest, ExampleGroup& group) const;
   TransferredPose transfer(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame) const;
   void split_by_clamp(const AlignedRest& rest, const std::vector<AlignedPose>& poses);
-  TransferredPose whole_pose(const AlignedRest& rest, const std::vector<AlignedPose>& poses, std::size_t p) const;
+  TransferredPose whole_pose(const AlignedRest& rest, const AlignedPose& pose, const PoseFrame& frame,
+                             std::size_t p) const;
   void add_pose(const PoseInput& input, const AlignedPose& pose, const TransferredPose& transferred,
                 ExampleGroup& group) const;
   ExampleData example_data(const AlignmentOutcome& outcome, double scale, const ExampleGroup& group) const;
@@ -80,6 +81,7 @@ class ShapeStageBuilder {
   std::vector<std::string>& warnings_;
   Eigen::Index functions_ = asset_.eigenfunctions;  // m
   Eigen::MatrixXd own_, shifts_;                    // 3n x poses of split_by_clamp() [m]; empty: no clamp follows
+  std::vector<TransferredPose> wholes_;             // the poses by these, whatever they act on
   double rest_scale_ = 1;                           // from the rest example's unit of length to the object's
   ShapeStage stage_;
 };
@@ -178,9 +180,10 @@ void ShapeStageBuilder::split_by_clamp(const AlignedRest& rest, const std::vecto
   shifts_ = fields - own_;
 }
 
-TransferredPose ShapeStageBuilder::whole_pose(const AlignedRest& rest, const std::vector<AlignedPose>& poses,
-                                              std::size_t p) const {
-  if (own_.size() == 0) return transfer(rest, poses[p], {rest.free_poses, fit_weights(), object_.fixed.any()});
+// `p` is its number.
+TransferredPose ShapeStageBuilder::whole_pose(const AlignedRest& rest, const AlignedPose& aligned,
+                                              const PoseFrame& frame, std::size_t p) const {
+  if (own_.size() == 0) return transfer(rest, aligned, frame);
   const Eigen::VectorXd own = own_.col(static_cast<Eigen::Index>(p)) / std::cbrt(stage_.object.volume);
   TransferredPose pose = posed_object(stage_.object, stage_.rest_coefficients,
                                       own.reshaped<Eigen::RowMajor>(object_.mesh.vertex_count(), 3));
@@ -231,13 +234,14 @@ void ShapeStageBuilder::add_pose(const PoseInput& input, const AlignedPose& pose
     example.surface_iterations = input.surface->iterations;
   }
   if (transferred.displacement.norm() <= kNoPose * stage_.object.vertices.norm())
-    throw InputError({"", "/examples, " + example.name,
-                      group.region.empty()
-                          ? "a pose that differs from the rest pose"
-                          : fmt::format("a pose that differs from the rest pose in the region {}", group.region),
-                      asset_.clamp_follows ? "one that does what its fixed vertices make of it"
-                                           : rest_pose_text(transferred.rotation),
-                      "leave it out: the rest pose is always an example"});
+    throw InputError(
+        {"", "/examples, " + example.name,
+         group.region.empty() ? "a pose that differs from the rest pose"
+                              : fmt::format("a pose that differs from the rest pose in the region {}", group.region),
+         asset_.clamp_follows ? "one that does no more than its fixed vertices make of it"
+                              : rest_pose_text(transferred.rotation),
+         asset_.clamp_follows ? "have it deform the body beside them; a scene's bones move the joint \"clamp\" alone"
+                              : "leave it out: the rest pose is always an example"});
   group.fields.conservativeResize(3 * object_.mesh.vertex_count(), group.fields.cols() + 1);
   group.fields.rightCols(1) = std::cbrt(stage_.object.volume) * transferred.displacement.reshaped<Eigen::RowMajor>();
   group.examples.examples.push_back(std::move(example));
@@ -289,7 +293,7 @@ void ShapeStageBuilder::add_examples() {
     set_shape_data(object_basis());
     add_poses(rest, poses);
   }
-  for (std::size_t i = 0; i < poses.size(); ++i) report(input_.poses[i].name, poses[i], whole_pose(rest, poses, i));
+  for (std::size_t i = 0; i < poses.size(); ++i) report(input_.poses[i].name, poses[i], wholes_[i]);
 }
 
 // The groups of the stage, by its m functions.
@@ -299,10 +303,12 @@ void ShapeStageBuilder::add_poses(const AlignedRest& rest, const std::vector<Ali
   stage_.alignments.assign(1, rest.outcome);
   add_groups(rest);
   if (input_.whole_body) stage_.groups.front().shifts = shifts_;
+  const PoseFrame frame{rest.free_poses, fit_weights(), object_.fixed.any()};
+  wholes_.clear();
   for (std::size_t p = 0; p < poses.size(); ++p) {
     const PoseInput& input = input_.poses[p];
     const AlignedPose& pose = poses[p];
-    const TransferredPose whole = whole_pose(rest, poses, p);
+    const TransferredPose& whole = wholes_.emplace_back(whole_pose(rest, pose, frame, p));
     stage_.poses.push_back({whole.rotation, rest_scale_ / pose.scale.unit, carried_displacement(whole)});
     if (shifts_.size() > 0)
       stage_.poses.back().displacement +=

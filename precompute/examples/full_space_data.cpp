@@ -21,11 +21,11 @@ std::optional<FullSpaceData> full_space_data(const ReducedModel& model, const El
   if (view == nullptr && model.skeleton && model.skeleton->shifts.rows() > 0) {
     const RowMatrix& shifts = model.skeleton->shifts;
     data.shifts.resize(std::ssize(examples.examples), 3 * filter.cols());
-    for (Eigen::Index k = 0; k < data.shifts.rows(); ++k)
-      data.shifts.row(k) = (filter.transpose() * shifts.middleRows(k * filter.rows(), filter.rows()))
-                               .eval()
-                               .reshaped<Eigen::RowMajor>()
-                               .transpose();
+    for (Eigen::Index k = 0; k < data.shifts.rows(); ++k) {
+      const RowMatrix shift = shifts.middleRows(k * filter.rows(), filter.rows());
+      data.shifts.row(k) =
+          filter_coefficients(filter, shift.reshaped<Eigen::RowMajor>()).reshaped<Eigen::RowMajor>().transpose();
+    }
   }
   // Fixed vertices do not move beside what moves them.
   for (Eigen::Index v = 0; v < body.fixed.size(); ++v)

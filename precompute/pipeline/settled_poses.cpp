@@ -164,7 +164,8 @@ Shape PoseSettler::settled_shape(const runtime::Model& model, Eigen::Index group
   return q ? Shape(field(group, *q)) : std::nullopt;
 }
 
-// What of a pose the unknowns of the body's steps can hold: modes, or all vertices but those that bones hold elsewhere.
+// The unknowns of the body's steps hold this part of a pose: modes, or all vertices but those that bones hold
+// elsewhere.
 Eigen::VectorXd PoseSettler::held(Eigen::Index group, const Eigen::VectorXd& given) const {
   if (!full_) return field(group, model_.modal->basis.transpose() * (stages_.system.full_mass * given));
   if (model_.skeleton->shifts.rows() > 0) return given;

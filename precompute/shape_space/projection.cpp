@@ -72,6 +72,11 @@ Eigen::MatrixXd descriptors(const ExampleSet& set) {
   return E;
 }
 
+void fill_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, ExampleSet& set) {
+  fill_gram(rest_descriptor, set);
+  set.hq = descriptors(set).transpose() * projection.shape_from_reduced;
+}
+
 }  // namespace
 
 void fill_gram(const Eigen::MatrixXd& rest_descriptor, ExampleSet& set) {
@@ -79,15 +84,6 @@ void fill_gram(const Eigen::MatrixXd& rest_descriptor, ExampleSet& set) {
   set.gram = E.transpose() * E;
   set.h0 = E.transpose() * flatten(rest_descriptor);
 }
-
-namespace {
-
-void fill_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection, ExampleSet& set) {
-  fill_gram(rest_descriptor, set);
-  set.hq = descriptors(set).transpose() * projection.shape_from_reduced;
-}
-
-}  // namespace
 
 void fill_weights_problem(const Eigen::MatrixXd& rest_descriptor, const ProjectionData& projection,
                           const RowMatrix& pose_map, ExampleSet& set) {

@@ -101,7 +101,7 @@ void attach_to(std::span<const std::int64_t> vertices, exmat_body& other, std::s
   wake(other.state);
 }
 
-/// What is wrong with the settings of an attachment; EXMAT_OK where nothing is, and `given` is complete then.
+/// Says what is wrong with the settings of an attachment; EXMAT_OK where nothing is, and `given` is complete then.
 exmat_status check_attachment(const char* function, const exmat_attachment& attachment, exmat_attachment& given) {
   if (const exmat_status status = check_size(function, attachment.size, kAttachmentSizes)) return status;
   given = completed(attachment, default_attachment());

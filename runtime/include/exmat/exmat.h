@@ -396,9 +396,9 @@ EXMAT_API exmat_status exmat_body_move_attachment(exmat_body* body, int64_t id, 
 /* Lets the patch go. */
 EXMAT_API exmat_status exmat_body_detach(exmat_body* body, int64_t id) EXMAT_NOEXCEPT;
 
-/* What the body exerts on the frame in the last step: `force` [3] [N] and `torque` [3] about the frame's origin [N m];
-   on another body about the point that holds the mean of the patch.
-   `broken`: 1 where that was more than the attachment bears. Each may be NULL. */
+/* Reads what the body exerts on the frame in the last step: `force` [3] [N] and `torque` [3] about the frame's origin
+   [N m]; on another body about the point that holds the mean of the patch. `broken`: 1 where that was more than the
+   attachment bears. Each may be NULL. */
 EXMAT_API exmat_status exmat_body_read_attachment_load(const exmat_body* body, int64_t id, double* force,
                                                        double* torque, int32_t* broken) EXMAT_NOEXCEPT;
 

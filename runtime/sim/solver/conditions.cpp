@@ -1,12 +1,6 @@
 #include "runtime/sim/solver/conditions.h"
 
 namespace exmat::runtime {
-namespace {
-
-/// Of the diagonal: conditions that say the same twice share their multiplier.
-constexpr double kRedundant = 1e-13;
-
-}  // namespace
 
 void Conditions::resize(Eigen::Index conditions) {
   violation = multipliers = change = Eigen::VectorXd::Zero(conditions);

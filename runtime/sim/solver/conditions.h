@@ -10,6 +10,10 @@ namespace exmat::runtime {
 /// Potential where nothing leads back to the conditions.
 inline constexpr double kNowhere = std::numeric_limits<double>::infinity();
 
+/// The diagonal of J A^-1 J^T is larger by this share, so that conditions which say the same twice share their
+/// multiplier.
+inline constexpr double kRedundant = 1e-13;
+
 /// Unknowns that enter some of the conditions: m of the conditions, k of the unknowns.
 struct ConditionBlock {
   Eigen::Index offset = 0, first = 0;  ///< of the unknowns, of the conditions

@@ -115,14 +115,12 @@ NewtonReport solve_attached(const Model& model, const StepScene& scene, const St
   start_contact(model, scene, state, workspace);
   near.newton.profile = workspace.profile;
   AttachedProblem problem(model, state, potential, workspace);
-  NewtonReport start;
-  if (!problem.begin(near.x, start)) {
-    start.status = NewtonStatus::kNonFinite;
-    return start;
+  NewtonReport total;
+  if (!problem.begin(near.x, total)) {
+    total.status = NewtonStatus::kNonFinite;
+    return total;
   }
-  NewtonReport total = minimise_near(problem, model, scene, state, potential, workspace, NewtonBegin::kFactor);
-  total.factorisations += start.factorisations;
-  total.projections += start.projections;
+  add(minimise_near(problem, model, scene, state, potential, workspace, NewtonBegin::kFactor), total);
   if (total.status == NewtonStatus::kNonFinite) return total;
   const BodyPose pose{model.frame->place(near.x, workspace.frame), near.q};
   settle_force(*model.frame, state.attachments, pose, workspace.frame, near);

@@ -54,11 +54,6 @@ ReducedPatch reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, 
   return patch;
 }
 
-void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment) {
-  attachment.patch =
-      reduce_patch(rest, basis_rows, attachment.shares, attachment.places, attachment.kind == AttachmentKind::kFixed);
-}
-
 void forget_body(int body, std::vector<Attachment>& attachments) noexcept {
   std::erase_if(attachments, [=](const Attachment& own) { return own.other && own.other->body == body; });
   for (Attachment& own : attachments)

@@ -93,8 +93,6 @@ void take_hold(const Eigen::VectorXd& masses, const Eigen::Matrix3Xd& here, Atta
 /// `places` as those of an attachment; `turns`: with its rotation.
 ReducedPatch reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, const Eigen::VectorXd& shares,
                           const Eigen::Matrix3Xd& places, bool turns);
-/// Sets that of an attachment that has kind, shares and places.
-void reduce_patch(const VertexArray& rest, const RowMatrix& basis_rows, Attachment& attachment);
 
 /// After a body was taken out of a world: attachments to it are gone, and bodies after it have a number less.
 void forget_body(int body, std::vector<Attachment>& attachments) noexcept;

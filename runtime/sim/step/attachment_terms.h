@@ -18,7 +18,7 @@ struct AttachmentWorkspace : Conditions {
   /// True if it has the size for steps with these.
   bool fits(std::span<const Attachment> attachments) const noexcept;
 
-  // Of all unknowns and conditions, which are one block.
+  // All unknowns and conditions are one block.
   Eigen::MatrixXd& gradients() noexcept { return blocks.front().gradients; }
   Eigen::MatrixXd& directions() noexcept { return blocks.front().directions; }
   const Eigen::MatrixXd& gradients() const noexcept { return blocks.front().gradients; }
@@ -38,14 +38,14 @@ struct StepRate {
 /// Mean of the vertices, world [m].
 Eigen::Vector3d mean_of(const Attachment& attachment, const BodyPose& pose) noexcept;
 
-/// Where a patch is: its mean, and the rotation that fits it best, from where it was attached.
+/// A patch is where its mean is, and turned by the rotation that fits it best since it was attached.
 struct PatchPlace {
   Eigen::Vector3d arm;       ///< mean from the body's position, world [m]
   Eigen::Matrix3d rotation;  ///< world; of a patch without one that of the body's frame
   Eigen::Matrix3Xd turn;     ///< 3 x r: how it turns about world axes by q, beside the body
 };
 
-/// Of a patch with rows of its rotation, or of its mean alone, whose rotation is the body's then.
+/// Finds that of a patch with rows of its rotation, or of its mean alone, whose rotation is the body's then.
 void place_patch(const ReducedPatch& patch, const BodyPose& pose, PatchPlace& place) noexcept;
 
 // Springs: k/2 |m - a|^2 + c c_v/2 |m - m_v - (a - a_before) / (dt c_v)|^2 of the mean m and the anchor a.

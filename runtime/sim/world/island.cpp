@@ -19,9 +19,8 @@ constexpr double kShareOfLimit = 0.3, kLeastExact = 0.1;
 // Normal forces are known well enough for friction (kSameFriction) long before the residual has come to its limit.
 constexpr double kRoughTolerance = 0.03;
 constexpr int kMostGradients = 400;
-constexpr int kSureIterations = 8;    // of Newton's method: bodies at rest take fewer
-constexpr double kGain = 1e-12;       // of the kinetic energy: rounding
-constexpr double kRedundant = 1e-13;  // as that of Conditions
+constexpr int kSureIterations = 8;  // of Newton's method: bodies at rest take fewer
+constexpr double kGain = 1e-12;     // of the kinetic energy: rounding
 // Likewise where bodies step in all vertices: each of their iterations costs as much as many of others.
 constexpr double kFullSolutionError = 0.03;
 
@@ -291,8 +290,7 @@ PotentialValue IslandProblem::value(Eigen::VectorXd& x) noexcept {
 }
 
 void IslandProblem::hessian(const Eigen::VectorXd& x, Tangent tangent, Eigen::MatrixXd& /*hessian*/) noexcept {
-  place(x);
-  if (has_hard()) set_conditions(x);
+  has_hard() ? static_cast<void>(set_conditions(x)) : place(x);
   is_projected_ = tangent != Tangent::kExact;
   for_all(bodies_.size(), threads_, [&](std::size_t i) {
     if (body(i).full)
@@ -506,20 +504,18 @@ void start_at(WorldBody& own, const Eigen::VectorXd& x, const Eigen::VectorXd& q
 /// was started.
 NewtonReport minimise(IslandProblem& problem, std::span<WorldBody* const> bodies, std::span<PairContact* const> pairs,
                       int threads, IslandWorkspace& workspace) noexcept {
-  NewtonReport start;
-  if (!problem.begin(workspace.x, start)) {
-    start.status = NewtonStatus::kStagnated;
-    return start;
+  NewtonReport total;
+  if (!problem.begin(workspace.x, total)) {
+    total.status = NewtonStatus::kStagnated;
+    return total;
   }
   const auto restart = [&] {
     for_all(bodies.size(), threads, [&](std::size_t i) { start_at(*bodies[i], workspace.x, bodies[i]->near().q); });
   };
   const auto refresh = [&] { return refresh_friction(bodies, pairs); };
-  NewtonReport total =
-      minimise_with_friction(problem, newton_of(bodies), workspace.x, workspace.newton, restart, refresh,
-                             start.factorisations > 0 ? NewtonBegin::kFactor : NewtonBegin::kHessian);
-  total.factorisations += start.factorisations;
-  total.projections += start.projections;
+  const NewtonBegin begin = problem.has_hard() ? NewtonBegin::kFactor : NewtonBegin::kHessian;
+  add(minimise_with_friction(problem, newton_of(bodies), workspace.x, workspace.newton, restart, refresh, begin),
+      total);
   return total;
 }
 

@@ -55,7 +55,8 @@ struct AttachedBar {
         rows.middleRows<3>(3 * k) = bar.basis().middleRows<3>(3 * v);
         places.row(k) = rest().row(v) - model->frame->origin().transpose();
       }
-      runtime::reduce_patch(places, rows, attachment);
+      attachment.patch = runtime::reduce_patch(places, rows, attachment.shares, attachment.places,
+                                               attachment.kind == AttachmentKind::kFixed);
       attachment.mean = attachment.mean_before = runtime::mean_of(attachment, runtime::pose_of(*model, state));
     }
     state.attachments.push_back(attachment);

@@ -340,8 +340,7 @@ void FullStep::first_iterate(Eigen::VectorXd& u) const noexcept {
 
 void FullStep::first_coefficients() noexcept {
   potential_.set_coefficients();
-  for (std::size_t group = 0; group < model_.examples.size(); ++group)
-    potential_.see(model_.examples[group], workspace_.examples[group].coefficients);
+  see_coefficients();
 }
 
 void FullStep::own_coefficients() noexcept {
@@ -349,8 +348,13 @@ void FullStep::own_coefficients() noexcept {
   work.trial.setZero();
   space_.to_field(memory_.bones->own, work.trial);
   kernels().mesh_coefficients(space_.filter(), work.trial.data(), work.potential.coefficients.data());
+  see_coefficients();
+}
+
+/// What the groups of examples see of the potential's coefficients.
+void FullStep::see_coefficients() noexcept {
   for (std::size_t group = 0; group < model_.examples.size(); ++group)
-    potential_.see(model_.examples[group], work.examples[group].coefficients);
+    potential_.see(model_.examples[group], workspace_.examples[group].coefficients);
 }
 
 // Sets solved = B residual; with contacts B = C S^-1 C, C = (I + z K)^-1/2 at each vertex that touches: exact of a

@@ -170,6 +170,7 @@ class FullStep {
   enum class Outcome { kFound, kIndefinite };
   static constexpr double kStiffStep = 10;  ///< edges that waves go
 
+  void see_coefficients() noexcept;
   void own_velocity(double time, const Eigen::VectorXd& q, const Eigen::VectorXd& v,
                     Eigen::VectorXd& own) const noexcept;
   void carry(Eigen::VectorXd& d) const noexcept;

@@ -18,7 +18,8 @@ Attachment held_vertex(const Model& model, const test::Bar& bar, const State& st
   VertexArray rest = bar.model.object->mesh.vertices.row(vertex);
   attachment.places = pose.to_world(rest.row(0).transpose());
   rest.rowwise() -= model.frame->origin().transpose();
-  reduce_patch(rest, bar.basis().middleRows<3>(3 * vertex), attachment);
+  attachment.patch = reduce_patch(rest, bar.basis().middleRows<3>(3 * vertex), attachment.shares, attachment.places,
+                                  attachment.kind == AttachmentKind::kFixed);
   attachment.mean = attachment.mean_before = mean_of(attachment, pose);
   return attachment;
 }
