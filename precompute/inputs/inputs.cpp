@@ -19,6 +19,7 @@
 #include "precompute/mesh_io/mesh_file.h"
 #include "precompute/mesh_io/surface_file.h"
 #include "precompute/mesh_io/vertex_selection.h"
+#include "precompute/posing/missed_pose.h"
 #include "precompute/render/embedding.h"
 
 namespace exmat::precompute {
@@ -169,7 +170,7 @@ class ExampleReader {
   void read_rest();
   void read_pose(const ExampleConfig& example);
   bool read_surface_pose(const ExampleConfig& example);
-  void judge_miss(const SurfacePose& fitted, const ExampleConfig& example) const;
+  void judge_miss(const SurfacePose& fitted, const VertexArray& posed, const ExampleConfig& example) const;
   MeshFile read_tets(const ExampleConfig& example);
   bool poses_rest(const MeshFile& file) const;
   void read_correspondences(PoseInput& example);
@@ -237,12 +238,12 @@ MeshFile ExampleReader::read_tets(const ExampleConfig& example) {
   return file;
 }
 
-// Warns of a misfit beyond what the cage's cells explain, or refuses it: the pose is no pose of this surface.
-void ExampleReader::judge_miss(const SurfacePose& fitted, const ExampleConfig& example) const {
+// Warns of a pose that the cage misses, or refuses it.
+void ExampleReader::judge_miss(const SurfacePose& fitted, const VertexArray& posed,
+                               const ExampleConfig& example) const {
   if (fitted.rms <= kMissWarned) return;
   const std::string found = fmt::format("{:.1f} % (RMS), {:.1f} % at most", 100 * fitted.rms, 100 * fitted.farthest);
-  const char* const advice =
-      "are its vertices in the order of the object's, and is it not mirrored? If so, ask for more cells";
+  const std::string advice = reason_of_miss(object_.surface->file().mesh, posed, fitted);
   if (fitted.rms > kMissRefused && !asset_.alignment.accept)
     throw InputError({example.file(asset_.object_mesh).string(), "example " + example.name,
                       fmt::format("a pose that the cage follows within {:g} % of its size", 100 * kMissRefused), found,
@@ -259,12 +260,7 @@ bool ExampleReader::read_surface_pose(const ExampleConfig& example) {
                       "poses of the rest example, since one is marked rest", "a pose of the object's surface",
                       "leave the rest example out: the object at rest is it"});
   const SurfacePose fitted = object_.surface->pose(*posed, "example " + example.name, cache_);
-  if (fitted.inverted > 0)
-    throw InputError({example.file(asset_.object_mesh).string(), "example " + example.name,
-                      "a pose that tets can follow",
-                      fmt::format("one that turns {} of {} inside out", fitted.inverted, object_.mesh.tet_count()),
-                      "mend the pose where it folds over itself, or ask for more cells"});
-  judge_miss(fitted, example);
+  judge_miss(fitted, *posed, example);
   PoseInput pose{example.name, example.file(asset_.object_mesh), {}};
   // The cage is kept whole, so its vertices are the file's.
   pose.mesh = {fitted.positions, object_.mesh.tets};

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fmt/format.h>
 #include <numeric>
+#include <optional>
 #include <vector>
 
 #include "common/core/error.h"
@@ -13,6 +14,7 @@
 #include "precompute/full_space/mesh_elasticity.h"
 #include "precompute/full_space/sparse_direction.h"
 #include "precompute/posing/surface_springs.h"
+#include "precompute/posing/volume_guard.h"
 
 namespace exmat::precompute {
 namespace {
@@ -22,6 +24,9 @@ namespace {
 constexpr double kFirstStiffness = 1, kLastStiffness = 1e5, kStiffen = 10;
 // From rest, poses are reached by softer springs first.
 constexpr double kFirstFromRest = 1e-3;
+// Strength of the guard over the root of the springs' stiffness: tets that these squeeze keep some percent of their
+// volume.
+constexpr double kGuard = 1;
 // A stage that brings the surface less than this share nearer is the last, and so is one that brings it so near (RMS
 // over the diagonal): a tenth of what is asked of a pose.
 constexpr double kGain = 0.3, kNear = 1e-4;
@@ -61,16 +66,18 @@ class PoseSolver {
       : body_(body),
         springs_(body.cage, body.surface, embedding, places),
         elasticity_(elasticity_of(body.cage)),
+        guard_(body.cage, elasticity_),
         spring_values_(elasticity_.values_of(springs_.hessian())),
         direction_(elasticity_.pattern()) {}
 
-  /// From positions x, by springs from `first` on.
-  SurfacePose solve(VertexArray x, double first);
+  /// From positions x, by springs from `first` on. Nothing where the springs of the first stage leave tets inside out.
+  std::optional<SurfacePose> solve(VertexArray x, double first);
+  int iterations() const { return iterations_; }
 
  private:
-  void minimise(VertexArray& x, double stiffness, double end, SurfacePose& pose);
+  void minimise(VertexArray& x, double stiffness, double end);
   double energy(const VertexArray& x, double stiffness) const;
-  int inverted(const VertexArray& x) const;
+  bool is_sound(const VertexArray& x) const { return tet_volumes({x, body_.cage.tets}).minCoeff() > 0; }
   Eigen::VectorXd displacements(const VertexArray& x) const {
     const VertexArray moved = x - body_.cage.vertices;
     return moved.reshaped<Eigen::RowMajor>();
@@ -79,27 +86,28 @@ class PoseSolver {
   const UnitBody& body_;
   SurfaceSprings springs_;
   MeshElasticity elasticity_;
+  VolumeGuard guard_;
   Eigen::VectorXd spring_values_;
   SparseDirection direction_;
+  int iterations_ = 0;
 };
 
 double PoseSolver::energy(const VertexArray& x, double stiffness) const {
   return elasticity_.energy(displacements(x)) + stiffness * springs_.energy(x);
 }
 
-int PoseSolver::inverted(const VertexArray& x) const {
-  return static_cast<int>((tet_volumes({x, body_.cage.tets}).array() <= 0).count());
-}
-
-void PoseSolver::minimise(VertexArray& x, double stiffness, double end, SurfacePose& pose) {
+// Where no tet is inside out at x, none is at the end.
+void PoseSolver::minimise(VertexArray& x, double stiffness, double end) {
+  const double guard = is_sound(x) ? kGuard * std::sqrt(stiffness) : 0;
   Eigen::VectorXd force, step;
   LowerTriangle hessian;
   const double rounding = 1e-14;
   // Exact tangents where they serve: far from the minimum they do not, as a rule.
   runtime::Tangent tangent = runtime::Tangent::kPositiveSemidefinite;
   for (int iteration = 0; iteration < kMostIterations; ++iteration) {
-    const double here =
+    double here =
         elasticity_.force_and_stiffness(displacements(x), tangent, force, hessian) + stiffness * springs_.energy(x);
+    if (guard > 0) here += guard_.add(x, guard, force, hessian);
     hessian.coeffs() += stiffness * spring_values_.array();
     const VertexArray pull = stiffness * springs_.gradient(x);
     const Eigen::VectorXd gradient = force + pull.reshaped<Eigen::RowMajor>();
@@ -118,10 +126,10 @@ void PoseSolver::minimise(VertexArray& x, double stiffness, double end, SurfaceP
     VertexArray trial;
     for (int halving = 0; halving <= kHalvings; ++halving, length /= 2) {
       trial = x + length * step.reshaped<Eigen::RowMajor>(x.rows(), 3);
-      there = energy(trial, stiffness);
+      there = energy(trial, stiffness) + (guard > 0 ? guard * guard_.energy(trial) : 0);
       if (there <= here + kArmijo * length * slope) break;
     }
-    ++pose.iterations;
+    ++iterations_;
     if (!(there < here)) return;
     x = trial;
     if (here - there <= std::max(end, rounding) * here) return;
@@ -130,38 +138,28 @@ void PoseSolver::minimise(VertexArray& x, double stiffness, double end, SurfaceP
   }
 }
 
-SurfacePose PoseSolver::solve(VertexArray x, double first) {
+std::optional<SurfacePose> PoseSolver::solve(VertexArray x, double first) {
   SurfacePose pose;
-  double last_rms = INFINITY, stiffness = first, reached = first;
-  VertexArray best = x;
-  bool sound = false;
-  for (; stiffness <= 1.001 * kLastStiffness; stiffness *= kStiffen) {
-    minimise(x, stiffness, kBetween, pose);
-    ++pose.stages;
-    const bool here_sound = inverted(x) == 0;
-    // Springs that invert tets ask for more than the cage can hold, but for the first stages, which come from a guess.
-    if (sound && !here_sound) break;
-    const double rms = springs_.rms(x);
-    log::debug(fmt::format("springs of {:.0e}: missed by {:.3g} of the diagonal, energy {:.4g}, {} inverted", stiffness,
-                           rms, elasticity_.energy(displacements(x)), inverted(x)));
+  double last_rms = INFINITY;
+  for (double stiffness = first; stiffness <= 1.001 * kLastStiffness; stiffness *= kStiffen) {
+    VertexArray moved = x;
+    minimise(moved, stiffness, kBetween);
+    const double rms = springs_.rms(moved);
+    log::debug(fmt::format("springs of {:.0e}: missed by {:.3g} of the diagonal, energy {:.4g}", stiffness, rms,
+                           elasticity_.energy(displacements(moved))));
+    if (!is_sound(moved)) return std::nullopt;
     const bool gained = rms < (1 - kGain) * last_rms;
-    if (!sound || gained) {
-      best = x;
-      reached = stiffness;
-    }
-    sound = here_sound;
-    if (sound && (!gained || rms <= kNear)) break;
+    if (!gained && stiffness > kFirstStiffness) break;
+    x = moved;
+    pose.stiffness = stiffness;
+    if (rms <= kNear) break;
     last_rms = rms;
   }
-  VertexArray settled = best;
-  minimise(settled, reached, kLast, pose);
-  if (inverted(settled) <= inverted(best)) best = settled;
-  pose.inverted = inverted(best);
-  pose.rms = springs_.rms(best);
-  pose.farthest = springs_.farthest(best);
-  pose.energy = elasticity_.energy(displacements(best));
-  pose.stiffness = reached;
-  pose.positions = best;
+  minimise(x, pose.stiffness, kLast);
+  pose.rms = springs_.rms(x);
+  pose.farthest = springs_.farthest(x, pose.worst);
+  pose.energy = elasticity_.energy(displacements(x));
+  pose.positions = x;
   return pose;
 }
 
@@ -174,20 +172,15 @@ SurfacePose pose_by_surface(const TetMesh& cage, const SurfaceMesh& surface, con
   const UnitBody body = unit_body(cage, surface);
   const VertexArray places = (posed.rowwise() - body.centre) / body.diagonal;
   PoseSolver solver(body, embedding, places);
-  SurfacePose pose = solver.solve(rigid_start(body.cage, body.surface, places), kFirstStiffness);
-  if (pose.inverted > 0) {
-    SurfacePose other = solver.solve(body.cage.vertices, kFirstFromRest);
-    const int iterations = pose.iterations + other.iterations;
-    if (other.inverted < pose.inverted) pose = std::move(other);
-    pose.iterations = iterations;
-  }
+  std::optional<SurfacePose> found = solver.solve(rigid_start(body.cage, body.surface, places), kFirstStiffness);
+  if (!found) found = solver.solve(body.cage.vertices, kFirstFromRest);
+  SurfacePose& pose = *found;
+  pose.iterations = solver.iterations();
   pose.positions = (pose.positions * body.diagonal).rowwise() + body.centre;
   pose.energy *= body.diagonal * body.diagonal * body.diagonal;
-  log::info(
-      fmt::format("{}: the cage misses the posed surface by {:.2g} % of the diagonal (RMS), {:.2g} % at most; {} "
-                  "iterations{}",
-                  name, 100 * pose.rms, 100 * pose.farthest, pose.iterations,
-                  pose.inverted > 0 ? fmt::format(", {} tets inside out", pose.inverted) : ""));
+  log::info(fmt::format(
+      "{}: the cage misses the posed surface by {:.2g} % of the diagonal (RMS), {:.2g} % at most; {} iterations", name,
+      100 * pose.rms, 100 * pose.farthest, pose.iterations));
   return pose;
 }
 

@@ -10,22 +10,20 @@ namespace exmat::precompute {
 
 /// A cage in the pose of its surface.
 struct SurfacePose {
-  VertexArray positions;  ///< n x 3, of the cage's vertices [m]
-  double rms = 0;         ///< distance of the posed surface from the one that the cage carries, over the diagonal of
-                          ///< the bounding box of the surface at rest: root of the mean square over its area
-  double farthest = 0;    ///< largest over its vertices, likewise
-  double energy = 0;      ///< elastic, of a material with Young's modulus 1 and Poisson ratio kPosePoisson [m^3]
-  double stiffness = 0;   ///< stiffness of the last springs over Young's modulus, at diagonal 1
-  int iterations = 0;     ///< iterations of Newton's method, all stages
-  int stages = 0;         ///< stiffnesses of the springs that were gone through
-  int inverted = 0;       ///< tets turned inside out
+  VertexArray positions;   ///< n x 3, of the cage's vertices [m]
+  double rms = 0;          ///< distance of the posed surface from the one that the cage carries, over the diagonal of
+                           ///< the bounding box of the surface at rest: root of the mean square over its area
+  double farthest = 0;     ///< largest over its vertices, likewise
+  double energy = 0;       ///< elastic, of a material with Young's modulus 1 and Poisson ratio kPosePoisson [m^3]
+  double stiffness = 0;    ///< stiffness of the last springs over Young's modulus, at diagonal 1
+  int iterations = 0;      ///< iterations of Newton's method, all stages
+  Eigen::Index worst = 0;  ///< the vertex of the surface that is farthest off
 };
 
 /// Members that the stage cache keeps.
 template <typename Archive>
 void pass_members(Archive& archive, SurfacePose& pose) {
-  pass_all(archive, pose.positions, pose.rms, pose.farthest, pose.energy, pose.stiffness, pose.iterations, pose.stages,
-           pose.inverted);
+  pass_all(archive, pose.positions, pose.rms, pose.farthest, pose.energy, pose.stiffness, pose.iterations, pose.worst);
 }
 
 /// Poisson ratio of the material that fills a pose: poses may change volume, so a low one.
@@ -33,10 +31,11 @@ constexpr double kPosePoisson = 0.3;
 
 /// The pose of a cage that carries its surface to `posed`: the least elastic energy (stable neo-Hookean) plus that of
 /// springs, per area of the surface at rest, from each of its vertices to its place in the pose. Springs become stiffer
-/// until that brings the surface no nearer, which is what the cage cannot hold. It begins where each vertex of the cage
-/// goes with the rigid motion of the surface about it (moving least squares, Schaefer et al. 2006), and where that ends
-/// in inverted tets once more from rest. `surface` at rest lies in the cage by `embedding`; `posed` [v x 3] are its
-/// vertices in the pose. `name` is for messages. Throws InputError where the pose has no finite positions.
+/// until that brings the surface no nearer, which is what the cage cannot hold. No tet is turned inside out:
+/// VolumeGuard is a third energy. It begins where each vertex of the cage goes with the rigid motion of the surface
+/// about it (moving least squares, Schaefer et al. 2006), and where that leaves tets inside out from rest, by soft
+/// springs first. `surface` at rest lies in the cage by `embedding`; `posed` [v x 3] are its vertices in the pose.
+/// `name` is for messages. Throws InputError where the pose has no finite positions.
 SurfacePose pose_by_surface(const TetMesh& cage, const SurfaceMesh& surface, const Embedding& embedding,
                             const VertexArray& posed, const std::string& name);
 

@@ -50,12 +50,10 @@ VertexArray SurfaceSprings::gradient(const VertexArray& x) const {
   return interpolation_.transpose() * (shares_.asDiagonal() * missed);
 }
 
-double SurfaceSprings::farthest(const VertexArray& x) const {
+double SurfaceSprings::farthest(const VertexArray& x, Eigen::Index& worst) const {
   const VertexArray missed = interpolation_ * x - places_;
-  double most = 0;
-  for (Eigen::Index v = 0; v < missed.rows(); ++v)
-    if (shares_[v] > 0) most = std::max(most, missed.row(v).norm());
-  return most;
+  const Eigen::ArrayXd counted = (shares_.array() > 0).cast<double>();
+  return (missed.rowwise().norm().array() * counted).maxCoeff(&worst);
 }
 
 VertexArray rigid_start(const TetMesh& cage, const SurfaceMesh& surface, const VertexArray& posed) {

@@ -27,7 +27,7 @@ class SurfaceSprings {
 
   /// Root of the mean squared distance over the area, and the largest [m].
   double rms(const VertexArray& x) const { return std::sqrt(2 * energy(x)); }
-  double farthest(const VertexArray& x) const;
+  double farthest(const VertexArray& x, Eigen::Index& worst) const;  ///< and the vertex of the surface
 
  private:
   Eigen::SparseMatrix<double, Eigen::RowMajor> interpolation_;  // v x n

@@ -101,7 +101,8 @@ std::string poses_table(const std::vector<Body>& bodies) {
         const auto pose =
             precompute::pose_by_surface(cage.mesh, body.surface, embedding, mapped(body.surface.vertices), map.name);
         const double seconds = timer.seconds();
-        if (pose.inverted > 0) throw WorkError(body.name + ", " + map.name + ": tets inside out");
+        if (tet_volumes({pose.positions, cage.mesh.tets}).minCoeff() <= 0)
+          throw WorkError(body.name + ", " + map.name + ": tets inside out");
         text += fmt::format("| {} | {} | {} | {:.3f} | {:.2f} | {:.2f} | {} | {:.1f} s |\n", body.name, map.name,
                             cage.mesh.tet_count(), 100 * pose.rms, 100 * pose.farthest,
                             pose.energy / test::pose_energy(cage.mesh, mapped(cage.mesh.vertices)), pose.iterations,
