@@ -187,6 +187,7 @@ class ExampleReader {
   std::map<std::string, Mesh> meshes_;  // of the examples, by name
   std::vector<std::int32_t> rest_file_tets_;
   FileNumbers rest_numbers_;
+  std::vector<KnownPose> known_poses_;  // of the object's surface
   ExampleInput input_;
 };
 
@@ -259,8 +260,10 @@ bool ExampleReader::read_surface_pose(const ExampleConfig& example) {
     throw InputError({asset_.file.string(), "/examples, " + example.name,
                       "poses of the rest example, since one is marked rest", "a pose of the object's surface",
                       "leave the rest example out: the object at rest is it"});
-  const SurfacePose fitted = object_.surface->pose(*posed, "example " + example.name, cache_);
+  if (known_poses_.empty()) known_poses_.push_back(object_.surface->rest());
+  const SurfacePose fitted = object_.surface->pose(*posed, known_poses_, "example " + example.name, cache_);
   judge_miss(fitted, *posed, example);
+  known_poses_.push_back({*posed, fitted.positions});
   PoseInput pose{example.name, example.file(asset_.object_mesh), {}};
   // The cage is kept whole, so its vertices are the file's.
   pose.mesh = {fitted.positions, object_.mesh.tets};

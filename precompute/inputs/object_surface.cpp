@@ -93,10 +93,12 @@ std::optional<VertexArray> ObjectSurface::posed(const ExampleConfig& example, In
   return example.morph ? morph_target(other, *example.morph, *example.surface) : other.mesh.vertices;
 }
 
-SurfacePose ObjectSurface::pose(const VertexArray& posed, const std::string& name, StageCache& cache) const {
+SurfacePose ObjectSurface::pose(const VertexArray& posed, std::span<const KnownPose> known, const std::string& name,
+                                StageCache& cache) const {
+  const VertexArray near = nearest_cage(known, posed);
   return cache.get(
-      "pose of surface", [&] { return pose_by_surface(cage_.mesh, file_.mesh, embedding_, posed, name); },
-      cage_.mesh.vertices, cage_.mesh.tets, file_.mesh.vertices, file_.mesh.triangles, posed);
+      "pose of surface", [&] { return pose_by_surface(cage_.mesh, file_.mesh, embedding_, posed, near, name); },
+      cage_.mesh.vertices, cage_.mesh.tets, file_.mesh.vertices, file_.mesh.triangles, posed, near);
 }
 
 TetMesh cage_of(const SurfaceMesh& surface, const AssetConfig& asset, const std::string& name, StageCache& cache) {

@@ -41,8 +41,12 @@ class ObjectSurface {
   /// The surface's vertices in the pose that an example names, or nothing where that has other vertices.
   std::optional<VertexArray> posed(const ExampleConfig& example, InputFiles& files) const;
 
-  /// The cage in a pose of its surface.
-  SurfacePose pose(const VertexArray& posed, const std::string& name, StageCache& cache) const;
+  /// The surface and its cage at rest.
+  KnownPose rest() const { return {file_.mesh.vertices, cage_.mesh.vertices}; }
+
+  /// The cage in a pose of its surface; `known` are others, that at rest among them.
+  SurfacePose pose(const VertexArray& posed, std::span<const KnownPose> known, const std::string& name,
+                   StageCache& cache) const;
 
  private:
   IdSelection ids_of(const VertexSelection& selection, const VertexArray& points) const;

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -25,6 +26,10 @@ namespace {
 constexpr double kAlpha = 1, kOffset = 0.2;
 // Trials: to find the cell size of a number of tets; to get all of the surface inside and no flat tet.
 constexpr int kSizeTrials = 6, kShapeTrials = 8;
+// Cages that are made where the first has too many or too few tets.
+constexpr int kCountRounds = 4;
+// Tets grow as this power of the size, between those of a sheet and of a solid.
+constexpr double kUsualPower = 2.5;
 // Factor by which the cage stands off more at each trial.
 constexpr double kFartherOff = 1.3;
 // Rounds of drawing the cage out over vertices that stick out of it, and how much farther than they stick out.
@@ -100,6 +105,24 @@ std::pair<double, double> dihedral_angles(const TetMesh& mesh) {
   return {least * 180 / std::numbers::pi, largest * 180 / std::numbers::pi};
 }
 
+// All triangles hang together by vertices, or by places where several lie.
+bool is_connected(const SurfaceMesh& surface) {
+  TriangleArray triangles = surface.triangles;
+  weld(surface.vertices, triangles);
+  std::vector<std::int32_t> parents(static_cast<std::size_t>(surface.vertices.rows()));
+  std::iota(parents.begin(), parents.end(), 0);
+  const auto root = [&](std::int32_t vertex) {
+    while (parents[static_cast<std::size_t>(vertex)] != vertex)
+      vertex = parents[static_cast<std::size_t>(vertex)] =
+          parents[static_cast<std::size_t>(parents[static_cast<std::size_t>(vertex)])];
+    return vertex;
+  };
+  for (const auto& corners : triangles.rowwise())
+    for (const int corner : {1, 2}) parents[static_cast<std::size_t>(root(corners[corner]))] = root(corners[0]);
+  const std::int32_t first = root(triangles(0, 0));
+  return std::ranges::all_of(triangles.rowwise(), [&](const auto& corners) { return root(corners[0]) == first; });
+}
+
 // Every edge has a triangle on either side.
 bool is_closed(const TriangleArray& triangles) {
   std::map<std::pair<std::int32_t, std::int32_t>, int> balance;
@@ -113,17 +136,23 @@ bool is_closed(const TriangleArray& triangles) {
 
 class CageMaker {
  public:
-  CageMaker(const UnitSurface& surface, const std::string& name) : surface_(surface), name_(name) {}
+  CageMaker(const UnitSurface& surface, const std::string& name)
+      : surface_(surface), name_(name), connected_(is_connected(surface.mesh)) {}
 
-  double size_for(int cells);
-  TetMesh shape(double size);
+  /// About so many tets; `size` becomes that of their cells.
+  TetMesh of_count(int cells, double& size) const;
+  /// `offset`: what the first trial has; becomes that of the cage, over the size.
+  TetMesh shape(double size, double& offset) const;
 
  private:
+  double size_for(int cells) const;
   TetMesh tets(double size, double offset, unsigned seed, bool improve) const;
   bool draw_out(TetMesh& mesh) const;
+  std::string fault_of(TetMesh& mesh) const;
 
   const UnitSurface& surface_;
   const std::string& name_;
+  bool connected_;
 };
 
 TetMesh CageMaker::tets(double size, double offset, unsigned seed, bool improve) const {
@@ -142,9 +171,9 @@ double tried_size(double size) { return std::round(std::clamp(size, kSmallestSiz
 
 // The number of tets grows as a power of the cell size between 2 (sheets) and 3 (solids), and more where fine cells
 // reach what coarse ones bridge: a secant in logarithms.
-double CageMaker::size_for(int cells) {
+double CageMaker::size_for(int cells) const {
   double size = tried_size(std::cbrt(0.5 / cells));
-  double best = size, best_miss = INFINITY, power = 2.5;
+  double best = size, best_miss = INFINITY, power = kUsualPower;
   double last_size = 0, last_count = 0;
   for (int trial = 0; trial < kSizeTrials; ++trial) {
     const auto count = static_cast<double>(tets(size, kOffset, 0, false).tet_count());
@@ -183,20 +212,45 @@ bool CageMaker::draw_out(TetMesh& mesh) const {
   return false;
 }
 
-TetMesh CageMaker::shape(double size) {
-  double offset = kOffset;
+// What keeps the mesh from being a cage, if anything does; draws it out over the surface.
+std::string CageMaker::fault_of(TetMesh& mesh) const {
+  if (!draw_out(mesh)) return "vertices of the surface outside";
+  const double angle = tet_volumes(mesh).minCoeff() > 0 ? dihedral_angles(mesh).first : 0;
+  if (angle < kLeastDihedralAngle) return fmt::format("a dihedral angle of {:.1f} degrees", angle);
+  TetMesh copy = mesh;
+  if (connected_ && check_mesh(copy, name_, {.drop_smaller_components = true}).dropped_components > 0)
+    return "several components";
+  return "";
+}
+
+TetMesh CageMaker::shape(double size, double& offset) const {
   std::string why;
   for (int trial = 0; trial < kShapeTrials; ++trial) {
     TetMesh mesh = tets(size, offset, static_cast<unsigned>(trial), true);
-    const bool encloses = draw_out(mesh);
-    const double angle = tet_volumes(mesh).minCoeff() > 0 ? dihedral_angles(mesh).first : 0;
-    if (encloses && angle >= kLeastDihedralAngle) return mesh;
-    why = encloses ? fmt::format("a dihedral angle of {:.1f} degrees", angle) : "vertices of the surface outside";
+    why = fault_of(mesh);
+    if (why.empty()) return mesh;
     offset *= kFartherOff;
     log::debug(fmt::format("{}: cage {} has {}; another trial", name_, trial + 1, why));
   }
   throw WorkError(
       fmt::format("{}: no cage without {} in {} trials; ask for another number of cells", name_, why, kShapeTrials));
+}
+
+// A cage that has to stand farther off the surface than the trials of size_for() has fewer tets than these.
+TetMesh CageMaker::of_count(int cells, double& size) const {
+  TetMesh best;
+  double best_miss = INFINITY, tried = size_for(cells), offset = kOffset;
+  for (int round = 0; round < kCountRounds && best_miss > kCountTolerance; ++round) {
+    TetMesh mesh = shape(tried, offset);
+    const double miss = std::log(static_cast<double>(mesh.tet_count()) / cells);
+    if (std::abs(miss) < best_miss) {
+      best = std::move(mesh);
+      best_miss = std::abs(miss);
+      size = tried;
+    }
+    tried = tried_size(tried * std::exp(miss / kUsualPower));
+  }
+  return best;
 }
 
 void require_mesher(const std::string& name) {
@@ -235,11 +289,11 @@ Cage make_cage(const SurfaceMesh& surface, const CageSettings& settings, const s
   require_mesher(name);
   const UnitSurface unit = unit_surface(surface, name);
   require_settings(settings, unit.diagonal, name);
-  CageMaker maker(unit, name);
-  const double size =
-      settings.cell_size ? *settings.cell_size / unit.diagonal : maker.size_for(settings.cells.value_or(kDefaultCells));
+  const CageMaker maker(unit, name);
+  double size = settings.cell_size.value_or(0) / unit.diagonal, offset = kOffset;
   Cage cage;
-  cage.mesh = maker.shape(size);
+  cage.mesh =
+      settings.cell_size ? maker.shape(size, offset) : maker.of_count(settings.cells.value_or(kDefaultCells), size);
   cage.farthest = 0;
   const SurfaceTree tree(unit.mesh.vertices, unit.mesh.triangles);
   const TriangleArray outer = surface_triangles(cage.mesh.tets);

@@ -1,5 +1,6 @@
 #include "precompute/posing/surface_pose.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <fmt/format.h>
@@ -30,6 +31,8 @@ constexpr double kGuard = 1;
 // A stage that brings the surface less than this share nearer is the last, and so is one that brings it so near (RMS
 // over the diagonal): a tenth of what is asked of a pose.
 constexpr double kGain = 0.3, kNear = 1e-4;
+// A pose that is missed by more (RMS over the diagonal) is sought from rest, too.
+constexpr double kMissed = 5e-3;
 // Newton's method ends where an iteration lowers the energy by less than this share of it, between stages and at last.
 constexpr double kBetween = 1e-3, kLast = 1e-8;
 constexpr int kMostIterations = 100;
@@ -132,7 +135,8 @@ void PoseSolver::minimise(VertexArray& x, double stiffness, double end) {
     ++iterations_;
     if (!(there < here)) return;
     x = trial;
-    if (here - there <= std::max(end, rounding) * here) return;
+    // What the guard shortens says little; the whole step would gain half the slope.
+    if (std::max(here - there, length < 1 ? -slope / 2 : 0) <= std::max(end, rounding) * here) return;
     tangent =
         length == 1 && here - there < 0.05 * here ? runtime::Tangent::kExact : runtime::Tangent::kPositiveSemidefinite;
   }
@@ -165,15 +169,39 @@ std::optional<SurfacePose> PoseSolver::solve(VertexArray x, double first) {
 
 }  // namespace
 
+VertexArray nearest_cage(std::span<const KnownPose> known, const VertexArray& posed) {
+  double least = INFINITY;
+  VertexArray nearest;
+  for (const KnownPose& own : known) {
+    const Eigen::Matrix4d motion = Eigen::umeyama(own.surface.transpose(), posed.transpose(), false);
+    const auto moved = [&](const VertexArray& points) -> VertexArray {
+      return (points * motion.topLeftCorner<3, 3>().transpose()).rowwise() + motion.topRightCorner<3, 1>().transpose();
+    };
+    const double gap = (moved(own.surface) - posed).squaredNorm();
+    if (!(gap < least)) continue;
+    least = gap;
+    nearest = moved(own.cage);
+  }
+  return nearest;
+}
+
 SurfacePose pose_by_surface(const TetMesh& cage, const SurfaceMesh& surface, const Embedding& embedding,
-                            const VertexArray& posed, const std::string& name) {
+                            const VertexArray& posed, const VertexArray& near, const std::string& name) {
   if (!posed.allFinite())
     throw InputError({name, "vertices", "finite numbers", "NaN or infinity", "export the pose again"});
   const UnitBody body = unit_body(cage, surface);
-  const VertexArray places = (posed.rowwise() - body.centre) / body.diagonal;
+  const auto at_unit = [&](const VertexArray& points) -> VertexArray {
+    return (points.rowwise() - body.centre) / body.diagonal;
+  };
+  const VertexArray places = at_unit(posed);
   PoseSolver solver(body, embedding, places);
   std::optional<SurfacePose> found = solver.solve(rigid_start(body.cage, body.surface, places), kFirstStiffness);
-  if (!found) found = solver.solve(body.cage.vertices, kFirstFromRest);
+  if (!found) {
+    found = solver.solve(at_unit(near), kFirstStiffness);
+    std::optional<SurfacePose> other;
+    if (!found || found->rms > kMissed) other = solver.solve(body.cage.vertices, kFirstFromRest);
+    if (!found || (other && other->rms < found->rms)) found = std::move(other);
+  }
   SurfacePose& pose = *found;
   pose.iterations = solver.iterations();
   pose.positions = (pose.positions * body.diagonal).rowwise() + body.centre;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 
 #include "common/mesh/tet_mesh.h"
@@ -26,6 +27,15 @@ void pass_members(Archive& archive, SurfacePose& pose) {
   pass_all(archive, pose.positions, pose.rms, pose.farthest, pose.energy, pose.stiffness, pose.iterations, pose.worst);
 }
 
+/// Where the vertices of a surface and of its cage are in a pose that was found [m].
+struct KnownPose {
+  VertexArray surface, cage;
+};
+
+/// The cage of that known pose, of one at least, whose surface is nearest to `posed`, moved onto it rigidly: frames of
+/// an animation are near each other.
+VertexArray nearest_cage(std::span<const KnownPose> known, const VertexArray& posed);
+
 /// Poisson ratio of the material that fills a pose: poses may change volume, so a low one.
 constexpr double kPosePoisson = 0.3;
 
@@ -33,10 +43,11 @@ constexpr double kPosePoisson = 0.3;
 /// springs, per area of the surface at rest, from each of its vertices to its place in the pose. Springs become stiffer
 /// until that brings the surface no nearer, which is what the cage cannot hold. No tet is turned inside out:
 /// VolumeGuard is a third energy. It begins where each vertex of the cage goes with the rigid motion of the surface
-/// about it (moving least squares, Schaefer et al. 2006), and where that leaves tets inside out from rest, by soft
-/// springs first. `surface` at rest lies in the cage by `embedding`; `posed` [v x 3] are its vertices in the pose.
-/// `name` is for messages. Throws InputError where the pose has no finite positions.
+/// about it (moving least squares, Schaefer et al. 2006). Where that leaves tets inside out it begins at `near` [n x
+/// 3], a pose of the cage without such tets, and where that misses the surface from rest, by springs that are soft
+/// first. `surface` at rest lies in the cage by `embedding`; `posed` [v x 3] are its vertices in the pose. `name` is
+/// for messages. Throws InputError where the pose has no finite positions.
 SurfacePose pose_by_surface(const TetMesh& cage, const SurfaceMesh& surface, const Embedding& embedding,
-                            const VertexArray& posed, const std::string& name);
+                            const VertexArray& posed, const VertexArray& near, const std::string& name);
 
 }  // namespace exmat::precompute

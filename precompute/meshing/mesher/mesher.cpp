@@ -9,9 +9,12 @@
 #include <CGAL/alpha_wrap_3.h>
 #include <CGAL/make_mesh_3.h>
 #include <CGAL/version.h>
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <exception>
+#include <set>
 #include <unordered_map>
 #include <vector>
 
@@ -21,7 +24,71 @@ namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Wrap = CGAL::Surface_mesh<Kernel::Point_3>;
-using Domain = CGAL::Polyhedral_mesh_domain_3<Wrap, Kernel>;
+using SurfaceDomain = CGAL::Polyhedral_mesh_domain_3<Wrap, Kernel>;
+
+// Cells of a grid that points are in.
+class Cells {
+ public:
+  explicit Cells(double size) : size_(size) {}
+
+  /// True if none was there.
+  bool add(double x, double y, double z) { return cells_.insert(cell_of(x, y, z)).second; }
+  /// True if one is there or beside it: no farther than two sizes, and all that are no farther than one.
+  bool has_near(double x, double y, double z) const {
+    const auto [a, b, c] = cell_of(x, y, z);
+    for (std::int64_t i = a - 1; i <= a + 1; ++i)
+      for (std::int64_t j = b - 1; j <= b + 1; ++j)
+        for (std::int64_t k = c - 1; k <= c + 1; ++k)
+          if (cells_.count({i, j, k}) > 0) return true;
+    return false;
+  }
+
+ private:
+  std::array<std::int64_t, 3> cell_of(double x, double y, double z) const {
+    const auto index = [&](double place) { return static_cast<std::int64_t>(std::floor(place / size_)); };
+    return {index(x), index(y), index(z)};
+  }
+
+  double size_;
+  std::set<std::array<std::int64_t, 3>> cells_;
+};
+
+// What the wrap encloses. Mesh_3 begins with points where random rays from the middle meet the surface, and may so miss
+// what is thin and far from there. This domain may begin with a vertex of the wrap in each cell of a grid.
+class Domain : public SurfaceDomain {
+ public:
+  /// `grid`: the size of its cells; 0 begins as Mesh_3 does.
+  Domain(const Wrap& wrap, double grid, CGAL::Random& random)
+      : SurfaceDomain(wrap, &random), wrap_(wrap), grid_(grid) {}
+
+  // NOLINTBEGIN(readability-identifier-naming): the names of CGAL's concept MeshDomain_3
+  struct Construct_initial_points {
+    const Domain& domain;
+    template <typename Output>
+    Output operator()(Output points, int count = 8) const {
+      return domain.add_initial_points(points, count);
+    }
+  };
+  Construct_initial_points construct_initial_points_object() const { return {*this}; }
+  // NOLINTEND(readability-identifier-naming)
+
+ private:
+  template <typename Output>
+  Output add_initial_points(Output points, int count) const {
+    if (grid_ == 0) return SurfaceDomain::construct_initial_points_object()(points, count);
+    Cells taken(grid_);
+    for (const auto vertex : wrap_.vertices()) {
+      const Kernel::Point_3& at = wrap_.point(vertex);
+      if (taken.add(at.x(), at.y(), at.z()))
+        *points++ = std::pair(at, index_from_surface_patch_index(make_surface_index()));
+    }
+    return points;
+  }
+
+  const Wrap& wrap_;
+  double grid_;
+};
+
 using Triangulation = CGAL::Mesh_triangulation_3<Domain, CGAL::Default, CGAL::Sequential_tag>::type;
 using Complex = CGAL::Mesh_complex_3_in_triangulation_3<Triangulation>;
 using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
@@ -36,6 +103,8 @@ constexpr double kFacetAngle = 25;
 constexpr double kRadiusEdgeRatio = 2;
 // Dihedral angles that perturbing and exuding seek [degree].
 constexpr double kSliverBound = 14;
+// How near tets are to the surface that they fill, over the cell size, and some more.
+constexpr double kCovered = 1.25;
 
 Wrap wrap_of(const MesherRequest& request) {
   std::vector<Kernel::Point_3> points;
@@ -76,12 +145,21 @@ exmat::TetMesh tets_of(const Complex& complex) {
   return mesh;
 }
 
-exmat::TetMesh make_tets(const MesherRequest& request) {
+// A facet's circumscribed circle is no larger than a cell, so that a vertex of the tets is near each of the wrap.
+bool covers(const exmat::TetMesh& mesh, const Wrap& wrap, double cell_size) {
+  Cells cells(kCovered * cell_size);
+  for (const auto& vertex : mesh.vertices.rowwise()) cells.add(vertex[0], vertex[1], vertex[2]);
+  return std::ranges::all_of(wrap.vertices(), [&](const auto vertex) {
+    const Kernel::Point_3& at = wrap.point(vertex);
+    return cells.has_near(at.x(), at.y(), at.z());
+  });
+}
+
+exmat::TetMesh fill(const Wrap& wrap, const MesherRequest& request, double grid) {
   namespace params = CGAL::parameters;
   CGAL::Random random(request.seed);
   CGAL::get_default_random() = CGAL::Random(request.seed);
-  const Wrap wrap = wrap_of(request);
-  const Domain domain(wrap, &random);
+  const Domain domain(wrap, grid, random);
   const Criteria criteria(params::facet_angle = kFacetAngle, params::facet_size = request.cell_size,
                           params::facet_distance = kSurfaceDistance * request.offset,
                           params::cell_radius_edge_ratio = kRadiusEdgeRatio, params::cell_size = request.cell_size);
@@ -95,10 +173,17 @@ exmat::TetMesh make_tets(const MesherRequest& request) {
   return tets_of(complex);
 }
 
+exmat::TetMesh make_tets(const MesherRequest& request) {
+  const Wrap wrap = wrap_of(request);
+  exmat::TetMesh mesh = fill(wrap, request, 0);
+  return covers(mesh, wrap, request.cell_size) ? mesh : fill(wrap, request, request.cell_size);
+}
+
 }  // namespace
 
 extern "C" __attribute__((visibility("default"))) void exmat_make_tets(const MesherRequest& request,
                                                                        exmat::TetMesh& mesh, std::string& failure) {
+  CGAL::set_warning_handler([](const char*, const char*, const char*, int, const char*) {});
   try {
     mesh = make_tets(request);
   } catch (const std::exception& error) {

@@ -98,8 +98,8 @@ std::string poses_table(const std::vector<Body>& bodies) {
       for (const Map& map : kMaps) {
         const auto mapped = [&](const VertexArray& points) { return map.of(points, length, body.axis, body.towards); };
         const Timer timer;
-        const auto pose =
-            precompute::pose_by_surface(cage.mesh, body.surface, embedding, mapped(body.surface.vertices), map.name);
+        const auto pose = precompute::pose_by_surface(cage.mesh, body.surface, embedding, mapped(body.surface.vertices),
+                                                      cage.mesh.vertices, map.name);
         const double seconds = timer.seconds();
         if (tet_volumes({pose.positions, cage.mesh.tets}).minCoeff() <= 0)
           throw WorkError(body.name + ", " + map.name + ": tets inside out");

@@ -65,6 +65,9 @@ void expect_cage(const Cage& cage, const SurfaceMesh& surface) {
   EXPECT_NEAR(cage.least_angle, angle, 1e-6);
 }
 
+// Cells of what is thinner than they are: how far the cage stands off, and so their number, goes in steps.
+constexpr double kCountOfThin = 0.2;
+
 TEST(Cage, EnclosesABall) {
   const SurfaceMesh ball = ball_surface(8, 0.5);
   const Cage cage = make_cage(ball, {400, {}}, "ball");
@@ -141,6 +144,20 @@ TEST(Cage, EnclosesASheetThinnerThanACell) {
   const SurfaceMesh sheet = box_surface({12, 8, 1}, {1, 0.7, 0.001});
   const Cage cage = make_cage(sheet, {1500, {}}, "sheet");
   expect_cage(cage, sheet);
+  EXPECT_NEAR(static_cast<double>(cage.mesh.tet_count()), 1500, kCountOfThin * 1500);
+}
+
+// Two ends that a rod of a hundredth of their thickness joins: rays from the middle meet the rod alone or an end, and a
+// cage that follows the rod closely falls apart.
+TEST(Cage, OfWhatHangsTogetherIsOneBody) {
+  SurfaceMesh surface = box_surface({32, 4, 4}, {4, 1, 1});
+  for (auto point : surface.vertices.rowwise()) {
+    const double thickness = point[0] < 1 || point[0] > 3 ? 1 : 0.01;
+    for (int axis : {1, 2}) point[axis] = thickness * (point[axis] - 0.5);
+  }
+  const Cage cage = make_cage(surface, {300, {}}, "dumbbell");
+  expect_cage(cage, surface);
+  EXPECT_NEAR(static_cast<double>(cage.mesh.tet_count()), 300, kCountOfThin * 300);
 }
 
 TEST(Cage, IgnoresTrianglesWithoutAreaAndVerticesWithoutTriangles) {

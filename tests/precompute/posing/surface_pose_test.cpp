@@ -30,7 +30,9 @@ struct SurfacePoseTest : testing::Test {
   }();
   Embedding embedding = embed_points(cage, surface.vertices, "bar");
 
-  SurfacePose pose(const VertexArray& posed) const { return pose_by_surface(cage, surface, embedding, posed, "pose"); }
+  SurfacePose pose(const VertexArray& posed) const {
+    return pose_by_surface(cage, surface, embedding, posed, cage.vertices, "pose");
+  }
 };
 
 VertexArray twisted(VertexArray x, double angle) {
@@ -99,6 +101,20 @@ TEST_F(SurfacePoseTest, SquashesArriveInside) {
   }
 }
 
+TEST_F(SurfacePoseTest, TheNearestKnownPoseIsMovedOntoTheNextOne) {
+  const Eigen::Matrix3d rotation = Eigen::AngleAxisd(2, Eigen::Vector3d(1, -1, 2).normalized()).toRotationMatrix();
+  const auto move = [&](const VertexArray& points) -> VertexArray {
+    return (points * rotation.transpose()).rowwise() + Eigen::RowVector3d(3, 1, -2);
+  };
+  std::vector<KnownPose> known;
+  for (const double angle : {1e-6, 1.0, 2.0, 3.0})
+    known.push_back({bent(surface.vertices, angle), bent(cage.vertices, angle)});
+  const VertexArray posed = move(bent(surface.vertices, 2));
+  EXPECT_LT((nearest_cage(known, posed) - move(known[2].cage)).norm(), 1e-12 * posed.norm());
+  EXPECT_LT((nearest_cage(known, move(bent(surface.vertices, 2.2))) - move(bent(cage.vertices, 2.2))).norm(),
+            (move(known[2].cage) - move(bent(cage.vertices, 2.2))).norm());
+}
+
 class LargePose : public SurfacePoseTest, public testing::WithParamInterface<int> {};
 TEST_P(LargePose, Arrives) {
   const std::array<VertexArray, 4> poses = {
@@ -136,7 +152,7 @@ TEST(BridgedPose, ArrivesWithoutTetsInsideOut) {
     point[2] += 0.2 * point[0];
   }
   const Embedding embedding = embed_points(cage, legs.vertices, "legs");
-  const SurfacePose found = pose_by_surface(cage, legs, embedding, posed, "closed");
+  const SurfacePose found = pose_by_surface(cage, legs, embedding, posed, cage.vertices, "closed");
   EXPECT_GT(tet_volumes({found.positions, cage.tets}).minCoeff(), 0);
   EXPECT_LT(found.rms, 0.002);
 }
