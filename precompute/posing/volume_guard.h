@@ -16,8 +16,8 @@ class VolumeGuard {
 
   /// At positions x [n x 3].
   double energy(const VertexArray& x) const;
-  /// `strength` times its derivative and, of its second derivative, what is positive semidefinite: that along the
-  /// derivative of J. Returns `strength` times the energy.
+  /// Adds `strength` times its derivative and its second derivative, of each tet the nearest positive semidefinite one.
+  /// Returns `strength` times the energy.
   double add(const VertexArray& x, double strength, Eigen::VectorXd& gradient, LowerTriangle& hessian) const;
 
  private:
